@@ -1,0 +1,63 @@
+//! What consumers see of any visibility map: "what is at this point?"
+//!
+//! Evaluation, queries, pictures and fusion ask through [`VisibilityMap`] and never see the grid
+//! behind it, so polar radar maps, Cartesian maps and camera maps serve alike.
+
+/// A point on the road plane, in the road frame.
+///
+/// # Units
+/// Centimetres, x along the road, y to the left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RoadPoint {
+    pub x_cm: i32,
+    pub y_cm: i32,
+}
+
+impl RoadPoint {
+    pub const fn new(x_cm: i32, y_cm: i32) -> Self {
+        Self { x_cm, y_cm }
+    }
+
+    /// Centre of the 1 m cell (i, j) = [i, i+1) x [j, j+1) metres.
+    pub const fn cell_centre(i: i32, j: i32) -> Self {
+        Self { x_cm: i.saturating_mul(100).saturating_add(50), y_cm: j.saturating_mul(100).saturating_add(50) }
+    }
+}
+
+/// Whether the sensor can see a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Visibility {
+    /// Nobody has current evidence. To be treated as not visible.
+    Unknown,
+    /// Something stands in the line of sight.
+    Invisible,
+    /// Some line of sight reaches the place.
+    Visible,
+}
+
+/// What a map knows of one place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CellState {
+    pub visibility: Visibility,
+    /// Graded visibility, 0 (blocked) to 255 (clear); 0 where unknown.
+    pub grade: u8,
+    /// Occupancy at the slice height, 0 (free) to 255 (occupied); 0 where unknown.
+    pub occupancy: u8,
+    /// Whether the map's occupancy threshold is reached.
+    pub occupied: bool,
+}
+
+impl CellState {
+    /// A place nobody has current evidence for.
+    pub const UNKNOWN: Self = Self { visibility: Visibility::Unknown, grade: 0, occupancy: 0, occupied: false };
+
+    pub const fn visible(&self) -> bool {
+        matches!(self.visibility, Visibility::Visible)
+    }
+}
+
+/// A map of what one sensor, or several, can see.
+pub trait VisibilityMap {
+    /// What is known of a point of the road plane.
+    fn at(&self, point: RoadPoint) -> CellState;
+}

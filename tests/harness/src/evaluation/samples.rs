@@ -1,0 +1,222 @@
+//! Which objects count at which frame, and whether the sensor detected them.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::Options;
+use crate::geometry::polygon::Convex;
+use crate::geometry::pose::{SensorPose, direction};
+use crate::geometry::sight::{box_in_sight, footprint_in_sight, shadow};
+use crate::geometry::solid::Solid;
+use crate::recording::{RadarDetection, Recording};
+use crate::truth::Object;
+
+/// A 1 m cell (i, j) = [i, i+1) x [j, j+1) metres of the road frame.
+pub type Cell = (i32, i32);
+
+/// One object at one counted frame.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// Index into the truth's tracks.
+    pub track: usize,
+    /// Ground distance from the sensor to the box centre, metres.
+    pub distance_m: f64,
+    /// Detections associated with it.
+    pub detections: u32,
+    /// D_O: enough detections.
+    pub detected: bool,
+    /// Some point of its footprint at slice height is in sight (`geometry-slice`).
+    pub slice_in_sight: bool,
+    /// Some point of its box is in sight (`geometry-box`).
+    pub box_in_sight: bool,
+    pub cells: Vec<Cell>,
+    pub solid: Solid,
+}
+
+/// One radar frame as the evaluation sees it.
+#[derive(Debug, Clone, Default)]
+pub struct FrameSamples {
+    pub counted: bool,
+    pub objects: Vec<Sample>,
+    /// Road cells without an object, and whether their centre is in sight.
+    pub cells: Vec<(Cell, bool)>,
+}
+
+/// Samples of every frame of a labelled recording.
+///
+/// `progress` is told each frame done.
+pub fn collect(recording: &Recording, options: &Options, progress: &(dyn Fn() + Sync)) -> Vec<FrameSamples> {
+    let Some(truth) = &recording.truth else {
+        return recording.frames.iter().map(|_| FrameSamples::default()).collect();
+    };
+    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+    let warm_up = if recording.sensor.frames_independent { 0.0 } else { options.warm_up_s };
+    let road = if recording.sensor.frames_independent { Vec::new() } else { road_cells(recording, options) };
+    recording
+        .frames
+        .par_iter()
+        .map(|frame| {
+            progress();
+            let counted = (frame.time_ns - start) as f64 * 1e-9 >= warm_up;
+            if !counted {
+                return FrameSamples::default();
+            }
+            frame_samples(recording, &truth.at(frame.time_ns), &frame.detections, &road, options)
+        })
+        .collect()
+}
+
+fn frame_samples(
+    recording: &Recording,
+    objects: &[Object],
+    detections: &[RadarDetection],
+    road: &[Cell],
+    options: &Options,
+) -> FrameSamples {
+    let pose = &recording.pose;
+    let sensor = pose.position;
+    let height = options.slice_height_m;
+    let associated = associate(recording, objects, detections, options);
+    let shadows: Vec<Option<Convex>> = objects.iter().map(|o| shadow(sensor, &o.solid, height)).collect();
+    let mut samples = Vec::new();
+    for (k, object) in objects.iter().enumerate() {
+        let [x, y, _] = object.solid.center;
+        let slow = object.speed().is_some_and(|v| v < options.min_speed_mps);
+        if slow || !recording.sensor.field_of_view.contains(pose.to_spherical([x, y, height])) {
+            continue;
+        }
+        let others = || (0..objects.len()).filter(|&i| i != k);
+        samples.push(Sample {
+            track: object.track,
+            distance_m: (x - sensor[0]).hypot(y - sensor[1]),
+            detections: associated[k],
+            detected: associated[k] >= options.min_detections,
+            slice_in_sight: footprint_in_sight(&object.solid, others().filter_map(|i| shadows[i].as_ref())),
+            box_in_sight: box_in_sight(sensor, &object.solid, others().map(|i| &objects[i].solid)),
+            cells: object.solid.cells().collect(),
+            solid: object.solid,
+        });
+    }
+    let taken: BTreeSet<Cell> = objects.iter().flat_map(|o| o.solid.cells()).collect();
+    let cells = road
+        .iter()
+        .filter(|c| !taken.contains(c))
+        .map(|&(i, j)| {
+            let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5];
+            ((i, j), !shadows.iter().flatten().any(|s| s.contains(centre)))
+        })
+        .collect();
+    FrameSamples { counted: true, objects: samples, cells }
+}
+
+/// Cells inside the field of view that some footprint overlaps at some frame of the recording.
+fn road_cells(recording: &Recording, options: &Options) -> Vec<Cell> {
+    let Some(truth) = &recording.truth else { return Vec::new() };
+    let visited: BTreeSet<Cell> = recording
+        .frames
+        .par_iter()
+        .fold(BTreeSet::new, |mut set, frame| {
+            for object in truth.at(frame.time_ns) {
+                set.extend(object.solid.cells());
+            }
+            set
+        })
+        .reduce(BTreeSet::new, |mut a, b| {
+            a.extend(b);
+            a
+        });
+    visited.into_iter().filter(|&(i, j)| cell_in_view(recording, (i, j), options.slice_height_m)).collect()
+}
+
+/// Whether a cell's own centre, at slice height, lies in the static field of view.
+pub fn cell_in_view(recording: &Recording, (i, j): Cell, height_m: f64) -> bool {
+    let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5, height_m];
+    recording.sensor.field_of_view.contains(recording.pose.to_spherical(centre))
+}
+
+/// How many detections belong to each object. A detection belongs to at most one.
+pub fn associate(
+    recording: &Recording,
+    objects: &[Object],
+    detections: &[RadarDetection],
+    options: &Options,
+) -> Vec<u32> {
+    let mut counts = vec![0; objects.len()];
+    for d in detections {
+        if let Some(k) = owner(recording, objects, d, options) {
+            counts[k] += 1;
+        }
+    }
+    counts
+}
+
+/// The object a detection belongs to: nearest ungrown footprint among those whose grown footprint
+/// holds it and whose motion explains its Doppler; ties by centre.
+pub fn owner(
+    recording: &Recording,
+    objects: &[Object],
+    detection: &RadarDetection,
+    options: &Options,
+) -> Option<usize> {
+    let pose = &recording.pose;
+    let p = detection.road_position(pose, options.slice_height_m);
+    let grown = !recording.sensor.frames_independent;
+    let judge_doppler = grown && !recording.sensor.platform_moving;
+    let line = line_of_sight(pose, p);
+    let mut best: Option<(f64, f64, usize)> = None;
+    for (k, object) in objects.iter().enumerate() {
+        let inside = if grown {
+            in_grown_footprint(&object.solid, pose, p, options)
+        } else {
+            object.solid.footprint_distance([p[0], p[1]]) <= 0.0
+        };
+        if !inside {
+            continue;
+        }
+        if judge_doppler && let Some([vx, vy]) = object.velocity {
+            let expected = vx * line[0] + vy * line[1];
+            if (f64::from(detection.radial_velocity_mps) - expected).abs() > options.doppler_tolerance_mps {
+                continue;
+            }
+        }
+        let to_footprint = object.solid.footprint_distance([p[0], p[1]]);
+        let to_centre = (p[0] - object.solid.center[0]).hypot(p[1] - object.solid.center[1]);
+        if best.is_none_or(|(f, c, _)| (to_footprint, to_centre) < (f, c)) {
+            best = Some((to_footprint, to_centre, k));
+        }
+    }
+    best.map(|(_, _, k)| k)
+}
+
+/// Unit vector from the sensor to a road point.
+fn line_of_sight(pose: &SensorPose, p: [f64; 3]) -> [f64; 3] {
+    let s = pose.to_spherical(p);
+    pose.rotate_to_road(direction(s.azimuth_rad, s.elevation_rad))
+}
+
+/// Whether the point, moved by up to the azimuth growth across its line of sight, meets the
+/// footprint grown on every side.
+fn in_grown_footprint(solid: &Solid, pose: &SensorPose, p: [f64; 3], options: &Options) -> bool {
+    let (dx, dy) = (p[0] - pose.position[0], p[1] - pose.position[1]);
+    let reach = options.growth_azimuth_deg.to_radians().tan();
+    // across the line of sight: the ground vector turned left, scaled by the tangent
+    let across = [-dy * reach, dx * reach];
+    let (l, w) = (solid.size[0] / 2.0 + options.growth_m, solid.size[1] / 2.0 + options.growth_m);
+    let a = solid.local([p[0] - across[0], p[1] - across[1]]);
+    let b = solid.local([p[0] + across[0], p[1] + across[1]]);
+    // Liang-Barsky: segment a-b against the rectangle |x| <= l, |y| <= w
+    let (mut t0, mut t1) = (0.0_f64, 1.0_f64);
+    for (start, delta, limit) in [(a[0], b[0] - a[0], l), (a[1], b[1] - a[1], w)] {
+        if delta.abs() < 1e-12 {
+            if start.abs() > limit {
+                return false;
+            }
+            continue;
+        }
+        let (u, v) = ((-limit - start) / delta, (limit - start) / delta);
+        t0 = t0.max(u.min(v));
+        t1 = t1.min(u.max(v));
+    }
+    t0 <= t1
+}

@@ -1,0 +1,3 @@
+//! The `viewshed` command.
+
+fn main() {}

@@ -1,0 +1,302 @@
+//! Recordings from MCAP files (profile `ros2`, CDR messages).
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail};
+use mcap::records::{MessageHeader, Record};
+
+use super::labels;
+use super::points::{self, NOT_A_RANGE, NOT_FINITE, Points};
+use super::problems::Problems;
+use super::ros::{self, Detection3DArray, PointCloud2, RadarScan, TfMessage};
+use super::transforms::Transforms;
+use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
+use crate::geometry::pose::SensorPose;
+use crate::geometry::solid::Solid;
+use crate::truth::{Label, Truth};
+
+pub const POINTS_TOPIC: &str = "/radar/points";
+pub const TRUTH_TOPIC: &str = "/ground_truth/objects";
+pub const ROAD_FRAME: &str = "road";
+pub const SENSOR_METADATA: &str = "viewshed.sensor";
+
+const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
+const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
+const DETECTIONS: &str = "vision_msgs/msg/Detection3DArray";
+const TF: &str = "tf2_msgs/msg/TFMessage";
+
+#[derive(Debug, Clone)]
+struct Topic {
+    name: String,
+    schema: String,
+    messages: u64,
+}
+
+#[derive(Default)]
+struct Reader {
+    radar_topic: Option<String>,
+    truth_topic: Option<String>,
+    schemas: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Topic>,
+    metadata: BTreeMap<String, String>,
+    transforms: Transforms,
+    radar_frame: Option<String>,
+    frames: Vec<Frame>,
+    labels: Vec<Label>,
+    labelled: bool,
+    problems: Problems,
+}
+
+/// Reads a recording with the files beside it: `NAME.labels.csv` (replaces the labels inside) and
+/// `NAME.occlusion.csv`.
+///
+/// # Errors
+/// A file that is no MCAP, and whatever makes an evaluation impossible: no radar frames, no mount,
+/// no field of view. The message names what was found and the option that mends it. Anything less
+/// is counted in [`Recording::problems`].
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut reader = Reader {
+        radar_topic: options.radar_topic.clone(),
+        truth_topic: options.truth_topic.clone(),
+        ..Default::default()
+    };
+    reader.records(&bytes)?;
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut recording = reader.finish(name, options)?;
+    let beside = |suffix: &str| path.with_file_name(format!("{}.{suffix}.csv", recording.name));
+    let (labels_csv, occlusion_csv) = (beside("labels"), beside("occlusion"));
+    if labels_csv.exists() {
+        let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
+        let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
+        recording.truth = Some(Truth::new(labels::read_labels(&labels_csv, start_ns, end_ns)?));
+    }
+    if occlusion_csv.exists() {
+        recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
+    }
+    restrict(&mut recording, options);
+    if recording.frames.is_empty() {
+        bail!("{}: no radar frame between --from and --to", path.display());
+    }
+    Ok(recording)
+}
+
+fn restrict(recording: &mut Recording, options: &ReadOptions) {
+    let Some(start) = recording.frames.first().map(|f| f.time_ns) else { return };
+    let since = |f: &Frame| (f.time_ns - start) as f64 * 1e-9;
+    recording
+        .frames
+        .retain(|f| options.from_s.is_none_or(|t| since(f) >= t) && options.to_s.is_none_or(|t| since(f) <= t));
+}
+
+impl Reader {
+    fn records(&mut self, bytes: &[u8]) -> Result<()> {
+        let options = mcap::read::Options::IgnoreEndMagic.into();
+        let records = mcap::read::ChunkFlattener::new_with_options(bytes, options)
+            .map_err(|e| anyhow!("not an MCAP file: {e}"))?;
+        let mut any = false;
+        let mut ended = false;
+        for record in records {
+            let record = match record {
+                Ok(r) => r,
+                Err(e) if !any => bail!("not an MCAP file: {e}"),
+                Err(e) => {
+                    let last = self.frames.last().map_or(0, |f| f.time_ns);
+                    self.problems.add("file", format!("damaged or cut off, read up to the break: {e}"), last);
+                    ended = true;
+                    break;
+                }
+            };
+            any = true;
+            match record {
+                Record::Schema { header, .. } => {
+                    self.schemas.insert(header.id, header.name);
+                }
+                Record::Channel(c) => {
+                    let schema = self.schemas.get(&c.schema_id).cloned().unwrap_or_else(|| "(no schema)".into());
+                    self.channels.entry(c.id).or_insert(Topic { name: c.topic, schema, messages: 0 });
+                }
+                Record::Message { header, data } => self.message(&header, &data),
+                Record::Metadata(m) if m.name == SENSOR_METADATA => self.metadata = m.metadata,
+                Record::DataEnd(_) => {
+                    ended = true;
+                }
+                _ => {}
+            }
+        }
+        if !any {
+            bail!("not an MCAP file: it holds no record");
+        }
+        if !ended {
+            let last = self.frames.last().map_or(0, |f| f.time_ns);
+            self.problems.add("file", "cut off before its end, read up to the break", last);
+        }
+        Ok(())
+    }
+
+    fn message(&mut self, header: &MessageHeader, data: &[u8]) {
+        let Some(topic) = self.channels.get_mut(&header.channel_id) else {
+            self.problems.add("file", "message on a channel never announced, skipped", header.log_time as i64);
+            return;
+        };
+        topic.messages += 1;
+        let Topic { name, schema, .. } = topic.clone();
+        let is_radar = self.radar_topic.as_deref().unwrap_or(POINTS_TOPIC) == name
+            || (self.radar_topic.is_none() && schema == RADAR_SCAN);
+        let is_truth = self.truth_topic.as_deref().unwrap_or(TRUTH_TOPIC) == name;
+        let outcome = match schema.as_str() {
+            POINT_CLOUD if is_radar => self.cloud(&name, header, data),
+            RADAR_SCAN if is_radar => self.scan(&name, header, data),
+            DETECTIONS if is_truth => self.objects(&name, data),
+            TF if name.ends_with("tf_static") => ros::decode::<TfMessage>(data).map(|m| self.transforms.add(m)),
+            _ if is_radar || is_truth => Err(format!("schema {schema} is none this reader knows")),
+            _ => Ok(()),
+        };
+        if let Err(what) = outcome {
+            self.problems.add(&name, format!("message skipped: {what}"), header.log_time as i64);
+        }
+    }
+
+    fn cloud(&mut self, topic: &str, header: &MessageHeader, data: &[u8]) -> Result<(), String> {
+        let cloud: PointCloud2 = ros::decode(data)?;
+        let points = points::from_cloud(&cloud)?;
+        self.frame(topic, &cloud.header, header, points);
+        Ok(())
+    }
+
+    fn scan(&mut self, topic: &str, header: &MessageHeader, data: &[u8]) -> Result<(), String> {
+        let scan: RadarScan = ros::decode(data)?;
+        let points = points::from_scan(&scan);
+        self.frame(topic, &scan.header, header, points);
+        Ok(())
+    }
+
+    fn frame(&mut self, topic: &str, header: &ros::Header, message: &MessageHeader, points: Points) {
+        let mut time_ns = header.stamp.nanoseconds();
+        if time_ns == 0 && message.log_time > 0 {
+            time_ns = message.log_time as i64;
+            self.problems.add(topic, "header without a stamp, log time taken", time_ns);
+        }
+        if let Some(last) = self.frames.last()
+            && time_ns <= last.time_ns
+        {
+            let what = if time_ns == last.time_ns { "time stands still" } else { "time runs backwards" };
+            self.problems.add(topic, what, time_ns);
+        }
+        self.problems.add_many(topic, NOT_FINITE, time_ns, points.not_finite);
+        self.problems.add_many(topic, NOT_A_RANGE, time_ns, points.not_a_range);
+        self.radar_frame.get_or_insert_with(|| header.frame_id.clone());
+        self.frames.push(Frame { time_ns, detections: points.detections });
+    }
+
+    fn objects(&mut self, topic: &str, data: &[u8]) -> Result<(), String> {
+        let array: Detection3DArray = ros::decode(data)?;
+        self.labelled = true;
+        let time_ns = array.header.stamp.nanoseconds();
+        for d in array.detections {
+            let (p, s, yaw_rad) = (d.center.position, d.size, d.center.orientation.yaw_rad());
+            if [p.x, p.y, p.z, s.x, s.y, s.z, yaw_rad].iter().any(|v| !v.is_finite()) {
+                self.problems.add(topic, "object with a value that is not finite, dropped", time_ns);
+            } else if s.x <= 0.0 || s.y <= 0.0 || s.z <= 0.0 {
+                self.problems.add(topic, "object without a size, dropped", time_ns);
+            } else {
+                self.labels.push(Label {
+                    time_ns,
+                    id: d.id,
+                    class: d.results.into_iter().next().map_or_else(|| "unknown".into(), |r| r.hypothesis.class_id),
+                    solid: Solid { center: [p.x, p.y, p.z], yaw_rad, size: [s.x, s.y, s.z] },
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn topics(&self) -> String {
+        if self.channels.is_empty() {
+            return "none".into();
+        }
+        let mut found: Vec<_> =
+            self.channels.values().map(|t| format!("{} ({}, {} messages)", t.name, t.schema, t.messages)).collect();
+        found.sort();
+        found.join(", ")
+    }
+
+    fn finish(self, name: String, options: &ReadOptions) -> Result<Recording> {
+        let topic = options.radar_topic.as_deref().unwrap_or(POINTS_TOPIC);
+        if self.frames.is_empty() {
+            let skipped: String = self.problems.iter().map(|p| format!("\n  {p}")).collect();
+            bail!(
+                "{name}: no radar frame on topic {topic}; topics found: {}. Name another with --radar-topic.{skipped}",
+                self.topics()
+            );
+        }
+        let radar_frame = self.radar_frame.clone().unwrap_or_default();
+        let pose = match options.mount {
+            Some([x, y, z, yaw, pitch, roll]) => SensorPose::new([x, y, z], yaw, pitch, roll),
+            None => self.transforms.pose(ROAD_FRAME, &radar_frame).ok_or_else(|| {
+                anyhow!(
+                    "{name}: no mount: /tf_static joins no frame `{ROAD_FRAME}` to the radar's `{radar_frame}` (transforms found: {}). Give it with --mount x,y,z,yaw,pitch,roll (metres, degrees).",
+                    self.transforms.describe()
+                )
+            })?,
+        };
+        if pose.position[2] <= 0.0 {
+            bail!(
+                "{name}: mount height {} m is not above the road; give the mount with --mount x,y,z,yaw,pitch,roll",
+                pose.position[2]
+            );
+        }
+        let sensor = self.sensor(&name, options)?;
+        let truth = self.labelled.then(|| Truth::new(self.labels));
+        Ok(Recording {
+            name,
+            sensor,
+            pose,
+            frames: self.frames,
+            truth,
+            occlusion: BTreeMap::new(),
+            problems: self.problems,
+        })
+    }
+
+    fn sensor(&self, recording: &str, options: &ReadOptions) -> Result<Sensor> {
+        let text = |key: &str| self.metadata.get(key).map(String::as_str);
+        let flag = |key: &str| text(key).map(|v| v.eq_ignore_ascii_case("true"));
+        let field_of_view = match options.field_of_view {
+            Some(f) => f,
+            None => {
+                let number = |key: &str| -> Result<f64> {
+                    let value = text(key).with_context(|| {
+                        format!("{recording}: field of view unknown: metadata `{SENSOR_METADATA}` has no `{key}`. Give it with --fov az_min,az_max,el_min,el_max,r_min,r_max (degrees, metres).")
+                    })?;
+                    value.parse().with_context(|| format!("{recording}: metadata `{SENSOR_METADATA}`: `{key}` is `{value}`, not a number; --fov replaces it"))
+                };
+                FieldOfView {
+                    azimuth_rad: [number("azimuth_min_rad")?, number("azimuth_max_rad")?],
+                    elevation_rad: [number("elevation_min_rad")?, number("elevation_max_rad")?],
+                    range_m: [number("range_min_m")?, number("range_max_m")?],
+                }
+            }
+        };
+        let limits = [
+            ("azimuth", field_of_view.azimuth_rad),
+            ("elevation", field_of_view.elevation_rad),
+            ("range", field_of_view.range_m),
+        ];
+        for (what, [lo, hi]) in limits {
+            if !(lo.is_finite() && hi.is_finite() && lo < hi) {
+                bail!("{recording}: field of view: {what} from {lo} to {hi} is no interval; --fov replaces it");
+            }
+        }
+        let measured = || self.frames.iter().flat_map(|f| &f.detections).any(|d| d.elevation_rad.is_some());
+        Ok(Sensor {
+            name: text("name").unwrap_or(recording).to_owned(),
+            field_of_view,
+            has_elevation: flag("has_elevation").unwrap_or_else(measured),
+            frames_independent: flag("frames_independent").unwrap_or(false),
+            platform_moving: text("platform") == Some("moving"),
+            licence: text("licence").map(str::to_owned),
+        })
+    }
+}

@@ -1,0 +1,113 @@
+//! Recordings: radar frames, mount, field of view and ground truth, whatever file they come from.
+
+pub mod labels;
+pub mod mcap;
+pub mod points;
+pub mod problems;
+pub mod ros;
+pub mod transforms;
+
+use std::collections::BTreeMap;
+
+use crate::geometry::pose::{SensorPose, Spherical};
+use crate::truth::Truth;
+use problems::Problems;
+
+/// One low-level radar measurement, as recorded.
+///
+/// Azimuth + left, elevation + up (radians), radial velocity + receding (m/s), RCS in dBsm, SNR in dB.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RadarDetection {
+    pub range_m: f32,
+    pub azimuth_rad: f32,
+    pub elevation_rad: Option<f32>,
+    pub radial_velocity_mps: f32,
+    pub rcs_dbsm: Option<f32>,
+    pub snr_db: Option<f32>,
+}
+
+impl RadarDetection {
+    /// Where the detection lies in the road frame; without elevation, at `height_m`.
+    pub fn road_position(&self, pose: &SensorPose, height_m: f64) -> [f64; 3] {
+        let (range_m, azimuth_rad) = (f64::from(self.range_m), f64::from(self.azimuth_rad));
+        pose.to_road(match self.elevation_rad {
+            Some(e) => Spherical { range_m, azimuth_rad, elevation_rad: f64::from(e) },
+            None => pose.at_height(range_m, azimuth_rad, height_m),
+        })
+    }
+}
+
+/// One radar scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Measurement time.
+    pub time_ns: i64,
+    pub detections: Vec<RadarDetection>,
+}
+
+/// Static field of view, in the sensor frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldOfView {
+    pub azimuth_rad: [f64; 2],
+    pub elevation_rad: [f64; 2],
+    pub range_m: [f64; 2],
+}
+
+impl FieldOfView {
+    pub fn contains(&self, s: Spherical) -> bool {
+        let within = |v: f64, [lo, hi]: [f64; 2]| (lo..=hi).contains(&v);
+        within(s.azimuth_rad, self.azimuth_rad)
+            && within(s.elevation_rad, self.elevation_rad)
+            && within(s.range_m, self.range_m)
+    }
+}
+
+/// What the recording says of its sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    pub name: String,
+    pub field_of_view: FieldOfView,
+    pub has_elevation: bool,
+    /// Single frames without continuity: the estimator is reset before each.
+    pub frames_independent: bool,
+    pub platform_moving: bool,
+    pub licence: Option<String>,
+}
+
+/// A whole recording in memory.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// File stem.
+    pub name: String,
+    pub sensor: Sensor,
+    pub pose: SensorPose,
+    pub frames: Vec<Frame>,
+    /// Objects over time, if labelled.
+    pub truth: Option<Truth>,
+    /// Human occlusion grade (0 = free, 2 = mostly hidden) by object id.
+    pub occlusion: BTreeMap<String, u8>,
+    /// What was wrong with the input, counted.
+    pub problems: Problems,
+}
+
+impl Recording {
+    pub fn duration_s(&self) -> f64 {
+        match (self.frames.first(), self.frames.last()) {
+            (Some(a), Some(b)) => (b.time_ns - a.time_ns) as f64 * 1e-9,
+            _ => 0.0,
+        }
+    }
+}
+
+/// What replaces or restricts what the file itself says.
+#[derive(Debug, Clone, Default)]
+pub struct ReadOptions {
+    pub radar_topic: Option<String>,
+    pub truth_topic: Option<String>,
+    /// x, y, z in metres, yaw, pitch, roll in radians.
+    pub mount: Option<[f64; 6]>,
+    pub field_of_view: Option<FieldOfView>,
+    /// Seconds since the first radar frame.
+    pub from_s: Option<f64>,
+    pub to_s: Option<f64>,
+}
