@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn depth_order_holds_for_a_long_box_beside_a_short_one() {
         // the truck's centre is farther than the car's, yet the truck stands between sensor and car
-        let truck = Solid { center: [30.0, 3.0, 2.0], yaw_rad: 0.0, size: [40.0, 2.5, 4.0] };
+        let truck = Solid { center: [30.0, 3.0, 2.0], yaw_rad: 0.0, size: [50.0, 2.5, 4.0] };
         let car = solid(18.0, 6.5, 4.0, 1.8, 1.5);
         assert!(!box_in_sight([0.0, 0.0, 3.0], &car, [&truck]));
         assert!(box_in_sight([0.0, 0.0, 3.0], &truck, [&car]));
