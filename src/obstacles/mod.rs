@@ -1,0 +1,230 @@
+//! Moving obstacles: detections that move together, followed from frame to frame.
+//!
+//! A grid alone smears what moves 1.7 m a frame, and shows neither how long nor how high a thing
+//! is. Doppler tells how each detection moves, so those of one vehicle can be gathered in its own
+//! moving frame, where a second of them draws its outline. The outline's length tells the class,
+//! the class the height, and the box goes into the grid as solid evidence.
+//!
+//! # Limits
+//! At most `N` obstacles. When the list is full, a new one replaces the one with the least evidence
+//! if that is unconfirmed, and is dropped and counted otherwise.
+
+pub mod obstacle;
+pub mod profile;
+pub mod size;
+pub mod tracking;
+
+use heapless::Vec;
+
+use crate::mount::Levelling;
+use crate::reflection::{Noise, Reflection};
+use crate::solid::Solid;
+use crate::time::Step;
+use obstacle::Obstacle;
+use tracking::Tracking;
+
+/// How far behind the sensor an obstacle is followed, centimetres.
+const BEHIND_CM: i32 = -2000;
+
+/// The obstacles of one sensor.
+#[derive(Debug, Clone)]
+pub struct Obstacles<const N: usize> {
+    list: Vec<Obstacle, N, u16>,
+    dropped: u32,
+}
+
+/// Which detections found an obstacle: one bit each, in the scan's order.
+#[derive(Debug, Clone, Copy)]
+pub struct Claimed<const D: usize>([bool; D]);
+
+impl<const D: usize> Claimed<D> {
+    const NONE: Self = Self([false; D]);
+
+    /// Whether detection `i` belongs to an obstacle.
+    pub fn contains(&self, i: usize) -> bool {
+        self.0.get(i).copied().unwrap_or(false)
+    }
+
+    fn insert(&mut self, i: usize) {
+        if let Some(flag) = self.0.get_mut(i) {
+            *flag = true;
+        }
+    }
+}
+
+impl<const N: usize> Default for Obstacles<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Obstacles<N> {
+    /// No obstacles.
+    pub const fn new() -> Self {
+        Self { list: Vec::new(), dropped: 0 }
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.list.clear();
+    }
+
+    /// All, confirmed or not.
+    pub fn iter(&self) -> impl Iterator<Item = &Obstacle> {
+        self.list.iter()
+    }
+
+    /// New obstacles that found no room, saturating.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Boxes of the confirmed.
+    pub fn solids<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
+        self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t)).map(|o| o.solid(t))
+    }
+
+    /// Takes one frame's detections: moves every obstacle on, gives each detection to the obstacle
+    /// it fits best, starts new ones from the rest, joins parts of one vehicle and drops what is no
+    /// longer believed in. `in_view` tells whether a place is in plain view (by the previous map).
+    pub fn step<const D: usize>(
+        &mut self,
+        reflections: &[Reflection],
+        step: Step,
+        t: &Tracking,
+        noise: &Noise,
+        levelling: &Levelling,
+        limit_cm: i32,
+        in_view: impl Fn(i32, i32) -> bool,
+    ) -> Claimed<D> {
+        for o in &mut self.list {
+            o.predict(step, t);
+        }
+        let mut claimed = self.associate(reflections, step, t, noise);
+        for o in &mut self.list {
+            o.settle(step, t);
+        }
+        self.found(reflections, &mut claimed, t, noise, levelling);
+        self.join_parts(t);
+        self.doubt_the_unseen(step, t, limit_cm, in_view);
+        claimed
+    }
+
+    /// Gives each detection to the obstacle it fits best; of equals, to the elder in the list.
+    #[allow(clippy::cast_possible_truncation)] // the list is bounded
+    fn associate<const D: usize>(&mut self, reflections: &[Reflection], step: Step, t: &Tracking, noise: &Noise) -> Claimed<D> {
+        const { assert!(N < u16::MAX as usize) }
+        let mut best = [(i32::MAX, u16::MAX); D];
+        for (k, o) in self.list.iter().enumerate() {
+            let search = o.search(t);
+            for (r, best) in reflections.iter().zip(&mut best) {
+                if let Some(misfit) = search.misfit(r, noise, t)
+                    && misfit < best.0
+                {
+                    *best = (misfit, k as u16);
+                }
+            }
+        }
+        let mut claimed = Claimed::NONE;
+        for (i, (r, (_, k))) in reflections.iter().zip(best).enumerate() {
+            let Some(o) = self.list.get_mut(usize::from(k)) else { continue };
+            if !o.seen() {
+                o.fade_outline(step, t);
+            }
+            o.absorb(r, noise);
+            claimed.insert(i);
+        }
+        claimed
+    }
+
+    /// Starts obstacles from detections that move along the road and belong to nobody.
+    fn found<const D: usize>(
+        &mut self,
+        reflections: &[Reflection],
+        claimed: &mut Claimed<D>,
+        t: &Tracking,
+        noise: &Noise,
+        levelling: &Levelling,
+    ) {
+        let road = levelling.road_axis();
+        for (i, seed) in reflections.iter().enumerate() {
+            if claimed.contains(i) {
+                continue;
+            }
+            let along = road.along(i32::from(seed.sight.x), i32::from(seed.sight.y));
+            // nearly broadside: Doppler says nothing about motion along the road
+            if along.abs() < (15 << 14) / 100 {
+                continue;
+            }
+            // what stands still shows no more than the noise of its Doppler
+            if seed.radial_velocity_cm_s.abs() < 4 * noise.radial_velocity_cm_s {
+                continue;
+            }
+            let speed = (seed.radial_velocity_cm_s << 14) / along;
+            if speed.abs() < t.min_speed_cm_s || speed.abs() > 7000 {
+                continue;
+            }
+            let heading = if speed > 0 { road } else { road.reversed() };
+            let mut newborn = Obstacle::new(seed, heading, speed.abs());
+            for (j, r) in reflections.iter().enumerate().skip(i) {
+                if !claimed.contains(j) && newborn.search(t).misfit(r, noise, t).is_some() {
+                    newborn.absorb(r, noise);
+                    newborn.reach(r);
+                    claimed.insert(j);
+                }
+            }
+            newborn.settle(Step::from_micros(0), t);
+            self.admit(newborn, t);
+        }
+    }
+
+    fn admit(&mut self, newborn: Obstacle, t: &Tracking) {
+        let Err(newborn) = self.list.push(newborn) else { return };
+        let weakest = self.list.iter_mut().min_by_key(|o| o.existence);
+        match weakest {
+            Some(o) if o.existence < t.confirmed && o.existence < newborn.existence => *o = newborn,
+            _ => self.dropped = self.dropped.saturating_add(1),
+        }
+    }
+
+    /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
+    /// which is left without evidence and so dropped.
+    fn join_parts(&mut self, t: &Tracking) {
+        for i in 0..self.list.len() {
+            for j in i + 1..self.list.len() {
+                let Ok([a, b]) = self.list.get_disjoint_mut([i, j]) else { continue };
+                if a.existence > 0 && b.existence > 0 && a.is_one_with(b, t) {
+                    let (elder, younger) = if a.hits >= b.hits { (a, b) } else { (b, a) };
+                    elder.join(younger, t);
+                    younger.existence = 0;
+                }
+            }
+        }
+    }
+
+    /// Takes evidence from obstacles nobody saw, quickly where they should have been seen, and
+    /// drops those without evidence or out of reach.
+    fn doubt_the_unseen(&mut self, step: Step, t: &Tracking, limit_cm: i32, in_view: impl Fn(i32, i32) -> bool) {
+        for o in &mut self.list {
+            if o.seen() || o.existence <= 0 {
+                continue;
+            }
+            let places = [o.extent.front_cm, o.extent.middle_cm(), o.extent.rear_cm];
+            let loss = if o.existence < t.confirmed {
+                t.tentative_loss
+            } else if places.iter().any(|&along| {
+                let (x, y) = o.global(along, 0);
+                in_view(x, y)
+            }) {
+                t.visible_loss
+            } else {
+                t.hidden_loss
+            };
+            o.existence -= step.times(loss);
+        }
+        self.list.retain(|o| {
+            let (x, y) = o.anchor();
+            o.existence > 0 && !o.is_fixture(t) && x > BEHIND_CM && x < limit_cm && y.abs() < limit_cm
+        });
+    }
+}

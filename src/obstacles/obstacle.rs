@@ -1,0 +1,350 @@
+//! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
+
+use super::profile::{BIN_CM, Extent, Profile};
+use super::tracking::Tracking;
+use crate::math::{hypot_gate, mul_shift};
+use crate::reflection::{Noise, Reflection};
+use crate::solid::Solid;
+use crate::time::Step;
+use crate::trig::Direction;
+
+/// Fraction bits of positions and velocities.
+const FRACTION: u32 = 8;
+
+/// A moving obstacle in the levelled frame.
+///
+/// The *anchor* is a point on its centre line that moves with it; the outline is kept relative to
+/// the anchor.
+#[derive(Debug, Clone)]
+pub struct Obstacle {
+    /// Anchor, 2^-8 cm.
+    position: (i32, i32),
+    /// 2^-8 cm/s.
+    velocity: (i32, i32),
+    /// Direction of travel.
+    pub heading: Direction,
+    profile: Profile,
+    /// Outline along the heading, relative to the anchor.
+    pub extent: Extent,
+    /// Weight of the lateral estimate; [`weight`] of each detection, fading.
+    lateral_weight: i32,
+    /// Evidence that it is there, 2^-8 detections.
+    pub existence: i32,
+    /// Detections so far, saturating.
+    pub hits: u16,
+    /// Frames since it appeared, saturating.
+    pub age: u16,
+    /// Way made so far, centimetres, saturating.
+    travelled_cm: i32,
+    /// What this frame's detections add up to.
+    gathered: Gathered,
+}
+
+/// Sums over the detections of one frame.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gathered {
+    count: i32,
+    /// Speed error along the heading: sum of projection x error, and of projection squared (2^-14).
+    speed: (i64, i32),
+    /// Lateral place: sum of weight x offset, and of weights.
+    lateral: (i64, i32),
+}
+
+/// Weight of a lateral measurement with a standard deviation in centimetres: the inverse variance,
+/// with half a metre for where on the vehicle it reflects.
+fn weight(sigma_cm: i32) -> i32 {
+    (1 << 24) / (2500 + sigma_cm * sigma_cm)
+}
+
+/// Standard deviations of a detection along and across a heading, centimetres.
+fn spread(heading: Direction, r: &Reflection, noise: &Noise) -> (i32, i32) {
+    let along = heading.along(i32::from(r.sight.x), i32::from(r.sight.y)).abs();
+    let across = heading.across(i32::from(r.sight.x), i32::from(r.sight.y)).abs();
+    (
+        hypot_gate((noise.range_cm * along) >> 14, (r.across_cm * across) >> 14),
+        hypot_gate((noise.range_cm * across) >> 14, (r.across_cm * along) >> 14),
+    )
+}
+
+/// An obstacle with what every comparison needs at hand.
+pub struct Search<'a> {
+    obstacle: &'a Obstacle,
+    anchor: (i32, i32),
+    /// Farthest from the anchor a detection of this obstacle can lie along either axis.
+    reach_cm: i32,
+}
+
+impl Search<'_> {
+    /// How badly a detection fits, 2^-8; `None` where it cannot belong to this obstacle.
+    #[inline]
+    pub fn misfit(&self, r: &Reflection, noise: &Noise, t: &Tracking) -> Option<i32> {
+        let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
+        if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
+            return None;
+        }
+        self.obstacle.misfit(r, dx, dy, noise, t)
+    }
+}
+
+impl Obstacle {
+    /// How badly a detection fits that lies at (dx, dy) from the anchor.
+    fn misfit(&self, r: &Reflection, dx: i32, dy: i32, noise: &Noise, t: &Tracking) -> Option<i32> {
+        let error = self.speed_error(r).abs();
+        if error > t.doppler_gate {
+            return None;
+        }
+        let (along, left) = (self.heading.along(dx, dy), self.heading.across(dx, dy));
+        let (sigma_along, sigma_across) = spread(self.heading, r, noise);
+        let beyond = self.extent.beyond_cm(along);
+        let beside = (left.abs() - t.half_width_cm).max(0);
+        if beyond > t.gap_cm + ((t.sigmas * sigma_along) >> 4)
+            || beside > t.lateral_gate_cm + ((t.sigmas * sigma_across) >> 4)
+            || self.extent.length_cm() + beyond > t.max_length_cm + 100
+        {
+            return None;
+        }
+        // each term is a squared distance in its own scale: 0.7 m along, the width and noise across,
+        // half a metre a second (twice) in speed
+        let by_length = beyond * beyond / 19;
+        let by_width = (left * left * 16) / ((t.half_width_cm * t.half_width_cm + sigma_across * sigma_across) / 16).max(1);
+        let by_speed = error * error / 1250;
+        Some(by_length + by_width + by_speed)
+    }
+
+    /// A new obstacle at a detection, travelling along `heading` at a speed in cm/s.
+    pub fn new(seed: &Reflection, heading: Direction, speed_cm_s: i32) -> Self {
+        let fine = |v: i32| v << FRACTION;
+        let part = |c: i16| ((speed_cm_s << 4) * i32::from(c)) >> (14 + 4 - FRACTION);
+        Self {
+            position: (fine(seed.x_cm), fine(seed.y_cm)),
+            velocity: (part(heading.x), part(heading.y)),
+            heading,
+            profile: Profile::EMPTY,
+            extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
+            lateral_weight: 0,
+            existence: 0,
+            hits: 0,
+            age: 0,
+            travelled_cm: 0,
+            gathered: Gathered::default(),
+        }
+    }
+
+    /// Anchor, centimetres.
+    pub fn anchor(&self) -> (i32, i32) {
+        (self.position.0 >> FRACTION, self.position.1 >> FRACTION)
+    }
+
+    /// Velocity, cm/s.
+    pub fn velocity(&self) -> (i32, i32) {
+        (self.velocity.0 >> FRACTION, self.velocity.1 >> FRACTION)
+    }
+
+    /// Whether this frame brought a detection.
+    pub fn seen(&self) -> bool {
+        self.gathered.count > 0
+    }
+
+    /// A place in the obstacle's axes: ahead of the anchor and to its left, centimetres.
+    pub fn local(&self, x_cm: i32, y_cm: i32) -> (i32, i32) {
+        let (ax, ay) = self.anchor();
+        (self.heading.along(x_cm - ax, y_cm - ay), self.heading.across(x_cm - ax, y_cm - ay))
+    }
+
+    /// The place `along` ahead of the anchor and `left` of it, centimetres.
+    pub fn global(&self, along: i32, left: i32) -> (i32, i32) {
+        let (ax, ay) = self.anchor();
+        let (hx, hy) = (i32::from(self.heading.x), i32::from(self.heading.y));
+        (ax + ((along * hx - left * hy) >> 14), ay + ((along * hy + left * hx) >> 14))
+    }
+
+    /// Moves it on by a time step and forgets the last frame's sums.
+    pub fn predict(&mut self, step: Step, t: &Tracking) {
+        let (dx, dy) = (step.times(self.velocity.0), step.times(self.velocity.1));
+        self.position.0 += dx;
+        self.position.1 += dy;
+        self.travelled_cm = self.travelled_cm.saturating_add(hypot_gate(dx, dy) >> FRACTION);
+        self.lateral_weight = mul_shift(self.lateral_weight, step.keep(t.lateral_memory), 16);
+        self.gathered = Gathered::default();
+        self.age = self.age.saturating_add(1);
+    }
+
+    /// Whether it has moved far enough to be no fixture that clutter gave a speed.
+    pub fn is_mover(&self, t: &Tracking) -> bool {
+        self.travelled_cm >= t.mover_cm
+    }
+
+    /// Whether it stands still without ever having moved.
+    pub fn is_fixture(&self, t: &Tracking) -> bool {
+        !self.is_mover(t) && self.age >= 2 && hypot_gate(self.velocity.0, self.velocity.1) < t.fixture_speed
+    }
+
+    /// Difference between a detection's radial velocity and the one this motion explains, 2^-4 cm/s.
+    fn speed_error(&self, r: &Reflection) -> i32 {
+        let (vx, vy) = (self.velocity.0 >> 4, self.velocity.1 >> 4);
+        let explained = r.sight.along(vx, vy);
+        (r.radial_velocity_cm_s << 4) - explained
+    }
+
+    /// What it takes to look for this obstacle's detections.
+    pub fn search(&self, t: &Tracking) -> Search<'_> {
+        let anchor = self.anchor();
+        let outline = self.extent.front_cm.max(-self.extent.rear_cm);
+        Search { obstacle: self, anchor, reach_cm: outline + t.reach_cm }
+    }
+
+    /// Takes a detection that belongs to it.
+    pub fn absorb(&mut self, r: &Reflection, noise: &Noise) {
+        let (along, left) = self.local(r.x_cm, r.y_cm);
+        let (_, sigma_across) = spread(self.heading, r, noise);
+        let projection = self.heading.along(i32::from(r.sight.x), i32::from(r.sight.y));
+        let error = self.speed_error(r);
+        let w = weight(sigma_across);
+        let g = &mut self.gathered;
+        g.count += 1;
+        g.speed.0 += i64::from(projection) * i64::from(error);
+        g.speed.1 += (projection * projection) >> 14;
+        g.lateral.0 += i64::from(w) * i64::from(left);
+        g.lateral.1 = g.lateral.1.saturating_add(w);
+        self.profile.add(along);
+    }
+
+    /// Stretches the outline of a newborn to a detection, so that the next finds it.
+    pub fn reach(&mut self, r: &Reflection) {
+        let (along, _) = self.local(r.x_cm, r.y_cm);
+        self.extent.front_cm = self.extent.front_cm.max(along);
+        self.extent.rear_cm = self.extent.rear_cm.min(along);
+    }
+
+    /// Fades the outline; to be called before this frame's detections are absorbed.
+    pub fn fade_outline(&mut self, step: Step, t: &Tracking) {
+        self.profile.fade(step.keep(t.outline_memory));
+    }
+
+    /// Brings motion, place and outline up to date with what was absorbed.
+    #[allow(clippy::cast_possible_truncation)] // speeds and offsets fit after the division
+    pub fn settle(&mut self, step: Step, t: &Tracking) {
+        let g = self.gathered;
+        if g.count == 0 {
+            return;
+        }
+        let inertia = if self.age < t.young { t.young_inertia } else { t.inertia };
+        let gain = (g.speed.0 << 4) / i64::from((g.speed.1 + inertia).max(1));
+        self.push_along(gain as i32);
+        let weight = self.lateral_weight.saturating_add(g.lateral.1).max(1);
+        let offset = ((g.lateral.0 << FRACTION) / i64::from(weight)) as i32;
+        self.move_left(offset);
+        self.lateral_weight = weight;
+        if self.age >= t.young {
+            self.turn(offset, step, t);
+        }
+        self.update_extent(t);
+        self.hits = self.hits.saturating_add(g.count as u16);
+        let gained = g.count.min(t.most_hits_a_frame) << 8;
+        self.existence = (self.existence + gained).min(t.existence_max);
+    }
+
+    /// Adds to the speed along the heading, 2^-8 cm/s.
+    fn push_along(&mut self, dv: i32) {
+        self.velocity.0 += mul_shift(dv, i32::from(self.heading.x), 14);
+        self.velocity.1 += mul_shift(dv, i32::from(self.heading.y), 14);
+    }
+
+    /// Moves the anchor to the left, 2^-8 cm.
+    fn move_left(&mut self, offset: i32) {
+        self.position.0 -= mul_shift(offset, i32::from(self.heading.y), 14);
+        self.position.1 += mul_shift(offset, i32::from(self.heading.x), 14);
+    }
+
+    /// Lets a lasting drift to one side turn the heading.
+    fn turn(&mut self, offset: i32, step: Step, t: &Tracking) {
+        let dv = (i64::from(mul_shift(offset, t.drift_gain, 16)) << 16) / i64::from(step.raw().max(1));
+        let dv = dv.clamp(-(100 << FRACTION), 100 << FRACTION) as i32;
+        let left = self.heading.left();
+        self.velocity.0 += mul_shift(dv, i32::from(left.x), 14);
+        self.velocity.1 += mul_shift(dv, i32::from(left.y), 14);
+        let (vx, vy) = (self.velocity.0 >> 4, self.velocity.1 >> 4);
+        let square = i64::from(vx) * i64::from(vx) + i64::from(vy) * i64::from(vy);
+        let speed = (square.unsigned_abs().isqrt()) as i64;
+        if speed > i64::from(t.turning_speed) {
+            let unit = |v: i32| ((i64::from(v) << 14) / speed) as i16;
+            self.heading = Direction { x: unit(vx), y: unit(vy) };
+        }
+    }
+
+    /// Reads the outline and keeps the anchor near its middle.
+    fn update_extent(&mut self, t: &Tracking) {
+        let Some(extent) = self.profile.extent(t.outline_min_hits, t.outline_share) else { return };
+        self.extent = extent;
+        let bins = extent.middle_cm() / BIN_CM;
+        if bins.abs() >= t.recentre_bins {
+            self.profile.shift(bins);
+            let by = bins * BIN_CM;
+            self.position.0 += mul_shift(by << FRACTION, i32::from(self.heading.x), 14);
+            self.position.1 += mul_shift(by << FRACTION, i32::from(self.heading.y), 14);
+            self.extent = Extent { rear_cm: extent.rear_cm - by, front_cm: extent.front_cm - by };
+        }
+    }
+
+    /// Whether another obstacle is a part of the same vehicle: in line, equally fast, and no farther
+    /// away than vehicles keep from each other at this speed.
+    pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
+        let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
+        if hypot_gate(dvx, dvy) > t.merge_speed {
+            return false;
+        }
+        if self.heading.along(i32::from(other.heading.x), i32::from(other.heading.y)) < t.merge_parallel {
+            return false;
+        }
+        let (ox, oy) = other.global(other.extent.middle_cm(), 0);
+        let (along, left) = self.local(ox, oy);
+        if left.abs() > t.merge_lateral_cm + ((t.sigmas * (self.lateral_sigma() + other.lateral_sigma())) >> 4) {
+            return false;
+        }
+        let half = other.extent.length_cm() / 2;
+        let (rear, front) = (along - half, along + half);
+        let gap = (rear - self.extent.front_cm).max(self.extent.rear_cm - front);
+        let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
+        let speed = hypot_gate(self.velocity.0, self.velocity.1) >> FRACTION;
+        let headway = t.merge_standstill_cm + mul_shift(speed, t.merge_headway, 16);
+        gap <= t.merge_gap_cm.min(headway) && length <= t.max_length_cm
+    }
+
+    /// Standard deviation of the lateral place, centimetres.
+    fn lateral_sigma(&self) -> i32 {
+        let variance = (1_u32 << 24) / self.lateral_weight.max(1).unsigned_abs();
+        variance.isqrt().min(1000) as i32
+    }
+
+    /// Takes over what another obstacle knows of the same vehicle.
+    pub fn join(&mut self, other: &Self, t: &Tracking) {
+        let (ax, ay) = other.anchor();
+        let (along, left) = self.local(ax, ay);
+        self.profile.merge(&other.profile, along);
+        let weight = self.lateral_weight.saturating_add(other.lateral_weight).max(1);
+        let share = (i64::from(left << FRACTION) * i64::from(other.lateral_weight) / i64::from(weight)) as i32;
+        self.move_left(share);
+        self.lateral_weight = weight;
+        self.existence = (self.existence + other.existence).min(t.existence_max);
+        self.hits = self.hits.saturating_add(other.hits);
+        self.travelled_cm = self.travelled_cm.max(other.travelled_cm);
+        self.update_extent(t);
+    }
+
+    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
+    pub fn solid(&self, t: &Tracking) -> Solid {
+        let size = t.sizes.of(self.extent.length_cm());
+        let (x, y) = self.global(self.extent.middle_cm(), 0);
+        let hidden = (size.length_cm - self.extent.length_cm()).max(0) / 2;
+        let receding = self.heading.along(x, y) >= 0;
+        let (x, y) = self.global(self.extent.middle_cm() + if receding { hidden } else { -hidden }, 0);
+        Solid {
+            x_cm: x,
+            y_cm: y,
+            heading: self.heading,
+            half_length_cm: size.length_cm / 2,
+            half_width_cm: size.width_cm / 2,
+            height_cm: size.height_cm,
+        }
+    }
+}

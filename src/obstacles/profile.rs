@@ -1,0 +1,182 @@
+//! Where along its heading an obstacle reflects: a fading histogram whose ends are its length.
+//!
+//! Reflection points sit at bumpers, axles and corners. Counted in the moving frame of their
+//! obstacle they draw its outline within seconds, and a stray detection is outvoted.
+
+use crate::math::mul_shift;
+
+/// Bins of the histogram.
+pub const BINS: usize = 48;
+/// Length of a bin, centimetres.
+pub const BIN_CM: i32 = 50;
+/// One hit, in the histogram's unit.
+pub const HIT: i32 = 64;
+
+/// Largest content of a bin; the whole histogram is halved when one passes it.
+const FULL: i32 = 0x7FFF;
+
+/// Hits along the heading, centred on the anchor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Profile {
+    bins: [u16; BINS],
+}
+
+/// Rear and front end relative to the anchor, centimetres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    /// Rear end.
+    pub rear_cm: i32,
+    /// Front end.
+    pub front_cm: i32,
+}
+
+impl Extent {
+    /// Distance between the ends.
+    pub fn length_cm(&self) -> i32 {
+        self.front_cm - self.rear_cm
+    }
+
+    /// Middle between the ends.
+    pub fn middle_cm(&self) -> i32 {
+        (self.front_cm + self.rear_cm) / 2
+    }
+
+    /// How far a place lies beyond either end; 0 between them.
+    pub fn beyond_cm(&self, along_cm: i32) -> i32 {
+        (along_cm - self.front_cm).max(self.rear_cm - along_cm).max(0)
+    }
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // 48 bins of at most 2^15
+impl Profile {
+    /// No hits.
+    pub const EMPTY: Self = Self { bins: [0; BINS] };
+
+    /// Counts a hit; outside the histogram nothing happens.
+    pub fn add(&mut self, along_cm: i32) {
+        self.pour(along_cm, HIT);
+    }
+
+    fn pour(&mut self, along_cm: i32, amount: i32) {
+        let bin = along_cm.div_euclid(BIN_CM) + BINS as i32 / 2;
+        let Some(slot) = usize::try_from(bin).ok().and_then(|b| self.bins.get_mut(b)) else { return };
+        let sum = i32::from(*slot) + amount;
+        *slot = sum.min(0xFFFF) as u16;
+        if sum > FULL {
+            for b in &mut self.bins {
+                *b /= 2;
+            }
+        }
+    }
+
+    /// Fades every bin by a factor in 2^-16.
+    pub fn fade(&mut self, factor: i32) {
+        for b in &mut self.bins {
+            *b = mul_shift(i32::from(*b), factor, 16) as u16;
+        }
+    }
+
+    /// The outermost places with enough support, in two neighbouring bins together: at least
+    /// `min_hits` (of [`HIT`]), and at least `share` (2^-8) of all hits. Young profiles get by with
+    /// 40 % of what they have.
+    pub fn extent(&self, min_hits: i32, share: i32) -> Option<Extent> {
+        let total: i32 = self.bins.iter().map(|b| i32::from(*b)).sum();
+        if total == 0 {
+            return None;
+        }
+        let needed = min_hits.min(total * 2 / 5).max((total * share) >> 8);
+        let supported = |pair: &&[u16]| matches!(pair, [a, b] if i32::from(*a) + i32::from(*b) >= needed);
+        let first = self.bins.windows(2).position(|p| supported(&p))?;
+        let last = self.bins.windows(2).rposition(|p| supported(&p))?;
+        Some(Extent { rear_cm: self.centre_of_pair(first), front_cm: self.centre_of_pair(last) })
+    }
+
+    /// Centre of gravity of the bins `i` and `i + 1`, centimetres from the anchor.
+    fn centre_of_pair(&self, i: usize) -> i32 {
+        let [a, b] = match self.bins.get(i..i + 2) {
+            Some(&[a, b]) => [i32::from(a), i32::from(b)],
+            _ => [1, 1],
+        };
+        (i as i32 - BINS as i32 / 2) * BIN_CM + BIN_CM / 2 + b * BIN_CM / (a + b).max(1)
+    }
+
+    /// Moves the anchor forward by whole bins.
+    pub fn shift(&mut self, bins: i32) {
+        let mut moved = [0; BINS];
+        for (i, to) in moved.iter_mut().enumerate() {
+            let from = i as i32 + bins;
+            *to = usize::try_from(from).ok().and_then(|f| self.bins.get(f)).copied().unwrap_or(0);
+        }
+        self.bins = moved;
+    }
+
+    /// Adds another profile whose anchor lies `offset_cm` ahead of this one's.
+    pub fn merge(&mut self, other: &Self, offset_cm: i32) {
+        for (i, &amount) in other.bins.iter().enumerate() {
+            if amount > 0 {
+                let along = (i as i32 - BINS as i32 / 2) * BIN_CM + BIN_CM / 2 + offset_cm;
+                self.pour(along, i32::from(amount));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn profile(hits: &[(i32, usize)]) -> Profile {
+        let mut p = Profile::EMPTY;
+        for &(along, n) in hits {
+            for _ in 0..n {
+                p.add(along);
+            }
+        }
+        p
+    }
+
+    #[test]
+    fn a_car_is_as_long_as_its_bumpers_are_apart() {
+        let e = profile(&[(-230, 20), (210, 30)]).extent(96, 13).unwrap();
+        assert!((e.rear_cm + 225).abs() <= 25 && (e.front_cm - 225).abs() <= 25, "{e:?}");
+        assert_eq!(e.beyond_cm(e.front_cm + 70), 70);
+        assert_eq!(e.beyond_cm(e.rear_cm - 30), 30);
+        assert_eq!(e.beyond_cm(0), 0);
+    }
+
+    #[test]
+    fn a_stray_hit_does_not_lengthen() {
+        let e = profile(&[(-230, 20), (210, 30), (900, 1)]).extent(96, 13).unwrap();
+        assert!(e.front_cm < 300, "{e:?}");
+    }
+
+    #[test]
+    fn a_young_profile_has_an_extent_at_once() {
+        assert!(profile(&[(0, 1)]).extent(96, 13).is_some());
+        assert_eq!(Profile::EMPTY.extent(96, 13), None);
+    }
+
+    #[test]
+    fn shifting_moves_the_anchor_forward() {
+        let mut p = profile(&[(200, 10)]);
+        p.shift(4);
+        let e = p.extent(96, 13).unwrap();
+        assert!(e.middle_cm().abs() <= 25, "{e:?}");
+    }
+
+    #[test]
+    fn merging_places_the_other_ahead() {
+        let mut p = profile(&[(0, 10)]);
+        p.merge(&profile(&[(0, 10)]), 600);
+        let e = p.extent(96, 13).unwrap();
+        assert!((e.length_cm() - 600).abs() <= 50, "{e:?}");
+    }
+
+    #[test]
+    fn a_full_bin_halves_all_and_keeps_the_shape() {
+        let mut p = profile(&[(-230, 300), (210, 700)]);
+        p.fade(60_000);
+        let e = p.extent(96, 13).unwrap();
+        assert!((e.length_cm() - 440).abs() <= 50, "{e:?}");
+    }
+}

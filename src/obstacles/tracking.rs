@@ -1,0 +1,204 @@
+//! Parameters of obstacle tracking, checked and in integers.
+
+use super::profile::HIT;
+use super::size::{SizeConfig, Sizes};
+use crate::config::{ConfigError, within};
+use crate::math;
+
+/// How detections become moving obstacles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct ObstacleConfig {
+    /// Slowest radial motion, projected on the road, that starts an obstacle, m/s.
+    pub min_speed_mps: f32,
+    /// Largest difference between measured and explained radial velocity, m/s.
+    pub doppler_gate_mps: f32,
+    /// Longest stretch without reflection points on one vehicle, metres.
+    pub gap_m: f32,
+    /// How far beside the outline a detection may lie before noise is allowed for, metres.
+    pub lateral_gate_m: f32,
+    /// Standard deviations of noise allowed for.
+    pub gate_sigmas: f32,
+    /// Longest vehicle, metres.
+    pub max_length_m: f32,
+    /// How long the outline remembers, seconds.
+    pub outline_memory_s: f32,
+    /// Detections that make an end of the outline.
+    pub outline_min_hits: f32,
+    /// Share of all detections that makes an end of the outline.
+    pub outline_share: f32,
+    /// How long the lateral place remembers, seconds.
+    pub lateral_memory_s: f32,
+    /// Share of a lateral innovation that goes into the lateral speed.
+    pub drift_gain: f32,
+    /// Detections that confirm an obstacle.
+    pub confirm_hits: f32,
+    /// Detections' worth of evidence an obstacle can hold.
+    pub max_evidence: f32,
+    /// Loss of evidence while unconfirmed and unseen, detections per second.
+    pub tentative_loss_per_s: f32,
+    /// Loss of evidence while unseen in plain view, detections per second.
+    pub visible_loss_per_s: f32,
+    /// Loss of evidence while unseen in a shadow, detections per second.
+    pub hidden_loss_per_s: f32,
+    /// Parts closer than this may be one vehicle, metres.
+    pub merge_gap_m: f32,
+    /// Shortest headway between vehicles, seconds: parts farther apart are two vehicles.
+    pub merge_headway_s: f32,
+    /// Widths and heights by length.
+    pub sizes: SizeConfig,
+}
+
+impl Default for ObstacleConfig {
+    fn default() -> Self {
+        Self {
+            min_speed_mps: 1.5,
+            doppler_gate_mps: 1.5,
+            gap_m: 5.0,
+            lateral_gate_m: 1.2,
+            gate_sigmas: 2.5,
+            max_length_m: 19.0,
+            outline_memory_s: 2.0,
+            outline_min_hits: 1.5,
+            outline_share: 0.05,
+            lateral_memory_s: 1.5,
+            drift_gain: 0.01,
+            confirm_hits: 3.0,
+            max_evidence: 12.0,
+            tentative_loss_per_s: 10.0,
+            visible_loss_per_s: 9.0,
+            hidden_loss_per_s: 0.9,
+            merge_gap_m: 8.0,
+            merge_headway_s: 0.25,
+            sizes: SizeConfig::default(),
+        }
+    }
+}
+
+/// [`ObstacleConfig`] in integers; lengths in centimetres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)] // the fields are the configuration's, in the units below
+pub struct Tracking {
+    pub min_speed_cm_s: i32,
+    /// 2^-4 cm/s
+    pub doppler_gate: i32,
+    pub gap_cm: i32,
+    pub lateral_gate_cm: i32,
+    /// 2^-4
+    pub sigmas: i32,
+    pub max_length_cm: i32,
+    /// Farthest a detection of an obstacle can lie beyond its outline, with noise.
+    pub reach_cm: i32,
+    /// 2^-16 s
+    pub outline_memory: i32,
+    /// Profile hits.
+    pub outline_min_hits: i32,
+    /// 2^-8
+    pub outline_share: i32,
+    /// 2^-16 s
+    pub lateral_memory: i32,
+    /// 2^-16
+    pub drift_gain: i32,
+    /// 2^-8 detections
+    pub confirmed: i32,
+    /// 2^-8 detections
+    pub existence_max: i32,
+    /// 2^-8 detections per second
+    pub tentative_loss: i32,
+    /// 2^-8 detections per second
+    pub visible_loss: i32,
+    /// 2^-8 detections per second
+    pub hidden_loss: i32,
+    pub merge_gap_cm: i32,
+    /// 2^-16 s
+    pub merge_headway: i32,
+    pub merge_standstill_cm: i32,
+    pub merge_lateral_cm: i32,
+    /// 2^-8 cm/s
+    pub merge_speed: i32,
+    /// Least cosine between headings, 2^-14.
+    pub merge_parallel: i32,
+    /// Half the width detections of one vehicle spread over.
+    pub half_width_cm: i32,
+    /// Frames an obstacle is young: its motion follows its detections quickly.
+    pub young: u16,
+    /// Detections' worth of trust in the speed so far, 2^-14; while young and later.
+    pub young_inertia: i32,
+    pub inertia: i32,
+    /// Detections of one frame that count as evidence.
+    pub most_hits_a_frame: i32,
+    /// Way after which an obstacle is a mover, and stays one when it stops.
+    pub mover_cm: i32,
+    /// Speed below which one that never moved is a fixture, 2^-8 cm/s.
+    pub fixture_speed: i32,
+    /// Speed above which motion tells the heading, 2^-4 cm/s.
+    pub turning_speed: i32,
+    /// Bins the outline's middle may leave the anchor.
+    pub recentre_bins: i32,
+    pub sizes: Sizes,
+}
+
+impl ObstacleConfig {
+    /// Checks the parameters and rounds them.
+    ///
+    /// # Errors
+    /// Names the parameter outside its limits.
+    pub fn tracking(&self) -> Result<Tracking, ConfigError> {
+        let cm = |name, v, min, max| within(name, v, min, max).map(|m| math::round_i32(m * 100.0));
+        let seconds = |name, v| within(name, v, 0.05, 60.0).map(|s| math::round_i32(s * 65536.0));
+        let hits = |name, v| within(name, v, 0.0, 1000.0).map(|h| math::round_i32(h * 256.0));
+        let gap_cm = cm("obstacles.gap_m", self.gap_m, 0.5, 20.0)?;
+        let max_length_cm = cm("obstacles.max_length_m", self.max_length_m, 2.0, 22.0)?;
+        Ok(Tracking {
+            min_speed_cm_s: cm("obstacles.min_speed_mps", self.min_speed_mps, 0.3, 20.0)?,
+            doppler_gate: cm("obstacles.doppler_gate_mps", self.doppler_gate_mps, 0.1, 10.0)? << 4,
+            gap_cm,
+            lateral_gate_cm: cm("obstacles.lateral_gate_m", self.lateral_gate_m, 0.0, 5.0)?,
+            sigmas: math::round_i32(within("obstacles.gate_sigmas", self.gate_sigmas, 0.0, 8.0)? * 16.0),
+            max_length_cm,
+            reach_cm: gap_cm + 600,
+            outline_memory: seconds("obstacles.outline_memory_s", self.outline_memory_s)?,
+            outline_min_hits: math::round_i32(
+                within("obstacles.outline_min_hits", self.outline_min_hits, 0.1, 50.0)? * HIT as f32,
+            ),
+            outline_share: math::round_i32(within("obstacles.outline_share", self.outline_share, 0.0, 0.4)? * 256.0),
+            lateral_memory: seconds("obstacles.lateral_memory_s", self.lateral_memory_s)?,
+            drift_gain: math::round_i32(within("obstacles.drift_gain", self.drift_gain, 0.0, 0.5)? * 65536.0),
+            confirmed: hits("obstacles.confirm_hits", self.confirm_hits)?,
+            existence_max: hits("obstacles.max_evidence", self.max_evidence)?,
+            tentative_loss: hits("obstacles.tentative_loss_per_s", self.tentative_loss_per_s)?,
+            visible_loss: hits("obstacles.visible_loss_per_s", self.visible_loss_per_s)?,
+            hidden_loss: hits("obstacles.hidden_loss_per_s", self.hidden_loss_per_s)?,
+            merge_gap_cm: cm("obstacles.merge_gap_m", self.merge_gap_m, 0.0, 20.0)?,
+            merge_headway: math::round_i32(
+                within("obstacles.merge_headway_s", self.merge_headway_s, 0.0, 5.0)? * 65536.0,
+            ),
+            merge_standstill_cm: 150,
+            merge_lateral_cm: 100,
+            merge_speed: 200 << 8,
+            merge_parallel: 15_500, // 19 degrees
+            half_width_cm: 80,
+            young: 5,
+            young_inertia: 1 << 13,
+            inertia: 4 << 14,
+            most_hits_a_frame: 3,
+            mover_cm: 200,
+            fixture_speed: math::round_i32(self.min_speed_mps * 100.0) << 7,
+            turning_speed: 200 << 4,
+            recentre_bins: 6,
+            sizes: self.sizes.sizes()?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_impossible_parameter_is_named() {
+        let e = ObstacleConfig { gap_m: -1.0, ..ObstacleConfig::default() }.tracking().unwrap_err();
+        assert_eq!(e.parameter, "obstacles.gap_m");
+    }
+}

@@ -1,0 +1,124 @@
+//! The polar result: graded visibility and occupancy at slice height, azimuth by ground range.
+
+use crate::angle::Angle;
+use crate::axes::Axes;
+use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use crate::mount::Levelling;
+use crate::trig;
+
+/// Grade of a cell nobody has evidence for.
+const UNKNOWN: u8 = 0;
+
+/// Where the cells of a polar map lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PolarGeometry {
+    /// The mount.
+    pub levelling: Levelling,
+    /// Length of a range cell along the ground, centimetres.
+    pub cell_cm: i32,
+    /// Right edge of the first azimuth, from the boresight's heading.
+    pub azimuth_origin: Angle,
+    /// Width of all azimuths together, 2^-16 turn.
+    pub azimuth_span: u16,
+}
+
+/// A polar visibility map of `A` azimuths (from right to left) by `R` ranges (from near to far).
+///
+/// # Limits
+/// `2 * A * R` bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PolarMap<const R: usize, const A: usize> {
+    /// Graded visibility, 1 (blocked) to 255 (clear); 0 = unknown.
+    grades: [[u8; R]; A],
+    /// Occupancy at slice height.
+    occupancy: [[u8; R]; A],
+    geometry: PolarGeometry,
+    /// Least grade that counts as visible.
+    visible_from: u8,
+    /// Least occupancy that counts as occupied.
+    occupied_from: u8,
+}
+
+impl<const R: usize, const A: usize> PolarMap<R, A> {
+    /// A map on which everything is unknown.
+    pub const fn unknown(geometry: PolarGeometry, visible_from: u8, occupied_from: u8) -> Self {
+        Self { grades: [[UNKNOWN; R]; A], occupancy: [[0; R]; A], geometry, visible_from, occupied_from }
+    }
+
+    /// Makes everything unknown.
+    pub fn forget(&mut self) {
+        self.grades = [[UNKNOWN; R]; A];
+        self.occupancy = [[0; R]; A];
+    }
+
+    /// Where the cells lie.
+    pub fn geometry(&self) -> &PolarGeometry {
+        &self.geometry
+    }
+
+    /// What is known of a cell; unknown outside the map.
+    pub fn cell(&self, azimuth: usize, range: usize) -> CellState {
+        let pick = |rows: &[[u8; R]; A]| rows.get(azimuth).and_then(|row| row.get(range)).copied();
+        match (pick(&self.grades), pick(&self.occupancy)) {
+            (Some(grade), Some(occupancy)) if grade != UNKNOWN => CellState {
+                visibility: if grade >= self.visible_from { Visibility::Visible } else { Visibility::Invisible },
+                grade,
+                occupancy,
+                occupied: occupancy >= self.occupied_from,
+            },
+            _ => CellState::UNKNOWN,
+        }
+    }
+
+    /// Grades (1 to 255, 0 = unknown) and occupancy of an azimuth, to be written by the ray caster.
+    pub fn rows_mut(&mut self, azimuth: usize) -> Option<(&mut [u8; R], &mut [u8; R])> {
+        self.grades.get_mut(azimuth).zip(self.occupancy.get_mut(azimuth))
+    }
+
+    /// Grades of an azimuth, 0 = unknown.
+    pub fn grades(&self, azimuth: usize) -> Option<&[u8; R]> {
+        self.grades.get(azimuth)
+    }
+
+    /// Occupancy of an azimuth.
+    pub fn occupancy(&self, azimuth: usize) -> Option<&[u8; R]> {
+        self.occupancy.get(azimuth)
+    }
+
+    /// The cell a place of the levelled frame lies in.
+    pub fn locate(&self, x_cm: i32, y_cm: i32) -> Option<(usize, usize)> {
+        let bearing = trig::bearing(x_cm, y_cm) - self.geometry.azimuth_origin;
+        let span = i32::from(self.geometry.azimuth_span).max(1);
+        // the same rounding as the grid's columns
+        let place = i32::from(bearing.raw()) * i32::try_from(A * 64).ok()? / (span / 4).max(1);
+        let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < A)?;
+        let square = i64::from(x_cm) * i64::from(x_cm) + i64::from(y_cm) * i64::from(y_cm);
+        let range = usize::try_from(square.unsigned_abs().isqrt()).ok()? / usize::try_from(self.geometry.cell_cm).ok()?.max(1);
+        (range < R).then_some((azimuth, range))
+    }
+
+    /// Least grade that counts as visible.
+    pub fn visible_from(&self) -> u8 {
+        self.visible_from
+    }
+}
+
+impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
+    /// The geometry of the maps cast on these axes.
+    pub fn polar(&self, levelling: &Levelling) -> PolarGeometry {
+        PolarGeometry {
+            levelling: *levelling,
+            cell_cm: self.cell_cm,
+            azimuth_origin: self.azimuth_origin,
+            azimuth_span: self.azimuth_span,
+        }
+    }
+}
+
+impl<const R: usize, const A: usize> VisibilityMap for PolarMap<R, A> {
+    /// The nearest cell's state, never a better neighbour's.
+    fn at(&self, point: RoadPoint) -> CellState {
+        let (x, y) = self.geometry.levelling.place(point);
+        self.locate(x, y).map_or(CellState::UNKNOWN, |(a, r)| self.cell(a, r))
+    }
+}

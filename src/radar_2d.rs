@@ -1,0 +1,215 @@
+//! The radar-2d estimator, the conventional baseline: occupancy and sight on a flat Cartesian grid.
+//!
+//! ```text
+//! detections -> gate -> reflections on the ground -> Cartesian grid -> sightlines -> map
+//! ```
+
+use crate::cartesian::{CELL_CM, CartesianConfig, CartesianGrid, CartesianParameters};
+use crate::config::{ConfigError, within};
+use crate::detection::Detection;
+use crate::field_of_view::Limits;
+use crate::gate::{Gate, GateConfig, Rejections};
+use crate::health::{Condition, Continuity, Health, HealthConfig, HealthLimits};
+use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use crate::math;
+use crate::mount::Levelling;
+use crate::reflection::Noise;
+use crate::scan::Scan;
+use crate::sensor::Sensor;
+use crate::sightlines::{Fan, Sightlines};
+use crate::time::{Step, Time};
+
+/// Everything that can be set, in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Radar2dConfig {
+    /// Which detections count.
+    pub gate: GateConfig,
+    /// The grid.
+    pub cartesian: CartesianConfig,
+    /// Height at which a place is in view or not, metres.
+    pub slice_height_m: f32,
+    /// When maps end.
+    pub health: HealthConfig,
+}
+
+impl Default for Radar2dConfig {
+    fn default() -> Self {
+        Self {
+            gate: GateConfig::default(),
+            cartesian: CartesianConfig::default(),
+            slice_height_m: 1.0,
+            health: HealthConfig::default(),
+        }
+    }
+}
+
+/// The configuration, checked and in integers.
+#[derive(Debug, Clone)]
+pub struct Radar2dParameters {
+    levelling: Levelling,
+    view: Limits,
+    gate: Gate,
+    noise: Noise,
+    cartesian: CartesianParameters,
+    fan: Fan,
+    slice_height_cm: i32,
+    health: HealthLimits,
+}
+
+impl Radar2dParameters {
+    /// Checks a configuration for a grid of `NX` by `NY` cells.
+    ///
+    /// # Errors
+    /// Names the first parameter that cannot be worked with.
+    pub fn new<const NX: usize, const NY: usize>(sensor: &Sensor, config: &Radar2dConfig) -> Result<Self, ConfigError> {
+        let levelling = sensor.mount.levelling()?;
+        let view = sensor.field_of_view.limits()?;
+        let slice = within("slice_height_m", config.slice_height_m, 0.0, 10.0)?;
+        let fan = Fan::new(&view);
+        let range_max_m = sensor.field_of_view.range_max_m;
+        let corners = fan.outline(view.range_cm[1]).map(|(x, y)| levelling.unplace(x, y));
+        Ok(Self {
+            gate: config.gate.gate(&view)?,
+            noise: sensor.noise.noise()?,
+            cartesian: config.cartesian.parameters::<NX, NY>(corners, range_max_m)?,
+            fan,
+            slice_height_cm: math::round_i32(slice * 100.0),
+            health: config.health.limits()?,
+            levelling,
+            view,
+        })
+    }
+}
+
+/// Which places behind an occupied one count as visible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reading {
+    /// All up to the last occupied cell on the ray: the sensor measured there.
+    Last,
+    /// All up to the end of the first occupied run.
+    First,
+}
+
+/// The estimator's state: a grid of `NX` by `NY` cells, `N` rays, `D` detections.
+#[derive(Debug, Clone)]
+pub struct Radar2d<const NX: usize, const NY: usize, const N: usize, const D: usize> {
+    scan: Scan<D>,
+    grid: CartesianGrid<NX, NY>,
+    sightlines: Sightlines<N>,
+    health: Health,
+    /// Whether the last frame left a map.
+    known: bool,
+    rejections: Rejections,
+}
+
+impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Default for Radar2d<NX, NY, N, D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Radar2d<NX, NY, N, D> {
+    /// Knows nothing; to be placed in static memory.
+    pub const fn new() -> Self {
+        Self {
+            scan: Scan::new(),
+            grid: CartesianGrid::new(),
+            sightlines: Sightlines::new(),
+            health: Health::NEW,
+            known: false,
+            rejections: Rejections::NONE,
+        }
+    }
+
+    /// Forgets everything but the counters.
+    pub fn reset(&mut self) {
+        self.grid.clear();
+        self.sightlines.clear();
+        self.health = Health::NEW;
+        self.known = false;
+    }
+
+    /// Takes a radar frame. `fault` is the sensor's own flag.
+    pub fn process<'a>(
+        &mut self,
+        p: &Radar2dParameters,
+        now: Time,
+        detections: impl IntoIterator<Item = &'a Detection>,
+        fault: bool,
+    ) -> Condition {
+        let mut reported = 0;
+        self.scan.clear();
+        for d in detections {
+            reported += 1;
+            self.scan.add(d, &p.gate, &p.noise, &p.levelling);
+        }
+        self.rejections.add_all(self.scan.rejections());
+        match self.health.frame(now, reported, fault, &p.health) {
+            Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros).keep(p.cartesian.memory)),
+            Continuity::First => {}
+            Continuity::Gap | Continuity::ClockStepped => self.grid.clear(),
+        }
+        for r in self.scan.reflections() {
+            self.grid.add(r, &p.noise, &p.levelling, &p.cartesian);
+        }
+        self.sightlines.clear();
+        for cell in self.grid.occupied(&p.cartesian) {
+            let (x, y) = p.levelling.place(cell);
+            self.sightlines.block(x, y, CELL_CM, &p.fan);
+        }
+        self.expire(p, now)
+    }
+
+    /// Makes the map unknown when its time has run out; to be called when no frame comes.
+    pub fn expire(&mut self, p: &Radar2dParameters, now: Time) -> Condition {
+        let condition = self.health.condition(now, &p.health);
+        self.known = condition == Condition::Healthy;
+        condition
+    }
+
+    /// The map, by one reading.
+    pub fn map<'a>(&'a self, p: &'a Radar2dParameters, reading: Reading) -> Radar2dMap<'a, NX, NY, N> {
+        let visible_from = match reading {
+            Reading::Last => 2,
+            Reading::First => 255,
+        };
+        Radar2dMap { grid: &self.grid, sightlines: &self.sightlines, known: self.known, visible_from, parameters: p }
+    }
+
+    /// Detections rejected since the start, by reason.
+    pub fn rejections(&self) -> &Rejections {
+        &self.rejections
+    }
+}
+
+/// The map of the last frame.
+#[derive(Debug, Clone)]
+pub struct Radar2dMap<'a, const NX: usize, const NY: usize, const N: usize> {
+    grid: &'a CartesianGrid<NX, NY>,
+    sightlines: &'a Sightlines<N>,
+    known: bool,
+    visible_from: u8,
+    parameters: &'a Radar2dParameters,
+}
+
+impl<const NX: usize, const NY: usize, const N: usize> VisibilityMap for Radar2dMap<'_, NX, NY, N> {
+    fn at(&self, point: RoadPoint) -> CellState {
+        let p = self.parameters;
+        let (x, y) = p.levelling.place(point);
+        if !self.known || !p.view.contains(p.levelling.unlevel([x, y, p.slice_height_cm - p.levelling.height_cm])) {
+            return CellState::UNKNOWN;
+        }
+        let grade = self.sightlines.grade(x, y, CELL_CM, &p.fan);
+        let cell = (point.x_cm.div_euclid(CELL_CM), point.y_cm.div_euclid(CELL_CM));
+        let occupancy = self.grid.occupancy(cell.0, cell.1, &p.cartesian).unwrap_or(0);
+        CellState {
+            visibility: if grade >= self.visible_from { Visibility::Visible } else { Visibility::Invisible },
+            grade,
+            occupancy,
+            occupied: occupancy >= p.cartesian.occupied_from,
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! The radar-3d estimator: all stages in order, from detections to a polar map.
+//!
+//! ```text
+//! detections -> gate -> reflections on the ground -> moving obstacles -+-> solids ---+
+//!                                                                      |             v
+//!                                             unclaimed detections -> evidence -> spherical grid
+//!                                                                                    |
+//!                        polar map: grade, bit, occupancy <- slice at h <- ray casting
+//! ```
+
+use crate::axes::Axes;
+use crate::config::{ConfigError, within};
+use crate::detection::Detection;
+use crate::evidence::{EvidenceConfig, InverseSensor};
+use crate::gate::{Gate, GateConfig, Rejections};
+use crate::health::{Condition, Continuity, Health, HealthConfig, HealthLimits};
+use crate::math;
+use crate::mount::Levelling;
+use crate::obstacles::tracking::{ObstacleConfig, Tracking};
+use crate::obstacles::{Claimed, Obstacles};
+use crate::polar::PolarMap;
+use crate::raycast;
+use crate::reflection::Noise;
+use crate::scan::Scan;
+use crate::sensor::Sensor;
+use crate::spherical::SphericalGrid;
+use crate::time::{Step, Time};
+use crate::voxelise::voxelise;
+
+/// Everything that can be set, in SI units.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct Radar3dConfig {
+    /// Which detections count.
+    pub gate: GateConfig,
+    /// Moving things.
+    pub obstacles: ObstacleConfig,
+    /// Unmoving things.
+    pub evidence: EvidenceConfig,
+    /// The result.
+    pub visibility: VisibilityConfig,
+    /// When maps end.
+    pub health: HealthConfig,
+}
+
+/// How the result is read off the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct VisibilityConfig {
+    /// Height above the road at which visibility is judged, metres.
+    pub slice_height_m: f32,
+    /// Least graded visibility that counts as visible.
+    pub visible_from: f32,
+    /// Least occupancy that counts as occupied.
+    pub occupied_from: f32,
+}
+
+impl Default for VisibilityConfig {
+    fn default() -> Self {
+        Self { slice_height_m: 1.0, visible_from: 0.5, occupied_from: 0.5 }
+    }
+}
+
+/// The configuration, checked and in integers.
+#[derive(Debug, Clone)]
+pub struct Radar3dParameters<const R: usize, const A: usize, const E: usize> {
+    axes: Axes<R, A, E>,
+    levelling: Levelling,
+    gate: Gate,
+    noise: Noise,
+    tracking: Tracking,
+    inverse_sensor: InverseSensor,
+    health: HealthLimits,
+    visible_from: u8,
+    occupied_from: u8,
+    /// How far obstacles are followed, centimetres.
+    limit_cm: i32,
+}
+
+impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> {
+    /// Checks a configuration.
+    ///
+    /// # Errors
+    /// Names the first parameter that cannot be worked with.
+    pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self, ConfigError> {
+        let levelling = sensor.mount.levelling()?;
+        let view = sensor.field_of_view.limits()?;
+        let axes = Axes::new(&levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
+        Ok(Self {
+            levelling,
+            gate: config.gate.gate(&view)?,
+            noise: sensor.noise.noise()?,
+            tracking: config.obstacles.tracking()?,
+            inverse_sensor: config.evidence.inverse_sensor(&sensor.noise, &axes)?,
+            health: config.health.limits()?,
+            visible_from: threshold("visibility.visible_from", config.visibility.visible_from)?,
+            occupied_from: threshold("visibility.occupied_from", config.visibility.occupied_from)?,
+            limit_cm: view.range_cm[1] + 2500,
+            axes,
+        })
+    }
+
+    /// An empty map for these parameters.
+    pub fn map(&self) -> PolarMap<R, A> {
+        PolarMap::unknown(self.axes.polar(&self.levelling), self.visible_from, self.occupied_from)
+    }
+
+    /// The grid's axes.
+    pub fn axes(&self) -> &Axes<R, A, E> {
+        &self.axes
+    }
+
+    /// The mount.
+    pub fn levelling(&self) -> &Levelling {
+        &self.levelling
+    }
+}
+
+/// A share of one as a byte, at least 2: grade 1 is blocked.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // limits are checked
+fn threshold(name: &'static str, share: f32) -> Result<u8, ConfigError> {
+    within(name, share, 0.01, 1.0).map(|s| math::round_i32(s * 255.0 + 0.25).clamp(2, 255) as u8)
+}
+
+/// The estimator's state: `R` ranges, `A` azimuths, `E` elevations, `N` obstacles, `D` detections.
+#[derive(Debug, Clone)]
+pub struct Radar3d<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> {
+    scan: Scan<D>,
+    obstacles: Obstacles<N>,
+    grid: SphericalGrid<R, A, E>,
+    health: Health,
+    rejections: Rejections,
+}
+
+/// The reference grid: 200 m in 1 m cells, 1 degree, 16 elevations.
+pub type ReferenceProfile = Radar3d<200, 120, 16, 96, 256>;
+
+/// For controllers with 128 kB: 2 m cells.
+pub type SmallProfile = Radar3d<100, 64, 8, 32, 128>;
+
+/// What a frame did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FrameReport {
+    /// How the frame follows the last.
+    pub continuity: Continuity,
+    /// What the sensor's frames say of it.
+    pub condition: Condition,
+    /// Detections used.
+    pub used: u16,
+    /// Detections rejected in this frame, by reason.
+    pub rejections: Rejections,
+    /// Obstacles followed, confirmed or not.
+    pub obstacles: u16,
+}
+
+impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> Default for Radar3d<R, A, E, N, D> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> Radar3d<R, A, E, N, D> {
+    /// Knows nothing; to be placed in static memory.
+    pub const fn new() -> Self {
+        Self {
+            scan: Scan::new(),
+            obstacles: Obstacles::new(),
+            grid: SphericalGrid::new(),
+            health: Health::NEW,
+            rejections: Rejections::NONE,
+        }
+    }
+
+    /// Forgets everything but the counters.
+    pub fn reset(&mut self) {
+        self.obstacles.clear();
+        self.grid.clear();
+        self.health = Health::NEW;
+    }
+
+    /// Takes a radar frame and brings the map up to its time. `fault` is the sensor's own flag.
+    #[allow(clippy::cast_possible_truncation)] // bounded lists
+    pub fn process<'a>(
+        &mut self,
+        p: &Radar3dParameters<R, A, E>,
+        now: Time,
+        detections: impl IntoIterator<Item = &'a Detection>,
+        fault: bool,
+        map: &mut PolarMap<R, A>,
+    ) -> FrameReport {
+        let mut reported = 0;
+        self.scan.clear();
+        for d in detections {
+            reported += 1;
+            self.scan.add(d, &p.gate, &p.noise, &p.levelling);
+        }
+        let continuity = self.health.frame(now, reported, fault, &p.health);
+        if continuity.resets() {
+            self.obstacles.clear();
+            self.grid.clear();
+        }
+        let step = match continuity {
+            Continuity::Follows(micros) => Step::from_micros(micros),
+            _ => Step::from_micros(0),
+        };
+        let claimed = self.follow_obstacles(p, step, map);
+        self.update_grid(p, step, continuity, &claimed, map);
+        let condition = self.health.condition(now, &p.health);
+        if condition == Condition::Healthy {
+            raycast::cast(&self.grid, &p.axes, map);
+        } else {
+            map.forget();
+        }
+        self.rejections.add_all(self.scan.rejections());
+        FrameReport {
+            continuity,
+            condition,
+            used: self.scan.reflections().len() as u16,
+            rejections: *self.scan.rejections(),
+            obstacles: self.obstacles.iter().count() as u16,
+        }
+    }
+
+    fn follow_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, step: Step, map: &PolarMap<R, A>) -> Claimed<D> {
+        let in_view = |x, y| map.locate(x, y).is_some_and(|(a, r)| map.cell(a, r).visible());
+        let reflections = self.scan.reflections();
+        self.obstacles.step(reflections, step, &p.tracking, &p.noise, &p.levelling, p.limit_cm, in_view)
+    }
+
+    fn update_grid(
+        &mut self,
+        p: &Radar3dParameters<R, A, E>,
+        step: Step,
+        continuity: Continuity,
+        claimed: &Claimed<D>,
+        map: &PolarMap<R, A>,
+    ) {
+        let first = !matches!(continuity, Continuity::Follows(_));
+        self.grid.remove_solids();
+        p.inverse_sensor.fade(&mut self.grid, map, step);
+        let reflections = self.scan.reflections();
+        for r in reflections {
+            p.inverse_sensor.clear(r, &p.axes, &mut self.grid);
+        }
+        for (i, r) in reflections.iter().enumerate() {
+            if !claimed.contains(i) {
+                p.inverse_sensor.add(r, first, &p.axes, &mut self.grid);
+            }
+        }
+        for solid in self.obstacles.solids(&p.tracking) {
+            voxelise(&solid, &p.axes, &mut self.grid);
+        }
+    }
+
+    /// Makes the map unknown when its time has run out; to be called when no frame comes.
+    pub fn expire(&self, p: &Radar3dParameters<R, A, E>, now: Time, map: &mut PolarMap<R, A>) -> Condition {
+        let condition = self.health.condition(now, &p.health);
+        if condition != Condition::Healthy {
+            map.forget();
+        }
+        condition
+    }
+
+    /// Detections rejected since the start, by reason.
+    pub fn rejections(&self) -> &Rejections {
+        &self.rejections
+    }
+
+    /// The moving obstacles.
+    pub fn obstacles(&self) -> &Obstacles<N> {
+        &self.obstacles
+    }
+
+    /// The occupancy grid.
+    pub fn grid(&self) -> &SphericalGrid<R, A, E> {
+        &self.grid
+    }
+}

@@ -1,0 +1,234 @@
+//! Lines of sight through the grid, and the slice at h: occupancy in, graded visibility out.
+//!
+//! # Model
+//! A line of sight is one azimuth and one elevation, so what blocks a cell is the largest occupancy
+//! among the nearer cells of its row: `blocked(r) = max over r' < r of Occ(r')`, and the grade is
+//! what is left of 255. The point at slice height lies between the centres of two rows; its value
+//! is interpolated, which finds the top of an obstacle within a row to 8 % of the row's height.
+//!
+//! An object never hides itself: the cells of an occupied run count as blocking only once the ray
+//! has left the run. What stands on the far side of the run is hidden.
+
+use crate::axes::Axes;
+use crate::polar::PolarMap;
+use crate::spherical::{Column, SphericalGrid};
+
+/// Occupancy from which a cell belongs to an object of its own.
+const OCCUPIED: u8 = 128;
+
+/// Grade of a cell that is known and blocked.
+const BLOCKED: u8 = 1;
+
+/// Casts all rays and writes the visibility and occupancy at slice height. Cells out of view stay
+/// unknown.
+///
+/// Costs a pass over the stacks that hold something and, behind the first of them, one step for
+/// each range cell in half-shadow.
+pub fn cast<const R: usize, const A: usize, const E: usize>(
+    grid: &SphericalGrid<R, A, E>,
+    axes: &Axes<R, A, E>,
+    map: &mut PolarMap<R, A>,
+) {
+    for (a, column) in grid.columns().enumerate() {
+        let Some((grades, occupancy)) = map.rows_mut(a) else { return };
+        *occupancy = [0; R];
+        cast_column(column, axes, grades, occupancy);
+        let view = axes.view(a);
+        if let Some(near) = grades.get_mut(..view.start) {
+            near.fill(0);
+        }
+        if let Some(far) = grades.get_mut(view.end..) {
+            far.fill(0);
+        }
+    }
+}
+
+fn cast_column<const R: usize, const A: usize, const E: usize>(
+    column: &Column<R, E>,
+    axes: &Axes<R, A, E>,
+    grades: &mut [u8; R],
+    occupancy: &mut [u8; R],
+) {
+    let mut shadow = Shadow { blocked: [0; E], run: [0; E], in_run: false };
+    let mut rows = axes.slice_rows().iter();
+    let mut lower = rows.next().copied();
+    let mut next = 0;
+    for (r, stack) in column.stacks() {
+        if next < r {
+            shadow.leave_run();
+            shadow.shade(axes, grades, next, r);
+        }
+        while lower.is_some_and(|s| usize::from(s.end) <= r) {
+            lower = rows.next().copied();
+        }
+        let row = lower.map_or(0, |s| usize::from(s.lower));
+        let share = axes.slice_share().get(r).copied().unwrap_or(0);
+        let here = pair(stack, row).at(share);
+        if here < OCCUPIED {
+            shadow.leave_run();
+        }
+        if let (Some(g), Some(o)) = (grades.get_mut(r), occupancy.get_mut(r)) {
+            *g = (255 - pair(&shadow.blocked, row).at(share)).max(BLOCKED);
+            *o = here;
+        }
+        shadow.pass(stack, here >= OCCUPIED);
+        next = r + 1;
+    }
+    shadow.leave_run();
+    shadow.shade(axes, grades, next, R);
+}
+
+/// What the ray bundle of one azimuth has met so far.
+struct Shadow<const E: usize> {
+    /// Largest occupancy on each row before the present run.
+    blocked: [u8; E],
+    /// Largest occupancy on each row within it.
+    run: [u8; E],
+    in_run: bool,
+}
+
+impl<const E: usize> Shadow<E> {
+    fn pass(&mut self, stack: &[u8; E], occupied: bool) {
+        self.in_run |= occupied;
+        raise(if occupied { &mut self.run } else { &mut self.blocked }, stack);
+    }
+
+    fn leave_run(&mut self) {
+        if self.in_run {
+            raise(&mut self.blocked, &self.run);
+            self.run = [0; E];
+            self.in_run = false;
+        }
+    }
+
+    /// Grades of a stretch of empty cells.
+    fn shade<const R: usize, const A: usize>(&self, axes: &Axes<R, A, E>, grades: &mut [u8; R], from: usize, to: usize) {
+        if self.blocked == [0; E] {
+            if let Some(clear) = grades.get_mut(from..to) {
+                clear.fill(255);
+            }
+            return;
+        }
+        let mut start = from;
+        for stretch in axes.slice_rows() {
+            let end = usize::from(stretch.end).min(to);
+            if end <= start {
+                continue;
+            }
+            let pair = pair(&self.blocked, usize::from(stretch.lower));
+            let (Some(cells), Some(shares)) = (grades.get_mut(start..end), axes.slice_share().get(start..end)) else { return };
+            if pair.low == pair.high {
+                cells.fill((255 - pair.low).max(BLOCKED));
+            } else {
+                for (g, &share) in cells.iter_mut().zip(shares) {
+                    *g = (255 - pair.at(share)).max(BLOCKED);
+                }
+            }
+            start = end;
+        }
+    }
+}
+
+/// Byte-wise maximum.
+fn raise<const E: usize>(level: &mut [u8; E], by: &[u8; E]) {
+    for (a, b) in level.iter_mut().zip(by) {
+        *a = (*a).max(*b);
+    }
+}
+
+/// Values on two neighbouring rows.
+#[derive(Clone, Copy)]
+struct Pair {
+    low: u8,
+    high: u8,
+}
+
+fn pair<const E: usize>(rows: &[u8; E], lower: usize) -> Pair {
+    match rows.get(lower..lower + 2) {
+        Some(&[low, high]) => Pair { low, high },
+        _ => Pair { low: 0, high: 0 },
+    }
+}
+
+impl Pair {
+    /// Value between the rows, `share` / 256 of the way up.
+    #[allow(clippy::cast_possible_truncation)] // a mean of bytes
+    fn at(self, share: u8) -> u8 {
+        let share = u32::from(share);
+        ((u32::from(self.low) * (256 - share) + u32::from(self.high) * share) >> 8) as u8
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field_of_view::FieldOfView;
+    use crate::map::{RoadPoint, Visibility, VisibilityMap};
+    use crate::mount::Mount;
+    use crate::solid::Solid;
+    use crate::trig::Direction;
+    use crate::voxelise::voxelise;
+    use std::format;
+    use std::string::String;
+
+    const VIEW: FieldOfView = FieldOfView {
+        azimuth_min_deg: -30.0,
+        azimuth_max_deg: 30.0,
+        elevation_min_deg: -30.0,
+        elevation_max_deg: 16.0,
+        range_min_m: 1.0,
+        range_max_m: 100.0,
+    };
+
+    /// Draws a map over the road: rows from left (top) to right, x ahead to the right; a character
+    /// is 5 m along by 2.5 m across. `.` visible, `#` invisible, `?` unknown, `O` visible and occupied.
+    fn draw(height_m: f32, yaw_deg: f32, solids: &[Solid]) -> String {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
+        let levelling = mount.levelling().unwrap();
+        let axes = Axes::<100, 120, 16>::new(&levelling, &VIEW, 1.0).unwrap();
+        let mut grid = SphericalGrid::new();
+        for s in solids {
+            voxelise(s, &axes, &mut grid);
+        }
+        let mut map = PolarMap::unknown(axes.polar(&levelling), 128, 128);
+        cast(&grid, &axes, &mut map);
+        let mut picture = String::new();
+        for j in (-4..=4).rev() {
+            for i in 0..20 {
+                let s = map.at(RoadPoint::new(i * 500 + 250, j * 250));
+                picture.push(match (s.visibility, s.occupied) {
+                    (Visibility::Unknown, _) => '?',
+                    (Visibility::Invisible, _) => '#',
+                    (Visibility::Visible, false) => '.',
+                    (Visibility::Visible, true) => 'O',
+                });
+            }
+            picture.push('\n');
+        }
+        format!("\n{picture}")
+    }
+
+    fn car(x_cm: i32, y_cm: i32, height_cm: i32) -> Solid {
+        Solid { x_cm, y_cm, heading: Direction::AHEAD, half_length_cm: 260, half_width_cm: 140, height_cm }
+    }
+
+    #[test]
+    fn a_truck_to_the_left_hides_the_left() {
+        // rear edge at 22.6 m, 4 m high, sensor at 6 m: hidden to 22.6 * 5 / 2 = 56 m
+        let expected = "
+???.................
+???.......#.........
+???....####.........
+???.O######.........
+???.................
+???.................
+???.................
+???.................
+???.................
+";
+        let _ = expected;
+        let got = draw(6.0, 0.0, &[car(2000, 300, 400)]);
+        std::eprintln!("{got}");
+        assert_eq!(got, expected);
+    }
+}

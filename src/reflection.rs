@@ -1,0 +1,198 @@
+//! Detections placed on the ground of the levelled frame.
+//!
+//! A detection marks a reflection point of something standing on the road. Its measured elevation
+//! is noisy (1 degree is 2.6 m at 150 m), so the *place* is taken where range and azimuth meet a
+//! usual reflector height, and the *height* is kept beside it as measured.
+
+use crate::angle::Angle;
+use crate::config::{ConfigError, within};
+use crate::detection::Detection;
+use crate::math;
+use crate::mount::Levelling;
+use crate::trig::{self, Direction, ONE};
+
+/// How well the sensor measures; from its data sheet.
+///
+/// # Units
+/// Standard deviations in metres and degrees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct NoiseConfig {
+    /// Range.
+    pub range_m: f32,
+    /// Azimuth.
+    pub azimuth_deg: f32,
+    /// Elevation.
+    pub elevation_deg: f32,
+    /// Radial velocity, m/s.
+    pub radial_velocity_mps: f32,
+    /// Height above the road at which vehicles usually reflect (bumpers, axles, plates).
+    pub reflector_height_m: f32,
+}
+
+impl Default for NoiseConfig {
+    fn default() -> Self {
+        Self { range_m: 0.25, azimuth_deg: 0.5, elevation_deg: 1.0, radial_velocity_mps: 0.15, reflector_height_m: 0.8 }
+    }
+}
+
+/// The noise model in integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Noise {
+    /// Range, centimetres.
+    pub range_cm: i32,
+    /// Azimuth, 2^-16 rad.
+    azimuth: i32,
+    /// Elevation, 2^-16 rad.
+    elevation: i32,
+    /// Radial velocity, cm/s.
+    pub radial_velocity_cm_s: i32,
+    reflector_height_cm: i32,
+}
+
+impl NoiseConfig {
+    /// Checks the figures and rounds them.
+    ///
+    /// # Errors
+    /// Names the parameter outside its limits.
+    pub fn noise(&self) -> Result<Noise, ConfigError> {
+        let angle = |degrees: f32| math::round_i32(degrees.to_radians() * 65536.0);
+        Ok(Noise {
+            range_cm: math::round_i32(within("noise.range_m", self.range_m, 0.01, 5.0)? * 100.0),
+            azimuth: angle(within("noise.azimuth_deg", self.azimuth_deg, 0.01, 10.0)?),
+            elevation: angle(within("noise.elevation_deg", self.elevation_deg, 0.01, 20.0)?),
+            radial_velocity_cm_s: math::round_i32(
+                within("noise.radial_velocity_mps", self.radial_velocity_mps, 0.01, 5.0)? * 100.0,
+            ),
+            reflector_height_cm: math::round_i32(
+                within("noise.reflector_height_m", self.reflector_height_m, 0.0, 3.0)? * 100.0,
+            ),
+        })
+    }
+}
+
+/// A reflection point on the road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reflection {
+    /// Place in the levelled frame, centimetres.
+    pub x_cm: i32,
+    /// Place in the levelled frame, centimetres, + left.
+    pub y_cm: i32,
+    /// Distance along the ground, centimetres.
+    pub ground_cm: i32,
+    /// Levelled azimuth.
+    pub bearing: Angle,
+    /// Ground components of the unit line of sight (shorter than one where it points down).
+    pub sight: Direction,
+    /// Radial velocity, cm/s, + receding.
+    pub radial_velocity_cm_s: i32,
+    /// Standard deviation across the line of sight, centimetres.
+    pub across_cm: i32,
+    /// Measured height above the road and its standard deviation, centimetres.
+    pub height_cm: Option<(i32, i32)>,
+    /// Radar cross-section, half dBsm.
+    pub rcs_half_dbsm: Option<i16>,
+    /// What decides who stays when a list is full, half dB.
+    pub strength: i16,
+}
+
+impl Noise {
+    /// Places a detection on the ground.
+    #[allow(clippy::cast_possible_truncation)] // unit vectors stay within 2^14 plus rounding
+    pub fn place(&self, d: &Detection, levelling: &Levelling) -> Reflection {
+        let range = i32::from(d.range_cm);
+        // the half-plane of this azimuth, levelled: ahead (elevation 0) and up
+        let ahead = levelling.level([trig::cos(d.azimuth), trig::sin(d.azimuth), 0]);
+        let up = levelling.up();
+        let fall = ((self.reflector_height_cm - levelling.height_cm) << 14) / range.max(1);
+        let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
+        let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
+        let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
+        let ground_cm = ((x_cm * x_cm + y_cm * y_cm) as u32).isqrt() as i32;
+        let height_cm = d.elevation.map(|e| {
+            let z = (ahead[2] * trig::cos(e) + up[2] * trig::sin(e)) >> 14;
+            (levelling.height_cm + ((z * range) >> 14), math::mul_shift(range, self.elevation, 16).max(1))
+        });
+        Reflection {
+            x_cm,
+            y_cm,
+            ground_cm,
+            bearing: trig::bearing(x_cm, y_cm),
+            sight: Direction { x: x as i16, y: y as i16 },
+            radial_velocity_cm_s: i32::from(d.radial_velocity_cm_s),
+            across_cm: math::mul_shift(range, self.azimuth, 16).max(1),
+            height_cm,
+            rcs_half_dbsm: d.rcs_half_dbsm,
+            strength: d.strength(),
+        }
+    }
+}
+
+/// Cosine and sine of the elevation at which a half-plane meets a height: ahead cos + up sin = fall,
+/// all 2^-14; straight up or down where it never does.
+#[allow(clippy::cast_possible_wrap, clippy::cast_sign_loss, clippy::cast_possible_truncation)] // squares of 2^14 fit
+fn meet_height(fall: i32, ahead: i32, up: i32) -> (i32, i32) {
+    let square = (ahead * ahead + up * up).max(1);
+    let reach = (square as u32).isqrt() as i32;
+    let fall = fall.clamp(-reach, reach);
+    let rest = ((square - fall * fall).max(0) as u32).isqrt() as i32;
+    // both are below 2^14 times the reach
+    let scaled = |v: i32| (v / (square >> 14).max(1)).clamp(-ONE, ONE);
+    (scaled(ahead * fall + up * rest), scaled(up * fall - ahead * rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mount::Mount;
+
+    fn place(range_m: f32, azimuth_deg: f32, elevation_deg: Option<f32>, pitch_deg: f32) -> Reflection {
+                let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
+        let d = Detection {
+            range_cm: (range_m * 100.0) as u16,
+            azimuth: Angle::from_degrees(azimuth_deg),
+            elevation: elevation_deg.map(Angle::from_degrees),
+            radial_velocity_cm_s: 100,
+            rcs_half_dbsm: None,
+            snr_half_db: Some(30),
+        };
+        NoiseConfig::default().noise().unwrap().place(&d, &mount.levelling().unwrap())
+    }
+
+    #[test]
+    fn a_reflection_lies_at_reflector_height_under_its_azimuth() {
+        let r = place(100.0, 30.0, None, 0.0);
+        // sqrt(100^2 - 5.2^2) = 99.86 m along the ground
+        assert!((r.ground_cm - 9986).abs() <= 3, "{r:?}");
+        assert!((r.x_cm - 8648).abs() <= 5 && (r.y_cm - 4993).abs() <= 5, "{r:?}");
+        assert_eq!(r.height_cm, None);
+        assert!((r.across_cm - 87).abs() <= 1, "half a degree at 100 m");
+    }
+
+    #[test]
+    fn pitch_turns_the_line_of_sight_and_not_the_place() {
+        let level = place(60.0, 40.0, None, 0.0);
+        let down = place(60.0, 40.0, None, 4.0);
+        assert!((level.ground_cm - down.ground_cm).abs() <= 5);
+        // looking down, the same sensor azimuth meets the ground a little farther out
+        assert!(down.bearing.raw() > level.bearing.raw());
+        assert!((down.bearing.raw() - level.bearing.raw()) < 80);
+    }
+
+    #[test]
+    fn elevation_up_is_height_up() {
+        let (up, _) = place(100.0, 0.0, Some(-1.0), 0.0).height_cm.unwrap();
+        let (down, sigma) = place(100.0, 0.0, Some(-3.0), 0.0).height_cm.unwrap();
+        assert!((up - (600 - 175)).abs() <= 3 && (down - (600 - 523)).abs() <= 3, "{up} {down}");
+        assert!((sigma - 174).abs() <= 1);
+        let (pitched, _) = place(100.0, 0.0, Some(0.0), 3.0).height_cm.unwrap();
+        assert!((pitched - (600 - 523)).abs() <= 3, "nose down lowers the axis: {pitched}");
+    }
+
+    #[test]
+    fn a_range_shorter_than_the_mast_lies_below_the_sensor() {
+        let r = place(4.0, 20.0, None, 0.0);
+        assert!(r.ground_cm < 20, "{r:?}");
+    }
+}

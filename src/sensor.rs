@@ -1,0 +1,18 @@
+//! A sensor as it is installed: what the integrator measures and reads off the data sheet.
+
+use crate::field_of_view::FieldOfView;
+use crate::mount::Mount;
+use crate::reflection::NoiseConfig;
+
+/// Where a sensor stands, what it could see, and how well it measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct Sensor {
+    /// Where it stands.
+    pub mount: Mount,
+    /// What it could see under ideal conditions.
+    pub field_of_view: FieldOfView,
+    /// How well it measures.
+    pub noise: NoiseConfig,
+}

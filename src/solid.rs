@@ -1,0 +1,110 @@
+//! Upright boxes on the road, in the levelled frame: what obstacles become for the grid.
+
+use crate::trig::Direction;
+
+/// An upright box standing on the road.
+///
+/// # Units
+/// Centimetres, levelled frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Solid {
+    /// Middle of the footprint.
+    pub x_cm: i32,
+    /// Middle of the footprint, + left.
+    pub y_cm: i32,
+    /// Direction of its length.
+    pub heading: Direction,
+    /// Half the length.
+    pub half_length_cm: i32,
+    /// Half the width.
+    pub half_width_cm: i32,
+    /// Top above the road.
+    pub height_cm: i32,
+}
+
+impl Solid {
+    /// Corners of the footprint, counter-clockwise.
+    pub fn corners(&self) -> [(i32, i32); 4] {
+        let left = self.heading.left();
+        let (lx, ly) = scaled(self.heading, self.half_length_cm);
+        let (wx, wy) = scaled(left, self.half_width_cm);
+        [
+            (self.x_cm + lx + wx, self.y_cm + ly + wy),
+            (self.x_cm - lx + wx, self.y_cm - ly + wy),
+            (self.x_cm - lx - wx, self.y_cm - ly - wy),
+            (self.x_cm + lx - wx, self.y_cm + ly - wy),
+        ]
+    }
+
+    /// Where a ray from the origin enters and leaves the footprint, centimetres along the ray;
+    /// `None` where it misses. An origin inside enters at 0.
+    pub fn crossing(&self, ray: Direction) -> Option<(i32, i32)> {
+        // the origin and the ray in the box's own axes
+        let start = (-self.heading.along(self.x_cm, self.y_cm), -self.heading.across(self.x_cm, self.y_cm));
+        let step = (
+            self.heading.along(i32::from(ray.x), i32::from(ray.y)),
+            self.heading.across(i32::from(ray.x), i32::from(ray.y)),
+        );
+        let (mut enter, mut leave) = (0, i32::MAX);
+        for (start, step, half) in [(start.0, step.0, self.half_length_cm), (start.1, step.1, self.half_width_cm)] {
+            if step.abs() < PARALLEL {
+                if start.abs() > half {
+                    return None;
+                }
+                continue;
+            }
+            let at = |side: i32| (i64::from(side - start) << 14) / i64::from(step);
+            let (a, b) = (at(-half), at(half));
+            enter = enter.max(clamped(a.min(b)));
+            leave = leave.min(clamped(a.max(b)));
+        }
+        (enter < leave).then_some((enter, leave))
+    }
+}
+
+/// Below this a ray counts as parallel to a side, 2^-14: 0.014 degrees.
+const PARALLEL: i32 = 4;
+
+#[allow(clippy::cast_possible_truncation)] // clamped
+fn clamped(v: i64) -> i32 {
+    v.clamp(-(1 << 24), 1 << 24) as i32
+}
+
+fn scaled(d: Direction, length: i32) -> (i32, i32) {
+    ((i32::from(d.x) * length) >> 14, (i32::from(d.y) * length) >> 14)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::trig;
+    use super::*;
+    use crate::angle::Angle;
+    
+    fn truck(x_cm: i32, y_cm: i32, heading_deg: f32) -> Solid {
+        Solid {
+            x_cm,
+            y_cm,
+            heading: trig::direction(Angle::from_degrees(heading_deg)),
+            half_length_cm: 800,
+            half_width_cm: 125,
+            height_cm: 400,
+        }
+    }
+
+    #[test]
+    fn a_ray_crosses_from_face_to_face() {
+        assert_eq!(truck(5000, 0, 0.0).crossing(Direction::AHEAD), Some((4200, 5800)));
+        let across = truck(5000, 0, 90.0).crossing(Direction::AHEAD).unwrap();
+        assert!((across.0 - 4875).abs() <= 2 && (across.1 - 5125).abs() <= 2, "{across:?}");
+        assert_eq!(truck(5000, 126, 0.0).crossing(Direction::AHEAD), None);
+        assert_eq!(truck(-5000, 0, 0.0).crossing(Direction::AHEAD), None, "behind the sensor");
+        assert_eq!(truck(0, 0, 0.0).crossing(Direction::AHEAD), Some((0, 800)), "over the sensor");
+    }
+
+    #[test]
+    fn corners_go_round_to_the_left() {
+        let c = truck(0, 0, 90.0).corners();
+        assert!((c[0].0 + 125).abs() <= 1 && (c[0].1 - 800).abs() <= 1, "{c:?}");
+        assert!((c[3].0 - 125).abs() <= 1 && (c[3].1 - 800).abs() <= 1, "{c:?}");
+    }
+}
