@@ -133,12 +133,11 @@ impl InverseSensor {
         let prior = self.height_prior_variance;
         let (height, variance) = match r.height_cm {
             Some((measured, sigma)) => {
-                let noise = sigma * sigma;
-                let weight = (i64::from(prior) << 8) / i64::from(prior + noise).max(1);
-                let height = self.height_prior_cm + (((measured - self.height_prior_cm) * weight as i32) >> 8);
-                (height, (i64::from(noise) * weight) >> 8)
+                let noise = sigma.min(10_000) * sigma.min(10_000);
+                let weight = (prior << 8) / (prior + noise).max(1);
+                (self.height_prior_cm + (((measured - self.height_prior_cm) * weight) >> 8), math::mul_shift(noise, weight, 8))
             }
-            None => (self.height_prior_cm, i64::from(prior)),
+            None => (self.height_prior_cm, prior),
         };
         (height, (variance.unsigned_abs().isqrt() as i32).max(1))
     }

@@ -5,6 +5,9 @@ use crate::config::{ConfigError, above, within};
 use crate::math;
 use crate::trig;
 
+/// Longest range a field of view may have, metres: squares of centimetres stay in 32 bits.
+pub const MAX_RANGE_M: f32 = 400.0;
+
 /// Limits in the sensor frame.
 ///
 /// # Units
@@ -43,7 +46,7 @@ impl FieldOfView {
     ///
     /// # Errors
     /// Limits that are reversed or not finite, an azimuth beyond 85 degrees (a roadside radar looks
-    /// ahead), a range beyond 600 m.
+    /// ahead), a range beyond [`MAX_RANGE_M`].
     pub fn limits(&self) -> Result<Limits, ConfigError> {
         within("field_of_view.azimuth_min_deg", self.azimuth_min_deg, -85.0, 85.0)?;
         within("field_of_view.azimuth_max_deg", self.azimuth_max_deg, -85.0, 85.0)?;
@@ -51,8 +54,8 @@ impl FieldOfView {
         within("field_of_view.elevation_min_deg", self.elevation_min_deg, -85.0, 85.0)?;
         within("field_of_view.elevation_max_deg", self.elevation_max_deg, -85.0, 85.0)?;
         above("field_of_view.elevation_max_deg", self.elevation_max_deg, self.elevation_min_deg)?;
-        within("field_of_view.range_min_m", self.range_min_m, 0.0, 600.0)?;
-        within("field_of_view.range_max_m", self.range_max_m, 1.0, 600.0)?;
+        within("field_of_view.range_min_m", self.range_min_m, 0.0, MAX_RANGE_M)?;
+        within("field_of_view.range_max_m", self.range_max_m, 1.0, MAX_RANGE_M)?;
         above("field_of_view.range_max_m", self.range_max_m, self.range_min_m)?;
         let angle = Angle::from_degrees;
         Ok(Limits {

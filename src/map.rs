@@ -8,12 +8,16 @@
 /// # Units
 /// Centimetres, x along the road, y to the left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RoadPoint {
+    /// Along the road.
     pub x_cm: i32,
+    /// To the left.
     pub y_cm: i32,
 }
 
 impl RoadPoint {
+    /// From centimetres.
     pub const fn new(x_cm: i32, y_cm: i32) -> Self {
         Self { x_cm, y_cm }
     }
@@ -26,6 +30,7 @@ impl RoadPoint {
 
 /// Whether the sensor can see a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Visibility {
     /// Nobody has current evidence. To be treated as not visible.
     Unknown,
@@ -37,7 +42,9 @@ pub enum Visibility {
 
 /// What a map knows of one place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct CellState {
+    /// Whether the sensor can see it.
     pub visibility: Visibility,
     /// Graded visibility, 0 (blocked) to 255 (clear); 0 where unknown.
     pub grade: u8,
@@ -51,6 +58,7 @@ impl CellState {
     /// A place nobody has current evidence for.
     pub const UNKNOWN: Self = Self { visibility: Visibility::Unknown, grade: 0, occupancy: 0, occupied: false };
 
+    /// Whether it can be seen; unknown is not visible.
     pub const fn visible(&self) -> bool {
         matches!(self.visibility, Visibility::Visible)
     }

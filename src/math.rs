@@ -14,16 +14,6 @@ pub(crate) fn cos(x: f32) -> f32 {
     libm::cosf(x)
 }
 
-/// Tangent of an angle in radians.
-pub(crate) fn tan(x: f32) -> f32 {
-    libm::tanf(x)
-}
-
-/// Arc tangent in radians.
-pub(crate) fn atan(x: f32) -> f32 {
-    libm::atanf(x)
-}
-
 /// Angle of the vector (x, y) in radians.
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     libm::atan2f(y, x)

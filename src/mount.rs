@@ -32,6 +32,9 @@ pub struct Mount {
     pub roll_deg: f32,
 }
 
+/// Places farther away than this along either axis are taken to lie at it, centimetres.
+const REACH_CM: i32 = 45_000;
+
 /// The mount in integers: levels detections and places road points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Levelling {
@@ -93,11 +96,11 @@ impl Levelling {
     }
 
     /// Levelled ground coordinates of a road point, centimetres.
-    #[allow(clippy::cast_possible_truncation)] // clamped to 600 m
+    #[allow(clippy::cast_possible_truncation)] // clamped
     pub fn place(&self, p: RoadPoint) -> (i32, i32) {
         let (dx, dy) = (p.x_cm.wrapping_sub(self.origin.x_cm), p.y_cm.wrapping_sub(self.origin.y_cm));
-        // beyond 600 m nothing is seen; the clamp keeps the result in 32 bits
-        let (dx, dy) = (dx.clamp(-60_000, 60_000), dy.clamp(-60_000, 60_000));
+        // beyond 400 m nothing is seen; the clamp keeps squares of the result in 32 bits
+        let (dx, dy) = (dx.clamp(-REACH_CM, REACH_CM), dy.clamp(-REACH_CM, REACH_CM));
         let (hx, hy) = (i64::from(self.heading.x), i64::from(self.heading.y));
         let (dx, dy) = (i64::from(dx), i64::from(dy));
         (((dx * hx + dy * hy) >> 14) as i32, ((dy * hx - dx * hy) >> 14) as i32)

@@ -92,8 +92,8 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
         // the same rounding as the grid's columns
         let place = i32::from(bearing.raw()) * i32::try_from(A * 64).ok()? / (span / 4).max(1);
         let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < A)?;
-        let square = i64::from(x_cm) * i64::from(x_cm) + i64::from(y_cm) * i64::from(y_cm);
-        let range = usize::try_from(square.unsigned_abs().isqrt()).ok()? / usize::try_from(self.geometry.cell_cm).ok()?.max(1);
+        let square = x_cm.unsigned_abs().saturating_pow(2).saturating_add(y_cm.unsigned_abs().saturating_pow(2));
+        let range = (square.isqrt() / self.geometry.cell_cm.unsigned_abs().max(1)) as usize;
         (range < R).then_some((azimuth, range))
     }
 

@@ -75,9 +75,10 @@ pub struct Radar3dParameters<const R: usize, const A: usize, const E: usize> {
     health: HealthLimits,
     visible_from: u8,
     occupied_from: u8,
-    /// How far obstacles are followed, centimetres.
-    limit_cm: i32,
 }
+
+/// How far behind the field of view's range obstacles are followed, centimetres.
+const BEYOND_CM: i32 = 2500;
 
 impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> {
     /// Checks a configuration.
@@ -87,17 +88,17 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
     pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self, ConfigError> {
         let levelling = sensor.mount.levelling()?;
         let view = sensor.field_of_view.limits()?;
+        let noise = sensor.noise.noise()?;
         let axes = Axes::new(&levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
         Ok(Self {
             levelling,
             gate: config.gate.gate(&view)?,
-            noise: sensor.noise.noise()?,
-            tracking: config.obstacles.tracking()?,
+            noise,
+            tracking: config.obstacles.tracking(noise, levelling.road_axis(), view.range_cm[1] + BEYOND_CM)?,
             inverse_sensor: config.evidence.inverse_sensor(&sensor.noise, &axes)?,
             health: config.health.limits()?,
             visible_from: threshold("visibility.visible_from", config.visibility.visible_from)?,
             occupied_from: threshold("visibility.occupied_from", config.visibility.occupied_from)?,
-            limit_cm: view.range_cm[1] + 2500,
             axes,
         })
     }
@@ -227,7 +228,7 @@ impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: us
     fn follow_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, step: Step, map: &PolarMap<R, A>) -> Claimed<D> {
         let in_view = |x, y| map.locate(x, y).is_some_and(|(a, r)| map.cell(a, r).visible());
         let reflections = self.scan.reflections();
-        self.obstacles.step(reflections, step, &p.tracking, &p.noise, &p.levelling, p.limit_cm, in_view)
+        self.obstacles.step(reflections, step, &p.tracking, in_view)
     }
 
     fn update_grid(

@@ -9,7 +9,7 @@
 //! An object never hides itself: the cells of an occupied run count as blocking only once the ray
 //! has left the run. What stands on the far side of the run is hidden.
 
-use crate::axes::Axes;
+use crate::axes::{Axes, SliceRow};
 use crate::polar::PolarMap;
 use crate::spherical::{Column, SphericalGrid};
 
@@ -50,18 +50,14 @@ fn cast_column<const R: usize, const A: usize, const E: usize>(
     occupancy: &mut [u8; R],
 ) {
     let mut shadow = Shadow { blocked: [0; E], run: [0; E], in_run: false };
-    let mut rows = axes.slice_rows().iter();
-    let mut lower = rows.next().copied();
+    let mut rows = axes.slice_rows().as_slice();
     let mut next = 0;
     for (r, stack) in column.stacks() {
         if next < r {
             shadow.leave_run();
-            shadow.shade(axes, grades, next, r);
+            shadow.shade(axes, &mut rows, grades, next, r);
         }
-        while lower.is_some_and(|s| usize::from(s.end) <= r) {
-            lower = rows.next().copied();
-        }
-        let row = lower.map_or(0, |s| usize::from(s.lower));
+        let row = rows_at(&mut rows, r);
         let share = axes.slice_share().get(r).copied().unwrap_or(0);
         let here = pair(stack, row).at(share);
         if here < OCCUPIED {
@@ -75,7 +71,19 @@ fn cast_column<const R: usize, const A: usize, const E: usize>(
         next = r + 1;
     }
     shadow.leave_run();
-    shadow.shade(axes, grades, next, R);
+    shadow.shade(axes, &mut rows, grades, next, R);
+}
+
+/// The lower of the two rows the slice plane runs between at a range cell; drops the stretches
+/// before it.
+fn rows_at(rows: &mut &[SliceRow], r: usize) -> usize {
+    while let Some((first, rest)) = rows.split_first() {
+        if usize::from(first.end) > r || rest.is_empty() {
+            return usize::from(first.lower);
+        }
+        *rows = rest;
+    }
+    0
 }
 
 /// What the ray bundle of one azimuth has met so far.
@@ -101,8 +109,15 @@ impl<const E: usize> Shadow<E> {
         }
     }
 
-    /// Grades of a stretch of empty cells.
-    fn shade<const R: usize, const A: usize>(&self, axes: &Axes<R, A, E>, grades: &mut [u8; R], from: usize, to: usize) {
+    /// Grades of empty cells.
+    fn shade<const R: usize, const A: usize>(
+        &self,
+        axes: &Axes<R, A, E>,
+        rows: &mut &[SliceRow],
+        grades: &mut [u8; R],
+        from: usize,
+        to: usize,
+    ) {
         if self.blocked == [0; E] {
             if let Some(clear) = grades.get_mut(from..to) {
                 clear.fill(255);
@@ -110,12 +125,10 @@ impl<const E: usize> Shadow<E> {
             return;
         }
         let mut start = from;
-        for stretch in axes.slice_rows() {
-            let end = usize::from(stretch.end).min(to);
-            if end <= start {
-                continue;
-            }
-            let pair = pair(&self.blocked, usize::from(stretch.lower));
+        while start < to {
+            let lower = rows_at(rows, start);
+            let end = rows.first().map_or(to, |s| usize::from(s.end)).clamp(start + 1, to);
+            let pair = pair(&self.blocked, lower);
             let (Some(cells), Some(shares)) = (grades.get_mut(start..end), axes.slice_share().get(start..end)) else { return };
             if pair.low == pair.high {
                 cells.fill((255 - pair.low).max(BLOCKED));
@@ -214,21 +227,72 @@ mod tests {
 
     #[test]
     fn a_truck_to_the_left_hides_the_left() {
-        // rear edge at 22.6 m, 4 m high, sensor at 6 m: hidden to 22.6 * 5 / 2 = 56 m
+        // rear edge at 22.6 m, 4 m high, seen from 6 m: hidden as far as 22.6 * 5 / 2 = 56 m
         let expected = "
-???.................
-???.......#.........
-???....####.........
-???.O######.........
-???.................
-???.................
-???.................
+???.....###.........
+???...#####.........
+??..#######.........
+??.OO##.............
+??..................
+??..................
+??..................
 ???.................
 ???.................
 ";
-        let _ = expected;
-        let got = draw(6.0, 0.0, &[car(2000, 300, 400)]);
-        std::eprintln!("{got}");
-        assert_eq!(got, expected);
+        assert_eq!(draw(6.0, 0.0, &[car(2000, 300, 400)]), expected);
+    }
+
+    #[test]
+    fn a_truck_to_the_right_hides_the_right_and_a_car_only_a_little() {
+        let expected = "
+???.................
+???.................
+??..................
+??..................
+??..................
+??.OO...............
+??..................
+???.................
+???.................
+";
+        // 1.5 m high: hidden as far as 22.6 * 5 / 4.5 = 25 m
+        assert_eq!(draw(6.0, 0.0, &[car(2000, -300, 150)]), expected);
+    }
+
+    #[test]
+    fn a_low_sensor_sees_nothing_behind_what_is_higher() {
+        let expected = "
+???.................
+???................#
+??...........#######
+?.....##############
+?..OO###############
+?.....##############
+??...........#######
+???................#
+???.................
+";
+        assert_eq!(draw(3.5, 0.0, &[car(2000, 0, 400)]), expected);
+    }
+
+    #[test]
+    fn something_below_the_slice_plane_hides_nothing_on_it() {
+        let picture = draw(6.0, 0.0, &[car(2000, 300, 70)]);
+        assert!(!picture.contains('#') && !picture.contains('O'), "{picture}");
+    }
+
+    #[test]
+    fn a_gap_between_two_trucks_is_hidden_and_both_rears_are_not_one() {
+        // the second stands in the first one's shadow: neither it nor what is behind it is visible
+        let picture = draw(3.5, 0.0, &[car(2000, 0, 400), car(4000, 0, 400)]);
+        let middle = picture.lines().nth(5);
+        assert_eq!(middle, Some("?..OO###############"));
+    }
+
+    #[test]
+    fn a_turned_sensor_looks_to_its_side() {
+        let left = draw(6.0, 20.0, &[]);
+        let (top, bottom) = (left.lines().nth(1).unwrap(), left.lines().nth(9).unwrap());
+        assert!(top.matches('?').count() < bottom.matches('?').count(), "yaw is to the left:{left}");
     }
 }

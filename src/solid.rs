@@ -36,27 +36,29 @@ impl Solid {
         ]
     }
 
+    /// The origin in the box's own axes, for [`Solid::crossing`].
+    pub fn origin(&self) -> (i32, i32) {
+        (-self.heading.along(self.x_cm, self.y_cm), -self.heading.across(self.x_cm, self.y_cm))
+    }
+
     /// Where a ray from the origin enters and leaves the footprint, centimetres along the ray;
     /// `None` where it misses. An origin inside enters at 0.
-    pub fn crossing(&self, ray: Direction) -> Option<(i32, i32)> {
-        // the origin and the ray in the box's own axes
-        let start = (-self.heading.along(self.x_cm, self.y_cm), -self.heading.across(self.x_cm, self.y_cm));
-        let step = (
-            self.heading.along(i32::from(ray.x), i32::from(ray.y)),
-            self.heading.across(i32::from(ray.x), i32::from(ray.y)),
-        );
+    pub fn crossing(&self, origin: (i32, i32), ray: Direction) -> Option<(i32, i32)> {
+        let ahead = (i32::from(ray.x) * i32::from(self.heading.x) + i32::from(ray.y) * i32::from(self.heading.y)) >> 14;
+        let left = (i32::from(ray.y) * i32::from(self.heading.x) - i32::from(ray.x) * i32::from(self.heading.y)) >> 14;
         let (mut enter, mut leave) = (0, i32::MAX);
-        for (start, step, half) in [(start.0, step.0, self.half_length_cm), (start.1, step.1, self.half_width_cm)] {
+        for (start, step, half) in [(origin.0, ahead, self.half_length_cm), (origin.1, left, self.half_width_cm)] {
             if step.abs() < PARALLEL {
                 if start.abs() > half {
                     return None;
                 }
                 continue;
             }
-            let at = |side: i32| (i64::from(side - start) << 14) / i64::from(step);
+            // up to 2^17 cm, so that the shift stays in 32 bits
+            let at = |side: i32| ((side - start).clamp(-0x1FFFF, 0x1FFFF) << 14) / step;
             let (a, b) = (at(-half), at(half));
-            enter = enter.max(clamped(a.min(b)));
-            leave = leave.min(clamped(a.max(b)));
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
         }
         (enter < leave).then_some((enter, leave))
     }
@@ -64,11 +66,6 @@ impl Solid {
 
 /// Below this a ray counts as parallel to a side, 2^-14: 0.014 degrees.
 const PARALLEL: i32 = 4;
-
-#[allow(clippy::cast_possible_truncation)] // clamped
-fn clamped(v: i64) -> i32 {
-    v.clamp(-(1 << 24), 1 << 24) as i32
-}
 
 fn scaled(d: Direction, length: i32) -> (i32, i32) {
     ((i32::from(d.x) * length) >> 14, (i32::from(d.y) * length) >> 14)
@@ -91,14 +88,18 @@ mod tests {
         }
     }
 
+    fn cross(s: Solid) -> Option<(i32, i32)> {
+        s.crossing(s.origin(), Direction::AHEAD)
+    }
+
     #[test]
     fn a_ray_crosses_from_face_to_face() {
-        assert_eq!(truck(5000, 0, 0.0).crossing(Direction::AHEAD), Some((4200, 5800)));
-        let across = truck(5000, 0, 90.0).crossing(Direction::AHEAD).unwrap();
+        assert_eq!(cross(truck(5000, 0, 0.0)), Some((4200, 5800)));
+        let across = cross(truck(5000, 0, 90.0)).unwrap();
         assert!((across.0 - 4875).abs() <= 2 && (across.1 - 5125).abs() <= 2, "{across:?}");
-        assert_eq!(truck(5000, 126, 0.0).crossing(Direction::AHEAD), None);
-        assert_eq!(truck(-5000, 0, 0.0).crossing(Direction::AHEAD), None, "behind the sensor");
-        assert_eq!(truck(0, 0, 0.0).crossing(Direction::AHEAD), Some((0, 800)), "over the sensor");
+        assert_eq!(cross(truck(5000, 126, 0.0)), None);
+        assert_eq!(cross(truck(-5000, 0, 0.0)), None, "behind the sensor");
+        assert_eq!(cross(truck(0, 0, 0.0)), Some((0, 800)), "over the sensor");
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub fn voxelise<const R: usize, const A: usize, const E: usize>(
     axes: &Axes<R, A, E>,
     grid: &mut SphericalGrid<R, A, E>,
 ) {
+    let origin = solid.origin();
     let (low, high) = outline(solid, axes);
     let first = (low >> 8).clamp(0, A as i32);
     let last = (high >> 8).clamp(-1, A as i32 - 1);
@@ -32,7 +33,7 @@ pub fn voxelise<const R: usize, const A: usize, const E: usize>(
         }
         let share = ((to - from) * 255 / (2 * WINDOW)) as u8;
         let ray = trig::direction(axes.azimuth_of((from + to) / 2));
-        let Some((enter, leave)) = solid.crossing(ray) else { continue };
+        let Some((enter, leave)) = solid.crossing(origin, ray) else { continue };
         let Some(column) = grid.column_mut(a as usize) else { continue };
         let nearest = (enter / axes.cell_cm) as usize;
         // the last cell counts where the box reaches its middle
@@ -46,6 +47,7 @@ pub fn voxelise<const R: usize, const A: usize, const E: usize>(
 }
 
 /// Right and left edge of a box on the column axis, 2^-8 columns.
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 512 columns
 fn outline<const R: usize, const A: usize, const E: usize>(solid: &Solid, axes: &Axes<R, A, E>) -> (i32, i32) {
     let corners = solid.corners();
     if corners.iter().any(|c| c.0 <= 0) {

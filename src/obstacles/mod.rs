@@ -16,8 +16,7 @@ pub mod tracking;
 
 use heapless::Vec;
 
-use crate::mount::Levelling;
-use crate::reflection::{Noise, Reflection};
+use crate::reflection::Reflection;
 use crate::solid::Solid;
 use crate::time::Step;
 use obstacle::Obstacle;
@@ -92,33 +91,30 @@ impl<const N: usize> Obstacles<N> {
         reflections: &[Reflection],
         step: Step,
         t: &Tracking,
-        noise: &Noise,
-        levelling: &Levelling,
-        limit_cm: i32,
         in_view: impl Fn(i32, i32) -> bool,
     ) -> Claimed<D> {
         for o in &mut self.list {
             o.predict(step, t);
         }
-        let mut claimed = self.associate(reflections, step, t, noise);
+        let mut claimed = self.associate(reflections, step, t);
         for o in &mut self.list {
             o.settle(step, t);
         }
-        self.found(reflections, &mut claimed, t, noise, levelling);
+        self.found(reflections, &mut claimed, t);
         self.join_parts(t);
-        self.doubt_the_unseen(step, t, limit_cm, in_view);
+        self.doubt_the_unseen(step, t, in_view);
         claimed
     }
 
     /// Gives each detection to the obstacle it fits best; of equals, to the elder in the list.
     #[allow(clippy::cast_possible_truncation)] // the list is bounded
-    fn associate<const D: usize>(&mut self, reflections: &[Reflection], step: Step, t: &Tracking, noise: &Noise) -> Claimed<D> {
+    fn associate<const D: usize>(&mut self, reflections: &[Reflection], step: Step, t: &Tracking) -> Claimed<D> {
         const { assert!(N < u16::MAX as usize) }
         let mut best = [(i32::MAX, u16::MAX); D];
         for (k, o) in self.list.iter().enumerate() {
             let search = o.search(t);
             for (r, best) in reflections.iter().zip(&mut best) {
-                if let Some(misfit) = search.misfit(r, noise, t)
+                if let Some(misfit) = search.misfit(r, t)
                     && misfit < best.0
                 {
                     *best = (misfit, k as u16);
@@ -131,44 +127,36 @@ impl<const N: usize> Obstacles<N> {
             if !o.seen() {
                 o.fade_outline(step, t);
             }
-            o.absorb(r, noise);
+            o.absorb(r, t);
             claimed.insert(i);
         }
         claimed
     }
 
     /// Starts obstacles from detections that move along the road and belong to nobody.
-    fn found<const D: usize>(
-        &mut self,
-        reflections: &[Reflection],
-        claimed: &mut Claimed<D>,
-        t: &Tracking,
-        noise: &Noise,
-        levelling: &Levelling,
-    ) {
-        let road = levelling.road_axis();
+    fn found<const D: usize>(&mut self, reflections: &[Reflection], claimed: &mut Claimed<D>, t: &Tracking) {
         for (i, seed) in reflections.iter().enumerate() {
             if claimed.contains(i) {
                 continue;
             }
-            let along = road.along(i32::from(seed.sight.x), i32::from(seed.sight.y));
+            let along = t.road.along(i32::from(seed.sight.x), i32::from(seed.sight.y));
             // nearly broadside: Doppler says nothing about motion along the road
             if along.abs() < (15 << 14) / 100 {
                 continue;
             }
             // what stands still shows no more than the noise of its Doppler
-            if seed.radial_velocity_cm_s.abs() < 4 * noise.radial_velocity_cm_s {
+            if seed.radial_velocity_cm_s.abs() < 4 * t.noise.radial_velocity_cm_s {
                 continue;
             }
             let speed = (seed.radial_velocity_cm_s << 14) / along;
             if speed.abs() < t.min_speed_cm_s || speed.abs() > 7000 {
                 continue;
             }
-            let heading = if speed > 0 { road } else { road.reversed() };
+            let heading = if speed > 0 { t.road } else { t.road.reversed() };
             let mut newborn = Obstacle::new(seed, heading, speed.abs());
             for (j, r) in reflections.iter().enumerate().skip(i) {
-                if !claimed.contains(j) && newborn.search(t).misfit(r, noise, t).is_some() {
-                    newborn.absorb(r, noise);
+                if !claimed.contains(j) && newborn.search(t).misfit(r, t).is_some() {
+                    newborn.absorb(r, t);
                     newborn.reach(r);
                     claimed.insert(j);
                 }
@@ -204,7 +192,7 @@ impl<const N: usize> Obstacles<N> {
 
     /// Takes evidence from obstacles nobody saw, quickly where they should have been seen, and
     /// drops those without evidence or out of reach.
-    fn doubt_the_unseen(&mut self, step: Step, t: &Tracking, limit_cm: i32, in_view: impl Fn(i32, i32) -> bool) {
+    fn doubt_the_unseen(&mut self, step: Step, t: &Tracking, in_view: impl Fn(i32, i32) -> bool) {
         for o in &mut self.list {
             if o.seen() || o.existence <= 0 {
                 continue;
@@ -224,7 +212,7 @@ impl<const N: usize> Obstacles<N> {
         }
         self.list.retain(|o| {
             let (x, y) = o.anchor();
-            o.existence > 0 && !o.is_fixture(t) && x > BEHIND_CM && x < limit_cm && y.abs() < limit_cm
+            o.existence > 0 && !o.is_fixture(t) && x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
         });
     }
 }

@@ -77,24 +77,24 @@ pub struct Search<'a> {
 impl Search<'_> {
     /// How badly a detection fits, 2^-8; `None` where it cannot belong to this obstacle.
     #[inline]
-    pub fn misfit(&self, r: &Reflection, noise: &Noise, t: &Tracking) -> Option<i32> {
+    pub fn misfit(&self, r: &Reflection, t: &Tracking) -> Option<i32> {
         let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
         if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
             return None;
         }
-        self.obstacle.misfit(r, dx, dy, noise, t)
+        self.obstacle.misfit(r, dx, dy, t)
     }
 }
 
 impl Obstacle {
     /// How badly a detection fits that lies at (dx, dy) from the anchor.
-    fn misfit(&self, r: &Reflection, dx: i32, dy: i32, noise: &Noise, t: &Tracking) -> Option<i32> {
+    fn misfit(&self, r: &Reflection, dx: i32, dy: i32, t: &Tracking) -> Option<i32> {
         let error = self.speed_error(r).abs();
         if error > t.doppler_gate {
             return None;
         }
         let (along, left) = (self.heading.along(dx, dy), self.heading.across(dx, dy));
-        let (sigma_along, sigma_across) = spread(self.heading, r, noise);
+        let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
         let beyond = self.extent.beyond_cm(along);
         let beside = (left.abs() - t.half_width_cm).max(0);
         if beyond > t.gap_cm + ((t.sigmas * sigma_along) >> 4)
@@ -194,9 +194,9 @@ impl Obstacle {
     }
 
     /// Takes a detection that belongs to it.
-    pub fn absorb(&mut self, r: &Reflection, noise: &Noise) {
+    pub fn absorb(&mut self, r: &Reflection, t: &Tracking) {
         let (along, left) = self.local(r.x_cm, r.y_cm);
-        let (_, sigma_across) = spread(self.heading, r, noise);
+        let (_, sigma_across) = spread(self.heading, r, &t.noise);
         let projection = self.heading.along(i32::from(r.sight.x), i32::from(r.sight.y));
         let error = self.speed_error(r);
         let w = weight(sigma_across);
@@ -257,6 +257,7 @@ impl Obstacle {
     }
 
     /// Lets a lasting drift to one side turn the heading.
+    #[allow(clippy::cast_possible_truncation)] // clamped to a metre a second
     fn turn(&mut self, offset: i32, step: Step, t: &Tracking) {
         let dv = (i64::from(mul_shift(offset, t.drift_gain, 16)) << 16) / i64::from(step.raw().max(1));
         let dv = dv.clamp(-(100 << FRACTION), 100 << FRACTION) as i32;
@@ -289,6 +290,10 @@ impl Obstacle {
     /// Whether another obstacle is a part of the same vehicle: in line, equally fast, and no farther
     /// away than vehicles keep from each other at this speed.
     pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
+        let ((ax, ay), (bx, by)) = (self.anchor(), other.anchor());
+        if (ax - bx).abs() > 2 * t.max_length_cm || (ay - by).abs() > 2 * t.max_length_cm {
+            return false;
+        }
         let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
         if hypot_gate(dvx, dvy) > t.merge_speed {
             return false;
@@ -317,6 +322,7 @@ impl Obstacle {
     }
 
     /// Takes over what another obstacle knows of the same vehicle.
+    #[allow(clippy::cast_possible_truncation)] // a share of the offset
     pub fn join(&mut self, other: &Self, t: &Tracking) {
         let (ax, ay) = other.anchor();
         let (along, left) = self.local(ax, ay);

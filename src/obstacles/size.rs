@@ -39,7 +39,7 @@ impl Default for SizeConfig {
     fn default() -> Self {
         let point = |length_m, width_m, height_m| SizePoint { length_m, width_m, height_m };
         Self {
-            points: [point(5.2, 1.8, 1.5), point(6.0, 2.05, 2.6), point(9.0, 2.5, 3.4), point(12.0, 2.55, 3.9)],
+            points: [point(5.2, 1.8, 1.5), point(6.0, 2.05, 2.6), point(9.0, 2.5, 3.4), point(12.0, 2.55, 4.0)],
             min_length_m: 3.8,
         }
     }
@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(sizes.of(440), Size { length_cm: 440, width_cm: 180, height_cm: 150 });
         assert_eq!(sizes.of(100).length_cm, 380);
         assert_eq!(sizes.of(600).height_cm, 260);
-        assert_eq!(sizes.of(1650), Size { length_cm: 1650, width_cm: 255, height_cm: 390 });
+        assert_eq!(sizes.of(1650), Size { length_cm: 1650, width_cm: 255, height_cm: 400 });
         assert_eq!(sizes.of(560).height_cm, 205, "half way from car to van");
     }
 

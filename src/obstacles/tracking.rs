@@ -2,6 +2,8 @@
 
 use super::profile::HIT;
 use super::size::{SizeConfig, Sizes};
+use crate::reflection::Noise;
+use crate::trig::Direction;
 use crate::config::{ConfigError, within};
 use crate::math;
 
@@ -56,7 +58,7 @@ impl Default for ObstacleConfig {
             min_speed_mps: 1.5,
             doppler_gate_mps: 1.5,
             gap_m: 5.0,
-            lateral_gate_m: 1.2,
+            lateral_gate_m: 1.0,
             gate_sigmas: 2.5,
             max_length_m: 19.0,
             outline_memory_s: 2.0,
@@ -137,14 +139,20 @@ pub struct Tracking {
     /// Bins the outline's middle may leave the anchor.
     pub recentre_bins: i32,
     pub sizes: Sizes,
+    pub noise: Noise,
+    /// The road's axis in the levelled frame.
+    pub road: Direction,
+    /// How far obstacles are followed.
+    pub limit_cm: i32,
 }
 
 impl ObstacleConfig {
-    /// Checks the parameters and rounds them.
+    /// Checks the parameters and rounds them. `road` is the road's axis in the levelled frame, and
+    /// obstacles are followed as far as `limit_cm`.
     ///
     /// # Errors
     /// Names the parameter outside its limits.
-    pub fn tracking(&self) -> Result<Tracking, ConfigError> {
+    pub fn tracking(&self, noise: Noise, road: Direction, limit_cm: i32) -> Result<Tracking, ConfigError> {
         let cm = |name, v, min, max| within(name, v, min, max).map(|m| math::round_i32(m * 100.0));
         let seconds = |name, v| within(name, v, 0.05, 60.0).map(|s| math::round_i32(s * 65536.0));
         let hits = |name, v| within(name, v, 0.0, 1000.0).map(|h| math::round_i32(h * 256.0));
@@ -188,6 +196,9 @@ impl ObstacleConfig {
             turning_speed: 200 << 4,
             recentre_bins: 6,
             sizes: self.sizes.sizes()?,
+            noise,
+            road,
+            limit_cm,
         })
     }
 }
@@ -195,10 +206,13 @@ impl ObstacleConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reflection::NoiseConfig;
 
     #[test]
     fn an_impossible_parameter_is_named() {
-        let e = ObstacleConfig { gap_m: -1.0, ..ObstacleConfig::default() }.tracking().unwrap_err();
+        let e = ObstacleConfig { gap_m: -1.0, ..ObstacleConfig::default() };
+        let noise = NoiseConfig::default().noise().unwrap();
+        let e = e.tracking(noise, Direction::AHEAD, 20_000).unwrap_err();
         assert_eq!(e.parameter, "obstacles.gap_m");
     }
 }

@@ -1,6 +1,12 @@
 //! Host-side harness of `viewshed`: recordings in, metrics and pictures out.
 
+pub mod commands;
+pub mod estimators;
 pub mod evaluation;
+pub mod foxglove;
 pub mod geometry;
+pub mod options;
+pub mod pictures;
 pub mod recording;
+pub mod report;
 pub mod truth;

@@ -1,3 +1,10 @@
 //! The `viewshed` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::Parser;
+use viewshed_harness::commands::Cli;
+
+fn main() -> ExitCode {
+    Cli::parse().run()
+}

@@ -15,6 +15,39 @@ pub struct Counts {
     pub fi: u64,
 }
 
+/// One of the four outcomes of an object-time-step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Outcome {
+    Tv,
+    Fv,
+    Ti,
+    Fi,
+}
+
+impl Outcome {
+    pub const ALL: [Self; 4] = [Self::Tv, Self::Ti, Self::Fv, Self::Fi];
+
+    pub fn of(visible: bool, detected: bool) -> Self {
+        match (visible, detected) {
+            (true, true) => Self::Tv,
+            (true, false) => Self::Fv,
+            (false, false) => Self::Ti,
+            (false, true) => Self::Fi,
+        }
+    }
+
+    /// As the paper writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tv => "TV",
+            Self::Fv => "FV",
+            Self::Ti => "TI",
+            Self::Fi => "FI",
+        }
+    }
+}
+
 /// `part / whole`; `None` where there is nothing to divide by.
 pub fn rate(part: u64, whole: u64) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
@@ -22,11 +55,11 @@ pub fn rate(part: u64, whole: u64) -> Option<f64> {
 
 impl Counts {
     pub fn add(&mut self, visible: bool, detected: bool) {
-        *match (visible, detected) {
-            (true, true) => &mut self.tv,
-            (true, false) => &mut self.fv,
-            (false, false) => &mut self.ti,
-            (false, true) => &mut self.fi,
+        *match Outcome::of(visible, detected) {
+            Outcome::Tv => &mut self.tv,
+            Outcome::Fv => &mut self.fv,
+            Outcome::Ti => &mut self.ti,
+            Outcome::Fi => &mut self.fi,
         } += 1;
     }
 
@@ -48,7 +81,11 @@ impl Counts {
 
     /// Share of object-time-steps that were detected.
     pub fn coverage(&self) -> Option<f64> {
-        rate(self.tv + self.fi, self.tv + self.fv + self.ti + self.fi)
+        rate(self.tv + self.fi, self.total())
+    }
+
+    pub fn total(&self) -> u64 {
+        self.tv + self.fv + self.ti + self.fi
     }
 }
 
@@ -58,6 +95,14 @@ impl std::ops::AddAssign for Counts {
         self.fv += o.fv;
         self.ti += o.ti;
         self.fi += o.fi;
+    }
+}
+
+impl std::ops::Mul<u64> for Counts {
+    type Output = Self;
+
+    fn mul(self, n: u64) -> Self {
+        Self { tv: self.tv * n, fv: self.fv * n, ti: self.ti * n, fi: self.fi * n }
     }
 }
 

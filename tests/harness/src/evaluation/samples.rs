@@ -9,7 +9,7 @@ use crate::geometry::polygon::Convex;
 use crate::geometry::pose::{SensorPose, direction};
 use crate::geometry::sight::{box_in_sight, footprint_in_sight, shadow};
 use crate::geometry::solid::Solid;
-use crate::recording::{RadarDetection, Recording};
+use crate::recording::{Frame, RadarDetection, Recording};
 use crate::truth::Object;
 
 /// A 1 m cell (i, j) = [i, i+1) x [j, j+1) metres of the road frame.
@@ -43,23 +43,24 @@ pub struct FrameSamples {
     pub cells: Vec<(Cell, bool)>,
 }
 
-/// Samples of every frame of a labelled recording.
+/// Samples of every frame. Without labels no frame has any, but warm-up is told from the rest.
 ///
 /// `progress` is told each frame done.
 pub fn collect(recording: &Recording, options: &Options, progress: &(dyn Fn() + Sync)) -> Vec<FrameSamples> {
-    let Some(truth) = &recording.truth else {
-        return recording.frames.iter().map(|_| FrameSamples::default()).collect();
-    };
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let warm_up = if recording.sensor.frames_independent { 0.0 } else { options.warm_up_s };
+    let counted = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9 >= warm_up;
+    let Some(truth) = &recording.truth else {
+        let unlabelled = |f| FrameSamples { counted: counted(f), ..FrameSamples::default() };
+        return recording.frames.iter().map(unlabelled).collect();
+    };
     let road = if recording.sensor.frames_independent { Vec::new() } else { road_cells(recording, options) };
     recording
         .frames
         .par_iter()
         .map(|frame| {
             progress();
-            let counted = (frame.time_ns - start) as f64 * 1e-9 >= warm_up;
-            if !counted {
+            if !counted(frame) {
                 return FrameSamples::default();
             }
             frame_samples(recording, &truth.at(frame.time_ns), &frame.detections, &road, options)
@@ -219,4 +220,64 @@ fn in_grown_footprint(solid: &Solid, pose: &SensorPose, p: [f64; 3], options: &O
         t1 = t1.min(u.max(v));
     }
     t0 <= t1
+}
+
+/// Samples and recordings put together by hand, for the tests of what is made of them.
+#[cfg(test)]
+pub mod by_hand {
+    use super::*;
+    use crate::recording::problems::Problems;
+    use crate::recording::{FieldOfView, Sensor};
+    use crate::truth::{Label, Truth};
+
+    pub const PERIOD_NS: i64 = 100_000_000;
+
+    /// A car of the given track, straight ahead.
+    pub fn sample(track: usize, distance_m: f64, detected: bool, in_sight: bool) -> Sample {
+        let solid = car(distance_m);
+        Sample {
+            track,
+            distance_m,
+            detections: u32::from(detected),
+            detected,
+            slice_in_sight: in_sight,
+            box_in_sight: in_sight,
+            cells: solid.cells().collect(),
+            solid,
+        }
+    }
+
+    fn car(x: f64) -> Solid {
+        Solid { center: [x, 0.0, 0.75], yaw_rad: 0.0, size: [4.6, 1.8, 1.5] }
+    }
+
+    /// Counted frames of the given objects.
+    pub fn frames(objects: impl IntoIterator<Item = Vec<Sample>>) -> Vec<FrameSamples> {
+        objects.into_iter().map(|objects| FrameSamples { counted: true, objects, cells: Vec::new() }).collect()
+    }
+
+    /// Empty frames at 10 Hz, and tracks named `0`, `1`, ... in their order.
+    pub fn recording(frames: usize, tracks: usize) -> Recording {
+        let label = |k| Label { time_ns: 0, id: format!("{k}"), class: "car".into(), solid: car(50.0) };
+        Recording {
+            name: "by-hand".into(),
+            sensor: Sensor {
+                name: "by-hand".into(),
+                field_of_view: FieldOfView {
+                    azimuth_rad: [-1.0, 1.0],
+                    elevation_rad: [-0.5, 0.5],
+                    range_m: [1.0, 200.0],
+                },
+                has_elevation: true,
+                frames_independent: false,
+                platform_moving: false,
+                licence: None,
+            },
+            pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
+            frames: (0..frames).map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new() }).collect(),
+            truth: Some(Truth::new((0..tracks).map(label).collect())),
+            occlusion: Default::default(),
+            problems: Problems::default(),
+        }
+    }
 }

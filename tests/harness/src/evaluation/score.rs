@@ -2,22 +2,35 @@
 
 use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
 
-use super::cells::CellCounts;
+use super::Grid;
+use super::cells::{CellCounts, CellTally};
 use super::counts::Counts;
-use super::samples::FrameSamples;
+use super::samples::{Cell, FrameSamples, Sample};
+use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
 
 /// A visibility estimator as the harness drives it: one radar frame in, one map out.
 pub trait Estimator: Send {
     fn name(&self) -> &str;
 
-    /// Forgets everything (before each frame of a recording of independent frames).
+    /// Forgets every frame seen, but not what was counted (called before each frame of a recording
+    /// of independent frames).
     fn reset(&mut self);
 
     /// Takes a radar frame and brings the map up to its time.
     fn step(&mut self, frame: &Frame);
 
     fn map(&self) -> &dyn VisibilityMap;
+
+    /// An object judged on the map's own polar cells; `None` where the map has none.
+    fn polar_verdict(&self, _solid: &Solid) -> Option<Verdict> {
+        None
+    }
+
+    /// What was rejected or dropped since construction, by reason.
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        Vec::new()
+    }
 }
 
 /// One object at one frame, as an estimator sees it. `grade` is `None` where all its cells are unknown.
@@ -31,16 +44,15 @@ pub struct Verdict {
 #[derive(Debug, Clone)]
 pub struct Score {
     pub name: String,
+    /// The cells objects were judged on: polar only where the map has polar cells.
+    pub grid: Grid,
+    /// Whether verdicts carry grades, so that a threshold can be moved.
+    pub graded: bool,
     pub verdicts: Vec<Vec<Verdict>>,
-    /// Cell counts by frame.
-    pub cells: Vec<CellCounts>,
-    /// Cells by grade (index 256: unknown), in sight and blocked, over all counted frames.
-    pub grades_clear: Vec<u64>,
-    pub grades_blocked: Vec<u64>,
+    /// Road cells by frame; empty where cells are not judged at all.
+    pub cells: Vec<CellTally>,
+    pub counters: Vec<(String, u64)>,
 }
-
-/// Grades 0..=255, and one place for unknown.
-pub const GRADE_SLOTS: usize = 257;
 
 impl Score {
     pub fn objects(&self, samples: &[FrameSamples]) -> Counts {
@@ -54,57 +66,62 @@ impl Score {
     }
 
     pub fn cell_counts(&self) -> CellCounts {
-        let mut total = CellCounts::ZERO;
-        for c in &self.cells {
-            total.blocked += c.blocked;
-            total.blocked_visible += c.blocked_visible;
-            total.clear += c.clear;
-            total.clear_not_visible += c.clear_not_visible;
-        }
+        let mut total = CellCounts::default();
+        self.cells.iter().for_each(|c| total += c.counts);
         total
     }
 }
 
-/// Scores one estimator over a whole recording.
+/// Scores one estimator over a whole recording. `progress` is told each frame done.
 pub fn score(
     estimator: &mut dyn Estimator,
     recording: &Recording,
     samples: &[FrameSamples],
+    grid: Grid,
     progress: &dyn Fn(),
 ) -> Score {
-    let mut score = Score {
-        name: estimator.name().to_owned(),
-        verdicts: Vec::with_capacity(samples.len()),
-        cells: Vec::with_capacity(samples.len()),
-        grades_clear: vec![0; GRADE_SLOTS],
-        grades_blocked: vec![0; GRADE_SLOTS],
-    };
+    let mut judged_on = grid;
+    let mut verdicts = Vec::with_capacity(samples.len());
+    let mut cells = Vec::with_capacity(samples.len());
     for (frame, sample) in recording.frames.iter().zip(samples) {
         if recording.sensor.frames_independent {
             estimator.reset();
         }
         estimator.step(frame);
         progress();
-        let map = estimator.map();
-        score.verdicts.push(sample.objects.iter().map(|o| verdict(map, &o.cells)).collect());
-        let mut cells = CellCounts::ZERO;
-        for &((i, j), in_sight) in &sample.cells {
-            let state = map.at(RoadPoint::cell_centre(i, j));
-            cells.add(in_sight, state.visible());
-            let slot = if state.visibility == Visibility::Unknown { GRADE_SLOTS - 1 } else { usize::from(state.grade) };
-            if in_sight {
-                score.grades_clear[slot] += 1;
-            } else {
-                score.grades_blocked[slot] += 1;
-            }
-        }
-        score.cells.push(cells);
+        let mut judge = |object: &Sample| {
+            let polar = (grid == Grid::Polar).then(|| estimator.polar_verdict(&object.solid)).flatten();
+            polar.unwrap_or_else(|| {
+                judged_on = Grid::Cartesian;
+                verdict(estimator.map(), &object.cells)
+            })
+        };
+        verdicts.push(sample.objects.iter().map(&mut judge).collect());
+        cells.push(tally(estimator.map(), &sample.cells));
     }
-    score
+    Score {
+        name: estimator.name().to_owned(),
+        grid: judged_on,
+        graded: true,
+        verdicts,
+        cells,
+        counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
+    }
+}
+
+/// The map's bits and grades at road cells of which the exact sight is known.
+fn tally(map: &dyn VisibilityMap, cells: &[(Cell, bool)]) -> CellTally {
+    let mut tally = CellTally::default();
+    for &((i, j), in_sight) in cells {
+        let state = map.at(RoadPoint::cell_centre(i, j));
+        let grade = (state.visibility != Visibility::Unknown).then_some(state.grade);
+        tally.add(in_sight, state.visible(), grade);
+    }
+    tally
 }
 
 /// An object is as visible as the best cell under it.
-fn verdict(map: &dyn VisibilityMap, cells: &[(i32, i32)]) -> Verdict {
+fn verdict(map: &dyn VisibilityMap, cells: &[Cell]) -> Verdict {
     let mut verdict = Verdict { visible: false, grade: None };
     for &(i, j) in cells {
         let state = map.at(RoadPoint::cell_centre(i, j));
@@ -114,4 +131,59 @@ fn verdict(map: &dyn VisibilityMap, cells: &[(i32, i32)]) -> Verdict {
         }
     }
     verdict
+}
+
+#[cfg(test)]
+mod tests {
+    use viewshed::map::CellState;
+
+    use super::*;
+
+    /// x < 0 unknown, x < 10 m visible, beyond invisible with a grade falling with x.
+    struct Ahead;
+
+    impl VisibilityMap for Ahead {
+        fn at(&self, p: RoadPoint) -> CellState {
+            let grade = u8::try_from(255 - (p.x_cm / 100).clamp(0, 255)).unwrap();
+            match p.x_cm {
+                ..0 => CellState::UNKNOWN,
+                0..1000 => CellState { visibility: Visibility::Visible, grade, occupancy: 0, occupied: false },
+                _ => CellState { visibility: Visibility::Invisible, grade, occupancy: 0, occupied: false },
+            }
+        }
+    }
+
+    #[test]
+    fn one_visible_cell_makes_an_object_visible_and_unknown_never_does() {
+        assert_eq!(verdict(&Ahead, &[(9, 0), (10, 0)]), Verdict { visible: true, grade: Some(246) });
+        assert_eq!(verdict(&Ahead, &[(10, 0), (20, 0)]), Verdict { visible: false, grade: Some(245) });
+        assert_eq!(verdict(&Ahead, &[(-1, 0)]), Verdict { visible: false, grade: None });
+        assert_eq!(verdict(&Ahead, &[(-1, 0), (30, 0)]).grade, Some(225));
+    }
+
+    #[test]
+    fn unknown_road_cells_count_as_not_visible() {
+        let t = tally(&Ahead, &[((-5, 0), true), ((5, 0), true), ((5, 1), false), ((15, 0), false)]);
+        assert_eq!(t.counts, CellCounts { blocked: 2, blocked_visible: 1, clear: 2, clear_not_visible: 1 });
+        assert_eq!((t.grades.positive[256], t.grades.negative[240]), (1, 1));
+    }
+}
+
+/// Scores put together by hand, for the tests of what is made of them.
+#[cfg(test)]
+pub mod by_hand {
+    use super::*;
+
+    /// A score that gives each sample the grade `grade` says, visible from 128 on.
+    pub fn score(name: &str, samples: &[FrameSamples], grade: impl Fn(&Sample) -> Option<u8>) -> Score {
+        let verdict = |s: &Sample| Verdict { visible: grade(s).is_some_and(|g| g >= 128), grade: grade(s) };
+        Score {
+            name: name.to_owned(),
+            grid: Grid::Cartesian,
+            graded: true,
+            verdicts: samples.iter().map(|frame| frame.objects.iter().map(verdict).collect()).collect(),
+            cells: vec![CellTally::default(); samples.len()],
+            counters: Vec::new(),
+        }
+    }
 }

@@ -6,6 +6,7 @@ pub mod points;
 pub mod problems;
 pub mod ros;
 pub mod transforms;
+pub mod write;
 
 use std::collections::BTreeMap;
 

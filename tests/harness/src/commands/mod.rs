@@ -1,0 +1,59 @@
+//! The `viewshed` command, one file or folder per subcommand.
+
+pub mod progress;
+pub mod replay;
+
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+
+/// Exit code for input or options that cannot be used.
+pub const BAD_INPUT: u8 = 2;
+
+/// Where a roadside radar can see, where it is blind, and how far that can be trusted.
+#[derive(Debug, Parser)]
+#[command(name = "viewshed", version)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Replay(Box<replay::Args>),
+}
+
+impl Cli {
+    /// Runs the subcommand; an error has been told on stderr.
+    pub fn run(&self) -> ExitCode {
+        let outcome = match &self.command {
+            Command::Replay(args) => replay::run(args),
+        };
+        outcome.unwrap_or_else(|error| {
+            complain(&error);
+            ExitCode::from(BAD_INPUT)
+        })
+    }
+}
+
+/// One error with its causes on stderr.
+pub fn complain(error: &anyhow::Error) {
+    eprintln!("error: {error:#}");
+}
+
+/// Prints to stdout; a reader that has seen enough (`| head`) is no error.
+pub fn print(text: &str) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e).context("cannot write to standard output"),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a whole file, naming it where that fails.
+pub fn write_file(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}

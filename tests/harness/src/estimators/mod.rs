@@ -1,0 +1,138 @@
+//! The library's estimators, driven by recordings.
+
+mod radar_2d;
+mod radar_3d;
+mod reference;
+
+use anyhow::{Result, bail};
+use serde::{Deserialize, Serialize};
+use viewshed::detection::{Detection, Measurement, NotADetection};
+use viewshed::field_of_view::FieldOfView;
+use viewshed::gate::{Rejection, Rejections};
+use viewshed::mount::Mount;
+use viewshed::radar_2d::{Radar2dConfig, Reading};
+use viewshed::radar_3d::Radar3dConfig;
+use viewshed::reflection::NoiseConfig;
+use viewshed::sensor::Sensor;
+use viewshed::time::Time;
+
+use crate::evaluation::score::Estimator;
+use crate::recording::{Frame, Recording};
+
+/// Parameters of all estimators.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// Detections of a frame an estimator may use, the strongest of those that pass its gate.
+    pub max_detections: usize,
+    /// Share of a cell that boxes must fill for `reference` to call it occupied.
+    pub reference_share: f64,
+    /// How well the sensor measures.
+    pub noise: NoiseConfig,
+    pub radar_2d: Radar2dConfig,
+    pub radar_3d: Radar3dConfig,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            max_detections: 256,
+            reference_share: 0.5,
+            noise: NoiseConfig::default(),
+            radar_2d: Radar2dConfig::default(),
+            radar_3d: Radar3dConfig::default(),
+        }
+    }
+}
+
+/// Most detections a frame that storage is compiled for.
+pub const MOST_DETECTIONS: usize = 4096;
+
+/// Every estimator for a recording, in the order of the table. `reference` needs ground truth.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estimator>>> {
+    let max_detections = match u16::try_from(options.max_detections) {
+        Ok(n) if n > 0 && options.max_detections <= MOST_DETECTIONS => n,
+        _ => bail!("--max-detections {} is outside 1 to {MOST_DETECTIONS}", options.max_detections),
+    };
+    let sensor = sensor(recording, &options.noise);
+    let mut radar_2d = options.radar_2d;
+    radar_2d.gate.max_detections = max_detections;
+    let mut radar_3d = options.radar_3d;
+    radar_3d.gate.max_detections = max_detections;
+    let mut estimators = vec![
+        radar_2d::new("radar-2d", Reading::Last, &sensor, &radar_2d)?,
+        radar_2d::new("radar-2d-first", Reading::First, &sensor, &radar_2d)?,
+        radar_3d::new(&sensor, &radar_3d)?,
+    ];
+    if let Some(truth) = &recording.truth {
+        estimators.push(reference::new(recording, truth, &sensor, options)?);
+    }
+    Ok(estimators)
+}
+
+/// The recording's sensor as the library takes it.
+pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
+    let (pose, view) = (recording.pose, recording.sensor.field_of_view);
+    let degrees = |v: f64| v.to_degrees() as f32;
+    Sensor {
+        mount: Mount {
+            x_m: pose.position[0] as f32,
+            y_m: pose.position[1] as f32,
+            height_m: pose.position[2] as f32,
+            yaw_deg: degrees(pose.yaw_rad()),
+            pitch_deg: degrees(pose.pitch_rad()),
+            roll_deg: degrees(pose.roll_rad()),
+        },
+        field_of_view: FieldOfView {
+            azimuth_min_deg: degrees(view.azimuth_rad[0]),
+            azimuth_max_deg: degrees(view.azimuth_rad[1]),
+            elevation_min_deg: degrees(view.elevation_rad[0]),
+            elevation_max_deg: degrees(view.elevation_rad[1]),
+            range_min_m: view.range_m[0] as f32,
+            range_max_m: view.range_m[1] as f32,
+        },
+        noise: *noise,
+    }
+}
+
+/// Turns recorded frames into the library's input and counts what cannot be.
+#[derive(Debug, Default)]
+struct Intake {
+    detections: Vec<Detection>,
+    not_finite: u64,
+    range: u64,
+    absurd: u64,
+}
+
+impl Intake {
+    fn take(&mut self, frame: &Frame) -> (Time, &[Detection]) {
+        self.detections.clear();
+        for d in &frame.detections {
+            let measurement = Measurement {
+                range_m: d.range_m,
+                azimuth_rad: d.azimuth_rad,
+                elevation_rad: d.elevation_rad,
+                radial_velocity_mps: d.radial_velocity_mps,
+                rcs_dbsm: d.rcs_dbsm,
+                snr_db: d.snr_db,
+            };
+            match Detection::new(&measurement) {
+                Ok(d) => self.detections.push(d),
+                Err(NotADetection::NotFinite) => self.not_finite += 1,
+                Err(NotADetection::Range) => self.range += 1,
+                Err(NotADetection::Absurd) => self.absurd += 1,
+            }
+        }
+        let micros = u64::try_from(frame.time_ns / 1000).unwrap_or(0);
+        (Time::from_micros(micros), &self.detections)
+    }
+
+    fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {
+        let gate = Rejection::ALL.map(|r| (r.name(), u64::from(rejections.count(r))));
+        let intake = [("not finite", self.not_finite), ("range not measurable", self.range), ("absurd", self.absurd)];
+        gate.into_iter().chain(intake).filter(|(_, n)| *n > 0).collect()
+    }
+}

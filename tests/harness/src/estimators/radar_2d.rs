@@ -1,0 +1,69 @@
+//! `radar-2d` and `radar-2d-first`: the two readings of the conventional grid.
+
+use anyhow::Result;
+use viewshed::map::{CellState, RoadPoint, VisibilityMap};
+use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
+use viewshed::sensor::Sensor;
+
+use super::{Intake, MOST_DETECTIONS};
+use crate::evaluation::score::Estimator;
+use crate::recording::Frame;
+
+/// Cells along and across the road: any heading of a 250 m fan fits.
+const CELLS: usize = 512;
+/// A quarter of a degree over 120 degrees: 0.9 m at 200 m.
+const RAYS: usize = 480;
+
+struct Driver<const D: usize> {
+    name: &'static str,
+    reading: Reading,
+    parameters: Radar2dParameters,
+    state: Box<Radar2d<CELLS, CELLS, RAYS, D>>,
+    intake: Intake,
+}
+
+/// The estimator; storage for 256 detections unless more are asked for.
+pub fn new(
+    name: &'static str,
+    reading: Reading,
+    sensor: &Sensor,
+    config: &Radar2dConfig,
+) -> Result<Box<dyn Estimator>> {
+    let parameters = Radar2dParameters::new::<CELLS, CELLS>(sensor, config)?;
+    let intake = Intake::default();
+    Ok(if config.gate.max_detections <= 256 {
+        Box::new(Driver::<256> { name, reading, parameters, state: Box::default(), intake })
+    } else {
+        let state: Box<Radar2d<CELLS, CELLS, RAYS, MOST_DETECTIONS>> = Box::default();
+        Box::new(Driver { name, reading, parameters, state, intake })
+    })
+}
+
+impl<const D: usize> VisibilityMap for Driver<D> {
+    fn at(&self, point: RoadPoint) -> CellState {
+        self.state.map(&self.parameters, self.reading).at(point)
+    }
+}
+
+impl<const D: usize> Estimator for Driver<D> {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn reset(&mut self) {
+        self.state.reset();
+    }
+
+    fn step(&mut self, frame: &Frame) {
+        let (now, detections) = self.intake.take(frame);
+        self.state.process(&self.parameters, now, detections, false);
+    }
+
+    fn map(&self) -> &dyn VisibilityMap {
+        self
+    }
+
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        self.intake.counters(self.state.rejections())
+    }
+}

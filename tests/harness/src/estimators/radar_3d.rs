@@ -1,0 +1,64 @@
+//! `radar-3d` on the reference grid.
+
+use anyhow::Result;
+use viewshed::map::VisibilityMap;
+use viewshed::polar::PolarMap;
+use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
+use viewshed::sensor::Sensor;
+
+use super::{Intake, MOST_DETECTIONS};
+use crate::evaluation::score::Estimator;
+use crate::recording::Frame;
+
+/// Range cells, azimuths and elevations of the reference grid.
+pub const RANGES: usize = 200;
+pub const AZIMUTHS: usize = 120;
+pub const ELEVATIONS: usize = 16;
+
+struct Driver<const D: usize> {
+    parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
+    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 96, D>>,
+    map: Box<PolarMap<RANGES, AZIMUTHS>>,
+    intake: Intake,
+}
+
+/// The estimator; storage for 256 detections unless more are asked for.
+pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
+    if config.gate.max_detections <= 256 {
+        Ok(Box::new(Driver::<256>::new(sensor, config)?))
+    } else {
+        Ok(Box::new(Driver::<MOST_DETECTIONS>::new(sensor, config)?))
+    }
+}
+
+impl<const D: usize> Driver<D> {
+    fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self> {
+        let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
+        let map = Box::new(parameters.map());
+        Ok(Self { parameters, state: Box::new(Radar3d::new()), map, intake: Intake::default() })
+    }
+}
+
+impl<const D: usize> Estimator for Driver<D> {
+    fn name(&self) -> &str {
+        "radar-3d"
+    }
+
+    fn reset(&mut self) {
+        self.state.reset();
+        self.map.forget();
+    }
+
+    fn step(&mut self, frame: &Frame) {
+        let (now, detections) = self.intake.take(frame);
+        self.state.process(&self.parameters, now, detections, false, &mut self.map);
+    }
+
+    fn map(&self) -> &dyn VisibilityMap {
+        &*self.map
+    }
+
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        self.intake.counters(self.state.rejections())
+    }
+}

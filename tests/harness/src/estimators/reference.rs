@@ -1,0 +1,149 @@
+//! `reference`: perfect occupancy from ground-truth boxes, through the library's visibility step.
+//!
+//! One grid for all objects. A cell holds the share of it that boxes fill, taken over sub-columns
+//! in azimuth, points in range and, exactly, the span of slopes a box covers in elevation.
+
+use anyhow::Result;
+use viewshed::axes::Axes;
+use viewshed::map::VisibilityMap;
+use viewshed::polar::PolarMap;
+use viewshed::radar_3d::Radar3dParameters;
+use viewshed::raycast;
+use viewshed::sensor::Sensor;
+use viewshed::spherical::SphericalGrid;
+
+use super::Options;
+use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
+use crate::evaluation::score::Estimator;
+use crate::geometry::pose::SensorPose;
+use crate::geometry::solid::Solid;
+use crate::recording::{Frame, Recording};
+use crate::truth::Truth;
+
+/// Sub-columns a column is divided into.
+const SUB_COLUMNS: usize = 8;
+
+/// Part of a column, around its centre, over which the share is taken. A bit tells the visibility at
+/// the centre, so what stands beside the centre line must not fill the cell.
+const WINDOW: f64 = 0.5;
+
+struct Reference {
+    truth: Truth,
+    pose: SensorPose,
+    parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
+    grid: Box<SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>>,
+    map: Box<PolarMap<RANGES, AZIMUTHS>>,
+    /// Stored share that a cell filled by `--reference-share` gets: half of full.
+    scale: f64,
+}
+
+pub fn new(recording: &Recording, truth: &Truth, sensor: &Sensor, options: &Options) -> Result<Box<dyn Estimator>> {
+    anyhow::ensure!(
+        options.reference_share > 0.0 && options.reference_share <= 1.0,
+        "--reference-share {} is outside 0 to 1",
+        options.reference_share
+    );
+    let parameters = Box::new(Radar3dParameters::new(sensor, &options.radar_3d)?);
+    let map = Box::new(parameters.map());
+    Ok(Box::new(Reference {
+        truth: truth.clone(),
+        pose: recording.pose,
+        parameters,
+        grid: Box::default(),
+        map,
+        scale: 0.5 / options.reference_share * 256.0,
+    }))
+}
+
+impl Estimator for Reference {
+    fn name(&self) -> &str {
+        "reference"
+    }
+
+    fn reset(&mut self) {}
+
+    fn step(&mut self, frame: &Frame) {
+        self.grid.clear();
+        let axes = self.parameters.axes();
+        for object in self.truth.at(frame.time_ns) {
+            fill(&object.solid, &self.pose, axes, self.scale, &mut self.grid);
+        }
+        raycast::cast(&self.grid, axes, &mut self.map);
+    }
+
+    fn map(&self) -> &dyn VisibilityMap {
+        &*self.map
+    }
+}
+
+/// Adds the share of every cell that a box fills.
+fn fill(
+    solid: &Solid,
+    pose: &SensorPose,
+    axes: &Axes<RANGES, AZIMUTHS, ELEVATIONS>,
+    scale: f64,
+    grid: &mut SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>,
+) {
+    let (sensor, yaw) = (pose.position, pose.yaw_rad());
+    let cell_m = f64::from(axes.cell_cm) / 100.0;
+    // slopes a point at this ground distance is seen under, from the box's bottom to its top
+    let slope = |z: f64, ground: f64| (z - f64::from(axes.sensor_height_cm()) / 100.0) / ground;
+    for a in 0..AZIMUTHS {
+        let Some(column) = grid.column_mut(a) else { continue };
+        let mut shares = [[0.0; ELEVATIONS]; RANGES];
+        let mut any = false;
+        for sub in 0..SUB_COLUMNS {
+            let place = a as f64 + 0.5 + WINDOW * ((sub as f64 + 0.5) / SUB_COLUMNS as f64 - 0.5);
+            let span = f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU;
+            let azimuth = yaw + f64::from(axes.azimuth_origin.radians()) + span * place / AZIMUTHS as f64;
+            let Some((enter, leave)) = crossing(solid, [sensor[0], sensor[1]], azimuth) else { continue };
+            any = true;
+            let (first, last) = ((enter / cell_m) as usize, (leave / cell_m) as usize);
+            for (r, rows) in shares.iter_mut().enumerate().take(last + 1).skip(first) {
+                let (near, far) = ((r as f64 * cell_m).max(enter), ((r + 1) as f64 * cell_m).min(leave));
+                // the steepest and the flattest line the box stops within the cell
+                let (low, high) = spanned(solid.bottom().min(0.0), solid.top(), near, far, &slope);
+                for (row, share) in rows.iter_mut().enumerate() {
+                    let (from, to) = axes.row_slopes(row);
+                    let covered = (high.min(to) - low.max(from)) / (to - from);
+                    *share += covered.clamp(0.0, 1.0) / SUB_COLUMNS as f64;
+                }
+            }
+        }
+        if !any {
+            continue;
+        }
+        for (r, rows) in shares.iter().enumerate().filter(|(_, rows)| rows.iter().any(|s| *s > 0.0)) {
+            let Some(stack) = column.evidence(r) else { continue };
+            for (cell, share) in stack.iter_mut().zip(rows) {
+                *cell = cell.saturating_add((share * scale).round().min(255.0) as u8);
+            }
+        }
+    }
+}
+
+/// Slopes of the lines of sight that a box stops between two ground distances.
+fn spanned(bottom: f64, top: f64, near: f64, far: f64, slope: &impl Fn(f64, f64) -> f64) -> (f64, f64) {
+    let low = slope(bottom, near).min(slope(bottom, far));
+    let high = slope(top, near).max(slope(top, far));
+    (low, high)
+}
+
+/// Where a ray on the ground enters and leaves a footprint, metres.
+fn crossing(solid: &Solid, from: [f64; 2], azimuth_rad: f64) -> Option<(f64, f64)> {
+    let start = solid.local(from);
+    let (s, c) = (azimuth_rad - solid.yaw_rad).sin_cos();
+    let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+    for (start, step, half) in [(start[0], c, solid.size[0] / 2.0), (start[1], s, solid.size[1] / 2.0)] {
+        if step.abs() < 1e-12 {
+            if start.abs() > half {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((-half - start) / step, (half - start) / step);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    (enter < leave).then_some((enter, leave))
+}

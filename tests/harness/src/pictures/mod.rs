@@ -1,0 +1,18 @@
+//! Pictures for people: maps from above, polar grids and trade-off curves, as PNG.
+//!
+//! Every function takes plain data and gives a [`canvas::Canvas`]; the same input gives the same
+//! bytes. Text is set in DejaVu Sans from inside the program, so no font has to be installed.
+
+pub mod birdseye;
+pub mod canvas;
+pub mod closeup;
+pub mod palette;
+pub mod polar;
+pub mod tradeoff;
+
+mod axes;
+mod cells;
+mod labels;
+mod legend;
+mod overlay;
+mod text;

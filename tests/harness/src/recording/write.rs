@@ -1,0 +1,185 @@
+//! Recordings out: radar frames, mount and ground truth as an MCAP file by the contract.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use anyhow::{Result, anyhow};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Compression, WriteOptions, Writer};
+use serde::Serialize;
+
+use super::mcap::{POINTS_TOPIC, ROAD_FRAME, SENSOR_METADATA, TRUTH_TOPIC};
+use super::ros::{
+    Detection3D, Detection3DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose, PointCloud2, PointField, Pose,
+    Quaternion, Stamp, TfMessage, Transform, TransformStamped, Vector3, encode,
+};
+use super::{Frame, RadarDetection, Sensor};
+use crate::geometry::pose::{SensorPose, direction};
+use crate::truth::Label;
+
+pub const TF_TOPIC: &str = "/tf_static";
+const RADAR_FRAME: &str = "radar";
+
+/// Name and definition of each message type written.
+const POINT_CLOUD: (&str, &str) = ("sensor_msgs/msg/PointCloud2", include_str!("msg/PointCloud2.msg"));
+const DETECTIONS: (&str, &str) = ("vision_msgs/msg/Detection3DArray", include_str!("msg/Detection3DArray.msg"));
+const TF: (&str, &str) = ("tf2_msgs/msg/TFMessage", include_str!("msg/TFMessage.msg"));
+
+/// FLOAT32 fields of a point, in this order.
+const FIELDS: [&str; 9] = ["x", "y", "z", "range", "azimuth", "elevation", "radial_velocity", "rcs", "snr"];
+
+/// Writes one recording, message by message, in the order of time.
+pub struct RecordingWriter<W: Write + Seek> {
+    writer: Writer<W>,
+    channels: BTreeMap<&'static str, u16>,
+    sequence: u32,
+}
+
+impl<W: Write + Seek> RecordingWriter<W> {
+    /// Begins a recording of a sensor mounted at `pose` since `start_ns`.
+    pub fn new(sink: W, sensor: &Sensor, pose: &SensorPose, start_ns: i64) -> Result<Self> {
+        let mut writer = WriteOptions::new().profile("ros2").compression(Some(Compression::Zstd)).create(sink)?;
+        writer.write_metadata(&sensor_metadata(sensor))?;
+        let mut recording = Self { writer, channels: BTreeMap::new(), sequence: 0 };
+        recording.message(TF_TOPIC, TF, start_ns, &mount(pose, RADAR_FRAME, start_ns))?;
+        Ok(recording)
+    }
+
+    pub fn frame(&mut self, frame: &Frame) -> Result<()> {
+        self.message(POINTS_TOPIC, POINT_CLOUD, frame.time_ns, &cloud(frame))
+    }
+
+    /// All objects of one instant; the labels' own times are not written.
+    pub fn objects<'a>(&mut self, time_ns: i64, labels: impl IntoIterator<Item = &'a Label>) -> Result<()> {
+        let header = Header { stamp: Stamp::from_nanoseconds(time_ns), frame_id: ROAD_FRAME.into() };
+        let detections = labels.into_iter().map(|l| detection(&header, l)).collect();
+        self.message(TRUTH_TOPIC, DETECTIONS, time_ns, &Detection3DArray { header, detections })
+    }
+
+    /// Completes the file and gives back what it was written to.
+    pub fn finish(mut self) -> Result<W> {
+        self.writer.finish()?;
+        Ok(self.writer.into_inner())
+    }
+
+    fn message<T: Serialize>(
+        &mut self,
+        topic: &'static str,
+        (schema, definition): (&str, &str),
+        time_ns: i64,
+        message: &T,
+    ) -> Result<()> {
+        let channel_id = match self.channels.get(topic) {
+            Some(&id) => id,
+            None => {
+                let schema = self.writer.add_schema(schema, "ros2msg", definition.as_bytes())?;
+                let id = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new())?;
+                self.channels.insert(topic, id);
+                id
+            }
+        };
+        let data = encode(message).map_err(|e| anyhow!("cannot encode a message for {topic}: {e}"))?;
+        // times before 1970 have no place in a recording
+        let time = u64::try_from(time_ns).unwrap_or(0);
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+        self.sequence = self.sequence.wrapping_add(1);
+        Ok(self.writer.write_to_known_channel(&header, &data)?)
+    }
+}
+
+/// Name, encoding and text of the `/tf_static` schema, and the message itself, ready to be written.
+pub fn mount_message(pose: &SensorPose, frame_id: &str, time_ns: i64) -> Result<(&'static str, &'static str, Vec<u8>)> {
+    let data = encode(&mount(pose, frame_id, time_ns)).map_err(|e| anyhow!("cannot encode the mount: {e}"))?;
+    Ok((TF.0, TF.1, data))
+}
+
+fn mount(pose: &SensorPose, frame_id: &str, time_ns: i64) -> TfMessage {
+    let [x, y, z] = pose.position;
+    TfMessage {
+        transforms: vec![TransformStamped {
+            header: Header { stamp: Stamp::from_nanoseconds(time_ns), frame_id: ROAD_FRAME.into() },
+            child_frame_id: frame_id.to_owned(),
+            transform: Transform { translation: Vector3 { x, y, z }, rotation: quaternion(pose) },
+        }],
+    }
+}
+
+/// Yaw, then pitch, then roll (REP-103).
+fn quaternion(pose: &SensorPose) -> Quaternion {
+    let (sy, cy) = (pose.yaw_rad() / 2.0).sin_cos();
+    let (sp, cp) = (pose.pitch_rad() / 2.0).sin_cos();
+    let (sr, cr) = (pose.roll_rad() / 2.0).sin_cos();
+    Quaternion {
+        x: sr * cp * cy - cr * sp * sy,
+        y: cr * sp * cy + sr * cp * sy,
+        z: cr * cp * sy - sr * sp * cy,
+        w: cr * cp * cy + sr * sp * sy,
+    }
+}
+
+/// The metadata record of a sensor.
+pub fn sensor_metadata(sensor: &Sensor) -> Metadata {
+    let view = &sensor.field_of_view;
+    let mut map = BTreeMap::from([
+        ("name".to_owned(), sensor.name.clone()),
+        ("has_elevation".to_owned(), sensor.has_elevation.to_string()),
+    ]);
+    for (what, unit, limits) in
+        [("azimuth", "rad", view.azimuth_rad), ("elevation", "rad", view.elevation_rad), ("range", "m", view.range_m)]
+    {
+        for (end, value) in ["min", "max"].iter().zip(limits) {
+            map.insert(format!("{what}_{end}_{unit}"), value.to_string());
+        }
+    }
+    if sensor.frames_independent {
+        map.insert("frames_independent".into(), "true".into());
+    }
+    if sensor.platform_moving {
+        map.insert("platform".into(), "moving".into());
+    }
+    map.extend(sensor.licence.iter().map(|l| ("licence".to_owned(), l.clone())));
+    Metadata { name: SENSOR_METADATA.into(), metadata: map }
+}
+
+fn cloud(frame: &Frame) -> PointCloud2 {
+    let point_step = 4 * FIELDS.len() as u32;
+    let width = frame.detections.len() as u32;
+    let field = |(name, offset): (&&str, u32)| PointField {
+        name: (*name).to_owned(),
+        offset,
+        datatype: PointField::FLOAT32,
+        count: 1,
+    };
+    PointCloud2 {
+        header: Header { stamp: Stamp::from_nanoseconds(frame.time_ns), frame_id: RADAR_FRAME.into() },
+        height: 1,
+        width,
+        fields: FIELDS.iter().zip((0..).step_by(4)).map(field).collect(),
+        is_bigendian: false,
+        point_step,
+        row_step: point_step * width,
+        data: frame.detections.iter().flat_map(point).flat_map(f32::to_le_bytes).collect(),
+        is_dense: true,
+    }
+}
+
+fn point(d: &RadarDetection) -> [f32; FIELDS.len()] {
+    let unit = direction(f64::from(d.azimuth_rad), f64::from(d.elevation_rad.unwrap_or(0.0)));
+    let [x, y, z] = unit.map(|u| (u * f64::from(d.range_m)) as f32);
+    let or_nan = |v: Option<f32>| v.unwrap_or(f32::NAN);
+    let (elevation, rcs, snr) = (or_nan(d.elevation_rad), or_nan(d.rcs_dbsm), or_nan(d.snr_db));
+    [x, y, z, d.range_m, d.azimuth_rad, elevation, d.radial_velocity_mps, rcs, snr]
+}
+
+fn detection(header: &Header, label: &Label) -> Detection3D {
+    let vector = |[x, y, z]: [f64; 3]| Vector3 { x, y, z };
+    let pose = Pose { position: vector(label.solid.center), orientation: Quaternion::from_yaw(label.solid.yaw_rad) };
+    let hypothesis = ObjectHypothesis { class_id: label.class.clone(), score: 1.0 };
+    Detection3D {
+        header: header.clone(),
+        results: vec![ObjectHypothesisWithPose { hypothesis, pose, covariance: Default::default() }],
+        center: pose,
+        size: vector(label.solid.size),
+        id: label.id.clone(),
+    }
+}

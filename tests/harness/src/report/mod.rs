@@ -1,0 +1,10 @@
+//! What people and programs get to see of a replay: a table, JSON, CSV.
+
+pub mod csv;
+pub mod json;
+pub mod notes;
+pub mod table;
+
+/// To be said wherever results are shown.
+pub const ORIGIN: &str = "No labelled gantry-radar recording is publicly obtainable. Synthetic recordings are synthetic: \
+                          their figures show that the method works on their world, not how well it does on a road.";

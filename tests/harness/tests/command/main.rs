@@ -1,0 +1,6 @@
+//! The `viewshed` command on small recordings made here: results, files, and input that is bad.
+
+mod bad_input;
+mod foxglove;
+mod replay;
+mod scene;
