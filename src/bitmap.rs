@@ -115,11 +115,14 @@ mod tests {
         let mut b = VisibilityBitmap::UNKNOWN;
         for (row, line) in b.rows.iter_mut().zip(picture.split_whitespace()) {
             for (r, c) in line.chars().enumerate() {
-                row.set(r, match c {
-                    '.' => Visibility::Visible,
-                    '#' => Visibility::Invisible,
-                    _ => Visibility::Unknown,
-                });
+                row.set(
+                    r,
+                    match c {
+                        '.' => Visibility::Visible,
+                        '#' => Visibility::Invisible,
+                        _ => Visibility::Unknown,
+                    },
+                );
             }
         }
         b

@@ -168,7 +168,9 @@ impl<const NX: usize, const NY: usize> CartesianGrid<NX, NY> {
                 let (a, b) = ((dx * ux + dy * uy) >> 14, (dy * ux - dx * uy) >> 14);
                 let (a, b) = (a * STEPS_PER_SIGMA / along, b * STEPS_PER_SIGMA / across);
                 let steps = ((a * a + b * b) as u32).isqrt() as usize;
-                let (Some(&weight), Some(y)) = (p.gaussian.get(steps), usize::try_from(j - p.origin.1).ok()) else { continue };
+                let (Some(&weight), Some(y)) = (p.gaussian.get(steps), usize::try_from(j - p.origin.1).ok()) else {
+                    continue;
+                };
                 if let Some(cell) = row.cells.get_mut(y) {
                     *cell = cell.saturating_add(weight);
                     row.used.set(y);

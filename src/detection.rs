@@ -78,7 +78,8 @@ impl Detection {
         if m.azimuth_rad.abs() > half_turn || elevation_rad.abs() > half_turn / 2.0 || speed.abs() > 32767.0 {
             return Err(NotADetection::Absurd);
         }
-        let half_db = |v: Option<f32>| v.filter(|v| v.is_finite()).map(|v| math::round_i32(v * 2.0).clamp(-32767, 32767) as i16);
+        let half_db =
+            |v: Option<f32>| v.filter(|v| v.is_finite()).map(|v| math::round_i32(v * 2.0).clamp(-32767, 32767) as i16);
         Ok(Self {
             range_cm: range_cm as u16,
             azimuth: Angle::from_radians(m.azimuth_rad),

@@ -135,7 +135,10 @@ impl InverseSensor {
             Some((measured, sigma)) => {
                 let noise = sigma.min(10_000) * sigma.min(10_000);
                 let weight = (prior << 8) / (prior + noise).max(1);
-                (self.height_prior_cm + (((measured - self.height_prior_cm) * weight) >> 8), math::mul_shift(noise, weight, 8))
+                (
+                    self.height_prior_cm + (((measured - self.height_prior_cm) * weight) >> 8),
+                    math::mul_shift(noise, weight, 8),
+                )
             }
             None => (self.height_prior_cm, prior),
         };

@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn positive_pitch_looks_down_and_positive_roll_lifts_the_left() {
-                let l = mount().levelling().unwrap();
+        let l = mount().levelling().unwrap();
         assert_eq!(l.level([16384, 0, 0]), [16135, 0, -2845]);
         let rolled = Mount { roll_deg: 10.0, pitch_deg: 0.0, ..mount() }.levelling().unwrap();
         assert_eq!(rolled.level([0, 16384, 0])[2], 2845);
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn levelling_and_back_is_the_same_vector() {
-                let l = Mount { roll_deg: -7.0, ..mount() }.levelling().unwrap();
+        let l = Mount { roll_deg: -7.0, ..mount() }.levelling().unwrap();
         let back = l.unlevel(l.level([10_000, -5_000, 3_000]));
         for (a, b) in back.iter().zip([10_000, -5_000, 3_000]) {
             assert!((a - b).abs() <= 3, "{back:?}");

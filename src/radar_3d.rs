@@ -157,7 +157,9 @@ pub struct FrameReport {
     pub obstacles: u16,
 }
 
-impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> Default for Radar3d<R, A, E, N, D> {
+impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> Default
+    for Radar3d<R, A, E, N, D>
+{
     fn default() -> Self {
         Self::new()
     }

@@ -129,7 +129,9 @@ impl<const E: usize> Shadow<E> {
             let lower = rows_at(rows, start);
             let end = rows.first().map_or(to, |s| usize::from(s.end)).clamp(start + 1, to);
             let pair = pair(&self.blocked, lower);
-            let (Some(cells), Some(shares)) = (grades.get_mut(start..end), axes.slice_share().get(start..end)) else { return };
+            let (Some(cells), Some(shares)) = (grades.get_mut(start..end), axes.slice_share().get(start..end)) else {
+                return;
+            };
             if pair.low == pair.high {
                 cells.fill((255 - pair.low).max(BLOCKED));
             } else {

@@ -148,7 +148,7 @@ mod tests {
     use crate::mount::Mount;
 
     fn place(range_m: f32, azimuth_deg: f32, elevation_deg: Option<f32>, pitch_deg: f32) -> Reflection {
-                let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
         let d = Detection {
             range_cm: (range_m * 100.0) as u16,
             azimuth: Angle::from_degrees(azimuth_deg),

@@ -94,7 +94,7 @@ mod tests {
     use std::vec::Vec as StdVec;
 
     fn scan<const D: usize>(strengths: &[i16]) -> Scan<D> {
-                let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
         let view = FieldOfView {
             azimuth_min_deg: -60.0,
             azimuth_max_deg: 60.0,

@@ -132,7 +132,11 @@ mod tests {
 
     fn fan() -> Fan {
         let degrees = Angle::from_degrees;
-        Fan::new(&Limits { azimuth: [degrees(-60.0), degrees(60.0)], elevation: [degrees(-16.0), degrees(16.0)], range_cm: [300, 20_000] })
+        Fan::new(&Limits {
+            azimuth: [degrees(-60.0), degrees(60.0)],
+            elevation: [degrees(-16.0), degrees(16.0)],
+            range_cm: [300, 20_000],
+        })
     }
 
     #[test]

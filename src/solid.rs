@@ -73,10 +73,10 @@ fn scaled(d: Direction, length: i32) -> (i32, i32) {
 
 #[cfg(test)]
 mod tests {
-    use crate::trig;
     use super::*;
     use crate::angle::Angle;
-    
+    use crate::trig;
+
     fn truck(x_cm: i32, y_cm: i32, heading_deg: f32) -> Solid {
         Solid {
             x_cm,

@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn sine_and_cosine_are_within_two_steps_everywhere() {
-                for raw in i16::MIN..=i16::MAX {
+        for raw in i16::MIN..=i16::MAX {
             let a = Angle::from_raw(raw);
             let exact = f64::from(raw) / 32768.0 * std::f64::consts::PI;
             assert!((f64::from(sin(a)) - exact.sin() * 16384.0).abs() < 2.0, "sin {raw}");
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn bearings_are_within_two_steps_and_turn_left() {
-                assert_eq!(bearing(0, 5), Angle::QUARTER);
+        assert_eq!(bearing(0, 5), Angle::QUARTER);
         assert_eq!(bearing(0, -5), -Angle::QUARTER);
         assert_eq!(bearing(-5, 0).raw(), i16::MIN);
         assert_eq!(bearing(0, 0), Angle::ZERO);
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn along_and_across_follow_the_direction() {
-                let d = direction(Angle::from_degrees(90.0));
+        let d = direction(Angle::from_degrees(90.0));
         assert_eq!((d.along(0, 100), d.across(-100, 0)), (100, 100));
         assert_eq!(d.left().along(-100, 0), 100);
     }

@@ -54,5 +54,8 @@ fn outline<const R: usize, const A: usize, const E: usize>(solid: &Solid, axes: 
         // beside or under the sensor: let the rays decide
         return (0, A as i32 * 256);
     }
-    corners.iter().map(|c| axes.column_place(trig::bearing(c.0, c.1))).fold((i32::MAX, i32::MIN), |(lo, hi), p| (lo.min(p), hi.max(p)))
+    corners
+        .iter()
+        .map(|c| axes.column_place(trig::bearing(c.0, c.1)))
+        .fold((i32::MAX, i32::MIN), |(lo, hi), p| (lo.min(p), hi.max(p)))
 }

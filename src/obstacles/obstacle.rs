@@ -106,7 +106,8 @@ impl Obstacle {
         // each term is a squared distance in its own scale: 0.7 m along, the width and noise across,
         // half a metre a second (twice) in speed
         let by_length = beyond * beyond / 19;
-        let by_width = (left * left * 16) / ((t.half_width_cm * t.half_width_cm + sigma_across * sigma_across) / 16).max(1);
+        let by_width =
+            (left * left * 16) / ((t.half_width_cm * t.half_width_cm + sigma_across * sigma_across) / 16).max(1);
         let by_speed = error * error / 1250;
         Some(by_length + by_width + by_speed)
     }

@@ -2,10 +2,10 @@
 
 use super::profile::HIT;
 use super::size::{SizeConfig, Sizes};
-use crate::reflection::Noise;
-use crate::trig::Direction;
 use crate::config::{ConfigError, within};
 use crate::math;
+use crate::reflection::Noise;
+use crate::trig::Direction;
 
 /// How detections become moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -149,6 +149,7 @@ impl SettingsArgs {
         self.evaluation.apply(&mut settings.evaluation);
         self.estimators.apply(&mut settings.estimators);
         settings.evaluation.check()?;
+        settings.estimators.judge_at(settings.evaluation.slice_height_m);
         Ok(settings)
     }
 }
@@ -273,5 +274,7 @@ mod tests {
         assert_eq!((s.evaluation.min_speed_mps, s.evaluation.grid), (3.0, Grid::Polar));
         assert_eq!(s.evaluation.growth_m, 1.0);
         assert_eq!(s.estimators.max_detections, 4096);
+        let s = parse(&["--slice-height", "0.5"]).unwrap();
+        assert_eq!(s.estimators.radar_3d.visibility.slice_height_m, 0.5, "truth and estimators share the height");
     }
 }

@@ -91,7 +91,7 @@ impl Track {
         (0..n)
             .map(|i| {
                 let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
-                let dt = (self.times_ns[b] - self.times_ns[a]) as f64 * 1e-9;
+                let dt = self.times_ns[b].saturating_sub(self.times_ns[a]) as f64 * 1e-9;
                 [0, 1].map(|k| (self.solids[b].center[k] - self.solids[a].center[k]) / dt)
             })
             .collect()
@@ -106,7 +106,7 @@ impl Track {
         }
         let previous = next.checked_sub(1)?;
         let lo = self.times_ns[previous];
-        let f = (time_ns - lo) as f64 / (hi - lo) as f64;
+        let f = time_ns.saturating_sub(lo) as f64 / hi.saturating_sub(lo).max(1) as f64;
         let (a, b) = (self.solids[previous], self.solids[next]);
         let mix = |x: f64, y: f64| x + f * (y - x);
         let turn =

@@ -10,13 +10,14 @@ use viewshed::detection::{Detection, Measurement, NotADetection};
 use viewshed::field_of_view::FieldOfView;
 use viewshed::gate::{Rejection, Rejections};
 use viewshed::mount::Mount;
+use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2dConfig, Reading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
 
-use crate::evaluation::score::Estimator;
+use crate::evaluation::score::{Estimator, PolarCells};
 use crate::recording::{Frame, Recording};
 
 /// Parameters of all estimators.
@@ -42,6 +43,14 @@ impl Default for Options {
             radar_2d: Radar2dConfig::default(),
             radar_3d: Radar3dConfig::default(),
         }
+    }
+}
+
+impl Options {
+    /// Takes the height at which truth is judged over to every estimator.
+    pub fn judge_at(&mut self, slice_height_m: f64) {
+        self.radar_2d.slice_height_m = slice_height_m as f32;
+        self.radar_3d.visibility.slice_height_m = slice_height_m as f32;
     }
 }
 
@@ -95,6 +104,19 @@ pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
             range_max_m: view.range_m[1] as f32,
         },
         noise: *noise,
+    }
+}
+
+/// A polar map's cells, for pictures and for judging on them.
+fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCells<'_> {
+    let g = map.geometry();
+    let right = f64::from(g.azimuth_origin.radians());
+    PolarCells {
+        azimuths: A,
+        ranges: R,
+        azimuth_rad: [right, right + f64::from(g.azimuth_span) / 65536.0 * std::f64::consts::TAU],
+        cell_m: f64::from(g.cell_cm) / 100.0,
+        cell: Box::new(|a, r| map.cell(a, r)),
     }
 }
 

@@ -6,8 +6,8 @@ use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 
-use super::{Intake, MOST_DETECTIONS};
-use crate::evaluation::score::Estimator;
+use super::{Intake, MOST_DETECTIONS, polar_cells};
+use crate::evaluation::score::{Estimator, PolarCells};
 use crate::recording::Frame;
 
 /// Range cells, azimuths and elevations of the reference grid.
@@ -56,6 +56,10 @@ impl<const D: usize> Estimator for Driver<D> {
 
     fn map(&self) -> &dyn VisibilityMap {
         &*self.map
+    }
+
+    fn polar(&self) -> Option<PolarCells<'_>> {
+        Some(polar_cells(&self.map))
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {

@@ -12,9 +12,9 @@ use viewshed::raycast;
 use viewshed::sensor::Sensor;
 use viewshed::spherical::SphericalGrid;
 
-use super::Options;
 use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
-use crate::evaluation::score::Estimator;
+use super::{Options, polar_cells};
+use crate::evaluation::score::{Estimator, PolarCells};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
@@ -73,6 +73,10 @@ impl Estimator for Reference {
 
     fn map(&self) -> &dyn VisibilityMap {
         &*self.map
+    }
+
+    fn polar(&self) -> Option<PolarCells<'_>> {
+        Some(polar_cells(&self.map))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Runs one estimator over a recording and scores its map at every counted frame.
 
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
+use viewshed::map::{CellState, RoadPoint, Visibility, VisibilityMap};
 
 use super::Grid;
 use super::cells::{CellCounts, CellTally};
@@ -22,8 +22,8 @@ pub trait Estimator: Send {
 
     fn map(&self) -> &dyn VisibilityMap;
 
-    /// An object judged on the map's own polar cells; `None` where the map has none.
-    fn polar_verdict(&self, _solid: &Solid) -> Option<Verdict> {
+    /// The map's own polar cells, where it has any.
+    fn polar(&self) -> Option<PolarCells<'_>> {
         None
     }
 
@@ -31,6 +31,18 @@ pub trait Estimator: Send {
     fn counters(&self) -> Vec<(&'static str, u64)> {
         Vec::new()
     }
+}
+
+/// The cells of a polar map: azimuths from right to left, ranges from near to far.
+pub struct PolarCells<'a> {
+    pub azimuths: usize,
+    pub ranges: usize,
+    /// Outer edges, radians from the boresight's heading, + left.
+    pub azimuth_rad: [f64; 2],
+    /// Length of a cell along the ground, metres.
+    pub cell_m: f64,
+    /// State of (azimuth, range).
+    pub cell: Box<dyn Fn(usize, usize) -> CellState + 'a>,
 }
 
 /// One object at one frame, as an estimator sees it. `grade` is `None` where all its cells are unknown.
@@ -90,11 +102,12 @@ pub fn score(
         estimator.step(frame);
         progress();
         let mut judge = |object: &Sample| {
-            let polar = (grid == Grid::Polar).then(|| estimator.polar_verdict(&object.solid)).flatten();
-            polar.unwrap_or_else(|| {
-                judged_on = Grid::Cartesian;
-                verdict(estimator.map(), &object.cells)
-            })
+            let map = estimator.map();
+            if grid == Grid::Polar && estimator.polar().is_some() {
+                return verdict(map, points(&object.solid));
+            }
+            judged_on = Grid::Cartesian;
+            verdict(map, object.cells.iter().map(|&(i, j)| RoadPoint::cell_centre(i, j)))
         };
         verdicts.push(sample.objects.iter().map(&mut judge).collect());
         cells.push(tally(estimator.map(), &sample.cells));
@@ -121,10 +134,10 @@ fn tally(map: &dyn VisibilityMap, cells: &[(Cell, bool)]) -> CellTally {
 }
 
 /// An object is as visible as the best cell under it.
-fn verdict(map: &dyn VisibilityMap, cells: &[Cell]) -> Verdict {
+fn verdict(map: &dyn VisibilityMap, places: impl IntoIterator<Item = RoadPoint>) -> Verdict {
     let mut verdict = Verdict { visible: false, grade: None };
-    for &(i, j) in cells {
-        let state = map.at(RoadPoint::cell_centre(i, j));
+    for place in places {
+        let state = map.at(place);
         verdict.visible |= state.visible();
         if state.visibility != Visibility::Unknown {
             verdict.grade = verdict.grade.max(Some(state.grade));
@@ -133,10 +146,26 @@ fn verdict(map: &dyn VisibilityMap, cells: &[Cell]) -> Verdict {
     verdict
 }
 
+/// Points no farther apart than this reach every polar cell a footprint overlaps, but for slivers.
+const POINT_SPACING_M: f64 = 0.25;
+
+/// Points all over a footprint, its edges included.
+fn points(solid: &Solid) -> impl Iterator<Item = RoadPoint> {
+    let [length, width, _] = solid.size;
+    let steps = |side: f64| (side / POINT_SPACING_M).ceil().max(1.0) as u32;
+    let (along, across) = (steps(length), steps(width));
+    let solid = *solid;
+    (0..=along).flat_map(move |i| {
+        (0..=across).map(move |j| {
+            let part = |k: u32, of: u32| f64::from(k) / f64::from(of) - 0.5;
+            let [x, y] = solid.global([part(i, along) * length, part(j, across) * width]);
+            RoadPoint::new((x * 100.0).round() as i32, (y * 100.0).round() as i32)
+        })
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use viewshed::map::CellState;
-
     use super::*;
 
     /// x < 0 unknown, x < 10 m visible, beyond invisible with a grade falling with x.
@@ -155,10 +184,20 @@ mod tests {
 
     #[test]
     fn one_visible_cell_makes_an_object_visible_and_unknown_never_does() {
+        let verdict =
+            |map: &Ahead, cells: &[Cell]| verdict(map, cells.iter().map(|&(i, j)| RoadPoint::cell_centre(i, j)));
         assert_eq!(verdict(&Ahead, &[(9, 0), (10, 0)]), Verdict { visible: true, grade: Some(246) });
         assert_eq!(verdict(&Ahead, &[(10, 0), (20, 0)]), Verdict { visible: false, grade: Some(245) });
         assert_eq!(verdict(&Ahead, &[(-1, 0)]), Verdict { visible: false, grade: None });
         assert_eq!(verdict(&Ahead, &[(-1, 0), (30, 0)]).grade, Some(225));
+    }
+
+    #[test]
+    fn points_cover_a_footprint_to_its_edges() {
+        let solid = Solid { center: [10.0, 5.0, 0.75], yaw_rad: 0.0, size: [4.0, 2.0, 1.5] };
+        let all: Vec<RoadPoint> = points(&solid).collect();
+        assert_eq!(all.len(), 17 * 9);
+        assert!(all.contains(&RoadPoint::new(800, 400)) && all.contains(&RoadPoint::new(1200, 600)));
     }
 
     #[test]

@@ -73,7 +73,7 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<Vec<Label>
     }
     if !labels.iter().any(|l| (start_ns..=end_ns).contains(&l.time_ns)) {
         for l in &mut labels {
-            l.time_ns += start_ns;
+            l.time_ns = l.time_ns.saturating_add(start_ns);
         }
     }
     Ok(labels)

@@ -26,6 +26,11 @@ const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
 const DETECTIONS: &str = "vision_msgs/msg/Detection3DArray";
 const TF: &str = "tf2_msgs/msg/TFMessage";
 
+/// Sides an object may have.
+const SIZE_M: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+/// Distance from the origin of the road an object may have.
+const FARTHEST_M: f64 = 1e5;
+
 #[derive(Debug, Clone)]
 struct Topic {
     name: String,
@@ -84,7 +89,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
 
 fn restrict(recording: &mut Recording, options: &ReadOptions) {
     let Some(start) = recording.frames.first().map(|f| f.time_ns) else { return };
-    let since = |f: &Frame| (f.time_ns - start) as f64 * 1e-9;
+    let since = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9;
     recording
         .frames
         .retain(|f| options.from_s.is_none_or(|t| since(f) >= t) && options.to_s.is_none_or(|t| since(f) <= t));
@@ -198,8 +203,10 @@ impl Reader {
             let (p, s, yaw_rad) = (d.center.position, d.size, d.center.orientation.yaw_rad());
             if [p.x, p.y, p.z, s.x, s.y, s.z, yaw_rad].iter().any(|v| !v.is_finite()) {
                 self.problems.add(topic, "object with a value that is not finite, dropped", time_ns);
-            } else if s.x <= 0.0 || s.y <= 0.0 || s.z <= 0.0 {
-                self.problems.add(topic, "object without a size, dropped", time_ns);
+            } else if [s.x, s.y, s.z].iter().any(|side| !SIZE_M.contains(side)) {
+                self.problems.add(topic, "object smaller than 1 cm or larger than 100 m, dropped", time_ns);
+            } else if [p.x, p.y, p.z].iter().any(|v| v.abs() > FARTHEST_M) {
+                self.problems.add(topic, "object farther than 100 km away, dropped", time_ns);
             } else {
                 self.labels.push(Label {
                     time_ns,

@@ -94,7 +94,7 @@ pub struct Recording {
 impl Recording {
     pub fn duration_s(&self) -> f64 {
         match (self.frames.first(), self.frames.last()) {
-            (Some(a), Some(b)) => (b.time_ns - a.time_ns) as f64 * 1e-9,
+            (Some(a), Some(b)) => b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9,
             _ => 0.0,
         }
     }

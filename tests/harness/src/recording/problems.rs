@@ -47,9 +47,16 @@ impl Problems {
     }
 }
 
+impl Problem {
+    /// The problem in words, its time counted from the start of the recording.
+    pub fn since(&self, start_ns: i64) -> String {
+        let seconds = self.first_time_ns.saturating_sub(start_ns) as f64 * 1e-9;
+        format!("{}: {} ({}x, first at {seconds:.3} s)", self.topic, self.what, self.count)
+    }
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { topic, what, count, first_time_ns } = self;
-        write!(f, "{topic}: {what} ({count}x, first at {:.3} s)", *first_time_ns as f64 * 1e-9)
+        f.write_str(&self.since(0))
     }
 }

@@ -54,7 +54,8 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
         lines.push("Problems of the input: none.".into());
     } else {
         lines.push("Problems of the input:".into());
-        lines.extend(recording.problems.iter().map(|p| format!("  {p}")));
+        let start = recording.frames.first().map_or(0, |f| f.time_ns);
+        lines.extend(recording.problems.iter().map(|p| format!("  {}", p.since(start))));
     }
     lines.extend(recording.sensor.licence.as_ref().map(|l| format!("Licence of the recording: {l}.")));
     lines

@@ -1,6 +1,7 @@
 //! `viewshed replay`: recordings in, the paper's table out.
 
 mod out;
+mod pictures;
 mod shipped;
 
 use std::fs::File;

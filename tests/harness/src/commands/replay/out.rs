@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
+use super::{SHOWN, pictures};
 use crate::commands::write_file;
 use crate::evaluation::examples::Example;
 use crate::evaluation::replay::Replay;
@@ -30,13 +31,7 @@ pub fn folders(dir: &Path, recordings: &[PathBuf]) -> Result<Vec<PathBuf>> {
 pub fn write(folder: &Path, text: &str, replay: &Replay, examples: &[Example], settings: &Settings) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     write_file(&folder.join("table.txt"), &format!("{text}\n{ORIGIN}\n"))?;
-    pictures(folder, replay, examples, settings)
-}
-
-/// Where pictures are drawn from a replay: its curves in `replay.summary`, its frames by
-/// [`crate::evaluation::replay::visit`] with a fresh estimator.
-fn pictures(_folder: &Path, _replay: &Replay, _examples: &[Example], _settings: &Settings) -> Result<()> {
-    Ok(())
+    pictures::write(folder, replay, SHOWN, examples, settings)
 }
 
 #[cfg(test)]
