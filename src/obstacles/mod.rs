@@ -9,9 +9,11 @@
 //! At most `N` obstacles. When the list is full, a new one replaces the one with the least evidence
 //! if that is unconfirmed, and is dropped and counted otherwise.
 
+mod by_range;
 pub mod obstacle;
 pub mod profile;
 pub mod size;
+pub mod tallness;
 pub mod tracking;
 
 use heapless::Vec;
@@ -19,6 +21,7 @@ use heapless::Vec;
 use crate::reflection::Reflection;
 use crate::solid::Solid;
 use crate::time::Step;
+use by_range::ByRange;
 use obstacle::Obstacle;
 use tracking::Tracking;
 
@@ -110,10 +113,13 @@ impl<const N: usize> Obstacles<N> {
     #[allow(clippy::cast_possible_truncation)] // the list is bounded
     fn associate<const D: usize>(&mut self, reflections: &[Reflection], step: Step, t: &Tracking) -> Claimed<D> {
         const { assert!(N < u16::MAX as usize) }
+        let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
         let mut best = [(i32::MAX, u16::MAX); D];
         for (k, o) in self.list.iter().enumerate() {
             let search = o.search(t);
-            for (r, best) in reflections.iter().zip(&mut best) {
+            let (from, to) = search.distances_cm();
+            for &i in by_range.between(from, to) {
+                let (Some(r), Some(best)) = (reflections.get(usize::from(i)), best.get_mut(usize::from(i))) else { continue };
                 if let Some(misfit) = search.misfit(r, t)
                     && misfit < best.0
                 {

@@ -1,6 +1,7 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
 use super::profile::{BIN_CM, Extent, Profile};
+use super::tallness::Tallness;
 use super::tracking::Tracking;
 use crate::math::{hypot_gate, mul_shift};
 use crate::reflection::{Noise, Reflection};
@@ -36,6 +37,7 @@ pub struct Obstacle {
     pub age: u16,
     /// Way made so far, centimetres, saturating.
     travelled_cm: i32,
+    tallness: Tallness,
     /// What this frame's detections add up to.
     gathered: Gathered,
 }
@@ -75,6 +77,16 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Least and greatest distance from the sensor a detection of this obstacle can have.
+    pub fn distances_cm(&self) -> (i32, i32) {
+        let (x, y) = (self.anchor.0.unsigned_abs().min(45_000), self.anchor.1.unsigned_abs().min(45_000));
+        #[allow(clippy::cast_possible_wrap)] // below 2^16
+        let distance = (x * x + y * y).isqrt() as i32;
+        // the corner of the square that is searched
+        let reach = self.reach_cm * 3 / 2;
+        (distance - reach, distance + reach)
+    }
+
     /// How badly a detection fits, 2^-8; `None` where it cannot belong to this obstacle.
     #[inline]
     pub fn misfit(&self, r: &Reflection, t: &Tracking) -> Option<i32> {
@@ -127,6 +139,7 @@ impl Obstacle {
             hits: 0,
             age: 0,
             travelled_cm: 0,
+            tallness: Tallness::default(),
             gathered: Gathered::default(),
         }
     }
@@ -208,6 +221,9 @@ impl Obstacle {
         g.lateral.0 += i64::from(w) * i64::from(left);
         g.lateral.1 = g.lateral.1.saturating_add(w);
         self.profile.add(along);
+        if let Some((height, sigma)) = r.height_cm {
+            self.tallness.add(height, sigma);
+        }
     }
 
     /// Stretches the outline of a newborn to a detection, so that the next finds it.
@@ -335,6 +351,7 @@ impl Obstacle {
         self.existence = (self.existence + other.existence).min(t.existence_max);
         self.hits = self.hits.saturating_add(other.hits);
         self.travelled_cm = self.travelled_cm.max(other.travelled_cm);
+        self.tallness.join(&other.tallness);
         self.update_extent(t);
     }
 
@@ -351,7 +368,7 @@ impl Obstacle {
             heading: self.heading,
             half_length_cm: size.length_cm / 2,
             half_width_cm: size.width_cm / 2,
-            height_cm: size.height_cm,
+            height_cm: size.height_cm.max(self.tallness.floor_cm()),
         }
     }
 }
