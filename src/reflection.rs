@@ -134,10 +134,8 @@ impl Noise {
 #[allow(clippy::cast_possible_wrap, clippy::cast_sign_loss, clippy::cast_possible_truncation)] // squares of 2^14 fit
 fn meet_height(fall: i32, ahead: i32, up: i32) -> (i32, i32) {
     let square = (ahead * ahead + up * up).max(1);
-    let reach = (square as u32).isqrt() as i32;
-    let fall = fall.clamp(-reach, reach);
+    let fall = fall.clamp(-ONE, ONE);
     let rest = ((square - fall * fall).max(0) as u32).isqrt() as i32;
-    // both are below 2^14 times the reach
     let scaled = |v: i32| (v / (square >> 14).max(1)).clamp(-ONE, ONE);
     (scaled(ahead * fall + up * rest), scaled(up * fall - ahead * rest))
 }

@@ -100,18 +100,16 @@ impl<const R: usize, const E: usize> Column<R, E> {
 
     /// Changes every stack that holds something; one left empty is skipped from then on.
     pub fn change(&mut self, mut change: impl FnMut(usize, &mut [u8; E])) {
-        for r in self.used.iter() {
+        let mut from = 0;
+        while let Some(r) = self.used.next(from) {
             if let Some(s) = self.stacks.get_mut(r) {
                 change(r, s);
+                if *s == [0; E] {
+                    self.used.clear(r);
+                }
             }
+            from = r + 1;
         }
-        let mut used = self.used;
-        for r in self.used.iter() {
-            if self.stacks.get(r).is_some_and(|s| s.iter().all(|v| *v == 0)) {
-                used.clear(r);
-            }
-        }
-        self.used = used;
     }
 
     /// Changes every stack nearer than `end` that holds something.
@@ -137,14 +135,13 @@ impl<const R: usize, const E: usize> Column<R, E> {
         let Some(stack) = self.stacks.get_mut(r) else { return };
         self.used.set(r);
         self.solid.set(r);
-        let mut left = top;
-        for cell in stack.iter_mut() {
-            if left <= 0 {
-                break;
-            }
-            let value = if left >= 256 { share } else { scaled(share, left) };
-            *cell = (*cell).max(value);
-            left -= 256;
+        let full = usize::try_from(top >> 8).unwrap_or(0).min(E);
+        let (below, above) = stack.split_at_mut(full);
+        for cell in below {
+            *cell = (*cell).max(share);
+        }
+        if let (Some(cell), 0..) = (above.first_mut(), top) {
+            *cell = (*cell).max(scaled(share, top & 0xFF));
         }
     }
 }

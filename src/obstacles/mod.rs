@@ -119,7 +119,9 @@ impl<const N: usize> Obstacles<N> {
             let search = o.search(t);
             let (from, to) = search.distances_cm();
             for &i in by_range.between(from, to) {
-                let (Some(r), Some(best)) = (reflections.get(usize::from(i)), best.get_mut(usize::from(i))) else { continue };
+                let (Some(r), Some(best)) = (reflections.get(usize::from(i)), best.get_mut(usize::from(i))) else {
+                    continue;
+                };
                 if let Some(misfit) = search.misfit(r, t)
                     && misfit < best.0
                 {
