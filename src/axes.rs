@@ -18,6 +18,9 @@ use crate::trig::Direction;
 /// Fraction bits of a slope.
 const SLOPE_BITS: u32 = 18;
 
+/// The view of a column the slice plane never enters.
+const NOTHING: (u8, u8) = (1, 0);
+
 /// A sensor closer to the slice plane than this has no slopes to tell distances by, centimetres.
 const LEAST_DROP_CM: i32 = 10;
 
@@ -40,8 +43,8 @@ pub struct Axes<const R: usize, const A: usize, const E: usize> {
     slice_share: [u8; R],
     /// Stretches of range cells whose slice points lie above the same row's centre.
     slice_rows: [SliceRow; E],
-    /// For every column: the first range cell in view and the first beyond, on the slice plane.
-    view: [(u16, u16); A],
+    /// For every column: the first and the last range cell in view on the slice plane.
+    view: [(u8, u8); A],
 }
 
 /// A stretch of range cells on which the slice plane runs between the same two rows' centres.
@@ -76,7 +79,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             row_top: 0,
             slice_share: [0; R],
             slice_rows: [SliceRow { lower: 0, end: 0 }; E],
-            view: [(0, 0); A],
+            view: [NOTHING; A],
         };
         let in_view = |bearing: f32, ground_cm: f32| {
             let (x, y) = (math::cos(bearing) * ground_cm, math::sin(bearing) * ground_cm);
@@ -111,16 +114,15 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         for a in 0..A {
             let bearing = self.azimuth_of((a as i32 * 256) + 128).radians();
             let seen = |r: &usize| in_view(bearing, (*r as f32 + 0.5) * self.cell_cm as f32);
-            let first = (0..R).find(seen).unwrap_or(0);
-            let end = (0..R).rev().find(seen).map_or(0, |last| last + 1);
-            if let Some(v) = self.view.get_mut(a) {
-                *v = (first as u16, end as u16);
+            let ends = (0..R).find(seen).zip((0..R).rev().find(seen));
+            if let (Some(v), Some((first, last))) = (self.view.get_mut(a), ends) {
+                *v = (first as u8, last as u8);
             }
         }
     }
 
     fn lay_rows(&mut self, drop: i32) {
-        let near_cell = self.view.iter().filter(|v| v.1 > v.0).map(|v| v.0).min().unwrap_or(0);
+        let near_cell = self.view.iter().filter(|v| **v != NOTHING).map(|v| v.0).min().unwrap_or(0);
         let near = math::sqrt((f32::from(near_cell) + 0.5) * self.cell_cm as f32);
         let far = math::sqrt((self.cell_cm * R as i32) as f32);
         let slope = |k: usize| {
@@ -238,8 +240,10 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Range cells of a column that are in view on the slice plane.
     pub fn view(&self, column: usize) -> core::ops::Range<usize> {
-        let (first, end) = self.view.get(column).copied().unwrap_or((0, 0));
-        usize::from(first)..usize::from(end)
+        match self.view.get(column) {
+            Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
+            _ => 0..0,
+        }
     }
 }
 

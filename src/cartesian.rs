@@ -155,11 +155,11 @@ impl<const NX: usize, const NY: usize> CartesianGrid<NX, NY> {
         let (ci, cj) = (place.x_cm.div_euclid(CELL_CM), place.y_cm.div_euclid(CELL_CM));
         // the line of sight on the ground, in the road's axes
         let toward = levelling.unturn(r.x_cm, r.y_cm);
-        let length = r.ground_cm.max(1);
+        let length = i32::from(r.ground_cm.max(1));
         let (ux, uy) = ((toward.0 << 14) / length, (toward.1 << 14) / length);
         // a cell is no point: half its side joins the noise
         let along = noise.range_cm + CELL_CM / 2;
-        let across = r.across_cm + CELL_CM / 2;
+        let across = i32::from(r.across_cm) + CELL_CM / 2;
         let reach = (across.max(along) * 5 / 2 / CELL_CM).min(8);
         for i in ci - reach..=ci + reach {
             let Some(row) = usize::try_from(i - p.origin.0).ok().and_then(|i| self.rows.get_mut(i)) else { continue };

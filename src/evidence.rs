@@ -133,6 +133,7 @@ impl InverseSensor {
         let prior = self.height_prior_variance;
         let (height, variance) = match r.height_cm {
             Some((measured, sigma)) => {
+                let (measured, sigma) = (i32::from(measured), i32::from(sigma));
                 let noise = sigma.min(10_000) * sigma.min(10_000);
                 let weight = (prior << 8) / (prior + noise).max(1);
                 (
@@ -174,12 +175,12 @@ impl InverseSensor {
     ) {
         let Some(column) = axes.column(r.bearing).and_then(|a| grid.column_mut(a)) else { return };
         // the detection's own cell and its spread stay
-        let end = (r.ground_cm / axes.cell_cm - 2).max(0) as usize;
+        let end = (i32::from(r.ground_cm) / axes.cell_cm - 2).max(0) as usize;
         let mut row = None;
         column.change_before(end, |stack| {
             let row = *row.get_or_insert_with(|| {
                 let (height, _) = self.height(r);
-                ((axes.row_place(axes.slope(height, r.ground_cm)) + 255) >> 8) as usize
+                ((axes.row_place(axes.slope(height, i32::from(r.ground_cm))) + 255) >> 8) as usize
             });
             for v in stack.iter_mut().skip(row) {
                 *v -= ((i32::from(*v) * self.clearing) >> 8) as u8;
@@ -197,21 +198,22 @@ impl InverseSensor {
         grid: &mut SphericalGrid<R, A, E>,
     ) {
         let gain = if first { 256 } else { self.gain };
+        let ground_cm = i32::from(r.ground_cm);
         let (height, sigma) = self.height(r);
         let mut profile = [0_u8; E];
         for (row, p) in profile.iter_mut().enumerate() {
-            let above = axes.height_at(axes.row_centre(row), r.ground_cm) - height;
+            let above = axes.height_at(axes.row_centre(row), ground_cm) - height;
             *p = self.bell(above.max(0), sigma) as u8;
         }
         let place = axes.column_place(r.bearing);
         let reach = 2 * self.azimuth_sigma;
         let (first, last) = (((place - reach) >> 8).max(0), ((place + reach) >> 8).min(A as i32 - 1));
-        let middle = r.ground_cm / axes.cell_cm;
+        let middle = ground_cm / axes.cell_cm;
         for a in first..=last {
             let Some(column) = grid.column_mut(a as usize) else { continue };
             let by_azimuth = self.bell(a * 256 + 128 - place, self.azimuth_sigma);
             for cell in (middle - 1).max(0)..=(middle + 1).min(R as i32 - 1) {
-                let offset = cell * axes.cell_cm + axes.cell_cm / 2 - r.ground_cm;
+                let offset = cell * axes.cell_cm + axes.cell_cm / 2 - ground_cm;
                 let weight = (gain * by_azimuth * self.bell(offset, self.range_sigma)) >> 16;
                 if weight < 4 {
                     continue;

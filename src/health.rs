@@ -92,8 +92,10 @@ impl Continuity {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Health {
     last_frame: Option<Time>,
-    /// Last frame that was not empty.
-    last_traffic: Option<Time>,
+    /// Whether there has been traffic.
+    traffic: bool,
+    /// First of the empty frames since then.
+    empty_since: Option<Time>,
     blind: bool,
 }
 
@@ -105,7 +107,7 @@ impl Default for Health {
 
 impl Health {
     /// Before the first frame.
-    pub const NEW: Self = Self { last_frame: None, last_traffic: None, blind: false };
+    pub const NEW: Self = Self { last_frame: None, traffic: false, empty_since: None, blind: false };
 
     /// Takes note of a frame. `detections` counts what the radar reported, gated or not; `fault` is
     /// its own flag.
@@ -118,15 +120,17 @@ impl Health {
                 Some(gap) => Continuity::Follows(gap),
             },
         };
-        if continuity == Continuity::ClockStepped {
-            // moments of the old clock say nothing on the new one; a blind sensor stays blind
-            self.last_traffic = self.last_traffic.map(|_| now);
+        if continuity.resets() {
+            // a run of empty frames has to be seen without a break; a blind sensor stays blind
+            self.empty_since = None;
         }
         if detections > 0 {
-            self.last_traffic = Some(now);
+            self.traffic = true;
+            self.empty_since = None;
             self.blind = false;
-        } else if let Some(quiet) = self.last_traffic.and_then(|t| now.since(t)) {
-            self.blind |= quiet >= limits.blind_after_us;
+        } else if self.traffic {
+            let since = *self.empty_since.get_or_insert(now);
+            self.blind |= now.since(since).is_some_and(|quiet| quiet >= limits.blind_after_us);
         }
         self.blind |= fault;
         self.last_frame = Some(now);
@@ -174,12 +178,14 @@ mod tests {
             h.frame(at(i * 66), 0, false, &l);
         }
         assert_eq!(h.condition(at(14 * 66), &l), Condition::Healthy);
-        h.frame(at(1000), 0, false, &l);
-        assert_eq!(h.condition(at(1000), &l), Condition::Blind);
-        h.frame(at(1066), 1, false, &l);
-        assert_eq!(h.condition(at(1066), &l), Condition::Healthy);
-        h.frame(at(1132), 1, true, &l);
-        assert_eq!(h.condition(at(1132), &l), Condition::Blind, "the sensor says so itself");
+        h.frame(at(1065), 0, false, &l);
+        assert_eq!(h.condition(at(1065), &l), Condition::Healthy);
+        h.frame(at(1066), 0, false, &l);
+        assert_eq!(h.condition(at(1066), &l), Condition::Blind, "a second after the first empty frame");
+        h.frame(at(1132), 1, false, &l);
+        assert_eq!(h.condition(at(1132), &l), Condition::Healthy);
+        h.frame(at(1198), 1, true, &l);
+        assert_eq!(h.condition(at(1198), &l), Condition::Blind, "the sensor says so itself");
     }
 
     #[test]

@@ -139,7 +139,7 @@ pub struct Radar3d<const R: usize, const A: usize, const E: usize, const N: usiz
 pub type ReferenceProfile = Radar3d<200, 120, 16, 96, 256>;
 
 /// For controllers with 128 kB: 2 m cells.
-pub type SmallProfile = Radar3d<100, 64, 8, 32, 128>;
+pub type SmallProfile = Radar3d<100, 64, 8, 24, 128>;
 
 /// What a frame did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -80,26 +80,24 @@ pub struct Reflection {
     /// Place in the levelled frame, centimetres, + left.
     pub y_cm: i32,
     /// Distance along the ground, centimetres.
-    pub ground_cm: i32,
+    pub ground_cm: u16,
     /// Levelled azimuth.
     pub bearing: Angle,
     /// Ground components of the unit line of sight (shorter than one where it points down).
     pub sight: Direction,
     /// Radial velocity, cm/s, + receding.
-    pub radial_velocity_cm_s: i32,
+    pub radial_velocity_cm_s: i16,
     /// Standard deviation across the line of sight, centimetres.
-    pub across_cm: i32,
+    pub across_cm: u16,
     /// Measured height above the road and its standard deviation, centimetres.
-    pub height_cm: Option<(i32, i32)>,
-    /// Radar cross-section, half dBsm.
-    pub rcs_half_dbsm: Option<i16>,
+    pub height_cm: Option<(i16, u16)>,
     /// What decides who stays when a list is full, half dB.
     pub strength: i16,
 }
 
 impl Noise {
     /// Places a detection on the ground.
-    #[allow(clippy::cast_possible_truncation)] // unit vectors stay within 2^14 plus rounding
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
     pub fn place(&self, d: &Detection, levelling: &Levelling) -> Reflection {
         let range = i32::from(d.range_cm);
         // the half-plane of this azimuth, levelled: ahead (elevation 0) and up
@@ -109,10 +107,11 @@ impl Noise {
         let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
         let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
         let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
-        let ground_cm = ((x_cm * x_cm + y_cm * y_cm) as u32).isqrt() as i32;
+        let ground_cm = (x_cm.unsigned_abs().saturating_pow(2).saturating_add(y_cm.unsigned_abs().saturating_pow(2))).isqrt() as u16;
         let height_cm = d.elevation.map(|e| {
             let z = (ahead[2] * trig::cos(e) + up[2] * trig::sin(e)) >> 14;
-            (levelling.height_cm + ((z * range) >> 14), math::mul_shift(range, self.elevation, 16).max(1))
+            let height = levelling.height_cm + ((z * range) >> 14);
+            (height.clamp(-30_000, 30_000) as i16, math::mul_shift(range, self.elevation, 16).clamp(1, 65_535) as u16)
         });
         Reflection {
             x_cm,
@@ -120,10 +119,9 @@ impl Noise {
             ground_cm,
             bearing: trig::bearing(x_cm, y_cm),
             sight: Direction { x: x as i16, y: y as i16 },
-            radial_velocity_cm_s: i32::from(d.radial_velocity_cm_s),
-            across_cm: math::mul_shift(range, self.azimuth, 16).max(1),
+            radial_velocity_cm_s: d.radial_velocity_cm_s,
+            across_cm: math::mul_shift(range, self.azimuth, 16).clamp(1, 65_535) as u16,
             height_cm,
-            rcs_half_dbsm: d.rcs_half_dbsm,
             strength: d.strength(),
         }
     }
@@ -162,17 +160,17 @@ mod tests {
     fn a_reflection_lies_at_reflector_height_under_its_azimuth() {
         let r = place(100.0, 30.0, None, 0.0);
         // sqrt(100^2 - 5.2^2) = 99.86 m along the ground
-        assert!((r.ground_cm - 9986).abs() <= 3, "{r:?}");
+        assert!((i32::from(r.ground_cm) - 9986).abs() <= 3, "{r:?}");
         assert!((r.x_cm - 8648).abs() <= 5 && (r.y_cm - 4993).abs() <= 5, "{r:?}");
         assert_eq!(r.height_cm, None);
-        assert!((r.across_cm - 87).abs() <= 1, "half a degree at 100 m");
+        assert!((i32::from(r.across_cm) - 87).abs() <= 1, "half a degree at 100 m");
     }
 
     #[test]
     fn pitch_turns_the_line_of_sight_and_not_the_place() {
         let level = place(60.0, 40.0, None, 0.0);
         let down = place(60.0, 40.0, None, 4.0);
-        assert!((level.ground_cm - down.ground_cm).abs() <= 5);
+        assert!(level.ground_cm.abs_diff(down.ground_cm) <= 5);
         // looking down, the same sensor azimuth meets the ground a little farther out
         assert!(down.bearing.raw() > level.bearing.raw());
         assert!((down.bearing.raw() - level.bearing.raw()) < 80);
@@ -183,7 +181,7 @@ mod tests {
         let (up, _) = place(100.0, 0.0, Some(-1.0), 0.0).height_cm.unwrap();
         let (down, sigma) = place(100.0, 0.0, Some(-3.0), 0.0).height_cm.unwrap();
         assert!((up - (600 - 175)).abs() <= 3 && (down - (600 - 523)).abs() <= 3, "{up} {down}");
-        assert!((sigma - 174).abs() <= 1);
+        assert!(sigma.abs_diff(174) <= 1);
         let (pitched, _) = place(100.0, 0.0, Some(0.0), 3.0).height_cm.unwrap();
         assert!((pitched - (600 - 523)).abs() <= 3, "nose down lowers the axis: {pitched}");
     }

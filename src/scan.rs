@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn of_equals_the_first_stay() {
         let s: Scan<2> = scan(&[20, 20, 20]);
-        let kept: StdVec<i32> = s.reflections().iter().map(|r| r.ground_cm / 100).collect();
+        let kept: StdVec<u16> = s.reflections().iter().map(|r| r.ground_cm / 100).collect();
         assert_eq!(kept, [8, 9]);
     }
 

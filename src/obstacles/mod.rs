@@ -153,10 +153,11 @@ impl<const N: usize> Obstacles<N> {
                 continue;
             }
             // what stands still shows no more than the noise of its Doppler
-            if seed.radial_velocity_cm_s.abs() < 4 * t.noise.radial_velocity_cm_s {
+            let radial = i32::from(seed.radial_velocity_cm_s);
+            if radial.abs() < 4 * t.noise.radial_velocity_cm_s {
                 continue;
             }
-            let speed = (seed.radial_velocity_cm_s << 14) / along;
+            let speed = (radial << 14) / along;
             if speed.abs() < t.min_speed_cm_s || speed.abs() > 7000 {
                 continue;
             }

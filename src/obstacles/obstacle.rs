@@ -36,7 +36,7 @@ pub struct Obstacle {
     /// Frames since it appeared, saturating.
     pub age: u16,
     /// Way made so far, centimetres, saturating.
-    travelled_cm: i32,
+    travelled_cm: u16,
     tallness: Tallness,
     /// What this frame's detections add up to.
     gathered: Gathered,
@@ -46,10 +46,11 @@ pub struct Obstacle {
 #[derive(Debug, Clone, Copy, Default)]
 struct Gathered {
     count: i32,
-    /// Speed error along the heading: sum of projection x error, and of projection squared (2^-14).
-    speed: (i64, i32),
+    /// Speed error along the heading: sum of projection x error (2^-10 cm/s), and of projection
+    /// squared (2^-14).
+    speed: (i32, i32),
     /// Lateral place: sum of weight x offset, and of weights.
-    lateral: (i64, i32),
+    lateral: (i32, i32),
 }
 
 /// Weight of a lateral measurement with a standard deviation in centimetres: the inverse variance,
@@ -60,11 +61,12 @@ fn weight(sigma_cm: i32) -> i32 {
 
 /// Standard deviations of a detection along and across a heading, centimetres.
 fn spread(heading: Direction, r: &Reflection, noise: &Noise) -> (i32, i32) {
+    let across_cm = i32::from(r.across_cm);
     let along = heading.along(i32::from(r.sight.x), i32::from(r.sight.y)).abs();
     let across = heading.across(i32::from(r.sight.x), i32::from(r.sight.y)).abs();
     (
-        hypot_gate((noise.range_cm * along) >> 14, (r.across_cm * across) >> 14),
-        hypot_gate((noise.range_cm * across) >> 14, (r.across_cm * along) >> 14),
+        hypot_gate((noise.range_cm * along) >> 14, (across_cm * across) >> 14),
+        hypot_gate((noise.range_cm * across) >> 14, (across_cm * along) >> 14),
     )
 }
 
@@ -177,7 +179,8 @@ impl Obstacle {
         let (dx, dy) = (step.times(self.velocity.0), step.times(self.velocity.1));
         self.position.0 += dx;
         self.position.1 += dy;
-        self.travelled_cm = self.travelled_cm.saturating_add(hypot_gate(dx, dy) >> FRACTION);
+        let way = u16::try_from(hypot_gate(dx, dy) >> FRACTION).unwrap_or(u16::MAX);
+        self.travelled_cm = self.travelled_cm.saturating_add(way);
         self.lateral_weight = mul_shift(self.lateral_weight, step.keep(t.lateral_memory), 16);
         self.gathered = Gathered::default();
         self.age = self.age.saturating_add(1);
@@ -185,7 +188,7 @@ impl Obstacle {
 
     /// Whether it has moved far enough to be no fixture that clutter gave a speed.
     pub fn is_mover(&self, t: &Tracking) -> bool {
-        self.travelled_cm >= t.mover_cm
+        i32::from(self.travelled_cm) >= t.mover_cm
     }
 
     /// Whether it stands still without ever having moved.
@@ -197,7 +200,7 @@ impl Obstacle {
     fn speed_error(&self, r: &Reflection) -> i32 {
         let (vx, vy) = (self.velocity.0 >> 4, self.velocity.1 >> 4);
         let explained = r.sight.along(vx, vy);
-        (r.radial_velocity_cm_s << 4) - explained
+        (i32::from(r.radial_velocity_cm_s) << 4) - explained
     }
 
     /// What it takes to look for this obstacle's detections.
@@ -216,13 +219,13 @@ impl Obstacle {
         let w = weight(sigma_across);
         let g = &mut self.gathered;
         g.count += 1;
-        g.speed.0 += i64::from(projection) * i64::from(error);
+        g.speed.0 = g.speed.0.saturating_add((projection * error) >> 8);
         g.speed.1 += (projection * projection) >> 14;
-        g.lateral.0 += i64::from(w) * i64::from(left);
+        g.lateral.0 = g.lateral.0.saturating_add(w * left);
         g.lateral.1 = g.lateral.1.saturating_add(w);
         self.profile.add(along);
         if let Some((height, sigma)) = r.height_cm {
-            self.tallness.add(height, sigma);
+            self.tallness.add(i32::from(height), i32::from(sigma));
         }
     }
 
@@ -246,10 +249,10 @@ impl Obstacle {
             return;
         }
         let inertia = if self.age < t.young { t.young_inertia } else { t.inertia };
-        let gain = (g.speed.0 << 4) / i64::from((g.speed.1 + inertia).max(1));
+        let gain = (i64::from(g.speed.0) << 12) / i64::from((g.speed.1 + inertia).max(1));
         self.push_along(gain as i32);
         let weight = self.lateral_weight.saturating_add(g.lateral.1).max(1);
-        let offset = ((g.lateral.0 << FRACTION) / i64::from(weight)) as i32;
+        let offset = ((i64::from(g.lateral.0) << FRACTION) / i64::from(weight)) as i32;
         self.move_left(offset);
         self.lateral_weight = weight;
         if self.age >= t.young {

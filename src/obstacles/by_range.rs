@@ -1,0 +1,87 @@
+//! A frame's reflections in bins of range, so that an obstacle looks only at those around it.
+
+use crate::reflection::Reflection;
+
+/// Bins of range.
+const BINS: usize = 64;
+
+/// Indices of up to `D` reflections, nearest bin first, in order of arrival within a bin.
+pub struct ByRange<const D: usize> {
+    order: [u16; D],
+    /// Where each bin begins in `order`, and where the last ends.
+    begins: [u16; BINS + 1],
+    bin_cm: i32,
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // bins and lists are short
+impl<const D: usize> ByRange<D> {
+    /// Sorts by counting: two passes over the reflections.
+    pub fn sort(reflections: &[Reflection], limit_cm: i32) -> Self {
+        let mut sorted = Self { order: [0; D], begins: [0; BINS + 1], bin_cm: (limit_cm / BINS as i32).max(1) };
+        for r in reflections {
+            let bin = sorted.bin(i32::from(r.ground_cm));
+            if let Some(n) = sorted.begins.get_mut(bin + 1) {
+                *n += 1;
+            }
+        }
+        let mut sum = 0;
+        for n in &mut sorted.begins {
+            sum += *n;
+            *n = sum;
+        }
+        let mut next = sorted.begins;
+        for (i, r) in reflections.iter().enumerate() {
+            let Some(at) = next.get_mut(sorted.bin(i32::from(r.ground_cm))) else { continue };
+            if let Some(slot) = sorted.order.get_mut(usize::from(*at)) {
+                *slot = i as u16;
+            }
+            *at += 1;
+        }
+        sorted
+    }
+
+    fn bin(&self, ground_cm: i32) -> usize {
+        (ground_cm.max(0) / self.bin_cm).min(BINS as i32 - 1) as usize
+    }
+
+    /// Indices of all reflections between two distances, and of some around them.
+    pub fn between(&self, from_cm: i32, to_cm: i32) -> &[u16] {
+        let begin = self.begins.get(self.bin(from_cm)).copied().unwrap_or(0);
+        let end = self.begins.get(self.bin(to_cm) + 1).copied().unwrap_or(0);
+        self.order.get(usize::from(begin)..usize::from(end)).unwrap_or(&[])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::angle::Angle;
+    use crate::trig::Direction;
+    use std::vec::Vec;
+
+    #[test]
+    fn every_reflection_in_the_interval_is_found_once() {
+        let ranges = [5_000, 19_999, 300, 5_100, 22_400, 40_000, 12_000];
+        let reflections: Vec<Reflection> = ranges
+            .iter()
+            .map(|&ground_cm: &u16| Reflection {
+                x_cm: i32::from(ground_cm),
+                y_cm: 0,
+                ground_cm,
+                bearing: Angle::ZERO,
+                sight: Direction::AHEAD,
+                radial_velocity_cm_s: 0,
+                across_cm: 1,
+                height_cm: None,
+                strength: 0,
+            })
+            .collect();
+        let sorted = ByRange::<8>::sort(&reflections, 22_500);
+        let all: Vec<u16> = sorted.between(0, 50_000).to_vec();
+        assert_eq!(all.len(), 7);
+        assert_eq!(all[0], 2);
+        let near: Vec<u16> = sorted.between(4_000, 6_000).to_vec();
+        assert!(near.contains(&0) && near.contains(&3) && !near.contains(&1), "{near:?}");
+        assert_eq!(sorted.between(30_000, 31_000).len(), 2, "what is beyond the limit is in the last bin");
+    }
+}

@@ -1,0 +1,38 @@
+//! Memory the estimators take, asserted. kB = 1000 bytes; output maps are not counted.
+
+use std::mem::size_of;
+
+use viewshed::polar::PolarMap;
+use viewshed::radar_2d::{Radar2d, Radar2dParameters};
+use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
+
+#[test]
+fn the_reference_grid_fits_450_kb() {
+    let state = size_of::<ReferenceProfile>();
+    let parameters = size_of::<Radar3dParameters<200, 120, 16>>();
+    println!("radar-3d 200 x 120 x 16: state {state} B, parameters {parameters} B");
+    assert!(state + parameters <= 450_000, "{state} + {parameters}");
+}
+
+#[test]
+fn the_small_profile_fits_64_kb_in_all() {
+    let state = size_of::<SmallProfile>();
+    let parameters = size_of::<Radar3dParameters<100, 64, 8>>();
+    println!("radar-3d 100 x 64 x 8: state {state} B, parameters {parameters} B");
+    assert!(state + parameters <= 64_000, "{state} + {parameters}");
+}
+
+#[test]
+fn the_flat_baseline_fits_450_kb() {
+    let state = size_of::<Radar2d<256, 400, 480, 256>>();
+    let parameters = size_of::<Radar2dParameters>();
+    println!("radar-2d 256 x 400 m: state {state} B, parameters {parameters} B");
+    assert!(state + parameters <= 450_000, "{state} + {parameters}");
+}
+
+#[test]
+fn a_polar_map_takes_two_bytes_a_cell() {
+    let map = size_of::<PolarMap<200, 120>>();
+    println!("polar map 200 x 120: {map} B");
+    assert!(map <= 2 * 200 * 120 + 128, "{map}");
+}
