@@ -147,9 +147,9 @@ impl InverseSensor {
     }
 
     /// Lets all evidence fade by a time step, by how well each cell was seen.
-    pub fn fade<const R: usize, const A: usize, const E: usize>(
+    pub fn fade<const R: usize, const A: usize, const E: usize, const W: usize>(
         &self,
-        grid: &mut SphericalGrid<R, A, E>,
+        grid: &mut SphericalGrid<R, A, E, W>,
         seen: &PolarMap<R, A>,
         step: Step,
     ) {
@@ -167,11 +167,11 @@ impl InverseSensor {
     }
 
     /// Clears what stands in a detection's line of sight.
-    pub fn clear<const R: usize, const A: usize, const E: usize>(
+    pub fn clear<const R: usize, const A: usize, const E: usize, const W: usize>(
         &self,
         r: &Reflection,
         axes: &Axes<R, A, E>,
-        grid: &mut SphericalGrid<R, A, E>,
+        grid: &mut SphericalGrid<R, A, E, W>,
     ) {
         let Some(column) = axes.column(r.bearing).and_then(|a| grid.column_mut(a)) else { return };
         // the detection's own cell and its spread stay
@@ -190,12 +190,12 @@ impl InverseSensor {
 
     /// Adds the evidence of a detection that belongs to no obstacle. In a `first` frame it is all the
     /// evidence there is and counts in full.
-    pub fn add<const R: usize, const A: usize, const E: usize>(
+    pub fn add<const R: usize, const A: usize, const E: usize, const W: usize>(
         &self,
         r: &Reflection,
         first: bool,
         axes: &Axes<R, A, E>,
-        grid: &mut SphericalGrid<R, A, E>,
+        grid: &mut SphericalGrid<R, A, E, W>,
     ) {
         let gain = if first { 256 } else { self.gain };
         let ground_cm = i32::from(r.ground_cm);

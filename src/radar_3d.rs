@@ -125,21 +125,22 @@ fn threshold(name: &'static str, share: f32) -> Result<u8, ConfigError> {
     within(name, share, 0.01, 1.0).map(|s| math::round_i32(s * 255.0 + 0.25).clamp(2, 255) as u8)
 }
 
-/// The estimator's state: `R` ranges, `A` azimuths, `E` elevations, `N` obstacles, `D` detections.
+/// The estimator's state: `R` ranges (up to `32 W`), `A` azimuths, `E` elevations, `N` obstacles, `D`
+/// detections.
 #[derive(Debug, Clone)]
-pub struct Radar3d<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> {
+pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> {
     scan: Scan<D>,
     obstacles: Obstacles<N>,
-    grid: SphericalGrid<R, A, E>,
+    grid: SphericalGrid<R, A, E, W>,
     health: Health,
     rejections: Rejections,
 }
 
 /// The reference grid: 200 m in 1 m cells, 1 degree, 16 elevations.
-pub type ReferenceProfile = Radar3d<200, 120, 16, 96, 256>;
+pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 96, 256>;
 
 /// For controllers with 128 kB: 2 m cells.
-pub type SmallProfile = Radar3d<100, 64, 8, 24, 128>;
+pub type SmallProfile = Radar3d<100, 64, 8, 4, 28, 176>;
 
 /// What a frame did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -157,15 +158,17 @@ pub struct FrameReport {
     pub obstacles: u16,
 }
 
-impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> Default
-    for Radar3d<R, A, E, N, D>
+impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> Default
+    for Radar3d<R, A, E, W, N, D>
 {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: usize> Radar3d<R, A, E, N, D> {
+impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
+    Radar3d<R, A, E, W, N, D>
+{
     /// Knows nothing; to be placed in static memory.
     pub const fn new() -> Self {
         Self {
@@ -278,7 +281,7 @@ impl<const R: usize, const A: usize, const E: usize, const N: usize, const D: us
     }
 
     /// The occupancy grid.
-    pub fn grid(&self) -> &SphericalGrid<R, A, E> {
+    pub fn grid(&self) -> &SphericalGrid<R, A, E, W> {
         &self.grid
     }
 }

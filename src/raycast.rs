@@ -24,8 +24,8 @@ const BLOCKED: u8 = 1;
 ///
 /// Costs a pass over the stacks that hold something and, behind the first of them, one step for
 /// each range cell in half-shadow.
-pub fn cast<const R: usize, const A: usize, const E: usize>(
-    grid: &SphericalGrid<R, A, E>,
+pub fn cast<const R: usize, const A: usize, const E: usize, const W: usize>(
+    grid: &SphericalGrid<R, A, E, W>,
     axes: &Axes<R, A, E>,
     map: &mut PolarMap<R, A>,
 ) {
@@ -43,8 +43,8 @@ pub fn cast<const R: usize, const A: usize, const E: usize>(
     }
 }
 
-fn cast_column<const R: usize, const A: usize, const E: usize>(
-    column: &Column<R, E>,
+fn cast_column<const R: usize, const A: usize, const E: usize, const W: usize>(
+    column: &Column<R, E, W>,
     axes: &Axes<R, A, E>,
     grades: &mut [u8; R],
     occupancy: &mut [u8; R],
@@ -201,7 +201,7 @@ mod tests {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
         let levelling = mount.levelling().unwrap();
         let axes = Axes::<100, 120, 16>::new(&levelling, &VIEW, 1.0).unwrap();
-        let mut grid = SphericalGrid::new();
+        let mut grid = SphericalGrid::<100, 120, 16>::new();
         for s in solids {
             voxelise(s, &axes, &mut grid);
         }

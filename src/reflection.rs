@@ -107,7 +107,8 @@ impl Noise {
         let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
         let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
         let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
-        let ground_cm = (x_cm.unsigned_abs().saturating_pow(2).saturating_add(y_cm.unsigned_abs().saturating_pow(2))).isqrt() as u16;
+        let ground_cm = (x_cm.unsigned_abs().saturating_pow(2).saturating_add(y_cm.unsigned_abs().saturating_pow(2)))
+            .isqrt() as u16;
         let height_cm = d.elevation.map(|e| {
             let z = (ahead[2] * trig::cos(e) + up[2] * trig::sin(e)) >> 14;
             let height = levelling.height_cm + ((z * range) >> 14);

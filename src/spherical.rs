@@ -6,36 +6,38 @@
 //! cells of one azimuth and range lie together (a *stack*), so a box is a run of filled stacks and
 //! a ray over all elevations is a byte-wise running maximum. Empty stacks are skipped by bit rows.
 
-use crate::bits::RangeBits;
+use crate::bits::Bits;
 
-/// Occupancy around one sensor.
+/// Occupancy around one sensor: `R` ranges, `A` azimuths, `E` elevations; `W` words of 32 bits tell
+/// which of the `R` stacks of an azimuth hold something.
 ///
 /// # Limits
-/// `R * A * E` bytes and 64 bytes per azimuth.
+/// `R * A * E` bytes and `8 W` bytes per azimuth; `R` up to `32 W`.
 #[derive(Debug, Clone)]
-pub struct SphericalGrid<const R: usize, const A: usize, const E: usize> {
-    columns: [Column<R, E>; A],
+pub struct SphericalGrid<const R: usize, const A: usize, const E: usize, const W: usize = 8> {
+    columns: [Column<R, E, W>; A],
 }
 
 /// All cells of one azimuth.
 #[derive(Debug, Clone)]
-pub struct Column<const R: usize, const E: usize> {
+pub struct Column<const R: usize, const E: usize, const W: usize = 8> {
     stacks: [[u8; E]; R],
     /// Range cells whose stack may hold something.
-    used: RangeBits,
+    used: Bits<W>,
     /// Range cells filled by a solid of this frame.
-    solid: RangeBits,
+    solid: Bits<W>,
 }
 
-impl<const R: usize, const A: usize, const E: usize> Default for SphericalGrid<R, A, E> {
+impl<const R: usize, const A: usize, const E: usize, const W: usize> Default for SphericalGrid<R, A, E, W> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const R: usize, const A: usize, const E: usize> SphericalGrid<R, A, E> {
+impl<const R: usize, const A: usize, const E: usize, const W: usize> SphericalGrid<R, A, E, W> {
     /// Nothing occupied.
     pub const fn new() -> Self {
+        const { assert!(R <= Bits::<W>::CAPACITY) }
         Self { columns: [const { Column::EMPTY }; A] }
     }
 
@@ -47,17 +49,17 @@ impl<const R: usize, const A: usize, const E: usize> SphericalGrid<R, A, E> {
     }
 
     /// All columns, from right to left.
-    pub fn columns(&self) -> impl Iterator<Item = &Column<R, E>> {
+    pub fn columns(&self) -> impl Iterator<Item = &Column<R, E, W>> {
         self.columns.iter()
     }
 
     /// All columns, from right to left.
-    pub fn columns_mut(&mut self) -> impl Iterator<Item = &mut Column<R, E>> {
+    pub fn columns_mut(&mut self) -> impl Iterator<Item = &mut Column<R, E, W>> {
         self.columns.iter_mut()
     }
 
     /// One column.
-    pub fn column_mut(&mut self, azimuth: usize) -> Option<&mut Column<R, E>> {
+    pub fn column_mut(&mut self, azimuth: usize) -> Option<&mut Column<R, E, W>> {
         self.columns.get_mut(azimuth)
     }
 
@@ -70,8 +72,8 @@ impl<const R: usize, const A: usize, const E: usize> SphericalGrid<R, A, E> {
     }
 }
 
-impl<const R: usize, const E: usize> Column<R, E> {
-    const EMPTY: Self = Self { stacks: [[0; E]; R], used: RangeBits::NONE, solid: RangeBits::NONE };
+impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
+    const EMPTY: Self = Self { stacks: [[0; E]; R], used: Bits::NONE, solid: Bits::NONE };
 
     fn clear(&mut self) {
         for r in self.used.iter() {
@@ -79,8 +81,8 @@ impl<const R: usize, const E: usize> Column<R, E> {
                 *s = [0; E];
             }
         }
-        self.used = RangeBits::NONE;
-        self.solid = RangeBits::NONE;
+        self.used = Bits::NONE;
+        self.solid = Bits::NONE;
     }
 
     fn remove_solids(&mut self) {
@@ -90,7 +92,7 @@ impl<const R: usize, const E: usize> Column<R, E> {
             }
             self.used.clear(r);
         }
-        self.solid = RangeBits::NONE;
+        self.solid = Bits::NONE;
     }
 
     /// Range cells that hold something, nearest first, with their stacks.

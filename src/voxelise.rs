@@ -16,10 +16,10 @@ const WINDOW: i32 = 64;
 
 /// Puts a box into the grid.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // column and range indices are checked
-pub fn voxelise<const R: usize, const A: usize, const E: usize>(
+pub fn voxelise<const R: usize, const A: usize, const E: usize, const W: usize>(
     solid: &Solid,
     axes: &Axes<R, A, E>,
-    grid: &mut SphericalGrid<R, A, E>,
+    grid: &mut SphericalGrid<R, A, E, W>,
 ) {
     let origin = solid.origin();
     let (low, high) = outline(solid, axes);

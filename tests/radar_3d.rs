@@ -109,7 +109,8 @@ fn a_vehicle_that_stops_stays_an_obstacle() {
 fn a_guard_rail_hides_nothing() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
     for frame in 0..60 {
-        let rail = (0..50).filter_map(|k| detection(&rig.sensor, [20.0 + f64::from(k * 3 + frame % 3), 8.0, 0.6], [0.0; 2], true));
+        let rail = (0..50)
+            .filter_map(|k| detection(&rig.sensor, [20.0 + f64::from(k * 3 + frame % 3), 8.0, 0.6], [0.0; 2], true));
         let d: Vec<Detection> = rail.collect();
         rig.frame(&d);
     }
