@@ -22,7 +22,7 @@ use crate::config::{ConfigError, within};
 use crate::math;
 use crate::polar::PolarMap;
 use crate::reflection::{NoiseConfig, Reflection};
-use crate::spherical::SphericalGrid;
+use crate::spherical::{Column, SphericalGrid};
 use crate::time::Step;
 
 /// How evidence of unmoving things comes and goes.
@@ -56,6 +56,9 @@ impl Default for EvidenceConfig {
         }
     }
 }
+
+/// Lines of sight of one frame that clear a column.
+const SIGHTS: u8 = 6;
 
 /// Steps of the Gaussian table to one standard deviation.
 const STEPS_PER_SIGMA: i32 = 16;
@@ -166,14 +169,30 @@ impl InverseSensor {
         }
     }
 
-    /// Clears what stands in a detection's line of sight.
+    /// Clears what stands in the detections' lines of sight, at most [`SIGHTS`] in a column: more
+    /// would take little that is left.
     pub fn clear<const R: usize, const A: usize, const E: usize, const W: usize>(
         &self,
-        r: &Reflection,
+        reflections: &[Reflection],
         axes: &Axes<R, A, E>,
         grid: &mut SphericalGrid<R, A, E, W>,
     ) {
-        let Some(column) = axes.column(r.bearing).and_then(|a| grid.column_mut(a)) else { return };
+        let mut sights = [0_u8; A];
+        for r in reflections {
+            let Some(a) = axes.column(r.bearing) else { continue };
+            if let (Some(n @ ..SIGHTS), Some(column)) = (sights.get_mut(a), grid.column_mut(a)) {
+                *n += 1;
+                self.clear_column(r, axes, column);
+            }
+        }
+    }
+
+    fn clear_column<const R: usize, const A: usize, const E: usize, const W: usize>(
+        &self,
+        r: &Reflection,
+        axes: &Axes<R, A, E>,
+        column: &mut Column<R, E, W>,
+    ) {
         // the detection's own cell and its spread stay
         let end = (i32::from(r.ground_cm) / axes.cell_cm - 2).max(0) as usize;
         let mut row = None;

@@ -137,7 +137,7 @@ pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usiz
 }
 
 /// The reference grid: 200 m in 1 m cells, 1 degree, 16 elevations.
-pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 96, 256>;
+pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 64, 256>;
 
 /// For controllers with 128 kB: 2 m cells.
 pub type SmallProfile = Radar3d<100, 64, 8, 4, 28, 176>;
@@ -248,11 +248,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         self.grid.remove_solids();
         p.inverse_sensor.fade(&mut self.grid, map, step);
         let reflections = self.scan.reflections();
-        for r in reflections {
-            p.inverse_sensor.clear(r, &p.axes, &mut self.grid);
-        }
+        p.inverse_sensor.clear(reflections, &p.axes, &mut self.grid);
         for (i, r) in reflections.iter().enumerate() {
-            if !claimed.contains(i) {
+            // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
+            if first || !(claimed.contains(i) || p.tracking.course(r).is_some()) {
                 p.inverse_sensor.add(r, first, &p.axes, &mut self.grid);
             }
         }

@@ -99,11 +99,12 @@ impl<const N: usize> Obstacles<N> {
         for o in &mut self.list {
             o.predict(step, t);
         }
-        let mut claimed = self.associate(reflections, step, t);
+        let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
+        let mut claimed = self.associate(reflections, &by_range, step, t);
         for o in &mut self.list {
             o.settle(step, t);
         }
-        self.found(reflections, &mut claimed, t);
+        self.found(reflections, &by_range, &mut claimed, t);
         self.join_parts(t);
         self.doubt_the_unseen(step, t, in_view);
         claimed
@@ -111,9 +112,14 @@ impl<const N: usize> Obstacles<N> {
 
     /// Gives each detection to the obstacle it fits best; of equals, to the elder in the list.
     #[allow(clippy::cast_possible_truncation)] // the list is bounded
-    fn associate<const D: usize>(&mut self, reflections: &[Reflection], step: Step, t: &Tracking) -> Claimed<D> {
+    fn associate<const D: usize>(
+        &mut self,
+        reflections: &[Reflection],
+        by_range: &ByRange<D>,
+        step: Step,
+        t: &Tracking,
+    ) -> Claimed<D> {
         const { assert!(N < u16::MAX as usize) }
-        let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
         let mut best = [(i32::MAX, u16::MAX); D];
         for (k, o) in self.list.iter().enumerate() {
             let search = o.search(t);
@@ -141,33 +147,38 @@ impl<const N: usize> Obstacles<N> {
         claimed
     }
 
-    /// Starts obstacles from detections that move along the road and belong to nobody.
-    fn found<const D: usize>(&mut self, reflections: &[Reflection], claimed: &mut Claimed<D>, t: &Tracking) {
+    /// Starts obstacles from detections that move along the road and belong to nobody. At most half
+    /// as many in a frame as there is room for in all; the rest waits for the next.
+    fn found<const D: usize>(
+        &mut self,
+        reflections: &[Reflection],
+        by_range: &ByRange<D>,
+        claimed: &mut Claimed<D>,
+        t: &Tracking,
+    ) {
+        let mut room = N / 2;
         for (i, seed) in reflections.iter().enumerate() {
             if claimed.contains(i) {
                 continue;
             }
-            let along = t.road.along(i32::from(seed.sight.x), i32::from(seed.sight.y));
-            // nearly broadside: Doppler says nothing about motion along the road
-            if along.abs() < (15 << 14) / 100 {
-                continue;
+            let Some((heading, speed)) = t.course(seed) else { continue };
+            if room == 0 {
+                return;
             }
-            // what stands still shows no more than the noise of its Doppler
-            let radial = i32::from(seed.radial_velocity_cm_s);
-            if radial.abs() < 4 * t.noise.radial_velocity_cm_s {
-                continue;
-            }
-            let speed = (radial << 14) / along;
-            if speed.abs() < t.min_speed_cm_s || speed.abs() > 7000 {
-                continue;
-            }
-            let heading = if speed > 0 { t.road } else { t.road.reversed() };
-            let mut newborn = Obstacle::new(seed, heading, speed.abs());
-            for (j, r) in reflections.iter().enumerate().skip(i) {
-                if !claimed.contains(j) && newborn.search(t).misfit(r, t).is_some() {
+            room -= 1;
+            let mut newborn = Obstacle::new(seed, heading, speed);
+            newborn.absorb(seed, t);
+            claimed.insert(i);
+            let mut search = newborn.search(t);
+            let (from, to) = search.distances_cm();
+            for &j in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
+                let j = usize::from(j);
+                let Some(r) = reflections.get(j).filter(|_| !claimed.contains(j)) else { continue };
+                if search.misfit(r, t).is_some() {
                     newborn.absorb(r, t);
                     newborn.reach(r);
                     claimed.insert(j);
+                    search = newborn.search(t);
                 }
             }
             newborn.settle(Step::from_micros(0), t);

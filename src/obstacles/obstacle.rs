@@ -71,14 +71,18 @@ fn spread(heading: Direction, r: &Reflection, noise: &Noise) -> (i32, i32) {
 }
 
 /// An obstacle with what every comparison needs at hand.
-pub struct Search<'a> {
-    obstacle: &'a Obstacle,
+#[derive(Debug, Clone, Copy)]
+pub struct Search {
+    heading: Direction,
+    /// 2^-4 cm/s
+    velocity: (i32, i32),
+    extent: Extent,
     anchor: (i32, i32),
     /// Farthest from the anchor a detection of this obstacle can lie along either axis.
     reach_cm: i32,
 }
 
-impl Search<'_> {
+impl Search {
     /// Least and greatest distance from the sensor a detection of this obstacle can have.
     pub fn distances_cm(&self) -> (i32, i32) {
         let (x, y) = (self.anchor.0.unsigned_abs().min(45_000), self.anchor.1.unsigned_abs().min(45_000));
@@ -96,17 +100,14 @@ impl Search<'_> {
         if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
             return None;
         }
-        self.obstacle.misfit(r, dx, dy, t)
-    }
-}
-
-impl Obstacle {
-    /// How badly a detection fits that lies at (dx, dy) from the anchor.
-    fn misfit(&self, r: &Reflection, dx: i32, dy: i32, t: &Tracking) -> Option<i32> {
-        let error = self.speed_error(r).abs();
+        let error = speed_error(self.velocity, r).abs();
         if error > t.doppler_gate {
             return None;
         }
+        self.misfit_of_place(r, dx, dy, error, t)
+    }
+
+    fn misfit_of_place(&self, r: &Reflection, dx: i32, dy: i32, error: i32, t: &Tracking) -> Option<i32> {
         let (along, left) = (self.heading.along(dx, dy), self.heading.across(dx, dy));
         let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
         let beyond = self.extent.beyond_cm(along);
@@ -125,7 +126,15 @@ impl Obstacle {
         let by_speed = error * error / 1250;
         Some(by_length + by_width + by_speed)
     }
+}
 
+/// Difference between a detection's radial velocity and the one a motion (2^-4 cm/s) explains,
+/// 2^-4 cm/s.
+fn speed_error(velocity: (i32, i32), r: &Reflection) -> i32 {
+    (i32::from(r.radial_velocity_cm_s) << 4) - r.sight.along(velocity.0, velocity.1)
+}
+
+impl Obstacle {
     /// A new obstacle at a detection, travelling along `heading` at a speed in cm/s.
     pub fn new(seed: &Reflection, heading: Direction, speed_cm_s: i32) -> Self {
         let fine = |v: i32| v << FRACTION;
@@ -196,18 +205,16 @@ impl Obstacle {
         !self.is_mover(t) && self.age >= 2 && hypot_gate(self.velocity.0, self.velocity.1) < t.fixture_speed
     }
 
-    /// Difference between a detection's radial velocity and the one this motion explains, 2^-4 cm/s.
-    fn speed_error(&self, r: &Reflection) -> i32 {
-        let (vx, vy) = (self.velocity.0 >> 4, self.velocity.1 >> 4);
-        let explained = r.sight.along(vx, vy);
-        (i32::from(r.radial_velocity_cm_s) << 4) - explained
-    }
-
     /// What it takes to look for this obstacle's detections.
-    pub fn search(&self, t: &Tracking) -> Search<'_> {
-        let anchor = self.anchor();
+    pub fn search(&self, t: &Tracking) -> Search {
         let outline = self.extent.front_cm.max(-self.extent.rear_cm);
-        Search { obstacle: self, anchor, reach_cm: outline + t.reach_cm }
+        Search {
+            heading: self.heading,
+            velocity: (self.velocity.0 >> 4, self.velocity.1 >> 4),
+            extent: self.extent,
+            anchor: self.anchor(),
+            reach_cm: outline + t.reach_cm,
+        }
     }
 
     /// Takes a detection that belongs to it.
@@ -215,7 +222,7 @@ impl Obstacle {
         let (along, left) = self.local(r.x_cm, r.y_cm);
         let (_, sigma_across) = spread(self.heading, r, &t.noise);
         let projection = self.heading.along(i32::from(r.sight.x), i32::from(r.sight.y));
-        let error = self.speed_error(r);
+        let error = speed_error((self.velocity.0 >> 4, self.velocity.1 >> 4), r);
         let w = weight(sigma_across);
         let g = &mut self.gathered;
         g.count += 1;
@@ -309,9 +316,10 @@ impl Obstacle {
 
     /// Whether another obstacle is a part of the same vehicle: in line, equally fast, and no farther
     /// away than vehicles keep from each other at this speed.
+    #[inline]
     pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
-        let ((ax, ay), (bx, by)) = (self.anchor(), other.anchor());
-        if (ax - bx).abs() > 2 * t.max_length_cm || (ay - by).abs() > 2 * t.max_length_cm {
+        let far = 2 * t.max_length_cm << FRACTION;
+        if (self.position.0 - other.position.0).abs() > far || (self.position.1 - other.position.1).abs() > far {
             return false;
         }
         let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);

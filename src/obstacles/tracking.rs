@@ -4,7 +4,7 @@ use super::profile::HIT;
 use super::size::{SizeConfig, Sizes};
 use crate::config::{ConfigError, within};
 use crate::math;
-use crate::reflection::Noise;
+use crate::reflection::{Noise, Reflection};
 use crate::trig::Direction;
 
 /// How detections become moving obstacles.
@@ -202,6 +202,29 @@ impl ObstacleConfig {
         })
     }
 }
+
+impl Tracking {
+    /// Heading and speed of something that moves along the road and shows this radial velocity;
+    /// `None` where it may be standing, or nearly crosses the line of sight.
+    pub fn course(&self, r: &Reflection) -> Option<(Direction, i32)> {
+        let along = self.road.along(i32::from(r.sight.x), i32::from(r.sight.y));
+        let radial = i32::from(r.radial_velocity_cm_s);
+        // nearly broadside Doppler says nothing about motion along the road, and what stands still
+        // shows no more than the noise of its Doppler
+        if along.abs() < LEAST_PROJECTION || radial.abs() < 4 * self.noise.radial_velocity_cm_s {
+            return None;
+        }
+        let speed = (radial << 14) / along;
+        let heading = if speed > 0 { self.road } else { self.road.reversed() };
+        (self.min_speed_cm_s..=FASTEST_CM_S).contains(&speed.abs()).then_some((heading, speed.abs()))
+    }
+}
+
+/// Least share of a motion along the road that must show in its Doppler, 2^-14: 81 degrees off.
+const LEAST_PROJECTION: i32 = (15 << 14) / 100;
+
+/// Speeds above this are no vehicle's.
+const FASTEST_CM_S: i32 = 7000;
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,186 @@
+//! Instructions a frame, counted by callgrind: `cargo bench -p viewshed-harness`.
+//!
+//! Counts everything from the gate to the map, for the shipped recording and for three adversarial
+//! scans of 256 detections. Counts repeat exactly and do not depend on the machine's speed.
+
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use viewshed::angle::Angle;
+use viewshed::detection::{Detection, Measurement};
+use viewshed::polar::PolarMap;
+use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
+use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
+use viewshed::sensor::Sensor;
+use viewshed::time::Time;
+use viewshed_harness::estimators;
+use viewshed_harness::recording::mcap::read;
+
+const ESTIMATORS: [&str; 3] = ["radar-3d", "radar-3d-small", "radar-2d"];
+const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
+/// Frames of each adversarial scan.
+const FRAMES: u64 = 45;
+const FRAME_US: u64 = 66_667;
+
+/// The function whose instructions are counted, as callgrind names it.
+fn measured(estimator: &str) -> &'static str {
+    if estimator == "radar-2d" { "instructions::measured_frame_2d" } else { "instructions::measured_frame_3d" }
+}
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().collect();
+    if let Some([_, estimator, scene]) = args.iter().position(|a| a == "--work").and_then(|i| args.get(i..i + 3)) {
+        work(estimator, scene);
+        return ExitCode::SUCCESS;
+    }
+    if Command::new("valgrind").arg("--version").output().is_err() {
+        eprintln!("valgrind is not installed; on Debian and Ubuntu: apt-get install valgrind");
+        return ExitCode::FAILURE;
+    }
+    println!("{:<16} {:<12} {:>9} {:>12} {:>12} {:>12}", "estimator", "scene", "frames", "mean", "median", "worst");
+    for estimator in ESTIMATORS {
+        for scene in SCENES {
+            let counts = measure(estimator, scene);
+            let Some(worst) = counts.last() else {
+                eprintln!("callgrind counted nothing for {estimator} on {scene}");
+                return ExitCode::FAILURE;
+            };
+            let mean = counts.iter().sum::<u64>() / counts.len() as u64;
+            let median = counts[counts.len() / 2];
+            println!("{estimator:<16} {scene:<12} {:>9} {mean:>12} {median:>12} {worst:>12}", counts.len());
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+/// Instructions of every frame, ascending.
+fn measure(estimator: &str, scene: &str) -> Vec<u64> {
+    let folder = std::env::temp_dir().join(format!("viewshed-bench-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder for callgrind's files");
+    let me = std::env::current_exe().expect("the path of this program");
+    let status = Command::new("valgrind")
+        .args(["--tool=callgrind", "--collect-atstart=no"])
+        .arg(format!("--toggle-collect={}", measured(estimator)))
+        .arg(format!("--dump-after={}", measured(estimator)))
+        .arg(format!("--callgrind-out-file={}", folder.join("out").display()))
+        .arg(me)
+        .args(["--work", estimator, scene])
+        .stderr(std::process::Stdio::null())
+        .status();
+    assert!(status.is_ok_and(|s| s.success()), "valgrind failed on {estimator} {scene}");
+    let mut counts: Vec<u64> = std::fs::read_dir(&folder)
+        .expect("callgrind's files")
+        .filter_map(|entry| totals(&entry.ok()?.path()))
+        .filter(|n| *n > 0)
+        .collect();
+    let _ = std::fs::remove_dir_all(&folder);
+    counts.sort_unstable();
+    counts
+}
+
+fn totals(path: &Path) -> Option<u64> {
+    let text = std::fs::read_to_string(path).ok()?;
+    text.lines().rev().find_map(|line| line.strip_prefix("totals: "))?.trim().parse().ok()
+}
+
+/// Runs an estimator over a scene; this is what runs under callgrind.
+fn work(estimator: &str, scene: &str) {
+    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap"));
+    let recording = read(&path, &Default::default()).expect("the shipped recording");
+    let sensor = estimators::sensor(&recording, &Default::default());
+    let frames: Vec<(Time, Vec<Detection>)> = if scene == "recording" {
+        let time = |ns: i64| Time::from_micros(u64::try_from(ns / 1000).unwrap_or(0));
+        recording.frames.iter().map(|f| (time(f.time_ns), f.detections.iter().filter_map(detection).collect())).collect()
+    } else {
+        (0..FRAMES).map(|k| (Time::from_micros(k * FRAME_US), adversarial(scene, k))).collect()
+    };
+    match estimator {
+        "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
+        "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &frames),
+        _ => run_2d(&sensor, &frames),
+    }
+}
+
+fn detection(d: &viewshed_harness::recording::RadarDetection) -> Option<Detection> {
+    Detection::new(&Measurement {
+        range_m: d.range_m,
+        azimuth_rad: d.azimuth_rad,
+        elevation_rad: d.elevation_rad,
+        radial_velocity_mps: d.radial_velocity_mps,
+        rcs_dbsm: d.rcs_dbsm,
+        snr_db: d.snr_db,
+    })
+    .ok()
+}
+
+/// 256 detections that fit the field of view: along one ray, one a ray, or new ones everywhere in
+/// every frame; with speeds of their own, so that few join.
+fn adversarial(scene: &str, frame: u64) -> Vec<Detection> {
+    let mut seed = if scene == "everywhere" { frame + 1 } else { 1 };
+    let mut random = |range: std::ops::Range<i32>| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        range.start + ((seed >> 33) % (range.end - range.start) as u64) as i32
+    };
+    (0..256)
+        .map(|i| {
+            let (range_cm, azimuth) = match scene {
+                "one-ray" => (2000 + 69 * i, 500),
+                "all-rays" => (6000, -10_000 + 78 * i),
+                _ => (random(1500..19_900), random(-10_500..10_500)),
+            };
+            Detection {
+                range_cm: range_cm as u16,
+                azimuth: Angle::from_raw(azimuth as i16),
+                elevation: Some(Angle::from_raw(random(-1500..200) as i16)),
+                radial_velocity_cm_s: random(-3000..3000) as i16,
+                rcs_half_dbsm: Some(20),
+                snr_half_db: Some(60),
+            }
+        })
+        .collect()
+}
+
+fn run_3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+    sensor: &Sensor,
+    frames: &[(Time, Vec<Detection>)],
+) {
+    let parameters = Radar3dParameters::<R, A, E>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
+    let mut map = Box::new(parameters.map());
+    for (now, detections) in frames {
+        measured_frame_3d(&mut state, &parameters, *now, detections, &mut map);
+    }
+    black_box(&map);
+}
+
+#[inline(never)]
+fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+    state: &mut Radar3d<R, A, E, W, N, D>,
+    parameters: &Radar3dParameters<R, A, E>,
+    now: Time,
+    detections: &[Detection],
+    map: &mut PolarMap<R, A>,
+) {
+    black_box(state.process(parameters, now, detections, false, map));
+}
+
+fn run_2d(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
+    let parameters = Radar2dParameters::new::<256, 400>(sensor, &Radar2dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(Radar2d::<256, 400, 480, 256>::new());
+    for (now, detections) in frames {
+        measured_frame_2d(&mut state, &parameters, *now, detections);
+    }
+    black_box(&state);
+}
+
+#[inline(never)]
+fn measured_frame_2d(
+    state: &mut Radar2d<256, 400, 480, 256>,
+    parameters: &Radar2dParameters,
+    now: Time,
+    detections: &[Detection],
+) {
+    black_box(state.process(parameters, now, detections, false));
+}
