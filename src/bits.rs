@@ -27,6 +27,7 @@ impl<const W: usize> Bits<W> {
     }
 
     /// Sets bit `i`; beyond the end nothing happens.
+    #[inline]
     pub fn set(&mut self, i: usize) {
         if let Some(word) = self.0.get_mut(i / 32) {
             *word |= 1 << (i % 32);
@@ -41,6 +42,7 @@ impl<const W: usize> Bits<W> {
     }
 
     /// The first set bit at or after `from`.
+    #[inline]
     pub fn next(&self, from: usize) -> Option<usize> {
         let mut word = from / 32;
         let mut left = *self.0.get(word)? & (u32::MAX << (from % 32));

@@ -2,7 +2,11 @@
 //!
 //! # Model
 //! Each detection adds a scaled bivariate Gaussian over range and azimuth noise, turned into the
-//! road's axes (Elfes 1989); everything fades with one memory, short enough for moving objects.
+//! road's axes (Elfes 1989), cut off at one and a half standard deviations. Everything fades by a constant
+//! amount per second, quickly enough for moving objects. A cell is a byte; half of full is occupied.
+//!
+//! # Limits
+//! Eight cells are one word and are faded together; words that hold nothing are skipped.
 //!
 //! # References
 //! Elfes, "Using occupancy grids for mobile robot perception and navigation", Computer 22(6), 1989.
@@ -13,9 +17,17 @@ use crate::map::RoadPoint;
 use crate::math;
 use crate::mount::Levelling;
 use crate::reflection::{Noise, Reflection};
+use crate::time::Step;
+use crate::trig::ONE;
 
 /// Side of a cell, centimetres.
 pub const CELL_CM: i32 = 100;
+
+/// Spread of a cell: its side over the root of twelve.
+const SPREAD_CM: i32 = 29;
+
+/// Occupancy from which a cell is occupied: the top bit.
+pub const OCCUPIED: u8 = 128;
 
 /// How the Cartesian grid gathers evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,128 +36,133 @@ pub const CELL_CM: i32 = 100;
 pub struct CartesianConfig {
     /// Peak of one detection's Gaussian, share of full occupancy.
     pub peak: f32,
-    /// How long evidence lasts, seconds.
+    /// Time in which full occupancy fades to nothing, seconds.
     pub memory_s: f32,
-    /// Least occupancy that counts as occupied.
-    pub occupied_from: f32,
 }
 
 impl Default for CartesianConfig {
     fn default() -> Self {
-        Self { peak: 0.7, memory_s: 0.2, occupied_from: 0.5 }
+        Self { peak: 0.7, memory_s: 0.4 }
     }
 }
 
-/// Steps of the Gaussian table to one standard deviation.
-const STEPS_PER_SIGMA: i32 = 16;
-/// Two and a half standard deviations: below 5 % of the peak nothing is added.
-const TABLE: usize = 40;
+/// Squared distances, in sixteenths of a squared standard deviation, up to one and a half of them.
+const TABLE: usize = 36;
 
 /// [`CartesianConfig`] in integers, with the grid's place on the road.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CartesianParameters {
-    /// exp(-x^2 / 2) of full occupancy times peak, by sixteenths of a standard deviation.
+    /// Peak times exp(-x^2 / 2) by x^2 in sixteenths.
     gaussian: [u8; TABLE],
-    /// 2^-16 s
-    pub(crate) memory: i32,
-    pub(crate) occupied_from: u8,
+    /// Occupancy lost in a second.
+    loss: i32,
     /// First cell along and across the road.
-    pub(crate) origin: (i32, i32),
+    origin: (i32, i32),
 }
 
 impl CartesianConfig {
     /// Checks the parameters and centres the grid on what is in view.
     ///
     /// # Errors
-    /// Names the parameter outside its limits; the range if the field of view does not fit `NX` by
-    /// `NY` cells.
+    /// Names the parameter outside its limits; the range if the field of view does not fit the grid.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // bytes and cell indices
-    pub fn parameters<const NX: usize, const NY: usize>(
+    pub fn parameters<const NX: usize, const NW: usize>(
         &self,
         corners: impl Iterator<Item = RoadPoint>,
         range_max_m: f32,
     ) -> Result<CartesianParameters, ConfigError> {
         let peak = within("cartesian.peak", self.peak, 0.01, 1.0)?;
         let memory = within("cartesian.memory_s", self.memory_s, 0.01, 60.0)?;
-        let occupied = within("cartesian.occupied_from", self.occupied_from, 0.01, 1.0)?;
         let (mut low, mut high) = ((i32::MAX, i32::MAX), (i32::MIN, i32::MIN));
         for p in corners {
             let cell = (p.x_cm.div_euclid(CELL_CM), p.y_cm.div_euclid(CELL_CM));
             low = (low.0.min(cell.0), low.1.min(cell.1));
             high = (high.0.max(cell.0), high.1.max(cell.1));
         }
-        let (spare_x, spare_y) = (NX as i32 - (high.0 - low.0) - 1, NY as i32 - (high.1 - low.1) - 1);
+        let (spare_x, spare_y) = (NX as i32 - (high.0 - low.0) - 1, 8 * NW as i32 - (high.1 - low.1) - 1);
         if spare_x < 0 || spare_y < 0 {
-            let problem = Problem::OutOfLimits { min: 1.0, max: NX.min(NY) as f32 / 2.0 };
+            let problem = Problem::OutOfLimits { min: 1.0, max: NX.min(8 * NW) as f32 / 2.0 };
             return Err(ConfigError { parameter: "field_of_view.range_max_m", value: range_max_m, problem });
         }
         let mut gaussian = [0; TABLE];
         for (i, g) in gaussian.iter_mut().enumerate() {
-            let x = i as f32 / STEPS_PER_SIGMA as f32;
-            *g = math::round_i32(math::exp_coarse(-0.5 * x * x) * peak * 255.0).clamp(0, 255) as u8;
+            let square = (i as f32 + 0.5) / 16.0;
+            *g = math::round_i32(math::exp_coarse(-0.5 * square) * peak * 255.0).clamp(0, 255) as u8;
         }
         Ok(CartesianParameters {
             gaussian,
-            memory: math::round_i32(memory * 65536.0),
-            occupied_from: math::round_i32(occupied * 255.0).clamp(1, 255) as u8,
+            loss: math::round_i32(255.0 / memory),
             origin: (low.0 - spare_x / 2, low.1 - spare_y / 2),
         })
     }
 }
 
-/// Occupancy of `NX` cells along the road by `NY` across; `NY` up to 512.
+/// Occupancy of `NX` cells along the road by `8 * NW` across; `NW` up to 64.
 #[derive(Debug, Clone)]
-pub struct CartesianGrid<const NX: usize, const NY: usize> {
-    rows: [Row<NY>; NX],
+pub struct CartesianGrid<const NX: usize, const NW: usize> {
+    rows: [Row<NW>; NX],
 }
 
-/// The cells of one metre along the road.
+/// The cells of one metre along the road, from right to left.
 #[derive(Debug, Clone)]
-struct Row<const NY: usize> {
-    cells: [u8; NY],
-    used: Bits<16>,
+struct Row<const NW: usize> {
+    words: [u64; NW],
+    /// Words that may hold something.
+    used: Bits<2>,
 }
 
-impl<const NX: usize, const NY: usize> Default for CartesianGrid<NX, NY> {
+/// One in every byte of a word.
+const ONES: u64 = 0x0101_0101_0101_0101;
+/// The top bit of every byte of a word.
+const TOPS: u64 = 0x8080_8080_8080_8080;
+
+/// Takes `loss` from every byte, none below zero.
+fn fade_word(word: u64, loss: u8) -> u64 {
+    let loss = u64::from(loss) * ONES;
+    // subtract with each byte's top bit held up, then see which bytes would have borrowed
+    let low = (word | TOPS) - (loss & !TOPS);
+    let difference = low ^ ((word ^ !loss) & TOPS);
+    let borrows = ((!word & loss) | (!(word ^ loss) & difference)) & TOPS;
+    let mask = (borrows << 1).wrapping_sub(borrows >> 7);
+    difference & !mask
+}
+
+impl<const NX: usize, const NW: usize> Default for CartesianGrid<NX, NW> {
     fn default() -> Self {
         Self::new()
     }
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // bytes and cell indices
-impl<const NX: usize, const NY: usize> CartesianGrid<NX, NY> {
+impl<const NX: usize, const NW: usize> CartesianGrid<NX, NW> {
     /// Nothing occupied.
     pub const fn new() -> Self {
-        const { assert!(NY <= Bits::<16>::CAPACITY) }
-        Self { rows: [const { Row { cells: [0; NY], used: Bits::NONE } }; NX] }
+        const { assert!(NW <= Bits::<2>::CAPACITY) }
+        Self { rows: [const { Row { words: [0; NW], used: Bits::NONE } }; NX] }
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         for row in &mut self.rows {
-            row.cells = [0; NY];
+            row.words = [0; NW];
             row.used = Bits::NONE;
         }
     }
 
-    /// Multiplies all occupancy by `keep`, 2^-16.
-    pub fn fade(&mut self, keep: i32) {
+    /// Lets everything fade by a time step.
+    pub fn fade(&mut self, step: Step, p: &CartesianParameters) {
+        let loss = step.times(p.loss).clamp(0, 255) as u8;
         for row in &mut self.rows {
-            if row.used.is_empty() {
-                continue;
-            }
-            for j in row.used.iter() {
-                if let Some(cell) = row.cells.get_mut(j) {
-                    *cell = ((i32::from(*cell) * keep) >> 16) as u8;
+            let mut from = 0;
+            while let Some(i) = row.used.next(from) {
+                if let Some(word) = row.words.get_mut(i) {
+                    *word = fade_word(*word, loss);
+                    if *word == 0 {
+                        row.used.clear(i);
+                    }
                 }
+                from = i + 1;
             }
-            let mut used = row.used;
-            for j in row.used.iter() {
-                if row.cells.get(j) == Some(&0) {
-                    used.clear(j);
-                }
-            }
-            row.used = used;
         }
     }
 
@@ -154,26 +171,39 @@ impl<const NX: usize, const NY: usize> CartesianGrid<NX, NY> {
         let place = levelling.unplace(r.x_cm, r.y_cm);
         let (ci, cj) = (place.x_cm.div_euclid(CELL_CM), place.y_cm.div_euclid(CELL_CM));
         // the line of sight on the ground, in the road's axes
-        let toward = levelling.unturn(r.x_cm, r.y_cm);
-        let length = i32::from(r.ground_cm.max(1));
-        let (ux, uy) = ((toward.0 << 14) / length, (toward.1 << 14) / length);
-        // a cell is no point: half its side joins the noise
-        let along = noise.range_cm + CELL_CM / 2;
-        let across = i32::from(r.across_cm) + CELL_CM / 2;
-        let reach = (across.max(along) * 5 / 2 / CELL_CM).min(8);
-        for i in ci - reach..=ci + reach {
-            let Some(row) = usize::try_from(i - p.origin.0).ok().and_then(|i| self.rows.get_mut(i)) else { continue };
-            for j in cj - reach..=cj + reach {
-                let (dx, dy) = (i * CELL_CM + CELL_CM / 2 - place.x_cm, j * CELL_CM + CELL_CM / 2 - place.y_cm);
-                let (a, b) = ((dx * ux + dy * uy) >> 14, (dy * ux - dx * uy) >> 14);
-                let (a, b) = (a * STEPS_PER_SIGMA / along, b * STEPS_PER_SIGMA / across);
-                let steps = ((a * a + b * b) as u32).isqrt() as usize;
-                let (Some(&weight), Some(y)) = (p.gaussian.get(steps), usize::try_from(j - p.origin.1).ok()) else {
-                    continue;
-                };
-                if let Some(cell) = row.cells.get_mut(y) {
-                    *cell = cell.saturating_add(weight);
-                    row.used.set(y);
+        let (ux, uy) = levelling.unturn(i32::from(r.sight.x), i32::from(r.sight.y));
+        // a cell is no point: its own spread, a side over the root of twelve, joins the noise
+        let along = math::hypot_gate(noise.range_cm, SPREAD_CM);
+        let across = math::hypot_gate(i32::from(r.across_cm), SPREAD_CM);
+        // a metre along x and y, in quarters of a standard deviation along and across the sight, 2^-14
+        let (ka, kc) = (400 * ONE / along, 400 * ONE / across);
+        let (ax, ay) = ((ux * (ka >> 4)) >> 10, (uy * (ka >> 4)) >> 10);
+        let (cx, cy) = (-((uy * (kc >> 4)) >> 10), (ux * (kc >> 4)) >> 10);
+        let reach = |a: i32, b: i32| {
+            ((3 * math::hypot_gate((along * a) >> 14, (across * b) >> 14) + CELL_CM) / (2 * CELL_CM)).min(8)
+        };
+        let (reach_x, reach_y) = (reach(ux, uy), reach(uy, ux));
+        // rows and columns of the grid that the Gaussian reaches
+        let clipped =
+            |centre: i32, reach: i32, size: usize| (centre - reach).max(0)..(centre + reach + 1).min(size as i32);
+        let (ci, cj) = (ci - p.origin.0, cj - p.origin.1);
+        let (rows, cells) = (clipped(ci, reach_x, NX), clipped(cj, reach_y, 8 * NW));
+        // from the detection to the centre of the first cell, in 2^-14 quarters
+        let (dx, dy) = (
+            (rows.start + p.origin.0) * CELL_CM + CELL_CM / 2 - place.x_cm,
+            (cells.start + p.origin.1) * CELL_CM + CELL_CM / 2 - place.y_cm,
+        );
+        let start = |x: i32, y: i32| (dx * (x >> 2) + dy * (y >> 2)) / (CELL_CM / 4);
+        let (mut a0, mut c0) = (start(ax, ay), start(cx, cy));
+        for i in rows {
+            let (mut a, mut c) = (a0, c0);
+            (a0, c0) = (a0 + ax, c0 + cx);
+            let Some(row) = self.rows.get_mut(i as usize) else { return };
+            for y in cells.clone() {
+                let (qa, qc) = (a >> 14, c >> 14);
+                (a, c) = (a + ay, c + cy);
+                if let Some(&weight) = p.gaussian.get((qa * qa + qc * qc) as usize) {
+                    row.add(y as usize, weight);
                 }
             }
         }
@@ -182,17 +212,48 @@ impl<const NX: usize, const NY: usize> CartesianGrid<NX, NY> {
     /// Occupancy of the cell (i, j) of the road.
     pub fn occupancy(&self, i: i32, j: i32, p: &CartesianParameters) -> Option<u8> {
         let row = self.rows.get(usize::try_from(i - p.origin.0).ok()?)?;
-        row.cells.get(usize::try_from(j - p.origin.1).ok()?).copied()
+        let y = usize::try_from(j - p.origin.1).ok()?;
+        row.words.get(y / 8).map(|word| (word >> (8 * (y % 8))) as u8)
     }
 
-    /// Centres of the occupied cells.
-    pub fn occupied<'a>(&'a self, p: &'a CartesianParameters) -> impl Iterator<Item = RoadPoint> + 'a {
-        self.rows.iter().enumerate().flat_map(move |(x, row)| {
-            let i = p.origin.0 + x as i32;
-            row.used
-                .iter()
-                .filter(|y| row.cells.get(*y).is_some_and(|c| *c >= p.occupied_from))
-                .map(move |y| RoadPoint::cell_centre(i, p.origin.1 + y as i32))
-        })
+    /// Visits the occupied cells: the cell along and across the road.
+    pub fn each_occupied(&self, p: &CartesianParameters, mut visit: impl FnMut(i32, i32)) {
+        for (x, row) in self.rows.iter().enumerate() {
+            for w in row.used.iter() {
+                let mut tops = row.words.get(w).copied().unwrap_or(0) & TOPS;
+                while tops != 0 {
+                    let byte = tops.trailing_zeros() / 8;
+                    visit(p.origin.0 + x as i32, p.origin.1 + 8 * w as i32 + byte as i32);
+                    tops &= tops - 1;
+                }
+            }
+        }
+    }
+}
+
+#[allow(clippy::cast_possible_truncation)] // one byte of the word
+impl<const NW: usize> Row<NW> {
+    fn add(&mut self, y: usize, weight: u8) {
+        let Some(word) = self.words.get_mut(y / 8) else { return };
+        let shift = 8 * (y % 8);
+        let sum = ((*word >> shift) as u8).saturating_add(weight);
+        *word = (*word & !(0xFF << shift)) | u64::from(sum) << shift;
+        self.used.set(y / 8);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_cells_fade_as_one_does() {
+        for loss in [0_u8, 1, 85, 127, 128, 200, 255] {
+            for base in 0..=255_u8 {
+                let cells: [u8; 8] = core::array::from_fn(|i| base.wrapping_add((i as u8).wrapping_mul(37)));
+                let faded = fade_word(u64::from_le_bytes(cells), loss).to_le_bytes();
+                assert_eq!(faded, cells.map(|c| c.saturating_sub(loss)), "{cells:?} - {loss}");
+            }
+        }
     }
 }

@@ -146,7 +146,7 @@ impl InverseSensor {
             }
             None => (self.height_prior_cm, prior),
         };
-        (height, (variance.unsigned_abs().isqrt() as i32).max(1))
+        (height, (math::root(variance.unsigned_abs()) as i32).max(1))
     }
 
     /// Lets all evidence fade by a time step, by how well each cell was seen.
@@ -179,7 +179,7 @@ impl InverseSensor {
     ) {
         let mut sights = [0_u8; A];
         for r in reflections {
-            let Some(a) = axes.column(r.bearing) else { continue };
+            let Some(a) = axes.column(r.bearing()) else { continue };
             if let (Some(n @ ..SIGHTS), Some(column)) = (sights.get_mut(a), grid.column_mut(a)) {
                 *n += 1;
                 self.clear_column(r, axes, column);
@@ -224,7 +224,7 @@ impl InverseSensor {
             let above = axes.height_at(axes.row_centre(row), ground_cm) - height;
             *p = self.bell(above.max(0), sigma) as u8;
         }
-        let place = axes.column_place(r.bearing);
+        let place = axes.column_place(r.bearing());
         let reach = 2 * self.azimuth_sigma;
         let (first, last) = (((place - reach) >> 8).max(0), ((place + reach) >> 8).min(A as i32 - 1));
         let middle = ground_cm / axes.cell_cm;

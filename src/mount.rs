@@ -78,6 +78,12 @@ impl Levelling {
         self.rotation.map(|[a, b, c]| (a * v[0] + b * v[1] + c * v[2]) >> 14)
     }
 
+    /// How much a sensor-frame vector rises, 2^-14 in, 2^-14 out.
+    pub fn rise(&self, v: [i32; 3]) -> i32 {
+        let [a, b, c] = self.rotation[2];
+        (a * v[0] + b * v[1] + c * v[2]) >> 14
+    }
+
     /// The sensor's upward axis, levelled, 2^-14.
     pub fn up(&self) -> [i32; 3] {
         let [x, y, z] = &self.rotation;
@@ -104,6 +110,15 @@ impl Levelling {
         let (hx, hy) = (i64::from(self.heading.x), i64::from(self.heading.y));
         let (dx, dy) = (i64::from(dx), i64::from(dy));
         (((dx * hx + dy * hy) >> 14) as i32, ((dy * hx - dx * hy) >> 14) as i32)
+    }
+
+    /// [`Levelling::place`] for points within 900 m of the sensor, in 32 bits.
+    #[inline]
+    pub fn place_near(&self, p: RoadPoint) -> (i32, i32) {
+        let (dx, dy) = (p.x_cm.wrapping_sub(self.origin.x_cm), p.y_cm.wrapping_sub(self.origin.y_cm));
+        let (hx, hy) = (i32::from(self.heading.x), i32::from(self.heading.y));
+        let sum = |a: i32, b: i32| a.wrapping_add(b) >> 14;
+        (sum(dx.wrapping_mul(hx), dy.wrapping_mul(hy)), sum(dy.wrapping_mul(hx), -dx.wrapping_mul(hy)))
     }
 
     /// Road point of a place in the levelled frame, centimetres.
@@ -155,6 +170,7 @@ mod tests {
         // sensor at (10, -2) looks along +y
         assert_eq!(l.place(RoadPoint::new(1000, 4800)), (5000, 0));
         assert_eq!(l.place(RoadPoint::new(900, -200)), (0, 100));
+        assert_eq!(l.place_near(RoadPoint::new(900, -200)), (0, 100));
         assert_eq!(l.unplace(5000, 0), RoadPoint::new(1000, 4800));
         assert_eq!(l.unplace(0, 100), RoadPoint::new(900, -200));
         assert_eq!(l.road_axis(), Direction { x: 0, y: -16384 });

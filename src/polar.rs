@@ -3,6 +3,7 @@
 use crate::angle::Angle;
 use crate::axes::Axes;
 use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use crate::math;
 use crate::mount::Levelling;
 use crate::trig;
 
@@ -92,8 +93,7 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
         // the same rounding as the grid's columns
         let place = i32::from(bearing.raw()) * i32::try_from(A * 64).ok()? / (span / 4).max(1);
         let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < A)?;
-        let square = x_cm.unsigned_abs().saturating_pow(2).saturating_add(y_cm.unsigned_abs().saturating_pow(2));
-        let range = (square.isqrt() / self.geometry.cell_cm.unsigned_abs().max(1)) as usize;
+        let range = usize::try_from(math::length(x_cm, y_cm) / self.geometry.cell_cm.max(1)).ok()?;
         (range < R).then_some((azimuth, range))
     }
 

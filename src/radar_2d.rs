@@ -4,7 +4,7 @@
 //! detections -> gate -> reflections on the ground -> Cartesian grid -> sightlines -> map
 //! ```
 
-use crate::cartesian::{CELL_CM, CartesianConfig, CartesianGrid, CartesianParameters};
+use crate::cartesian::{CELL_CM, CartesianConfig, CartesianGrid, CartesianParameters, OCCUPIED};
 use crate::config::{ConfigError, within};
 use crate::detection::Detection;
 use crate::field_of_view::Limits;
@@ -59,21 +59,24 @@ pub struct Radar2dParameters {
 }
 
 impl Radar2dParameters {
-    /// Checks a configuration for a grid of `NX` by `NY` cells.
+    /// Checks a configuration for a grid of `NX` by `8 * NW` cells and `N` rays.
     ///
     /// # Errors
     /// Names the first parameter that cannot be worked with.
-    pub fn new<const NX: usize, const NY: usize>(sensor: &Sensor, config: &Radar2dConfig) -> Result<Self, ConfigError> {
+    pub fn new<const NX: usize, const NW: usize, const N: usize>(
+        sensor: &Sensor,
+        config: &Radar2dConfig,
+    ) -> Result<Self, ConfigError> {
         let levelling = sensor.mount.levelling()?;
         let view = sensor.field_of_view.limits()?;
         let slice = within("slice_height_m", config.slice_height_m, 0.0, 10.0)?;
-        let fan = Fan::new(&view);
+        let fan = Fan::new(&view, N, CELL_CM);
         let range_max_m = sensor.field_of_view.range_max_m;
         let corners = fan.outline(view.range_cm[1]).map(|(x, y)| levelling.unplace(x, y));
         Ok(Self {
             gate: config.gate.gate(&view)?,
             noise: sensor.noise.noise()?,
-            cartesian: config.cartesian.parameters::<NX, NY>(corners, range_max_m)?,
+            cartesian: config.cartesian.parameters::<NX, NW>(corners, range_max_m)?,
             fan,
             slice_height_cm: math::round_i32(slice * 100.0),
             health: config.health.limits()?,
@@ -93,11 +96,11 @@ pub enum Reading {
     First,
 }
 
-/// The estimator's state: a grid of `NX` by `NY` cells, `N` rays, `D` detections.
+/// The estimator's state: a grid of `NX` by `8 * NW` cells, `N` rays, `D` detections.
 #[derive(Debug, Clone)]
-pub struct Radar2d<const NX: usize, const NY: usize, const N: usize, const D: usize> {
+pub struct Radar2d<const NX: usize, const NW: usize, const N: usize, const D: usize> {
     scan: Scan<D>,
-    grid: CartesianGrid<NX, NY>,
+    grid: CartesianGrid<NX, NW>,
     sightlines: Sightlines<N>,
     health: Health,
     /// Whether the last frame left a map.
@@ -105,13 +108,13 @@ pub struct Radar2d<const NX: usize, const NY: usize, const N: usize, const D: us
     rejections: Rejections,
 }
 
-impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Default for Radar2d<NX, NY, N, D> {
+impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Default for Radar2d<NX, NW, N, D> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Radar2d<NX, NY, N, D> {
+impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<NX, NW, N, D> {
     /// Knows nothing; to be placed in static memory.
     pub const fn new() -> Self {
         Self {
@@ -144,11 +147,11 @@ impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Radar2d<N
         self.scan.clear();
         for d in detections {
             reported += 1;
-            self.scan.add(d, &p.gate, &p.noise, &p.levelling);
+            self.scan.add_flat(d, &p.gate, &p.noise, &p.levelling);
         }
         self.rejections.add_all(self.scan.rejections());
         match self.health.frame(now, reported, fault, &p.health) {
-            Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros).keep(p.cartesian.memory)),
+            Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros), &p.cartesian),
             Continuity::First => {}
             Continuity::Gap | Continuity::ClockStepped => self.grid.clear(),
         }
@@ -156,10 +159,11 @@ impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Radar2d<N
             self.grid.add(r, &p.noise, &p.levelling, &p.cartesian);
         }
         self.sightlines.clear();
-        for cell in self.grid.occupied(&p.cartesian) {
-            let (x, y) = p.levelling.place(cell);
-            self.sightlines.block(x, y, CELL_CM, &p.fan);
-        }
+        let sightlines = &mut self.sightlines;
+        self.grid.each_occupied(&p.cartesian, |i, j| {
+            let (x, y) = p.levelling.place_near(RoadPoint::cell_centre(i, j));
+            sightlines.block(x, y, &p.fan);
+        });
         self.expire(p, now)
     }
 
@@ -171,7 +175,7 @@ impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Radar2d<N
     }
 
     /// The map, by one reading.
-    pub fn map<'a>(&'a self, p: &'a Radar2dParameters, reading: Reading) -> Radar2dMap<'a, NX, NY, N> {
+    pub fn map<'a>(&'a self, p: &'a Radar2dParameters, reading: Reading) -> Radar2dMap<'a, NX, NW, N> {
         let visible_from = match reading {
             Reading::Last => 2,
             Reading::First => 255,
@@ -187,29 +191,29 @@ impl<const NX: usize, const NY: usize, const N: usize, const D: usize> Radar2d<N
 
 /// The map of the last frame.
 #[derive(Debug, Clone)]
-pub struct Radar2dMap<'a, const NX: usize, const NY: usize, const N: usize> {
-    grid: &'a CartesianGrid<NX, NY>,
+pub struct Radar2dMap<'a, const NX: usize, const NW: usize, const N: usize> {
+    grid: &'a CartesianGrid<NX, NW>,
     sightlines: &'a Sightlines<N>,
     known: bool,
     visible_from: u8,
     parameters: &'a Radar2dParameters,
 }
 
-impl<const NX: usize, const NY: usize, const N: usize> VisibilityMap for Radar2dMap<'_, NX, NY, N> {
+impl<const NX: usize, const NW: usize, const N: usize> VisibilityMap for Radar2dMap<'_, NX, NW, N> {
     fn at(&self, point: RoadPoint) -> CellState {
         let p = self.parameters;
         let (x, y) = p.levelling.place(point);
         if !self.known || !p.view.contains(p.levelling.unlevel([x, y, p.slice_height_cm - p.levelling.height_cm])) {
             return CellState::UNKNOWN;
         }
-        let grade = self.sightlines.grade(x, y, CELL_CM, &p.fan);
+        let grade = self.sightlines.grade(x, y, &p.fan);
         let cell = (point.x_cm.div_euclid(CELL_CM), point.y_cm.div_euclid(CELL_CM));
         let occupancy = self.grid.occupancy(cell.0, cell.1, &p.cartesian).unwrap_or(0);
         CellState {
             visibility: if grade >= self.visible_from { Visibility::Visible } else { Visibility::Invisible },
             grade,
             occupancy,
-            occupied: occupancy >= p.cartesian.occupied_from,
+            occupied: occupancy >= OCCUPIED,
         }
     }
 }

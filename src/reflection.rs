@@ -81,8 +81,6 @@ pub struct Reflection {
     pub y_cm: i32,
     /// Distance along the ground, centimetres.
     pub ground_cm: u16,
-    /// Levelled azimuth.
-    pub bearing: Angle,
     /// Ground components of the unit line of sight (shorter than one where it points down).
     pub sight: Direction,
     /// Radial velocity, cm/s, + receding.
@@ -96,7 +94,7 @@ pub struct Reflection {
 }
 
 impl Noise {
-    /// Places a detection on the ground.
+    /// Places a detection on the ground, its height left open.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
     pub fn place(&self, d: &Detection, levelling: &Levelling) -> Reflection {
         let range = i32::from(d.range_cm);
@@ -107,24 +105,40 @@ impl Noise {
         let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
         let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
         let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
-        let ground_cm = (x_cm.unsigned_abs().saturating_pow(2).saturating_add(y_cm.unsigned_abs().saturating_pow(2)))
-            .isqrt() as u16;
-        let height_cm = d.elevation.map(|e| {
-            let z = (ahead[2] * trig::cos(e) + up[2] * trig::sin(e)) >> 14;
-            let height = levelling.height_cm + ((z * range) >> 14);
-            (height.clamp(-30_000, 30_000) as i16, math::mul_shift(range, self.elevation, 16).clamp(1, 65_535) as u16)
-        });
+        let ground_cm = math::length(x_cm, y_cm) as u16;
         Reflection {
             x_cm,
             y_cm,
             ground_cm,
-            bearing: trig::bearing(x_cm, y_cm),
             sight: Direction { x: x as i16, y: y as i16 },
             radial_velocity_cm_s: d.radial_velocity_cm_s,
             across_cm: math::mul_shift(range, self.azimuth, 16).clamp(1, 65_535) as u16,
-            height_cm,
+            height_cm: None,
             strength: d.strength(),
         }
+    }
+}
+
+impl Reflection {
+    /// Levelled azimuth.
+    pub fn bearing(&self) -> Angle {
+        trig::bearing(self.x_cm, self.y_cm)
+    }
+}
+
+impl Noise {
+    /// Height above the road of a detection whose elevation was measured, and its standard
+    /// deviation, centimetres.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
+    pub fn height(&self, d: &Detection, levelling: &Levelling) -> Option<(i16, u16)> {
+        let elevation = d.elevation?;
+        let range = i32::from(d.range_cm);
+        let (ahead, left) = (trig::cos(d.azimuth), trig::sin(d.azimuth));
+        let level = trig::cos(elevation);
+        let rise = levelling.rise([(ahead * level) >> 14, (left * level) >> 14, trig::sin(elevation)]);
+        let height = levelling.height_cm + ((rise * range) >> 14);
+        let sigma = math::mul_shift(range, self.elevation, 16);
+        Some((height.clamp(-30_000, 30_000) as i16, sigma.clamp(1, 65_535) as u16))
     }
 }
 
@@ -134,7 +148,7 @@ impl Noise {
 fn meet_height(fall: i32, ahead: i32, up: i32) -> (i32, i32) {
     let square = (ahead * ahead + up * up).max(1);
     let fall = fall.clamp(-ONE, ONE);
-    let rest = ((square - fall * fall).max(0) as u32).isqrt() as i32;
+    let rest = math::root((square - fall * fall).max(0).unsigned_abs()) as i32;
     let scaled = |v: i32| (v / (square >> 14).max(1)).clamp(-ONE, ONE);
     (scaled(ahead * fall + up * rest), scaled(up * fall - ahead * rest))
 }
@@ -154,7 +168,8 @@ mod tests {
             rcs_half_dbsm: None,
             snr_half_db: Some(30),
         };
-        NoiseConfig::default().noise().unwrap().place(&d, &mount.levelling().unwrap())
+        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
+        Reflection { height_cm: noise.height(&d, &levelling), ..noise.place(&d, &levelling) }
     }
 
     #[test]
@@ -173,8 +188,8 @@ mod tests {
         let down = place(60.0, 40.0, None, 4.0);
         assert!(level.ground_cm.abs_diff(down.ground_cm) <= 5);
         // looking down, the same sensor azimuth meets the ground a little farther out
-        assert!(down.bearing.raw() > level.bearing.raw());
-        assert!((down.bearing.raw() - level.bearing.raw()) < 80);
+        assert!(down.bearing().raw() > level.bearing().raw());
+        assert!((down.bearing().raw() - level.bearing().raw()) < 80);
     }
 
     #[test]

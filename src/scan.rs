@@ -39,25 +39,34 @@ impl<const D: usize> Scan<D> {
         self.rejections = Rejections::NONE;
     }
 
-    /// Takes a detection, or counts why not.
+    /// Takes a detection with its height, where measured, or counts why not.
     pub fn add(&mut self, d: &Detection, gate: &Gate, noise: &Noise, levelling: &Levelling) {
+        self.add_with(d, gate, || Reflection { height_cm: noise.height(d, levelling), ..noise.place(d, levelling) });
+    }
+
+    /// Takes a detection without its height, or counts why not.
+    pub fn add_flat(&mut self, d: &Detection, gate: &Gate, noise: &Noise, levelling: &Levelling) {
+        self.add_with(d, gate, || noise.place(d, levelling));
+    }
+
+    fn add_with(&mut self, d: &Detection, gate: &Gate, place: impl Fn() -> Reflection) {
         if let Err(reason) = gate.judge(d) {
             self.rejections.add(reason);
             return;
         }
         if self.reflections.len() < D.min(gate.max_detections) {
-            let _ = self.reflections.push(noise.place(d, levelling));
+            let _ = self.reflections.push(place());
             return;
         }
         self.rejections.add(Rejection::Overflow);
-        let (place, strength) = self.weakest.unwrap_or_else(|| self.find_weakest());
+        let (weakest, strength) = self.weakest.unwrap_or_else(|| self.find_weakest());
         if d.strength() > strength {
-            if let Some(slot) = self.reflections.get_mut(place) {
-                *slot = noise.place(d, levelling);
+            if let Some(slot) = self.reflections.get_mut(weakest) {
+                *slot = place();
             }
             self.weakest = Some(self.find_weakest());
         } else {
-            self.weakest = Some((place, strength));
+            self.weakest = Some((weakest, strength));
         }
     }
 

@@ -24,9 +24,9 @@ fn the_small_profile_fits_64_kb_in_all() {
 
 #[test]
 fn the_flat_baseline_fits_450_kb() {
-    let state = size_of::<Radar2d<256, 400, 480, 256>>();
+    let state = size_of::<Radar2d<208, 45, 320, 256>>();
     let parameters = size_of::<Radar2dParameters>();
-    println!("radar-2d 256 x 400 m: state {state} B, parameters {parameters} B");
+    println!("radar-2d 208 x 360 m: state {state} B, parameters {parameters} B");
     assert!(state + parameters <= 450_000, "{state} + {parameters}");
 }
 

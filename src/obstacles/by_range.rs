@@ -55,7 +55,6 @@ impl<const D: usize> ByRange<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::Angle;
     use crate::trig::Direction;
     use std::vec::Vec;
 
@@ -68,7 +67,6 @@ mod tests {
                 x_cm: i32::from(ground_cm),
                 y_cm: 0,
                 ground_cm,
-                bearing: Angle::ZERO,
                 sight: Direction::AHEAD,
                 radial_velocity_cm_s: 0,
                 across_cm: 1,

@@ -3,7 +3,7 @@
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;
 use super::tracking::Tracking;
-use crate::math::{hypot_gate, mul_shift};
+use crate::math::{hypot_gate, length, mul_shift};
 use crate::reflection::{Noise, Reflection};
 use crate::solid::Solid;
 use crate::time::Step;
@@ -85,9 +85,7 @@ pub struct Search {
 impl Search {
     /// Least and greatest distance from the sensor a detection of this obstacle can have.
     pub fn distances_cm(&self) -> (i32, i32) {
-        let (x, y) = (self.anchor.0.unsigned_abs().min(45_000), self.anchor.1.unsigned_abs().min(45_000));
-        #[allow(clippy::cast_possible_wrap)] // below 2^16
-        let distance = (x * x + y * y).isqrt() as i32;
+        let distance = length(self.anchor.0, self.anchor.1);
         // the corner of the square that is searched
         let reach = self.reach_cm * 3 / 2;
         (distance - reach, distance + reach)

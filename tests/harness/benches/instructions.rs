@@ -92,7 +92,11 @@ fn work(estimator: &str, scene: &str) {
     let sensor = estimators::sensor(&recording, &Default::default());
     let frames: Vec<(Time, Vec<Detection>)> = if scene == "recording" {
         let time = |ns: i64| Time::from_micros(u64::try_from(ns / 1000).unwrap_or(0));
-        recording.frames.iter().map(|f| (time(f.time_ns), f.detections.iter().filter_map(detection).collect())).collect()
+        recording
+            .frames
+            .iter()
+            .map(|f| (time(f.time_ns), f.detections.iter().filter_map(detection).collect()))
+            .collect()
     } else {
         (0..FRAMES).map(|k| (Time::from_micros(k * FRAME_US), adversarial(scene, k))).collect()
     };
@@ -167,8 +171,9 @@ fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: us
 }
 
 fn run_2d(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
-    let parameters = Radar2dParameters::new::<256, 400>(sensor, &Radar2dConfig::default()).expect("defaults are valid");
-    let mut state = Box::new(Radar2d::<256, 400, 480, 256>::new());
+    let parameters =
+        Radar2dParameters::new::<208, 45, 320>(sensor, &Radar2dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(Radar2d::<208, 45, 320, 256>::new());
     for (now, detections) in frames {
         measured_frame_2d(&mut state, &parameters, *now, detections);
     }
@@ -177,7 +182,7 @@ fn run_2d(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
 
 #[inline(never)]
 fn measured_frame_2d(
-    state: &mut Radar2d<256, 400, 480, 256>,
+    state: &mut Radar2d<208, 45, 320, 256>,
     parameters: &Radar2dParameters,
     now: Time,
     detections: &[Detection],

@@ -9,16 +9,17 @@ use super::{Intake, MOST_DETECTIONS};
 use crate::evaluation::score::Estimator;
 use crate::recording::Frame;
 
-/// Cells along and across the road: any heading of a 250 m fan fits.
+/// Cells along the road, and words of eight cells across: any heading of a 250 m fan fits.
 const CELLS: usize = 512;
-/// A quarter of a degree over 120 degrees: 0.9 m at 200 m.
-const RAYS: usize = 480;
+const WORDS: usize = 64;
+/// 0.4 degrees over 120 degrees: 1.4 m at 200 m.
+const RAYS: usize = 320;
 
 struct Driver<const D: usize> {
     name: &'static str,
     reading: Reading,
     parameters: Radar2dParameters,
-    state: Box<Radar2d<CELLS, CELLS, RAYS, D>>,
+    state: Box<Radar2d<CELLS, WORDS, RAYS, D>>,
     intake: Intake,
 }
 
@@ -29,12 +30,12 @@ pub fn new(
     sensor: &Sensor,
     config: &Radar2dConfig,
 ) -> Result<Box<dyn Estimator>> {
-    let parameters = Radar2dParameters::new::<CELLS, CELLS>(sensor, config)?;
+    let parameters = Radar2dParameters::new::<CELLS, WORDS, RAYS>(sensor, config)?;
     let intake = Intake::default();
     Ok(if config.gate.max_detections <= 256 {
         Box::new(Driver::<256> { name, reading, parameters, state: Box::default(), intake })
     } else {
-        let state: Box<Radar2d<CELLS, CELLS, RAYS, MOST_DETECTIONS>> = Box::default();
+        let state: Box<Radar2d<CELLS, WORDS, RAYS, MOST_DETECTIONS>> = Box::default();
         Box::new(Driver { name, reading, parameters, state, intake })
     })
 }
