@@ -113,6 +113,11 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         &self.axes
     }
 
+    /// The parameters of obstacle tracking.
+    pub fn tracking(&self) -> &Tracking {
+        &self.tracking
+    }
+
     /// The mount.
     pub fn levelling(&self) -> &Levelling {
         &self.levelling

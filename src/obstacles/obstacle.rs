@@ -78,9 +78,14 @@ pub struct Search {
     velocity: (i32, i32),
     extent: Extent,
     anchor: (i32, i32),
+    /// Longest stretch of it without reflections.
+    gap_cm: i32,
     /// Farthest from the anchor a detection of this obstacle can lie along either axis.
     reach_cm: i32,
 }
+
+/// How far noise carries a detection beyond its obstacle, centimetres.
+const NOISE_REACH_CM: i32 = 600;
 
 impl Search {
     /// Least and greatest distance from the sensor a detection of this obstacle can have.
@@ -110,8 +115,12 @@ impl Search {
         let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
         let beyond = self.extent.beyond_cm(along);
         let beside = (left.abs() - t.half_width_cm).max(0);
-        if beyond > t.gap_cm + ((t.sigmas * sigma_along) >> 4)
-            || beside > t.lateral_gate_cm + ((t.sigmas * sigma_across) >> 4)
+        // far along the vehicle or far to its side, but not both
+        let part = |distance: i32, gate: i32, sigma: i32| (distance << 8) / (gate + ((t.sigmas * sigma) >> 4)).max(1);
+        let (ahead, aside) = (part(beyond, self.gap_cm, sigma_along), part(beside, t.lateral_gate_cm, sigma_across));
+        if ahead > 256
+            || aside > 256
+            || ahead * ahead + aside * aside > 256 * 256
             || self.extent.length_cm() + beyond > t.max_length_cm + 100
         {
             return None;
@@ -203,15 +212,24 @@ impl Obstacle {
         !self.is_mover(t) && self.age >= 2 && hypot_gate(self.velocity.0, self.velocity.1) < t.fixture_speed
     }
 
+    /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
+    /// other at this speed.
+    fn gap_cm(&self, t: &Tracking) -> i32 {
+        let speed = hypot_gate(self.velocity.0, self.velocity.1) >> FRACTION;
+        t.gap_cm.min(t.standstill_cm + mul_shift(speed, t.headway, 16))
+    }
+
     /// What it takes to look for this obstacle's detections.
     pub fn search(&self, t: &Tracking) -> Search {
         let outline = self.extent.front_cm.max(-self.extent.rear_cm);
+        let gap_cm = self.gap_cm(t);
         Search {
             heading: self.heading,
             velocity: (self.velocity.0 >> 4, self.velocity.1 >> 4),
             extent: self.extent,
             anchor: self.anchor(),
-            reach_cm: outline + t.reach_cm,
+            gap_cm,
+            reach_cm: outline + gap_cm + NOISE_REACH_CM,
         }
     }
 
@@ -336,9 +354,7 @@ impl Obstacle {
         let (rear, front) = (along - half, along + half);
         let gap = (rear - self.extent.front_cm).max(self.extent.rear_cm - front);
         let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
-        let speed = hypot_gate(self.velocity.0, self.velocity.1) >> FRACTION;
-        let headway = t.merge_standstill_cm + mul_shift(speed, t.merge_headway, 16);
-        gap <= t.merge_gap_cm.min(headway) && length <= t.max_length_cm
+        gap <= self.gap_cm(t) && length <= t.max_length_cm
     }
 
     /// Standard deviation of the lateral place, centimetres.

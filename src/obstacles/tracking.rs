@@ -16,8 +16,12 @@ pub struct ObstacleConfig {
     pub min_speed_mps: f32,
     /// Largest difference between measured and explained radial velocity, m/s.
     pub doppler_gate_mps: f32,
-    /// Longest stretch without reflection points on one vehicle, metres.
+    /// Longest stretch without reflections within one vehicle, metres.
     pub gap_m: f32,
+    /// Shortest headway between vehicles, seconds: what is farther apart is two vehicles.
+    pub headway_s: f32,
+    /// Shortest gap between vehicles standing in a queue, metres.
+    pub standstill_m: f32,
     /// How far beside the outline a detection may lie before noise is allowed for, metres.
     pub lateral_gate_m: f32,
     /// Standard deviations of noise allowed for.
@@ -44,10 +48,6 @@ pub struct ObstacleConfig {
     pub visible_loss_per_s: f32,
     /// Loss of evidence while unseen in a shadow, detections per second.
     pub hidden_loss_per_s: f32,
-    /// Parts closer than this may be one vehicle, metres.
-    pub merge_gap_m: f32,
-    /// Shortest headway between vehicles, seconds: parts farther apart are two vehicles.
-    pub merge_headway_s: f32,
     /// Widths and heights by length.
     pub sizes: SizeConfig,
 }
@@ -57,7 +57,9 @@ impl Default for ObstacleConfig {
         Self {
             min_speed_mps: 1.5,
             doppler_gate_mps: 1.5,
-            gap_m: 5.0,
+            gap_m: 9.0,
+            headway_s: 0.4,
+            standstill_m: 1.0,
             lateral_gate_m: 1.0,
             gate_sigmas: 2.5,
             max_length_m: 19.0,
@@ -71,8 +73,6 @@ impl Default for ObstacleConfig {
             tentative_loss_per_s: 10.0,
             visible_loss_per_s: 9.0,
             hidden_loss_per_s: 0.9,
-            merge_gap_m: 8.0,
-            merge_headway_s: 0.25,
             sizes: SizeConfig::default(),
         }
     }
@@ -90,8 +90,9 @@ pub struct Tracking {
     /// 2^-4
     pub sigmas: i32,
     pub max_length_cm: i32,
-    /// Farthest a detection of an obstacle can lie beyond its outline, with noise.
-    pub reach_cm: i32,
+    /// 2^-16 s
+    pub headway: i32,
+    pub standstill_cm: i32,
     /// 2^-16 s
     pub outline_memory: i32,
     /// Profile hits.
@@ -112,10 +113,6 @@ pub struct Tracking {
     pub visible_loss: i32,
     /// 2^-8 detections per second
     pub hidden_loss: i32,
-    pub merge_gap_cm: i32,
-    /// 2^-16 s
-    pub merge_headway: i32,
-    pub merge_standstill_cm: i32,
     pub merge_lateral_cm: i32,
     /// 2^-8 cm/s
     pub merge_speed: i32,
@@ -165,7 +162,8 @@ impl ObstacleConfig {
             lateral_gate_cm: cm("obstacles.lateral_gate_m", self.lateral_gate_m, 0.0, 5.0)?,
             sigmas: math::round_i32(within("obstacles.gate_sigmas", self.gate_sigmas, 0.0, 8.0)? * 16.0),
             max_length_cm,
-            reach_cm: gap_cm + 600,
+            headway: math::round_i32(within("obstacles.headway_s", self.headway_s, 0.0, 5.0)? * 65536.0),
+            standstill_cm: cm("obstacles.standstill_m", self.standstill_m, 0.0, 10.0)?,
             outline_memory: seconds("obstacles.outline_memory_s", self.outline_memory_s)?,
             outline_min_hits: math::round_i32(
                 within("obstacles.outline_min_hits", self.outline_min_hits, 0.1, 50.0)? * HIT as f32,
@@ -178,11 +176,6 @@ impl ObstacleConfig {
             tentative_loss: hits("obstacles.tentative_loss_per_s", self.tentative_loss_per_s)?,
             visible_loss: hits("obstacles.visible_loss_per_s", self.visible_loss_per_s)?,
             hidden_loss: hits("obstacles.hidden_loss_per_s", self.hidden_loss_per_s)?,
-            merge_gap_cm: cm("obstacles.merge_gap_m", self.merge_gap_m, 0.0, 20.0)?,
-            merge_headway: math::round_i32(
-                within("obstacles.merge_headway_s", self.merge_headway_s, 0.0, 5.0)? * 65536.0,
-            ),
-            merge_standstill_cm: 150,
             merge_lateral_cm: 100,
             merge_speed: 200 << 8,
             merge_parallel: 15_500, // 19 degrees
