@@ -1,6 +1,7 @@
 //! Where a roadside radar can see, and where it is blind.
 #![no_std]
 #![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::cast_possible_truncation))]
 
 #[cfg(test)]
 extern crate std;

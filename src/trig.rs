@@ -55,6 +55,8 @@ fn dot(a: i32, b: i16, c: i32, d: i16) -> i32 {
 }
 
 const STEPS: usize = 256;
+const LAST_STEP: i32 = 255;
+const _: () = assert!(LAST_STEP as usize + 1 == STEPS);
 
 /// Sine over a quarter turn, 2^-14.
 static SINE: [u16; STEPS + 1] = sine_table();
@@ -138,9 +140,9 @@ pub fn bearing(x: i32, y: i32) -> Angle {
 
 /// Table value at `position` in 0..=2^14, `position >> shift` being the step.
 fn interpolate(table: &[u16; STEPS + 1], position: i32, shift: u32) -> i32 {
-    let step = (position >> shift).clamp(0, STEPS as i32 - 1) as usize;
-    let part = position - ((step as i32) << shift);
-    match table.get(step..step + 2) {
+    let step = (position >> shift).clamp(0, LAST_STEP);
+    let part = position - (step << shift);
+    match table.get(step as usize..step as usize + 2) {
         Some(&[a, b]) => {
             let (a, b) = (i32::from(a), i32::from(b));
             a + (((b - a) * part + (1 << (shift - 1))) >> shift)

@@ -1,5 +1,7 @@
 //! The radar-3d estimator from detections to map, on small worlds whose answer is known.
 
+#![allow(clippy::cast_possible_truncation)]
+
 mod common;
 
 use common::{FRAME_US, Rig, Vehicle, detection, gantry};

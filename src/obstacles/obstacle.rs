@@ -334,7 +334,7 @@ impl Obstacle {
     /// away than vehicles keep from each other at this speed.
     #[inline]
     pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
-        let far = 2 * t.max_length_cm << FRACTION;
+        let far = (2 * t.max_length_cm) << FRACTION;
         if (self.position.0 - other.position.0).abs() > far || (self.position.1 - other.position.1).abs() > far {
             return false;
         }

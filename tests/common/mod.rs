@@ -1,6 +1,7 @@
 //! A small world for the library's integration tests: boxes that reflect at their corners.
 
 #![allow(dead_code)] // each test file uses a part
+#![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
 use viewshed::angle::Angle;
 use viewshed::detection::Detection;
