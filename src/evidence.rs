@@ -169,7 +169,7 @@ impl InverseSensor {
         }
     }
 
-    /// Clears what stands in the detections' lines of sight, at most [`SIGHTS`] in a column: more
+    /// Clears what stands in the detections' lines of sight, at most `SIGHTS` in a column: more
     /// would take little that is left.
     pub fn clear<const R: usize, const A: usize, const E: usize, const W: usize>(
         &self,

@@ -63,7 +63,7 @@ pub enum Rejection {
 }
 
 impl Rejection {
-    /// Every reason, in the order of [`Rejections::counts`].
+    /// Every reason, in the order of `Rejections::counts`.
     pub const ALL: [Self; 7] =
         [Self::Range, Self::Azimuth, Self::Elevation, Self::Quality, Self::Rcs, Self::Velocity, Self::Overflow];
 

@@ -1,0 +1,26 @@
+#!/bin/bash
+# Every test: host, and firmware under emulation where boards/ has it. Installs what it needs or says what it skipped.
+# The runners' own summary lines come last.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. tests/tools.sh
+need_compilers
+
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+status=0
+run() {
+    say "== $*"
+    "$@" 2>&1 | tee -a "$log" || status=1
+}
+
+run cargo test --release --locked --workspace
+[ ! -x tests/firmware.sh ] || run tests/firmware.sh
+
+echo
+echo "== summary"
+grep -E '^(test result:|skipped:|firmware:)' "$log" || true
+passed=$(awk '/^test result:/ { n += $4 } END { print n + 0 }' "$log")
+failed=$(awk '/^test result:/ { n += $6 } END { print n + 0 }' "$log")
+echo "in all: $passed passed, $failed failed"
+exit $status

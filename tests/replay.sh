@@ -1,0 +1,9 @@
+#!/bin/sh
+# The main job: replays the shipped recording, prints the table of metrics, writes pictures to out/.
+# Arguments go to `viewshed replay`: tests/replay.sh FILE.mcap --out DIR, or --help.
+set -eu
+here=$(CDPATH='' cd -- "$(dirname "$0")" && pwd)
+. "$here/tools.sh"
+need_compilers
+[ $# -gt 0 ] || set -- --out out
+exec cargo run --release --locked --manifest-path "$here/../Cargo.toml" --package viewshed-harness --quiet -- replay "$@"
