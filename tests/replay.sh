@@ -6,4 +6,4 @@ here=$(CDPATH='' cd -- "$(dirname "$0")" && pwd)
 . "$here/tools.sh"
 need_compilers
 [ $# -gt 0 ] || set -- --out out
-exec cargo run --release --locked --manifest-path "$here/../Cargo.toml" --package viewshed-harness --quiet -- replay "$@"
+exec cargo run --release --locked --manifest-path "$here/../Cargo.toml" --package viewshed-harness -- replay "$@"
