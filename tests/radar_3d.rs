@@ -201,3 +201,47 @@ fn queries_answer_in_the_four_words() {
     assert_eq!(query::area(&*rig.map, &place(x - 3000, 500)), Answer::VisibleFree);
     assert_eq!(query::area(&*rig.map, &place(300, 0)), Answer::Unknown);
 }
+
+/// Detections of a moving thing at points of its own axes: ahead of its middle and to its left.
+fn points(rig: &Rig, v: &Vehicle, at: &[(f64, f64)], speed: f64) -> Vec<Detection> {
+    at.iter().filter_map(|(x, y)| detection(&rig.sensor, [v.x + x, v.y + y, 0.8], [speed, 0.0], true)).collect()
+}
+
+#[test]
+fn a_truck_seen_only_at_both_ends_is_one_vehicle() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let truck = Vehicle::truck(60.0, 4.0, 22.0);
+    let mut report = None;
+    for frame in 0..30 {
+        let now = truck.at(f64::from(frame) * FRAME_US as f64 * 1e-6);
+        let d = points(&rig, &now, &[(-8.2, -1.0), (-8.2, 1.0), (-6.0, 0.0), (6.0, 0.0), (8.2, 0.0)], truck.speed);
+        report = Some(rig.frame(&d));
+    }
+    assert_eq!(report.unwrap().obstacles, 1);
+    let now = truck.at(29.0 * FRAME_US as f64 * 1e-6);
+    assert_eq!(rig.visibility(now.x + 30.0, 5.5), Visibility::Invisible, "a truck is high, two cars are not");
+}
+
+#[test]
+fn two_cars_at_a_safe_headway_are_two_vehicles() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    // 1 s from bumper to bumper
+    let cars = [Vehicle::car(50.0, 0.0, 22.0), Vehicle::car(50.0 + 22.0 + 4.4, 0.0, 22.0)];
+    rig.drive(&cars, 30, true);
+    let report = rig.frame(&[]);
+    assert_eq!(report.obstacles, 2);
+}
+
+#[test]
+fn spinning_wheels_are_no_vehicles_of_their_own() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let car = Vehicle::car(40.0, 4.0, 20.0);
+    let mut report = None;
+    for frame in 0..30 {
+        let now = car.at(f64::from(frame) * FRAME_US as f64 * 1e-6);
+        let mut d = now.detections(&rig.sensor, true);
+        d.extend(points(&rig, &now, &[(-1.3, -0.8), (1.3, -0.8)], car.speed * 1.6));
+        report = Some(rig.frame(&d));
+    }
+    assert_eq!(report.unwrap().obstacles, 1);
+}

@@ -144,7 +144,47 @@ impl<const N: usize> Obstacles<N> {
             o.absorb(r, t);
             claimed.insert(i);
         }
+        self.associate_wheels(reflections, by_range, &mut claimed, t);
         claimed
+    }
+
+    /// Gives what is left and moves to the vehicle whose wheel it may be.
+    #[allow(clippy::cast_possible_truncation)] // the list is bounded
+    fn associate_wheels<const D: usize>(
+        &mut self,
+        reflections: &[Reflection],
+        by_range: &ByRange<D>,
+        claimed: &mut Claimed<D>,
+        t: &Tracking,
+    ) {
+        let mut best = [(i32::MAX, u16::MAX); D];
+        for (k, o) in self.list.iter().enumerate() {
+            if o.existence < t.confirmed {
+                continue;
+            }
+            let search = o.search(t);
+            let (from, to) = search.distances_cm();
+            for &i in by_range.between(from, to) {
+                let i = usize::from(i);
+                if claimed.contains(i) {
+                    continue;
+                }
+                let (Some(r), Some(best)) = (reflections.get(i), best.get_mut(i)) else { continue };
+                if t.course(r).is_none() {
+                    continue;
+                }
+                if let Some(misfit) = search.misfit_of_wheel(r, t)
+                    && misfit < best.0
+                {
+                    *best = (misfit, k as u16);
+                }
+            }
+        }
+        for (i, (r, (_, k))) in reflections.iter().zip(best).enumerate() {
+            let Some(o) = self.list.get_mut(usize::from(k)) else { continue };
+            o.absorb_wheel(r);
+            claimed.insert(i);
+        }
     }
 
     /// Starts obstacles from detections that move along the road and belong to nobody. At most half
@@ -196,14 +236,19 @@ impl<const N: usize> Obstacles<N> {
     }
 
     /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
-    /// which is left without evidence and so dropped.
+    /// which is left without evidence and so dropped. So is what lies within a vehicle.
     fn join_parts(&mut self, t: &Tracking) {
         for i in 0..self.list.len() {
             for j in i + 1..self.list.len() {
                 let Ok([a, b]) = self.list.get_disjoint_mut([i, j]) else { continue };
-                if a.existence > 0 && b.existence > 0 && a.is_one_with(b, t) {
-                    let (elder, younger) = if a.hits >= b.hits { (a, b) } else { (b, a) };
+                if a.existence <= 0 || b.existence <= 0 {
+                    continue;
+                }
+                let (elder, younger) = if a.hits >= b.hits { (a, b) } else { (b, a) };
+                if elder.is_one_with(younger, t) {
                     elder.join(younger, t);
+                    younger.existence = 0;
+                } else if elder.hits / 2 >= younger.hits && elder.encloses(younger, t) {
                     younger.existence = 0;
                 }
             }

@@ -110,6 +110,23 @@ impl Search {
         self.misfit_of_place(r, dx, dy, error, t)
     }
 
+    /// How badly a detection fits as a wheel of this obstacle, which returns anything between
+    /// standstill and twice its speed; `None` where it cannot be one.
+    #[inline]
+    pub fn misfit_of_wheel(&self, r: &Reflection, t: &Tracking) -> Option<i32> {
+        let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
+        if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
+            return None;
+        }
+        let body = r.sight.along(self.velocity.0, self.velocity.1);
+        let wheel = i32::from(r.radial_velocity_cm_s) << 4;
+        let spun = if body < 0 { -wheel } else { wheel };
+        if spun < 0 || spun > 2 * body.abs() + t.doppler_gate {
+            return None;
+        }
+        self.misfit_of_place(r, dx, dy, 0, t)
+    }
+
     fn misfit_of_place(&self, r: &Reflection, dx: i32, dy: i32, error: i32, t: &Tracking) -> Option<i32> {
         let (along, left) = (self.heading.along(dx, dy), self.heading.across(dx, dy));
         let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
@@ -215,8 +232,13 @@ impl Obstacle {
     /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
     /// other at this speed.
     fn gap_cm(&self, t: &Tracking) -> i32 {
+        t.gap_cm.min(self.headway_cm(t.headway, t))
+    }
+
+    /// Distance that vehicles this fast keep at a headway (2^-16 s).
+    fn headway_cm(&self, headway: i32, t: &Tracking) -> i32 {
         let speed = hypot_gate(self.velocity.0, self.velocity.1) >> FRACTION;
-        t.gap_cm.min(t.standstill_cm + mul_shift(speed, t.headway, 16))
+        t.standstill_cm + mul_shift(speed, headway, 16)
     }
 
     /// What it takes to look for this obstacle's detections.
@@ -250,6 +272,12 @@ impl Obstacle {
         if let Some((height, sigma)) = r.height_cm {
             self.tallness.add(i32::from(height), i32::from(sigma));
         }
+    }
+
+    /// Takes a detection of one of its wheels: their Doppler says nothing of its speed.
+    pub fn absorb_wheel(&mut self, r: &Reflection) {
+        let (along, _) = self.local(r.x_cm, r.y_cm);
+        self.profile.add(along);
     }
 
     /// Stretches the outline of a newborn to a detection, so that the next finds it.
@@ -322,12 +350,17 @@ impl Obstacle {
         self.extent = extent;
         let bins = extent.middle_cm() / BIN_CM;
         if bins.abs() >= t.recentre_bins {
-            self.profile.shift(bins);
-            let by = bins * BIN_CM;
-            self.position.0 += mul_shift(by << FRACTION, i32::from(self.heading.x), 14);
-            self.position.1 += mul_shift(by << FRACTION, i32::from(self.heading.y), 14);
-            self.extent = Extent { rear_cm: extent.rear_cm - by, front_cm: extent.front_cm - by };
+            self.recentre(bins);
         }
+    }
+
+    /// Moves the anchor forward by bins of the profile; everything stays where it is.
+    fn recentre(&mut self, bins: i32) {
+        self.profile.shift(bins);
+        let by = bins * BIN_CM;
+        self.position.0 += mul_shift(by << FRACTION, i32::from(self.heading.x), 14);
+        self.position.1 += mul_shift(by << FRACTION, i32::from(self.heading.y), 14);
+        self.extent = Extent { rear_cm: self.extent.rear_cm - by, front_cm: self.extent.front_cm - by };
     }
 
     /// Whether another obstacle is a part of the same vehicle: in line, equally fast, and no farther
@@ -354,7 +387,24 @@ impl Obstacle {
         let (rear, front) = (along - half, along + half);
         let gap = (rear - self.extent.front_cm).max(self.extent.rear_cm - front);
         let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
-        gap <= self.gap_cm(t) && length <= t.max_length_cm
+        let coupled = i32::from(self.travelled_cm.min(other.travelled_cm)) >= t.coupled_way_cm
+            && hypot_gate(dvx, dvy) <= t.coupled_speed
+            && left.abs() <= t.merge_lateral_cm;
+        let widest = if coupled { self.headway_cm(t.coupled_headway, t) } else { self.gap_cm(t) };
+        gap <= widest && length <= t.max_length_cm
+    }
+
+    /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
+    /// for a vehicle, or an echo between the two.
+    #[inline]
+    pub fn encloses(&self, other: &Self, t: &Tracking) -> bool {
+        let far = t.max_length_cm << FRACTION;
+        if (self.position.0 - other.position.0).abs() > far || (self.position.1 - other.position.1).abs() > far {
+            return false;
+        }
+        let (x, y) = other.global(other.extent.middle_cm(), 0);
+        let (along, left) = self.local(x, y);
+        left.abs() <= t.merge_lateral_cm && self.extent.beyond_cm(along) == 0
     }
 
     /// Standard deviation of the lateral place, centimetres.
@@ -366,7 +416,12 @@ impl Obstacle {
     /// Takes over what another obstacle knows of the same vehicle.
     #[allow(clippy::cast_possible_truncation)] // a share of the offset
     pub fn join(&mut self, other: &Self, t: &Tracking) {
+        // the histogram is no longer than the longest vehicle: its middle first
         let (ax, ay) = other.anchor();
+        let (along, _) = self.local(ax, ay);
+        let rear = self.extent.rear_cm.min(along + other.extent.rear_cm);
+        let front = self.extent.front_cm.max(along + other.extent.front_cm);
+        self.recentre((rear + front) / 2 / BIN_CM);
         let (along, left) = self.local(ax, ay);
         self.profile.merge(&other.profile, along);
         let weight = self.lateral_weight.saturating_add(other.lateral_weight).max(1);

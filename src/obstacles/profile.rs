@@ -9,6 +9,8 @@ use crate::math::mul_shift;
 pub const BINS: usize = 48;
 /// Length of a bin, centimetres.
 pub const BIN_CM: i32 = 50;
+/// Bins that hold one end of a vehicle: its bumper, lamps and nearest axle.
+const END_BINS: usize = 5;
 /// One hit, in the histogram's unit.
 pub const HIT: i32 = 64;
 
@@ -76,18 +78,21 @@ impl Profile {
         }
     }
 
-    /// The outermost places with enough support, in two neighbouring bins together: at least
-    /// `min_hits` (of [`HIT`]), and at least `share` (2^-8) of all hits. Young profiles get by with
-    /// 40 % of what they have.
+    /// The outermost places with enough support: a group of [`END_BINS`] bins with at least `min_hits`
+    /// (of [`HIT`]) and at least `share` (2^-8) of all hits, and in it two neighbours with half of
+    /// that. Young profiles get by with 40 % of what they have.
     pub fn extent(&self, min_hits: i32, share: i32) -> Option<Extent> {
         let total: i32 = self.bins.iter().map(|b| i32::from(*b)).sum();
         if total == 0 {
             return None;
         }
         let needed = min_hits.min(total * 2 / 5).max((total * share) >> 8);
-        let supported = |pair: &&[u16]| matches!(pair, [a, b] if i32::from(*a) + i32::from(*b) >= needed);
-        let first = self.bins.windows(2).position(|p| supported(&p))?;
-        let last = self.bins.windows(2).rposition(|p| supported(&p))?;
+        let sum = |part: &[u16]| part.iter().map(|b| i32::from(*b)).sum::<i32>();
+        let group = |i: usize| self.bins.get(i..i + END_BINS).unwrap_or(&[]);
+        let first = (0..=BINS - END_BINS).find(|&i| sum(group(i)) >= needed)?;
+        let last = (0..=BINS - END_BINS).rfind(|&i| sum(group(i)) >= needed)?;
+        let first = first + group(first).windows(2).position(|p| 2 * sum(p) >= needed)?;
+        let last = last + group(last).windows(2).rposition(|p| 2 * sum(p) >= needed)?;
         Some(Extent { rear_cm: self.centre_of_pair(first), front_cm: self.centre_of_pair(last) })
     }
 

@@ -20,6 +20,12 @@ pub struct ObstacleConfig {
     pub gap_m: f32,
     /// Shortest headway between vehicles, seconds: what is farther apart is two vehicles.
     pub headway_s: f32,
+    /// Shortest headway that vehicles keep for long, seconds: what follows closer is coupled.
+    pub coupled_headway_s: f32,
+    /// Way both must have come for that, metres.
+    pub coupled_way_m: f32,
+    /// Largest difference in speed of what is coupled, m/s.
+    pub coupled_speed_mps: f32,
     /// Shortest gap between vehicles standing in a queue, metres.
     pub standstill_m: f32,
     /// How far beside the outline a detection may lie before noise is allowed for, metres.
@@ -56,23 +62,26 @@ impl Default for ObstacleConfig {
     fn default() -> Self {
         Self {
             min_speed_mps: 1.5,
-            doppler_gate_mps: 1.5,
-            gap_m: 9.0,
+            doppler_gate_mps: 1.2,
+            gap_m: 7.0,
             headway_s: 0.4,
+            coupled_headway_s: 0.6,
+            coupled_way_m: 12.0,
+            coupled_speed_mps: 0.5,
             standstill_m: 1.0,
             lateral_gate_m: 1.0,
-            gate_sigmas: 2.5,
+            gate_sigmas: 2.0,
             max_length_m: 19.0,
             outline_memory_s: 2.0,
-            outline_min_hits: 1.5,
-            outline_share: 0.05,
-            lateral_memory_s: 1.5,
+            outline_min_hits: 2.5,
+            outline_share: 0.06,
+            lateral_memory_s: 1.0,
             drift_gain: 0.01,
             confirm_hits: 3.0,
             max_evidence: 12.0,
             tentative_loss_per_s: 10.0,
             visible_loss_per_s: 9.0,
-            hidden_loss_per_s: 0.9,
+            hidden_loss_per_s: 2.0,
             sizes: SizeConfig::default(),
         }
     }
@@ -92,6 +101,11 @@ pub struct Tracking {
     pub max_length_cm: i32,
     /// 2^-16 s
     pub headway: i32,
+    /// 2^-16 s
+    pub coupled_headway: i32,
+    pub coupled_way_cm: i32,
+    /// 2^-8 cm/s
+    pub coupled_speed: i32,
     pub standstill_cm: i32,
     /// 2^-16 s
     pub outline_memory: i32,
@@ -163,6 +177,13 @@ impl ObstacleConfig {
             sigmas: math::round_i32(within("obstacles.gate_sigmas", self.gate_sigmas, 0.0, 8.0)? * 16.0),
             max_length_cm,
             headway: math::round_i32(within("obstacles.headway_s", self.headway_s, 0.0, 5.0)? * 65536.0),
+            coupled_headway: math::round_i32(
+                within("obstacles.coupled_headway_s", self.coupled_headway_s, 0.0, 5.0)? * 65536.0,
+            ),
+            coupled_way_cm: cm("obstacles.coupled_way_m", self.coupled_way_m, 0.0, 100.0)?,
+            coupled_speed: math::round_i32(
+                within("obstacles.coupled_speed_mps", self.coupled_speed_mps, 0.0, 5.0)? * 25_600.0,
+            ),
             standstill_cm: cm("obstacles.standstill_m", self.standstill_m, 0.0, 10.0)?,
             outline_memory: seconds("obstacles.outline_memory_s", self.outline_memory_s)?,
             outline_min_hits: math::round_i32(
