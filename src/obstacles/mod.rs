@@ -110,7 +110,8 @@ impl<const N: usize> Obstacles<N> {
         claimed
     }
 
-    /// Gives each detection to the obstacle it fits best; of equals, to the elder in the list.
+    /// Gives each detection to the obstacle it fits best, or else to the one whose wheel it may be; of
+    /// equals, to the elder in the list.
     #[allow(clippy::cast_possible_truncation)] // the list is bounded
     fn associate<const D: usize>(
         &mut self,
@@ -120,71 +121,52 @@ impl<const N: usize> Obstacles<N> {
         t: &Tracking,
     ) -> Claimed<D> {
         const { assert!(N < u16::MAX as usize) }
-        let mut best = [(i32::MAX, u16::MAX); D];
+        const NONE: (i32, u16) = (i32::MAX, u16::MAX);
+        let mut best = [(NONE, NONE); D];
+        let mut moving = Claimed::<D>::NONE;
+        for (i, r) in reflections.iter().enumerate().filter(|(_, r)| t.course(r).is_some()) {
+            moving.insert(i);
+        }
         for (k, o) in self.list.iter().enumerate() {
             let search = o.search(t);
+            let confirmed = o.existence >= t.confirmed;
             let (from, to) = search.distances_cm();
             for &i in by_range.between(from, to) {
-                let (Some(r), Some(best)) = (reflections.get(usize::from(i)), best.get_mut(usize::from(i))) else {
-                    continue;
-                };
-                if let Some(misfit) = search.misfit(r, t)
-                    && misfit < best.0
+                let i = usize::from(i);
+                let (Some(r), Some((body, wheel))) = (reflections.get(i), best.get_mut(i)) else { continue };
+                let Some(offset) = search.within_reach(r) else { continue };
+                if let Some(misfit) = search.misfit(r, offset, t) {
+                    if misfit < body.0 {
+                        *body = (misfit, k as u16);
+                    }
+                } else if confirmed
+                    && body.1 == u16::MAX
+                    && moving.contains(i)
+                    && let Some(misfit) = search.misfit_of_wheel(r, offset, t)
+                    && misfit < wheel.0
                 {
-                    *best = (misfit, k as u16);
+                    *wheel = (misfit, k as u16);
                 }
             }
         }
         let mut claimed = Claimed::NONE;
-        for (i, (r, (_, k))) in reflections.iter().zip(best).enumerate() {
-            let Some(o) = self.list.get_mut(usize::from(k)) else { continue };
+        for (i, (r, ((_, body), _))) in reflections.iter().zip(&best).enumerate() {
+            let Some(o) = self.list.get_mut(usize::from(*body)) else { continue };
             if !o.seen() {
                 o.fade_outline(step, t);
             }
             o.absorb(r, t);
             claimed.insert(i);
         }
-        self.associate_wheels(reflections, by_range, &mut claimed, t);
-        claimed
-    }
-
-    /// Gives what is left and moves to the vehicle whose wheel it may be.
-    #[allow(clippy::cast_possible_truncation)] // the list is bounded
-    fn associate_wheels<const D: usize>(
-        &mut self,
-        reflections: &[Reflection],
-        by_range: &ByRange<D>,
-        claimed: &mut Claimed<D>,
-        t: &Tracking,
-    ) {
-        let mut best = [(i32::MAX, u16::MAX); D];
-        for (k, o) in self.list.iter().enumerate() {
-            if o.existence < t.confirmed {
+        for (i, (r, (_, (_, wheel)))) in reflections.iter().zip(&best).enumerate() {
+            if claimed.contains(i) {
                 continue;
             }
-            let search = o.search(t);
-            let (from, to) = search.distances_cm();
-            for &i in by_range.between(from, to) {
-                let i = usize::from(i);
-                if claimed.contains(i) {
-                    continue;
-                }
-                let (Some(r), Some(best)) = (reflections.get(i), best.get_mut(i)) else { continue };
-                if t.course(r).is_none() {
-                    continue;
-                }
-                if let Some(misfit) = search.misfit_of_wheel(r, t)
-                    && misfit < best.0
-                {
-                    *best = (misfit, k as u16);
-                }
-            }
-        }
-        for (i, (r, (_, k))) in reflections.iter().zip(best).enumerate() {
-            let Some(o) = self.list.get_mut(usize::from(k)) else { continue };
+            let Some(o) = self.list.get_mut(usize::from(*wheel)) else { continue };
             o.absorb_wheel(r);
             claimed.insert(i);
         }
+        claimed
     }
 
     /// Starts obstacles from detections that move along the road and belong to nobody. At most half
@@ -214,7 +196,7 @@ impl<const N: usize> Obstacles<N> {
             for &j in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
                 let j = usize::from(j);
                 let Some(r) = reflections.get(j).filter(|_| !claimed.contains(j)) else { continue };
-                if search.misfit(r, t).is_some() {
+                if search.within_reach(r).and_then(|offset| search.misfit(r, offset, t)).is_some() {
                     newborn.absorb(r, t);
                     newborn.reach(r);
                     claimed.insert(j);

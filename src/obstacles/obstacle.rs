@@ -96,42 +96,40 @@ impl Search {
         (distance - reach, distance + reach)
     }
 
-    /// How badly a detection fits, 2^-8; `None` where it cannot belong to this obstacle.
+    /// A detection's offset from the anchor; `None` where it is out of reach.
     #[inline]
-    pub fn misfit(&self, r: &Reflection, t: &Tracking) -> Option<i32> {
+    pub fn within_reach(&self, r: &Reflection) -> Option<(i32, i32)> {
         let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
-        if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
-            return None;
-        }
+        (dx.abs() <= self.reach_cm && dy.abs() <= self.reach_cm).then_some((dx, dy))
+    }
+
+    /// How badly a detection at an offset fits, 2^-8; `None` where it cannot belong to this obstacle.
+    #[inline]
+    pub fn misfit(&self, r: &Reflection, offset: (i32, i32), t: &Tracking) -> Option<i32> {
         let error = speed_error(self.velocity, r).abs();
-        if error > t.doppler_gate {
-            return None;
-        }
-        self.misfit_of_place(r, dx, dy, error, t)
+        if error > t.doppler_gate { None } else { self.misfit_of_place(r, offset, error, t) }
     }
 
     /// How badly a detection fits as a wheel of this obstacle, which returns anything between
     /// standstill and twice its speed; `None` where it cannot be one.
     #[inline]
-    pub fn misfit_of_wheel(&self, r: &Reflection, t: &Tracking) -> Option<i32> {
-        let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
-        if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
-            return None;
-        }
+    pub fn misfit_of_wheel(&self, r: &Reflection, offset: (i32, i32), t: &Tracking) -> Option<i32> {
         let body = r.sight.along(self.velocity.0, self.velocity.1);
         let wheel = i32::from(r.radial_velocity_cm_s) << 4;
         let spun = if body < 0 { -wheel } else { wheel };
-        if spun < 0 || spun > 2 * body.abs() + t.doppler_gate {
-            return None;
-        }
-        self.misfit_of_place(r, dx, dy, 0, t)
+        if spun < 0 || spun > 2 * body.abs() + t.doppler_gate { None } else { self.misfit_of_place(r, offset, 0, t) }
     }
 
-    fn misfit_of_place(&self, r: &Reflection, dx: i32, dy: i32, error: i32, t: &Tracking) -> Option<i32> {
+    fn misfit_of_place(&self, r: &Reflection, (dx, dy): (i32, i32), error: i32, t: &Tracking) -> Option<i32> {
         let (along, left) = (self.heading.along(dx, dy), self.heading.across(dx, dy));
-        let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
         let beyond = self.extent.beyond_cm(along);
         let beside = (left.abs() - t.half_width_cm).max(0);
+        // out of the question whatever the direction of the noise
+        let noise = (t.sigmas * (t.noise.range_cm + i32::from(r.across_cm))) >> 4;
+        if beyond > self.gap_cm + noise || beside > t.lateral_gate_cm + noise {
+            return None;
+        }
+        let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
         // far along the vehicle or far to its side, but not both
         let part = |distance: i32, gate: i32, sigma: i32| (distance << 8) / (gate + ((t.sigmas * sigma) >> 4)).max(1);
         let (ahead, aside) = (part(beyond, self.gap_cm, sigma_along), part(beside, t.lateral_gate_cm, sigma_across));
