@@ -124,7 +124,7 @@ impl<const N: usize> Obstacles<N> {
         const NONE: (i32, u16) = (i32::MAX, u16::MAX);
         let mut best = [(NONE, NONE); D];
         let mut moving = Claimed::<D>::NONE;
-        for (i, r) in reflections.iter().enumerate().filter(|(_, r)| t.course(r).is_some()) {
+        for (i, _) in reflections.iter().enumerate().filter(|(_, r)| t.course(r).is_some()) {
             moving.insert(i);
         }
         for (k, o) in self.list.iter().enumerate() {
