@@ -11,6 +11,8 @@ use crate::raycast::Map;
 const REACH: f64 = 2.0;
 /// Range cells before a detection's own that its line of sight does not clear.
 const SPARED: usize = 2;
+/// Lines of sight of one frame that clear a column.
+const SIGHTS: usize = 6;
 
 /// The model for one grid.
 #[derive(Debug, Clone, Copy)]
@@ -61,9 +63,18 @@ impl InverseSensor {
         }
     }
 
-    /// Clears what stands in a detection's line of sight: the rows that lie above it altogether.
-    pub fn clear(&self, d: &Placed, axes: &Axes, grid: &mut Grid) {
-        let Some(a) = column(axes, d) else { return };
+    /// Clears what stands in the detections' lines of sight, of the first [`SIGHTS`] in a column.
+    pub fn clear(&self, placed: &[Placed], axes: &Axes, grid: &mut Grid) {
+        let mut sights = vec![0; axes.azimuths];
+        for d in placed {
+            let Some(a) = column(axes, d).filter(|a| sights[*a] < SIGHTS) else { continue };
+            sights[a] += 1;
+            self.clear_column(d, a, axes, grid);
+        }
+    }
+
+    /// Clears one line of sight: the rows that lie above it altogether.
+    fn clear_column(&self, d: &Placed, a: usize, axes: &Axes, grid: &mut Grid) {
         let (height, _) = self.height(d);
         let row = axes.row_place(axes.slope(height, d.ground())).ceil() as usize;
         let end = ((d.ground() / axes.cell_m) as usize).saturating_sub(SPARED).min(axes.ranges);
@@ -108,7 +119,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Levelled, place};
     use crate::scene::{self, AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, mounts, raise, within};
-    use viewshed::detection::{Detection, Measurement};
+    use viewshed::detection::Measurement;
     use viewshed::evidence::InverseSensor as IntegerSensor;
     use viewshed::mount::{Levelling, Mount};
     use viewshed::polar::PolarMap;
@@ -151,17 +162,17 @@ mod tests {
         }
 
         fn add(&mut self, m: &Measurement, first: bool) {
-            let r = self.noise.place(&Detection::new(m).unwrap(), &self.levelling);
+            let r = scene::reflection(m, &self.noise, &self.levelling);
             self.integer.add(&r, first, &self.axes, &mut self.grid);
             let d = place(m, &NoiseConfig::default(), &self.levelled);
             self.exact.add(&d, first, &self.exact_axes, &mut self.exact_grid);
         }
 
         fn clear(&mut self, m: &Measurement) {
-            let r = self.noise.place(&Detection::new(m).unwrap(), &self.levelling);
-            self.integer.clear(&r, &self.axes, &mut self.grid);
+            let r = scene::reflection(m, &self.noise, &self.levelling);
+            self.integer.clear(&[r], &self.axes, &mut self.grid);
             let d = place(m, &NoiseConfig::default(), &self.levelled);
-            self.exact.clear(&d, &self.exact_axes, &mut self.exact_grid);
+            self.exact.clear(&[d], &self.exact_axes, &mut self.exact_grid);
         }
 
         /// Both grids the same: `value` of 255 wherever `filled` says.

@@ -3,7 +3,7 @@
 //! Written from the model the library documents, with plain vectors, metres, radians, seconds and
 //! shares of one: exact roots and angles where the library has tables, `exp(-dt / memory)` where it
 //! divides, real numbers where it rounds. One stage one file, in data-flow order; each ends with
-//! the comparison of its stage, [`agreement`] compares the whole over the shipped recording.
+//! the comparison of its stage, [`agreement`] compares the whole over the shipped recording and [`traffic`] on random scenes.
 //!
 //! Parameters come from the library's configurations in SI units. Rules of tracking that are no
 //! configuration are read from [`viewshed::obstacles::tracking::Tracking`] in their stated units.
@@ -27,3 +27,4 @@ mod pipeline;
 
 mod agreement;
 mod scene;
+mod traffic;

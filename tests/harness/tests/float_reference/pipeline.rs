@@ -20,7 +20,7 @@ use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
 use crate::voxelise::voxelise;
 
 /// Obstacles followed at most.
-const OBSTACLES: usize = 96;
+const OBSTACLES: usize = 64;
 /// How far behind the field of view's range obstacles are followed, metres.
 const BEYOND_M: f64 = 25.0;
 
@@ -79,11 +79,12 @@ impl Pipeline {
         let claimed = self.obstacles.step(&scan.placed, dt, &self.rules, in_view);
         self.grid.remove_solids();
         self.inverse_sensor.fade(&mut self.grid, &self.map, &self.axes, dt);
-        for d in &scan.placed {
-            self.inverse_sensor.clear(d, &self.axes, &mut self.grid);
-        }
-        for (d, _) in scan.placed.iter().zip(claimed).filter(|(_, claimed)| !claimed) {
-            self.inverse_sensor.add(d, first, &self.axes, &mut self.grid);
+        self.inverse_sensor.clear(&scan.placed, &self.axes, &mut self.grid);
+        for (d, claimed) in scan.placed.iter().zip(claimed) {
+            // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
+            if first || !(claimed || self.rules.course(d).is_some()) {
+                self.inverse_sensor.add(d, first, &self.axes, &mut self.grid);
+            }
         }
         for solid in self.obstacles.solids(&self.rules) {
             voxelise(&solid, &self.axes, &mut self.grid);

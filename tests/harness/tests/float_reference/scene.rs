@@ -2,10 +2,10 @@
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use viewshed::detection::Measurement;
+use viewshed::detection::{Detection, Measurement};
 use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::Mount;
-use viewshed::reflection::NoiseConfig;
+use viewshed::mount::{Levelling, Mount};
+use viewshed::reflection::{Noise, NoiseConfig, Reflection};
 use viewshed::spherical::SphericalGrid;
 
 use crate::geometry::{Ground, Levelled, along};
@@ -18,6 +18,12 @@ pub const ELEVATIONS: usize = 16;
 
 pub type IntegerAxes = viewshed::axes::Axes<RANGES, AZIMUTHS, ELEVATIONS>;
 pub type IntegerGrid = SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>;
+
+/// What the library makes of a measurement, its height included.
+pub fn reflection(m: &Measurement, noise: &Noise, levelling: &Levelling) -> Reflection {
+    let d = Detection::new(m).unwrap();
+    Reflection { height_cm: noise.height(&d, levelling), ..noise.place(&d, levelling) }
+}
 
 pub const VIEW: FieldOfView = FieldOfView {
     azimuth_min_deg: -60.0,

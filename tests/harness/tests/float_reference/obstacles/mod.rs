@@ -7,18 +7,14 @@ mod synthetic;
 
 use viewshed_harness::geometry::solid::Solid;
 
-use crate::geometry::{Ground, Placed, along};
+use crate::geometry::{Ground, Placed};
 pub use obstacle::Obstacle;
 pub use rules::Rules;
 
 /// How far behind the sensor an obstacle is followed, metres.
 const BEHIND: f64 = -20.0;
-/// Least projection of the line of sight on the road that tells motion along it.
-const LEAST_PROJECTION: f64 = 0.15;
-/// Standard deviations of Doppler that what stands still may show.
-const STANDING_SIGMAS: f64 = 4.0;
-/// Fastest an obstacle starts, m/s.
-const FASTEST: f64 = 70.0;
+/// Stretches of distance that detections are visited in, nearest first, when a vehicle is gathered.
+const STRETCHES: f64 = 64.0;
 
 #[derive(Debug, Clone, Default)]
 pub struct Obstacles {
@@ -67,25 +63,28 @@ impl Obstacles {
         owners.iter().map(Option::is_some).collect()
     }
 
-    /// Starts obstacles from detections that move along the road and belong to nobody.
+    /// Starts obstacles from detections that move along the road and belong to nobody; at most half as
+    /// many in a frame as are followed at all.
     fn found(&mut self, placed: &[Placed], claimed: &mut [bool], rules: &Rules) {
+        let stretch = |i: &usize| (placed[*i].ground() / (rules.limit / STRETCHES)) as usize;
+        let mut nearest_first: Vec<usize> = (0..placed.len()).collect();
+        nearest_first.sort_by_key(stretch);
+        let mut born = 0;
         for (i, seed) in placed.iter().enumerate() {
-            let projection = along(rules.road, seed.sight);
-            let speed = seed.radial_velocity / projection;
-            if claimed[i]
-                || projection.abs() < LEAST_PROJECTION
-                || seed.radial_velocity.abs() < STANDING_SIGMAS * rules.speed_sigma
-                || speed.abs() < rules.min_speed
-                || speed.abs() > FASTEST
-            {
-                continue;
+            let Some((heading, speed)) = rules.course(seed).filter(|_| !claimed[i]) else { continue };
+            if born == self.capacity / 2 {
+                return;
             }
-            let mut newborn = Obstacle::new(seed, rules.road.map(|c| c * speed.signum()), speed.abs());
-            for (d, claimed) in placed.iter().zip(claimed.iter_mut()).skip(i) {
-                if !*claimed && newborn.misfit(d, rules).is_some() {
+            born += 1;
+            let mut newborn = Obstacle::new(seed, heading, speed);
+            newborn.absorb(seed, rules);
+            claimed[i] = true;
+            for &j in &nearest_first {
+                let d = &placed[j];
+                if !claimed[j] && newborn.misfit(d, rules).is_some() {
                     newborn.absorb(d, rules);
                     newborn.reach(d);
-                    *claimed = true;
+                    claimed[j] = true;
                 }
             }
             newborn.settle(0.0, rules);

@@ -106,16 +106,24 @@ impl Obstacle {
         [(rules.range_sigma * c).hypot(d.sigma_across * s), (rules.range_sigma * s).hypot(d.sigma_across * c)]
     }
 
+    /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
+    /// other at this speed.
+    fn gap(&self, rules: &Rules) -> f64 {
+        rules.gap.min(rules.standstill + length(self.velocity) * rules.headway)
+    }
+
     /// How badly a detection fits; `None` where it cannot belong to this obstacle.
     pub fn misfit(&self, d: &Placed, rules: &Rules) -> Option<f64> {
         let error = self.speed_error(d);
-        let [ahead, left] = self.local(d.at);
+        let [forward, left] = self.local(d.at);
         let [sigma_along, sigma_across] = self.spread(d, rules);
-        let beyond = self.extent.beyond(ahead);
+        let beyond = self.extent.beyond(forward);
         let beside = (left.abs() - rules.half_width).max(0.0);
+        // far along the vehicle or far to its side, but not both
+        let ahead = beyond / (self.gap(rules) + rules.sigmas * sigma_along);
+        let aside = beside / (rules.lateral_gate + rules.sigmas * sigma_across);
         let fits = error.abs() <= rules.doppler_gate
-            && beyond <= rules.gap + rules.sigmas * sigma_along
-            && beside <= rules.lateral_gate + rules.sigmas * sigma_across
+            && ahead.hypot(aside) <= 1.0
             && self.extent.length() + beyond <= rules.max_length + LENGTH_TO_SPARE;
         // squared distances in their own scales: 0.7 m along, width and noise across, half a metre a
         // second (twice) in speed
@@ -197,11 +205,10 @@ impl Obstacle {
         let (rear, front) = (ahead - half, ahead + half);
         let gap = (rear - self.extent.front).max(self.extent.rear - front);
         let whole = front.max(self.extent.front) - rear.min(self.extent.rear);
-        let headway = rules.merge_standstill + length(self.velocity) * rules.merge_headway;
         length(difference(self.velocity, other.velocity)) <= rules.merge_speed
             && along(self.heading, other.heading) >= rules.merge_parallel
             && left.abs() <= rules.merge_lateral + rules.sigmas * (self.lateral_sigma() + other.lateral_sigma())
-            && gap <= rules.merge_gap.min(headway)
+            && gap <= self.gap(rules)
             && whole <= rules.max_length
     }
 

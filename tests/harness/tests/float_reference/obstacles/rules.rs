@@ -5,7 +5,14 @@ use viewshed::obstacles::tracking::ObstacleConfig;
 use viewshed::reflection::NoiseConfig;
 use viewshed::trig::Direction;
 
-use crate::geometry::Ground;
+use crate::geometry::{Ground, Placed, along};
+
+/// Least projection of the line of sight on the road that tells motion along it.
+const LEAST_PROJECTION: f64 = 0.15;
+/// Standard deviations of Doppler that what stands still may show.
+const STANDING_SIGMAS: f64 = 4.0;
+/// Fastest an obstacle starts, m/s.
+const FASTEST: f64 = 70.0;
 
 /// Lengths in metres, times in seconds, speeds in m/s, evidence in detections.
 #[derive(Debug, Clone, Copy)]
@@ -26,8 +33,9 @@ pub struct Rules {
     pub tentative_loss: f64,
     pub visible_loss: f64,
     pub hidden_loss: f64,
-    pub merge_gap: f64,
-    pub merge_headway: f64,
+    /// Shortest headway between vehicles, and gap where they stand.
+    pub headway: f64,
+    pub standstill: f64,
     pub sizes: SizeConfig,
     pub range_sigma: f64,
     pub speed_sigma: f64,
@@ -36,7 +44,6 @@ pub struct Rules {
     /// How far obstacles are followed.
     pub limit: f64,
     // rules that cannot be configured
-    pub merge_standstill: f64,
     pub merge_lateral: f64,
     pub merge_speed: f64,
     /// Least cosine between headings.
@@ -75,14 +82,13 @@ impl Rules {
             tentative_loss: real(c.tentative_loss_per_s),
             visible_loss: real(c.visible_loss_per_s),
             hidden_loss: real(c.hidden_loss_per_s),
-            merge_gap: real(c.merge_gap_m),
-            merge_headway: real(c.merge_headway_s),
+            headway: real(c.headway_s),
+            standstill: real(c.standstill_m),
             sizes: c.sizes,
             range_sigma: real(noise.range_m),
             speed_sigma: real(noise.radial_velocity_mps),
             road,
             limit,
-            merge_standstill: cm(integer.merge_standstill_cm),
             merge_lateral: cm(integer.merge_lateral_cm),
             merge_speed: cm(integer.merge_speed) / 256.0,
             merge_parallel: f64::from(integer.merge_parallel) / 16384.0,
@@ -96,5 +102,17 @@ impl Rules {
             turning_speed: cm(integer.turning_speed) / 16.0,
             recentre_bins: f64::from(integer.recentre_bins),
         }
+    }
+
+    /// Heading and speed of something that moves along the road and shows this radial velocity; nothing
+    /// where it may be standing, or nearly crosses the line of sight.
+    pub fn course(&self, d: &Placed) -> Option<(Ground, f64)> {
+        let projection = along(self.road, d.sight);
+        let speed = d.radial_velocity / projection;
+        let tells = projection.abs() >= LEAST_PROJECTION
+            && d.radial_velocity.abs() >= STANDING_SIGMAS * self.speed_sigma
+            && speed.abs() >= self.min_speed
+            && speed.abs() <= FASTEST;
+        tells.then(|| (self.road.map(|c| c * speed.signum()), speed.abs()))
     }
 }
