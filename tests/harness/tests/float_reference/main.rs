@@ -26,5 +26,6 @@ mod raycast;
 mod pipeline;
 
 mod agreement;
+mod line_of_sight;
 mod scene;
 mod traffic;
