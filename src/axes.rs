@@ -24,6 +24,9 @@ const FARTHEST_RISE_CM: i32 = 4000;
 /// The steepest edge a row can have: 89.8 degrees.
 const STEEPEST: i32 = 1 << (SLOPE_BITS + 8);
 
+/// What lies this close to an angular limit of the field of view lies on it.
+const ON_THE_LIMIT_DEG: f32 = 0.01;
+
 /// The view of a column the slice plane never enters.
 const NOTHING: (u8, u8) = (1, 0);
 
@@ -87,10 +90,17 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             slice_rows: [SliceRow { lower: 0, end: 0 }; E],
             view: [NOTHING; A],
         };
+        // a limit itself is in view, whatever a float makes of it
+        let wide = FieldOfView {
+            azimuth_min_deg: view.azimuth_min_deg - ON_THE_LIMIT_DEG,
+            azimuth_max_deg: view.azimuth_max_deg + ON_THE_LIMIT_DEG,
+            elevation_min_deg: view.elevation_min_deg - ON_THE_LIMIT_DEG,
+            elevation_max_deg: view.elevation_max_deg + ON_THE_LIMIT_DEG,
+            ..*view
+        };
         let in_view = |bearing: f32, ground_cm: f32| {
             let (x, y) = (math::cos(bearing) * ground_cm, math::sin(bearing) * ground_cm);
-            let sensor = levelling.unlevel([math::round_i32(x), math::round_i32(y), -drop]);
-            view.contains(sensor.map(|v| v as f32 / 100.0))
+            wide.contains(levelling.unlevel_exact([x, y, -drop as f32]).map(|v| v / 100.0))
         };
         axes.lay_columns(&in_view).ok_or(ConfigError {
             parameter: "field_of_view.elevation_min_deg",
