@@ -100,7 +100,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(cases(150))]
+    #![proptest_config(cases(100))]
 
     /// What a mount and a field of view do to each other is all that can be wrong within the limits.
     #[test]

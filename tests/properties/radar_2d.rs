@@ -68,7 +68,7 @@ fn worlds(most: usize) -> impl Strategy<Value = (Setup, Vec<Frame>)> {
 }
 
 proptest! {
-    #![proptest_config(cases(150))]
+    #![proptest_config(cases(100))]
 
     #[test]
     fn any_frames_at_any_setup_leave_a_map_that_holds(world in worlds(12)) {
@@ -96,6 +96,24 @@ proptest! {
             prop_assert_eq!(condition, Condition::Stale);
         }
         rig.check(condition)?;
+    }
+
+    #[test]
+    fn a_larger_field_of_view_takes_nothing_away(setup in short(), more in proptest::array::uniform5(0.0..20.0_f32)) {
+        let mut larger = setup;
+        let v = &mut larger.sensor.field_of_view;
+        v.azimuth_min_deg = (v.azimuth_min_deg - more[0]).max(-85.0);
+        v.azimuth_max_deg = (v.azimuth_max_deg + more[1]).min(85.0);
+        v.elevation_min_deg = (v.elevation_min_deg - more[2]).max(-85.0);
+        v.elevation_max_deg = (v.elevation_max_deg + more[3]).min(85.0);
+        v.range_max_m = (v.range_max_m + more[4]).min(RANGE_M);
+        let [mut small, mut large] = [Rig::new(&setup), Rig::new(&larger)];
+        let empty = Frame { now: Time::from_micros(1), fault: false, detections: Vec::new() };
+        prop_assert_eq!([small.frame(&empty), large.frame(&empty)], [Condition::Healthy; 2]);
+        let [a, b] = [&small, &large].map(|rig| rig.state.map(&rig.parameters, Reading::First));
+        for p in small.points() {
+            prop_assert!(!a.at(p).visible() || b.at(p).visible(), "an empty road is visible: {:?}", p);
+        }
     }
 
     #[test]

@@ -76,7 +76,7 @@ fn worlds(most: usize) -> impl Strategy<Value = (Setup, Vec<Frame>)> {
 }
 
 proptest! {
-    #![proptest_config(cases(200))]
+    #![proptest_config(cases(120))]
 
     #[test]
     fn any_frames_at_any_setup_leave_a_map_that_holds(world in worlds(16)) {
@@ -90,7 +90,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(cases(12))]
+    #![proptest_config(cases(8))]
 
     #[test]
     fn the_small_profile_holds(world in worlds(12)) {

@@ -66,7 +66,7 @@ fn reflections(setup: &Setup, seed: u64) -> Vec<Reflection> {
 }
 
 proptest! {
-    #![proptest_config(cases(200))]
+    #![proptest_config(cases(120))]
 
     #[test]
     fn higher_points_lie_no_lower_on_the_row_axis(
