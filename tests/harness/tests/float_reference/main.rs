@@ -25,6 +25,8 @@ mod raycast;
 
 mod pipeline;
 
+mod cartesian;
+
 mod agreement;
 mod line_of_sight;
 mod scene;
