@@ -93,6 +93,9 @@ pub const OF_RADAR_3D: &[Parameter] = parameters! {
     "obstacles.gap_m" 0.5 20.0 radar_3d.obstacles.gap_m;
     "obstacles.headway_s" 0.0 5.0 radar_3d.obstacles.headway_s;
     "obstacles.standstill_m" 0.0 10.0 radar_3d.obstacles.standstill_m;
+    "obstacles.coupled_headway_s" 0.0 5.0 radar_3d.obstacles.coupled_headway_s;
+    "obstacles.coupled_way_m" 0.0 100.0 radar_3d.obstacles.coupled_way_m;
+    "obstacles.coupled_speed_mps" 0.0 5.0 radar_3d.obstacles.coupled_speed_mps;
     "obstacles.lateral_gate_m" 0.0 5.0 radar_3d.obstacles.lateral_gate_m;
     "obstacles.gate_sigmas" 0.0 8.0 radar_3d.obstacles.gate_sigmas;
     "obstacles.max_length_m" 2.0 22.0 radar_3d.obstacles.max_length_m;

@@ -60,7 +60,22 @@ impl Obstacles {
             }
             o.absorb(d, rules);
         }
-        owners.iter().map(Option::is_some).collect()
+        let mut claimed: Vec<bool> = owners.iter().map(Option::is_some).collect();
+        self.associate_wheels(placed, &mut claimed, rules);
+        claimed
+    }
+
+    /// Gives what is left and moves to the vehicle whose wheel it may be.
+    fn associate_wheels(&mut self, placed: &[Placed], claimed: &mut [bool], rules: &Rules) {
+        let believed = |o: &&mut Obstacle| o.existence >= rules.confirm_hits;
+        for (d, claimed) in placed.iter().zip(claimed).filter(|(d, c)| !**c && rules.course(d).is_some()) {
+            let fits =
+                self.list.iter_mut().filter(believed).filter_map(|o| o.misfit_of_wheel(d, rules).map(|m| (m, o)));
+            if let Some((_, o)) = fits.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                o.absorb_wheel(d);
+                *claimed = true;
+            }
+        }
     }
 
     /// Starts obstacles from detections that move along the road and belong to nobody; at most half as
@@ -105,17 +120,23 @@ impl Obstacles {
         }
     }
 
-    /// Joins parts of one vehicle: the one with more detections takes the other, which is dropped.
+    /// Joins parts of one vehicle: the one with more detections takes the other, which is dropped. So is
+    /// what lies within a vehicle.
     fn join_parts(&mut self, rules: &Rules) {
         for i in 0..self.list.len() {
             for j in i + 1..self.list.len() {
                 let (a, b) = (&self.list[i], &self.list[j]);
-                if a.existence <= 0.0 || b.existence <= 0.0 || !a.is_one_with(b, rules) {
+                if a.existence <= 0.0 || b.existence <= 0.0 {
                     continue;
                 }
-                let (elder, younger) = if b.has_more_hits_than(a) { (j, i) } else { (i, j) };
+                let (elder, younger) = if b.hits > a.hits { (j, i) } else { (i, j) };
                 let other = self.list[younger].clone();
-                self.list[elder].join(&other, rules);
+                let elder = &mut self.list[elder];
+                if elder.is_one_with(&other, rules) {
+                    elder.join(&other, rules);
+                } else if (elder.hits / 2.0).floor() < other.hits || !elder.encloses(&other, rules) {
+                    continue;
+                }
                 self.list[younger].existence = 0.0;
             }
         }

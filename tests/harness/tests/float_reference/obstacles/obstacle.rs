@@ -25,7 +25,7 @@ pub struct Obstacle {
     lateral_weight: f64,
     /// Evidence that it is there, detections.
     pub existence: f64,
-    hits: f64,
+    pub hits: f64,
     pub age: u32,
     travelled: f64,
     tallness: Tallness,
@@ -109,12 +109,28 @@ impl Obstacle {
     /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
     /// other at this speed.
     fn gap(&self, rules: &Rules) -> f64 {
-        rules.gap.min(rules.standstill + length(self.velocity) * rules.headway)
+        rules.gap.min(self.distance_at(rules.headway, rules))
+    }
+
+    /// Distance that vehicles this fast keep at a headway.
+    fn distance_at(&self, headway: f64, rules: &Rules) -> f64 {
+        rules.standstill + length(self.velocity) * headway
     }
 
     /// How badly a detection fits; `None` where it cannot belong to this obstacle.
     pub fn misfit(&self, d: &Placed, rules: &Rules) -> Option<f64> {
-        let error = self.speed_error(d);
+        self.misfit_with(d, self.speed_error(d), rules)
+    }
+
+    /// The same for a wheel, which returns anything between standstill and twice the obstacle's speed.
+    pub fn misfit_of_wheel(&self, d: &Placed, rules: &Rules) -> Option<f64> {
+        let body = along(d.sight, self.velocity);
+        let spun = d.radial_velocity * if body < 0.0 { -1.0 } else { 1.0 };
+        let fits = spun >= 0.0 && spun <= 2.0 * body.abs() + rules.doppler_gate;
+        self.misfit_with(d, 0.0, rules).filter(|_| fits)
+    }
+
+    fn misfit_with(&self, d: &Placed, error: f64, rules: &Rules) -> Option<f64> {
         let [forward, left] = self.local(d.at);
         let [sigma_along, sigma_across] = self.spread(d, rules);
         let beyond = self.extent.beyond(forward);
@@ -148,6 +164,12 @@ impl Obstacle {
         if let Some((height, sigma)) = d.height {
             self.tallness.add(height, sigma);
         }
+    }
+
+    /// Takes a detection of one of its wheels: their Doppler says nothing of its speed.
+    pub fn absorb_wheel(&mut self, d: &Placed) {
+        let [ahead, _] = self.local(d.at);
+        self.profile.add(ahead, 1.0);
     }
 
     /// Stretches the outline of a newborn to a detection.
@@ -191,11 +213,16 @@ impl Obstacle {
         self.extent = extent;
         let bins = (extent.middle() / BIN_M).trunc();
         if bins.abs() >= rules.recentre_bins {
-            self.profile.shift(bins as i32);
-            let by = bins * BIN_M;
-            self.anchor = self.ahead(by);
-            self.extent = Extent { rear: extent.rear - by, front: extent.front - by };
+            self.recentre(bins);
         }
+    }
+
+    /// Moves the anchor forward by whole bins; everything stays where it is.
+    fn recentre(&mut self, bins: f64) {
+        self.profile.shift(bins as i32);
+        let by = bins * BIN_M;
+        self.anchor = self.ahead(by);
+        self.extent = Extent { rear: self.extent.rear - by, front: self.extent.front - by };
     }
 
     /// Whether another obstacle is a part of the same vehicle.
@@ -205,11 +232,22 @@ impl Obstacle {
         let (rear, front) = (ahead - half, ahead + half);
         let gap = (rear - self.extent.front).max(self.extent.rear - front);
         let whole = front.max(self.extent.front) - rear.min(self.extent.rear);
-        length(difference(self.velocity, other.velocity)) <= rules.merge_speed
+        let apart = length(difference(self.velocity, other.velocity));
+        let coupled = self.travelled.min(other.travelled) >= rules.coupled_way
+            && apart <= rules.coupled_speed
+            && left.abs() <= rules.merge_lateral;
+        let widest = if coupled { self.distance_at(rules.coupled_headway, rules) } else { self.gap(rules) };
+        apart <= rules.merge_speed
             && along(self.heading, other.heading) >= rules.merge_parallel
             && left.abs() <= rules.merge_lateral + rules.sigmas * (self.lateral_sigma() + other.lateral_sigma())
-            && gap <= self.gap(rules)
+            && gap <= widest
             && whole <= rules.max_length
+    }
+
+    /// Whether another obstacle lies within this one, where nothing else can be.
+    pub fn encloses(&self, other: &Self, rules: &Rules) -> bool {
+        let [ahead, left] = self.local(other.ahead(other.extent.middle()));
+        left.abs() <= rules.merge_lateral && self.extent.beyond(ahead) <= 0.0
     }
 
     fn lateral_sigma(&self) -> f64 {
@@ -218,6 +256,11 @@ impl Obstacle {
 
     /// Takes over what another obstacle knows of the same vehicle.
     pub fn join(&mut self, other: &Self, rules: &Rules) {
+        // the histogram is no longer than the longest vehicle: its middle first
+        let [ahead, _] = self.local(other.anchor);
+        let (rear, front) =
+            (self.extent.rear.min(ahead + other.extent.rear), self.extent.front.max(ahead + other.extent.front));
+        self.recentre(((rear + front) / 2.0 / BIN_M).trunc());
         let [ahead, offset] = self.local(other.anchor);
         self.profile.merge(&other.profile, ahead);
         self.lateral_weight += other.lateral_weight;
@@ -227,10 +270,6 @@ impl Obstacle {
         self.travelled = self.travelled.max(other.travelled);
         self.tallness.join(&other.tallness);
         self.update_extent(rules);
-    }
-
-    pub fn has_more_hits_than(&self, other: &Self) -> bool {
-        self.hits > other.hits
     }
 
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.

@@ -36,6 +36,10 @@ pub struct Rules {
     /// Shortest headway between vehicles, and gap where they stand.
     pub headway: f64,
     pub standstill: f64,
+    /// Headway below which what has come this far together, equally fast, is one vehicle.
+    pub coupled_headway: f64,
+    pub coupled_way: f64,
+    pub coupled_speed: f64,
     pub sizes: SizeConfig,
     pub range_sigma: f64,
     pub speed_sigma: f64,
@@ -84,6 +88,9 @@ impl Rules {
             hidden_loss: real(c.hidden_loss_per_s),
             headway: real(c.headway_s),
             standstill: real(c.standstill_m),
+            coupled_headway: real(c.coupled_headway_s),
+            coupled_way: real(c.coupled_way_m),
+            coupled_speed: real(c.coupled_speed_mps),
             sizes: c.sizes,
             range_sigma: real(noise.range_m),
             speed_sigma: real(noise.radial_velocity_mps),
