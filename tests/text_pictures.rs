@@ -68,9 +68,9 @@ fn cast_picture(height_m: f32, picture: &str) -> String {
 fn slice_picture(height_m: f32) -> String {
     let axes = axes(&mount(height_m));
     let mut lines = vec![vec!['.'; R]; E];
-    for r in 0..R {
+    for (r, share) in axes.slice_share().iter().enumerate() {
         let lower = axes.slice_rows().iter().find(|s| usize::from(s.end) > r).unwrap().lower;
-        let row = usize::from(lower) + usize::from(axes.slice_share()[r] >= 128);
+        let row = usize::from(lower) + usize::from(*share >= 128);
         lines[E - 1 - row][r] = '=';
     }
     let lines: Vec<String> = lines.iter().map(|l| l.iter().collect()).collect();
