@@ -48,7 +48,8 @@ fn what_lies_outside_its_limits_is_named_with_its_value() {
 
 #[test]
 fn limits_the_wrong_way_round_are_named() {
-    let cases: [(&str, fn(&mut Setup)); 5] = [
+    type Change = fn(&mut Setup);
+    let cases: [(&str, Change); 5] = [
         ("field_of_view.azimuth_max_deg", |s| s.sensor.field_of_view.azimuth_min_deg = 61.0),
         ("field_of_view.elevation_max_deg", |s| s.sensor.field_of_view.elevation_min_deg = 17.0),
         ("field_of_view.range_max_m", |s| s.sensor.field_of_view.range_min_m = 201.0),
