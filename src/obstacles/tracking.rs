@@ -128,6 +128,8 @@ pub struct Tracking {
     /// 2^-8 detections per second
     pub hidden_loss: i32,
     pub merge_lateral_cm: i32,
+    /// Least distance between the middles of two vehicles side by side.
+    pub abreast_cm: i32,
     /// 2^-8 cm/s
     pub merge_speed: i32,
     /// Least cosine between headings, 2^-14.
@@ -204,6 +206,7 @@ impl ObstacleConfig {
             visible_loss: hits("obstacles.visible_loss_per_s", self.visible_loss_per_s)?,
             hidden_loss: hits("obstacles.hidden_loss_per_s", self.hidden_loss_per_s)?,
             merge_lateral_cm: 100,
+            abreast_cm: 180,
             merge_speed: 200 << 8,
             merge_parallel: 15_500, // 19 degrees
             half_width_cm: 80,
