@@ -237,9 +237,11 @@ impl Obstacle {
             && apart <= rules.coupled_speed
             && left.abs() <= rules.merge_lateral;
         let widest = if coupled { self.distance_at(rules.coupled_headway, rules) } else { self.gap(rules) };
+        let uncertain = rules.sigmas * (self.lateral_sigma() + other.lateral_sigma());
+        let abreast = if gap <= 0.0 { rules.abreast } else { 0.0 };
         apart <= rules.merge_speed
             && along(self.heading, other.heading) >= rules.merge_parallel
-            && left.abs() <= rules.merge_lateral + rules.sigmas * (self.lateral_sigma() + other.lateral_sigma())
+            && left.abs() <= abreast.max(rules.merge_lateral + uncertain)
             && gap <= widest
             && whole <= rules.max_length
     }

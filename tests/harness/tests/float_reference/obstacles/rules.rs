@@ -49,6 +49,7 @@ pub struct Rules {
     pub limit: f64,
     // rules that cannot be configured
     pub merge_lateral: f64,
+    pub abreast: f64,
     pub merge_speed: f64,
     /// Least cosine between headings.
     pub merge_parallel: f64,
@@ -97,6 +98,7 @@ impl Rules {
             road,
             limit,
             merge_lateral: cm(integer.merge_lateral_cm),
+            abreast: cm(integer.abreast_cm),
             merge_speed: cm(integer.merge_speed) / 256.0,
             merge_parallel: f64::from(integer.merge_parallel) / 16384.0,
             half_width: cm(integer.half_width_cm),
