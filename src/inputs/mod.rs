@@ -6,6 +6,7 @@
 
 pub mod ars408;
 mod collected;
+pub mod native;
 mod polar;
 pub mod signal;
 
@@ -24,7 +25,7 @@ pub struct RadarScan<'a> {
     pub number: u32,
     /// What was measured and passed the radar's own quality marks.
     pub detections: &'a [Detection],
-    /// Announced and not arrived.
+    /// Announced and not arrived; the most it can be, where that is not known exactly.
     pub missing: u16,
     /// Whether the radar says that something is wrong with it.
     pub fault: bool,

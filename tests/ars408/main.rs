@@ -1,5 +1,7 @@
 //! Frames of an ARS408 in, scans out.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
 mod description;
 mod entries;
 mod random;
