@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Deserialize;
+use viewshed::inputs::ars408::profile::{PROFILES, Profile};
 
 use crate::estimators;
 use crate::evaluation::{self, Grid};
@@ -76,6 +77,12 @@ struct ReadingArgs {
     /// In the sensor frame: azimuth + to the left, elevation + up. Example: --fov -60,60,-16,16,3,200
     #[arg(long, value_name = "AZ,AZ,EL,EL,R,R", value_parser = field_of_view, allow_hyphen_values = true)]
     fov: Option<FieldOfView>,
+    /// Sensor id of the radar in a CAN log that has several, 0 to 7
+    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..8))]
+    sensor_id: Option<u8>,
+    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
+    #[arg(long, value_name = "NAME", value_parser = profile)]
+    profile: Option<&'static Profile>,
     /// Begin this many seconds after the first radar frame
     #[arg(long, value_name = "SECONDS", value_parser = finite)]
     from: Option<f64>,
@@ -168,6 +175,8 @@ impl ReadingArgs {
             field_of_view: self.fov,
             from_s: self.from,
             to_s: self.to,
+            sensor_id: self.sensor_id,
+            profile: self.profile,
         }
     }
 }
@@ -210,6 +219,11 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let values = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
     let found = values.len();
     values.try_into().map_err(|_| format!("{found} values, {N} are needed"))
+}
+
+fn profile(text: &str) -> Result<&'static Profile, String> {
+    let names = || PROFILES.map(|p| p.name).join(", ");
+    Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
 }
 
 fn mount(text: &str) -> Result<[f64; 6], String> {

@@ -1,6 +1,9 @@
 //! Recordings: radar frames, mount, field of view and ground truth, whatever file they come from.
 
+pub mod ars408;
+pub mod beside;
 pub mod candump;
+pub mod capture;
 pub mod labels;
 pub mod mcap;
 pub mod points;
@@ -10,6 +13,9 @@ pub mod transforms;
 pub mod write;
 
 use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
 
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::truth::Truth;
@@ -112,4 +118,21 @@ pub struct ReadOptions {
     /// Seconds since the first radar frame.
     pub from_s: Option<f64>,
     pub to_s: Option<f64>,
+    /// Which sensor of a bus with several.
+    pub sensor_id: Option<u8>,
+    /// Which kind of radar a CAN log is of.
+    pub profile: Option<&'static viewshed::inputs::ars408::profile::Profile>,
+}
+
+/// Reads a recording of any kind: MCAP, or a CAN log of `candump -L`.
+///
+/// # Errors
+/// A file that is none of them, and whatever makes replaying it impossible.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if !candump::is_log(&bytes) {
+        return mcap::read(path, options);
+    }
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    beside::complete(ars408::read(name, &bytes, options)?, path, options)
 }
