@@ -1,0 +1,63 @@
+//! What is on the bus or line, what should be, what is wrong, and what to do about it.
+
+pub mod can;
+pub mod findings;
+pub mod sensor;
+pub mod text;
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+
+use crate::recording::ars408::lines;
+use crate::recording::candump;
+use crate::recording::problems::{Problem, Problems};
+use can::Identifier;
+use findings::Finding;
+use sensor::Sensor;
+
+/// Everything that is said of one log.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    pub log: String,
+    pub kind: &'static str,
+    pub frames: usize,
+    pub duration_s: f64,
+    /// Frames in the busiest second.
+    pub busiest_second: usize,
+    pub identifiers: Vec<Identifier>,
+    pub sensors: Vec<Sensor>,
+    pub problems: Vec<Problem>,
+    pub findings: Vec<Finding>,
+}
+
+/// Reads a log and judges it.
+///
+/// # Errors
+/// A file that cannot be read or is no such log.
+pub fn examine(path: &Path) -> Result<Report> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if !candump::is_log(&bytes) {
+        bail!(
+            "{log} is no log of `candump -L`: its first line is not `(seconds) interface identifier#data`. Record one with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
+        );
+    }
+    let mut problems = Problems::default();
+    let lines = lines(&bytes, &mut problems);
+    let sensors = sensor::all(&lines);
+    let mut report = Report {
+        log,
+        kind: "candump",
+        frames: lines.len(),
+        duration_s: can::duration_s(&lines),
+        busiest_second: can::busiest_second(&lines),
+        identifiers: can::identifiers(&lines, &sensors),
+        problems: problems.iter().collect(),
+        findings: Vec::new(),
+        sensors,
+    };
+    report.findings = findings::judge(&report, &lines);
+    Ok(report)
+}
