@@ -1,7 +1,7 @@
 //! What differs between the original and its clones, as a table.
 
 use crate::detection::Detection;
-use crate::inputs::polar::{radial, spherical};
+use crate::inputs::polar::spherical;
 use crate::inputs::signal::{Quantity, Signal};
 
 /// How a status message announces clusters.
@@ -107,7 +107,7 @@ impl General {
             elevation: z.map(|_| place.elevation),
             // a speed towards the front alone is one along the line of sight already
             radial_velocity_cm_s: match self.left_cm_s {
-                Some(_) => radial([x, y], velocity, place.range_cm),
+                Some(_) => place.radial([x, y], velocity),
                 None => velocity[0] as i16,
             },
             rcs_half_dbsm: Some(self.rcs_half_dbsm.get(word) as i16),
