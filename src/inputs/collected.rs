@@ -69,6 +69,10 @@ impl<const N: usize> Collected<N> {
         self.numbers.retain(Option::is_some);
     }
 
+    pub(crate) fn get_mut(&mut self, place: usize) -> Option<&mut Detection> {
+        self.detections.get_mut(place)
+    }
+
     pub(crate) fn detections(&self) -> &[Detection] {
         &self.detections
     }

@@ -9,6 +9,7 @@ mod collected;
 pub mod native;
 mod polar;
 pub mod signal;
+pub mod ti;
 
 use crate::detection::Detection;
 use crate::time::Time;
