@@ -6,16 +6,16 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 
 use super::{print, write_file};
+use crate::doctor::examine;
 use crate::doctor::findings::Severity;
-use crate::doctor::{examine, text};
 use crate::recording::{self, ReadOptions};
 
 /// Exit code for a log in which something is wrong.
 const WRONG: u8 = 1;
 
-/// Say what is on a radar's bus, what should be, what is wrong and what to do
+/// Say what is on a radar's bus or line, what should be, what is wrong and what to do
 ///
-/// Reads a log of `candump -L`. Which identifiers were seen and which an ARS408 in its mode would
+/// Reads a log of `candump -L`, or a capture of a TI mmWave radar's data port. Which identifiers were seen and which an ARS408 in its mode would
 /// send, with their lengths; its scans, counters, settings and faults; and what to do about what is
 /// wrong. Exit code 1 if something is wrong, 2 if the log cannot be read.
 #[derive(Debug, clap::Args)]
@@ -39,7 +39,7 @@ pub struct Args {
 /// Files that cannot be read or written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let report = examine(&args.log)?;
-    print(&text::text(&report))?;
+    print(&report.text())?;
     if let Some(path) = &args.json {
         write_file(path, &(serde_json::to_string_pretty(&report)? + "\n"))?;
     }
@@ -47,7 +47,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let options = ReadOptions { sensor_id: args.sensor_id, ..Default::default() };
         write_detections(path, &recording::read(&args.log, &options)?)?;
     }
-    let wrong = report.findings.iter().any(|f| f.severity == Severity::Error);
+    let wrong = report.findings().iter().any(|f| f.severity == Severity::Error);
     Ok(if wrong { ExitCode::from(WRONG) } else { ExitCode::SUCCESS })
 }
 

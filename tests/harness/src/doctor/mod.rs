@@ -4,6 +4,7 @@ pub mod can;
 pub mod findings;
 pub mod sensor;
 pub mod text;
+pub mod ti;
 
 use std::path::Path;
 
@@ -13,6 +14,7 @@ use serde::Serialize;
 use crate::recording::ars408::lines;
 use crate::recording::candump;
 use crate::recording::problems::{Problem, Problems};
+use crate::recording::ti::is_capture;
 use can::Identifier;
 use findings::Finding;
 use sensor::Sensor;
@@ -32,20 +34,52 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
+/// A judged log of either kind.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Examined {
+    Can(Report),
+    Ti(ti::Report),
+}
+
+impl Examined {
+    pub fn findings(&self) -> &[Finding] {
+        match self {
+            Self::Can(report) => &report.findings,
+            Self::Ti(report) => &report.findings,
+        }
+    }
+
+    /// The report to be read.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Can(report) => text::can(report),
+            Self::Ti(report) => text::ti(report),
+        }
+    }
+}
+
 /// Reads a log and judges it.
 ///
 /// # Errors
 /// A file that cannot be read or is no such log.
-pub fn examine(path: &Path) -> Result<Report> {
+pub fn examine(path: &Path) -> Result<Examined> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if !candump::is_log(&bytes) {
-        bail!(
-            "{log} is no log of `candump -L`: its first line is not `(seconds) interface identifier#data`. Record one with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
-        );
+    if candump::is_log(&bytes) {
+        return Ok(Examined::Can(can(log, &bytes)));
     }
+    if !bytes.starts_with(mcap::MAGIC) && is_capture(&bytes) {
+        return Ok(Examined::Ti(ti::examine(log, &bytes)));
+    }
+    bail!(
+        "{log} is neither a log of `candump -L`, whose lines are `(seconds) interface identifier#data`, nor a capture of a TI mmWave radar's data port, which has the bytes 02 01 04 03 06 05 08 07 before each frame. Record a bus with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
+    );
+}
+
+fn can(log: String, bytes: &[u8]) -> Report {
     let mut problems = Problems::default();
-    let lines = lines(&bytes, &mut problems);
+    let lines = lines(bytes, &mut problems);
     let sensors = sensor::all(&lines);
     let mut report = Report {
         log,
@@ -59,5 +93,5 @@ pub fn examine(path: &Path) -> Result<Report> {
         sensors,
     };
     report.findings = findings::judge(&report, &lines);
-    Ok(report)
+    report
 }

@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
 
-use super::Report;
 use super::can::Identifier;
-use super::findings::Severity;
+use super::findings::{Finding, Severity};
 use super::sensor::{Sensor, named};
+use super::{Report, ti};
 
-/// The whole report.
-pub fn text(report: &Report) -> String {
+/// The report of a bus.
+pub fn can(report: &Report) -> String {
     let mut text = format!("{}: {} frames in {:.1} s\n", report.log, report.frames, report.duration_s);
     if !report.identifiers.is_empty() {
         let _ = writeln!(text, "{}", identifiers(&report.identifiers));
@@ -21,11 +21,31 @@ pub fn text(report: &Report) -> String {
     for problem in &report.problems {
         let _ = writeln!(text, "{}: {} ({}x)", problem.topic, problem.what, problem.count);
     }
-    text += "\n";
-    if report.findings.is_empty() {
+    text + &findings(&report.findings)
+}
+
+/// The report of a TI capture.
+pub fn ti(report: &ti::Report) -> String {
+    let header = report.header.map_or_else(|| "unknown".into(), |bytes| format!("{bytes} bytes"));
+    let mut text = format!(
+        "{}: {} bytes, {} frames of TI mmWave, header {header}: {} scans, {} of them empty, {} points\n",
+        report.log, report.bytes, report.frames, report.scans, report.empty_scans, report.points
+    );
+    for (kind, n) in &report.items {
+        let _ = writeln!(text, "item of type {kind}: {n}x");
+    }
+    for (what, n) in report.counters.iter().filter(|(_, n)| **n > 0) {
+        let _ = writeln!(text, "{what}: {n}x");
+    }
+    text + &findings(&report.findings)
+}
+
+fn findings(all: &[Finding]) -> String {
+    let mut text = "\n".to_owned();
+    if all.is_empty() {
         text += "Nothing is wrong.\n";
     }
-    for finding in &report.findings {
+    for finding in all {
         let word = match finding.severity {
             Severity::Error => "WRONG",
             Severity::Warning => "doubtful",

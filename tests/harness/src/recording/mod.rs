@@ -9,6 +9,7 @@ pub mod mcap;
 pub mod points;
 pub mod problems;
 pub mod ros;
+pub mod ti;
 pub mod transforms;
 pub mod write;
 
@@ -122,17 +123,25 @@ pub struct ReadOptions {
     pub sensor_id: Option<u8>,
     /// Which kind of radar a CAN log is of.
     pub profile: Option<&'static viewshed::inputs::ars408::profile::Profile>,
+    /// Kind of header of a TI capture.
+    pub ti_header: Option<viewshed::inputs::ti::Family>,
+    /// Time between frames of a TI capture.
+    pub frame_period_s: Option<f64>,
 }
 
-/// Reads a recording of any kind: MCAP, or a CAN log of `candump -L`.
+/// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, or a TI mmWave capture.
 ///
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    if !candump::is_log(&bytes) {
-        return mcap::read(path, options);
-    }
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    beside::complete(ars408::read(name, &bytes, options)?, path, options)
+    let recording = if candump::is_log(&bytes) {
+        ars408::read(name, &bytes, options)?
+    } else if !bytes.starts_with(::mcap::MAGIC) && ti::is_capture(&bytes) {
+        ti::read(name, &bytes, options)?
+    } else {
+        return mcap::read(path, options);
+    };
+    beside::complete(recording, path, options)
 }

@@ -203,6 +203,6 @@ fn the_doctor_refuses_what_is_no_log() {
     std::fs::write(folder.join("a.log"), "time,x,y\n").unwrap();
     let output = doctor(&folder, &["a.log"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("candump -L"));
+    assert!(stderr(&output).contains("candump -L"), "{}", stderr(&output));
     assert_eq!(doctor(&folder, &["absent.log"]).status.code(), Some(2));
 }

@@ -5,3 +5,4 @@ mod can_log;
 mod foxglove;
 mod replay;
 mod scene;
+mod ti_capture;
