@@ -95,7 +95,7 @@ fn examine(interface: &str, sensor: u8, lines: &[&Line]) -> Sensor {
     let objects = frames(Message::ObjectStatus).map(|f| object_status::COUNTER.get(word(f.data())));
     let (clusters, objects): (Vec<u32>, Vec<u32>) = (clusters.collect(), objects.collect());
     let states: Vec<RadarState> = frames(Message::RadarState).filter_map(|f| RadarState::read(f.data())).collect();
-    let version = frames(Message::Version).filter_map(|f| Version::read(f.data())).last();
+    let version = frames(Message::Version).filter_map(|f| Version::read(f.data())).next_back();
     Sensor {
         interface: interface.to_owned(),
         sensor,
@@ -126,8 +126,11 @@ fn step(counts: &[u32]) -> Option<u16> {
     advances.into_iter().max_by_key(|(_, n)| *n).map(|(advance, _)| advance)
 }
 
+/// A fault by its name, and whether a state message reports it.
+type Fault = (&'static str, fn(&RadarState) -> bool);
+
 fn faults(states: &[RadarState]) -> BTreeMap<&'static str, usize> {
-    let kinds: [(&'static str, fn(&RadarState) -> bool); 7] = [
+    let kinds: [Fault; 7] = [
         ("supply voltage", |s| s.voltage_error),
         ("temperature", |s| s.temperature_error),
         ("temporary error", |s| s.temporary_error),

@@ -3,6 +3,7 @@
 mod bad_input;
 mod can_log;
 mod foxglove;
+mod radar_scan;
 mod replay;
 mod scene;
 mod ti_capture;
