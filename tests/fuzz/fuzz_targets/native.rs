@@ -41,7 +41,7 @@ fuzz_target!(|bytes: &[u8]| {
         (message[5], message[6], message[7]) = (message[5] & 3, message[6] & 3, message[7] & 3);
         message[8..14].fill(0);
         Profile::P05.protect(&mut message, 0x4001, i as u8);
-        let mut see = |outcome: Outcome<'_>| {
+        let see = |outcome: Outcome<'_>| {
             if let Outcome::Scan(scan) = outcome {
                 assert!(scan.detections.len() <= 16 && scan.detections.iter().all(|d| d.range_cm > 0));
             }
