@@ -28,5 +28,6 @@ pub mod profile;
 pub mod quality;
 pub mod receiver;
 pub mod state;
+pub mod upkeep;
 
 pub use receiver::{Ars408, Config, Counters, Outcome, Refusal};
