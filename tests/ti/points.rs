@@ -145,6 +145,14 @@ fn side_info_finds_its_points_past_those_that_are_none() {
 }
 
 #[test]
+fn extreme_ratios_are_no_trouble() {
+    let points = [[0.0, 10.0, 0.0, 0.0], [0.0, 10.0, 0.0, 0.0]];
+    let frame = Frame::new(Family::Bytes40, 1).cartesian(&points).item(7, 0, shorts(&[i16::MAX, 0, i16::MIN, 0]));
+    let ratios: Vec<_> = usual(&frame).iter().map(|d| d.snr_half_db.unwrap()).collect();
+    assert_eq!(ratios, [6553, -6554]);
+}
+
+#[test]
 fn a_full_list_keeps_the_first_or_the_strongest() {
     let mut radar = Ti::<2>::new(Config { family: Some(Family::Bytes40), dialect: Dialect::USUAL });
     let points: Vec<[f32; 4]> = (1..=4).map(|i| [0.0, 10.0 * i as f32, 0.0, 0.0]).collect();

@@ -132,10 +132,16 @@ impl Layout {
             Self::Polar(PolarPoints::Raised) => {
                 Record::Point(spherical(float(0), float(1), Some(float(2)), float(3), Some(float(4)), dialect))
             }
-            // tenths to halves
-            Self::SideInfo => Record::Snr((signed(0) + if signed(0) < 0 { -2 } else { 2 }) / 5),
+            Self::SideInfo => Record::Snr(halves(signed(0))),
         }
     }
+}
+
+/// Tenths to halves, rounded.
+#[allow(clippy::cast_possible_truncation)] // a fifth of 16 bits
+fn halves(tenths: i16) -> i16 {
+    let tenths = i32::from(tenths);
+    ((tenths + 2 * tenths.signum()) / 5) as i16
 }
 
 fn chunk<const N: usize>(bytes: &[u8; LONGEST_RECORD], at: usize) -> Option<[u8; N]> {
