@@ -78,8 +78,8 @@ struct ReadingArgs {
     /// In the sensor frame: azimuth + to the left, elevation + up. Example: --fov -60,60,-16,16,3,200
     #[arg(long, value_name = "AZ,AZ,EL,EL,R,R", value_parser = field_of_view, allow_hyphen_values = true)]
     fov: Option<FieldOfView>,
-    /// Sensor id of the radar in a CAN log that has several, 0 to 7
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..8))]
+    /// Sensor id of the radar in a CAN log or capture that has several
+    #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
     #[arg(long, value_name = "NAME", value_parser = profile)]

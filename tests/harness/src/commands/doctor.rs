@@ -15,7 +15,7 @@ const WRONG: u8 = 1;
 
 /// Say what is on a radar's bus or line, what should be, what is wrong and what to do
 ///
-/// Reads a log of `candump -L`, or a capture of a TI mmWave radar's data port. Which identifiers were seen and which an ARS408 in its mode would
+/// Reads a log of `candump -L`, or a capture of a TI mmWave radar's data port or of the native format. Which identifiers were seen and which an ARS408 in its mode would
 /// send, with their lengths; its scans, counters, settings and faults; and what to do about what is
 /// wrong. Exit code 1 if something is wrong, 2 if the log cannot be read.
 #[derive(Debug, clap::Args)]
@@ -29,7 +29,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     detections: Option<PathBuf>,
     /// Sensor id for --detections, if there are several
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(0..8))]
+    #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
 }
 

@@ -2,6 +2,7 @@
 
 pub mod can;
 pub mod findings;
+pub mod native;
 pub mod sensor;
 pub mod text;
 pub mod ti;
@@ -11,6 +12,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
+use crate::recording;
 use crate::recording::ars408::lines;
 use crate::recording::candump;
 use crate::recording::problems::{Problem, Problems};
@@ -34,12 +36,13 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
-/// A judged log of either kind.
+/// A judged log of any kind.
 #[derive(Debug, Serialize)]
 #[serde(untagged)]
 pub enum Examined {
     Can(Report),
     Ti(ti::Report),
+    Native(native::Report),
 }
 
 impl Examined {
@@ -47,6 +50,7 @@ impl Examined {
         match self {
             Self::Can(report) => &report.findings,
             Self::Ti(report) => &report.findings,
+            Self::Native(report) => &report.findings,
         }
     }
 
@@ -55,6 +59,7 @@ impl Examined {
         match self {
             Self::Can(report) => text::can(report),
             Self::Ti(report) => text::ti(report),
+            Self::Native(report) => text::native(report),
         }
     }
 }
@@ -67,20 +72,30 @@ pub fn examine(path: &Path) -> Result<Examined> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if candump::is_log(&bytes) {
-        return Ok(Examined::Can(can(log, &bytes)));
+        return Ok(can(log, &bytes));
     }
-    if !bytes.starts_with(mcap::MAGIC) && is_capture(&bytes) {
-        return Ok(Examined::Ti(ti::examine(log, &bytes)));
+    if !bytes.starts_with(mcap::MAGIC) {
+        if is_capture(&bytes) {
+            return Ok(Examined::Ti(ti::examine(log, &bytes)));
+        }
+        if recording::native::is_capture(&bytes) {
+            let (messages, broken) = recording::native::unstuff(&bytes);
+            return Ok(Examined::Native(native::examine(log, &messages, broken)));
+        }
     }
     bail!(
-        "{log} is neither a log of `candump -L`, whose lines are `(seconds) interface identifier#data`, nor a capture of a TI mmWave radar's data port, which has the bytes 02 01 04 03 06 05 08 07 before each frame. Record a bus with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
+        "{log} is not a log of `candump -L`, whose lines are `(seconds) interface identifier#data`, not a capture of a TI mmWave radar's data port, which has the bytes 02 01 04 03 06 05 08 07 before each frame, nor a capture of the native format. Record a bus with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
     );
 }
 
-fn can(log: String, bytes: &[u8]) -> Report {
+fn can(log: String, bytes: &[u8]) -> Examined {
     let mut problems = Problems::default();
     let lines = lines(bytes, &mut problems);
     let sensors = sensor::all(&lines);
+    let native = recording::native::of_log(&lines);
+    if sensors.is_empty() && !native.is_empty() {
+        return Examined::Native(native::examine(log, &native, 0));
+    }
     let mut report = Report {
         log,
         kind: "candump",
@@ -93,5 +108,5 @@ fn can(log: String, bytes: &[u8]) -> Report {
         sensors,
     };
     report.findings = findings::judge(&report, &lines);
-    report
+    Examined::Can(report)
 }

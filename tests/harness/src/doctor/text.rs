@@ -7,7 +7,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use super::can::Identifier;
 use super::findings::{Finding, Severity};
 use super::sensor::{Sensor, named};
-use super::{Report, ti};
+use super::{Report, native, ti};
 
 /// The report of a bus.
 pub fn can(report: &Report) -> String {
@@ -36,6 +36,23 @@ pub fn ti(report: &ti::Report) -> String {
     }
     for (what, n) in report.counters.iter().filter(|(_, n)| **n > 0) {
         let _ = writeln!(text, "{what}: {n}x");
+    }
+    text + &findings(&report.findings)
+}
+
+/// The report of the native format.
+pub fn native(report: &native::Report) -> String {
+    let mut text = format!("{}: {} messages of the native format\n", report.log, report.messages);
+    for s in &report.sensors {
+        let _ = write!(
+            text,
+            "sensor {}: {} messages, {} scans, {} detections",
+            s.sensor, s.messages, s.scans, s.detections
+        );
+        if let Some(p) = s.period_ms {
+            let _ = write!(text, ", every {:.1} ms ({:.1} to {:.1})", p.median, p.min, p.max);
+        }
+        text += "\n";
     }
     text + &findings(&report.findings)
 }

@@ -12,7 +12,7 @@ use viewshed::time::Time;
 use super::candump::Line;
 use super::capture::{self, Kind};
 use super::problems::Problems;
-use super::{Frame, ReadOptions, Recording};
+use super::{Frame, ReadOptions, Recording, native};
 
 /// Entries of a scan that are kept; clones announce more than 255.
 const MOST_ENTRIES: usize = 1024;
@@ -24,6 +24,10 @@ const MOST_ENTRIES: usize = 1024;
 pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
     let mut problems = Problems::default();
     let lines = lines(bytes, &mut problems);
+    let native = native::of_log(&lines);
+    if !native.is_empty() && !lines.iter().any(|l| sensor_of(l).is_some()) {
+        return native::read(name, &native, 0, options);
+    }
     let (interface, sensor) = choose(&name, &lines, options)?;
     let mine: Vec<&Line> = lines.iter().filter(|line| line.interface == interface).collect();
     let elsewhere = lines.iter().filter(|l| l.interface != interface && sensor_of(l) == Some(sensor)).count();

@@ -6,6 +6,7 @@ pub mod candump;
 pub mod capture;
 pub mod labels;
 pub mod mcap;
+pub mod native;
 pub mod points;
 pub mod problems;
 pub mod ros;
@@ -129,7 +130,8 @@ pub struct ReadOptions {
     pub frame_period_s: Option<f64>,
 }
 
-/// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, or a TI mmWave capture.
+/// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, a capture of a TI mmWave radar or of
+/// the native format.
 ///
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
@@ -140,6 +142,9 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
         ars408::read(name, &bytes, options)?
     } else if !bytes.starts_with(::mcap::MAGIC) && ti::is_capture(&bytes) {
         ti::read(name, &bytes, options)?
+    } else if !bytes.starts_with(::mcap::MAGIC) && native::is_capture(&bytes) {
+        let (messages, broken) = native::unstuff(&bytes);
+        native::read(name, &messages, broken, options)?
     } else {
         return mcap::read(path, options);
     };

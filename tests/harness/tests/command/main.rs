@@ -3,6 +3,7 @@
 mod bad_input;
 mod can_log;
 mod foxglove;
+mod native_capture;
 mod radar_scan;
 mod replay;
 mod scene;

@@ -34,8 +34,8 @@ const SHOWN: &str = "radar-3d";
 /// and FIR compare the map itself with exact lines of sight, wherever traffic passes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// MCAP recordings, CAN logs of `candump -L` (ARS408), or captures of a TI mmWave radar's data port
-    /// [default: the MCAP files in tests/recordings]
+    /// MCAP recordings, CAN logs of `candump -L` (ARS408), captures of a TI mmWave radar's data port or of the
+    /// native format [default: the MCAP files in tests/recordings]
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// Write everything that was found as JSON: an object, for several recordings an array
