@@ -46,6 +46,11 @@ pub(super) struct Header {
     pub(super) sdk: u8,
 }
 
+impl Header {
+    /// Before the first.
+    pub(super) const NONE: Self = Self { total: 0, items: 0, number: 0, points: None, sub_frame: 0, sdk: 0 };
+}
+
 impl Family {
     /// All families.
     pub const ALL: [Self; 4] = [Self::Bytes36, Self::Bytes40, Self::Bytes44, Self::Bytes52];

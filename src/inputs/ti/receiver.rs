@@ -95,6 +95,14 @@ pub struct Ti<const N: usize> {
     outside: u32,
     head: [u8; LONGEST],
     stage: Stage,
+    header: Header,
+    /// Items left, the current one included.
+    left: u32,
+    /// Where the current stage ends.
+    end: u32,
+    layout: Layout,
+    record: [u8; LONGEST_RECORD],
+    filled: usize,
     started: Time,
     points: u16,
     ratios: u16,
@@ -104,30 +112,20 @@ pub struct Ti<const N: usize> {
 }
 
 /// What the next bytes are.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
     /// Not of interest before the next magic word.
     Searching,
+    /// The header.
     Header,
-    /// Type and length of an item that ends here.
-    Item {
-        header: Header,
-        left: u32,
-        end: u32,
-    },
-    /// Payload up to `end`.
-    Payload {
-        header: Header,
-        left: u32,
-        end: u32,
-        layout: Option<Layout>,
-        record: [u8; LONGEST_RECORD],
-        filled: usize,
-    },
+    /// Type and length of an item.
+    Item,
+    /// An item's payload, to be stepped over.
+    Other,
+    /// An item's records.
+    Records,
     /// Zeros up to the frame's end.
-    Padding {
-        header: Header,
-    },
+    Padding,
 }
 
 /// So many broken frames in a row mean that another firmware runs.
@@ -149,6 +147,12 @@ impl<const N: usize> Ti<N> {
             outside: 0,
             head: [0; LONGEST],
             stage: Stage::Searching,
+            header: Header::NONE,
+            left: 0,
+            end: 0,
+            layout: Layout::Cartesian,
+            record: [0; LONGEST_RECORD],
+            filled: 0,
             started: Time::from_micros(0),
             points: 0,
             ratios: 0,
@@ -178,7 +182,7 @@ impl<const N: usize> Ti<N> {
                 None => {}
                 Some(Event::Learnt(family)) => return (i + 1, Outcome::Learnt(family)),
                 Some(Event::Broken(flaw)) => return (i + 1, Outcome::Broken(flaw)),
-                Some(Event::Complete(header)) => return (i + 1, self.complete(&header)),
+                Some(Event::Complete) => return (i + 1, self.complete()),
             }
         }
         (bytes.len(), Outcome::Taken)
@@ -211,18 +215,21 @@ impl<const N: usize> Ti<N> {
             self.learning.take(self.position, self.window, &self.head);
             return None;
         };
-        match self.step(family, byte) {
-            Ok(stage) => self.stage = stage,
-            Err(flaw) => return self.broken(flaw),
+        if self.stage == Stage::Records {
+            self.fill(byte);
         }
-        match self.stage {
-            Stage::Padding { header } if self.position == header.total => {
-                self.position = 0;
-                self.stage = Stage::Searching;
-                Some(Event::Complete(header))
-            }
-            _ => None,
+        if self.position != self.end {
+            return None;
         }
+        if let Err(flaw) = self.step(family) {
+            return self.broken(flaw);
+        }
+        if self.stage == Stage::Padding && self.position == self.header.total {
+            self.position = 0;
+            self.stage = Stage::Searching;
+            return Some(Event::Complete);
+        }
+        None
     }
 
     /// A magic word, wherever it came.
@@ -244,6 +251,7 @@ impl<const N: usize> Ti<N> {
         self.head = [0; LONGEST];
         self.position = ITEM_HEADER;
         self.stage = Stage::Header;
+        self.end = self.family.map_or(0, Family::header);
         self.started = now;
         (self.points, self.ratios) = (0, 0);
         self.collected.clear();
@@ -264,55 +272,74 @@ impl<const N: usize> Ti<N> {
         Some(Event::Broken(flaw))
     }
 
-    /// The stage after a byte.
+    /// The stage is at its end: goes to the next.
     #[allow(clippy::cast_possible_truncation)] // halves of the window
-    fn step(&mut self, family: Family, byte: u8) -> Result<Stage, Flaw> {
-        let position = self.position;
+    fn step(&mut self, family: Family) -> Result<(), Flaw> {
         match self.stage {
-            Stage::Header if position == family.header() => {
-                let header = family.read(&self.head).ok_or(Flaw::Header)?;
-                next(header, header.items, position)
+            Stage::Header => {
+                self.header = family.read(&self.head).ok_or(Flaw::Header)?;
+                self.left = self.header.items;
+                self.next()
             }
-            Stage::Item { header, left, end } if position == end => {
+            Stage::Item => {
                 let (kind, length) = (self.window as u32, (self.window >> 32) as u32);
                 let payload = family.payload(length).ok_or(Flaw::Items)?;
-                let end = position.checked_add(payload).filter(|end| *end <= header.total).ok_or(Flaw::Items)?;
-                let layout = self.layout(family, kind, &header);
-                if layout.is_none() {
-                    count(&mut self.counters.other_items);
+                self.end = self.position.saturating_add(payload);
+                if self.end > self.header.total {
+                    return Err(Flaw::Items);
                 }
-                if end == position {
-                    return next(header, left - 1, position);
-                }
-                Ok(Stage::Payload { header, left, end, layout, record: [0; LONGEST_RECORD], filled: 0 })
-            }
-            Stage::Payload { header, left, end, mut layout, mut record, mut filled } => {
-                if let Some(current) = layout {
-                    if let Some(place) = record.get_mut(filled) {
-                        *place = byte;
-                        filled += 1;
+                self.stage = match self.layout(family, kind) {
+                    Some(layout) => {
+                        (self.layout, self.filled) = (layout, 0);
+                        Stage::Records
                     }
-                    if filled == current.record() {
-                        layout = Some(self.record(current, &record));
-                        filled = 0;
+                    None => {
+                        count(&mut self.counters.other_items);
+                        Stage::Other
                     }
-                }
-                match (position == end, filled) {
-                    (false, _) => Ok(Stage::Payload { header, left, end, layout, record, filled }),
-                    (true, 0) => next(header, left - 1, position),
-                    (true, _) => Err(Flaw::Records),
-                }
+                };
+                if payload == 0 { self.item_ends() } else { Ok(()) }
             }
-            stage => Ok(stage),
+            Stage::Records if self.filled > 0 => Err(Flaw::Records),
+            Stage::Records | Stage::Other => self.item_ends(),
+            Stage::Searching | Stage::Padding => Ok(()),
+        }
+    }
+
+    fn item_ends(&mut self) -> Result<(), Flaw> {
+        self.left = self.left.saturating_sub(1);
+        self.next()
+    }
+
+    /// The stage behind an item or the header.
+    fn next(&mut self) -> Result<(), Flaw> {
+        let rest = self.header.total.checked_sub(self.position).ok_or(Flaw::Items)?;
+        (self.stage, self.end) = match self.left {
+            0 if rest < PADDING => (Stage::Padding, self.header.total),
+            1.. if rest >= ITEM_HEADER => (Stage::Item, self.position + ITEM_HEADER),
+            _ => return Err(Flaw::Items),
+        };
+        Ok(())
+    }
+
+    /// Takes a byte of a record.
+    fn fill(&mut self, byte: u8) {
+        if let Some(place) = self.record.get_mut(self.filled) {
+            *place = byte;
+            self.filled += 1;
+        }
+        if self.filled == self.layout.record() {
+            self.filled = 0;
+            self.take_record();
         }
     }
 
     /// How an item is laid out; `None` if it is of no interest.
-    fn layout(&self, family: Family, kind: u32, header: &Header) -> Option<Layout> {
+    fn layout(&self, family: Family, kind: u32) -> Option<Layout> {
         match (family, kind) {
             (Family::Bytes52, 6) => Some(Layout::Polar(self.config.dialect.polar_points)),
             (Family::Bytes52, _) => None,
-            (_, 1) if header.sdk <= 2 => Some(Layout::IndexedHead),
+            (_, 1) if self.header.sdk <= 2 => Some(Layout::IndexedHead),
             (_, 1) => Some(Layout::Cartesian),
             (_, 7) => Some(Layout::SideInfo),
             (_, 1000) => Some(Layout::Spherical),
@@ -321,10 +348,10 @@ impl<const N: usize> Ti<N> {
         }
     }
 
-    /// Takes a record; the layout of the one behind it.
-    fn record(&mut self, layout: Layout, record: &[u8; LONGEST_RECORD]) -> Layout {
-        match layout.read(record, &self.config.dialect) {
-            Record::Head(behind) => return behind,
+    /// Takes a whole record.
+    fn take_record(&mut self) {
+        match self.layout.read(&self.record, &self.config.dialect) {
+            Record::Head(behind) => self.layout = behind,
             Record::Point(point) => {
                 match point.map(|point| self.collected.add(self.points, point)) {
                     Err(_) => count(&mut self.counters.no_point),
@@ -341,17 +368,17 @@ impl<const N: usize> Ti<N> {
                 self.ratios = self.ratios.saturating_add(1);
             }
         }
-        layout
     }
 
-    fn complete(&mut self, header: &Header) -> Outcome<'_> {
+    fn complete(&mut self) -> Outcome<'_> {
+        let header = self.header;
         let announced = header.points.unwrap_or(self.points);
         if !usable(announced, self.points) {
             count(&mut self.counters.broken);
             return Outcome::Broken(Flaw::Points);
         }
         self.broken_in_a_row = 0;
-        self.follow(header);
+        self.follow(&header);
         count(&mut self.counters.scans);
         Outcome::Scan(RadarScan {
             time: self.started,
@@ -377,15 +404,6 @@ impl<const N: usize> Ti<N> {
 /// What a byte led to.
 enum Event {
     Learnt(Family),
-    Complete(Header),
+    Complete,
     Broken(Flaw),
-}
-
-/// The stage behind an item or the header, at `position`.
-fn next(header: Header, left: u32, position: u32) -> Result<Stage, Flaw> {
-    match header.total.checked_sub(position) {
-        Some(rest) if left == 0 && rest < PADDING => Ok(Stage::Padding { header }),
-        Some(rest) if left > 0 && rest >= ITEM_HEADER => Ok(Stage::Item { header, left, end: position + ITEM_HEADER }),
-        _ => Err(Flaw::Items),
-    }
 }
