@@ -2,6 +2,9 @@
 
 use std::mem::size_of;
 
+use viewshed::inputs::ars408::Ars408;
+use viewshed::inputs::native::{Receiver, SerialReceiver};
+use viewshed::inputs::ti::Ti;
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
 use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
@@ -35,4 +38,18 @@ fn a_polar_map_takes_two_bytes_a_cell() {
     let map = size_of::<PolarMap<200, 120>>();
     println!("polar map 200 x 120: {map} B");
     assert!(map <= 2 * 200 * 120 + 128, "{map}");
+}
+
+#[test]
+fn a_radar_input_for_256_detections_fits_6500_bytes() {
+    let sizes = [
+        ("ARS408", size_of::<Ars408<256>>()),
+        ("native over CAN FD", size_of::<Receiver<256>>()),
+        ("native over a serial line", size_of::<SerialReceiver<256>>()),
+        ("TI mmWave", size_of::<Ti<256>>()),
+    ];
+    for (input, bytes) in sizes {
+        println!("{input}: {bytes} B");
+        assert!(bytes <= 6_500, "{input}: {bytes}");
+    }
 }

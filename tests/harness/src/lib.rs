@@ -1,6 +1,7 @@
 //! Host-side harness of `viewshed`: recordings in, metrics and pictures out.
 
 pub mod commands;
+pub mod doctor;
 pub mod estimators;
 pub mod evaluation;
 pub mod foxglove;

@@ -1,5 +1,6 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
+pub mod doctor;
 pub mod progress;
 pub mod replay;
 
@@ -24,6 +25,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Replay(Box<replay::Args>),
+    Doctor(doctor::Args),
 }
 
 impl Cli {
@@ -31,6 +33,7 @@ impl Cli {
     pub fn run(&self) -> ExitCode {
         let outcome = match &self.command {
             Command::Replay(args) => replay::run(args),
+            Command::Doctor(args) => doctor::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);
