@@ -133,3 +133,4 @@ pub mod spherical;
 pub mod time;
 pub mod trig;
 pub mod voxelise;
+pub mod wire;

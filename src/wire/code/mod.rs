@@ -1,0 +1,6 @@
+//! The code of the map: rays in, words out, whatever they travel on.
+
+pub mod block;
+pub mod interval;
+pub mod model;
+pub mod ray;

@@ -1,0 +1,3 @@
+//! Radar frames in, visibility out.
+
+pub mod code;

@@ -1,0 +1,3 @@
+//! What the maps of a recording cost on a bus, and what a receiver makes of them.
+
+pub mod symbols;
