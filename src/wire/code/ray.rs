@@ -21,6 +21,17 @@ impl Known {
         if near < end && end <= 256 { Self { near: near as u8, last: (end - 1) as u8 } } else { Self::NONE }
     }
 
+    /// First and last cell as bytes; 1 and 0 where nothing is known.
+    pub const fn limits(self) -> [u8; 2] {
+        [self.near, self.last]
+    }
+
+    /// From first and last cell; `None` if they are in the wrong order, unless they are 1 and 0.
+    pub const fn from_limits(limits: [u8; 2]) -> Option<Self> {
+        let [near, last] = limits;
+        if near <= last || (near == 1 && last == 0) { Some(Self { near, last }) } else { None }
+    }
+
     /// Whether no cell is known.
     pub const fn is_empty(self) -> bool {
         self.near > self.last
