@@ -67,6 +67,8 @@ pub enum Part {
     Delta,
     /// The second, third or fourth word of a block; classic CAN only.
     More(Word),
+    /// Cells of one azimuth in plain bits.
+    Plain,
 }
 
 /// Which word of a block a frame carries, the first not counted.
@@ -121,10 +123,10 @@ pub enum Message {
 }
 
 /// Number of the first map message.
-const FIRST_MAP: u8 = 8;
+const FIRST_MAP: u8 = 6;
 
 /// Message numbers a plane takes.
-const PER_PLANE: u8 = 5;
+const PER_PLANE: u8 = 6;
 
 impl Message {
     /// The message's number.
@@ -141,6 +143,7 @@ impl Message {
                     Part::Refresh => 0,
                     Part::Delta => 1,
                     Part::More(word) => 2 + word as u8,
+                    Part::Plain => 5,
                 };
                 FIRST_MAP + PER_PLANE * plane as u8 + part
             }
@@ -157,7 +160,7 @@ impl Message {
             3 => Self::Freshness,
             4 => Self::Detections,
             5 => Self::Time,
-            FIRST_MAP..23 => {
+            FIRST_MAP..24 => {
                 let plane = match (number - FIRST_MAP) / PER_PLANE {
                     0 => Plane::Visibility,
                     1 => Plane::Grade,
@@ -168,11 +171,12 @@ impl Message {
                     1 => Part::Delta,
                     2 => Part::More(Word::Second),
                     3 => Part::More(Word::Third),
-                    _ => Part::More(Word::Fourth),
+                    4 => Part::More(Word::Fourth),
+                    _ => Part::Plain,
                 };
                 Self::Map(plane, part)
             }
-            6 | 7 | 23..32 => Self::Other(number),
+            24..32 => Self::Other(number),
             _ => return None,
         })
     }
@@ -448,7 +452,8 @@ mod tests {
         }
         assert_eq!(Message::from_number(32), None);
         assert_eq!(Message::Map(Plane::Occupancy, Part::More(Word::Fourth)).number(), 22);
-        assert_eq!(Message::from_number(9), Some(Message::Map(Plane::Visibility, Part::Delta)));
+        assert_eq!(Message::from_number(7), Some(Message::Map(Plane::Visibility, Part::Delta)));
+        assert_eq!(Message::from_number(23), Some(Message::Map(Plane::Occupancy, Part::Plain)));
     }
 
     #[test]
@@ -478,12 +483,12 @@ mod tests {
         let packet = Packet::new(Packing::Classic, 1, message, Epoch::new(5), &[0xAA, 1, 2, 3, 4, 5]).protect(3, None);
         assert_eq!(packet.bytes()[1..], [0x53, 0xAA, 1, 2, 3, 4, 5]);
         let frame = packet.frame(&Addresses::STANDARD).unwrap();
-        assert_eq!(frame.id, CanId::Standard(0x428));
+        assert_eq!(frame.id, CanId::Standard(0x426));
         let received = Received::from_frame(&frame, &Addresses::STANDARD).unwrap();
         assert_eq!((received.sensor, received.message, received.epoch, received.counter), (1, message, Epoch::new(5), 3));
         assert_eq!(received.own, [0xAA, 1, 2, 3, 4, 5]);
         // the same bytes under another sensor's identifier
-        let other = CanFrame::classic(CanId::Standard(0x408), packet.bytes()).unwrap();
+        let other = CanFrame::classic(CanId::Standard(0x406), packet.bytes()).unwrap();
         assert_eq!(
             Received::from_frame(&other, &Addresses::STANDARD),
             Err(NotAMessage::Protection(E2eError::Check))

@@ -8,25 +8,16 @@
 //! the expected one, or the expected one is gone, or there is a new one at a distance. Blocked and
 //! clear stretches are long, so most rays take less than a bit.
 //!
-//! A ray too ragged for any block goes out in plain bits, a segment at a time, and cannot be built
-//! upon by a delta.
+//! A ray too ragged for any block goes out in plain bits, outside this code.
 //!
 //! # Limits
 //! 256 azimuths, 256 range cells. Decoding a block never loops more than (azimuths x 2 cells) times,
 //! whatever the words say.
 
 use super::interval::{Coder, Decoder, Encoder, Form, OutOfWords};
-use super::model::{
-    AS_EXPECTED, EDGES, GONE, KNOWN, MODEL, NEW, PLAIN, REACH, STOP_CLASSES, STOPS_BELOW, TOLD,
-};
+use super::model::{AS_EXPECTED, EDGES, GONE, KNOWN, MODEL, NEW, REACH, STOP_CLASSES, STOPS_BELOW, TOLD};
 use super::ray::{Known, Ray};
 use crate::bits::Bits;
-
-/// Cells of a plain segment.
-pub const SEGMENT: usize = 96;
-
-/// Segments that cover every cell.
-pub const SEGMENTS: usize = 3;
 
 /// Bits that tell how many ticks older a delta's refresh is, less one.
 pub const AGE_BITS: u32 = 4;
@@ -404,23 +395,6 @@ impl Block {
         Self { encoder, end }
     }
 
-    /// Tells a segment of a ray in plain bits.
-    pub fn plain<const W: usize>(form: Form, usual: Known, ray: &Ray<W>, segment: usize) -> Self {
-        let mut encoder = Encoder::new(form);
-        let expected = Ray::clear(usual);
-        let table = ray_table::<W>(Kind::Refresh, Before::START, &expected);
-        let told = encoder
-            .symbol(table, PLAIN)
-            .and_then(|()| encoder.plain(9, ray.known.near()))
-            .and_then(|()| encoder.plain(9, ray.known.end()))
-            .and_then(|()| encoder.plain(2, segment))
-            .and_then(|()| {
-                let mut cells = segment * SEGMENT..(segment + 1) * SEGMENT;
-                cells.try_for_each(|cell| encoder.plain(1, usize::from(ray.get(cell))))
-            });
-        Self { encoder, end: usize::from(told.is_some()) }
-    }
-
     /// The words, the first the most significant.
     pub fn words(&self) -> &[u64] {
         self.encoder.words()
@@ -480,20 +454,6 @@ impl<const W: usize> Progress<W> {
     }
 }
 
-/// What a block says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Told<const W: usize> {
-    /// A whole ray.
-    Ray(Ray<W>),
-    /// Cells of a segment of a ray; the others are left as they are.
-    Segment {
-        /// The known cells of the whole ray, and the bits of the segment's cells.
-        ray: Ray<W>,
-        /// Which segment.
-        segment: usize,
-    },
-}
-
 /// Why a block's decoding ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -525,7 +485,7 @@ pub fn decode<'a, const W: usize>(
     usual: Known,
     azimuths: usize,
     mut was: impl FnMut(usize) -> Option<Ray<W>>,
-    mut take: impl FnMut(usize, Told<W>),
+    mut take: impl FnMut(usize, Ray<W>),
 ) -> Ending {
     let Ok(mut decoder) = Decoder::new(words, form) else { return Ending::OutOfWords };
     if kind != Kind::Refresh && decoder.plain(AGE_BITS).is_err() {
@@ -549,13 +509,9 @@ pub fn decode<'a, const W: usize>(
         };
         let expected = progress.expected(kind, &refreshed);
         match decode_ray(&mut decoder, kind, progress.before, &expected) {
-            Ok(Told::Ray(ray)) => {
-                take(azimuth, Told::Ray(ray));
+            Ok(ray) => {
+                take(azimuth, ray);
                 progress.advance(&ray, &expected, &refreshed);
-            }
-            Ok(segment) => {
-                take(azimuth, segment);
-                return complete(&decoder);
             }
             Err(NotARay::OutOfWords) => return Ending::OutOfWords,
             Err(NotARay::Malformed) => return Ending::Malformed,
@@ -574,19 +530,18 @@ fn decode_ray<const W: usize>(
     kind: Kind,
     before: Before,
     expected: &Ray<W>,
-) -> Result<Told<W>, NotARay> {
+) -> Result<Ray<W>, NotARay> {
     let known = match decoder.symbol(ray_table(kind, before, expected))? {
-        AS_EXPECTED => return Ok(Told::Ray(*expected)),
+        AS_EXPECTED => return Ok(*expected),
         EDGES => expected.known,
         KNOWN if kind == Kind::Refresh => {
             let near = decode_limit(decoder, expected.known.near())?;
             let end = decode_limit(decoder, expected.known.end())?;
             limits::<W>(near, end)?
         }
-        PLAIN if kind == Kind::Refresh && before.first => return decode_segment(decoder),
         _ => return Err(NotARay::Malformed),
     };
-    decode_edges(decoder, kind, known, expected).map(Told::Ray)
+    decode_edges(decoder, kind, known, expected)
 }
 
 /// Known cells as told: nothing, or within the row.
@@ -594,21 +549,6 @@ fn limits<const W: usize>(near: usize, end: usize) -> Result<Known, NotARay> {
     let known = Known::new(near, end);
     let none = near == Known::NONE.near() && end == Known::NONE.end();
     if (known.is_empty() && !none) || end > Bits::<W>::CAPACITY { Err(NotARay::Malformed) } else { Ok(known) }
-}
-
-fn decode_segment<const W: usize>(decoder: &mut Decoder<'_>) -> Result<Told<W>, NotARay> {
-    let (near, end) = (decoder.plain(9)?, decoder.plain(9)?);
-    let segment = decoder.plain(2)?;
-    if segment >= SEGMENTS {
-        return Err(NotARay::Malformed);
-    }
-    let mut bits = Bits::NONE;
-    for cell in segment * SEGMENT..(segment + 1) * SEGMENT {
-        if decoder.plain(1)? == 1 {
-            bits.set(cell);
-        }
-    }
-    Ok(Told::Segment { ray: Ray::new(limits::<W>(near, end)?, bits), segment })
 }
 
 #[cfg(test)]
@@ -667,20 +607,6 @@ mod tests {
         while at < count {
             let block = Block::new(form, kind, at, USUAL, count, map);
             if block.end == at {
-                for segment in 0..SEGMENTS {
-                    let block = Block::plain(form, USUAL, &map.now[at], segment);
-                    assert_eq!(block.end, 1, "a segment always fits");
-                    let mut taken = 0;
-                    let ending = decode(block.words(), form, Kind::Refresh, at, USUAL, count, |_| None, |a, told| {
-                        let Told::Segment { ray, segment: s } = told else { panic!("no segment") };
-                        assert_eq!((a, s), (at, segment));
-                        taken += 1;
-                        let cells = Bits::span(segment * SEGMENT, (segment + 1) * SEGMENT);
-                        assert_eq!(*ray.bits(), map.now[at].bits().and(&cells));
-                        assert_eq!(ray.known, map.now[at].known);
-                    });
-                    assert_eq!((ending, taken), (Ending::Complete, 1));
-                }
                 got[at] = map.now[at];
                 at += 1;
                 continue;
@@ -690,17 +616,14 @@ mod tests {
             let ending = decode(block.words(), form, kind, at, USUAL, count, was, |a, told| {
                 assert_eq!(a, next);
                 next += 1;
-                match told {
-                    Told::Ray(ray) => got[a] = ray,
-                    Told::Segment { .. } => panic!("a segment nobody sent"),
-                }
+                got[a] = told;
             });
             assert_eq!((ending, next), (Ending::Complete, block.end));
             words += block.words().len();
             // fewer words give fewer rays, and the same ones
             for n in 1..block.words().len() {
                 decode(&block.words()[..n], form, kind, at, USUAL, count, was, |a, told| {
-                    assert_eq!(told, Told::Ray(map.now[a]));
+                    assert_eq!(told, map.now[a]);
                 });
             }
             at = block.end;

@@ -17,8 +17,6 @@ pub const AS_EXPECTED: usize = 0;
 pub const EDGES: usize = 1;
 /// Known cells told, then edges.
 pub const KNOWN: usize = 2;
-/// A segment of plain bits.
-pub const PLAIN: usize = 3;
 
 /// Symbols of [`Model::limit`]: the limit is as expected, one cell nearer, one farther, or told.
 pub const TOLD: usize = 3;
@@ -33,7 +31,7 @@ pub const STOPS_BELOW: u32 = 4;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Model {
     /// How a ray is told, by what went before (see `Before`) and whether edges are expected.
-    pub ray: [[[u8; 4]; 2]; 8],
+    pub ray: [[[u8; 3]; 2]; 8],
     /// Whether the first known cell's bit is the expected one (0) or not, by the expected bit.
     pub first: [[u8; 2]; 2],
     /// The next edge, where one is expected: by kind (refresh, delta), by the bit before it, by the
@@ -75,6 +73,6 @@ mod tests {
 
     #[test]
     fn the_tables_take_less_than_half_a_kilobyte() {
-        assert_eq!(size_of::<Model>(), 380);
+        assert_eq!(size_of::<Model>(), 364);
     }
 }
