@@ -108,6 +108,11 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
     pub fn visible_from(&self) -> u8 {
         self.visible_from
     }
+
+    /// Least occupancy that counts as occupied.
+    pub fn occupied_from(&self) -> u8 {
+        self.occupied_from
+    }
 }
 
 impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {

@@ -21,6 +21,8 @@
 
 use crc::Crc;
 
+use super::code::block::Context;
+use super::code::interval::Form;
 use super::code::ray::Known;
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
 use crate::angle::Angle;
@@ -29,13 +31,13 @@ use crate::mount::{Levelling, Mount};
 use crate::polar::PolarGeometry;
 
 /// Groups of a header.
-pub const GROUPS: usize = 7;
+pub const GROUPS: u8 = 7;
 
 /// Bytes of a group.
 const GROUP: usize = 5;
 
 /// Own bytes of a long header: flags, then the groups.
-pub const LONG: usize = 1 + GROUPS * GROUP;
+pub const LONG: usize = 1 + GROUPS as usize * GROUP;
 
 /// Most azimuths of a map on the wire.
 pub const MOST_AZIMUTHS: usize = 128;
@@ -163,8 +165,13 @@ impl Header {
         }
     }
 
+    /// What the code of its maps needs of it.
+    pub fn context(&self, form: Form) -> Context {
+        Context { form, usual: self.usual, azimuths: usize::from(self.azimuths) }
+    }
+
     /// Groups 1 to 6.
-    fn groups(&self) -> [[u8; GROUP]; GROUPS - 1] {
+    fn groups(&self) -> [[u8; GROUP]; GROUPS as usize - 1] {
         let [_, x1, x2, x3] = self.mount.origin.x_cm.to_be_bytes();
         let [_, y1, y2, y3] = self.mount.origin.y_cm.to_be_bytes();
         let [h1, h2] = self.mount.height_cm.to_be_bytes();
@@ -192,7 +199,7 @@ impl Header {
         groups
     }
 
-    fn parse(groups: &[[u8; GROUP]; GROUPS - 1]) -> Result<Self, NotAHeader> {
+    fn parse(groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> Result<Self, NotAHeader> {
         let [
             [x1, x2, x3, h1, h2],
             [y1, y2, y3, yaw1, yaw2],
@@ -264,7 +271,7 @@ fn flags(clock: &Clock, group: u8) -> u8 {
 }
 
 /// The check over groups 1 to 6, the last byte left out.
-fn check(groups: &[[u8; GROUP]; GROUPS - 1]) -> u8 {
+fn check(groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> u8 {
     let bytes = groups.as_flattened();
     CRC_8.checksum(bytes.split_last().map_or(bytes, |(_, rest)| rest))
 }
@@ -286,7 +293,7 @@ pub enum Brought {
 /// Collects an epoch's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Collector {
-    groups: [[u8; GROUP]; GROUPS - 1],
+    groups: [[u8; GROUP]; GROUPS as usize - 1],
     /// Which of them are there, a bit each.
     there: u8,
     header: Option<Header>,
@@ -300,7 +307,7 @@ impl Default for Collector {
 
 impl Collector {
     /// Nothing yet.
-    pub const NEW: Self = Self { groups: [[0; GROUP]; GROUPS - 1], there: 0, header: None };
+    pub const NEW: Self = Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, header: None };
 
     /// The header, once complete.
     pub fn header(&self) -> Option<&Header> {
@@ -319,14 +326,14 @@ impl Collector {
         }
         let synchronised = flags >> 7 == 1;
         let first: [u8; GROUP] = *bytes.first_chunk().ok_or(NotAHeader::TooShort)?;
-        if bytes.len() < GROUPS * GROUP {
-            return match usize::from(flags >> 4 & 7) {
+        if bytes.len() < usize::from(GROUPS) * GROUP {
+            return match flags >> 4 & 7 {
                 0 => Ok(Brought::Clock(Clock::parse(synchronised, first))),
                 GROUPS.. => Err(NotAHeader::Range),
-                group => self.take_group(group - 1, first),
+                group => self.take_group(usize::from(group) - 1, first),
             };
         }
-        let mut groups = [[0; GROUP]; GROUPS - 1];
+        let mut groups = [[0; GROUP]; GROUPS as usize - 1];
         let rest = bytes.get(GROUP..).unwrap_or(&[]);
         groups.as_flattened_mut().iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
         let header = Header::parse(&groups)?;
@@ -337,7 +344,7 @@ impl Collector {
         Ok(Brought::Clock(Clock::parse(synchronised, first)))
     }
 
-    fn contradicts(&self, groups: &[[u8; GROUP]; GROUPS - 1]) -> bool {
+    fn contradicts(&self, groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> bool {
         let mut both = self.groups.iter().zip(groups).enumerate();
         both.any(|(i, (old, new))| self.there >> i & 1 == 1 && old != new)
     }

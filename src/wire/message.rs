@@ -203,7 +203,19 @@ impl Addresses {
             CanId::Standard(_) => 0x7FF,
             CanId::Extended(_) => 0x1FFF_FFFF,
         };
-        if base.raw() % 32 == 0 && base.raw() + 31 <= most { Some(Self { base }) } else { None }
+        if base.raw().is_multiple_of(32) && base.raw() + 31 <= most { Some(Self { base }) } else { None }
+    }
+
+    /// The last sensor there is room for.
+    #[allow(clippy::cast_possible_truncation)] // at most 255
+    pub const fn most_sensor(&self) -> u8 {
+        let (most, sensors) = match self.base {
+            // eight sensors on 11 bits leave the identifiers behind them alone
+            CanId::Standard(_) => (0x7FF, 7),
+            CanId::Extended(_) => (0x1FFF_FFFF, 255),
+        };
+        let room = (most - self.base.raw() - 31) / 32;
+        if room < sensors { room as u8 } else { sensors as u8 }
     }
 
     /// The identifier of a sensor's message; `None` if the sensor's lie beyond the last.
@@ -211,7 +223,13 @@ impl Addresses {
         let raw = self.base.raw() + 32 * sensor as u32 + message.number() as u32;
         match self.base {
             #[allow(clippy::cast_possible_truncation)] // checked
-            CanId::Standard(_) => if raw <= 0x7FF { CanId::standard(raw as u16) } else { None },
+            CanId::Standard(_) => {
+                if raw <= 0x7FF {
+                    CanId::standard(raw as u16)
+                } else {
+                    None
+                }
+            }
             CanId::Extended(_) => CanId::extended(raw),
         }
     }
@@ -225,8 +243,7 @@ impl Addresses {
         );
         let offset = id.raw().checked_sub(self.base.raw()).filter(|_| same_length)?;
         let sensor = u8::try_from(offset / 32).ok()?;
-        // eight sensors on 11 bits leave the identifiers behind them alone
-        if matches!(id, CanId::Standard(_)) && sensor > 7 {
+        if sensor > self.most_sensor() {
             return None;
         }
         Some((sensor, Message::from_number((offset % 32) as u8)?))
@@ -485,14 +502,14 @@ mod tests {
         let frame = packet.frame(&Addresses::STANDARD).unwrap();
         assert_eq!(frame.id, CanId::Standard(0x426));
         let received = Received::from_frame(&frame, &Addresses::STANDARD).unwrap();
-        assert_eq!((received.sensor, received.message, received.epoch, received.counter), (1, message, Epoch::new(5), 3));
+        assert_eq!(
+            (received.sensor, received.message, received.epoch, received.counter),
+            (1, message, Epoch::new(5), 3)
+        );
         assert_eq!(received.own, [0xAA, 1, 2, 3, 4, 5]);
         // the same bytes under another sensor's identifier
         let other = CanFrame::classic(CanId::Standard(0x406), packet.bytes()).unwrap();
-        assert_eq!(
-            Received::from_frame(&other, &Addresses::STANDARD),
-            Err(NotAMessage::Protection(E2eError::Check))
-        );
+        assert_eq!(Received::from_frame(&other, &Addresses::STANDARD), Err(NotAMessage::Protection(E2eError::Check)));
     }
 
     #[test]

@@ -1,9 +1,12 @@
 //! Radar frames in, visibility out.
 
+pub mod broadcast;
 pub mod code;
 pub mod e2e;
 pub mod frame;
 pub mod header;
+mod layer;
+pub mod layers;
 pub mod map_message;
 pub mod message;
 pub mod scan_number;

@@ -9,7 +9,7 @@
 //! | 0 | uptime, s |
 //! | 1 | firmware version: major, minor, patch; wire version |
 //! | 2 | fingerprint of the configuration |
-//! | 3 | radar frames lost, 2 bytes; frames dropped on sending, 2 bytes |
+//! | 3 | radar frames lost, 2 bytes; azimuths of maps dropped on sending, 2 bytes |
 //! | 4 | frames received with failed protection, 2 bytes; times bus-off, 2 bytes |
 //! | 5 | cause of the last reset; 3 bytes kept free, 0 |
 //!
@@ -18,10 +18,10 @@
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
 
 /// Pages of a status.
-pub const PAGES: usize = 6;
+pub const PAGES: u8 = 6;
 
 /// Own bytes of a long status.
-pub const LONG: usize = 2 + 4 * PAGES;
+pub const LONG: usize = 2 + 4 * PAGES as usize;
 
 /// What the sender's maps are worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -178,7 +178,7 @@ pub struct Status {
     pub fingerprint: u32,
     /// Radar frames lost.
     pub radar_lost: u16,
-    /// Frames dropped on sending.
+    /// Azimuths of maps dropped on sending.
     pub dropped: u16,
     /// Frames received with failed protection.
     pub e2e_errors: u16,
@@ -257,10 +257,9 @@ impl Status {
     }
 
     /// Own bytes of a long message.
-    #[allow(clippy::cast_possible_truncation)] // six pages
     pub fn emit(&self) -> [u8; LONG] {
         let mut bytes = [0; LONG];
-        let pages = (0..PAGES as u8).flat_map(|page| self.page(page));
+        let pages = (0..PAGES).flat_map(|page| self.page(page));
         let all = [self.state as u8, self.reason.number()].into_iter().chain(pages);
         bytes.iter_mut().zip(all).for_each(|(to, from)| *to = from);
         bytes
@@ -285,8 +284,8 @@ impl Status {
         match chunks {
             [] => return Err(NotAStatus::TooShort),
             [page] => new.take_page(first >> 4, *page)?,
-            pages if pages.len() >= PAGES => {
-                (0..).zip(pages.iter().take(PAGES)).try_for_each(|(number, page)| new.take_page(number, *page))?;
+            pages if pages.len() >= usize::from(PAGES) => {
+                (0..PAGES).zip(pages).try_for_each(|(number, page)| new.take_page(number, *page))?;
             }
             _ => return Err(NotAStatus::TooShort),
         }

@@ -10,6 +10,7 @@
 
 use super::code::ray::Ray;
 use super::message::{CLASSIC_BYTES, LONG_BYTES};
+use super::scan_number::ScanNumber;
 
 /// Length of a step, centimetres.
 pub const STEP_CM: u32 = 200;
@@ -27,11 +28,23 @@ pub fn steps<const W: usize>(ray: &Ray<W>, cell_cm: u16) -> u8 {
     (end_cm / STEP_CM).min(255) as u8
 }
 
+/// Own bytes of a message, and how many they are.
+#[allow(clippy::cast_possible_truncation)] // 128 azimuths
+pub fn emit(scan: ScanNumber, first: usize, steps: impl Iterator<Item = u8>) -> ([u8; LONG_BYTES], usize) {
+    let mut own = [0; LONG_BYTES];
+    let mut length = 0;
+    for (to, from) in own.iter_mut().zip([scan.byte(), first as u8].into_iter().chain(steps)) {
+        *to = from;
+        length += 1;
+    }
+    (own, length)
+}
+
 /// Ranges of consecutive azimuths in a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ranges<'a> {
     /// Number of the scan.
-    pub scan: u8,
+    pub scan: ScanNumber,
     /// First azimuth.
     pub first: u8,
     /// Steps of the azimuths from the first on.
@@ -42,7 +55,9 @@ impl<'a> Ranges<'a> {
     /// From a message's own bytes; `None` if they are too few.
     pub fn parse(own: &'a [u8]) -> Option<Self> {
         match own {
-            [scan, first, steps @ ..] if !steps.is_empty() => Some(Self { scan: *scan, first: *first, steps }),
+            [scan, first, steps @ ..] if !steps.is_empty() => {
+                Some(Self { scan: ScanNumber::from_byte(*scan), first: *first, steps })
+            }
             _ => None,
         }
     }
@@ -74,8 +89,10 @@ mod tests {
 
     #[test]
     fn a_message_is_these_bytes() {
-        let ranges = Ranges::parse(&[0x21, 40, 0, 100, 99, 255]).unwrap();
-        assert_eq!((ranges.scan, ranges.metres(41), ranges.metres(43)), (0x21, Some(200), Some(510)));
+        let (own, length) = emit(ScanNumber::from_byte(0x21), 40, [0, 100, 99, 255].into_iter());
+        assert_eq!(own[..length], [0x21, 40, 0, 100, 99, 255]);
+        let ranges = Ranges::parse(&own[..length]).unwrap();
+        assert_eq!((ranges.scan.byte(), ranges.metres(41), ranges.metres(43)), (0x21, Some(200), Some(510)));
         assert_eq!((ranges.metres(39), ranges.metres(44)), (None, None));
         assert_eq!(Ranges::parse(&[1, 2]), None);
     }

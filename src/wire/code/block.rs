@@ -334,6 +334,17 @@ fn decode_limit(decoder: &mut Decoder<'_>, expected: usize) -> Result<usize, Not
     }
 }
 
+/// What sender and receiver of a block agree on beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Context {
+    /// Size and most number of the words.
+    pub form: Form,
+    /// The header's usually known cells.
+    pub usual: Known,
+    /// The header's number of azimuths.
+    pub azimuths: usize,
+}
+
 /// The rays a block is made of or built on.
 pub trait Rays<const W: usize> {
     /// The ray of an azimuth as it is now, if it is to be told in this block.
@@ -355,17 +366,17 @@ pub struct Block {
 /// the first azimuth behind them.
 pub fn encode<const W: usize>(
     coder: &mut (impl Coder + Clone),
+    context: &Context,
     kind: Kind,
     start: usize,
-    usual: Known,
-    azimuths: usize,
     rays: &impl Rays<W>,
 ) -> usize {
     if let Kind::Delta { ticks } = kind {
         // the first word has room
         let _ = coder.plain(AGE_BITS, usize::from(ticks.saturating_sub(1)));
     }
-    let mut progress = Progress::new(usual);
+    let azimuths = context.azimuths;
+    let mut progress = Progress::new(context.usual);
     for azimuth in start..azimuths {
         let before = coder.clone();
         let told = progress.tell(coder, kind, azimuth, rays);
@@ -382,16 +393,9 @@ pub fn encode<const W: usize>(
 
 impl Block {
     /// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray.
-    pub fn new<const W: usize>(
-        form: Form,
-        kind: Kind,
-        start: usize,
-        usual: Known,
-        azimuths: usize,
-        rays: &impl Rays<W>,
-    ) -> Self {
-        let mut encoder = Encoder::new(form);
-        let end = encode(&mut encoder, kind, start, usual, azimuths, rays);
+    pub fn new<const W: usize>(context: &Context, kind: Kind, start: usize, rays: &impl Rays<W>) -> Self {
+        let mut encoder = Encoder::new(context.form);
+        let end = encode(&mut encoder, context, kind, start, rays);
         Self { encoder, end }
     }
 
@@ -477,22 +481,20 @@ pub fn age(words: &[u64], form: Form) -> Option<u8> {
 
 /// Reads a block and hands its rays to `take`, azimuth by azimuth. `was` gives the rays of the refresh
 /// a delta names.
-pub fn decode<'a, const W: usize>(
+pub fn decode<const W: usize>(
     words: &[u64],
-    form: Form,
+    context: &Context,
     kind: Kind,
     start: usize,
-    usual: Known,
-    azimuths: usize,
     mut was: impl FnMut(usize) -> Option<Ray<W>>,
     mut take: impl FnMut(usize, Ray<W>),
 ) -> Ending {
-    let Ok(mut decoder) = Decoder::new(words, form) else { return Ending::OutOfWords };
+    let Ok(mut decoder) = Decoder::new(words, context.form) else { return Ending::OutOfWords };
     if kind != Kind::Refresh && decoder.plain(AGE_BITS).is_err() {
         return Ending::OutOfWords;
     }
-    let mut progress = Progress::new(usual);
-    for azimuth in start..azimuths {
+    let mut progress = Progress::new(context.usual);
+    for azimuth in start..context.azimuths {
         if !progress.before.first {
             match stop_table(decoder.room()).map(|table| decoder.symbol(table)) {
                 None | Some(Ok(1)) => return complete(&decoder),
@@ -560,6 +562,10 @@ mod tests {
 
     const USUAL: Known = Known::new(3, 60);
 
+    fn context(form: Form, azimuths: usize) -> Context {
+        Context { form, usual: USUAL, azimuths }
+    }
+
     struct Map {
         now: Vec<Ray<2>>,
         was: Vec<Ray<2>>,
@@ -602,10 +608,11 @@ mod tests {
     /// All blocks of a map, decoded again.
     fn through(map: &Map, form: Form, kind: Kind) -> (Vec<Ray<2>>, usize) {
         let count = map.now.len();
+        let context = Context { form, usual: USUAL, azimuths: count };
         let mut got = vec![Ray::UNKNOWN; count];
         let (mut at, mut words) = (0, 0);
         while at < count {
-            let block = Block::new(form, kind, at, USUAL, count, map);
+            let block = Block::new(&context, kind, at, map);
             if block.end == at {
                 got[at] = map.now[at];
                 at += 1;
@@ -613,7 +620,7 @@ mod tests {
             }
             let mut next = at;
             let was = |a: usize| map.was.get(a).copied();
-            let ending = decode(block.words(), form, kind, at, USUAL, count, was, |a, told| {
+            let ending = decode(block.words(), &context, kind, at, was, |a, told| {
                 assert_eq!(a, next);
                 next += 1;
                 got[a] = told;
@@ -622,7 +629,7 @@ mod tests {
             words += block.words().len();
             // fewer words give fewer rays, and the same ones
             for n in 1..block.words().len() {
-                decode(&block.words()[..n], form, kind, at, USUAL, count, was, |a, told| {
+                decode(&block.words()[..n], &context, kind, at, was, |a, told| {
                     assert_eq!(told, map.now[a]);
                 });
             }
@@ -649,7 +656,7 @@ mod tests {
             let was: Vec<_> = rays.iter().map(|(was, ..)| *was).collect();
             let now = rays.iter().map(|(was, edges, same)| if *same { *was } else { ray(was.known, edges) }).collect();
             let map = Map { now, was };
-            let block = Block::new(Form::CLASSIC, Kind::Delta { ticks }, 0, USUAL, map.now.len(), &map);
+            let block = Block::new(&context(Form::CLASSIC, map.now.len()), Kind::Delta { ticks }, 0, &map);
             prop_assert_eq!(age(block.words(), Form::CLASSIC), Some(ticks));
             prop_assert_eq!(through(&map, Form::CLASSIC, Kind::Delta { ticks }).0, map.now);
         }
@@ -665,7 +672,8 @@ mod tests {
             let mut taken = 0;
             let was = |a: usize| (a % 7 != 6).then(|| ray(USUAL, &[a % 50, 55]));
             let usual = Known::new(usual.0, usual.1);
-            decode::<2>(&words, Form::CLASSIC, kind, start, usual, 120, was, |a, _| {
+            let context = Context { usual, ..context(Form::CLASSIC, 120) };
+            decode::<2>(&words, &context, kind, start, was, |a, _| {
                 assert!(a >= start && a < 120);
                 taken += 1;
             });
@@ -678,7 +686,7 @@ mod tests {
         let was = vec![ray(USUAL, &[]), ray(USUAL, &[20, 30]), ray(USUAL, &[20, 30]), ray(USUAL, &[])];
         let now = vec![ray(USUAL, &[]), ray(USUAL, &[18, 28]), ray(USUAL, &[18, 28]), ray(USUAL, &[])];
         let map = Map { now, was };
-        let block = Block::new(Form::CLASSIC, Kind::Delta { ticks: 4 }, 0, USUAL, 4, &map);
+        let block = Block::new(&context(Form::CLASSIC, 4), Kind::Delta { ticks: 4 }, 0, &map);
         let bits = 132 - block.encoder.room();
         assert!(block.end == 4 && bits <= 32, "{bits} bits, and 4 of them for the refresh's age");
     }
@@ -687,15 +695,15 @@ mod tests {
     fn a_delta_without_its_refresh_tells_nothing() {
         let map = Map { now: vec![ray(USUAL, &[9])], was: vec![ray(USUAL, &[])] };
         let kind = Kind::Delta { ticks: 1 };
-        let block = Block::new(Form::LONG, kind, 0, USUAL, 1, &map);
-        let ending = decode::<2>(block.words(), Form::LONG, kind, 0, USUAL, 1, |_| None, |_, _| panic!("taken"));
+        let block = Block::new(&context(Form::LONG, 1), kind, 0, &map);
+        let ending = decode::<2>(block.words(), &context(Form::LONG, 1), kind, 0, |_| None, |_, _| panic!("taken"));
         assert_eq!(ending, Ending::NoRefresh);
     }
 
     #[test]
     fn known_cells_that_changed_need_a_refresh() {
         let map = Map { now: vec![ray(Known::new(4, 60), &[])], was: vec![ray(USUAL, &[])] };
-        assert_eq!(Block::new(Form::LONG, Kind::Delta { ticks: 1 }, 0, USUAL, 1, &map).end, 0);
-        assert_eq!(Block::new(Form::LONG, Kind::Refresh, 0, USUAL, 1, &map).end, 1);
+        assert_eq!(Block::new(&context(Form::LONG, 1), Kind::Delta { ticks: 1 }, 0, &map).end, 0);
+        assert_eq!(Block::new(&context(Form::LONG, 1), Kind::Refresh, 0, &map).end, 1);
     }
 }

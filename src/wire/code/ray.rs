@@ -1,7 +1,7 @@
 //! One azimuth of a map as it travels: which cells are known, and a bit for each of them.
 
-use crate::bits::Bits;
 use crate::bitmap::Row;
+use crate::bits::Bits;
 
 /// The cells of an azimuth there is evidence for: `near..=last`, or none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -158,7 +158,15 @@ mod tests {
 
     fn draw(ray: &Ray<1>) -> String {
         (0..ray.known.end().max(1))
-            .map(|i| if !ray.known.contains(i) { ' ' } else if ray.get(i) { '.' } else { '#' })
+            .map(|i| {
+                if !ray.known.contains(i) {
+                    ' '
+                } else if ray.get(i) {
+                    '.'
+                } else {
+                    '#'
+                }
+            })
             .collect()
     }
 

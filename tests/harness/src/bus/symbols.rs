@@ -1,6 +1,6 @@
 //! How often radar-3d's maps use each symbol of the wire's code: where its tables come from.
 
-use viewshed::wire::code::block::{self, Kind, Rays};
+use viewshed::wire::code::block::{self, Context, Kind, Rays};
 use viewshed::wire::code::interval::{Coder, Encoder, Form};
 use viewshed::wire::code::model::MODEL;
 use viewshed::wire::code::ray::{Known, Ray};
@@ -69,11 +69,12 @@ impl Symbols {
 
     /// Counts the symbols of one scan; returns the words it took.
     pub fn count<const W: usize>(&mut self, scan: &Scan<'_, W>, form: Form, kind: Kind, usual: Known) -> usize {
+        let context = Context { form, usual, azimuths: scan.now.len() };
         let all = tables(&MODEL);
         let (mut at, mut words) = (0, 0);
         while at < scan.now.len() {
             let mut coder = Counting { encoder: interval::Encoder::new(form), seen: Vec::new() };
-            let end = block::encode(&mut coder, kind, at, usual, scan.now.len(), scan);
+            let end = block::encode(&mut coder, &context, kind, at, scan);
             for (table, symbol) in coder.seen {
                 if let Some(place) = all.iter().position(|t| t.as_ptr() == table) {
                     self.0[place][symbol] += 1;
