@@ -9,6 +9,7 @@ mod layer;
 pub mod layers;
 pub mod map_message;
 pub mod message;
+pub mod receive;
 pub mod scan_number;
 pub mod serial;
 pub mod status;

@@ -10,7 +10,7 @@
 use crate::time::Time;
 
 /// Length of a tick, microseconds.
-pub const TICK_US: u64 = 20_000;
+pub const TICK_US: u32 = 20_000;
 
 /// Time after which numbers come again, microseconds.
 pub const PERIOD_US: u32 = 5_120_000;
@@ -24,7 +24,7 @@ impl ScanNumber {
     /// Of a scan measured at this time of the sender's clock.
     #[allow(clippy::cast_possible_truncation)] // modulo 256
     pub const fn at(measured: Time) -> Self {
-        Self((measured.micros() / TICK_US) as u8)
+        Self((measured.micros() / TICK_US as u64) as u8)
     }
 
     /// From the byte in a message.
@@ -56,7 +56,7 @@ impl ScanNumber {
     /// How far a clock is past the beginning of this tick, modulo the period; microseconds.
     #[allow(clippy::cast_possible_truncation)] // modulo
     pub const fn lag(self, now: Time) -> u32 {
-        let beginning = self.0 as u32 * TICK_US as u32;
+        let beginning = self.0 as u32 * TICK_US;
         let now = (now.micros() % PERIOD_US as u64) as u32;
         (now + PERIOD_US - beginning) % PERIOD_US
     }

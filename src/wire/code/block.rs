@@ -479,15 +479,22 @@ pub fn age(words: &[u64], form: Form) -> Option<u8> {
     u8::try_from(age + 1).ok()
 }
 
-/// Reads a block and hands its rays to `take`, azimuth by azimuth. `was` gives the rays of the refresh
-/// a delta names.
+/// Takes the rays of a block, azimuth by azimuth.
+pub trait Reader<const W: usize> {
+    /// The ray of an azimuth in the refresh a delta names, if it is at hand.
+    fn was(&self, azimuth: usize) -> Option<Ray<W>>;
+
+    /// A ray as it is now.
+    fn take(&mut self, azimuth: usize, ray: &Ray<W>);
+}
+
+/// Reads what is there of a block.
 pub fn decode<const W: usize>(
     words: &[u64],
     context: &Context,
     kind: Kind,
     start: usize,
-    mut was: impl FnMut(usize) -> Option<Ray<W>>,
-    mut take: impl FnMut(usize, Ray<W>),
+    reader: &mut impl Reader<W>,
 ) -> Ending {
     let Ok(mut decoder) = Decoder::new(words, context.form) else { return Ending::OutOfWords };
     if kind != Kind::Refresh && decoder.plain(AGE_BITS).is_err() {
@@ -504,7 +511,7 @@ pub fn decode<const W: usize>(
         }
         let refreshed = match kind {
             Kind::Refresh => Ray::UNKNOWN,
-            Kind::Delta { .. } => match was(azimuth) {
+            Kind::Delta { .. } => match reader.was(azimuth) {
                 Some(ray) => ray,
                 None => return Ending::NoRefresh,
             },
@@ -512,7 +519,7 @@ pub fn decode<const W: usize>(
         let expected = progress.expected(kind, &refreshed);
         match decode_ray(&mut decoder, kind, progress.before, &expected) {
             Ok(ray) => {
-                take(azimuth, ray);
+                reader.take(azimuth, &ray);
                 progress.advance(&ray, &expected, &refreshed);
             }
             Err(NotARay::OutOfWords) => return Ending::OutOfWords,
@@ -564,6 +571,18 @@ mod tests {
 
     fn context(form: Form, azimuths: usize) -> Context {
         Context { form, usual: USUAL, azimuths }
+    }
+
+    /// Reads into closures.
+    struct Closures<F, G>(F, G);
+
+    impl<F: Fn(usize) -> Option<Ray<2>>, G: FnMut(usize, Ray<2>)> Reader<2> for Closures<F, G> {
+        fn was(&self, azimuth: usize) -> Option<Ray<2>> {
+            self.0(azimuth)
+        }
+        fn take(&mut self, azimuth: usize, ray: &Ray<2>) {
+            self.1(azimuth, *ray);
+        }
     }
 
     struct Map {
@@ -620,18 +639,30 @@ mod tests {
             }
             let mut next = at;
             let was = |a: usize| map.was.get(a).copied();
-            let ending = decode(block.words(), &context, kind, at, was, |a, told| {
-                assert_eq!(a, next);
-                next += 1;
-                got[a] = told;
-            });
+            let ending = decode(
+                block.words(),
+                &context,
+                kind,
+                at,
+                &mut Closures(was, |a, told| {
+                    assert_eq!(a, next);
+                    next += 1;
+                    got[a] = told;
+                }),
+            );
             assert_eq!((ending, next), (Ending::Complete, block.end));
             words += block.words().len();
             // fewer words give fewer rays, and the same ones
             for n in 1..block.words().len() {
-                decode(&block.words()[..n], &context, kind, at, was, |a, told| {
-                    assert_eq!(told, map.now[a]);
-                });
+                decode(
+                    &block.words()[..n],
+                    &context,
+                    kind,
+                    at,
+                    &mut Closures(was, |a, told| {
+                        assert_eq!(told, map.now[a]);
+                    }),
+                );
             }
             at = block.end;
         }
@@ -673,10 +704,10 @@ mod tests {
             let was = |a: usize| (a % 7 != 6).then(|| ray(USUAL, &[a % 50, 55]));
             let usual = Known::new(usual.0, usual.1);
             let context = Context { usual, ..context(Form::CLASSIC, 120) };
-            decode::<2>(&words, &context, kind, start, was, |a, _| {
+            decode::<2>(&words, &context, kind, start, &mut Closures(was, |a: usize, _| {
                 assert!(a >= start && a < 120);
                 taken += 1;
-            });
+            }));
             prop_assert!(taken <= 120);
         }
     }
@@ -696,7 +727,8 @@ mod tests {
         let map = Map { now: vec![ray(USUAL, &[9])], was: vec![ray(USUAL, &[])] };
         let kind = Kind::Delta { ticks: 1 };
         let block = Block::new(&context(Form::LONG, 1), kind, 0, &map);
-        let ending = decode::<2>(block.words(), &context(Form::LONG, 1), kind, 0, |_| None, |_, _| panic!("taken"));
+        let ending =
+            decode::<2>(block.words(), &context(Form::LONG, 1), kind, 0, &mut Closures(|_| None, |_, _| panic!("taken")));
         assert_eq!(ending, Ending::NoRefresh);
     }
 
