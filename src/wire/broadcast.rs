@@ -148,7 +148,7 @@ struct Every {
 
 impl Every {
     fn new(now: Time, period_us: u64) -> Self {
-        Self { next: now, period_us: period_us.max(1) }
+        Self { next: now, period_us }
     }
 
     /// Whether it has come; a clock that stepped back does not put it off by more than a period.

@@ -727,8 +727,13 @@ mod tests {
         let map = Map { now: vec![ray(USUAL, &[9])], was: vec![ray(USUAL, &[])] };
         let kind = Kind::Delta { ticks: 1 };
         let block = Block::new(&context(Form::LONG, 1), kind, 0, &map);
-        let ending =
-            decode::<2>(block.words(), &context(Form::LONG, 1), kind, 0, &mut Closures(|_| None, |_, _| panic!("taken")));
+        let ending = decode::<2>(
+            block.words(),
+            &context(Form::LONG, 1),
+            kind,
+            0,
+            &mut Closures(|_| None, |_, _| panic!("taken")),
+        );
         assert_eq!(ending, Ending::NoRefresh);
     }
 

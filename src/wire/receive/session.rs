@@ -141,7 +141,7 @@ impl Session {
             self.left |= 1 << old.number();
         }
         self.left &= !(1 << epoch.number());
-        (self.epoch, self.heard) = (Some(epoch), now);
+        (self.epoch, self.heard, self.conflict) = (Some(epoch), now, None);
         self.restart();
         Entry::New
     }
