@@ -219,7 +219,9 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     }
 
     fn take_checked(&mut self, now: Time, message: &Received<'_>, limits: &Limits) -> Result<Accepted, Refused> {
-        match self.session.enter(now, message.epoch, limits) {
+        let dated = matches!(message.message, Message::Map(..) | Message::VisibleRange);
+        let scan = message.own.first().filter(|_| dated).map(|byte| ScanNumber::from_byte(*byte));
+        match self.session.enter(now, message.epoch, scan, limits) {
             Entry::Taken => {}
             Entry::New => self.forget_all(),
             Entry::OldEpoch => return Err(Refused::OldEpoch),

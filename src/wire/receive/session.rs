@@ -9,9 +9,9 @@
 //! *Trust.* A session tells nothing before it is `A + D` old and has heard [`ENOUGH`] frames: one of
 //! them was in time.
 //!
-//! *Epochs.* A new epoch begins a new session, and the old one is refused for `A + D`. Should it come
-//! again after that while its number is not forgotten, two senders use one number: a conflict, until
-//! only one of them is heard for a second.
+//! *Epochs.* A new epoch begins a new session, and the old one is refused for `A + D`, its late frames
+//! for a period of the scan numbers. Should it speak again after `A + D`, in time by its own measure, then
+//! two senders use one number: a conflict, until only one of them is heard for a second.
 
 use crate::time::Time;
 use crate::wire::message::Epoch;
@@ -89,6 +89,8 @@ pub(super) struct Session {
     /// When each epoch was left, milliseconds, and which are remembered.
     left_ms: [u32; 16],
     left: u16,
+    /// The epoch left last and its smallest lag.
+    previous: Option<(Epoch, u32)>,
     conflict: Option<Time>,
 }
 
@@ -102,6 +104,7 @@ impl Session {
         late_since: None,
         left_ms: [0; 16],
         left: 0,
+        previous: None,
         conflict: None,
     };
 
@@ -109,8 +112,8 @@ impl Session {
         self.epoch
     }
 
-    /// A checked frame of any kind.
-    pub fn enter(&mut self, now: Time, epoch: Epoch, limits: &Limits) -> Entry {
+    /// A checked frame of any kind, with its scan number if it has one.
+    pub fn enter(&mut self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &Limits) -> Entry {
         let Some(current) = self.epoch else { return self.begin(now, epoch) };
         if now.since(self.heard).is_none_or(|silence| silence > SILENCE_US) {
             return self.begin(now, epoch);
@@ -119,17 +122,30 @@ impl Session {
             self.heard = now;
             return Entry::Taken;
         }
-        if self.conflicting(now) {
-            self.conflict = Some(now);
-            return Entry::Conflict;
+        let left = self.since_left(now, epoch);
+        if left.is_some_and(|since| since <= limits.sum_us()) {
+            return Entry::OldEpoch;
         }
-        match self.since_left(now, epoch) {
-            Some(since) if since <= limits.sum_us() => Entry::OldEpoch,
-            Some(since) if since <= u64::from(PERIOD_US) => {
+        if self.conflicting(now) || left.is_some_and(|since| since <= u64::from(PERIOD_US)) {
+            if self.speaks_now(now, epoch, scan, limits) {
                 self.conflict = Some(now);
-                Entry::Conflict
+                return Entry::Conflict;
             }
-            _ => self.begin(now, epoch),
+            return Entry::OldEpoch;
+        }
+        self.begin(now, epoch)
+    }
+
+    /// Whether a frame of another epoch is of a sender that speaks now: not one that is late by the
+    /// measure that epoch had.
+    fn speaks_now(&self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &Limits) -> bool {
+        match (self.previous.filter(|(previous, _)| *previous == epoch), scan) {
+            (Some((_, least)), Some(scan)) => {
+                let behind = behind(scan.lag(now), least);
+                behind <= limits.max_delay_us || behind > PERIOD_US / 2
+            }
+            (None, Some(_)) => self.left >> epoch.number() & 1 == 0,
+            (_, None) => false,
         }
     }
 
@@ -139,6 +155,7 @@ impl Session {
                 *left = milliseconds(now);
             }
             self.left |= 1 << old.number();
+            self.previous = self.begun.map(|(_, least, _)| (old, least));
         }
         self.left &= !(1 << epoch.number());
         (self.epoch, self.heard, self.conflict) = (Some(epoch), now, None);
@@ -260,7 +277,7 @@ mod tests {
 
     fn trusting() -> Session {
         let mut s = Session::NONE;
-        assert_eq!(s.enter(ms(0), Epoch::new(3), &LIMITS), Entry::New);
+        assert_eq!(s.enter(ms(0), Epoch::new(3), None, &LIMITS), Entry::New);
         for k in 0..10 {
             assert_eq!(s.hear(ms(50 * k + 30), scan(50 * k), &LIMITS), Hearing::InTime);
         }
@@ -271,7 +288,7 @@ mod tests {
     #[test]
     fn a_session_is_trusted_after_age_and_delay_and_enough_frames() {
         let mut s = Session::NONE;
-        s.enter(ms(0), Epoch::new(3), &LIMITS);
+        s.enter(ms(0), Epoch::new(3), None, &LIMITS);
         for k in 0..8 {
             assert!(!s.trusted(ms(50 * k + 5), &LIMITS));
             s.hear(ms(50 * k + 5), scan(50 * k), &LIMITS);
@@ -310,18 +327,20 @@ mod tests {
     #[test]
     fn the_old_epoch_is_refused_and_then_a_conflict() {
         let mut s = trusting();
-        assert_eq!(s.enter(ms(500), Epoch::new(4), &LIMITS), Entry::New);
-        assert_eq!(s.enter(ms(900), Epoch::new(3), &LIMITS), Entry::OldEpoch);
-        assert!(!s.conflicting(ms(900)));
-        assert_eq!(s.enter(ms(901), Epoch::new(3), &LIMITS), Entry::Conflict);
-        assert!(s.conflicting(ms(901)));
-        assert_eq!(s.enter(ms(902), Epoch::new(4), &LIMITS), Entry::Taken, "but nothing is told");
-        assert_eq!(s.enter(ms(1000), Epoch::new(9), &LIMITS), Entry::Conflict, "a third one either");
-        assert!(!s.conflicting(ms(2001)));
-        assert_eq!(s.enter(ms(2002), Epoch::new(9), &LIMITS), Entry::New, "a restart");
+        let mut enter = |at: u64, epoch, scan| s.enter(ms(at), Epoch::new(epoch), scan, &LIMITS);
+        assert_eq!(enter(500, 4, None), Entry::New);
+        assert_eq!(enter(900, 3, Some(scan(870))), Entry::OldEpoch);
+        assert_eq!(enter(901, 3, Some(scan(450))), Entry::OldEpoch, "a late one");
+        assert_eq!(enter(901, 3, None), Entry::OldEpoch, "of no known time");
+        assert_eq!(enter(901, 3, Some(scan(800))), Entry::Conflict);
+        assert_eq!(enter(902, 4, None), Entry::Taken, "but nothing is told");
+        assert_eq!(enter(1000, 9, Some(scan(0))), Entry::Conflict, "a third one either");
+        assert!(s.conflicting(ms(1999)) && !s.conflicting(ms(2001)));
+        let mut enter = |at: u64, epoch| s.enter(ms(at), Epoch::new(epoch), None, &LIMITS);
+        assert_eq!(enter(2002, 9), Entry::New, "a restart");
         // the old number may come again when it is forgotten
-        (0..6).for_each(|k| assert_eq!(s.enter(ms(2100 + 1000 * k), Epoch::new(9), &LIMITS), Entry::Taken));
-        assert_eq!(s.enter(ms(7200), Epoch::new(4), &LIMITS), Entry::New);
+        (0..6).for_each(|k| assert_eq!(enter(2100 + 1000 * k, 9), Entry::Taken));
+        assert_eq!(enter(7200, 4), Entry::New);
     }
 
     #[test]
@@ -329,8 +348,9 @@ mod tests {
         let mut s = Session::NONE;
         for k in 0..600 {
             let epoch = Epoch::new(1 + u8::try_from(k & 1).unwrap());
-            s.enter(ms(33 * k), epoch, &LIMITS);
-            s.hear(ms(33 * k), scan(33 * k), &LIMITS);
+            if s.enter(ms(33 * k), epoch, Some(scan(33 * k)), &LIMITS) != Entry::Conflict {
+                s.hear(ms(33 * k), scan(33 * k), &LIMITS);
+            }
             assert_eq!(s.conflicting(ms(33 * k)), k >= 14, "{k}");
             assert!(!s.trusted(ms(33 * k), &LIMITS));
         }
@@ -339,8 +359,8 @@ mod tests {
     #[test]
     fn silence_ends_a_session() {
         let mut s = trusting();
-        assert_eq!(s.enter(ms(3100), Epoch::new(3), &LIMITS), Entry::New);
-        assert_eq!(s.enter(ms(3000), Epoch::new(3), &LIMITS), Entry::New, "so does a clock stepping back");
+        assert_eq!(s.enter(ms(3100), Epoch::new(3), None, &LIMITS), Entry::New);
+        assert_eq!(s.enter(ms(3000), Epoch::new(3), None, &LIMITS), Entry::New, "so does a clock stepping back");
     }
 
     #[test]
