@@ -50,7 +50,7 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
     }
 
     /// Whether a plane is sent.
-    fn has(&self, plane: Plane) -> bool {
+    pub fn has(&self, plane: Plane) -> bool {
         plane.index() < P && self.header().is_some_and(|header| header.planes >> plane.index() & 1 == 1)
     }
 

@@ -1,5 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
+pub mod bus;
+pub mod listen;
 pub mod progress;
 pub mod replay;
 
@@ -24,6 +26,8 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Replay(Box<replay::Args>),
+    Bus(Box<bus::Args>),
+    Listen(listen::Args),
 }
 
 impl Cli {
@@ -31,6 +35,8 @@ impl Cli {
     pub fn run(&self) -> ExitCode {
         let outcome = match &self.command {
             Command::Replay(args) => replay::run(args),
+            Command::Bus(args) => bus::run(args),
+            Command::Listen(args) => listen::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

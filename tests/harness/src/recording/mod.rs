@@ -1,5 +1,6 @@
 //! Recordings: radar frames, mount, field of view and ground truth, whatever file they come from.
 
+pub mod candump;
 pub mod labels;
 pub mod mcap;
 pub mod points;
