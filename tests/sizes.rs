@@ -5,6 +5,8 @@ use std::mem::size_of;
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
 use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
+use viewshed::wire::broadcast::Broadcaster;
+use viewshed::wire::receive::SensorReceiver;
 
 #[test]
 fn the_reference_grid_fits_450_kb() {
@@ -35,4 +37,12 @@ fn a_polar_map_takes_two_bytes_a_cell() {
     let map = size_of::<PolarMap<200, 120>>();
     println!("polar map 200 x 120: {map} B");
     assert!(map <= 2 * 200 * 120 + 128, "{map}");
+}
+
+#[test]
+fn a_sensor_at_its_receiver_fits_8_kb_and_its_sender_9_kb() {
+    let receiver = size_of::<SensorReceiver<120, 7, 1>>();
+    let sender = size_of::<Broadcaster<120, 7>>();
+    println!("receiver of 120 x 200: {receiver} B a sensor, sender: {sender} B");
+    assert!(receiver <= 8000 && sender <= 9000, "{receiver}, {sender}");
 }

@@ -74,8 +74,13 @@ impl Assembly {
         let free = || self.slots.iter().position(|slot| slot.there == 0).unwrap_or(SLOTS - 1);
         let at = found.unwrap_or_else(free);
         // the one touched last comes first, so the last one waited longest
-        self.slots.get_mut(..=at)?.rotate_right(1);
+        let touched = *self.slots.get(at)?;
+        for i in (0..at).rev() {
+            let slot = *self.slots.get(i)?;
+            *self.slots.get_mut(i + 1)? = slot;
+        }
         let slot = self.slots.first_mut()?;
+        *slot = touched;
         if found.is_none() {
             *slot = Slot { place, delta: false, there: 0, words: [0; WORDS] };
         }
