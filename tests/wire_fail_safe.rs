@@ -16,8 +16,9 @@ use std::collections::{BinaryHeap, VecDeque};
 use shadows::{A, Map, R, Random, Shadows, W, header};
 use viewshed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
-use viewshed::wire::code::block::{self, Kind, Reader};
+use viewshed::wire::code::block::Kind;
 use viewshed::wire::code::ray::Ray;
+use viewshed::wire::code::reading::{self, Reader};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::map_message;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Part, Plane, Received};
@@ -159,7 +160,14 @@ impl World {
         let map = map_message::parse(received.own, true).unwrap();
         let mut azimuths = Azimuths(Vec::new());
         let context = header(0).context(received.packing.form());
-        let _ = block::decode(map.words(), &context, Kind::Refresh, map.start, &mut azimuths);
+        let _ = reading::decode(
+            map.words(),
+            &context,
+            Kind::Refresh,
+            map.start,
+            &mut { reading::Place::START },
+            &mut azimuths,
+        );
         for azimuth in azimuths.0 {
             let newest = &mut self.newest[azimuth];
             if newest.is_none_or(|(epoch, newest)| epoch != received.epoch || newest < measured) {

@@ -47,11 +47,28 @@ impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A
     }
 }
 
-/// Cells whose value reaches a threshold.
+/// Cells whose value reaches a threshold, eight at a time.
+#[allow(clippy::cast_possible_truncation)] // eight bits are left
 fn at_least<const W: usize>(cells: &[u8], threshold: u8) -> Bits<W> {
+    const HIGH: u64 = 0x8080_8080_8080_8080;
+    let least = u64::from(threshold) * 0x0101_0101_0101_0101;
     let mut words = [0; W];
     for (word, cells) in words.iter_mut().zip(cells.chunks(32)) {
-        *word = cells.iter().rev().fold(0, |bits, cell| bits << 1 | u32::from(*cell >= threshold));
+        for (place, eight) in cells.chunks(8).enumerate() {
+            let mut bytes = [0; 8];
+            match eight.first_chunk() {
+                Some(whole) => bytes = *whole,
+                // the last of a row; the threshold is above 0
+                None => bytes.iter_mut().zip(eight).for_each(|(to, from)| *to = *from),
+            }
+            let cells = u64::from_le_bytes(bytes);
+            // the highest bit of a byte: whether its lower seven reach the threshold's
+            let low = (cells | HIGH) - (least & !HIGH);
+            let reached = ((cells & !least) | (!(cells ^ least) & low)) & HIGH;
+            // the highest bits of all bytes side by side
+            let together = (reached >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            *word |= (together as u32) << (8 * place);
+        }
     }
     Bits::from_words(words)
 }
@@ -88,6 +105,16 @@ mod tests {
         assert_eq!(Layers::<2>::ray(&map(), Plane::Visibility, 1).known, Known::new(3, 34));
         assert_eq!(Layers::<2>::ray(&map(), Plane::Visibility, 0), Ray::UNKNOWN);
         assert_eq!(Layers::<2>::ray(&map(), Plane::Visibility, 2), Ray::UNKNOWN);
+    }
+
+    #[test]
+    fn eight_cells_at_a_time_say_what_one_says() {
+        for threshold in [1, 2, 100, 127, 128, 129, 200, 255] {
+            let cells: std::vec::Vec<u8> = (0..60_u32).map(|i| (i * 37 + u32::from(threshold)) as u8).collect();
+            let bits = at_least::<2>(&cells, threshold);
+            let expected: std::vec::Vec<usize> = (0..60).filter(|i| cells[*i] >= threshold).collect();
+            assert_eq!(bits.iter().collect::<std::vec::Vec<_>>(), expected, "{threshold}");
+        }
     }
 
     #[test]

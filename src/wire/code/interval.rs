@@ -153,6 +153,16 @@ impl<'a> Decoder<'a> {
         Ok(Self { words, used: 1, value, width: 1 << form.bits, form })
     }
 
+    /// Words joined on so far, what is left of the number, and the interval's width.
+    pub(super) fn state(&self) -> (usize, u64, u64) {
+        (self.used, self.value, self.width)
+    }
+
+    /// Goes on where another decoder of the same words was.
+    pub(super) fn resume(words: &'a [u64], form: Form, (used, value, width): (usize, u64, u64)) -> Self {
+        Self { words, used, value, width, form }
+    }
+
     /// Bits left, at most: what the encoder had left at this point.
     pub fn room(&self) -> u32 {
         room(self.width, self.used, self.form)

@@ -116,19 +116,40 @@ impl<const W: usize> Ray<W> {
             before = word >> 31;
             word ^ shifted
         });
-        Bits::from_words(words).and(&Bits::span(self.known.near() + 1, self.known.end()))
+        let mut toggles = Bits::from_words(words);
+        // no bit is set outside, so the limits are the only other places that differ
+        if !self.known.is_empty() {
+            toggles.clear(self.known.near());
+            toggles.clear(self.known.end());
+        }
+        toggles
+    }
+
+    /// Whether any of the known cells differs from the one before.
+    pub fn has_toggles(&self) -> bool {
+        !self.toggles().is_empty()
+    }
+
+    /// From bits none of which is set outside the known cells.
+    pub(crate) const fn within(known: Known, bits: Bits<W>) -> Self {
+        Self { known, bits }
     }
 
     /// What this ray of the refresh will probably be by now: where the neighbour changed since the
     /// same refresh, what the neighbour is now; elsewhere as it was.
     pub fn expected(&self, neighbour: &Self, neighbour_was: &Self) -> Self {
+        if neighbour == neighbour_was {
+            return *self;
+        }
         let mut words = *self.bits.words();
         let neighbours = neighbour.bits.words().iter().zip(neighbour_was.bits.words());
         for (word, (now, was)) in words.iter_mut().zip(neighbours) {
             let changed = now ^ was;
             *word = (*word & !changed) | (now & changed);
         }
-        Self::new(self.known, Bits::from_words(words))
+        let same_cells = neighbour.known == self.known && neighbour_was.known == self.known;
+        let bits = Bits::from_words(words);
+        if same_cells { Self::within(self.known, bits) } else { Self::new(self.known, bits) }
     }
 
     /// How many cells from the first known one on are set without a gap: the end of that run.

@@ -1,6 +1,7 @@
 //! The words of blocks, frame by frame, in any order.
 
 use crate::wire::code::block::Kind;
+use crate::wire::code::reading;
 use crate::wire::message::Plane;
 use crate::wire::scan_number::ScanNumber;
 
@@ -26,6 +27,8 @@ struct Slot {
     /// Which words are there, a bit each; none: the slot is free.
     there: u8,
     words: [u64; WORDS],
+    /// Where reading goes on.
+    reading: reading::Place,
 }
 
 /// Blocks under way, the one touched last first.
@@ -39,6 +42,8 @@ pub(super) struct Assembly {
 pub(super) struct Begun {
     /// Whether it is a delta.
     pub delta: bool,
+    /// Where reading goes on.
+    pub reading: reading::Place,
     words: [u64; WORDS],
     count: usize,
 }
@@ -56,8 +61,16 @@ impl Assembly {
             delta: false,
             there: 0,
             words: [0; WORDS],
+            reading: reading::Place::START,
         }; SLOTS],
     };
+
+    /// Notes how far the block touched last was read.
+    pub fn read_up_to(&mut self, place: reading::Place) {
+        if let Some(slot) = self.slots.first_mut() {
+            slot.reading = place;
+        }
+    }
 
     pub fn forget(&mut self) {
         *self = Self::NEW;
@@ -82,7 +95,7 @@ impl Assembly {
         let slot = self.slots.first_mut()?;
         *slot = touched;
         if found.is_none() {
-            *slot = Slot { place, delta: false, there: 0, words: [0; WORDS] };
+            *slot = Slot { place, delta: false, there: 0, words: [0; WORDS], reading: reading::Place::START };
         }
         let before = slot.there.trailing_ones();
         *slot.words.get_mut(index)? = word;
@@ -91,7 +104,7 @@ impl Assembly {
             slot.delta = kind != Kind::Refresh;
         }
         let count = slot.there.trailing_ones();
-        let begun = Begun { delta: slot.delta, words: slot.words, count: count as usize };
+        let begun = Begun { delta: slot.delta, reading: slot.reading, words: slot.words, count: count as usize };
         (count > before).then_some(begun)
     }
 }

@@ -40,15 +40,15 @@ impl<const A: usize, const W: usize> Sectors<A, W> {
 
     /// The newest of an azimuth and its scan.
     pub fn now(&self, azimuth: usize) -> Option<(Ray<W>, ScanNumber)> {
-        let ray = Ray::new(*self.known.get(azimuth)?, *self.now.get(azimuth)?);
+        let ray = Ray::within(*self.known.get(azimuth)?, *self.now.get(azimuth)?);
         Some((ray, *self.now_scan.get(azimuth)?)).filter(|_| self.there.get(azimuth))
     }
 
     /// An azimuth of the refresh of exactly this scan.
     pub fn refresh(&self, azimuth: usize, scan: ScanNumber) -> Option<Ray<W>> {
         let there = self.refreshed.get(azimuth) && self.was_scan.get(azimuth) == Some(&scan);
-        let ray = Ray::new(*self.known.get(azimuth)?, *self.was.get(azimuth)?);
-        Some(ray).filter(|_| there)
+        let ray = Ray::within(*self.known.get(azimuth)?, *self.was.get(azimuth)?);
+        there.then_some(ray)
     }
 
     /// Whether an azimuth is of an older scan than this, or there is none.

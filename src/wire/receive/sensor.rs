@@ -4,8 +4,9 @@ use super::assembly::{Assembly, Begun, Place};
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Limits, Session};
 use crate::time::Time;
-use crate::wire::code::block::{self, Ending, Kind, Reader};
+use crate::wire::code::block::Kind;
 use crate::wire::code::ray::Ray;
+use crate::wire::code::reading::{self, Ending, Reader};
 use crate::wire::e2e::{Counter, Sequence};
 use crate::wire::header::{Brought, Clock, Collector, Header, NotAHeader};
 use crate::wire::map_message;
@@ -311,6 +312,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         let Some(sectors) = self.planes.get_mut(plane.index()) else { return Ok(Accepted::Other(message.message)) };
         let context = header.context(message.packing.form());
         let (words, delta): (&[u64], bool);
+        let mut place = reading::Place::START;
         let begun: Begun;
         match part {
             Part::Plain => {
@@ -326,21 +328,26 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
                     _ => (0, Some(Kind::Refresh)),
                 };
                 let start = u8::try_from(map.start).map_err(|_| Refused::Malformed)?;
-                let place = Place { plane, scan: map.scan, start };
+                let block = Place { plane, scan: map.scan, start };
                 let word = *map.words().first().ok_or(Refused::Malformed)?;
-                match self.assembly.take(place, index, kind, word) {
+                match self.assembly.take(block, index, kind, word) {
                     Some(more) => begun = more,
                     None => return Ok(accepted),
                 }
-                (words, delta) = (begun.words(), begun.delta);
+                (words, delta, place) = (begun.words(), begun.delta, begun.reading);
             }
         }
-        let kind = match (delta, block::age(words, context.form)) {
+        let kind = match (delta, reading::age(words, context.form)) {
             (false, _) => Kind::Refresh,
             (true, Some(ticks)) => Kind::Delta { ticks },
             (true, None) => return Err(Refused::Malformed),
         };
-        match block::decode(words, &context, kind, map.start, &mut Reading { sectors, kind, scan: map.scan }) {
+        let mut reader = Reading { sectors, kind, scan: map.scan };
+        let ending = reading::decode(words, &context, kind, map.start, &mut place, &mut reader);
+        if !long {
+            self.assembly.read_up_to(place);
+        }
+        match ending {
             Ending::Complete | Ending::OutOfWords => Ok(accepted),
             Ending::NoRefresh => Err(Refused::NoRefresh),
             Ending::Malformed => Err(Refused::Malformed),
@@ -390,5 +397,9 @@ impl<const A: usize, const W: usize> Reader<W> for Reading<'_, A, W> {
 
     fn take(&mut self, azimuth: usize, ray: &Ray<W>) {
         self.sectors.take(azimuth, self.scan, ray, self.kind == Kind::Refresh);
+    }
+
+    fn taken(&self, azimuth: usize) -> Option<Ray<W>> {
+        self.sectors.now(azimuth).filter(|(_, scan)| *scan == self.scan).map(|(ray, _)| ray)
     }
 }
