@@ -30,7 +30,8 @@ impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A
         };
         let visible = self.visible_from();
         let bits = match plane {
-            Plane::Visibility => at_least(grades, visible),
+            // above unknown, so known
+            Plane::Visibility => return Ray::within(known, at_least(grades, visible)),
             Plane::Grade => {
                 // the upper halves of both classes
                 let (clear, nearly) = (visible.midpoint(u8::MAX), visible.midpoint(1));
@@ -53,6 +54,8 @@ fn at_least<const W: usize>(cells: &[u8], threshold: u8) -> Bits<W> {
     const HIGH: u64 = 0x8080_8080_8080_8080;
     let least = u64::from(threshold) * 0x0101_0101_0101_0101;
     let mut words = [0; W];
+    // eight cells are often like the eight before
+    let (mut before, mut together) = (0, if threshold == 0 { 0xFF } else { 0 });
     for (word, cells) in words.iter_mut().zip(cells.chunks(32)) {
         for (place, eight) in cells.chunks(8).enumerate() {
             let mut bytes = [0; 8];
@@ -62,11 +65,14 @@ fn at_least<const W: usize>(cells: &[u8], threshold: u8) -> Bits<W> {
                 None => bytes.iter_mut().zip(eight).for_each(|(to, from)| *to = *from),
             }
             let cells = u64::from_le_bytes(bytes);
-            // the highest bit of a byte: whether its lower seven reach the threshold's
-            let low = (cells | HIGH) - (least & !HIGH);
-            let reached = ((cells & !least) | (!(cells ^ least) & low)) & HIGH;
-            // the highest bits of all bytes side by side
-            let together = (reached >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            if cells != before {
+                before = cells;
+                // the highest bit of a byte: whether its lower seven reach the threshold's
+                let low = (cells | HIGH) - (least & !HIGH);
+                let reached = ((cells & !least) | (!(cells ^ least) & low)) & HIGH;
+                // the highest bits of all bytes side by side
+                together = (reached >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            }
             *word |= (together as u32) << (8 * place);
         }
     }

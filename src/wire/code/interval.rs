@@ -87,6 +87,9 @@ impl Encoder {
             return None;
         }
         self.width = to - from;
+        if from == 0 {
+            return Some(());
+        }
         let mut carry = from;
         // bounded by the number of words
         for word in self.words.iter_mut().take(self.used).rev() {
@@ -102,6 +105,7 @@ impl Encoder {
 }
 
 impl Coder for Encoder {
+    #[inline]
     fn symbol(&mut self, table: &'static [u8], symbol: usize) -> Option<()> {
         self.join();
         let below: u64 = table.iter().take(symbol).map(|f| u64::from(*f)).sum();
