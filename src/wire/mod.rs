@@ -1,4 +1,6 @@
-//! Radar frames in, visibility out.
+//! Visibility out, over CAN, CAN FD and serial lines.
+//!
+#![doc = include_str!("SPECIFICATION.md")]
 
 pub mod broadcast;
 pub mod code;
