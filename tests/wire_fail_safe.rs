@@ -140,7 +140,7 @@ impl World {
             let (sensor, message) =
                 addresses.message(viewshed::wire::frame::CanId::standard(id as u16).unwrap()).unwrap();
             let id = addresses.id(sensor, message).unwrap();
-            let long = self.medium.packing() == Packing::Long;
+            let long = self.medium.packing(false) == Packing::Long;
             let frame = if long { CanFrame::fd(id, &data) } else { CanFrame::classic(id, &data) }.unwrap();
             let outcome = self.receiver.frame(Self::receiver_time(at), &frame);
             // what decodes alone and was taken must not be told older afterwards

@@ -282,3 +282,35 @@ fn two_senders_with_one_number_are_a_conflict() {
         }
     }
 }
+
+#[cfg(feature = "secoc")]
+#[test]
+fn secured_messages_need_their_key_and_bring_the_same_maps() {
+    use viewshed::wire::secoc::{Opener, Sealer};
+    const KEY: [u8; 16] = [7; 16];
+    for medium in [MEDIA[1], MEDIA[2]] {
+        let config = BroadcastConfig { secured: true, ..BroadcastConfig::new(SENSOR, medium) };
+        let mut sender = Broadcaster::<A, W>::new(config, header(7), Epoch::new(3), ms(0)).unwrap();
+        let (mut sealer, mut opener) = (Sealer::new(KEY, 1000), Opener::new(KEY));
+        let mut receiver = Receiver::<1, A, W>::new([SENSOR], addresses(medium), Limits::DEFAULT);
+        let mut keyless = receiver.clone();
+        let mut shadows = Shadows::new(4);
+        for scan in 0..100 {
+            let map = shadows.next();
+            let _ = sender.scan(ms(67 * scan), &map);
+            for now in 67 * scan..67 * scan + 66 {
+                assert!(sender.next_packet(ms(now)).is_none(), "never without its seal");
+                let Some(packet) = sender.next_sealed(ms(now), &mut sealer) else { continue };
+                assert_eq!(keyless.message(ms(now), packet.bytes()), Err(Refused::Sealed));
+                // before the first freshness message nothing can be opened
+                if let Ok(opened) = opener.open(&Received::from_bytes(packet.bytes()).unwrap()) {
+                    let _ = receiver.checked(ms(now), &opened);
+                }
+            }
+            if scan > 20 {
+                let received = receiver.map(SENSOR, ms(67 * scan + 66));
+                (0..A).for_each(|a| assert_eq!(received.ray(Plane::Visibility, a), map.0[a], "{medium:?} {scan}"));
+            }
+        }
+    }
+}

@@ -32,6 +32,8 @@ use super::layers::Layers;
 use super::map_message::{self, LIMITS, SEGMENTS};
 use super::message::{Addresses, CLASSIC_BYTES, Epoch, LONG_BYTES, Message, Packet, Packing, Part, Plane, Word};
 use super::scan_number::ScanNumber;
+#[cfg(feature = "secoc")]
+use super::secoc::{Key, Sealer};
 use super::serial;
 use super::status::{PAGES, Status};
 use super::visible_range;
@@ -52,9 +54,10 @@ pub enum Medium {
 
 impl Medium {
     /// How messages are packed for it.
-    pub const fn packing(&self) -> Packing {
+    pub const fn packing(&self, secured: bool) -> Packing {
         match self {
             Self::Can(_) => Packing::Classic,
+            Self::CanFd(_) | Self::Serial if secured => Packing::Secured,
             Self::CanFd(_) | Self::Serial => Packing::Long,
         }
     }
@@ -80,6 +83,9 @@ pub struct BroadcastConfig {
     pub status_ms: u16,
     /// Time in which the whole header is sent once, milliseconds.
     pub header_ms: u16,
+    /// Whether messages carry an authenticator; they are then taken by [`Broadcaster::next_sealed`]. Not on
+    /// classic CAN, whose frames have no room for it.
+    pub secured: bool,
     /// Time in which the visible range of all azimuths is sent once, milliseconds; `None` for never.
     pub visible_range_ms: Option<u16>,
 }
@@ -96,6 +102,7 @@ impl BroadcastConfig {
             max_delay_ms: 100,
             status_ms: 250,
             header_ms: 490,
+            secured: false,
             visible_range_ms: None,
         }
     }
@@ -106,6 +113,8 @@ impl BroadcastConfig {
             Medium::Serial => u8::MAX,
         };
         within("broadcast.sensor", u32::from(self.sensor), 0, u32::from(most_sensor))?;
+        let most_secured = u32::from(!matches!(self.medium, Medium::Can(_)));
+        within("broadcast.secured", u32::from(self.secured), 0, most_secured)?;
         within("broadcast.gap_us", self.gap_us, 0, 20_000)?;
         within("broadcast.stale_ms", u32::from(self.stale_ms), 10, u32::from(self.max_delay_ms))?;
         // half a period of the scan numbers is more than both together
@@ -204,6 +213,7 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     status_due: Every,
     header_due: Every,
     range_due: Option<Every>,
+    freshness_due: Every,
     page: u8,
     group: u8,
     range_from: usize,
@@ -235,6 +245,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             status_due: Every::new(now, u64::from(config.status_ms) * 1000),
             header_due: Every::new(now, 1),
             range_due: None,
+            freshness_due: Every::new(now, 1_000_000),
             page: 0,
             group: 0,
             range_from: 0,
@@ -260,11 +271,10 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.header = Header { planes: planes(P), ..header };
         self.status.fingerprint = header.fingerprint;
         self.quiet(now);
-        let long = self.config.medium.packing() == Packing::Long;
+        let long = !self.packing().is_classic();
         let groups = if long { 1 } else { u64::from(GROUPS) };
         self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / groups);
-        let azimuths = if long { visible_range::LONG_AZIMUTHS } else { visible_range::CLASSIC_AZIMUTHS };
-        let messages = usize::from(header.azimuths).div_ceil(azimuths) as u64;
+        let messages = usize::from(header.azimuths).div_ceil(self.packing().most_own() - 2) as u64;
         let period = |ms: u16| Every::new(now, u64::from(ms) * 1000 / messages.max(1));
         self.range_due = self.config.visible_range_ms.map(period);
         Ok(())
@@ -276,6 +286,10 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         (self.last, self.refreshed, self.from) = (None, None, 0);
         let quiet_us = (u64::from(self.config.max_age_ms) + u64::from(self.config.max_delay_ms)) * 1000;
         self.quiet_until = Time::from_micros(now.micros() + quiet_us);
+    }
+
+    fn packing(&self) -> Packing {
+        self.config.medium.packing(self.config.secured)
     }
 
     /// What is told of the sender. Uptime, versions, fingerprint and dropped azimuths are filled in.
@@ -374,15 +388,36 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         serial::stuff(packet.bytes(), line)
     }
 
-    /// The next message, if one is due.
+    /// The next message, if one is due; never a secured one.
     pub fn next_packet(&mut self, now: Time) -> Option<Packet> {
+        if self.config.secured {
+            return None;
+        }
+        let packet = self.next_bare(now)?;
+        Some(self.protect(packet))
+    }
+
+    /// The next message with its authenticator, if one is due.
+    #[cfg(feature = "secoc")]
+    pub fn next_sealed<K: Key>(&mut self, now: Time, sealer: &mut Sealer<K>) -> Option<Packet> {
+        if !self.config.secured {
+            return None;
+        }
+        let bare = self.next_bare(now)?;
+        let sealed = sealer.seal(bare, matches!(self.config.medium, Medium::CanFd(_)));
+        Some(self.protect(sealed))
+    }
+
+    /// The next message without its protection.
+    fn next_bare(&mut self, now: Time) -> Option<Packet> {
         if !self.gap.due(now) {
             return None;
         }
         let packet = self.status_packet(now).or_else(|| self.header_packet(now));
-        let packet = packet.or_else(|| self.map_packet(now)).or_else(|| self.range_packet(now))?;
+        let packet = packet.or_else(|| self.freshness_packet(now)).or_else(|| self.map_packet(now));
+        let packet = packet.or_else(|| self.range_packet(now))?;
         self.gap.next = Time::from_micros(now.micros() + self.gap.period_us);
-        Some(self.protect(packet))
+        Some(packet)
     }
 
     fn protect(&mut self, packet: Packet) -> Packet {
@@ -397,7 +432,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     fn packet(&self, message: Message, own: &[u8]) -> Packet {
-        Packet::new(self.config.medium.packing(), self.config.sensor, message, self.epoch, own)
+        Packet::new(self.packing(), self.config.sensor, message, self.epoch, own)
     }
 
     fn status_packet(&mut self, now: Time) -> Option<Packet> {
@@ -408,7 +443,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         let uptime_s = now.since(self.started).unwrap_or(0) / 1_000_000;
         self.status.uptime_s = u32::try_from(uptime_s).unwrap_or(u32::MAX);
         self.status.wire_version = super::message::WIRE_VERSION;
-        if self.config.medium.packing() == Packing::Long {
+        if !self.packing().is_classic() {
             return Some(self.packet(Message::Status, &self.status.emit()));
         }
         let own = self.status.emit_page(self.page);
@@ -422,12 +457,21 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         }
         self.header_due.done(now);
         let clock = Clock { time_ms: now.micros() / 1000, synchronised: self.synchronised };
-        if self.config.medium.packing() == Packing::Long {
+        if !self.packing().is_classic() {
             return Some(self.packet(Message::Header, &self.header.emit(&clock)));
         }
         let own = self.header.emit_group(&clock, self.group);
         self.group = (self.group + 1) % GROUPS;
         Some(self.packet(Message::Header, &own))
+    }
+
+    /// Room for the freshness value, once a second.
+    fn freshness_packet(&mut self, now: Time) -> Option<Packet> {
+        if !self.config.secured || !self.freshness_due.due(now) {
+            return None;
+        }
+        self.freshness_due.done(now);
+        Some(self.packet(Message::Freshness, &[0; 8]))
     }
 
     fn map_packet(&mut self, now: Time) -> Option<Packet> {
@@ -468,7 +512,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     fn next_running(&mut self, scan: &Scan) -> Option<Running> {
-        let context = self.header.context(self.config.medium.packing().form());
+        let context = self.header.context(self.packing().form());
         let telling = Telling { context, scan: scan.number, all: scan.all };
         let from = self.from;
         let mut layers = self.layers.iter_mut().enumerate();
@@ -478,7 +522,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     /// The message that is next of a block or a ray, and whether it is the last.
     fn message(&self, scan: &Scan, running: &Running) -> Option<(Part, Own, bool)> {
         let sent = usize::from(running.sent);
-        let long = self.config.medium.packing() == Packing::Long;
+        let long = !self.packing().is_classic();
         match running.next {
             Next::Block { kind, start, ref block } => {
                 let first = if kind == Kind::Refresh { Part::Refresh } else { Part::Delta };
@@ -512,9 +556,8 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             .filter(|last| now.since(*last).is_some_and(|age| age <= u64::from(self.config.stale_ms) * 1000))?;
         due.done(now);
         self.range_due = Some(due);
-        let packing = self.config.medium.packing();
-        let (azimuths, all) = (usize::from(self.header.azimuths), packing == Packing::Long);
-        let most = if all { visible_range::LONG_AZIMUTHS } else { visible_range::CLASSIC_AZIMUTHS };
+        let azimuths = usize::from(self.header.azimuths);
+        let most = self.packing().most_own() - 2;
         let first = self.range_from;
         self.range_from = if first + most < azimuths { first + most } else { 0 };
         let layer = self.layers.first()?;

@@ -7,6 +7,7 @@
 //! |---|---|---|
 //! | protection | profile 11: byte 0, low nibble of byte 1 | profile 05: bytes 0 to 2 |
 //! | message number, sensor | by identifier | bytes 3, 4 |
+//! | secured | never | highest bit of byte 5 |
 //! | epoch | high nibble of byte 1 | low nibble of byte 5 |
 //! | own bytes | from byte 2 on | from byte 6 on |
 //!
@@ -21,6 +22,12 @@ pub const WIRE_VERSION: u8 = 1;
 
 /// Message numbers of a sensor.
 pub const MESSAGES: usize = 32;
+
+/// Bytes of an authenticator, behind the own bytes of a secured message.
+pub const SEAL_BYTES: usize = 8;
+
+/// In a long message's byte 5: it is secured.
+const SECURED: u8 = 0x80;
 
 /// Own bytes of a classic message.
 pub const CLASSIC_BYTES: usize = 6;
@@ -286,14 +293,31 @@ pub enum Packing {
     Classic,
     /// Up to 64 bytes.
     Long,
+    /// Up to 64 bytes, the last 8 of them an authenticator.
+    Secured,
 }
 
 impl Packing {
+    /// Whether messages have 8 bytes.
+    pub const fn is_classic(self) -> bool {
+        matches!(self, Self::Classic)
+    }
+
+    /// Most own bytes.
+    pub const fn most_own(self) -> usize {
+        match self {
+            Self::Classic => CLASSIC_BYTES,
+            Self::Long => LONG_BYTES,
+            Self::Secured => LONG_BYTES - SEAL_BYTES,
+        }
+    }
+
     /// The form of a map's code.
     pub const fn form(self) -> Form {
         match self {
             Self::Classic => Form::CLASSIC,
             Self::Long => Form::LONG,
+            Self::Secured => Form::LONG_SECURED,
         }
     }
 
@@ -301,7 +325,7 @@ impl Packing {
     pub const fn profile(self) -> Profile {
         match self {
             Self::Classic => Profile::P11,
-            Self::Long => Profile::P05,
+            Self::Long | Self::Secured => Profile::P05,
         }
     }
 }
@@ -331,23 +355,18 @@ impl Packet {
     #[allow(clippy::cast_possible_truncation)] // at most 64
     pub fn new(packing: Packing, sensor: u8, message: Message, epoch: Epoch, own: &[u8]) -> Self {
         let mut bytes = [0; MOST_BYTES];
-        let (start, most) = match packing {
-            Packing::Classic => (CLASSIC_START, CLASSIC_BYTES),
-            Packing::Long => (LONG_START, LONG_BYTES),
-        };
-        match packing {
-            Packing::Classic => bytes[1] = epoch.0 << 4,
-            Packing::Long => {
-                bytes[3] = message.number();
-                bytes[4] = sensor;
-                bytes[5] = epoch.0;
-            }
+        let (start, most) = (if packing.is_classic() { CLASSIC_START } else { LONG_START }, packing.most_own());
+        if packing.is_classic() {
+            bytes[1] = epoch.0 << 4;
+        } else {
+            let secured = if packing == Packing::Secured { SECURED } else { 0 };
+            (bytes[3], bytes[4], bytes[5]) = (message.number(), sensor, epoch.0 | secured);
         }
         let own = own.get(..most).unwrap_or(own);
         for (to, from) in bytes.iter_mut().skip(start).zip(own) {
             *to = *from;
         }
-        let length = if packing == Packing::Classic { 8 } else { start + own.len() };
+        let length = if packing.is_classic() { 8 } else { start + own.len() };
         Self { sensor, message, packing, length: length as u8, bytes }
     }
 
@@ -365,6 +384,14 @@ impl Packet {
         self
     }
 
+    /// Room for another so many bytes at the end, filled up with zeros so that all have this length.
+    #[cfg_attr(not(feature = "secoc"), allow(dead_code))]
+    #[allow(clippy::cast_possible_truncation)] // at most 64
+    pub(super) fn lengthen(&mut self, length: usize) -> &mut [u8] {
+        self.length = length.clamp(usize::from(self.length), MOST_BYTES) as u8;
+        self.bytes.get_mut(..usize::from(self.length)).unwrap_or_default()
+    }
+
     /// All bytes.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.length)).unwrap_or(&[])
@@ -375,7 +402,7 @@ impl Packet {
         let id = addresses.id(self.sensor, self.message)?;
         match self.packing {
             Packing::Classic => CanFrame::classic(id, self.bytes()),
-            Packing::Long => CanFrame::fd(id, self.bytes()),
+            Packing::Long | Packing::Secured => CanFrame::fd(id, self.bytes()),
         }
     }
 }
@@ -410,8 +437,10 @@ pub struct Received<'a> {
     pub epoch: Epoch,
     /// The protection's counter.
     pub counter: u8,
-    /// The message's own bytes.
+    /// The message's own bytes; in a sealed message with the authenticator behind them.
     pub own: &'a [u8],
+    /// Whether it is secured and nobody has looked at the authenticator yet.
+    pub sealed: bool,
 }
 
 impl<'a> Received<'a> {
@@ -438,7 +467,7 @@ impl<'a> Received<'a> {
         }
         let counter = Profile::P11.check(bytes, data_id(sensor, message)).map_err(NotAMessage::Protection)?;
         let epoch = Epoch::new(second >> 4);
-        Ok(Self { sensor, message, packing: Packing::Classic, epoch, counter, own })
+        Ok(Self { sensor, message, packing: Packing::Classic, epoch, counter, own, sealed: false })
     }
 
     /// Checks a long message, as a serial line or a CAN FD frame carries it.
@@ -453,8 +482,9 @@ impl<'a> Received<'a> {
             return Err(NotAMessage::Mislabelled { number: *number, sensor: *sensor });
         };
         let counter = Profile::P05.check(bytes, data_id(*sensor, message)).map_err(NotAMessage::Protection)?;
-        let epoch = Epoch::new(*epoch);
-        Ok(Self { sensor: *sensor, message, packing: Packing::Long, epoch, counter, own })
+        let sealed = epoch & SECURED != 0;
+        let packing = if sealed { Packing::Secured } else { Packing::Long };
+        Ok(Self { sensor: *sensor, message, packing, epoch: Epoch::new(*epoch), counter, own, sealed })
     }
 }
 

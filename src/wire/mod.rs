@@ -13,6 +13,8 @@ pub mod map_message;
 pub mod message;
 pub mod receive;
 pub mod scan_number;
+#[cfg(feature = "secoc")]
+pub mod secoc;
 pub mod serial;
 pub mod status;
 pub mod visible_range;

@@ -558,7 +558,8 @@ static void frame(uint64_t now, unsigned id, const uint8_t *data, int n, bool fd
         if (crc8(crc8(0, data_id_bytes, 2), data + 1, n - 1) != data[0]) return;
         message(&sensors[sensor], now, number, data[1] >> 4, data + 2, n - 2, false);
     } else {
-        if (n < 6 || data[3] != number || data[4] != sensor) return;
+        /* without a key, authenticated messages are left alone */
+        if (n < 6 || data[3] != number || data[4] != sensor || data[5] & 0x80) return;
         if (crc16(crc16(0xFFFF, data + 2, n - 2), data_id_bytes, 2) != (data[0] | data[1] << 8)) return;
         message(&sensors[sensor], now, number, data[5] & 15, data + 6, n - 6, true);
     }

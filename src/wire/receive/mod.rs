@@ -84,6 +84,14 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         self.received(now, Received::from_bytes(bytes), sensor)
     }
 
+    /// Takes a message that is checked already, and opened if it was secured.
+    ///
+    /// # Errors
+    /// Why it is not used.
+    pub fn checked(&mut self, now: Time, message: &Received<'_>) -> Result<Accepted, Refused> {
+        self.received(now, Ok(*message), Some(message.sensor))
+    }
+
     fn received(
         &mut self,
         now: Time,

@@ -10,7 +10,7 @@ use crate::wire::code::reading::{self, Ending, Reader};
 use crate::wire::e2e::{Counter, Sequence};
 use crate::wire::header::{Brought, Clock, Collector, Header, NotAHeader};
 use crate::wire::map_message;
-use crate::wire::message::{Epoch, Message, NotAMessage, Packing, Part, Plane, Received};
+use crate::wire::message::{Epoch, Message, NotAMessage, Part, Plane, Received};
 use crate::wire::scan_number::ScanNumber;
 use crate::wire::status::Status;
 use crate::wire::visible_range::Ranges;
@@ -38,6 +38,8 @@ pub enum Accepted {
 pub enum Refused {
     /// No intact message of ours.
     NotAMessage(NotAMessage),
+    /// Secured, and its authenticator was not looked at.
+    Sealed,
     /// Of an epoch that is over.
     OldEpoch,
     /// Two senders use this sensor's number.
@@ -198,7 +200,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     pub(super) fn refuse(&mut self, why: Refused) -> Refused {
         let c = &mut self.counters;
         let count = match why {
-            Refused::NotAMessage(_) => &mut c.protection,
+            Refused::NotAMessage(_) | Refused::Sealed => &mut c.protection,
             Refused::OldEpoch | Refused::Conflict => &mut c.epoch,
             Refused::Late => &mut c.late,
             Refused::NoHeader | Refused::NoRefresh => &mut c.early,
@@ -220,6 +222,9 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     }
 
     fn take_checked(&mut self, now: Time, message: &Received<'_>, limits: &Limits) -> Result<Accepted, Refused> {
+        if message.sealed {
+            return Err(Refused::Sealed);
+        }
         let dated = matches!(message.message, Message::Map(..) | Message::VisibleRange);
         let scan = message.own.first().filter(|_| dated).map(|byte| ScanNumber::from_byte(*byte));
         match self.session.enter(now, message.epoch, scan, limits) {
@@ -300,7 +305,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         part: Part,
         limits: &Limits,
     ) -> Result<Accepted, Refused> {
-        let long = message.packing == Packing::Long;
+        let long = !message.packing.is_classic();
         let map = map_message::parse(message.own, long).ok_or(Refused::Malformed)?;
         // the lag is looked at before there is a header, so that a session settles meanwhile
         self.hear(now, map.scan, limits)?;
