@@ -119,10 +119,6 @@ pub enum Message {
     VisibleRange,
     /// Full freshness value of the authentication.
     Freshness,
-    /// Detections of a scan, in the native format.
-    Detections,
-    /// A moment on the sender's clock.
-    Time,
     /// A part of a map.
     Map(Plane, Part),
     /// A number this version gives no meaning; 24 to 31 are the configuration's.
@@ -143,8 +139,6 @@ impl Message {
             Self::Header => 1,
             Self::VisibleRange => 2,
             Self::Freshness => 3,
-            Self::Detections => 4,
-            Self::Time => 5,
             Self::Map(plane, part) => {
                 let part = match part {
                     Part::Refresh => 0,
@@ -165,8 +159,6 @@ impl Message {
             1 => Self::Header,
             2 => Self::VisibleRange,
             3 => Self::Freshness,
-            4 => Self::Detections,
-            5 => Self::Time,
             FIRST_MAP..24 => {
                 let plane = match (number - FIRST_MAP) / PER_PLANE {
                     0 => Plane::Visibility,
@@ -183,7 +175,7 @@ impl Message {
                 };
                 Self::Map(plane, part)
             }
-            24..32 => Self::Other(number),
+            4 | 5 | 24..32 => Self::Other(number),
             _ => return None,
         })
     }
