@@ -8,6 +8,8 @@
 //! A hundredth of a million scans by default, all of them with
 //! `cargo test --release --test wire_fail_safe -- --include-ignored`.
 
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
+
 mod shadows;
 
 use std::cmp::Reverse;

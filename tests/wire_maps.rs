@@ -1,5 +1,7 @@
 //! From a sender to a receiver over every medium: without loss nothing is lost.
 
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
+
 mod shadows;
 
 use shadows::{A, Map, Shadows, W, header};

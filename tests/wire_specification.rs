@@ -1,5 +1,7 @@
 //! The specification's tables are the code's, and its example is what the code sends and reads.
 
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
+
 use viewshed::angle::Angle;
 use viewshed::bits::Bits;
 use viewshed::map::RoadPoint;

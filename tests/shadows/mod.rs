@@ -1,6 +1,7 @@
 //! Maps of moving shadows, and a bus that loses, delays, repeats and reorders.
 
 #![allow(dead_code)] // each test file uses a part
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used)]
 
 use viewshed::angle::Angle;
 use viewshed::bits::Bits;

@@ -223,7 +223,7 @@ fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Pa
     for packet in packets {
         let _ = black_box(match packet.packing {
             Packing::Classic => receiver.frame(now, &packet.frame(&Addresses::STANDARD).expect("an identifier")),
-            Packing::Long => receiver.message(now, packet.bytes()),
+            Packing::Long | Packing::Secured => receiver.message(now, packet.bytes()),
         });
     }
 }

@@ -39,7 +39,7 @@ pub struct Args {
 /// # Errors
 /// A log that cannot be read, or holds no broadcast.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    if !(args.every > 0.0) {
+    if args.every.is_nan() || args.every <= 0.0 {
         bail!("--every {} is not above 0", args.every);
     }
     let text = std::fs::read_to_string(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
