@@ -21,6 +21,39 @@ impl<const W: usize> Bits<W> {
     /// No bit set.
     pub const NONE: Self = Self([0; W]);
 
+    /// From words of 32 bits, the first bit the lowest of the first word.
+    pub const fn from_words(words: [u32; W]) -> Self {
+        Self(words)
+    }
+
+    /// As words of 32 bits.
+    pub const fn words(&self) -> &[u32; W] {
+        &self.0
+    }
+
+    /// The bits `from..to`.
+    pub fn span(from: usize, to: usize) -> Self {
+        let mut out = Self::NONE;
+        for (i, word) in out.0.iter_mut().enumerate() {
+            let below = |end: usize| match end.saturating_sub(i * 32) {
+                n @ 0..32 => (1_u32 << n) - 1,
+                _ => u32::MAX,
+            };
+            *word = below(to) & !below(from);
+        }
+        out
+    }
+
+    /// The same bits in a row of another length; those beyond its end are lost.
+    #[must_use]
+    pub fn resized<const V: usize>(&self) -> Bits<V> {
+        let mut out = Bits::NONE;
+        for (to, from) in out.0.iter_mut().zip(self.0) {
+            *to = from;
+        }
+        out
+    }
+
     /// Whether bit `i` is set; beyond the end none is.
     pub fn get(&self, i: usize) -> bool {
         self.0.get(i / 32).is_some_and(|word| word >> (i % 32) & 1 == 1)
@@ -111,6 +144,14 @@ mod tests {
         assert_eq!(b.iter().collect::<Vec<_>>(), set);
         assert_eq!((b.count(), b.last(), b.next(33), b.next(256)), (5, Some(255), Some(100), None));
         assert!(b.get(31) && !b.get(30) && !b.get(300));
+    }
+
+    #[test]
+    fn spans_cross_words_and_rows_change_length() {
+        assert_eq!(RangeBits::span(30, 66).iter().collect::<Vec<_>>(), (30..66).collect::<Vec<_>>());
+        assert_eq!((RangeBits::span(0, 256).count(), RangeBits::span(9, 9).count()), (256, 0));
+        assert_eq!(bits(&[3, 40, 100]).resized::<2>().iter().collect::<Vec<_>>(), [3, 40]);
+        assert_eq!(bits(&[3, 40]).resized::<2>().words(), &[8, 256]);
     }
 
     #[test]

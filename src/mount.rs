@@ -73,6 +73,12 @@ impl Mount {
 }
 
 impl Levelling {
+    /// Of a sensor whose maps are level already, as received ones are: only its place and heading matter.
+    pub fn on_road(origin: RoadPoint, height_cm: i32, heading: Angle) -> Self {
+        let level = [[trig::ONE, 0, 0], [0, trig::ONE, 0], [0, 0, trig::ONE]];
+        Self { height_cm, origin, heading: trig::direction(heading), rotation: level }
+    }
+
     /// Levelled components of a sensor-frame vector; 2^-14 in, 2^-14 out.
     pub fn level(&self, v: [i32; 3]) -> [i32; 3] {
         self.rotation.map(|[a, b, c]| (a * v[0] + b * v[1] + c * v[2]) >> 14)

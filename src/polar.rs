@@ -23,6 +23,19 @@ pub struct PolarGeometry {
     pub azimuth_span: u16,
 }
 
+impl PolarGeometry {
+    /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size.
+    pub fn locate(&self, x_cm: i32, y_cm: i32, ranges: usize, azimuths: usize) -> Option<(usize, usize)> {
+        let bearing = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
+        let span = i32::from(self.azimuth_span).max(1);
+        // the same rounding as the grid's columns
+        let place = i32::from(bearing.raw()) * i32::try_from(azimuths * 64).ok()? / (span / 4).max(1);
+        let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < azimuths)?;
+        let range = usize::try_from(math::length(x_cm, y_cm) / self.cell_cm.max(1)).ok()?;
+        (range < ranges).then_some((azimuth, range))
+    }
+}
+
 /// A polar visibility map of `A` azimuths (from right to left) by `R` ranges (from near to far).
 ///
 /// # Limits
@@ -88,18 +101,17 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
 
     /// The cell a place of the levelled frame lies in.
     pub fn locate(&self, x_cm: i32, y_cm: i32) -> Option<(usize, usize)> {
-        let bearing = trig::bearing(x_cm, y_cm) - self.geometry.azimuth_origin;
-        let span = i32::from(self.geometry.azimuth_span).max(1);
-        // the same rounding as the grid's columns
-        let place = i32::from(bearing.raw()) * i32::try_from(A * 64).ok()? / (span / 4).max(1);
-        let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < A)?;
-        let range = usize::try_from(math::length(x_cm, y_cm) / self.geometry.cell_cm.max(1)).ok()?;
-        (range < R).then_some((azimuth, range))
+        self.geometry.locate(x_cm, y_cm, R, A)
     }
 
     /// Least grade that counts as visible.
     pub fn visible_from(&self) -> u8 {
         self.visible_from
+    }
+
+    /// Least occupancy that counts as occupied.
+    pub fn occupied_from(&self) -> u8 {
+        self.occupied_from
     }
 }
 

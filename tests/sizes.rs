@@ -8,6 +8,8 @@ use viewshed::inputs::ti::Ti;
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
 use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
+use viewshed::wire::broadcast::Broadcaster;
+use viewshed::wire::receive::SensorReceiver;
 
 #[test]
 fn the_reference_grid_fits_450_kb() {
@@ -52,4 +54,12 @@ fn a_radar_input_for_256_detections_fits_6500_bytes() {
         println!("{input}: {bytes} B");
         assert!(bytes <= 6_500, "{input}: {bytes}");
     }
+}
+
+#[test]
+fn a_sensor_at_its_receiver_fits_8_kb_and_its_sender_9_kb() {
+    let receiver = size_of::<SensorReceiver<120, 7, 1>>();
+    let sender = size_of::<Broadcaster<120, 7>>();
+    println!("receiver of 120 x 200: {receiver} B a sensor, sender: {sender} B");
+    assert!(receiver <= 8000 && sender <= 9000, "{receiver}, {sender}");
 }

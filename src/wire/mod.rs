@@ -1,5 +1,20 @@
-//! Radar frames in, visibility out.
+//! Radar frames in and visibility out, over CAN, CAN FD and serial lines.
+//!
+#![doc = include_str!("SPECIFICATION.md")]
 
+pub mod broadcast;
+pub mod code;
 pub mod e2e;
 pub mod frame;
+pub mod header;
+mod layer;
+pub mod layers;
+pub mod map_message;
+pub mod message;
+pub mod receive;
+pub mod scan_number;
+#[cfg(feature = "secoc")]
+pub mod secoc;
 pub mod serial;
+pub mod status;
+pub mod visible_range;

@@ -1,7 +1,8 @@
 //! Instructions a frame, counted by callgrind: `cargo bench -p viewshed-harness`.
 //!
 //! Counts everything from the gate to the map, for the shipped recording and for three adversarial
-//! scans of 256 detections. Counts repeat exactly and do not depend on the machine's speed.
+//! scans of 256 detections; and sending and receiving the maps, from map to packets and back. Names
+//! behind `--` measure only those. Counts repeat exactly and do not depend on the machine's speed.
 
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -14,6 +15,11 @@ use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
+use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::wire::code::ray::Known;
+use viewshed::wire::header::Header;
+use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
+use viewshed::wire::receive::{Limits, Receiver};
 use viewshed_harness::estimators;
 use viewshed_harness::recording::mcap::read;
 
@@ -23,9 +29,17 @@ const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
 const FRAMES: u64 = 45;
 const FRAME_US: u64 = 66_667;
 
+/// What is measured on the recording's maps only.
+const WIRE: [&str; 4] = ["send-can", "receive-can", "send-long", "receive-long"];
+
 /// The function whose instructions are counted, as callgrind names it.
 fn measured(estimator: &str) -> &'static str {
-    if estimator == "radar-2d" { "instructions::measured_frame_2d" } else { "instructions::measured_frame_3d" }
+    match estimator {
+        "radar-2d" => "instructions::measured_frame_2d",
+        "send-can" | "send-long" => "instructions::measured_send",
+        "receive-can" | "receive-long" => "instructions::measured_receive",
+        _ => "instructions::measured_frame_3d",
+    }
 }
 
 fn main() -> ExitCode {
@@ -39,17 +53,20 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     println!("{:<16} {:<12} {:>9} {:>12} {:>12} {:>12}", "estimator", "scene", "frames", "mean", "median", "worst");
-    for estimator in ESTIMATORS {
-        for scene in SCENES {
-            let counts = measure(estimator, scene);
-            let Some(worst) = counts.last() else {
-                eprintln!("callgrind counted nothing for {estimator} on {scene}");
-                return ExitCode::FAILURE;
-            };
-            let mean = counts.iter().sum::<u64>() / counts.len() as u64;
-            let median = counts[counts.len() / 2];
-            println!("{estimator:<16} {scene:<12} {:>9} {mean:>12} {median:>12} {worst:>12}", counts.len());
+    let estimators = ESTIMATORS.iter().flat_map(|e| SCENES.map(|scene| (*e, scene)));
+    let asked: Vec<&String> = args.iter().skip(1).filter(|a| !a.starts_with("--")).collect();
+    for (estimator, scene) in estimators.chain(WIRE.map(|w| (w, SCENES[0]))) {
+        if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
+            continue;
         }
+        let counts = measure(estimator, scene);
+        let Some(worst) = counts.last() else {
+            eprintln!("callgrind counted nothing for {estimator} on {scene}");
+            return ExitCode::FAILURE;
+        };
+        let mean = counts.iter().sum::<u64>() / counts.len() as u64;
+        let median = counts[counts.len() / 2];
+        println!("{estimator:<16} {scene:<12} {:>9} {mean:>12} {median:>12} {worst:>12}", counts.len());
     }
     ExitCode::SUCCESS
 }
@@ -102,6 +119,8 @@ fn work(estimator: &str, scene: &str) {
     };
     match estimator {
         "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
+        "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
+        "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
         "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &frames),
         _ => run_2d(&sensor, &frames),
     }
@@ -168,6 +187,45 @@ fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: us
     map: &mut PolarMap<R, A>,
 ) {
     black_box(state.process(parameters, now, detections, false, map));
+}
+
+/// Radar-3d's maps from a sender to a receiver, a scan at a time.
+fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) {
+    let parameters =
+        Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 64, 256>::new());
+    let mut map = Box::new(parameters.map());
+    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
+    let header = Header::new::<200, 120>(&sensor.mount, map.geometry(), Known::new(15, 200), 1, 0).expect("sendable");
+    let begin = frames.first().map_or(Time::from_micros(0), |f| f.0);
+    let mut sender =
+        Box::new(Broadcaster::<120, 7>::new(config, header, Epoch::new(1), begin).expect("defaults are valid"));
+    let mut receiver = Box::new(Receiver::<1, 120, 7>::new([0], Addresses::STANDARD, Limits::DEFAULT));
+    for (now, detections) in frames {
+        state.process(&parameters, *now, detections, false, &mut map);
+        let mut packets = Vec::with_capacity(1000);
+        measured_send(&mut sender, *now, &map, &mut packets);
+        measured_receive(&mut receiver, *now, &packets);
+    }
+    black_box(&receiver);
+}
+
+#[inline(never)]
+fn measured_send(sender: &mut Broadcaster<120, 7>, now: Time, map: &PolarMap<200, 120>, packets: &mut Vec<Packet>) {
+    let _ = black_box(sender.scan(now, map));
+    while let Some(packet) = sender.next_packet(now) {
+        packets.push(packet);
+    }
+}
+
+#[inline(never)]
+fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Packet]) {
+    for packet in packets {
+        let _ = black_box(match packet.packing {
+            Packing::Classic => receiver.frame(now, &packet.frame(&Addresses::STANDARD).expect("an identifier")),
+            Packing::Long | Packing::Secured => receiver.message(now, packet.bytes()),
+        });
+    }
 }
 
 fn run_2d(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {

@@ -1,6 +1,8 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
+pub mod bus;
 pub mod doctor;
+pub mod listen;
 pub mod progress;
 pub mod replay;
 
@@ -26,6 +28,8 @@ pub struct Cli {
 enum Command {
     Replay(Box<replay::Args>),
     Doctor(doctor::Args),
+    Bus(Box<bus::Args>),
+    Listen(listen::Args),
 }
 
 impl Cli {
@@ -34,6 +38,8 @@ impl Cli {
         let outcome = match &self.command {
             Command::Replay(args) => replay::run(args),
             Command::Doctor(args) => doctor::run(args),
+            Command::Bus(args) => bus::run(args),
+            Command::Listen(args) => listen::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

@@ -1,7 +1,7 @@
 //! The library's estimators, driven by recordings.
 
 mod radar_2d;
-mod radar_3d;
+pub mod radar_3d;
 mod reference;
 
 use anyhow::{Result, bail};

@@ -5,6 +5,7 @@ use viewshed::map::VisibilityMap;
 use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
+use viewshed::time::Time;
 
 use super::{Intake, MOST_DETECTIONS, polar_cells};
 use crate::evaluation::score::{Estimator, PolarCells};
@@ -29,6 +30,24 @@ pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>
     } else {
         Ok(Box::new(Driver::<MOST_DETECTIONS>::new(sensor, config)?))
     }
+}
+
+/// Runs the estimator over frames and shows its map after each, with the frame's time.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn maps(
+    frames: &[Frame],
+    sensor: &Sensor,
+    config: &Radar3dConfig,
+    mut visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>),
+) -> Result<()> {
+    let mut driver = Driver::<256>::new(sensor, config)?;
+    for frame in frames {
+        driver.step(frame);
+        visit(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &driver.map);
+    }
+    Ok(())
 }
 
 impl<const D: usize> Driver<D> {

@@ -1,0 +1,596 @@
+//! Maps in, messages out, one at a time and never too late: the sender.
+//!
+//! # Model
+//! [`Broadcaster::scan`] takes a map, [`Broadcaster::status_mut`] what is to be told of the sender;
+//! [`Broadcaster::next_frame`] (CAN, CAN FD) or [`Broadcaster::next_line`] (serial) gives the next frame
+//! that is due, or none yet. It never waits. A caller asks after every frame and once a millisecond.
+//!
+//! What goes first: status, header, map, visible range. Between two frames lies the minimum gap.
+//!
+//! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are told
+//! against it. The header's groups and the pages of the status go round all the time, so who joins late
+//! has everything within a second.
+//!
+//! *What is dropped.* A new map ends the one before: what of that was not handed out is dropped, and
+//! the new one begins at the azimuth where the old one broke off, so that on a bus too narrow every
+//! azimuth has its turn. What of a map is not handed out within [`BroadcastConfig::stale_ms`] of its
+//! measurement is dropped too. Azimuths dropped are counted in the status. Nothing is sent late: a
+//! caller aborts what its mailboxes still hold after [`Broadcaster::deadline`].
+//!
+//! *Quiet.* After the start, after [`Broadcaster::restart`] and after a clock that stepped back the epoch
+//! is a new one, and no map is sent for the greatest age and delay together: by then nothing of the old
+//! epoch is under way.
+//!
+//! # Limits
+//! 50 scans a second. Two maps of `A` rays for each of `P` planes.
+
+use super::code::block::Kind;
+use super::frame::{CanFrame, fd_length};
+use super::header::{Clock, GROUPS, Header};
+use super::layer::{Layer, Next, Telling};
+use super::layers::Layers;
+use super::map_message::{self, LIMITS, SEGMENTS};
+use super::message::{Addresses, CLASSIC_BYTES, Epoch, LONG_BYTES, Message, Packet, Packing, Part, Plane, Word};
+use super::scan_number::ScanNumber;
+#[cfg(feature = "secoc")]
+use super::secoc::{Key, Sealer};
+use super::serial;
+use super::status::{PAGES, Status};
+use super::visible_range;
+use crate::config::{ConfigError, Problem};
+use crate::time::Time;
+
+/// What messages travel on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Medium {
+    /// Classic CAN: frames of 8 bytes.
+    Can(Addresses),
+    /// CAN FD: frames of up to 64 bytes.
+    CanFd(Addresses),
+    /// A serial line.
+    Serial,
+}
+
+impl Medium {
+    /// How messages are packed for it.
+    pub const fn packing(&self, secured: bool) -> Packing {
+        match self {
+            Self::Can(_) => Packing::Classic,
+            Self::CanFd(_) | Self::Serial if secured => Packing::Secured,
+            Self::CanFd(_) | Self::Serial => Packing::Long,
+        }
+    }
+}
+
+/// How a sender behaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct BroadcastConfig {
+    /// The sensor's number, 0 to 7 with 11-bit identifiers.
+    pub sensor: u8,
+    /// What messages travel on.
+    pub medium: Medium,
+    /// Least time between two frames, microseconds.
+    pub gap_us: u32,
+    /// Age at which a map is not sent any more, milliseconds.
+    pub stale_ms: u16,
+    /// Greatest age of a map at its receivers, milliseconds.
+    pub max_age_ms: u16,
+    /// Greatest delay from measurement to reception, milliseconds.
+    pub max_delay_ms: u16,
+    /// Time between two status messages, milliseconds; at most 500.
+    pub status_ms: u16,
+    /// Time in which the whole header is sent once, milliseconds.
+    pub header_ms: u16,
+    /// Whether messages carry an authenticator; they are then taken by [`Broadcaster::next_sealed`]. Not on
+    /// classic CAN, whose frames have no room for it.
+    pub secured: bool,
+    /// Time in which the visible range of all azimuths is sent once, milliseconds; `None` for never.
+    pub visible_range_ms: Option<u16>,
+}
+
+impl BroadcastConfig {
+    /// The defaults for a sensor.
+    pub const fn new(sensor: u8, medium: Medium) -> Self {
+        Self {
+            sensor,
+            medium,
+            gap_us: 1000,
+            stale_ms: 100,
+            max_age_ms: 300,
+            max_delay_ms: 100,
+            status_ms: 250,
+            header_ms: 490,
+            secured: false,
+            visible_range_ms: None,
+        }
+    }
+
+    fn check(&self) -> Result<(), ConfigError> {
+        let most_sensor = match self.medium {
+            Medium::Can(addresses) | Medium::CanFd(addresses) => addresses.most_sensor(),
+            Medium::Serial => u8::MAX,
+        };
+        within("broadcast.sensor", u32::from(self.sensor), 0, u32::from(most_sensor))?;
+        let most_secured = u32::from(!matches!(self.medium, Medium::Can(_)));
+        within("broadcast.secured", u32::from(self.secured), 0, most_secured)?;
+        within("broadcast.gap_us", self.gap_us, 0, 20_000)?;
+        within("broadcast.stale_ms", u32::from(self.stale_ms), 10, u32::from(self.max_delay_ms))?;
+        // half a period of the scan numbers is more than both together
+        within("broadcast.max_age_ms", u32::from(self.max_age_ms), 50, 1000)?;
+        within("broadcast.max_delay_ms", u32::from(self.max_delay_ms), 10, 500)?;
+        within("broadcast.status_ms", u32::from(self.status_ms), 10, 500)?;
+        within("broadcast.header_ms", u32::from(self.header_ms), 10, 500)?;
+        within("broadcast.visible_range_ms", u32::from(self.visible_range_ms.unwrap_or(100)), 10, 60_000)
+    }
+}
+
+#[allow(clippy::cast_precision_loss)] // for the message only
+fn within(parameter: &'static str, value: u32, min: u32, max: u32) -> Result<(), ConfigError> {
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    let problem = Problem::OutOfLimits { min: min as f32, max: max as f32 };
+    Err(ConfigError { parameter, value: value as f32, problem })
+}
+
+/// Age of the last whole refresh at which the next is due, ticks of 20 ms.
+const REFRESH_TICKS: u8 = 9;
+
+/// Why a map is not sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum NotSent {
+    /// Within 20 ms of the one before.
+    TooSoon,
+    /// The epoch is new and nothing of the old one may be under way.
+    Quiet,
+}
+
+/// A moment that comes again and again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Every {
+    next: Time,
+    period_us: u64,
+}
+
+impl Every {
+    fn new(now: Time, period_us: u64) -> Self {
+        Self { next: now, period_us }
+    }
+
+    /// Whether it has come; a clock that stepped back does not put it off by more than a period.
+    fn due(&self, now: Time) -> bool {
+        self.next.since(now).is_none_or(|wait| wait == 0 || wait > self.period_us)
+    }
+
+    fn done(&mut self, now: Time) {
+        let late = now.since(self.next).unwrap_or(u64::MAX);
+        let from = if late < self.period_us { self.next } else { now };
+        self.next = Time::from_micros(from.micros() + self.period_us);
+    }
+}
+
+/// A block or a ray on its way, message by message.
+#[derive(Debug, Clone, Copy)]
+struct Running {
+    plane: usize,
+    next: Next,
+    /// Messages handed out of it.
+    sent: u8,
+}
+
+/// The scan being sent.
+#[derive(Debug, Clone, Copy)]
+struct Scan {
+    number: ScanNumber,
+    measured: Time,
+    /// Whether it refreshes everything.
+    all: bool,
+    running: Option<Running>,
+}
+
+/// Sends the maps of one sensor: at most `A` azimuths of `32 W` ranges, the first `P` planes.
+#[derive(Debug, Clone)]
+pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
+    config: BroadcastConfig,
+    header: Header,
+    epoch: Epoch,
+    synchronised: bool,
+    status: Status,
+    layers: [Layer<A, W>; P],
+    scan: Option<Scan>,
+    /// The scan before, and when it was measured.
+    last: Option<Time>,
+    /// The last scan that began to refresh everything.
+    refreshed: Option<Time>,
+    /// Where the next map begins.
+    from: usize,
+    started: Time,
+    quiet_until: Time,
+    gap: Every,
+    status_due: Every,
+    header_due: Every,
+    range_due: Option<Every>,
+    freshness_due: Every,
+    page: u8,
+    group: u8,
+    range_from: usize,
+    counters: [u8; 32],
+}
+
+impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
+    /// Starts an epoch; one that the sender did not use lately, from a counter kept over restarts or
+    /// from noise.
+    ///
+    /// # Errors
+    /// Names the parameter that cannot be worked with.
+    pub fn new(config: BroadcastConfig, header: Header, epoch: Epoch, now: Time) -> Result<Self, ConfigError> {
+        config.check()?;
+        let mut new = Self {
+            config,
+            header,
+            epoch,
+            synchronised: false,
+            status: Status::starting(header.fingerprint),
+            layers: [const { Layer::new() }; P],
+            scan: None,
+            last: None,
+            refreshed: None,
+            from: 0,
+            started: now,
+            quiet_until: now,
+            gap: Every::new(now, u64::from(config.gap_us)),
+            status_due: Every::new(now, u64::from(config.status_ms) * 1000),
+            header_due: Every::new(now, 1),
+            range_due: None,
+            freshness_due: Every::new(now, 1_000_000),
+            page: 0,
+            group: 0,
+            range_from: 0,
+            counters: [0; 32],
+        };
+        new.begin(header, now)?;
+        Ok(new)
+    }
+
+    /// Begins a new epoch: the mount, the geometry or the configuration changed.
+    ///
+    /// # Errors
+    /// A map larger than this sender's storage.
+    pub fn restart(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+        self.epoch = self.epoch.next();
+        self.begin(header, now)
+    }
+
+    fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+        let most = |cells: usize| u32::try_from(cells).unwrap_or(u32::MAX);
+        within("header.azimuths", u32::from(header.azimuths), 1, most(A.min(super::header::MOST_AZIMUTHS)))?;
+        within("header.ranges", u32::from(header.ranges), 1, most((32 * W).min(256)))?;
+        self.header = Header { planes: planes(P), ..header };
+        self.status.fingerprint = header.fingerprint;
+        self.quiet(now);
+        let long = !self.packing().is_classic();
+        let groups = if long { 1 } else { u64::from(GROUPS) };
+        self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / groups);
+        let messages = usize::from(header.azimuths).div_ceil(self.packing().most_own() - 2) as u64;
+        let period = |ms: u16| Every::new(now, u64::from(ms) * 1000 / messages.max(1));
+        self.range_due = self.config.visible_range_ms.map(period);
+        Ok(())
+    }
+
+    fn quiet(&mut self, now: Time) {
+        self.drop_scan();
+        self.layers.iter_mut().for_each(Layer::forget);
+        (self.last, self.refreshed, self.from) = (None, None, 0);
+        let quiet_us = (u64::from(self.config.max_age_ms) + u64::from(self.config.max_delay_ms)) * 1000;
+        self.quiet_until = Time::from_micros(now.micros() + quiet_us);
+    }
+
+    fn packing(&self) -> Packing {
+        self.config.medium.packing(self.config.secured)
+    }
+
+    /// What is told of the sender. Uptime, versions, fingerprint and dropped azimuths are filled in.
+    pub fn status_mut(&mut self) -> &mut Status {
+        &mut self.status
+    }
+
+    /// Whether the clock is set by a time service.
+    pub fn set_synchronised(&mut self, synchronised: bool) {
+        self.synchronised = synchronised;
+    }
+
+    /// The epoch.
+    pub fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// Time at which what was handed out of the current map is to be aborted, should a mailbox still
+    /// hold it.
+    pub fn deadline(&self) -> Option<Time> {
+        let stale = u64::from(self.config.stale_ms) * 1000;
+        self.last.map(|measured| Time::from_micros(measured.micros() + stale))
+    }
+
+    /// Takes a map measured at this time. What was still to be sent of the one before is dropped.
+    ///
+    /// # Errors
+    /// The map is not sent: [`NotSent`] says why.
+    pub fn scan(&mut self, measured: Time, map: &impl Layers<W>) -> Result<(), NotSent> {
+        let number = ScanNumber::at(measured);
+        let since = match self.last.map(|last| measured.since(last)) {
+            // the clock stepped back: numbers would come again
+            Some(None) => {
+                self.epoch = self.epoch.next();
+                self.quiet(measured);
+                return Err(NotSent::Quiet);
+            }
+            Some(since) => since,
+            None => None,
+        };
+        if self.last.is_some_and(|last| ScanNumber::at(last) == number && since.is_some_and(|us| us < 40_000)) {
+            return Err(NotSent::TooSoon);
+        }
+        let wait = self.quiet_until.since(measured).unwrap_or(0);
+        if wait > 0 {
+            return Err(NotSent::Quiet);
+        }
+        self.drop_scan();
+        if since.is_none_or(|us| us > 300_000) {
+            // scan numbers are told apart for as long as this
+            self.layers.iter_mut().for_each(Layer::forget);
+            self.refreshed = None;
+        }
+        let azimuths = usize::from(self.header.azimuths);
+        for (layer, plane) in self.layers.iter_mut().zip(Plane::ALL) {
+            layer.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
+        }
+        let refreshed = self.refreshed.map(ScanNumber::at);
+        let all = refreshed.is_none_or(|refreshed| number.ticks_after(refreshed) >= REFRESH_TICKS);
+        if all {
+            self.refreshed = Some(measured);
+        }
+        self.last = Some(measured);
+        self.scan = Some(Scan { number, measured, all, running: None });
+        Ok(())
+    }
+
+    fn drop_scan(&mut self) {
+        let Some(scan) = self.scan.take() else { return };
+        let pending: u32 = self.layers.iter().map(Layer::pending).sum();
+        self.status.dropped = self.status.dropped.saturating_add(u16::try_from(pending).unwrap_or(u16::MAX));
+        if let Some(running) = scan.running {
+            self.from = match running.next {
+                Next::Block { start, .. } => start,
+                Next::Plain { azimuth } => azimuth,
+            };
+        }
+        self.layers.iter_mut().for_each(Layer::give_up);
+    }
+
+    /// Whether everything of the last map is handed out or dropped.
+    pub fn idle(&self) -> bool {
+        self.scan.is_none()
+    }
+
+    /// The next CAN frame, if one is due.
+    pub fn next_frame(&mut self, now: Time) -> Option<CanFrame> {
+        let (Medium::Can(addresses) | Medium::CanFd(addresses)) = self.config.medium else { return None };
+        self.next_packet(now)?.frame(&addresses)
+    }
+
+    /// Writes the next message as it goes on a serial line, if one is due; how many bytes it takes. The
+    /// buffer holds [`serial::MOST_STUFFED`] bytes.
+    pub fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize> {
+        let packet = self.next_packet(now)?;
+        serial::stuff(packet.bytes(), line)
+    }
+
+    /// The next message, if one is due; never a secured one.
+    pub fn next_packet(&mut self, now: Time) -> Option<Packet> {
+        if self.config.secured {
+            return None;
+        }
+        let packet = self.next_bare(now)?;
+        Some(self.protect(packet))
+    }
+
+    /// The next message with its authenticator, if one is due.
+    #[cfg(feature = "secoc")]
+    pub fn next_sealed<K: Key>(&mut self, now: Time, sealer: &mut Sealer<K>) -> Option<Packet> {
+        if !self.config.secured {
+            return None;
+        }
+        let bare = self.next_bare(now)?;
+        let sealed = sealer.seal(bare, matches!(self.config.medium, Medium::CanFd(_)));
+        Some(self.protect(sealed))
+    }
+
+    /// The next message without its protection.
+    fn next_bare(&mut self, now: Time) -> Option<Packet> {
+        if !self.gap.due(now) {
+            return None;
+        }
+        let packet = self.status_packet(now).or_else(|| self.header_packet(now));
+        let packet = packet.or_else(|| self.freshness_packet(now)).or_else(|| self.map_packet(now));
+        let packet = packet.or_else(|| self.range_packet(now))?;
+        self.gap.next = Time::from_micros(now.micros() + self.gap.period_us);
+        Some(packet)
+    }
+
+    fn protect(&mut self, packet: Packet) -> Packet {
+        let filled = match self.config.medium {
+            Medium::CanFd(_) => fd_length(packet.bytes().len()),
+            _ => None,
+        };
+        let Some(counter) = self.counters.get_mut(usize::from(packet.message.number())) else { return packet };
+        let protected = packet.protect(*counter, filled);
+        *counter = packet.packing.profile().next(*counter);
+        protected
+    }
+
+    fn packet(&self, message: Message, own: &[u8]) -> Packet {
+        Packet::new(self.packing(), self.config.sensor, message, self.epoch, own)
+    }
+
+    fn status_packet(&mut self, now: Time) -> Option<Packet> {
+        if !self.status_due.due(now) {
+            return None;
+        }
+        self.status_due.done(now);
+        let uptime_s = now.since(self.started).unwrap_or(0) / 1_000_000;
+        self.status.uptime_s = u32::try_from(uptime_s).unwrap_or(u32::MAX);
+        self.status.wire_version = super::message::WIRE_VERSION;
+        if !self.packing().is_classic() {
+            return Some(self.packet(Message::Status, &self.status.emit()));
+        }
+        let own = self.status.emit_page(self.page);
+        self.page = (self.page + 1) % PAGES;
+        Some(self.packet(Message::Status, &own))
+    }
+
+    fn header_packet(&mut self, now: Time) -> Option<Packet> {
+        if !self.header_due.due(now) {
+            return None;
+        }
+        self.header_due.done(now);
+        let clock = Clock { time_ms: now.micros() / 1000, synchronised: self.synchronised };
+        if !self.packing().is_classic() {
+            return Some(self.packet(Message::Header, &self.header.emit(&clock)));
+        }
+        let own = self.header.emit_group(&clock, self.group);
+        self.group = (self.group + 1) % GROUPS;
+        Some(self.packet(Message::Header, &own))
+    }
+
+    /// Room for the freshness value, once a second.
+    fn freshness_packet(&mut self, now: Time) -> Option<Packet> {
+        if !self.config.secured || !self.freshness_due.due(now) {
+            return None;
+        }
+        self.freshness_due.done(now);
+        Some(self.packet(Message::Freshness, &[0; 8]))
+    }
+
+    fn map_packet(&mut self, now: Time) -> Option<Packet> {
+        let mut scan = self.scan?;
+        if now.since(scan.measured).is_none_or(|age| age > u64::from(self.config.stale_ms) * 1000) {
+            self.drop_scan();
+            return None;
+        }
+        let mut running = match scan.running {
+            Some(running) => running,
+            None => self.next_running(&scan)?,
+        };
+        let (part, own, last) = self.message(&scan, &running)?;
+        let plane = Plane::ALL.get(running.plane).copied()?;
+        let packet = self.packet(Message::Map(plane, part), own.bytes());
+        running.sent += 1;
+        scan.running = Some(running);
+        if last {
+            let layer = self.layers.get_mut(running.plane)?;
+            match running.next {
+                Next::Block { kind, start, block } => {
+                    layer.told(Some(kind), start, block.end, scan.number);
+                    self.from = block.end;
+                }
+                Next::Plain { azimuth } => {
+                    layer.told(None, azimuth, azimuth + 1, scan.number);
+                    self.from = azimuth + 1;
+                }
+            }
+            scan.running = None;
+        }
+        self.scan = Some(scan);
+        if scan.running.is_none() && self.layers.iter().all(|layer| layer.pending() == 0) {
+            // complete: the next one begins at the right edge again
+            (self.scan, self.from) = (None, 0);
+        }
+        Some(packet)
+    }
+
+    fn next_running(&mut self, scan: &Scan) -> Option<Running> {
+        let context = self.header.context(self.packing().form());
+        let telling = Telling { context, scan: scan.number, all: scan.all };
+        let from = self.from;
+        let mut layers = self.layers.iter_mut().enumerate();
+        layers.find_map(|(plane, layer)| layer.next(&telling, from).map(|next| Running { plane, next, sent: 0 }))
+    }
+
+    /// The message that is next of a block or a ray, and whether it is the last.
+    fn message(&self, scan: &Scan, running: &Running) -> Option<(Part, Own, bool)> {
+        let sent = usize::from(running.sent);
+        let long = !self.packing().is_classic();
+        match running.next {
+            Next::Block { kind, start, ref block } => {
+                let first = if kind == Kind::Refresh { Part::Refresh } else { Part::Delta };
+                if long {
+                    return Some((first, Own::long(map_message::words(scan.number, start, block.words())), true));
+                }
+                let part = Word::at(sent).map_or(first, Part::More);
+                let own = map_message::word(scan.number, start, *block.words().get(sent)?);
+                Some((part, Own::classic(own), sent + 1 == block.words().len()))
+            }
+            Next::Plain { azimuth } => {
+                let ray = self.layers.get(running.plane)?.now(azimuth);
+                if long {
+                    return Some((Part::Plain, Own::long(map_message::plain(scan.number, azimuth, ray)), true));
+                }
+                let mut segments = [LIMITS]
+                    .into_iter()
+                    .chain(0..SEGMENTS)
+                    .filter(|s| map_message::has_segment(ray.known, *s))
+                    .skip(sent);
+                let own = map_message::segment(scan.number, azimuth, ray, segments.next()?);
+                Some((Part::Plain, Own::classic(own), segments.next().is_none()))
+            }
+        }
+    }
+
+    fn range_packet(&mut self, now: Time) -> Option<Packet> {
+        let mut due = self.range_due.filter(|due| due.due(now))?;
+        let measured = self
+            .last
+            .filter(|last| now.since(*last).is_some_and(|age| age <= u64::from(self.config.stale_ms) * 1000))?;
+        due.done(now);
+        self.range_due = Some(due);
+        let azimuths = usize::from(self.header.azimuths);
+        let most = self.packing().most_own() - 2;
+        let first = self.range_from;
+        self.range_from = if first + most < azimuths { first + most } else { 0 };
+        let layer = self.layers.first()?;
+        let steps =
+            (first..(first + most).min(azimuths)).map(|a| visible_range::steps(layer.now(a), self.header.cell_cm));
+        let (own, length) = visible_range::emit(ScanNumber::at(measured), first, steps);
+        Some(self.packet(Message::VisibleRange, own.get(..length)?))
+    }
+}
+
+/// A bit for each of the first planes.
+fn planes(count: usize) -> u8 {
+    Plane::ALL.iter().take(count).fold(0, |bits, plane| bits | 1 << plane.index())
+}
+
+/// Own bytes of a message.
+struct Own {
+    bytes: [u8; LONG_BYTES],
+    length: usize,
+}
+
+impl Own {
+    fn classic(own: [u8; CLASSIC_BYTES]) -> Self {
+        let mut bytes = [0; LONG_BYTES];
+        bytes.iter_mut().zip(own).for_each(|(to, from)| *to = from);
+        Self { bytes, length: CLASSIC_BYTES }
+    }
+
+    fn long((bytes, length): ([u8; LONG_BYTES], usize)) -> Self {
+        Self { bytes, length }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or(&[])
+    }
+}

@@ -1,0 +1,230 @@
+//! Rays in, the words of one block out, and back: the code of the map.
+//!
+//! # Model
+//! A block tells consecutive azimuths from a start on. A *refresh* decodes alone: a ray is expected
+//! to be like the one before it in the block, the first like the usual one of the header. A *delta*
+//! is told against the refresh it names: the first ray is expected to be as it was, every other as
+//! [`Ray::expected`] has it. What differs is told edge by edge: the next edge lies a few cells from
+//! the expected one, or the expected one is gone, or there is a new one at a distance. Blocked and
+//! clear stretches are long, so most rays take less than a bit.
+//!
+//! A ray too ragged for any block goes out in plain bits, outside this code.
+//!
+//! # Limits
+//! 256 azimuths, 256 range cells. Decoding a block never loops more than (azimuths x 2 cells) times,
+//! whatever the words say.
+
+use super::expectation::{
+    Before, Expected, Last, Progress, distance_table, edge_table, end_table, first_table, ray_table, shift, stop_table,
+};
+use super::interval::{Coder, Encoder, Form};
+use super::model::{AS_EXPECTED, EDGES, GONE, KNOWN, MODEL, NEW, REACH, STOPS_BELOW, TOLD};
+use super::ray::{Known, Ray};
+
+/// Bits that tell how many ticks older a delta's refresh is, less one.
+pub const AGE_BITS: u32 = 4;
+
+/// What a block is built on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Kind {
+    /// Decodes alone.
+    Refresh,
+    /// On the refresh this many ticks older, 1 to 16.
+    Delta {
+        /// Its age before this scan.
+        ticks: u8,
+    },
+}
+
+impl Kind {
+    pub(super) fn index(self) -> usize {
+        usize::from(self != Self::Refresh)
+    }
+}
+
+/// What sender and receiver of a block agree on beforehand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Context {
+    /// Size and most number of the words.
+    pub form: Form,
+    /// The header's usually known cells.
+    pub usual: Known,
+    /// The header's number of azimuths.
+    pub azimuths: usize,
+}
+
+/// The rays a block is made of or built on.
+pub trait Rays<const W: usize> {
+    /// The ray of an azimuth as it is now, if it is to be told in this block.
+    fn now(&self, azimuth: usize) -> Option<&Ray<W>>;
+
+    /// The ray of an azimuth in the refresh a delta names, if it is at hand.
+    fn was(&self, azimuth: usize) -> Option<&Ray<W>>;
+}
+
+/// A block as words.
+#[derive(Debug, Clone, Copy)]
+pub struct Block {
+    encoder: Encoder,
+    /// First azimuth behind the block; the start itself if nothing fitted.
+    pub end: usize,
+}
+
+impl Block {
+    /// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray.
+    pub fn new<const W: usize>(context: &Context, kind: Kind, start: usize, rays: &impl Rays<W>) -> Self {
+        let mut encoder = Encoder::new(context.form);
+        let end = encode(&mut encoder, context, kind, start, rays);
+        Self { encoder, end }
+    }
+
+    /// Bits left.
+    pub fn room(&self) -> u32 {
+        self.encoder.room()
+    }
+
+    /// The words, the first the most significant.
+    pub fn words(&self) -> &[u64] {
+        self.encoder.words()
+    }
+}
+
+/// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray; returns
+/// the first azimuth behind them.
+pub fn encode<const W: usize>(
+    coder: &mut (impl Coder + Clone),
+    context: &Context,
+    kind: Kind,
+    start: usize,
+    rays: &impl Rays<W>,
+) -> usize {
+    if let Kind::Delta { ticks } = kind {
+        // the first word has room
+        let _ = coder.plain(AGE_BITS, usize::from(ticks.saturating_sub(1)));
+    }
+    let azimuths = context.azimuths;
+    let mut progress = Progress::new(context.usual);
+    for azimuth in start..azimuths {
+        let before = coder.clone();
+        let told = tell(&mut progress, coder, kind, azimuth, rays);
+        if told.is_none() || (azimuth + 1 < azimuths && !can_stop(coder)) {
+            *coder = before;
+            if azimuth > start {
+                let _ = stop(coder);
+            }
+            return azimuth;
+        }
+    }
+    azimuths
+}
+
+fn can_stop(coder: &(impl Coder + Clone)) -> bool {
+    // "no further ray" takes 8 bits at most
+    coder.room() < STOPS_BELOW || coder.room() > 10 || stop(&mut coder.clone()).is_some()
+}
+
+fn stop(coder: &mut impl Coder) -> Option<()> {
+    stop_table(coder.room()).map_or(Some(()), |table| coder.symbol(table, 1))
+}
+
+/// Tells an azimuth; `None` if it does not fit.
+fn tell<const W: usize>(
+    progress: &mut Progress<W>,
+    coder: &mut impl Coder,
+    kind: Kind,
+    azimuth: usize,
+    rays: &impl Rays<W>,
+) -> Option<()> {
+    let ray = rays.now(azimuth)?;
+    let was = match kind {
+        Kind::Refresh => &Ray::UNKNOWN,
+        Kind::Delta { .. } => rays.was(azimuth).filter(|was| was.known == ray.known)?,
+    };
+    if !progress.before.first {
+        coder.symbol(stop_table(coder.room())?, 0)?;
+    }
+    let expected = progress.expected(kind, was);
+    encode_ray(coder, kind, progress.before, ray, &expected)?;
+    progress.advance(ray, &expected, was);
+    Some(())
+}
+
+/// Tells a ray; `None` if it does not fit.
+fn encode_ray<const W: usize>(
+    coder: &mut impl Coder,
+    kind: Kind,
+    before: Before,
+    ray: &Ray<W>,
+    expected: &Ray<W>,
+) -> Option<()> {
+    let table = ray_table(kind, before, expected);
+    if ray == expected {
+        return coder.symbol(table, AS_EXPECTED);
+    }
+    if ray.known == expected.known {
+        coder.symbol(table, EDGES)?;
+    } else {
+        coder.symbol(table, KNOWN)?;
+        encode_limit(coder, ray.known.near(), expected.known.near())?;
+        encode_limit(coder, ray.known.end(), expected.known.end())?;
+    }
+    if ray.known.is_empty() {
+        return Some(());
+    }
+    let (mut bit, expected_bit) = (ray.first(), expected.known.is_empty() || expected.first());
+    coder.symbol(first_table(expected_bit), usize::from(bit != expected_bit))?;
+    let toggles = ray.toggles();
+    let mut hints = Expected::new(expected);
+    let (mut place, mut last) = (ray.known.near(), Last::None);
+    hints.from = place + 1;
+    loop {
+        let edge = toggles.next(place + 1);
+        match (hints.next(bit, ray.known.end()), edge) {
+            (Some(hint), edge) => {
+                let table = edge_table(kind, bit, last);
+                match edge {
+                    Some(edge) if edge + REACH >= hint && edge <= hint + REACH => {
+                        coder.symbol(table, edge + REACH - hint)?;
+                        last = shift(edge, hint);
+                        place = edge;
+                    }
+                    Some(edge) if edge < hint => {
+                        coder.symbol(table, NEW)?;
+                        encode_distance(coder, bit, edge - place)?;
+                        last = Last::Other;
+                        place = edge;
+                    }
+                    _ => {
+                        coder.symbol(table, GONE)?;
+                        last = Last::Other;
+                        hints.from = hint + 1;
+                        continue;
+                    }
+                }
+            }
+            (None, Some(edge)) => {
+                coder.symbol(end_table(kind, bit, last), 1)?;
+                encode_distance(coder, bit, edge - place)?;
+                last = Last::Other;
+                place = edge;
+            }
+            (None, None) => return coder.symbol(end_table(kind, bit, last), 0),
+        }
+        bit = !bit;
+        hints.from = hints.from.max(place + 1);
+    }
+}
+
+fn encode_distance(coder: &mut impl Coder, bit: bool, distance: usize) -> Option<()> {
+    let bits = distance.checked_ilog2()?;
+    coder.symbol(distance_table(bit), bits as usize)?;
+    coder.plain(bits, distance)
+}
+
+fn encode_limit(coder: &mut impl Coder, limit: usize, expected: usize) -> Option<()> {
+    let near = [expected, expected.wrapping_sub(1), expected + 1];
+    let symbol = near.iter().position(|n| *n == limit).unwrap_or(TOLD);
+    coder.symbol(&MODEL.limit, symbol)?;
+    if symbol == TOLD { coder.plain(9, limit) } else { Some(()) }
+}

@@ -1,0 +1,8 @@
+//! The code of the map: rays in, words out, whatever they travel on.
+
+pub mod block;
+mod expectation;
+pub mod interval;
+pub mod model;
+pub mod ray;
+pub mod reading;

@@ -1,0 +1,78 @@
+//! The frequencies of the code's symbols, of 256.
+//!
+//! Counted on radar-3d's maps of the training recordings; `viewshed bus --count-symbols` prints
+//! them anew. Other maps decode just as exactly and take a little more room.
+
+/// How far an edge may lie from the expected one to be told as a shift.
+pub const REACH: usize = 5;
+
+/// Symbols of [`Model::edge`]: shifts of -5 to 5 cells, then these two.
+pub const GONE: usize = 2 * REACH + 1;
+/// An edge where none is expected.
+pub const NEW: usize = 2 * REACH + 2;
+
+/// Symbols of [`Model::ray`].
+pub const AS_EXPECTED: usize = 0;
+/// Known cells as expected, edges told.
+pub const EDGES: usize = 1;
+/// Known cells told, then edges.
+pub const KNOWN: usize = 2;
+
+/// Symbols of [`Model::limit`]: the limit is as expected, one cell nearer, one farther, or told.
+pub const TOLD: usize = 3;
+
+/// Room from which on each of the [`Model::stop`] tables but the first holds.
+pub const STOP_CLASSES: [u32; 7] = [8, 12, 16, 20, 26, 34, 48];
+
+/// With less room than this a message is over without saying so.
+pub const STOPS_BELOW: u32 = 4;
+
+/// All tables.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Model {
+    /// How a ray is told, by what went before (see `Before`) and whether edges are expected.
+    pub ray: [[[u8; 3]; 2]; 8],
+    /// Whether the first known cell's bit is the expected one (0) or not, by the expected bit.
+    pub first: [[u8; 2]; 2],
+    /// The next edge, where one is expected: by kind (refresh, delta), by the bit before it, by the
+    /// edge before (see `Last`).
+    pub edge: [[[[u8; 13]; 5]; 2]; 2],
+    /// Whether the ray has no further edge (0) or a new one, where none is expected any more: by
+    /// kind, by the bit, by whether the edge before was a shift (0) or not.
+    pub end: [[[[u8; 2]; 2]; 2]; 2],
+    /// The number of bits of a new edge's distance, less one, by the bit before it.
+    pub distance: [[u8; 8]; 2],
+    /// A limit of the known cells.
+    pub limit: [u8; 4],
+    /// Whether another ray follows (0) or none, by room.
+    pub stop: [[u8; 2]; 8],
+}
+
+/// The tables of wire version 1.
+pub static MODEL: Model = include!("model.in");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sums_to_256(table: &[u8]) {
+        assert_eq!(table.iter().map(|f| u32::from(*f)).sum::<u32>(), 256, "{table:?}");
+        assert!(table.iter().all(|f| *f > 0), "every symbol can be told: {table:?}");
+    }
+
+    #[test]
+    fn every_table_sums_to_256_and_leaves_room_for_every_symbol() {
+        MODEL.ray.as_flattened().iter().for_each(|t| sums_to_256(t));
+        MODEL.first.iter().for_each(|t| sums_to_256(t));
+        MODEL.edge.as_flattened().as_flattened().iter().for_each(|t| sums_to_256(t));
+        MODEL.end.as_flattened().as_flattened().iter().for_each(|t| sums_to_256(t));
+        MODEL.distance.iter().for_each(|t| sums_to_256(t));
+        sums_to_256(&MODEL.limit);
+        MODEL.stop.iter().for_each(|t| sums_to_256(t));
+    }
+
+    #[test]
+    fn the_tables_take_less_than_half_a_kilobyte() {
+        assert_eq!(size_of::<Model>(), 364);
+    }
+}

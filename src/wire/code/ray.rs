@@ -1,0 +1,242 @@
+//! One azimuth of a map as it travels: which cells are known, and a bit for each of them.
+
+use crate::bitmap::Row;
+use crate::bits::Bits;
+
+/// The cells of an azimuth there is evidence for: `near..=last`, or none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Known {
+    near: u8,
+    last: u8,
+}
+
+impl Known {
+    /// Nothing is known.
+    pub const NONE: Self = Self { near: 1, last: 0 };
+
+    /// The cells `near..end`; none if that is empty or reaches beyond 256 cells.
+    #[allow(clippy::cast_possible_truncation)] // checked
+    pub const fn new(near: usize, end: usize) -> Self {
+        if near < end && end <= 256 { Self { near: near as u8, last: (end - 1) as u8 } } else { Self::NONE }
+    }
+
+    /// First and last cell as bytes; 1 and 0 where nothing is known.
+    pub const fn limits(self) -> [u8; 2] {
+        [self.near, self.last]
+    }
+
+    /// From first and last cell; `None` if they are in the wrong order, unless they are 1 and 0.
+    pub const fn from_limits(limits: [u8; 2]) -> Option<Self> {
+        let [near, last] = limits;
+        if near <= last || (near == 1 && last == 0) { Some(Self { near, last }) } else { None }
+    }
+
+    /// Whether no cell is known.
+    pub const fn is_empty(self) -> bool {
+        self.near > self.last
+    }
+
+    /// First known cell.
+    pub const fn near(self) -> usize {
+        self.near as usize
+    }
+
+    /// First cell beyond; not above [`Known::near`] where nothing is known.
+    pub const fn end(self) -> usize {
+        if self.is_empty() { 0 } else { self.last as usize + 1 }
+    }
+
+    /// Whether a cell is known.
+    pub const fn contains(self, cell: usize) -> bool {
+        cell >= self.near as usize && cell < self.end()
+    }
+}
+
+/// An azimuth of one plane, in a row of at most `32 * W` cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ray<const W: usize> {
+    /// Cells there is evidence for.
+    pub known: Known,
+    /// A bit for each of them: visible, say. No bit is set outside.
+    bits: Bits<W>,
+}
+
+impl<const W: usize> Ray<W> {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self { known: Known::NONE, bits: Bits::NONE };
+
+    /// From bits; those outside the known cells are dropped.
+    pub fn new(known: Known, bits: Bits<W>) -> Self {
+        Self { known, bits: bits.and(&Bits::span(known.near(), known.end())) }
+    }
+
+    /// All known cells set.
+    pub fn clear(known: Known) -> Self {
+        Self { known, bits: Bits::span(known.near(), known.end()) }
+    }
+
+    /// Of a bitmap's row. Unknown cells between known ones count as known and not visible, which is
+    /// the safe side; the number of them comes with it.
+    pub fn of(row: &Row) -> (Self, u32) {
+        let known = match (row.known.next(0), row.known.last()) {
+            (Some(near), Some(last)) => Known::new(near, last + 1),
+            _ => return (Self::UNKNOWN, 0),
+        };
+        let cells = known.end() - known.near();
+        let holes = u32::try_from(cells).unwrap_or(0).saturating_sub(row.known.count());
+        (Self::new(known, row.visible.and(&row.known).resized()), holes)
+    }
+
+    /// As a row of a bitmap.
+    pub fn row(&self) -> Row {
+        Row { known: Bits::span(self.known.near(), self.known.end()), visible: self.bits.resized() }
+    }
+
+    /// The bit of a cell.
+    pub fn get(&self, cell: usize) -> bool {
+        self.bits.get(cell)
+    }
+
+    /// The bits.
+    pub fn bits(&self) -> &Bits<W> {
+        &self.bits
+    }
+
+    /// The bit of the first known cell.
+    pub fn first(&self) -> bool {
+        self.bits.get(self.known.near())
+    }
+
+    /// Cells whose bit differs from the one before, within the known cells.
+    pub fn toggles(&self) -> Bits<W> {
+        let mut before = 0;
+        let words = self.bits.words().map(|word| {
+            let shifted = (word << 1) | before;
+            before = word >> 31;
+            word ^ shifted
+        });
+        let mut toggles = Bits::from_words(words);
+        // no bit is set outside, so the limits are the only other places that differ
+        if !self.known.is_empty() {
+            toggles.clear(self.known.near());
+            toggles.clear(self.known.end());
+        }
+        toggles
+    }
+
+    /// Whether any of the known cells differs from the one before.
+    pub fn has_toggles(&self) -> bool {
+        !self.toggles().is_empty()
+    }
+
+    /// From bits none of which is set outside the known cells.
+    pub(crate) const fn within(known: Known, bits: Bits<W>) -> Self {
+        Self { known, bits }
+    }
+
+    /// What this ray of the refresh will probably be by now: where the neighbour changed since the
+    /// same refresh, what the neighbour is now; elsewhere as it was.
+    pub fn expected(&self, neighbour: &Self, neighbour_was: &Self) -> Self {
+        if neighbour == neighbour_was {
+            return *self;
+        }
+        let mut words = *self.bits.words();
+        let neighbours = neighbour.bits.words().iter().zip(neighbour_was.bits.words());
+        for (word, (now, was)) in words.iter_mut().zip(neighbours) {
+            let changed = now ^ was;
+            *word = (*word & !changed) | (now & changed);
+        }
+        let same_cells = neighbour.known == self.known && neighbour_was.known == self.known;
+        let bits = Bits::from_words(words);
+        if same_cells { Self::within(self.known, bits) } else { Self::new(self.known, bits) }
+    }
+
+    /// How many cells from the first known one on are set without a gap: the end of that run.
+    pub fn clear_to(&self) -> usize {
+        if self.known.is_empty() || !self.first() {
+            return 0;
+        }
+        self.toggles().next(0).unwrap_or(self.known.end())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::String;
+    use std::vec::Vec;
+
+    /// `.` visible, `#` not, blanks unknown.
+    fn ray(picture: &str) -> Ray<1> {
+        let cells: Vec<char> = picture.chars().collect();
+        let near = cells.iter().position(|c| *c != ' ').unwrap_or(0);
+        let end = cells.iter().rposition(|c| *c != ' ').map_or(0, |e| e + 1);
+        let mut bits = Bits::NONE;
+        cells.iter().enumerate().filter(|(_, c)| **c == '.').for_each(|(i, _)| bits.set(i));
+        Ray::new(Known::new(near, end), bits)
+    }
+
+    fn draw(ray: &Ray<1>) -> String {
+        (0..ray.known.end().max(1))
+            .map(|i| {
+                if !ray.known.contains(i) {
+                    ' '
+                } else if ray.get(i) {
+                    '.'
+                } else {
+                    '#'
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn toggles_lie_within_the_known_cells() {
+        let toggles = |p: &str| ray(p).toggles().iter().collect::<Vec<_>>();
+        assert_eq!(toggles("  ..##.  "), [4, 6]);
+        assert_eq!(toggles("####"), [0_usize; 0]);
+        assert_eq!(toggles("  .  "), [0_usize; 0]);
+        let whole = Ray::<7>::new(Known::new(0, 224), Bits::span(31, 33));
+        assert_eq!(whole.toggles().iter().collect::<Vec<_>>(), [31, 33]);
+    }
+
+    #[test]
+    fn where_the_neighbour_moved_it_leads() {
+        let (was, now) = (ray("....##...."), ray("..##......"));
+        assert_eq!(draw(&ray("....##....").expected(&now, &was)), "..##......");
+        assert_eq!(draw(&ray("......##..").expected(&now, &was)), "..##..##..", "elsewhere as it was");
+        assert_eq!(draw(&ray("....##....").expected(&was, &was)), "....##....");
+    }
+
+    #[test]
+    fn holes_of_unknown_become_invisible_and_are_counted() {
+        let mut row = Row::default();
+        for (cell, state) in "  ..?.#".chars().enumerate() {
+            match state {
+                '.' => row.set(cell, crate::map::Visibility::Visible),
+                '#' => row.set(cell, crate::map::Visibility::Invisible),
+                _ => {}
+            }
+        }
+        let (ray, holes) = Ray::<1>::of(&row);
+        assert_eq!((draw(&ray).as_str(), holes), ("  ..#.#", 1));
+        assert_eq!(ray.row().cell(4), crate::map::Visibility::Invisible);
+        assert_eq!(Ray::<1>::of(&Row::default()), (Ray::UNKNOWN, 0));
+    }
+
+    #[test]
+    fn the_first_run_is_what_is_guaranteed() {
+        assert_eq!(ray("  ..##..").clear_to(), 4);
+        assert_eq!(ray("  ......").clear_to(), 8);
+        assert_eq!((ray("  #....").clear_to(), Ray::<1>::UNKNOWN.clear_to()), (0, 0));
+    }
+
+    #[test]
+    fn known_cells_are_an_interval() {
+        assert_eq!(Known::new(3, 3), Known::NONE);
+        assert_eq!(Known::new(3, 257), Known::NONE);
+        assert!(Known::new(0, 256).contains(255) && !Known::NONE.contains(0) && !Known::NONE.contains(1));
+        assert_eq!((Known::NONE.end(), Known::new(0, 256).end()), (0, 256));
+    }
+}

@@ -1,0 +1,479 @@
+//! What a sender's maps are of: mount, geometry, configuration; and its clock.
+//!
+//! # Model
+//! Seven groups of five bytes. Group 0 is the sender's clock; groups 1 to 6 stay the same for a whole
+//! epoch. A long message carries them one after another, a classic one carries one of them, so a
+//! receiver collects six and keeps them. All numbers are big-endian.
+//!
+//! | group | bytes |
+//! |---|---|
+//! | 0 | time, ms modulo 2^40 |
+//! | 1 | x, cm, 3 bytes signed; height, cm |
+//! | 2 | y, cm, 3 bytes signed; yaw, 2^-16 turn |
+//! | 3 | pitch, roll, 2^-16 turn; planes, a bit each |
+//! | 4 | right edge of the first azimuth from the boresight's heading, 2^-16 turn; width of all azimuths together, 2^-16 turn; azimuths less one |
+//! | 5 | length of a range cell, cm; range cells less one; first and last cell usually known (1 and 0: none) |
+//! | 6 | fingerprint of the configuration, 4 bytes; CRC-8 of profile 11 over the 29 bytes before it |
+//!
+//! # Limits
+//! 128 azimuths (their start takes seven bits of a classic frame), 256 range cells, positions within
+//! 83 km of the road's origin.
+
+use crc::Crc;
+
+use super::code::block::Context;
+use super::code::interval::Form;
+use super::code::ray::Known;
+use super::message::{CLASSIC_BYTES, WIRE_VERSION};
+use crate::angle::Angle;
+use crate::map::RoadPoint;
+use crate::mount::{Levelling, Mount};
+use crate::polar::PolarGeometry;
+
+/// Groups of a header.
+pub const GROUPS: u8 = 7;
+
+/// Bytes of a group.
+const GROUP: usize = 5;
+
+/// Own bytes of a long header: flags, then the groups.
+pub const LONG: usize = 1 + GROUPS as usize * GROUP;
+
+/// Most azimuths of a map on the wire.
+pub const MOST_AZIMUTHS: usize = 128;
+
+static CRC_8: Crc<u8> = Crc::<u8>::new(&crc::CRC_8_GSM_A);
+
+/// A fingerprint of a configuration's bytes: CRC-32, to see that two are the same.
+pub fn fingerprint(bytes: &[u8]) -> u32 {
+    Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
+}
+
+/// The sender's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Clock {
+    /// Milliseconds, modulo 2^40.
+    pub time_ms: u64,
+    /// Whether it is set by a time service, so that it can be compared with other clocks.
+    pub synchronised: bool,
+}
+
+/// The mount as the wire has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct WireMount {
+    /// Place on the road plane.
+    pub origin: RoadPoint,
+    /// Above the road, centimetres.
+    pub height_cm: u16,
+    /// Heading of the boresight, + left.
+    pub yaw: Angle,
+    /// + nose down.
+    pub pitch: Angle,
+    /// + left side up.
+    pub roll: Angle,
+}
+
+/// What the maps of an epoch are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Header {
+    /// Where the sensor stands.
+    pub mount: WireMount,
+    /// Right edge of the first azimuth, from the boresight's heading.
+    pub azimuth_origin: Angle,
+    /// Width of all azimuths together, 2^-16 turn.
+    pub azimuth_span: u16,
+    /// Number of azimuths, 1 to 128.
+    pub azimuths: u8,
+    /// Length of a range cell along the ground, centimetres.
+    pub cell_cm: u16,
+    /// Number of range cells, 1 to 256.
+    pub ranges: u16,
+    /// Cells that are usually known.
+    pub usual: Known,
+    /// Planes the sender sends, a bit each.
+    pub planes: u8,
+    /// Fingerprint of the configuration.
+    pub fingerprint: u32,
+}
+
+/// Why there is no header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum NotAHeader {
+    /// A wire version this receiver does not know.
+    Version {
+        /// The sender's.
+        version: u8,
+    },
+    /// Bytes are missing.
+    TooShort,
+    /// The check over all groups does not fit.
+    Check,
+    /// A value out of range.
+    Range,
+    /// A map of this size or place cannot be sent.
+    Unsendable,
+}
+
+impl Header {
+    /// For the maps of an estimator.
+    ///
+    /// # Errors
+    /// [`NotAHeader::Unsendable`] if the map has more than 128 azimuths or 256 range cells, or the
+    /// mount is none.
+    pub fn new<const R: usize, const A: usize>(
+        mount: &Mount,
+        geometry: &PolarGeometry,
+        usual: Known,
+        planes: u8,
+        fingerprint: u32,
+    ) -> Result<Self, NotAHeader> {
+        let unsendable = NotAHeader::Unsendable;
+        let origin = mount.levelling().map_err(|_| unsendable)?.origin();
+        if A == 0 || A > MOST_AZIMUTHS || R == 0 || R > 256 || usual.end() > R {
+            return Err(unsendable);
+        }
+        Ok(Self {
+            mount: WireMount {
+                origin,
+                height_cm: u16::try_from(geometry.levelling.height_cm).map_err(|_| unsendable)?,
+                yaw: Angle::from_degrees(mount.yaw_deg),
+                pitch: Angle::from_degrees(mount.pitch_deg),
+                roll: Angle::from_degrees(mount.roll_deg),
+            },
+            azimuth_origin: geometry.azimuth_origin,
+            azimuth_span: geometry.azimuth_span,
+            azimuths: u8::try_from(A).map_err(|_| unsendable)?,
+            cell_cm: u16::try_from(geometry.cell_cm).map_err(|_| unsendable)?,
+            ranges: u16::try_from(R).map_err(|_| unsendable)?,
+            usual,
+            planes,
+            fingerprint,
+        })
+    }
+
+    /// Where the cells lie on the road, for queries.
+    pub fn geometry(&self) -> PolarGeometry {
+        PolarGeometry {
+            levelling: Levelling::on_road(self.mount.origin, i32::from(self.mount.height_cm), self.mount.yaw),
+            cell_cm: i32::from(self.cell_cm),
+            azimuth_origin: self.azimuth_origin,
+            azimuth_span: self.azimuth_span,
+        }
+    }
+
+    /// What the code of its maps needs of it.
+    pub fn context(&self, form: Form) -> Context {
+        Context { form, usual: self.usual, azimuths: usize::from(self.azimuths) }
+    }
+
+    /// Groups 1 to 6.
+    fn groups(&self) -> [[u8; GROUP]; GROUPS as usize - 1] {
+        let [_, x1, x2, x3] = self.mount.origin.x_cm.to_be_bytes();
+        let [_, y1, y2, y3] = self.mount.origin.y_cm.to_be_bytes();
+        let [h1, h2] = self.mount.height_cm.to_be_bytes();
+        let [yaw1, yaw2] = self.mount.yaw.raw().to_be_bytes();
+        let [pitch1, pitch2] = self.mount.pitch.raw().to_be_bytes();
+        let [roll1, roll2] = self.mount.roll.raw().to_be_bytes();
+        let [origin1, origin2] = self.azimuth_origin.raw().to_be_bytes();
+        let [span1, span2] = self.azimuth_span.to_be_bytes();
+        let [cell1, cell2] = self.cell_cm.to_be_bytes();
+        let [f1, f2, f3, f4] = self.fingerprint.to_be_bytes();
+        let [_, ranges] = self.ranges.saturating_sub(1).to_be_bytes();
+        let [near, last] = self.usual.limits();
+        let mut groups = [
+            [x1, x2, x3, h1, h2],
+            [y1, y2, y3, yaw1, yaw2],
+            [pitch1, pitch2, roll1, roll2, self.planes],
+            [origin1, origin2, span1, span2, self.azimuths.saturating_sub(1)],
+            [cell1, cell2, ranges, near, last],
+            [f1, f2, f3, f4, 0],
+        ];
+        let sum = check(&groups);
+        if let Some(byte) = groups.last_mut().and_then(|group| group.last_mut()) {
+            *byte = sum;
+        }
+        groups
+    }
+
+    fn parse(groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> Result<Self, NotAHeader> {
+        let [
+            [x1, x2, x3, h1, h2],
+            [y1, y2, y3, yaw1, yaw2],
+            [pitch1, pitch2, roll1, roll2, planes],
+            [origin1, origin2, span1, span2, azimuths],
+            [cell1, cell2, ranges, near, last],
+            [f1, f2, f3, f4, sum],
+        ] = *groups;
+        if sum != check(groups) {
+            return Err(NotAHeader::Check);
+        }
+        let coordinate = |a, b, c| i32::from_be_bytes([a, b, c, 0]) >> 8;
+        let angle = |a, b| Angle::from_raw(i16::from_be_bytes([a, b]));
+        let ranges = u16::from(ranges) + 1;
+        let usual = Known::from_limits([near, last]).ok_or(NotAHeader::Range)?;
+        let header = Self {
+            mount: WireMount {
+                origin: RoadPoint::new(coordinate(x1, x2, x3), coordinate(y1, y2, y3)),
+                height_cm: u16::from_be_bytes([h1, h2]),
+                yaw: angle(yaw1, yaw2),
+                pitch: angle(pitch1, pitch2),
+                roll: angle(roll1, roll2),
+            },
+            azimuth_origin: angle(origin1, origin2),
+            azimuth_span: u16::from_be_bytes([span1, span2]),
+            azimuths: azimuths.checked_add(1).filter(|n| usize::from(*n) <= MOST_AZIMUTHS).ok_or(NotAHeader::Range)?,
+            cell_cm: u16::from_be_bytes([cell1, cell2]),
+            ranges,
+            usual,
+            planes,
+            fingerprint: u32::from_be_bytes([f1, f2, f3, f4]),
+        };
+        let empty = header.cell_cm == 0 || header.azimuth_span == 0;
+        if empty || usual.end() > usize::from(ranges) { Err(NotAHeader::Range) } else { Ok(header) }
+    }
+
+    /// Own bytes of a long message.
+    pub fn emit(&self, clock: &Clock) -> [u8; LONG] {
+        let mut bytes = [0; LONG];
+        let groups = [clock.group()].into_iter().chain(self.groups());
+        let all = [flags(clock, 0)].into_iter().chain(groups.flatten());
+        bytes.iter_mut().zip(all).for_each(|(to, from)| *to = from);
+        bytes
+    }
+
+    /// Own bytes of the classic message that carries a group, 0 to 6.
+    pub fn emit_group(&self, clock: &Clock, group: u8) -> [u8; CLASSIC_BYTES] {
+        let groups = self.groups();
+        let place = usize::from(group).checked_sub(1).and_then(|place| groups.get(place));
+        let [a, b, c, d, e] = place.copied().unwrap_or_else(|| clock.group());
+        [flags(clock, group), a, b, c, d, e]
+    }
+}
+
+impl Clock {
+    fn group(&self) -> [u8; GROUP] {
+        let [_, _, _, a, b, c, d, e] = self.time_ms.to_be_bytes();
+        [a, b, c, d, e]
+    }
+
+    fn parse(synchronised: bool, [a, b, c, d, e]: [u8; GROUP]) -> Self {
+        Self { time_ms: u64::from_be_bytes([0, 0, 0, a, b, c, d, e]), synchronised }
+    }
+}
+
+/// First own byte: clock set, group, wire version.
+fn flags(clock: &Clock, group: u8) -> u8 {
+    u8::from(clock.synchronised) << 7 | group << 4 | WIRE_VERSION
+}
+
+/// The check over groups 1 to 6, the last byte left out.
+fn check(groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> u8 {
+    let bytes = groups.as_flattened();
+    CRC_8.checksum(bytes.split_last().map_or(bytes, |(_, rest)| rest))
+}
+
+/// What a header message brought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Brought {
+    /// The clock, and nothing else new.
+    Clock(Clock),
+    /// A group that was missing or is as it was.
+    Group,
+    /// The header is complete now.
+    Complete,
+    /// A group that contradicts what this epoch said before.
+    Contradiction,
+}
+
+/// Collects an epoch's header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Collector {
+    groups: [[u8; GROUP]; GROUPS as usize - 1],
+    /// Which of them are there, a bit each.
+    there: u8,
+    header: Option<Header>,
+}
+
+impl Default for Collector {
+    fn default() -> Self {
+        Self::NEW
+    }
+}
+
+impl Collector {
+    /// Nothing yet.
+    pub const NEW: Self = Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, header: None };
+
+    /// The header, once complete.
+    pub fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
+    /// Takes a message's own bytes: a group, or all of them.
+    ///
+    /// # Errors
+    /// An unknown wire version, missing bytes, a check that does not fit, values out of range.
+    pub fn take(&mut self, own: &[u8]) -> Result<Brought, NotAHeader> {
+        let [flags, bytes @ ..] = own else { return Err(NotAHeader::TooShort) };
+        let version = flags & 0x0F;
+        if version != WIRE_VERSION {
+            return Err(NotAHeader::Version { version });
+        }
+        let synchronised = flags >> 7 == 1;
+        let first: [u8; GROUP] = *bytes.first_chunk().ok_or(NotAHeader::TooShort)?;
+        if bytes.len() < usize::from(GROUPS) * GROUP {
+            return match flags >> 4 & 7 {
+                0 => Ok(Brought::Clock(Clock::parse(synchronised, first))),
+                GROUPS.. => Err(NotAHeader::Range),
+                group => self.take_group(usize::from(group) - 1, first),
+            };
+        }
+        let mut groups = [[0; GROUP]; GROUPS as usize - 1];
+        let rest = bytes.get(GROUP..).unwrap_or(&[]);
+        groups.as_flattened_mut().iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
+        let header = Header::parse(&groups)?;
+        if self.there != 0 && self.contradicts(&groups) {
+            return Ok(Brought::Contradiction);
+        }
+        *self = Self { groups, there: 0x3F, header: Some(header) };
+        Ok(Brought::Clock(Clock::parse(synchronised, first)))
+    }
+
+    fn contradicts(&self, groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> bool {
+        let mut both = self.groups.iter().zip(groups).enumerate();
+        both.any(|(i, (old, new))| self.there >> i & 1 == 1 && old != new)
+    }
+
+    fn take_group(&mut self, place: usize, group: [u8; GROUP]) -> Result<Brought, NotAHeader> {
+        let Some(slot) = self.groups.get_mut(place) else { return Err(NotAHeader::Range) };
+        let known = self.there >> place & 1 == 1;
+        if known && *slot != group {
+            return Ok(Brought::Contradiction);
+        }
+        *slot = group;
+        self.there |= 1 << place;
+        if known || self.there != 0x3F {
+            return Ok(Brought::Group);
+        }
+        match Header::parse(&self.groups) {
+            Ok(header) => {
+                self.header = Some(header);
+                Ok(Brought::Complete)
+            }
+            Err(error) => {
+                // some group was wrong, none says which
+                *self = Self::NEW;
+                Err(error)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn header() -> Header {
+        Header {
+            mount: WireMount {
+                origin: RoadPoint::new(-1234, 560),
+                height_cm: 600,
+                yaw: Angle::from_raw(-2731),
+                pitch: Angle::from_raw(728),
+                roll: Angle::from_raw(-1),
+            },
+            azimuth_origin: Angle::from_raw(-10968),
+            azimuth_span: 21936,
+            azimuths: 120,
+            cell_cm: 100,
+            ranges: 200,
+            usual: Known::new(15, 200),
+            planes: 1,
+            fingerprint: 0xDEAD_BEEF,
+        }
+    }
+
+    const CLOCK: Clock = Clock { time_ms: 0x01_0203_0405, synchronised: true };
+
+    #[test]
+    fn the_long_header_is_these_bytes() {
+        let expected = [
+            0x81, // clock set, wire version 1
+            0x01, 0x02, 0x03, 0x04, 0x05, // time
+            0xFF, 0xFB, 0x2E, 0x02, 0x58, // x = -1234, height 600
+            0x00, 0x02, 0x30, 0xF5, 0x55, // y = 560, yaw
+            0x02, 0xD8, 0xFF, 0xFF, 0x01, // pitch, roll, planes
+            0xD5, 0x28, 0x55, 0xB0, 119, // azimuths from -60.25 degrees on
+            0x00, 0x64, 199, 15, 199, // cells
+            0xDE, 0xAD, 0xBE, 0xEF, 0xD2, // fingerprint, check
+        ];
+        assert_eq!(header().emit(&CLOCK), expected);
+    }
+
+    #[test]
+    fn groups_come_in_any_order_and_more_than_once() {
+        let mut c = Collector::NEW;
+        for group in [6, 2, 2, 5, 1, 4] {
+            assert_eq!(c.take(&header().emit_group(&CLOCK, group)), Ok(Brought::Group));
+        }
+        assert_eq!(c.take(&header().emit_group(&CLOCK, 0)), Ok(Brought::Clock(CLOCK)));
+        assert!(c.header().is_none());
+        assert_eq!(c.take(&header().emit_group(&CLOCK, 3)), Ok(Brought::Complete));
+        assert_eq!(c.header(), Some(&header()));
+        let other = Header { azimuths: 119, ..header() };
+        assert_eq!(c.take(&other.emit_group(&CLOCK, 4)), Ok(Brought::Contradiction));
+        assert_eq!(c.take(&other.emit(&CLOCK)), Ok(Brought::Contradiction));
+        let mut c = Collector::NEW;
+        assert_eq!(c.take(&header().emit(&CLOCK)), Ok(Brought::Clock(CLOCK)));
+        assert_eq!(c.header(), Some(&header()));
+    }
+
+    #[test]
+    fn groups_of_two_headers_do_not_make_one() {
+        let other = Header { fingerprint: 1, ..header() };
+        let mut c = Collector::NEW;
+        (1..6).for_each(|group| assert_eq!(c.take(&other.emit_group(&CLOCK, group)), Ok(Brought::Group)));
+        let mut mixed = header().emit_group(&CLOCK, 6);
+        mixed[4] ^= 1;
+        assert_eq!(c.take(&mixed), Err(NotAHeader::Check));
+        assert_eq!(c, Collector::NEW);
+    }
+
+    #[test]
+    fn unknown_versions_and_impossible_sizes_are_refused() {
+        let take = |bytes: &[u8]| Collector::default().take(bytes);
+        let mut bytes = header().emit(&CLOCK);
+        bytes[0] = 0x82;
+        assert_eq!(take(&bytes), Err(NotAHeader::Version { version: 2 }));
+        assert_eq!(take(&[0x01, 0, 0]), Err(NotAHeader::TooShort));
+        let wide = Header { usual: Known::new(0, 201), ..header() };
+        assert_eq!(take(&wide.emit(&CLOCK)), Err(NotAHeader::Range));
+        let flat = Header { cell_cm: 0, ..header() };
+        assert_eq!(take(&flat.emit(&CLOCK)), Err(NotAHeader::Range));
+    }
+
+    #[test]
+    fn a_point_lies_in_the_same_cell_on_both_sides() {
+        let mount = Mount { x_m: -12.34, y_m: 5.6, height_m: 6.0, yaw_deg: -15.0, pitch_deg: 4.0, roll_deg: 1.0 };
+        let geometry = PolarGeometry {
+            levelling: mount.levelling().unwrap(),
+            cell_cm: 100,
+            azimuth_origin: Angle::from_degrees(-60.25),
+            azimuth_span: 21936,
+        };
+        let sent = Header::new::<200, 120>(&mount, &geometry, Known::new(15, 200), 1, 0).unwrap();
+        let received = sent.geometry();
+        for i in (-20_000..20_000).step_by(333) {
+            let p = RoadPoint::new(i, i / 3 - 1000);
+            let (here, there) = (geometry.levelling.place(p), received.levelling.place(p));
+            assert_eq!(here, there);
+            assert_eq!(received.locate(here.0, here.1, 200, 120), geometry.locate(here.0, here.1, 200, 120));
+        }
+        assert!(Header::new::<200, 200>(&mount, &geometry, Known::NONE, 1, 0).is_err());
+    }
+}

@@ -1,0 +1,162 @@
+//! One plane of a map on its way out: which azimuths are still to be told, and on what they build.
+//!
+//! # Model
+//! Azimuths are told in runs of the same kind. One that was refreshed not long ago, whose known cells
+//! are as they were, is told against that refresh; any other is refreshed. An azimuth that no block
+//! can hold goes out in plain bits. Only what was handed out whole is built upon.
+
+use super::code::block::{Block, Context, Kind, Rays};
+use super::code::ray::Ray;
+use super::scan_number::ScanNumber;
+use crate::bits::Bits;
+
+/// Azimuths, a bit each.
+pub(super) type Azimuths = Bits<4>;
+
+/// Most ticks between a refresh and a delta on it.
+pub const MOST_TICKS: u8 = 16;
+
+/// How a scan is told.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Telling {
+    pub context: Context,
+    pub scan: ScanNumber,
+    /// Whether everything is refreshed.
+    pub all: bool,
+}
+
+/// What goes out next of a plane.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Next {
+    /// Azimuths `start..` up to the block's end.
+    Block { kind: Kind, start: usize, block: Block },
+    /// An azimuth in plain bits.
+    Plain { azimuth: usize },
+}
+
+/// A plane as it is sent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layer<const A: usize, const W: usize> {
+    /// The scan being told.
+    now: [Ray<W>; A],
+    pending: Azimuths,
+    /// The refresh of each azimuth, and its scan.
+    was: [Ray<W>; A],
+    was_scan: [ScanNumber; A],
+    /// Which azimuths have one to build on.
+    refreshed: Azimuths,
+}
+
+/// The azimuths of a layer that are told in one way, from a start on.
+struct Run<'a, const A: usize, const W: usize> {
+    layer: &'a Layer<A, W>,
+    kind: Kind,
+    telling: &'a Telling,
+}
+
+impl<const A: usize, const W: usize> Rays<W> for Run<'_, A, W> {
+    fn now(&self, azimuth: usize) -> Option<&Ray<W>> {
+        let pending = self.layer.pending.get(azimuth) && self.layer.kind(azimuth, self.telling) == self.kind;
+        self.layer.now.get(azimuth).filter(|_| pending)
+    }
+
+    fn was(&self, azimuth: usize) -> Option<&Ray<W>> {
+        self.layer.was.get(azimuth)
+    }
+}
+
+impl<const A: usize, const W: usize> Layer<A, W> {
+    /// Nothing to tell.
+    pub const fn new() -> Self {
+        Self {
+            now: [Ray::UNKNOWN; A],
+            pending: Azimuths::NONE,
+            was: [Ray::UNKNOWN; A],
+            was_scan: [ScanNumber::from_byte(0); A],
+            refreshed: Azimuths::NONE,
+        }
+    }
+
+    /// Takes a scan; what was still to be told of the one before is not told any more.
+    pub fn offer(&mut self, scan: ScanNumber, azimuths: usize, ray: impl Fn(usize) -> Ray<W>) {
+        self.pending = Azimuths::span(0, azimuths.min(A));
+        for (azimuth, (now, was)) in self.now.iter_mut().zip(self.was_scan).enumerate().take(azimuths) {
+            *now = ray(azimuth);
+            if scan.ticks_after(was) > MOST_TICKS {
+                self.refreshed.clear(azimuth);
+            }
+        }
+    }
+
+    /// Builds on nothing from here on.
+    pub fn forget(&mut self) {
+        self.refreshed = Azimuths::NONE;
+        self.pending = Azimuths::NONE;
+    }
+
+    /// Azimuths still to be told.
+    pub fn pending(&self) -> u32 {
+        self.pending.count()
+    }
+
+    /// Tells no more of this scan.
+    pub fn give_up(&mut self) {
+        self.pending = Azimuths::NONE;
+    }
+
+    /// How an azimuth is told.
+    fn kind(&self, azimuth: usize, telling: &Telling) -> Kind {
+        let (Some(now), Some(was), Some(was_scan)) =
+            (self.now.get(azimuth), self.was.get(azimuth), self.was_scan.get(azimuth))
+        else {
+            return Kind::Refresh;
+        };
+        let ticks = telling.scan.ticks_after(*was_scan);
+        let builds = self.refreshed.get(azimuth) && now.known == was.known && (1..=MOST_TICKS).contains(&ticks);
+        if builds && !telling.all { Kind::Delta { ticks } } else { Kind::Refresh }
+    }
+
+    /// What goes out next, looking from an azimuth on and then from the first.
+    pub fn next(&mut self, telling: &Telling, from: usize) -> Option<Next> {
+        let start = self.pending.next(from).or_else(|| self.pending.next(0))?;
+        let mut kind = self.kind(start, telling);
+        let mut block = self.block(telling, kind, start);
+        if block.end == start && kind != Kind::Refresh {
+            // against its refresh it does not fit
+            self.refreshed.clear(start);
+            kind = Kind::Refresh;
+            block = self.block(telling, kind, start);
+        }
+        if kind == Kind::Refresh {
+            // receivers may take any part of it
+            (start..block.end.max(start + 1)).for_each(|azimuth| self.refreshed.clear(azimuth));
+        }
+        Some(if block.end == start { Next::Plain { azimuth: start } } else { Next::Block { kind, start, block } })
+    }
+
+    fn block(&self, telling: &Telling, kind: Kind, start: usize) -> Block {
+        let run = Run { layer: self, kind, telling };
+        Block::new(&telling.context, kind, start, &run)
+    }
+
+    /// What was handed out whole is told.
+    pub fn told(&mut self, kind: Option<Kind>, start: usize, end: usize, scan: ScanNumber) {
+        for azimuth in start..end.min(A) {
+            self.pending.clear(azimuth);
+            if kind == Some(Kind::Refresh) {
+                self.refreshed.set(azimuth);
+                if let (Some(was), Some(now)) = (self.was.get_mut(azimuth), self.now.get(azimuth)) {
+                    *was = *now;
+                }
+                if let Some(was_scan) = self.was_scan.get_mut(azimuth) {
+                    *was_scan = scan;
+                }
+            }
+        }
+    }
+
+    /// An azimuth of the scan being told.
+    pub fn now(&self, azimuth: usize) -> &Ray<W> {
+        self.now.get(azimuth).unwrap_or(&Ray::UNKNOWN)
+    }
+}

@@ -1,0 +1,117 @@
+//! A received map, as consumers ask it.
+
+use super::sensor::SensorReceiver;
+use super::session::Limits;
+use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use crate::polar::PolarGeometry;
+use crate::time::Time;
+use crate::wire::code::ray::Ray;
+use crate::wire::header::Header;
+use crate::wire::message::Plane;
+use crate::wire::scan_number::ScanNumber;
+
+/// The map of one sensor at a moment. Everything is unknown that is not known to be current.
+///
+/// Grades come in four steps where the grade plane is sent, else they are 0 and 255. Occupancy needs
+/// its plane; without it nothing is said to be free.
+#[derive(Debug, Clone, Copy)]
+pub struct ReceivedMap<'a, const A: usize, const W: usize, const P: usize> {
+    /// Sensor, header and geometry, where there is something to tell.
+    told: Option<(&'a SensorReceiver<A, W, P>, &'a Header, PolarGeometry)>,
+    now: Time,
+    limits: Limits,
+}
+
+/// Occupancy where it is not sent.
+const NOT_SENT: u8 = 128;
+
+impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P> {
+    pub(super) fn new(sensor: Option<&'a SensorReceiver<A, W, P>>, now: Time, limits: Limits) -> Self {
+        let trusted = sensor.filter(|sensor| sensor.trusted(now, &limits));
+        let told = trusted.and_then(|sensor| sensor.header().map(|header| (sensor, header, header.geometry())));
+        Self { told, now, limits }
+    }
+
+    /// What the map is of; `None` where everything is unknown.
+    pub fn header(&self) -> Option<&'a Header> {
+        self.told.as_ref().map(|(_, header, _)| *header)
+    }
+
+    /// An azimuth of a plane; unknown where it is not sent or not current.
+    pub fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
+        let ray = self.told.as_ref().and_then(|(sensor, ..)| sensor.current(plane, azimuth, self.now, &self.limits));
+        ray.map_or(Ray::UNKNOWN, |(ray, _)| ray)
+    }
+
+    /// The scan an azimuth's visibility is of; `None` where it is unknown.
+    pub fn scan(&self, azimuth: usize) -> Option<ScanNumber> {
+        let (sensor, ..) = self.told.as_ref()?;
+        sensor.current(Plane::Visibility, azimuth, self.now, &self.limits).map(|(_, scan)| scan)
+    }
+
+    /// Whether a plane is sent.
+    pub fn has(&self, plane: Plane) -> bool {
+        plane.index() < P && self.header().is_some_and(|header| header.planes >> plane.index() & 1 == 1)
+    }
+
+    /// What is known of a cell.
+    pub fn cell(&self, azimuth: usize, range: usize) -> CellState {
+        let visibility = self.ray(Plane::Visibility, azimuth);
+        if !visibility.known.contains(range) {
+            return CellState::UNKNOWN;
+        }
+        let visible = visibility.get(range);
+        let bit = |plane| {
+            let ray = Some(self.ray(plane, azimuth)).filter(|_| self.has(plane));
+            ray.filter(|ray| ray.known.contains(range)).map(|ray| ray.get(range))
+        };
+        let grade = match (visible, bit(Plane::Grade)) {
+            (true, None | Some(true)) => u8::MAX,
+            (true, Some(false)) => 170,
+            (false, Some(true)) => 85,
+            (false, None | Some(false)) => 0,
+        };
+        let occupied = bit(Plane::Occupancy);
+        CellState {
+            visibility: if visible { Visibility::Visible } else { Visibility::Invisible },
+            grade,
+            occupancy: occupied.map_or(NOT_SENT, |occupied| if occupied { u8::MAX } else { 0 }),
+            occupied: occupied.unwrap_or(true),
+        }
+    }
+}
+
+impl<const A: usize, const W: usize, const P: usize> VisibilityMap for ReceivedMap<'_, A, W, P> {
+    fn at(&self, point: RoadPoint) -> CellState {
+        let Some((_, header, geometry)) = &self.told else { return CellState::UNKNOWN };
+        let (x, y) = geometry.levelling.place(point);
+        let cell = geometry.locate(x, y, usize::from(header.ranges), usize::from(header.azimuths));
+        cell.map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))
+    }
+}
+
+/// The maps of all sensors at a moment: visible is what any of them sees.
+#[derive(Debug, Clone, Copy)]
+pub struct Together<'a, const N: usize, const A: usize, const W: usize, const P: usize> {
+    maps: [ReceivedMap<'a, A, W, P>; N],
+}
+
+impl<'a, const N: usize, const A: usize, const W: usize, const P: usize> Together<'a, N, A, W, P> {
+    pub(super) fn new(maps: [ReceivedMap<'a, A, W, P>; N]) -> Self {
+        Self { maps }
+    }
+}
+
+impl<const N: usize, const A: usize, const W: usize, const P: usize> VisibilityMap for Together<'_, N, A, W, P> {
+    /// The clearest state of all sensors; occupied if any that sees the place says so.
+    fn at(&self, point: RoadPoint) -> CellState {
+        self.maps.iter().map(|map| map.at(point)).fold(CellState::UNKNOWN, |a, b| {
+            let (better, worse) = if (b.visibility, b.grade) > (a.visibility, a.grade) { (b, a) } else { (a, b) };
+            if better.visible() && worse.visible() {
+                let occupied = better.occupied || worse.occupied;
+                return CellState { occupancy: better.occupancy.max(worse.occupancy), occupied, ..better };
+            }
+            better
+        })
+    }
+}

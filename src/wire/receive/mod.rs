@@ -1,0 +1,132 @@
+//! Frames in, maps of several sensors out: the receiver, and why it can be trusted.
+//!
+//! # Fail-safe
+//! Let `A` be the greatest age ([`Limits::max_age_us`]) and `D` the greatest delay between measurement
+//! and reception that the integrator guarantees ([`Limits::max_delay_us`]). *When the receiver answers
+//! visible, the sender's map of the same sensor, epoch and geometry, measured at most `A + D` ago, had
+//! that cell visible, and no accepted frame of a newer scan says otherwise.* It holds under any loss,
+//! truncation and interleaving, and under repetition and reordering displaced by less than half the
+//! period of the scan numbers. Why:
+//!
+//! - *The cell was visible in the scan the sector is marked with.* A refresh decodes alone. A delta
+//!   decodes only against the refresh of exactly the scan it names, azimuth by azimuth. Words are joined
+//!   only within one plane, scan and start, where a sender tells one block; words missing end the
+//!   decoding before the first ray that needs them.
+//! - *The scan is the one its number says.* Numbers come again after 5.12 s. Every map frame passes the
+//!   check of its lag, so what is accepted was measured at most `2 D` before it came; sectors,
+//!   refreshes and words are dropped long before 5.12 s; silence of half a period ends the session.
+//! - *The scan was measured at most `A + D` ago.* A sector is told while its number is at most `A` (less
+//!   25 ms for a tick and for drifting clocks) behind the clocks' difference as the fastest frame of
+//!   the session showed it. That frame took at most `D`: a session tells nothing before it is `A + D` old and has
+//!   heard 8 map frames, so that not all of them were late ones, and when a frame turns out faster by
+//!   more than `D` the session begins anew.
+//! - *Sensor, epoch and geometry are the same.* The sensor is in the identifier or in the message, and in
+//!   the protection's data ID. A frame of a new epoch empties the maps, the old epoch is refused for
+//!   `A + D`, and a header's groups are checked together. Senders are quiet for `A + D` after a change.
+//!   Two epochs that alternate, and groups that contradict those of the same epoch, are two senders
+//!   with one number: a conflict is reported and everything is unknown.
+//! - *No newer frame says otherwise.* A sector takes what is newer by its number, whatever order frames
+//!   come in. Frames that cannot be decoded say nothing; what they would have said stays unsaid until the
+//!   sector has aged.
+//!
+//! Corruption passes at the check sum's residual rate. What the integrator owes: `D`, and a sender whose
+//! mailboxes are aborted after its deadline.
+//!
+//! # Limits
+//! For 120 azimuths by 200 ranges below 8 kB a sensor, ages included.
+
+mod assembly;
+mod map;
+mod sectors;
+mod sensor;
+mod session;
+
+pub use map::{ReceivedMap, Together};
+pub use sensor::{Accepted, Condition, Counters, Refused, SensorReceiver};
+pub use session::{ENOUGH, Limits};
+
+use super::frame::CanFrame;
+use super::message::{Addresses, NotAMessage, Received};
+use crate::time::Time;
+
+/// Receives the maps of `N` sensors: at most `A` azimuths of `32 W` ranges, the first `P` planes.
+#[derive(Debug, Clone)]
+pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usize = 1> {
+    addresses: Addresses,
+    limits: Limits,
+    sensors: [(u8, SensorReceiver<A, W, P>); N],
+    foreign: u32,
+}
+
+impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N, A, W, P> {
+    /// Of these sensors, and no others.
+    pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits) -> Self {
+        Self { addresses, limits, sensors: sensors.map(|number| (number, SensorReceiver::NEW)), foreign: 0 }
+    }
+
+    /// Takes a CAN or CAN FD frame.
+    ///
+    /// # Errors
+    /// Why it is not used.
+    pub fn frame(&mut self, now: Time, frame: &CanFrame) -> Result<Accepted, Refused> {
+        let addresses = self.addresses;
+        let received = Received::from_frame(frame, &addresses);
+        let sensor = addresses.message(frame.id).map(|(sensor, _)| sensor);
+        self.received(now, received, sensor)
+    }
+
+    /// Takes a message from a serial line.
+    ///
+    /// # Errors
+    /// Why it is not used.
+    pub fn message(&mut self, now: Time, bytes: &[u8]) -> Result<Accepted, Refused> {
+        let sensor = bytes.get(4).copied();
+        self.received(now, Received::from_bytes(bytes), sensor)
+    }
+
+    /// Takes a message that is checked already, and opened if it was secured.
+    ///
+    /// # Errors
+    /// Why it is not used.
+    pub fn checked(&mut self, now: Time, message: &Received<'_>) -> Result<Accepted, Refused> {
+        self.received(now, Ok(*message), Some(message.sensor))
+    }
+
+    fn received(
+        &mut self,
+        now: Time,
+        received: Result<Received<'_>, NotAMessage>,
+        sensor: Option<u8>,
+    ) -> Result<Accepted, Refused> {
+        let limits = self.limits;
+        let found = self.sensors.iter_mut().find(|(number, _)| Some(*number) == sensor);
+        let Some((_, sensor)) = found.filter(|_| received != Err(NotAMessage::Foreign)) else {
+            self.foreign = self.foreign.saturating_add(1);
+            return Err(Refused::NotAMessage(NotAMessage::Foreign));
+        };
+        match received {
+            Ok(received) => sensor.take(now, &received, &limits),
+            Err(error) => Err(sensor.refuse(Refused::NotAMessage(error))),
+        }
+    }
+
+    /// Frames of nobody's, or of sensors that are not listened to.
+    pub fn foreign(&self) -> u32 {
+        self.foreign
+    }
+
+    /// What is known of a sensor.
+    pub fn sensor(&self, number: u8) -> Option<&SensorReceiver<A, W, P>> {
+        self.sensors.iter().find(|(n, _)| *n == number).map(|(_, sensor)| sensor)
+    }
+
+    /// A sensor's map as it is now; everything is unknown where it cannot be trusted.
+    pub fn map(&self, number: u8, now: Time) -> ReceivedMap<'_, A, W, P> {
+        ReceivedMap::new(self.sensor(number), now, self.limits)
+    }
+
+    /// All sensors' maps as they are now.
+    pub fn together(&self, now: Time) -> Together<'_, N, A, W, P> {
+        Together::new(self.sensors.each_ref().map(|(_, sensor)| ReceivedMap::new(Some(sensor), now, self.limits)))
+    }
+}

@@ -1,0 +1,350 @@
+//! How the sender is: state, reasons, counters; at least twice a second, also when faulty.
+//!
+//! # Model
+//! Six pages of four bytes. State and reason stand in every message; a long message carries all
+//! pages one after another, a classic one carries one. All numbers are big-endian.
+//!
+//! | page | bytes |
+//! |---|---|
+//! | 0 | uptime, s |
+//! | 1 | firmware version: major, minor, patch; wire version |
+//! | 2 | fingerprint of the configuration |
+//! | 3 | radar frames lost, 2 bytes; azimuths of maps dropped on sending, 2 bytes |
+//! | 4 | frames received with failed protection, 2 bytes; times bus-off, 2 bytes |
+//! | 5 | cause of the last reset; 3 bytes kept free, 0 |
+//!
+//! Counters stay at their largest value.
+
+use super::message::{CLASSIC_BYTES, WIRE_VERSION};
+
+/// Pages of a status.
+pub const PAGES: u8 = 6;
+
+/// Own bytes of a long status.
+pub const LONG: usize = 2 + 4 * PAGES as usize;
+
+/// What the sender's maps are worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum State {
+    /// No map yet.
+    #[default]
+    Starting,
+    /// Maps are sent.
+    Ok,
+    /// The radar is blind: maps say unknown.
+    Blind,
+    /// Maps are sent, but something is not as it should be.
+    Degraded,
+    /// No maps.
+    Fault,
+}
+
+/// Why a state is not ok.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Reason {
+    /// None.
+    #[default]
+    None,
+    /// The radar sends nothing.
+    RadarSilent,
+    /// The radar reports a fault of its own.
+    RadarFault,
+    /// The radar is not configured as it should be.
+    RadarConfiguration,
+    /// Scans arrive incomplete.
+    IncompleteScans,
+    /// The configuration block cannot be used.
+    Configuration,
+    /// A clock stepped.
+    ClockStepped,
+    /// The bus takes fewer frames than there are.
+    BusOverload,
+    /// The controller was bus-off.
+    BusOff,
+    /// The time of a frame was exceeded.
+    Overrun,
+    /// A number given by the integrator, or by a later version.
+    Other(u8),
+}
+
+impl Reason {
+    /// The reason's number.
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::None => 0,
+            Self::RadarSilent => 1,
+            Self::RadarFault => 2,
+            Self::RadarConfiguration => 3,
+            Self::IncompleteScans => 4,
+            Self::Configuration => 5,
+            Self::ClockStepped => 6,
+            Self::BusOverload => 7,
+            Self::BusOff => 8,
+            Self::Overrun => 9,
+            Self::Other(number) => number,
+        }
+    }
+
+    /// The reason of a number.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::None,
+            1 => Self::RadarSilent,
+            2 => Self::RadarFault,
+            3 => Self::RadarConfiguration,
+            4 => Self::IncompleteScans,
+            5 => Self::Configuration,
+            6 => Self::ClockStepped,
+            7 => Self::BusOverload,
+            8 => Self::BusOff,
+            9 => Self::Overrun,
+            other => Self::Other(other),
+        }
+    }
+}
+
+/// Why the sender last started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ResetCause {
+    /// Not told.
+    #[default]
+    Unknown,
+    /// Power came.
+    PowerOn,
+    /// The reset pin.
+    External,
+    /// Asked for, as after a change of configuration.
+    Software,
+    /// The watchdog.
+    Watchdog,
+    /// The supply fell too low.
+    BrownOut,
+    /// A panic or a processor fault.
+    Crash,
+    /// A number of a later version.
+    Other(u8),
+}
+
+impl ResetCause {
+    /// The cause's number.
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Unknown => 0,
+            Self::PowerOn => 1,
+            Self::External => 2,
+            Self::Software => 3,
+            Self::Watchdog => 4,
+            Self::BrownOut => 5,
+            Self::Crash => 6,
+            Self::Other(number) => number,
+        }
+    }
+
+    /// The cause of a number.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::Unknown,
+            1 => Self::PowerOn,
+            2 => Self::External,
+            3 => Self::Software,
+            4 => Self::Watchdog,
+            5 => Self::BrownOut,
+            6 => Self::Crash,
+            other => Self::Other(other),
+        }
+    }
+}
+
+/// The whole status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Status {
+    /// What the maps are worth.
+    pub state: State,
+    /// Why not more.
+    pub reason: Reason,
+    /// Why the sender last started.
+    pub reset_cause: ResetCause,
+    /// Since the start, seconds.
+    pub uptime_s: u32,
+    /// Major, minor, patch.
+    pub firmware: [u8; 3],
+    /// Wire version.
+    pub wire_version: u8,
+    /// Fingerprint of the configuration.
+    pub fingerprint: u32,
+    /// Radar frames lost.
+    pub radar_lost: u16,
+    /// Azimuths of maps dropped on sending.
+    pub dropped: u16,
+    /// Frames received with failed protection.
+    pub e2e_errors: u16,
+    /// Times the controller was bus-off.
+    pub bus_off: u16,
+}
+
+/// Why bytes are no status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum NotAStatus {
+    /// Bytes are missing.
+    TooShort,
+    /// A page that does not exist.
+    Page {
+        /// Its number.
+        page: u8,
+    },
+    /// A state that does not exist.
+    State {
+        /// Its number.
+        state: u8,
+    },
+}
+
+impl Status {
+    /// A status before anything is known.
+    pub const fn starting(fingerprint: u32) -> Self {
+        Self {
+            state: State::Starting,
+            reason: Reason::None,
+            reset_cause: ResetCause::Unknown,
+            uptime_s: 0,
+            firmware: [0; 3],
+            wire_version: WIRE_VERSION,
+            fingerprint,
+            radar_lost: 0,
+            dropped: 0,
+            e2e_errors: 0,
+            bus_off: 0,
+        }
+    }
+
+    fn page(&self, page: u8) -> [u8; 4] {
+        let pair = |a: u16, b: u16| (u32::from(a) << 16 | u32::from(b)).to_be_bytes();
+        let [major, minor, patch] = self.firmware;
+        match page {
+            0 => self.uptime_s.to_be_bytes(),
+            1 => [major, minor, patch, self.wire_version],
+            2 => self.fingerprint.to_be_bytes(),
+            3 => pair(self.radar_lost, self.dropped),
+            4 => pair(self.e2e_errors, self.bus_off),
+            _ => [self.reset_cause.number(), 0, 0, 0],
+        }
+    }
+
+    fn take_page(&mut self, page: u8, bytes: [u8; 4]) -> Result<(), NotAStatus> {
+        let [a, b, c, d] = bytes;
+        let pair = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+        match page {
+            0 => self.uptime_s = u32::from_be_bytes(bytes),
+            1 => (self.firmware, self.wire_version) = ([a, b, c], d),
+            2 => self.fingerprint = u32::from_be_bytes(bytes),
+            3 => (self.radar_lost, self.dropped) = pair,
+            4 => (self.e2e_errors, self.bus_off) = pair,
+            5 => self.reset_cause = ResetCause::from_number(a),
+            page => return Err(NotAStatus::Page { page }),
+        }
+        Ok(())
+    }
+
+    /// Own bytes of the classic message that carries a page, 0 to 5.
+    pub fn emit_page(&self, page: u8) -> [u8; CLASSIC_BYTES] {
+        let [a, b, c, d] = self.page(page);
+        [page << 4 | self.state as u8, self.reason.number(), a, b, c, d]
+    }
+
+    /// Own bytes of a long message.
+    pub fn emit(&self) -> [u8; LONG] {
+        let mut bytes = [0; LONG];
+        let pages = (0..PAGES).flat_map(|page| self.page(page));
+        let all = [self.state as u8, self.reason.number()].into_iter().chain(pages);
+        bytes.iter_mut().zip(all).for_each(|(to, from)| *to = from);
+        bytes
+    }
+
+    /// Takes a message's own bytes: one page, or all of them.
+    ///
+    /// # Errors
+    /// Bytes missing, a page or a state that does not exist.
+    pub fn take(&mut self, own: &[u8]) -> Result<(), NotAStatus> {
+        let [first, reason, pages @ ..] = own else { return Err(NotAStatus::TooShort) };
+        let state = match first & 0x0F {
+            0 => State::Starting,
+            1 => State::Ok,
+            2 => State::Blind,
+            3 => State::Degraded,
+            4 => State::Fault,
+            state => return Err(NotAStatus::State { state }),
+        };
+        let (chunks, _) = pages.as_chunks::<4>();
+        let mut new = Self { state, reason: Reason::from_number(*reason), ..*self };
+        match chunks {
+            [] => return Err(NotAStatus::TooShort),
+            [page] => new.take_page(first >> 4, *page)?,
+            pages if pages.len() >= usize::from(PAGES) => {
+                (0..PAGES).zip(pages).try_for_each(|(number, page)| new.take_page(number, *page))?;
+            }
+            _ => return Err(NotAStatus::TooShort),
+        }
+        *self = new;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STATUS: Status = Status {
+        state: State::Blind,
+        reason: Reason::RadarSilent,
+        reset_cause: ResetCause::Watchdog,
+        uptime_s: 0x0102_0304,
+        firmware: [1, 2, 3],
+        wire_version: 1,
+        fingerprint: 0xCAFE_F00D,
+        radar_lost: 0x1122,
+        dropped: 0x3344,
+        e2e_errors: 0x5566,
+        bus_off: 7,
+    };
+
+    #[test]
+    fn the_long_status_is_these_bytes() {
+        let expected = [
+            2, 1, 1, 2, 3, 4, 1, 2, 3, 1, 0xCA, 0xFE, 0xF0, 0x0D, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0, 7, 4, 0, 0, 0,
+        ];
+        assert_eq!(STATUS.emit(), expected);
+        let mut got = Status::starting(0);
+        got.take(&expected).unwrap();
+        assert_eq!(got, STATUS);
+    }
+
+    #[test]
+    fn pages_add_up_to_the_status() {
+        assert_eq!(STATUS.emit_page(3), [0x32, 1, 0x11, 0x22, 0x33, 0x44]);
+        let mut got = Status::starting(0);
+        for page in 0..6 {
+            got.take(&STATUS.emit_page(page)).unwrap();
+            assert_eq!((got.state, got.reason), (State::Blind, Reason::RadarSilent), "in every page");
+        }
+        assert_eq!(got, STATUS);
+    }
+
+    #[test]
+    fn what_is_no_status_changes_nothing() {
+        let mut got = STATUS;
+        assert_eq!(got.take(&[0x05, 0, 0, 0, 0, 0]), Err(NotAStatus::State { state: 5 }));
+        assert_eq!(got.take(&[0x60, 0, 0, 0, 0, 0]), Err(NotAStatus::Page { page: 6 }));
+        assert_eq!(got.take(&[0x00, 0, 1]), Err(NotAStatus::TooShort));
+        assert_eq!(got.take(&[0x00, 0, 1, 2, 3, 4, 5, 6, 7, 8]), Err(NotAStatus::TooShort));
+        assert_eq!(got, STATUS);
+        for number in 0..=255 {
+            assert_eq!(Reason::from_number(number).number(), number);
+            assert_eq!(ResetCause::from_number(number).number(), number);
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! What a log of a bus tells of the maps on it.
+
+use serde::Serialize;
+use viewshed::map::{CellState, Visibility};
+use viewshed::time::Time;
+use viewshed::wire::message::{Addresses, Plane};
+use viewshed::wire::receive::{Condition, Limits, ReceivedMap, Receiver};
+
+use crate::recording::candump::Line;
+
+/// Sensors, azimuths, words of ranges and planes there is room for: all of them.
+pub const SENSORS: u8 = 8;
+const A: usize = 128;
+const W: usize = 8;
+const P: usize = 3;
+
+/// A received map at a moment.
+pub type Map<'a> = ReceivedMap<'a, A, W, P>;
+
+/// Listens to a log.
+pub struct Listening {
+    receiver: Box<Receiver<{ SENSORS as usize }, A, W, P>>,
+    limits: Limits,
+    frames: u64,
+    last: Time,
+}
+
+/// Cells of one map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Moment {
+    /// On the log's clock.
+    pub time_s: f64,
+    pub visible: usize,
+    pub invisible: usize,
+    pub unknown: usize,
+}
+
+/// What one sensor said.
+#[derive(Debug, Clone, Serialize)]
+pub struct Heard {
+    pub sensor: u8,
+    pub condition: String,
+    pub epoch: Option<u8>,
+    pub header: Option<Mounted>,
+    pub status: Option<Told>,
+    pub counters: Counted,
+    pub maps: Vec<Moment>,
+}
+
+/// Mount and geometry.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mounted {
+    pub x_m: f64,
+    pub y_m: f64,
+    pub height_m: f64,
+    pub yaw_deg: f64,
+    pub pitch_deg: f64,
+    pub roll_deg: f64,
+    pub azimuths: u8,
+    /// Right edge of the first, left edge of the last.
+    pub azimuth_deg: [f64; 2],
+    pub ranges: u16,
+    pub cell_m: f64,
+    pub fingerprint: u32,
+}
+
+/// The status.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Told {
+    pub state: String,
+    pub reason: String,
+    pub reset_cause: String,
+    pub uptime_s: u32,
+    pub firmware: [u8; 3],
+    pub wire_version: u8,
+    pub fingerprint: u32,
+    pub radar_lost: u16,
+    pub dropped: u16,
+    pub e2e_errors: u16,
+    pub bus_off: u16,
+}
+
+/// What happened to its frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Counted {
+    pub accepted: u32,
+    pub protection: u32,
+    pub lost: u32,
+    pub repeated: u32,
+    pub out_of_sequence: u32,
+    pub late: u32,
+    pub epoch: u32,
+    pub early: u32,
+    pub malformed: u32,
+}
+
+impl Listening {
+    pub fn new(addresses: Addresses) -> Self {
+        let sensors = std::array::from_fn(|number| number as u8);
+        let limits = Limits::DEFAULT;
+        let receiver = Box::new(Receiver::new(sensors, addresses, limits));
+        Self { receiver, limits, frames: 0, last: Time::from_micros(0) }
+    }
+
+    /// Takes a line of the log.
+    pub fn take(&mut self, line: &Line) {
+        let Some(frame) = line.frame() else { return };
+        self.frames += 1;
+        self.last = Time::from_micros(u64::try_from(line.time_ns / 1000).unwrap_or(0));
+        // what is refused is counted there
+        let _ = self.receiver.frame(self.last, frame);
+    }
+
+    /// Frames so far.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Frames that are of none of the sensors.
+    pub fn foreign(&self) -> u32 {
+        self.receiver.foreign()
+    }
+
+    /// The sensors heard, by number.
+    pub fn sensors(&self) -> Vec<u8> {
+        let heard = |number: &u8| self.receiver.sensor(*number).is_some_and(|s| s.epoch().is_some());
+        (0..SENSORS).filter(heard).collect()
+    }
+
+    /// A sensor's map as it is now.
+    pub fn map(&self, sensor: u8) -> Map<'_> {
+        self.receiver.map(sensor, self.last)
+    }
+
+    /// Counts a sensor's map as it is now; `None` where it is unknown what there is to count.
+    pub fn moment(&self, sensor: u8) -> Option<Moment> {
+        let map = self.map(sensor);
+        let header = map.header()?;
+        let mut moment = Moment { time_s: self.last.micros() as f64 / 1e6, visible: 0, invisible: 0, unknown: 0 };
+        for azimuth in 0..usize::from(header.azimuths) {
+            let ray = map.ray(Plane::Visibility, azimuth);
+            let (known, visible) = (ray.known.end().saturating_sub(ray.known.near()), ray.bits().count() as usize);
+            moment.visible += visible;
+            moment.invisible += known - visible;
+            moment.unknown += usize::from(header.ranges) - known;
+        }
+        Some(moment)
+    }
+
+    /// Everything heard of a sensor; `maps` as counted on the way.
+    pub fn heard(&self, number: u8, maps: Vec<Moment>) -> Option<Heard> {
+        let sensor = self.receiver.sensor(number)?;
+        let header = sensor.header().map(|h| {
+            let degrees = |angle: viewshed::angle::Angle| f64::from(angle.radians()).to_degrees();
+            let right = degrees(h.azimuth_origin);
+            Mounted {
+                x_m: f64::from(h.mount.origin.x_cm) / 100.0,
+                y_m: f64::from(h.mount.origin.y_cm) / 100.0,
+                height_m: f64::from(h.mount.height_cm) / 100.0,
+                yaw_deg: degrees(h.mount.yaw),
+                pitch_deg: degrees(h.mount.pitch),
+                roll_deg: degrees(h.mount.roll),
+                azimuths: h.azimuths,
+                azimuth_deg: [right, right + f64::from(h.azimuth_span) / 65536.0 * 360.0],
+                ranges: h.ranges,
+                cell_m: f64::from(h.cell_cm) / 100.0,
+                fingerprint: h.fingerprint,
+            }
+        });
+        let status = sensor.status().map(|s| Told {
+            state: format!("{:?}", s.state),
+            reason: format!("{:?}", s.reason),
+            reset_cause: format!("{:?}", s.reset_cause),
+            uptime_s: s.uptime_s,
+            firmware: s.firmware,
+            wire_version: s.wire_version,
+            fingerprint: s.fingerprint,
+            radar_lost: s.radar_lost,
+            dropped: s.dropped,
+            e2e_errors: s.e2e_errors,
+            bus_off: s.bus_off,
+        });
+        let c = sensor.counters();
+        let counters = Counted {
+            accepted: c.accepted,
+            protection: c.protection,
+            lost: c.lost,
+            repeated: c.repeated,
+            out_of_sequence: c.out_of_sequence,
+            late: c.late,
+            epoch: c.epoch,
+            early: c.early,
+            malformed: c.malformed,
+        };
+        let condition = match sensor.condition(self.last, &self.limits) {
+            Condition::Waiting => "waiting",
+            Condition::NoHeader => "no header",
+            Condition::Unusable => "unusable",
+            Condition::Conflict => "conflict",
+            Condition::Ok => "ok",
+        };
+        let epoch = sensor.epoch().map(|epoch| epoch.number());
+        Some(Heard { sensor: number, condition: condition.into(), epoch, header, status, counters, maps })
+    }
+}
+
+/// A cell as pictures show it: occupied only where that is told.
+pub fn shown(map: &Map<'_>, azimuth: usize, range: usize) -> CellState {
+    let cell = map.cell(azimuth, range);
+    let occupied = cell.occupied && map.has(Plane::Occupancy) && cell.visibility != Visibility::Unknown;
+    CellState { occupied, ..cell }
+}

@@ -1,0 +1,78 @@
+//! How busy a bus is.
+
+use serde::Serialize;
+
+use super::traffic::Traffic;
+
+/// Shares of a bus, 0 to 1.
+#[derive(Debug, Clone, Serialize)]
+pub struct Load {
+    pub name: &'static str,
+    /// Of all windows of a second.
+    pub load_median: f64,
+    /// The worst window of a second.
+    pub load_worst: f64,
+    /// Every frame counts, status and header too.
+    pub frames_per_scan: f64,
+    /// Data bytes; on a serial line all of them.
+    pub bytes_per_scan: f64,
+}
+
+/// Time before the first map, in which a sender is quiet, microseconds.
+const QUIET_US: u64 = 400_000;
+
+impl Load {
+    pub fn new(traffic: &Traffic) -> Self {
+        let begin = traffic.sent.first().map_or(0, |s| s.at.micros()) + QUIET_US;
+        let sent: Vec<(u64, f64)> =
+            traffic.sent.iter().map(|s| (s.at.micros(), s.duration_s)).filter(|(at, _)| *at >= begin).collect();
+        let counted = traffic.sent.iter().filter(|s| s.at.micros() >= begin);
+        let (frames, bytes) = counted.fold((0, 0), |(n, b), s| (n + 1, b + s.bytes.len()));
+        let mut windows = windows(&sent);
+        windows.sort_by(f64::total_cmp);
+        let per_scan = |n: usize| n as f64 / traffic.scans.max(1) as f64;
+        Self {
+            name: traffic.bus.name,
+            load_median: windows.get(windows.len() / 2).copied().unwrap_or(0.0),
+            load_worst: windows.last().copied().unwrap_or(0.0),
+            frames_per_scan: per_scan(frames),
+            bytes_per_scan: per_scan(bytes),
+        }
+    }
+}
+
+/// The load of every window of a second that begins with a frame and ends before the last one.
+fn windows(sent: &[(u64, f64)]) -> Vec<f64> {
+    let Some(last) = sent.last() else { return Vec::new() };
+    let (mut end, mut busy) = (0, 0.0);
+    let mut windows = Vec::new();
+    for (at, duration) in sent {
+        while let Some((_, more)) = sent.get(end).filter(|(t, _)| *t < at + 1_000_000) {
+            busy += more;
+            end += 1;
+        }
+        if at + 1_000_000 > last.0 && !windows.is_empty() {
+            break;
+        }
+        windows.push(busy);
+        busy -= duration;
+    }
+    windows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_hold_what_begins_within_a_second() {
+        // a frame of 10 ms every 100 ms, and a burst in the third second
+        let mut sent: Vec<(u64, f64)> = (0..50).map(|k| (k * 100_000, 0.01)).collect();
+        sent.extend((0..20).map(|k| (2_500_000 + k * 1000, 0.01)));
+        sent.sort_by_key(|s| s.0);
+        let windows = windows(&sent);
+        assert!((windows[0] - 0.1).abs() < 1e-9);
+        let worst = windows.iter().copied().fold(0.0, f64::max);
+        assert!((worst - 0.3).abs() < 1e-9, "{worst}");
+    }
+}

@@ -1,0 +1,100 @@
+//! What a receiver makes of a bus that loses frames.
+
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use serde::Serialize;
+use viewshed::time::Time;
+use viewshed::wire::broadcast::Medium;
+use viewshed::wire::message::{Addresses, Plane};
+use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::serial::Unstuffer;
+
+use super::traffic::{A, Maps, Traffic, W};
+
+/// Shares of frames lost.
+pub const LOSSES: [f64; 4] = [0.0, 0.01, 0.05, 0.2];
+
+/// Time a receiver is given to settle, microseconds.
+const SETTLING_US: u64 = 1_500_000;
+
+/// What arrived at one rate of loss.
+#[derive(Debug, Clone, Serialize)]
+pub struct Arrived {
+    pub name: &'static str,
+    /// Share of frames lost.
+    pub loss: f64,
+    /// Scans compared, each when the next one was measured.
+    pub scans: usize,
+    /// Share of the sender's visible cells reported visible: median and lowest twentieth of the scans.
+    pub visible_median: f64,
+    pub visible_p05: f64,
+    /// Share of scans in which every cell is the same.
+    pub equal: f64,
+    /// Cells reported visible that no scan of the last A + D had visible, in all.
+    pub wrongly_visible: u64,
+}
+
+impl Arrived {
+    /// Feeds what was sent into a receiver and compares after every scan.
+    pub fn new(maps: &Maps, traffic: &Traffic, loss: f64, sensor: u8) -> Self {
+        let addresses = match traffic.bus.medium {
+            Medium::Can(addresses) | Medium::CanFd(addresses) => addresses,
+            Medium::Serial => Addresses::STANDARD,
+        };
+        let mut receiver = Box::new(Receiver::<1, A, W>::new([sensor], addresses, Limits::DEFAULT));
+        let mut unstuffer = Unstuffer::new();
+        let mut random = Pcg64::seed_from_u64(1);
+        let (mut shares, mut equal, mut wrongly_visible) = (Vec::new(), 0, 0);
+        let settled = maps.scans.first().map_or(0, |scan| scan.measured.micros()) + SETTLING_US;
+        let mut sent = traffic.sent.iter().peekable();
+        for (k, scan) in maps.scans.iter().enumerate() {
+            while let Some(one) = sent.next_if(|one| one.scans <= k + 1) {
+                if (f64::from(random.next_u32()) + 0.5) / 4_294_967_296.0 < loss {
+                    continue;
+                }
+                let at = Time::from_micros(one.at.micros() + (one.duration_s * 1e6) as u64);
+                match &one.frame {
+                    Some(frame) => drop(receiver.frame(at, frame).is_ok()),
+                    None => {
+                        if let (_, Some(message)) = unstuffer.push(&one.bytes) {
+                            let _ = receiver.message(at, message);
+                        }
+                    }
+                }
+            }
+            let Some(next) = maps.scans.get(k + 1).filter(|_| scan.measured.micros() >= settled) else { continue };
+            let map = receiver.map(sensor, next.measured);
+            let (mut visible, mut arrived, mut same) = (0, 0, true);
+            for (azimuth, ray) in scan.rays.iter().enumerate() {
+                let received = map.ray(Plane::Visibility, azimuth);
+                visible += ray.bits().count();
+                arrived += ray.bits().and(received.bits()).count();
+                same &= received == *ray;
+                let lately = maps.scans[..=k].iter().rev();
+                let lately = lately.take_while(|s| next.measured.since(s.measured).is_some_and(|us| us <= 400_000));
+                let ever = lately.fold([0; W], |mut all, s| {
+                    all.iter_mut().zip(s.rays[azimuth].bits().words()).for_each(|(a, b)| *a |= b);
+                    all
+                });
+                let words = received.bits().words().iter().zip(ever);
+                wrongly_visible += words.map(|(r, e)| u64::from((r & !e).count_ones())).sum::<u64>();
+            }
+            equal += usize::from(same);
+            if visible > 0 {
+                shares.push(f64::from(arrived) / f64::from(visible));
+            }
+        }
+        shares.sort_by(f64::total_cmp);
+        let scans = shares.len();
+        let at = |share: f64| shares.get((scans as f64 * share) as usize).copied().unwrap_or(f64::NAN);
+        Self {
+            name: traffic.bus.name,
+            loss,
+            scans,
+            visible_median: at(0.5),
+            visible_p05: at(0.05),
+            equal: equal as f64 / scans.max(1) as f64,
+            wrongly_visible,
+        }
+    }
+}

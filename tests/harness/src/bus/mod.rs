@@ -1,0 +1,10 @@
+//! What the maps of a recording cost on a bus, and what a receiver makes of them.
+
+pub mod bits;
+pub mod entropy;
+pub mod listening;
+pub mod load;
+pub mod loss;
+pub mod report;
+pub mod symbols;
+pub mod traffic;

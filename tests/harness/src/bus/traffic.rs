@@ -1,0 +1,170 @@
+//! Everything a sender puts on a bus while a recording runs.
+
+use anyhow::{Result, anyhow};
+use viewshed::polar::PolarMap;
+use viewshed::time::Time;
+use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::wire::code::ray::{Known, Ray};
+use viewshed::wire::frame::CanFrame;
+use viewshed::wire::header::{Header, fingerprint};
+use viewshed::wire::layers::Layers;
+use viewshed::wire::message::{Addresses, Epoch, Plane};
+use viewshed::wire::serial::MOST_STUFFED;
+
+use super::bits;
+use crate::estimators::{self, radar_3d};
+use crate::recording::Recording;
+
+/// Azimuths, and words of 32 ranges, of radar-3d's maps.
+pub const A: usize = radar_3d::AZIMUTHS;
+pub const W: usize = radar_3d::RANGES.div_ceil(32);
+
+/// A bus with its rates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bus {
+    pub name: &'static str,
+    pub medium: Medium,
+    /// Bits a second: nominal, and CAN FD's data rate.
+    pub rates: [f64; 2],
+}
+
+/// The buses of the table.
+pub const BUSES: [Bus; 4] = [
+    Bus { name: "classic-500k", medium: Medium::Can(Addresses::STANDARD), rates: [500e3; 2] },
+    Bus { name: "classic-1M", medium: Medium::Can(Addresses::STANDARD), rates: [1e6; 2] },
+    Bus { name: "fd-500k-2M", medium: Medium::CanFd(Addresses::STANDARD), rates: [500e3, 2e6] },
+    Bus { name: "serial-230400", medium: Medium::Serial, rates: [230_400.0; 2] },
+];
+
+/// A scan as it was sent.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    pub measured: Time,
+    pub rays: Vec<Ray<W>>,
+}
+
+/// The maps of a recording, and what they are of.
+pub struct Maps {
+    pub header: Header,
+    pub scans: Vec<Scan>,
+    /// Unknown cells between known ones; on the wire they are not visible.
+    pub holes: u64,
+}
+
+impl Maps {
+    /// Radar-3d's maps.
+    pub fn new(recording: &Recording, options: &estimators::Options, step: &dyn Fn()) -> Result<Self> {
+        let sensor = estimators::sensor(recording, &options.noise);
+        let (mut scans, mut geometry, mut holes) = (Vec::new(), None, 0);
+        radar_3d::maps(&recording.frames, &sensor, &options.radar_3d, |measured, map| {
+            geometry = Some(*map.geometry());
+            let rays: Vec<Ray<W>> = (0..A).map(|azimuth| map.ray(Plane::Visibility, azimuth)).collect();
+            holes += holes_of(map, &rays);
+            scans.push(Scan { measured, rays });
+            step();
+        })?;
+        let geometry = geometry.ok_or_else(|| anyhow!("{} has no radar frames", recording.name))?;
+        let usual = scans.iter().map(|scan| scan.rays[A / 2].known).find(|known| !known.is_empty());
+        let configuration = format!("{sensor:?} {:?}", options.radar_3d);
+        let header = Header::new::<{ radar_3d::RANGES }, A>(
+            &sensor.mount,
+            &geometry,
+            usual.unwrap_or(Known::NONE),
+            1,
+            fingerprint(configuration.as_bytes()),
+        )
+        .map_err(|error| anyhow!("the maps of {} cannot be sent: {error:?}", recording.name))?;
+        Ok(Self { header, scans, holes })
+    }
+}
+
+fn holes_of(map: &PolarMap<{ radar_3d::RANGES }, A>, rays: &[Ray<W>]) -> u64 {
+    let unknown = |azimuth: usize, ray: &Ray<W>| {
+        let grades = map.grades(azimuth).map_or(&[][..], |g| &g[..]);
+        grades
+            .get(ray.known.near()..ray.known.end().max(ray.known.near()))
+            .map_or(0, |g| g.iter().filter(|g| **g == 0).count())
+    };
+    rays.iter().enumerate().map(|(azimuth, ray)| unknown(azimuth, ray) as u64).sum()
+}
+
+/// What was put on the bus at once.
+#[derive(Debug, Clone)]
+pub struct Sent {
+    pub at: Time,
+    /// Time on the bus, seconds.
+    pub duration_s: f64,
+    /// Data bytes; on a serial line all of them.
+    pub bytes: Vec<u8>,
+    /// `None` on a serial line.
+    pub frame: Option<CanFrame>,
+    /// How many scans were offered before it.
+    pub scans: usize,
+}
+
+/// Everything that was sent.
+#[derive(Debug, Clone)]
+pub struct Traffic {
+    pub bus: Bus,
+    pub sent: Vec<Sent>,
+    /// Scans that were sent, without those of the quiet first moments.
+    pub scans: usize,
+    /// Azimuths of scans that were dropped.
+    pub dropped: u16,
+}
+
+impl Layers<W> for Scan {
+    fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
+        let ray = self.rays.get(azimuth).filter(|_| plane == Plane::Visibility);
+        ray.copied().unwrap_or(Ray::UNKNOWN)
+    }
+}
+
+/// How often the sender is asked, microseconds.
+const POLL_US: u64 = 250;
+
+impl Traffic {
+    /// Sends maps over a bus.
+    ///
+    /// # Errors
+    /// A configuration the library refuses.
+    pub fn new(maps: &Maps, bus: Bus, visible_range_ms: Option<u16>, sensor: u8) -> Result<Self> {
+        let begin = maps.scans.first().map_or(Time::from_micros(0), |scan| scan.measured);
+        let config = BroadcastConfig { visible_range_ms, ..BroadcastConfig::new(sensor, bus.medium) };
+        let mut sender = Broadcaster::<A, W>::new(config, maps.header, Epoch::new(1), begin)
+            .map_err(|error| anyhow!("{}: {error}", bus.name))?;
+        sender.status_mut().state = viewshed::wire::status::State::Ok;
+        let (mut sent, mut scans) = (Vec::new(), 0);
+        // the bus is busy up to here
+        let mut free = begin;
+        for (k, scan) in maps.scans.iter().enumerate() {
+            scans += usize::from(sender.scan(scan.measured, scan).is_ok());
+            let end = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_667, |next| next.measured.micros());
+            let mut now = scan.measured.max(free);
+            while now.micros() < end {
+                if let Some(one) = Sent::next(&mut sender, &bus, now, k + 1) {
+                    free = Time::from_micros(now.micros() + (one.duration_s * 1e6).ceil() as u64);
+                    sent.push(one);
+                }
+                now = Time::from_micros(now.micros() + POLL_US).max(free);
+            }
+        }
+        Ok(Self { bus, sent, scans, dropped: sender.status_mut().dropped })
+    }
+}
+
+impl Sent {
+    fn next(sender: &mut Broadcaster<A, W>, bus: &Bus, at: Time, scans: usize) -> Option<Self> {
+        if bus.medium == Medium::Serial {
+            let mut line = [0; MOST_STUFFED];
+            let n = sender.next_line(at, &mut line)?;
+            // start and stop bit
+            let duration_s = 10.0 * n as f64 / bus.rates[0];
+            return Some(Self { at, duration_s, bytes: line[..n].to_vec(), frame: None, scans });
+        }
+        let frame = sender.next_frame(at)?;
+        let bits = bits::of(&frame);
+        let duration_s = f64::from(bits.nominal) / bus.rates[0] + f64::from(bits.data) / bus.rates[1];
+        Some(Self { at, duration_s, bytes: frame.data().to_vec(), frame: Some(frame), scans })
+    }
+}

@@ -1,0 +1,243 @@
+//! The DBC describes every classic message: two readers of it find in our frames what we put there.
+
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
+
+mod shadows;
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+use can_dbc::{ByteOrder, Dbc, MultiplexIndicator, Signal, ValueType};
+use shadows::{A, Map, Shadows, USUAL, W, header};
+use viewshed::angle::Angle;
+use viewshed::map::RoadPoint;
+use viewshed::time::Time;
+use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::wire::code::ray::Ray;
+use viewshed::wire::frame::CanFrame;
+use viewshed::wire::header::{Header, WireMount};
+use viewshed::wire::map_message::{self, LIMITS};
+use viewshed::wire::message::{Addresses, Epoch, Message, Part, Plane, Received, Word};
+use viewshed::wire::status::{Reason, ResetCause, State};
+use viewshed::wire::visible_range;
+
+const DBC: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/dbc/viewshed.dbc");
+
+/// Signals of a frame by name.
+type Signals = BTreeMap<String, f64>;
+
+fn described() -> Dbc {
+    Dbc::try_from(std::fs::read_to_string(DBC).unwrap().as_str()).unwrap()
+}
+
+fn sent_header() -> Header {
+    Header {
+        mount: WireMount {
+            origin: RoadPoint::new(-123_456, 7890),
+            height_cm: 612,
+            yaw: Angle::from_raw(-16384),
+            pitch: Angle::from_raw(728),
+            roll: Angle::from_raw(-3),
+        },
+        ..header(0xDEAD_BEEF)
+    }
+}
+
+const TIME_MS: u64 = 7_000_000_000;
+
+/// A few seconds of a sensor's traffic, all planes, with visible ranges; and the map last sent.
+fn frames() -> (Vec<CanFrame>, Map) {
+    let config = BroadcastConfig {
+        visible_range_ms: Some(200),
+        gap_us: 100,
+        ..BroadcastConfig::new(0, Medium::Can(Addresses::STANDARD))
+    };
+    let time = |us: u64| Time::from_micros(TIME_MS * 1000 + us);
+    let mut sender = Broadcaster::<A, W, 3>::new(config, sent_header(), Epoch::new(11), time(0)).unwrap();
+    sender.set_synchronised(true);
+    let status = sender.status_mut();
+    (status.state, status.reason, status.reset_cause) =
+        (State::Degraded, Reason::IncompleteScans, ResetCause::Watchdog);
+    (status.firmware, status.radar_lost, status.e2e_errors, status.bus_off) = ([1, 22, 3], 40_000, 515, 2);
+    let mut shadows = Shadows::new(3);
+    let (mut frames, mut map) = (Vec::new(), shadows.next());
+    for us in (0..3_000_000).step_by(100) {
+        if us % 67_000 == 0 {
+            map = shadows.next();
+            let _ = sender.scan(time(us), &map);
+        }
+        frames.extend(sender.next_frame(time(us)));
+    }
+    (frames, map)
+}
+
+/// The raw value of a Motorola signal.
+fn raw(signal: &Signal, data: &[u8]) -> i64 {
+    assert_eq!(signal.byte_order, ByteOrder::BigEndian);
+    let first = signal.start_bit / 8 * 8 + 7 - signal.start_bit % 8;
+    let bits = (first..first + signal.size).map(|bit| data[bit as usize / 8] >> (7 - bit % 8) & 1);
+    let value = bits.fold(0, |value: u64, bit| value << 1 | u64::from(bit));
+    let unused = 64 - signal.size;
+    match signal.value_type {
+        ValueType::Signed => (value << unused) as i64 >> unused,
+        ValueType::Unsigned => value as i64,
+    }
+}
+
+/// What can-dbc's reading of the file makes of a frame.
+fn decode(dbc: &Dbc, frame: &CanFrame) -> (String, Signals) {
+    let message = dbc.messages.iter().find(|m| m.id.raw() == frame.id.raw()).unwrap_or_else(|| panic!("{frame:?}"));
+    assert_eq!(message.size as usize, frame.data().len());
+    let switch = message.signals.iter().find(|s| s.multiplexer_indicator == MultiplexIndicator::Multiplexor);
+    let switch = switch.map(|s| raw(s, frame.data()) as u64);
+    let present = message.signals.iter().filter(|s| match s.multiplexer_indicator {
+        MultiplexIndicator::MultiplexedSignal(page) => Some(page) == switch,
+        _ => true,
+    });
+    let value = |s: &Signal| raw(s, frame.data()) as f64 * s.factor + s.offset;
+    (message.name.clone(), present.map(|s| (s.name.clone(), value(s))).collect())
+}
+
+/// Every signal's last value, over all frames.
+fn all_signals(dbc: &Dbc, frames: &[CanFrame]) -> Signals {
+    frames.iter().flat_map(|frame| decode(dbc, frame).1).collect()
+}
+
+#[test]
+fn every_classic_message_is_described_and_no_other() {
+    let dbc = described();
+    let sent = [Message::Status, Message::Header, Message::VisibleRange].into_iter().chain(
+        Plane::ALL.into_iter().flat_map(|plane| {
+            let words = [Word::Second, Word::Third, Word::Fourth].map(Part::More);
+            [Part::Refresh, Part::Delta, Part::Plain]
+                .into_iter()
+                .chain(words)
+                .map(move |part| Message::Map(plane, part))
+        }),
+    );
+    let mut ids: Vec<u32> = sent.map(|m| Addresses::STANDARD.id(0, m).unwrap().raw()).collect();
+    let mut found: Vec<u32> = dbc.messages.iter().map(|m| m.id.raw()).collect();
+    ids.sort_unstable();
+    found.sort_unstable();
+    assert_eq!(found, ids);
+    assert!(dbc.messages.iter().all(|m| m.size == 8));
+}
+
+#[test]
+fn header_and_status_read_as_they_were_sent() {
+    let (frames, _) = frames();
+    let got = all_signals(&described(), &frames);
+    let turn = 360.0 / 65536.0;
+    let expected = [
+        ("Epoch", 11.0),
+        ("State", 3.0),
+        ("Reason", 4.0),
+        ("Reset_Cause", 4.0),
+        ("Firmware_Major", 1.0),
+        ("Firmware_Minor", 22.0),
+        ("Firmware_Patch", 3.0),
+        ("Wire_Version", 1.0),
+        ("Status_Fingerprint", f64::from(0xDEAD_BEEF_u32)),
+        ("Radar_Lost", 40_000.0),
+        ("Azimuths_Dropped", 0.0),
+        ("E2E_Errors", 515.0),
+        ("Bus_Off", 2.0),
+        ("Clock_Synchronised", 1.0),
+        ("Header_Wire_Version", 1.0),
+        ("Mount_X", -1234.56),
+        ("Mount_Y", 78.90),
+        ("Mount_Height", 6.12),
+        ("Mount_Yaw", -90.0),
+        ("Mount_Pitch", 728.0 * turn),
+        ("Mount_Roll", -3.0 * turn),
+        ("Planes", 7.0),
+        ("Azimuth_Origin", -10_000.0 * turn),
+        ("Azimuth_Span", 20_000.0 * turn),
+        ("Azimuths", A as f64),
+        ("Range_Cell", 2.0),
+        ("Ranges", 64.0),
+        ("Usual_First", USUAL.near() as f64),
+        ("Usual_Last", (USUAL.end() - 1) as f64),
+        ("Fingerprint", f64::from(0xDEAD_BEEF_u32)),
+    ];
+    for (name, value) in expected {
+        assert!((got[name] - value).abs() < 1e-9, "{name}: {} instead of {value}", got[name]);
+    }
+    assert!((TIME_MS as f64..TIME_MS as f64 + 3000.0).contains(&got["Time"]) && (1.0..4.0).contains(&got["Uptime"]));
+}
+
+#[test]
+fn ranges_words_and_cells_read_as_they_were_sent() {
+    let (frames, map) = frames();
+    let dbc = described();
+    let mut seen = BTreeMap::new();
+    for frame in &frames {
+        let (name, got) = decode(&dbc, frame);
+        *seen.entry(name).or_insert(0) += 1;
+        let received = Received::from_frame(frame, &Addresses::STANDARD).unwrap();
+        assert_eq!(got["E2E_Counter"], f64::from(received.counter));
+        if let Message::Map(_, part) = received.message {
+            let message = map_message::parse(received.own, false).unwrap();
+            assert_eq!(got["Scan"], f64::from(message.scan.byte()));
+            if part == Part::Plain {
+                let whole = ((got["Segment"] as u64) << 29) + got["Cells"] as u64;
+                assert_eq!((got["Azimuth"], whole), (message.start as f64, message.words()[0]));
+                assert!(got["Segment"] <= f64::from(LIMITS));
+            } else {
+                assert_eq!((got["Start_Azimuth"], got["Word"]), (message.start as f64, message.words()[0] as f64));
+            }
+        }
+    }
+    assert!(seen.len() >= 15, "{seen:?}");
+    // the ranges of the last map, by azimuth
+    let got = all_signals(&dbc, &frames);
+    let right = (0..A).filter(|azimuth| {
+        let ray: &Ray<W> = &map.0[*azimuth];
+        got[&format!("Visible_Range_{azimuth:03}")] == 2.0 * f64::from(visible_range::steps(ray, 200))
+    });
+    // those of the last scan only; the others are up to 200 ms older
+    assert!(right.count() > A / 2);
+}
+
+#[test]
+fn cantools_reads_the_same() {
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+    if !Command::new(&python).args(["-c", "import cantools"]).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
+    {
+        println!("skipped: {python} cannot import cantools (pip install cantools)");
+        return;
+    }
+    let (frames, _) = frames();
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/dbc/decode.py");
+    let mut child =
+        Command::new(&python).args([script, DBC]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = String::new();
+    for frame in &frames {
+        let data: String = frame.data().iter().map(|b| format!("{b:02X}")).collect();
+        lines += &format!("{:03X}#{data}\n", frame.id.raw());
+    }
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(lines.as_bytes()));
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap().unwrap();
+    assert!(output.status.success());
+    let dbc = described();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut compared = 0;
+    for (line, frame) in text.lines().zip(&frames) {
+        let mut words = line.split(' ').skip(1);
+        let (name, ours) = decode(&dbc, frame);
+        assert_eq!(words.next(), Some(name.as_str()));
+        let theirs: Vec<(String, f64)> = words
+            .map(|word| word.split_once('=').unwrap())
+            .map(|(name, value)| (name.to_owned(), value.parse().unwrap()))
+            .collect();
+        assert_eq!(theirs.len(), ours.len(), "{line}");
+        for (signal, value) in theirs {
+            assert!((ours[&signal] - value).abs() < 1e-6, "{name} {signal}: {value} instead of {}", ours[&signal]);
+            compared += 1;
+        }
+    }
+    assert!(compared > 5 * frames.len());
+}
