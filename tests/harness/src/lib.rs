@@ -11,3 +11,4 @@ pub mod pictures;
 pub mod recording;
 pub mod report;
 pub mod truth;
+pub mod twin;

@@ -1,0 +1,247 @@
+//! One instant: everything that blocks or returns a wave, and the exact lines of sight past it.
+//!
+//! A path is tried against the boxes of every body that could stand in it; by the road it is the straight
+//! line to the point's mirror image, past the boxes and past their mirror images. A box that is touched
+//! only at its surface does not block.
+
+use super::body::Block;
+use crate::geometry::solid::Solid;
+
+/// Shortening at both ends of a path, so that a point on a surface is not blocked by that surface.
+const END: f64 = 1e-6;
+
+/// What stands somewhere: a vehicle or a structure.
+#[derive(Debug, Clone)]
+pub struct Body<'a> {
+    /// Box of the ground truth.
+    pub solid: Solid,
+    /// m/s, road frame.
+    pub velocity: [f64; 2],
+    /// What blocks, in the body's own axes.
+    pub blocks: &'a [Block],
+}
+
+/// All bodies of one instant as one sensor sees them.
+#[derive(Debug)]
+pub struct World<'a> {
+    pub bodies: Vec<Body<'a>>,
+    /// The sensor in each body's own axes.
+    eyes: Vec<[f64; 3]>,
+    /// Bodies that could stand between the sensor and each body, itself included.
+    between: Vec<Vec<usize>>,
+    eye: [f64; 3],
+}
+
+/// Directions a body covers, seen from above.
+struct Extent {
+    azimuth_rad: f64,
+    half_rad: f64,
+    near_m: f64,
+    far_m: f64,
+}
+
+impl<'a> World<'a> {
+    pub fn new(eye: [f64; 3], bodies: Vec<Body<'a>>) -> Self {
+        let extents: Vec<Extent> = bodies.iter().map(|b| extent(&b.solid, eye)).collect();
+        let between = extents
+            .iter()
+            .enumerate()
+            .map(|(k, own)| {
+                let meets = |(i, other): (usize, &Extent)| {
+                    let apart = turn(other.azimuth_rad - own.azimuth_rad).abs();
+                    (i == k || (other.near_m < own.far_m && apart <= own.half_rad + other.half_rad)).then_some(i)
+                };
+                extents.iter().enumerate().filter_map(meets).collect()
+            })
+            .collect();
+        let eyes = bodies.iter().map(|b| in_axes(&b.solid, eye)).collect();
+        Self { bodies, eyes, between, eye }
+    }
+
+    /// A point of a body's own axes, in the road frame.
+    pub fn place(&self, body: usize, [ahead, left, up]: [f64; 3]) -> [f64; 3] {
+        let solid = &self.bodies[body].solid;
+        let [x, y] = solid.global([ahead, left]);
+        [x, y, solid.bottom() + up]
+    }
+
+    /// Whether nothing stands between the sensor and a point of a body (road frame).
+    pub fn in_sight(&self, body: usize, point: [f64; 3]) -> bool {
+        !self.between[body].iter().any(|&i| self.hit(i, self.eyes[i], point, Fold::None))
+    }
+
+    /// Whether the point is seen by way of the road: sensor, road, point.
+    pub fn in_sight_by_road(&self, body: usize, point: [f64; 3]) -> bool {
+        let image = [point[0], point[1], -point[2]];
+        !self.between[body]
+            .iter()
+            .any(|&i| self.hit(i, self.eyes[i], image, Fold::None) || self.hit(i, self.eyes[i], image, Fold::Down))
+    }
+
+    /// Whether nothing stands between two places.
+    pub fn clear(&self, from: [f64; 3], to: [f64; 3]) -> bool {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let length = dx.hypot(dy).max(1e-9);
+        (0..self.bodies.len()).all(|i| {
+            let solid = &self.bodies[i].solid;
+            // the path passes the body at more than its half diagonal
+            let (cx, cy) = (solid.center[0] - from[0], solid.center[1] - from[1]);
+            let aside = (dx * cy - dy * cx).abs() / length;
+            let reach = 0.5 * solid.size[0].hypot(solid.size[1]);
+            aside > reach || !self.hit(i, in_axes(solid, from), to, Fold::None)
+        })
+    }
+
+    pub fn eye(&self) -> [f64; 3] {
+        self.eye
+    }
+
+    fn hit(&self, body: usize, from: [f64; 3], to: [f64; 3], fold: Fold) -> bool {
+        let Body { solid, blocks, .. } = &self.bodies[body];
+        let to = in_axes(solid, to);
+        let floor = solid.bottom();
+        let outer = Block {
+            ahead: [-solid.size[0] / 2.0, solid.size[0] / 2.0],
+            left: [-solid.size[1] / 2.0, solid.size[1] / 2.0],
+            up: [0.0, solid.size[2]],
+        };
+        crosses(from, to, &outer, floor, fold) && blocks.iter().any(|b| crosses(from, to, b, floor, fold))
+    }
+}
+
+/// Whether boxes are taken as they stand or as the road mirrors them.
+#[derive(Clone, Copy, PartialEq)]
+enum Fold {
+    None,
+    Down,
+}
+
+/// Whether a segment passes through the inside of a block (both in the body's axes, heights from the road).
+fn crosses(from: [f64; 3], to: [f64; 3], block: &Block, floor: f64, fold: Fold) -> bool {
+    let up = [floor + block.up[0], floor + block.up[1]];
+    let up = if fold == Fold::Down { [-up[1], -up[0]] } else { up };
+    let (mut enter, mut leave) = (END, 1.0 - END);
+    for (axis, [low, high]) in [block.ahead, block.left, up].into_iter().enumerate() {
+        let step = to[axis] - from[axis];
+        if step.abs() < 1e-12 {
+            if from[axis] <= low || from[axis] >= high {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((low - from[axis]) / step, (high - from[axis]) / step);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+        if enter >= leave {
+            return false;
+        }
+    }
+    true
+}
+
+/// A road point in a body's axes; heights stay above the road.
+fn in_axes(solid: &Solid, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    let [ahead, left] = solid.local([x, y]);
+    [ahead, left, z]
+}
+
+fn extent(solid: &Solid, eye: [f64; 3]) -> Extent {
+    let toward = |p: [f64; 2]| (p[1] - eye[1]).atan2(p[0] - eye[0]);
+    let near_m = solid.footprint_distance([eye[0], eye[1]]);
+    let far_m = solid.footprint().iter().map(|p| (p[0] - eye[0]).hypot(p[1] - eye[1])).fold(0.0, f64::max);
+    let azimuth_rad = toward([solid.center[0], solid.center[1]]);
+    // below the sensor, a body is in every direction
+    let half_rad = if near_m < 0.1 {
+        std::f64::consts::PI
+    } else {
+        solid.footprint().iter().map(|p| turn(toward(*p) - azimuth_rad).abs()).fold(0.0, f64::max) + 1e-3
+    };
+    Extent { azimuth_rad, half_rad, near_m, far_m }
+}
+
+/// An angle within half a turn to either side.
+fn turn(angle_rad: f64) -> f64 {
+    (angle_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::blocks;
+    use super::super::traffic::types::{Class, Kind};
+    use super::*;
+    use crate::geometry::sight::shadow;
+
+    const EYE: [f64; 3] = [0.0, 0.0, 6.0];
+
+    fn standing(class: Class, x: f64, y: f64, yaw_rad: f64) -> (Solid, Vec<Block>) {
+        let size = class.size();
+        let solid = Solid { center: [x, y, size[2] / 2.0], yaw_rad, size };
+        (solid, blocks(&Kind { class, size }))
+    }
+
+    fn world(bodies: &[(Solid, Vec<Block>)]) -> World<'_> {
+        World::new(EYE, bodies.iter().map(|(s, b)| Body { solid: *s, velocity: [0.0; 2], blocks: b }).collect())
+    }
+
+    #[test]
+    fn a_car_behind_a_truck_is_hidden_and_seen_beneath_it_by_the_road() {
+        // far away the path is flat enough to pass below the frame from end to end
+        let far = [standing(Class::Truck, 150.0, 0.0, 0.0), standing(Class::Car, 165.0, 0.0, 0.0)];
+        let w = world(&far);
+        let bumper = w.place(1, [-2.32, 0.0, 0.3]);
+        assert!(!w.in_sight(1, bumper));
+        assert!(w.in_sight_by_road(1, bumper), "between the wheels, below the frame");
+        let wheel = w.place(1, [-2.32, 0.9, 0.3]);
+        assert!(!w.in_sight_by_road(1, wheel), "the truck's wheels stand in the way");
+        // at 60 m it would have to rise through the trailer's floor: similar triangles give 64 m at most
+        let near = [standing(Class::Truck, 60.0, 0.0, 0.0), standing(Class::Car, 73.0, 0.0, 0.0)];
+        let w = world(&near);
+        assert!(!w.in_sight_by_road(1, w.place(1, [-2.32, 0.0, 0.15])));
+        let aside = [standing(Class::Truck, 60.0, 0.0, 0.0), standing(Class::Car, 73.0, 4.0, 0.0)];
+        let w = world(&aside);
+        assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5])));
+    }
+
+    #[test]
+    fn a_body_hides_its_own_far_side_and_not_its_near_one() {
+        let all = [standing(Class::Car, 40.0, 0.0, 0.0)];
+        let w = world(&all);
+        assert!(w.in_sight(0, w.place(0, [-2.32, 0.0, 0.5])));
+        assert!(!w.in_sight(0, w.place(0, [2.32, 0.0, 0.5])));
+        let turned = [standing(Class::Car, 40.0, 0.0, std::f64::consts::PI)];
+        let w = world(&turned);
+        assert!(w.in_sight(0, w.place(0, [2.32, 0.0, 0.5])), "now its front looks here");
+    }
+
+    #[test]
+    fn sight_agrees_with_the_analytic_shadow_of_a_full_box() {
+        let (solid, _) = standing(Class::Van, 40.0, 3.0, 0.4);
+        let [l, wide, h] = solid.size;
+        let whole = vec![Block { ahead: [-l / 2.0, l / 2.0], left: [-wide / 2.0, wide / 2.0], up: [0.0, h] }];
+        let shade = shadow(EYE, &solid, 1.0).unwrap();
+        let probe = Solid { center: [60.0, 0.0, 0.5], yaw_rad: 0.0, size: [90.0, 40.0, 1.0] };
+        let all = [(solid, whole), (probe, Vec::new())];
+        let w = world(&all);
+        let mut hidden = 0;
+        for i in 0..90 {
+            for j in 0..40 {
+                let p = [15.5 + f64::from(i), -19.5 + f64::from(j), 1.0];
+                let blocked = !w.in_sight(1, p);
+                assert_eq!(blocked, shade.contains([p[0], p[1]]), "{p:?}");
+                assert_eq!(blocked, !w.clear(EYE, p), "{p:?}");
+                hidden += u32::from(blocked);
+            }
+        }
+        assert!(hidden > 50);
+    }
+
+    #[test]
+    fn a_sign_over_the_road_blocks_what_looks_through_it_only() {
+        let sign = Solid { center: [30.0, 0.0, 6.0], yaw_rad: 0.0, size: [0.3, 8.0, 1.5] };
+        let plate = vec![Block { ahead: [-0.15, 0.15], left: [-4.0, 4.0], up: [0.0, 1.5] }];
+        let all = [(sign, plate), standing(Class::Car, 60.0, 0.0, 0.0)];
+        let w = world(&all);
+        assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5])), "below the sign");
+        assert!(!w.clear(EYE, [200.0, 0.0, 6.0]));
+    }
+}
