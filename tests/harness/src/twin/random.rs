@@ -18,6 +18,8 @@ pub enum Use {
     CameraFrame = 3,
     /// What distinguishes one post of a barrier from the next.
     Structure = 4,
+    /// Whether interference meets a radar frame.
+    Interference = 5,
 }
 
 /// A stream of draws.

@@ -4,7 +4,7 @@
 //! line to the point's mirror image, past the boxes and past their mirror images. A box that is touched
 //! only at its surface does not block.
 
-use super::body::Block;
+use super::body::{Block, FRAME_M};
 use crate::geometry::solid::Solid;
 
 /// Shortening at both ends of a path, so that a point on a surface is not blocked by that surface.
@@ -19,6 +19,57 @@ pub struct Body<'a> {
     pub velocity: [f64; 2],
     /// What blocks, in the body's own axes.
     pub blocks: &'a [Block],
+    pub sides: Sides,
+}
+
+/// Whether the long sides of a body mirror waves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sides {
+    Dull,
+    /// The walls of a truck or bus, above its frame.
+    Vehicle,
+    /// A structure that loses this much, one way.
+    Structure { loss_db: f64 },
+}
+
+/// An upright flat face that mirrors.
+#[derive(Debug, Clone, Copy)]
+pub struct Face {
+    pub body: usize,
+    /// Points away from the body, horizontal.
+    pub normal: [f64; 2],
+    /// One way.
+    pub loss_db: f64,
+    middle: [f64; 2],
+    half_m: f64,
+    up: [f64; 2],
+    /// The body's, m/s.
+    velocity: [f64; 2],
+}
+
+impl Face {
+    /// Distance of a place before the face, metres.
+    pub fn distance(&self, p: [f64; 3]) -> f64 {
+        (p[0] - self.middle[0]) * self.normal[0] + (p[1] - self.middle[1]) * self.normal[1]
+    }
+
+    pub fn mirrored(&self, p: [f64; 3]) -> [f64; 3] {
+        let d = 2.0 * self.distance(p);
+        [p[0] - d * self.normal[0], p[1] - d * self.normal[1], p[2]]
+    }
+
+    /// Velocity of the image of something that moves.
+    pub fn mirrored_velocity(&self, v: [f64; 2]) -> [f64; 2] {
+        let [nx, ny] = self.normal;
+        let toward = 2.0 * ((v[0] - self.velocity[0]) * nx + (v[1] - self.velocity[1]) * ny);
+        [v[0] - toward * nx, v[1] - toward * ny]
+    }
+
+    /// Whether a point of the face's plane lies on the face.
+    pub fn holds(&self, p: [f64; 3]) -> bool {
+        let along = (p[0] - self.middle[0]) * -self.normal[1] + (p[1] - self.middle[1]) * self.normal[0];
+        along.abs() <= self.half_m && (self.up[0]..=self.up[1]).contains(&p[2])
+    }
 }
 
 /// All bodies of one instant as one sensor sees them.
@@ -90,6 +141,32 @@ impl<'a> World<'a> {
             let reach = 0.5 * solid.size[0].hypot(solid.size[1]);
             aside > reach || !self.hit(i, in_axes(solid, from), to, Fold::None)
         })
+    }
+
+    /// All faces that mirror; the walls of vehicles lose `vehicle_loss_db`.
+    pub fn faces(&self, vehicle_loss_db: f64) -> Vec<Face> {
+        let mut faces = Vec::new();
+        for (k, body) in self.bodies.iter().enumerate() {
+            let (loss_db, foot) = match body.sides {
+                Sides::Dull => continue,
+                Sides::Vehicle => (vehicle_loss_db, FRAME_M),
+                Sides::Structure { loss_db } => (loss_db, 0.0),
+            };
+            let solid = &body.solid;
+            let (s, c) = solid.yaw_rad.sin_cos();
+            for side in [1.0, -1.0] {
+                faces.push(Face {
+                    body: k,
+                    normal: [-s * side, c * side],
+                    loss_db,
+                    middle: solid.global([0.0, side * solid.size[1] / 2.0]),
+                    half_m: solid.size[0] / 2.0,
+                    up: [solid.bottom() + foot, solid.top()],
+                    velocity: body.velocity,
+                });
+            }
+        }
+        faces
     }
 
     pub fn eye(&self) -> [f64; 3] {
@@ -180,7 +257,7 @@ mod tests {
     }
 
     fn world(bodies: &[(Solid, Vec<Block>)]) -> World<'_> {
-        World::new(EYE, bodies.iter().map(|(s, b)| Body { solid: *s, velocity: [0.0; 2], blocks: b }).collect())
+        World::new(EYE, bodies.iter().map(|(s, b)| Body { solid: *s, velocity: [0.0; 2], blocks: b, sides: Sides::Dull }).collect())
     }
 
     #[test]
@@ -243,5 +320,22 @@ mod tests {
         let w = world(&all);
         assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5])), "below the sign");
         assert!(!w.clear(EYE, [200.0, 0.0, 6.0]));
+    }
+
+    #[test]
+    fn a_face_mirrors_places_and_velocities_on_its_own_side() {
+        let (solid, blocks) = standing(Class::Truck, 60.0, 5.0, 0.0);
+        let truck = Body { solid, velocity: [20.0, 0.0], blocks: &blocks, sides: Sides::Vehicle };
+        let w = World::new(EYE, vec![truck]);
+        let faces = w.faces(10.0);
+        // its right side is at y = 3.725 and faces -y
+        let face = faces.iter().find(|f| f.normal[1] < 0.0).unwrap();
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} {b}");
+        close(face.distance([0.0, 0.0, 1.0]), 3.725);
+        close(face.mirrored([50.0, 0.0, 1.0])[1], 7.45);
+        let [along, across] = face.mirrored_velocity([25.0, 1.0]);
+        close(along, 25.0);
+        close(across, -1.0);
+        assert!(face.holds([60.0, 3.725, 2.0]) && !face.holds([60.0, 3.725, 0.5]) && !face.holds([70.0, 3.725, 2.0]));
     }
 }
