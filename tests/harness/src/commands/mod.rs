@@ -3,6 +3,7 @@
 pub mod doctor;
 pub mod progress;
 pub mod replay;
+pub mod simulate;
 
 use std::io::Write;
 use std::path::Path;
@@ -26,6 +27,7 @@ pub struct Cli {
 enum Command {
     Replay(Box<replay::Args>),
     Doctor(doctor::Args),
+    Simulate(simulate::Args),
 }
 
 impl Cli {
@@ -34,6 +36,7 @@ impl Cli {
         let outcome = match &self.command {
             Command::Replay(args) => replay::run(args),
             Command::Doctor(args) => doctor::run(args),
+            Command::Simulate(args) => simulate::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

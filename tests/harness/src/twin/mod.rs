@@ -10,5 +10,7 @@ pub mod radar;
 pub mod random;
 pub mod road;
 pub mod scatter;
+pub mod scene;
+pub mod simulate;
 pub mod traffic;
 pub mod world;

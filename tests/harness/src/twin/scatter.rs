@@ -33,6 +33,8 @@ pub struct Scatterer {
     pub rcs_dbsm: f64,
     /// Turns with the wheels: its speed lies between none and twice the vehicle's.
     pub wheel: bool,
+    /// Lies behind glass: its own vehicle does not block it.
+    pub inside: bool,
 }
 
 /// Spread of RCS among vehicles of one kind, dB (standard deviation).
@@ -58,7 +60,7 @@ struct Points {
 
 impl Points {
     fn add(&mut self, position: [f64; 3], outward: Option<[f64; 2]>, sharpness: f64, rcs_dbsm: f64) {
-        self.list.push(Scatterer { position, outward, sharpness, rcs_dbsm, wheel: false });
+        self.list.push(Scatterer { position, outward, sharpness, rcs_dbsm, wheel: false, inside: false });
     }
 
     /// On the front (`AHEAD`) or rear (`BEHIND`) face, at a share of the width to the left.
@@ -82,13 +84,20 @@ impl Points {
     fn sides(&mut self, from_front: f64, up: f64, sharpness: f64, rcs_dbsm: f64, wheel: bool) {
         for side in [1.0, -1.0] {
             let place = [self.half[0] - from_front, side * (self.half[1] + OFF), up];
-            self.list.push(Scatterer { position: place, outward: Some([0.0, side]), sharpness, rcs_dbsm, wheel });
+            let outward = Some([0.0, side]);
+            self.list.push(Scatterer { position: place, outward, sharpness, rcs_dbsm, wheel, inside: false });
         }
     }
 
     /// Below the floor, seen from all sides where the gap lets a wave through.
     fn below(&mut self, from_front: f64, up: f64, rcs_dbsm: f64) {
         self.add([self.half[0] - from_front, 0.0, up], None, 0.0, rcs_dbsm);
+    }
+
+    /// Seats and steering gear behind the windows, from all sides; the glass is in the RCS.
+    fn seats(&mut self, from_front: f64, up: f64, rcs_dbsm: f64) {
+        let position = [self.half[0] - from_front, 0.0, up];
+        self.list.push(Scatterer { position, outward: None, sharpness: 0.0, rcs_dbsm, wheel: false, inside: true });
     }
 
     /// Along the front and rear edge of the roof, seen from all around.
@@ -119,7 +128,10 @@ pub fn scatterers(kind: &Kind, dice: &mut Dice) -> Vec<Scatterer> {
             p.sides(0.18 * length, 0.30, 2.0, 2.0, true);
             p.sides(0.78 * length, 0.30, 2.0, 2.0, true);
             p.below(0.18 * length, 0.15, 0.0);
+            p.below(0.50 * length, 0.15, -3.0);
             p.below(0.78 * length, 0.15, 0.0);
+            p.seats(0.45 * length, 0.65 * height, -2.0);
+            p.seats(0.70 * length, 0.65 * height, -2.0);
             let roof = if kind.class == Class::Van { [0.2 * length, length - 0.05] } else { [0.34 * length, 0.9 * length] };
             p.roof(roof, -8.0);
         }
@@ -243,10 +255,10 @@ mod tests {
     }
 
     #[test]
-    fn no_point_lies_inside_a_block_of_its_own_vehicle() {
+    fn only_seats_lie_inside_a_block_of_their_own_vehicle() {
         for class in Class::ALL {
             let (kind, points) = of(class);
-            for s in points {
+            for s in points.into_iter().filter(|s| !s.inside) {
                 let [a, l, u] = s.position;
                 let inside = |r: [f64; 2], v: f64| r[0] < v && v < r[1];
                 let hit = blocks(&kind).into_iter().find(|b| inside(b.ahead, a) && inside(b.left, l) && inside(b.up, u));

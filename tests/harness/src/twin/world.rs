@@ -116,17 +116,21 @@ impl<'a> World<'a> {
         [x, y, solid.bottom() + up]
     }
 
-    /// Whether nothing stands between the sensor and a point of a body (road frame).
-    pub fn in_sight(&self, body: usize, point: [f64; 3]) -> bool {
-        !self.between[body].iter().any(|&i| self.hit(i, self.eyes[i], point, Fold::None))
+    /// Whether nothing stands between the sensor and a point of a body (road frame); the body itself
+    /// blocks it too, but for a point `inside`.
+    pub fn in_sight(&self, body: usize, point: [f64; 3], inside: bool) -> bool {
+        self.between(body, inside).all(|i| !self.hit(i, self.eyes[i], point, Fold::None))
     }
 
     /// Whether the point is seen by way of the road: sensor, road, point.
-    pub fn in_sight_by_road(&self, body: usize, point: [f64; 3]) -> bool {
+    pub fn in_sight_by_road(&self, body: usize, point: [f64; 3], inside: bool) -> bool {
         let image = [point[0], point[1], -point[2]];
-        !self.between[body]
-            .iter()
-            .any(|&i| self.hit(i, self.eyes[i], image, Fold::None) || self.hit(i, self.eyes[i], image, Fold::Down))
+        self.between(body, inside)
+            .all(|i| !self.hit(i, self.eyes[i], image, Fold::None) && !self.hit(i, self.eyes[i], image, Fold::Down))
+    }
+
+    fn between(&self, body: usize, inside: bool) -> impl Iterator<Item = usize> {
+        self.between[body].iter().copied().filter(move |i| !(inside && *i == body))
     }
 
     /// Whether nothing stands between two places.
@@ -266,28 +270,28 @@ mod tests {
         let far = [standing(Class::Truck, 150.0, 0.0, 0.0), standing(Class::Car, 165.0, 0.0, 0.0)];
         let w = world(&far);
         let bumper = w.place(1, [-2.32, 0.0, 0.3]);
-        assert!(!w.in_sight(1, bumper));
-        assert!(w.in_sight_by_road(1, bumper), "between the wheels, below the frame");
+        assert!(!w.in_sight(1, bumper, false));
+        assert!(w.in_sight_by_road(1, bumper, false), "between the wheels, below the frame");
         let wheel = w.place(1, [-2.32, 0.9, 0.3]);
-        assert!(!w.in_sight_by_road(1, wheel), "the truck's wheels stand in the way");
+        assert!(!w.in_sight_by_road(1, wheel, false), "the truck's wheels stand in the way");
         // at 60 m it would have to rise through the trailer's floor: similar triangles give 64 m at most
         let near = [standing(Class::Truck, 60.0, 0.0, 0.0), standing(Class::Car, 73.0, 0.0, 0.0)];
         let w = world(&near);
-        assert!(!w.in_sight_by_road(1, w.place(1, [-2.32, 0.0, 0.15])));
+        assert!(!w.in_sight_by_road(1, w.place(1, [-2.32, 0.0, 0.15]), false));
         let aside = [standing(Class::Truck, 60.0, 0.0, 0.0), standing(Class::Car, 73.0, 4.0, 0.0)];
         let w = world(&aside);
-        assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5])));
+        assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5]), false));
     }
 
     #[test]
     fn a_body_hides_its_own_far_side_and_not_its_near_one() {
         let all = [standing(Class::Car, 40.0, 0.0, 0.0)];
         let w = world(&all);
-        assert!(w.in_sight(0, w.place(0, [-2.32, 0.0, 0.5])));
-        assert!(!w.in_sight(0, w.place(0, [2.32, 0.0, 0.5])));
+        assert!(w.in_sight(0, w.place(0, [-2.32, 0.0, 0.5]), false));
+        assert!(!w.in_sight(0, w.place(0, [2.32, 0.0, 0.5]), false));
         let turned = [standing(Class::Car, 40.0, 0.0, std::f64::consts::PI)];
         let w = world(&turned);
-        assert!(w.in_sight(0, w.place(0, [2.32, 0.0, 0.5])), "now its front looks here");
+        assert!(w.in_sight(0, w.place(0, [2.32, 0.0, 0.5]), false), "now its front looks here");
     }
 
     #[test]
@@ -303,7 +307,7 @@ mod tests {
         for i in 0..90 {
             for j in 0..40 {
                 let p = [15.5 + f64::from(i), -19.5 + f64::from(j), 1.0];
-                let blocked = !w.in_sight(1, p);
+                let blocked = !w.in_sight(1, p, false);
                 assert_eq!(blocked, shade.contains([p[0], p[1]]), "{p:?}");
                 assert_eq!(blocked, !w.clear(EYE, p), "{p:?}");
                 hidden += u32::from(blocked);
@@ -318,7 +322,7 @@ mod tests {
         let plate = vec![Block { ahead: [-0.15, 0.15], left: [-4.0, 4.0], up: [0.0, 1.5] }];
         let all = [(sign, plate), standing(Class::Car, 60.0, 0.0, 0.0)];
         let w = world(&all);
-        assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5])), "below the sign");
+        assert!(w.in_sight(1, w.place(1, [-2.32, 0.0, 0.5]), false), "below the sign");
         assert!(!w.clear(EYE, [200.0, 0.0, 6.0]));
     }
 

@@ -53,6 +53,8 @@ pub struct Seen {
     pub rcs_dbsm: f64,
     /// One-way gain of its direction, dB.
     pub gain_db: f64,
+    /// Behind its own vehicle's glass.
+    pub inside: bool,
 }
 
 /// All echoes of one instant; `noise` is the noise's power, 1 where nothing disturbs.
@@ -75,7 +77,7 @@ pub fn collect(radar: &Radar, world: &World, returns: &[&[Scatterer]], noise: f6
             if mean * fade < FAINTEST / 16.0 {
                 continue;
             }
-            let in_sight = world.in_sight(body, seen.place);
+            let in_sight = world.in_sight(body, seen.place, seen.inside);
             ways(radar, world, body, &seen, in_sight, (mean * fade).sqrt(), phase, &mut echoes);
             if in_sight && mean > mirrors::FAINTEST {
                 strong.push((body, seen));
@@ -111,6 +113,7 @@ fn look(radar: &Radar, world: &World, body: usize, point: &Scatterer, wheel: f64
         velocity: [vx * factor, vy * factor],
         rcs_dbsm: point.rcs_dbsm + fall_db,
         gain_db: radar.model.antenna.gain_db(seen.azimuth_rad, seen.elevation_rad),
+        inside: point.inside,
     })
 }
 
@@ -141,7 +144,7 @@ fn ways(
     let eye = world.eye();
     let sine = (eye[2] - image[2]) / below.range_m;
     let road = radar.model.road.reflection(sine, radar.model.wavelength_m);
-    let by_road = road != 0.0 && world.in_sight_by_road(body, seen.place);
+    let by_road = road != 0.0 && world.in_sight_by_road(body, seen.place, seen.inside);
     if !in_sight && !by_road {
         return;
     }

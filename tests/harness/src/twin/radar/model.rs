@@ -15,8 +15,8 @@ use crate::twin::road::Road;
 pub struct RadarModel {
     /// Wavelength, metres: 76.5 GHz, the middle of the long-range band (ETSI EN 301 091).
     pub wavelength_m: f64,
-    /// SNR of 10 dBsm at 100 m on the boresight, dB. From the radar equation with 10 dBm, 20 dBi to both
-    /// sides, 10 ms of coherent time, 14 dB noise figure and 4 dB losses (figures of that order: ITU-R
+    /// SNR of 10 dBsm at 100 m on the boresight, dB. From the radar equation with 12 dBm, 20 dBi to both
+    /// sides, 13 ms of coherent time, 12 dB noise figure and 4 dB losses (figures of that order: ITU-R
     /// M.2057 for automotive radars).
     pub reference_snr_db: f64,
     pub antenna: Antenna,
@@ -143,7 +143,7 @@ impl Default for RadarModel {
     fn default() -> Self {
         Self {
             wavelength_m: 0.00392,
-            reference_snr_db: 35.0,
+            reference_snr_db: 40.0,
             antenna: Antenna::default(),
             resolution: Resolution::default(),
             detector: Detector::default(),
@@ -269,10 +269,10 @@ mod tests {
     #[test]
     fn the_reference_follows_from_the_radar_equation() {
         let model = RadarModel::default();
-        let (power_w, gain, rcs, range_m) = (0.01, 100.0_f64, 10.0, 100.0_f64);
+        let (power_w, gain, rcs, range_m) = (0.01585, 100.0_f64, 10.0, 100.0_f64);
         let received = power_w * gain * gain * model.wavelength_m.powi(2) * rcs
             / ((4.0 * std::f64::consts::PI).powi(3) * range_m.powi(4));
-        let noise = 1.38e-23 * 290.0 * 10_f64.powf(1.4) / 0.010;
+        let noise = 1.38e-23 * 290.0 * 10_f64.powf(1.2) / 0.013;
         let snr_db = 10.0 * (received / noise).log10() - 4.0;
         assert!((snr_db - model.reference_snr_db).abs() < 1.0, "{snr_db}");
     }
