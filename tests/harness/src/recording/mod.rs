@@ -4,6 +4,7 @@ pub mod ars408;
 pub mod beside;
 pub mod candump;
 pub mod capture;
+pub mod camera;
 pub mod labels;
 pub mod mcap;
 pub mod native;

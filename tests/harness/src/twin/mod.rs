@@ -6,6 +6,7 @@
 //! [`simulate`] writes the recording. [`random`] is where every draw comes from.
 
 pub mod body;
+pub mod camera;
 pub mod radar;
 pub mod random;
 pub mod road;

@@ -43,6 +43,8 @@ pub struct Scatterer {
 const VEHICLE_SPREAD_DB: f64 = 2.5;
 /// Spread among the points of one vehicle, dB: no two cars have the same bumper.
 const POINT_SPREAD_DB: f64 = 2.0;
+/// Spread of the places of axles, seats and edges among vehicles of one kind, metres to each side.
+const PLACE_SPREAD_M: f64 = 0.25;
 /// How far a point stands off the surface that carries it, metres.
 const OFF: f64 = 0.02;
 /// Spacing of posts, rails and boxes along the side of a long vehicle, metres.
@@ -207,6 +209,11 @@ pub fn scatterers(kind: &Kind, dice: &mut Dice) -> Vec<Scatterer> {
     }
     let vehicle_db = VEHICLE_SPREAD_DB * dice.normal();
     for point in &mut p.list {
+        if point.outward.is_none() {
+            // what lies below, behind or above the walls lies somewhere else in every model
+            point.position[0] += PLACE_SPREAD_M * dice.between(-1.0, 1.0);
+            point.position[1] += PLACE_SPREAD_M * dice.between(-1.0, 1.0);
+        }
         point.rcs_dbsm += vehicle_db + POINT_SPREAD_DB * dice.normal();
     }
     p.list

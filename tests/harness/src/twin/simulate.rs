@@ -1,21 +1,25 @@
 //! A scene in time: the world at every frame, what the sensors measure of it, the recording.
 
 use std::io::{Seek, Write};
+use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 
 use super::body::{Block, blocks};
+use super::camera::{Camera, Target};
 use super::radar::Radar;
 use super::radar::disturbance::{Outage, noise_db, outage};
 use super::random::{Dice, Use, name};
 use super::scatter::{Scatterer, scatterers};
-use super::scene::Scene;
 use super::scene::structure::Piece;
+use super::scene::{Look, Scene};
 use super::traffic::types::Class;
-use super::traffic::{self, Region, Traffic};
+use super::traffic::{self, Region, Traffic, Vehicle};
 use super::world::{Body, Sides, World};
+use crate::geometry::solid::Solid;
+use crate::recording::camera::CameraFrame;
 use crate::recording::write::RecordingWriter;
 use crate::recording::{Frame, Sensor};
 use crate::truth::Label;
@@ -43,11 +47,18 @@ struct Prepared {
     sides: Sides,
 }
 
-/// What one frame gives; no radar frame where it is missing.
+/// What one radar frame gives; no frame where it is missing.
 pub struct Step {
     pub time_ns: i64,
     pub radar: Option<Frame>,
     pub labels: Vec<Label>,
+}
+
+/// Everything that stands and drives at one instant, in one order: structures first.
+struct Instant<'a> {
+    bodies: Vec<Body<'a>>,
+    returns: Vec<&'a [Scatterer]>,
+    labels: Vec<Label>,
 }
 
 impl Simulation {
@@ -64,7 +75,14 @@ impl Simulation {
             center: [mount.x_m, mount.y_m],
             radius_m: scene.radar.field_of_view.range_m[1] + BEYOND_M,
         };
-        let traffic = traffic::read(&source, &region)?;
+        let mut traffic = traffic::read(&source, &region)?;
+        let looks: Vec<Look> = scene.looks();
+        traffic.keep(|place| looks.iter().any(|look| look.reaches(place)));
+        ensure!(
+            !traffic.vehicles.is_empty(),
+            "{}: an empty scene: vehicles come near, but none where a sensor looks; check the yaw of the mounts",
+            source.path.display()
+        );
         let vehicles = traffic
             .vehicles
             .iter()
@@ -83,19 +101,32 @@ impl Simulation {
 
     /// Radar frames of the whole recording.
     pub fn frames(&self) -> u64 {
+        self.count(self.scene.radar.rate_hz)
+    }
+
+    /// Camera frames of the whole recording.
+    pub fn camera_frames(&self) -> u64 {
+        self.scene.camera.as_ref().map_or(0, |c| self.count(c.rate_hz))
+    }
+
+    fn count(&self, rate_hz: f64) -> u64 {
         // a frame at the very end belongs to the next recording
-        (self.scene.duration_s * self.scene.radar.rate_hz - 1e-9).floor() as u64 + 1
+        (self.scene.duration_s * rate_hz - 1e-9).floor() as u64 + 1
+    }
+
+    fn time_ns(&self, since_s: f64) -> i64 {
+        self.scene.start_ns() + (since_s * 1e9).round() as i64
     }
 
     /// Everything that happens at one radar frame.
     ///
     /// # Errors
-    /// A vehicle that drives through the sensor.
+    /// A vehicle that drives through a sensor.
     pub fn step(&self, number: u64) -> Result<Step> {
         let section = &self.scene.radar;
         let since_s = number as f64 / section.rate_hz;
-        let time_ns = self.scene.start_ns() + (since_s * 1e9).round() as i64;
-        let (bodies, returns, labels) = self.instant(since_s, time_ns)?;
+        let time_ns = self.time_ns(since_s);
+        let Instant { bodies, returns, labels } = self.instant(since_s, time_ns)?;
         let radar = match outage(&section.outage, since_s) {
             Some(Outage::Missing) => None,
             Some(Outage::Empty) => Some(Vec::new()),
@@ -109,48 +140,62 @@ impl Simulation {
         Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections }), labels })
     }
 
-    /// Bodies, what they return, and their labels, in one order.
-    fn instant(&self, since_s: f64, time_ns: i64) -> Result<(Vec<Body<'_>>, Vec<&[Scatterer]>, Vec<Label>)> {
-        let eye = self.radar.pose.position;
-        let mut bodies = Vec::new();
-        let mut returns = Vec::new();
-        let mut labels = Vec::new();
+    /// What the camera sees at one of its frames.
+    ///
+    /// # Errors
+    /// A vehicle that drives through a sensor.
+    pub fn camera_step(&self, camera: &Camera, rate_hz: f64, number: u64) -> Result<CameraFrame> {
+        let since_s = number as f64 / rate_hz;
+        let time_ns = self.time_ns(since_s);
+        let labels = self.instant(since_s, time_ns)?.labels;
+        let is_vehicle = |l: &&Label| Class::named(&l.class).is_some();
+        let targets: Vec<Target> =
+            labels.iter().filter(is_vehicle).map(|l| Target { class: &l.class, solid: l.solid }).collect();
+        let screens: Vec<Solid> = labels.iter().filter(|l| !is_vehicle(l)).map(|l| l.solid).collect();
+        Ok(CameraFrame { time_ns, boxes: camera.detect(&targets, &screens, self.scene.seed, number) })
+    }
+
+    fn instant(&self, since_s: f64, time_ns: i64) -> Result<Instant<'_>> {
+        let mut instant = Instant { bodies: Vec::new(), returns: Vec::new(), labels: Vec::new() };
         for piece in &self.structures {
             let Piece { label, blocks, scatterers, sides } = piece;
-            bodies.push(Body { solid: label.solid, velocity: [0.0; 2], blocks, sides: *sides });
-            returns.push(scatterers.as_slice());
-            labels.push(Label { time_ns, ..label.clone() });
+            instant.bodies.push(Body { solid: label.solid, velocity: [0.0; 2], blocks, sides: *sides });
+            instant.returns.push(scatterers);
+            instant.labels.push(Label { time_ns, ..label.clone() });
         }
         for (k, pose) in self.traffic.at(self.scene.from_s() + since_s) {
             let (vehicle, prepared) = (&self.traffic.vehicles[k], &self.vehicles[k]);
             let solid = pose.solid;
-            if solid.footprint_distance([eye[0], eye[1]]) <= 0.0 && eye[2] <= solid.top() {
-                bail!(
-                    "{} `{}` drives through radar `{}` at {since_s:.2} s: the mount at ({}, {}) is {} m high",
-                    vehicle.kind.class.name(),
-                    vehicle.id,
-                    self.scene.radar.name,
-                    eye[0],
-                    eye[1],
-                    eye[2]
-                );
-            }
-            bodies.push(Body { solid, velocity: pose.velocity, blocks: &prepared.blocks, sides: prepared.sides });
-            returns.push(prepared.scatterers.as_slice());
+            self.passes_below(&solid, vehicle, since_s)?;
+            instant.bodies.push(Body { solid, velocity: pose.velocity, blocks: &prepared.blocks, sides: prepared.sides });
+            instant.returns.push(&prepared.scatterers);
             let round = |v: f64| (v / LABEL_STEP_M).round() * LABEL_STEP_M;
             let [x, y, z] = solid.center;
-            labels.push(Label {
+            instant.labels.push(Label {
                 time_ns,
                 id: vehicle.id.clone(),
                 class: vehicle.kind.class.name().to_owned(),
-                solid: crate::geometry::solid::Solid {
-                    center: [round(x), round(y), z],
-                    yaw_rad: round(solid.yaw_rad),
-                    size: solid.size,
-                },
+                solid: Solid { center: [round(x), round(y), z], yaw_rad: round(solid.yaw_rad), size: solid.size },
             });
         }
-        Ok((bodies, returns, labels))
+        Ok(instant)
+    }
+
+    fn passes_below(&self, solid: &Solid, vehicle: &Vehicle, since_s: f64) -> Result<()> {
+        for (sensor, mount) in self.scene.mounts() {
+            let hit = solid.footprint_distance([mount.x_m, mount.y_m]) <= 0.0 && mount.height_m <= solid.top();
+            ensure!(
+                !hit,
+                "{} `{}` drives through {sensor} at {since_s:.2} s: it is {} m high, the mount at ({}, {}) {} m",
+                vehicle.kind.class.name(),
+                vehicle.id,
+                solid.top(),
+                mount.x_m,
+                mount.y_m,
+                mount.height_m
+            );
+        }
+        Ok(())
     }
 
     /// What the recording says of the radar.
@@ -165,30 +210,56 @@ impl Simulation {
         }
     }
 
-    /// Simulates everything and writes it. `progress` is told each frame done.
+    /// Simulates everything and writes it. `progress` is told each radar frame done.
     ///
     /// # Errors
     /// Those of [`Simulation::step`], and a sink that takes no more.
     pub fn record<W: Write + Seek>(&self, sink: W, progress: &(dyn Fn() + Sync)) -> Result<W> {
-        let mut writer = RecordingWriter::new(sink, &self.sensor(), &self.radar.pose, self.scene.start_ns())?;
+        let (sensor, start_ns) = (self.sensor(), self.scene.start_ns());
+        let camera = self.scene.camera.as_ref().map(|section| (section.camera(), section.rate_hz));
+        let pose = &self.radar.pose;
+        let mut writer = match &camera {
+            Some((camera, _)) => RecordingWriter::with_camera(sink, &sensor, pose, &camera.pose, start_ns)?,
+            None => RecordingWriter::new(sink, &sensor, pose, start_ns)?,
+        };
         let frames = self.frames();
+        let mut camera_first = 0;
         for first in (0..frames).step_by(BATCH) {
             let last = (first + BATCH as u64).min(frames);
-            let steps: Vec<Result<Step>> = (first..last)
-                .into_par_iter()
-                .map(|number| {
-                    progress();
-                    self.step(number)
-                })
-                .collect();
-            for step in steps {
-                let step = step?;
+            let steps = in_parallel(first..last, |number| {
+                progress();
+                self.step(number)
+            })?;
+            let mut pictures = Vec::new();
+            if let Some((camera, rate_hz)) = &camera {
+                // those before the next batch of the radar; after the last, all
+                let before = (last as f64 / self.scene.radar.rate_hz * rate_hz).ceil() as u64;
+                let camera_last = if last == frames { self.camera_frames() } else { before.min(self.camera_frames()) };
+                pictures = in_parallel(camera_first..camera_last, |n| self.camera_step(camera, *rate_hz, n))?;
+                camera_first = camera_last;
+            }
+            let mut pictures = pictures.iter().peekable();
+            let mut until = |time_ns: i64, writer: &mut RecordingWriter<W>| -> Result<()> {
+                while let (Some(frame), Some((camera, _))) = (pictures.next_if(|f| f.time_ns <= time_ns), &camera) {
+                    writer.camera_frame(frame, &camera.intrinsics)?;
+                }
+                Ok(())
+            };
+            for step in &steps {
+                until(step.time_ns, &mut writer)?;
                 if let Some(frame) = &step.radar {
                     writer.frame(frame)?;
                 }
                 writer.objects(step.time_ns, &step.labels)?;
             }
+            until(i64::MAX, &mut writer)?;
         }
         writer.finish().context("cannot complete the recording")
     }
+}
+
+/// Computes numbered frames in parallel, in their order; the first error wins.
+fn in_parallel<T: Send>(numbers: Range<u64>, compute: impl Fn(u64) -> Result<T> + Sync + Send) -> Result<Vec<T>> {
+    let all: Vec<Result<T>> = numbers.into_par_iter().map(compute).collect();
+    all.into_iter().collect()
 }

@@ -33,8 +33,8 @@ pub fn measure(radar: &Radar, peak: &Peak, noise: f64, dice: &mut Dice) -> Optio
     let rcs_dbsm = radar.rcs_dbsm(snr_db + 10.0 * noise.log10(), f64::from(range_m), gain_db);
     Some(RadarDetection {
         range_m,
-        azimuth_rad: round(azimuth_rad, rounding.angle_rad),
-        elevation_rad: radar.has_elevation.then(|| round(elevation_rad, rounding.angle_rad)),
+        azimuth_rad: round(azimuth_rad, rounding.azimuth_rad),
+        elevation_rad: radar.has_elevation.then(|| round(elevation_rad, rounding.elevation_rad)),
         radial_velocity_mps: round(velocity_mps, rounding.velocity_mps),
         rcs_dbsm: Some(round(rcs_dbsm, rounding.strength_db)),
         snr_db: Some(round(snr_db, rounding.strength_db)),
@@ -82,7 +82,7 @@ mod tests {
     fn what_is_reported_has_the_steps_of_the_interface() {
         let radar = radar();
         let d = measure(&radar, &peak(50.0), 1.0, &mut Dice::new(1, Use::RadarFrame, 2)).unwrap();
-        assert_eq!(d.range_m * 32.0, (d.range_m * 32.0).round());
+        assert_eq!(d.range_m * 16.0, (d.range_m * 16.0).round());
         assert_eq!(d.snr_db, Some(17.0));
         assert_eq!(d.rcs_dbsm.unwrap() * 2.0, (d.rcs_dbsm.unwrap() * 2.0).round());
         let mut flat = radar.clone();

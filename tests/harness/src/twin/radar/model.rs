@@ -133,7 +133,8 @@ pub struct Interference {
 #[serde(default, deny_unknown_fields)]
 pub struct Rounding {
     pub range_m: f64,
-    pub angle_rad: f64,
+    pub azimuth_rad: f64,
+    pub elevation_rad: f64,
     pub velocity_mps: f64,
     /// Of RCS and SNR, dB.
     pub strength_db: f64,
@@ -202,7 +203,7 @@ impl Default for Interference {
 
 impl Default for Rounding {
     fn default() -> Self {
-        Self { range_m: 1.0 / 32.0, angle_rad: 1.0 / 4096.0, velocity_mps: 1.0 / 64.0, strength_db: 0.5 }
+        Self { range_m: 1.0 / 16.0, azimuth_rad: 1.0 / 2048.0, elevation_rad: 1.0 / 512.0, velocity_mps: 1.0 / 32.0, strength_db: 0.5 }
     }
 }
 
@@ -242,7 +243,8 @@ impl RadarModel {
             ("interference.noise_rise_db", self.interference.noise_rise_db, 0.0, 60.0),
             ("max_detections", self.max_detections as f64, 1.0, 65_536.0),
             ("rounding.range_m", m.range_m, 1e-6, 5.0),
-            ("rounding.angle_rad", m.angle_rad, 1e-9, 0.2),
+            ("rounding.azimuth_rad", m.azimuth_rad, 1e-9, 0.2),
+            ("rounding.elevation_rad", m.elevation_rad, 1e-9, 0.2),
             ("rounding.velocity_mps", m.velocity_mps, 1e-6, 5.0),
             ("rounding.strength_db", m.strength_db, 1e-6, 10.0),
         ];

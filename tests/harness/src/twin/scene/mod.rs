@@ -20,6 +20,12 @@
 //! [radar.model]                   # twin::radar::model, each parameter with a default
 //! reference_snr_db = 35.0
 //!
+//! [camera]                        # may be left out
+//! name = "camera"
+//! mount = { height_m = 6.0, pitch_deg = 6.0 }
+//! image = { width_px = 1920, height_px = 1080, view_deg = 60.0 }
+//! rate_hz = 15.0
+//!
 //! [[static]]
 //! id = "median"
 //! class = "barrier"
@@ -38,6 +44,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::camera::detector::DetectorModel;
+use super::camera::{Camera, Image};
 use super::radar::Radar;
 use super::radar::disturbance::{NoiseInterval, OutageInterval};
 use super::radar::model::RadarModel;
@@ -63,6 +71,7 @@ pub struct Scene {
     pub licence: Option<String>,
     pub traffic: Option<TrafficFile>,
     pub radar: RadarSection,
+    pub camera: Option<CameraSection>,
     #[serde(default, rename = "static")]
     pub structures: Vec<Structure>,
     /// Folder of the file, which its paths start from.
@@ -219,13 +228,69 @@ impl RadarSection {
         self.mount.check()?;
         self.field_of_view.check()?;
         self.model.check()?;
-        ensure!(self.rate_hz > 0.0 && self.rate_hz <= 1000.0, "rate_hz is {}, it must lie in 0 to 1000", self.rate_hz);
+        check_rate(self.rate_hz)?;
         let times = self.interference.iter().map(|i| ("interference", i.from_s, i.to_s));
         for (what, from, to) in times.chain(self.outage.iter().map(|o| ("outage", o.from_s, o.to_s))) {
             ensure!(from < to, "{what} from {from} s to {to} s is no interval");
         }
         Ok(())
     }
+}
+
+/// A sector of the road plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    from: [f64; 2],
+    direction_rad: f64,
+    half_rad: f64,
+}
+
+impl Look {
+    /// Vehicles matter this far outside of the sector, and this near in any direction.
+    const MARGIN_RAD: f64 = 0.2;
+    const NEAR_M: f64 = 30.0;
+
+    pub fn reaches(&self, [x, y]: [f64; 2]) -> bool {
+        let (dx, dy) = (x - self.from[0], y - self.from[1]);
+        let turn = dy.atan2(dx) - self.direction_rad;
+        let aside = (turn + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+        aside.abs() <= self.half_rad + Self::MARGIN_RAD || dx.hypot(dy) <= Self::NEAR_M
+    }
+}
+
+/// A camera beside the radar.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSection {
+    pub name: String,
+    pub mount: Mount,
+    pub image: Image,
+    pub rate_hz: f64,
+    #[serde(default)]
+    pub detector: DetectorModel,
+}
+
+impl CameraSection {
+    pub fn camera(&self) -> Camera {
+        Camera { pose: self.mount.pose(), intrinsics: self.image.intrinsics(), model: self.detector }
+    }
+
+    fn check(&self) -> Result<()> {
+        self.mount.check()?;
+        self.detector.check()?;
+        check_rate(self.rate_hz)?;
+        let Image { width_px, height_px, view_deg } = self.image;
+        ensure!((1.0..=170.0).contains(&view_deg), "image.view_deg is {view_deg}, it must lie in 1 to 170");
+        for (name, side) in [("width_px", width_px), ("height_px", height_px)] {
+            ensure!((16..=20_000).contains(&side), "image.{name} is {side}, it must lie in 16 to 20000");
+        }
+        Ok(())
+    }
+}
+
+fn check_rate(rate_hz: f64) -> Result<()> {
+    ensure!(rate_hz > 0.0 && rate_hz <= 1000.0, "rate_hz is {rate_hz}, it must lie in 0 to 1000");
+    Ok(())
 }
 
 impl Scene {
@@ -247,14 +312,15 @@ impl Scene {
             "duration_s is {}, it must lie in 0 to 86400",
             self.duration_s
         );
-        let radar = &self.radar;
-        let named = || format!("radar `{}`", radar.name);
-        radar.check().with_context(named)?;
+        self.radar.check().with_context(|| format!("radar `{}`", self.radar.name))?;
+        if let Some(camera) = &self.camera {
+            camera.check().with_context(|| format!("camera `{}`", camera.name))?;
+        }
         for structure in &self.structures {
             structure.check()?;
-            let Mount { x_m, y_m, height_m, .. } = radar.mount;
-            if structure.holds([x_m, y_m, height_m]) {
-                bail!("{}: it is inside of static `{}`", named(), structure.id);
+            for (sensor, mount) in self.mounts() {
+                let inside = structure.holds([mount.x_m, mount.y_m, mount.height_m]);
+                ensure!(!inside, "{sensor}: it is inside of static `{}`", structure.id);
             }
         }
         let mut ids: Vec<&str> = self.structures.iter().map(|s| s.id.as_str()).collect();
@@ -263,6 +329,28 @@ impl Scene {
             bail!("two elements of [[static]] have the id `{}`", twice[0]);
         }
         Ok(())
+    }
+
+    /// Every sensor with its mount.
+    pub fn mounts(&self) -> Vec<(String, Mount)> {
+        let radar = (format!("radar `{}`", self.radar.name), self.radar.mount);
+        let camera = self.camera.as_ref().map(|c| (format!("camera `{}`", c.name), c.mount));
+        std::iter::once(radar).chain(camera).collect()
+    }
+
+    /// Where each sensor looks, seen from above.
+    pub fn looks(&self) -> Vec<Look> {
+        let look = |mount: &Mount, azimuth_deg: [f64; 2]| Look {
+            from: [mount.x_m, mount.y_m],
+            direction_rad: (mount.yaw_deg + (azimuth_deg[0] + azimuth_deg[1]) / 2.0).to_radians(),
+            half_rad: ((azimuth_deg[1] - azimuth_deg[0]) / 2.0).to_radians(),
+        };
+        let radar = look(&self.radar.mount, self.radar.field_of_view.azimuth_deg);
+        let camera = self.camera.as_ref().map(|c| {
+            let half = c.image.view_deg / 2.0;
+            look(&c.mount, [-half, half])
+        });
+        std::iter::once(radar).chain(camera).collect()
     }
 
     /// The traffic file, `--fcd` first.

@@ -231,6 +231,24 @@ impl Traffic {
     }
 }
 
+impl Traffic {
+    /// Keeps of every vehicle the time from its first to its last row that matters, one row more at both ends.
+    pub fn keep(&mut self, matters: impl Fn([f64; 2]) -> bool) {
+        for vehicle in &mut self.vehicles {
+            let place = |s: &Sample| matters(s.center);
+            let (first, last) = (vehicle.samples.iter().position(place), vehicle.samples.iter().rposition(place));
+            match first.zip(last) {
+                Some((first, last)) => {
+                    vehicle.samples.truncate(last + 2);
+                    vehicle.samples.drain(..first.saturating_sub(1));
+                }
+                None => vehicle.samples.clear(),
+            }
+        }
+        self.vehicles.retain(|v| v.samples.len() > 1);
+    }
+}
+
 impl Vehicle {
     /// Pose between the first and the last row.
     pub fn at(&self, time_s: f64) -> Option<Pose> {
@@ -309,6 +327,17 @@ mod tests {
         let ids: Vec<&str> = traffic.vehicles.iter().map(|v| v.id.as_str()).collect();
         assert_eq!(ids, ["a", "a#2"]);
         assert_eq!(traffic.at(3.0).count(), 0);
+    }
+
+    #[test]
+    fn a_vehicle_is_kept_without_gaps_from_first_to_last_time_it_matters() {
+        let mut traffic = collect((0..20).map(|k| row(f64::from(k) * 0.5, f64::from(k)))).unwrap();
+        traffic.keep(|[x, _]| x == 5.0 || x == 9.0);
+        let vehicle = &traffic.vehicles[0];
+        assert!(vehicle.at(3.5).is_some(), "between the two it is known too");
+        assert!(vehicle.at(2.0).is_some() && vehicle.at(1.9).is_none() && vehicle.at(5.0).is_some() && vehicle.at(5.1).is_none());
+        traffic.keep(|_| false);
+        assert!(traffic.vehicles.is_empty());
     }
 
     #[test]
