@@ -7,8 +7,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
-use super::progress::bar;
 use super::print;
+use super::progress::bar;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 

@@ -1,8 +1,8 @@
 //! Camera detections: boxes in pixels, and the camera they were made with.
 
 use super::ros::{
-    BoundingBox2D, CameraInfo, Detection2D, Detection2DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose,
-    Pose, Quaternion, RegionOfInterest, Vector3,
+    BoundingBox2D, CameraInfo, Detection2D, Detection2DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose, Pose,
+    Quaternion, RegionOfInterest, Vector3,
 };
 
 pub const OBJECTS_TOPIC: &str = "/camera/objects";

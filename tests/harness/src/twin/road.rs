@@ -47,9 +47,7 @@ impl Road {
         let refracted = (self.permittivity - (1.0 - sine * sine)).sqrt();
         let fresnel = match self.polarisation {
             Polarisation::Horizontal => (sine - refracted) / (sine + refracted),
-            Polarisation::Vertical => {
-                (self.permittivity * sine - refracted) / (self.permittivity * sine + refracted)
-            }
+            Polarisation::Vertical => (self.permittivity * sine - refracted) / (self.permittivity * sine + refracted),
         };
         let phase = std::f64::consts::TAU * self.roughness_mm * 1e-3 * sine / wavelength_m;
         fresnel * (-2.0 * phase * phase).exp()

@@ -15,6 +15,9 @@
 //!   (cars from behind, around 10 dBsm); J. Fortuny-Guasch, J.-M. Chareau, JRC report EUR 25762 (2013)
 //!   (pedestrians at 77 GHz, around -8 dBsm); M. Skolnik, "Introduction to Radar Systems" (trucks some 10 dB
 //!   above cars). How a total is shared among the points is an assumption.
+//! - M. Meyer, G. Kuschk, "Automotive Radar Dataset for Deep Learning Based 3D Object Detection", EuRAD 2019
+//!   (Astyx HiRes2019): at 50 to 100 m its trucks have 4 to 5 times as many detections as its cars, spread over
+//!   their whole length (median 69 to 110 against 17 to 25).
 
 use super::body::{CAB_M, FRAME_M, truck_axles};
 use super::random::Dice;
@@ -49,6 +52,11 @@ const PLACE_SPREAD_M: f64 = 0.25;
 const OFF: f64 = 0.02;
 /// Spacing of posts, rails and boxes along the side of a long vehicle, metres.
 const SIDE_SPACING_M: f64 = 1.5;
+
+/// Posts, tanks, boxes and brackets along a truck return to nearly all sides: between a post (0) and a rough
+/// wall (2). Together with the cross-members below it makes a truck at 50 to 100 m as much richer than a car
+/// as real recordings have it (see References).
+const BRACKET_SHARPNESS: f64 = 1.0;
 
 const AHEAD: [f64; 2] = [1.0, 0.0];
 const BEHIND: [f64; 2] = [-1.0, 0.0];
@@ -134,7 +142,8 @@ pub fn scatterers(kind: &Kind, dice: &mut Dice) -> Vec<Scatterer> {
             p.below(0.78 * length, 0.15, 0.0);
             p.seats(0.45 * length, 0.65 * height, -2.0);
             p.seats(0.70 * length, 0.65 * height, -2.0);
-            let roof = if kind.class == Class::Van { [0.2 * length, length - 0.05] } else { [0.34 * length, 0.9 * length] };
+            let roof =
+                if kind.class == Class::Van { [0.2 * length, length - 0.05] } else { [0.34 * length, 0.9 * length] };
             p.roof(roof, -8.0);
         }
         Class::Truck => {
@@ -152,8 +161,9 @@ pub fn scatterers(kind: &Kind, dice: &mut Dice) -> Vec<Scatterer> {
             p.corners(2.60, 2.0, -2.0);
             let mut from_front = CAB_M + 0.7;
             while from_front < length - 0.8 {
-                p.sides(from_front, 0.80, 3.0, 5.0, false);
+                p.sides(from_front, 0.80, BRACKET_SHARPNESS, 4.0, false);
                 p.sides(from_front, 1.25, 20.0, 6.0, false);
+                p.below(from_front, 0.70, -1.0);
                 from_front += SIDE_SPACING_M;
             }
             for [front, rear] in truck_axles(length) {
@@ -176,7 +186,7 @@ pub fn scatterers(kind: &Kind, dice: &mut Dice) -> Vec<Scatterer> {
             p.corners(2.40, 0.0, 0.0);
             let mut from_front = 1.0;
             while from_front < length - 0.5 {
-                p.sides(from_front, 0.60, 4.0, 4.0, false);
+                p.sides(from_front, 0.60, 2.0 * BRACKET_SHARPNESS, 4.0, false);
                 p.sides(from_front, 1.00, 25.0, 7.0, false);
                 from_front += SIDE_SPACING_M;
             }
@@ -268,7 +278,8 @@ mod tests {
             for s in points.into_iter().filter(|s| !s.inside) {
                 let [a, l, u] = s.position;
                 let inside = |r: [f64; 2], v: f64| r[0] < v && v < r[1];
-                let hit = blocks(&kind).into_iter().find(|b| inside(b.ahead, a) && inside(b.left, l) && inside(b.up, u));
+                let hit =
+                    blocks(&kind).into_iter().find(|b| inside(b.ahead, a) && inside(b.left, l) && inside(b.up, u));
                 assert_eq!(hit, None, "{class:?} {s:?}");
             }
         }

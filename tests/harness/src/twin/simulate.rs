@@ -167,7 +167,12 @@ impl Simulation {
             let (vehicle, prepared) = (&self.traffic.vehicles[k], &self.vehicles[k]);
             let solid = pose.solid;
             self.passes_below(&solid, vehicle, since_s)?;
-            instant.bodies.push(Body { solid, velocity: pose.velocity, blocks: &prepared.blocks, sides: prepared.sides });
+            instant.bodies.push(Body {
+                solid,
+                velocity: pose.velocity,
+                blocks: &prepared.blocks,
+                sides: prepared.sides,
+            });
             instant.returns.push(&prepared.scatterers);
             let round = |v: f64| (v / LABEL_STEP_M).round() * LABEL_STEP_M;
             let [x, y, z] = solid.center;

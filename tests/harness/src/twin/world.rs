@@ -29,7 +29,9 @@ pub enum Sides {
     /// The walls of a truck or bus, above its frame.
     Vehicle,
     /// A structure that loses this much, one way.
-    Structure { loss_db: f64 },
+    Structure {
+        loss_db: f64,
+    },
 }
 
 /// An upright flat face that mirrors.
@@ -261,7 +263,10 @@ mod tests {
     }
 
     fn world(bodies: &[(Solid, Vec<Block>)]) -> World<'_> {
-        World::new(EYE, bodies.iter().map(|(s, b)| Body { solid: *s, velocity: [0.0; 2], blocks: b, sides: Sides::Dull }).collect())
+        World::new(
+            EYE,
+            bodies.iter().map(|(s, b)| Body { solid: *s, velocity: [0.0; 2], blocks: b, sides: Sides::Dull }).collect(),
+        )
     }
 
     #[test]

@@ -191,7 +191,9 @@ mod tests {
         let target = [car(40.0, 0.0)];
         let exact = camera.view(&[target[0].solid], &[])[0].edges;
         let errors: Vec<f64> = (0..2000)
-            .filter_map(|n| camera.detect(&target, &[], 1, n).first().filter(|b| b.score > 0.6).map(|b| b.edges[3] - exact[3]))
+            .filter_map(|n| {
+                camera.detect(&target, &[], 1, n).first().filter(|b| b.score > 0.6).map(|b| b.edges[3] - exact[3])
+            })
             .collect();
         let spread = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
         let expected = 1.0_f64.hypot(0.03 * (exact[3] - exact[1]));

@@ -44,11 +44,8 @@ struct Cell {
 /// The greatest cells, in the order of their bins.
 pub fn resolve(radar: &Radar, echoes: Vec<Echo>, dice: &mut Dice) -> Vec<Peak> {
     let resolution = &radar.model.resolution;
-    let steps = [
-        resolution.range_m / 2.0,
-        resolution.velocity_mps / 2.0,
-        resolution.azimuth_deg.to_radians().sin() / 2.0,
-    ];
+    let steps =
+        [resolution.range_m / 2.0, resolution.velocity_mps / 2.0, resolution.azimuth_deg.to_radians().sin() / 2.0];
     let mut cells: BTreeMap<Bin, Cell> = BTreeMap::new();
     for e in echoes {
         let place = [e.range_m, e.velocity_mps, e.azimuth_rad.sin()];
@@ -57,8 +54,7 @@ pub fn resolve(radar: &Radar, echoes: Vec<Echo>, dice: &mut Dice) -> Vec<Peak> {
         let weight = e.power();
         cell.amplitude = [cell.amplitude[0] + e.amplitude[0], cell.amplitude[1] + e.amplitude[1]];
         cell.weight += weight;
-        for (moment, value) in
-            cell.moments.iter_mut().zip([e.range_m, e.azimuth_rad, e.elevation_rad, e.velocity_mps])
+        for (moment, value) in cell.moments.iter_mut().zip([e.range_m, e.azimuth_rad, e.elevation_rad, e.velocity_mps])
         {
             *moment += weight * value;
         }

@@ -94,8 +94,8 @@ mod tests {
         let mut dice = Dice::new(1, Use::RadarFrame, 1);
         let count: usize = (0..400).map(|_| false_alarms(&radar, &mut dice).len()).sum();
         // 400 ranges x 933 velocities x 62 azimuths, exp(-11.22)
-        let expected = 400.0 * 933.3 * (2.0 * 60_f64.to_radians().sin() / 1.6_f64.to_radians().sin())
-            * (-10_f64.powf(1.05)).exp();
+        let expected =
+            400.0 * 933.3 * (2.0 * 60_f64.to_radians().sin() / 1.6_f64.to_radians().sin()) * (-10_f64.powf(1.05)).exp();
         assert!((count as f64 / 400.0 - expected).abs() < 0.1 * expected, "{count} {expected}");
     }
 }

@@ -37,8 +37,7 @@ pub struct OutageInterval {
 
 /// Rise of the noise in one frame, dB: intervals and a burst that may meet it.
 pub fn noise_db(intervals: &[NoiseInterval], bursts: &Interference, time_s: f64, dice: &mut Dice) -> f64 {
-    let steady: f64 =
-        intervals.iter().filter(|i| (i.from_s..i.to_s).contains(&time_s)).map(|i| i.noise_rise_db).sum();
+    let steady: f64 = intervals.iter().filter(|i| (i.from_s..i.to_s).contains(&time_s)).map(|i| i.noise_rise_db).sum();
     let (met, rise) = (dice.chance(bursts.probability), dice.exponential() * bursts.noise_rise_db);
     steady + if met { rise } else { 0.0 }
 }

@@ -53,14 +53,7 @@ mod tests {
     use crate::twin::random::Use;
 
     fn peak(power: f64) -> Peak {
-        Peak {
-            bin: [0; 3],
-            power,
-            range_m: 100.0,
-            azimuth_rad: 0.1,
-            elevation_rad: -0.05,
-            velocity_mps: 12.0,
-        }
+        Peak { bin: [0; 3], power, range_m: 100.0, azimuth_rad: 0.1, elevation_rad: -0.05, velocity_mps: 12.0 }
     }
 
     #[test]

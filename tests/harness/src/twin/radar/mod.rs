@@ -14,7 +14,6 @@ pub mod measure;
 pub mod mirrors;
 pub mod model;
 
-
 use super::random::{Dice, Use};
 use super::scatter::Scatterer;
 use super::world::World;
@@ -35,7 +34,14 @@ impl Radar {
     /// Everything detected in one frame, in the order of range, Doppler and azimuth.
     ///
     /// `noise_db` is how far the noise has risen; `number` makes the frame's draws its own.
-    pub fn scan(&self, world: &World, returns: &[&[Scatterer]], seed: u64, number: u64, noise_db: f64) -> Vec<RadarDetection> {
+    pub fn scan(
+        &self,
+        world: &World,
+        returns: &[&[Scatterer]],
+        seed: u64,
+        number: u64,
+        noise_db: f64,
+    ) -> Vec<RadarDetection> {
         let mut dice = Dice::new(seed, Use::RadarFrame, number);
         let noise = 10_f64.powf(noise_db / 10.0);
         let echoes = echoes::collect(self, world, returns, noise, &mut dice);
@@ -43,7 +49,9 @@ impl Radar {
         let peaks = detector::detect(&self.model.detector, cells);
         let mut detections: Vec<RadarDetection> =
             peaks.iter().filter_map(|p| measure::measure(self, p, noise, &mut dice)).collect();
-        detections.extend(detector::false_alarms(self, &mut dice).iter().filter_map(|p| measure::measure(self, p, noise, &mut dice)));
+        detections.extend(
+            detector::false_alarms(self, &mut dice).iter().filter_map(|p| measure::measure(self, p, noise, &mut dice)),
+        );
         let most = self.model.max_detections;
         if detections.len() > most {
             // the strongest stay, in their order

@@ -203,7 +203,13 @@ impl Default for Interference {
 
 impl Default for Rounding {
     fn default() -> Self {
-        Self { range_m: 1.0 / 16.0, azimuth_rad: 1.0 / 2048.0, elevation_rad: 1.0 / 512.0, velocity_mps: 1.0 / 32.0, strength_db: 0.5 }
+        Self {
+            range_m: 1.0 / 16.0,
+            azimuth_rad: 1.0 / 2048.0,
+            elevation_rad: 1.0 / 512.0,
+            velocity_mps: 1.0 / 32.0,
+            strength_db: 0.5,
+        }
     }
 }
 

@@ -363,14 +363,20 @@ impl Scene {
         let path = match (fcd, section.and_then(|t| t.fcd.as_ref())) {
             (Some(path), _) => path.to_owned(),
             (None, Some(path)) => in_folder(path),
-            (None, None) => bail!("scene `{}` names no traffic: give --fcd FILE, or [traffic] fcd in the scene", self.name),
+            (None, None) => {
+                bail!("scene `{}` names no traffic: give --fcd FILE, or [traffic] fcd in the scene", self.name)
+            }
         };
         let Some(section) = section else { return Ok(Source { path, ..Source::default() }) };
         Ok(Source {
             path,
             types: section.types.iter().map(in_folder).collect(),
             net: section.net.as_ref().map(in_folder),
-            frame: RoadFrame { origin: section.origin, heading_rad: section.heading_deg.to_radians(), net_offset: [0.0; 2] },
+            frame: RoadFrame {
+                origin: section.origin,
+                heading_rad: section.heading_deg.to_radians(),
+                net_offset: [0.0; 2],
+            },
         })
     }
 
@@ -419,7 +425,10 @@ rate_hz = 15.0
         let mut scene = parse(&format!("{LEAST}\n[traffic]\nfcd = \"a/b.xml\"\ntypes = [\"t.xml\"]\n")).unwrap();
         scene.folder = "some".into();
         let source = scene.source(None).unwrap();
-        assert_eq!((source.path.as_path(), source.types[0].as_path()), (Path::new("some/a/b.xml"), Path::new("some/t.xml")));
+        assert_eq!(
+            (source.path.as_path(), source.types[0].as_path()),
+            (Path::new("some/a/b.xml"), Path::new("some/t.xml"))
+        );
     }
 
     #[test]

@@ -63,11 +63,7 @@ impl Structure {
     fn size(&self) -> Option<[f64; 3]> {
         let class = Class::named(&self.class).map(Class::size);
         let [length, width, height] = [self.length_m, self.width_m, self.height_m];
-        Some([
-            length.or(class.map(|s| s[0]))?,
-            width.or(class.map(|s| s[1]))?,
-            height.or(class.map(|s| s[2]))?,
-        ])
+        Some([length.or(class.map(|s| s[0]))?, width.or(class.map(|s| s[1]))?, height.or(class.map(|s| s[2]))?])
     }
 
     fn solid(&self, size: [f64; 3]) -> Solid {
@@ -96,7 +92,8 @@ impl Structure {
         {
             ensure!(value >= 0.01 && value <= most, "static `{id}`: {what} is {value}, it must lie in 0.01 to {most}");
         }
-        for (what, value) in [("center", self.center[0]), ("center", self.center[1]), ("heading_deg", self.heading_deg)] {
+        for (what, value) in [("center", self.center[0]), ("center", self.center[1]), ("heading_deg", self.heading_deg)]
+        {
             ensure!(value.is_finite() && value.abs() < 1e5, "static `{id}`: {what} is {value}");
         }
         ensure!((0.0..=50.0).contains(&self.bottom_m), "static `{id}`: bottom_m is {}", self.bottom_m);
@@ -213,7 +210,9 @@ mod tests {
     #[test]
     fn impossible_structures_are_named() {
         let error = |s: Structure| s.check().unwrap_err().to_string();
-        assert!(error(Structure { length_m: None, ..barrier() }).contains("`median`: class `barrier` has no default size"));
+        assert!(
+            error(Structure { length_m: None, ..barrier() }).contains("`median`: class `barrier` has no default size")
+        );
         assert!(error(Structure { height_m: Some(-1.0), ..barrier() }).contains("height_m is -1"));
         assert!(error(Structure { center: [f64::NAN, 0.0], ..barrier() }).contains("center is NaN"));
     }

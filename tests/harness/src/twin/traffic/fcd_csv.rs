@@ -118,7 +118,11 @@ mod tests {
     fn bad_rows_are_named_by_file_line_and_vehicle() {
         let heading = "# note\ntime;id;x;y;angle;type\n0;a;1;1;90;car\n";
         let error = |row: &str| format!("{:#}", parse(&format!("{heading}{row}\n")).unwrap_err());
-        assert!(error("1;b;NaN;1;90;car").contains("t.csv, line 4: vehicle `b`: x `NaN`"), "{}", error("1;b;NaN;1;90;car"));
+        assert!(
+            error("1;b;NaN;1;90;car").contains("t.csv, line 4: vehicle `b`: x `NaN`"),
+            "{}",
+            error("1;b;NaN;1;90;car")
+        );
         assert!(error("1;b;1;1;90;rocket").contains("unknown vehicle type `rocket`"));
         assert!(error("0:01;b;1;1;90;car").contains("no number of seconds"));
         assert!(error("0;a;1;1;90;car").contains("vehicle `a`"), "twice at one time");

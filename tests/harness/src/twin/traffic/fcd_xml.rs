@@ -18,13 +18,7 @@ use super::{Collector, Row};
 ///
 /// # Errors
 /// Names file, line and vehicle of the first row that cannot be used, and a file that is cut off.
-pub fn read(
-    text: Text,
-    path: &Path,
-    types: &VehicleTypes,
-    frame: &RoadFrame,
-    collected: &mut Collector,
-) -> Result<()> {
+pub fn read(text: Text, path: &Path, types: &VehicleTypes, frame: &RoadFrame, collected: &mut Collector) -> Result<()> {
     let line = text.line();
     let mut xml = quick_xml::Reader::from_reader(text);
     let mut buffer = Vec::new();
@@ -43,7 +37,8 @@ pub fn read(
             Event::Start(e) | Event::Empty(e) => match e.name().as_ref() {
                 "timestep" => time_s = Some(time(&e).with_context(place)?),
                 who @ ("vehicle" | "person") => {
-                    let time_s = time_s.with_context(|| format!("<{who}> outside of a <timestep>")).with_context(place)?;
+                    let time_s =
+                        time_s.with_context(|| format!("<{who}> outside of a <timestep>")).with_context(place)?;
                     let row = row(&e, time_s, types, frame).with_context(place)?;
                     let id = row.id.clone();
                     collected.add(row).with_context(|| format!("{}, {who} `{id}`", place()))?;

@@ -64,11 +64,8 @@ mod tests {
     #[test]
     fn a_net_shifted_and_turned_is_undone() {
         // the road runs north; the net was moved by (1000, 500)
-        let frame = RoadFrame {
-            origin: [100.0, 50.0],
-            heading_rad: std::f64::consts::FRAC_PI_2,
-            net_offset: [1000.0, 500.0],
-        };
+        let frame =
+            RoadFrame { origin: [100.0, 50.0], heading_rad: std::f64::consts::FRAC_PI_2, net_offset: [1000.0, 500.0] };
         let [x, y] = frame.place([1100.0, 570.0]);
         assert!((x - 20.0).abs() < 1e-12 && y.abs() < 1e-12, "north of the origin is ahead");
         let [_, left] = frame.place([1090.0, 550.0]);

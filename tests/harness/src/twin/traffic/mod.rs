@@ -276,11 +276,7 @@ impl Vehicle {
             - std::f64::consts::PI;
         let size = self.kind.size;
         Some(Pose {
-            solid: Solid {
-                center: [along[0].0, along[1].0, size[2] / 2.0],
-                yaw_rad: a.heading_rad + f * turn,
-                size,
-            },
+            solid: Solid { center: [along[0].0, along[1].0, size[2] / 2.0], yaw_rad: a.heading_rad + f * turn, size },
             velocity: [along[0].1, along[1].1],
         })
     }
@@ -335,7 +331,12 @@ mod tests {
         traffic.keep(|[x, _]| x == 5.0 || x == 9.0);
         let vehicle = &traffic.vehicles[0];
         assert!(vehicle.at(3.5).is_some(), "between the two it is known too");
-        assert!(vehicle.at(2.0).is_some() && vehicle.at(1.9).is_none() && vehicle.at(5.0).is_some() && vehicle.at(5.1).is_none());
+        assert!(
+            vehicle.at(2.0).is_some()
+                && vehicle.at(1.9).is_none()
+                && vehicle.at(5.0).is_some()
+                && vehicle.at(5.1).is_none()
+        );
         traffic.keep(|_| false);
         assert!(traffic.vehicles.is_empty());
     }
