@@ -4,6 +4,7 @@ pub mod commands;
 pub mod doctor;
 pub mod estimators;
 pub mod evaluation;
+pub mod experiment;
 pub mod foxglove;
 pub mod geometry;
 pub mod options;

@@ -1,6 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod doctor;
+pub mod experiment;
 pub mod progress;
 pub mod replay;
 pub mod simulate;
@@ -28,6 +29,7 @@ enum Command {
     Replay(Box<replay::Args>),
     Doctor(doctor::Args),
     Simulate(simulate::Args),
+    Experiment(Box<experiment::Args>),
 }
 
 impl Cli {
@@ -37,6 +39,7 @@ impl Cli {
             Command::Replay(args) => replay::run(args),
             Command::Doctor(args) => doctor::run(args),
             Command::Simulate(args) => simulate::run(args),
+            Command::Experiment(args) => experiment::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

@@ -1,6 +1,7 @@
 //! What people and programs get to see of a replay: a table, JSON, CSV.
 
 pub mod csv;
+pub mod experiment;
 pub mod json;
 pub mod notes;
 pub mod table;

@@ -52,6 +52,23 @@ pub struct Step {
     pub time_ns: i64,
     pub radar: Option<Frame>,
     pub labels: Vec<Label>,
+    /// Vehicles whose middle lies in the radar's field of view, hidden or not.
+    pub in_view: usize,
+}
+
+/// What a recording has become.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct Made {
+    /// Radar frames written; those of an outage may be missing.
+    pub frames: u64,
+    pub camera_frames: u64,
+    pub detections: u64,
+    pub camera_boxes: u64,
+    /// Distinct vehicles that drive in the recording.
+    pub vehicles: usize,
+    /// Vehicles in the radar's field of view, mean over all frames.
+    pub vehicles_in_view: f64,
+    pub most_vehicles_in_view: usize,
 }
 
 /// Everything that stands and drives at one instant, in one order: structures first.
@@ -137,7 +154,8 @@ impl Simulation {
                 Some(self.radar.scan(&world, &returns, self.scene.seed, number, noise))
             }
         };
-        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections }), labels })
+        let in_view = self.in_view(&labels);
+        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections }), labels, in_view })
     }
 
     /// What the camera sees at one of its frames.
@@ -186,6 +204,12 @@ impl Simulation {
         Ok(instant)
     }
 
+    fn in_view(&self, labels: &[Label]) -> usize {
+        let view = |l: &&Label| self.radar.field_of_view.contains(self.radar.pose.to_spherical(l.solid.center));
+        // structures come first and are not counted
+        labels[self.structures.len()..].iter().filter(view).count()
+    }
+
     fn passes_below(&self, solid: &Solid, vehicle: &Vehicle, since_s: f64) -> Result<()> {
         for (sensor, mount) in self.scene.mounts() {
             let hit = solid.footprint_distance([mount.x_m, mount.y_m]) <= 0.0 && mount.height_m <= solid.top();
@@ -219,7 +243,7 @@ impl Simulation {
     ///
     /// # Errors
     /// Those of [`Simulation::step`], and a sink that takes no more.
-    pub fn record<W: Write + Seek>(&self, sink: W, progress: &(dyn Fn() + Sync)) -> Result<W> {
+    pub fn record<W: Write + Seek>(&self, sink: W, progress: &(dyn Fn() + Sync)) -> Result<(W, Made)> {
         let (sensor, start_ns) = (self.sensor(), self.scene.start_ns());
         let camera = self.scene.camera.as_ref().map(|section| (section.camera(), section.rate_hz));
         let pose = &self.radar.pose;
@@ -228,6 +252,7 @@ impl Simulation {
             None => RecordingWriter::new(sink, &sensor, pose, start_ns)?,
         };
         let frames = self.frames();
+        let mut made = Made { vehicles: self.traffic.vehicles.len(), ..Made::default() };
         let mut camera_first = 0;
         for first in (0..frames).step_by(BATCH) {
             let last = (first + BATCH as u64).min(frames);
@@ -243,6 +268,8 @@ impl Simulation {
                 pictures = in_parallel(camera_first..camera_last, |n| self.camera_step(camera, *rate_hz, n))?;
                 camera_first = camera_last;
             }
+            made.camera_frames += pictures.len() as u64;
+            made.camera_boxes += pictures.iter().map(|f| f.boxes.len() as u64).sum::<u64>();
             let mut pictures = pictures.iter().peekable();
             let mut until = |time_ns: i64, writer: &mut RecordingWriter<W>| -> Result<()> {
                 while let (Some(frame), Some((camera, _))) = (pictures.next_if(|f| f.time_ns <= time_ns), &camera) {
@@ -252,14 +279,19 @@ impl Simulation {
             };
             for step in &steps {
                 until(step.time_ns, &mut writer)?;
+                made.vehicles_in_view += step.in_view as f64 / frames as f64;
+                made.most_vehicles_in_view = made.most_vehicles_in_view.max(step.in_view);
                 if let Some(frame) = &step.radar {
+                    made.frames += 1;
+                    made.detections += frame.detections.len() as u64;
                     writer.frame(frame)?;
                 }
                 writer.objects(step.time_ns, &step.labels)?;
             }
             until(i64::MAX, &mut writer)?;
         }
-        writer.finish().context("cannot complete the recording")
+        let sink = writer.finish().context("cannot complete the recording")?;
+        Ok((sink, made))
     }
 }
 

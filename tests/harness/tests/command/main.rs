@@ -7,4 +7,5 @@ mod native_capture;
 mod radar_scan;
 mod replay;
 mod scene;
+mod simulate;
 mod ti_capture;

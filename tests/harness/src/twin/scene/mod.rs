@@ -306,7 +306,9 @@ impl Scene {
         Ok(scene)
     }
 
-    fn check(&self) -> Result<()> {
+    /// # Errors
+    /// The element and figure of what cannot be.
+    pub fn check(&self) -> Result<()> {
         ensure!(
             self.duration_s > 0.0 && self.duration_s <= 86_400.0,
             "duration_s is {}, it must lie in 0 to 86400",
