@@ -118,7 +118,9 @@ fn a_recording_keeps_to_the_contract_and_can_be_replayed() {
 fn what_cannot_be_simulated_is_told_with_its_place_and_leaves_no_recording() {
     let none = ["", ""];
     let car = "id=\"car.0\" x=\"20.00\" y=\"3.75\"";
-    let cases: [(&str, [&str; 2], [&str; 2], &[&str]); 12] = [
+    // name, what is replaced in the scene and in the traffic, what the error says
+    type Case = (&'static str, [&'static str; 2], [&'static str; 2], &'static [&'static str]);
+    let cases: [Case; 12] = [
         ("type", none, ["type=\"car\"", "type=\"rocket\""], &["small.fcd.xml, line 4", "`car.0`", "`rocket`"]),
         ("nan", none, [car, "id=\"car.0\" x=\"nan\" y=\"3.75\""], &["small.fcd.xml, line 12", "`car.0`", "x `nan`"]),
         (

@@ -72,11 +72,11 @@ mod tests {
     #[test]
     fn rows_are_centres_and_headings_of_the_road() {
         let traffic =
-            parse("0,a,truck,10,2,3.14,12,2.5,3.5\n1,a,truck,0,2,3.14,12,2.5,3.5\n0,b,car,1,1,,,,\n1,b,car,2,1,,,,\n")
+            parse("0,a,truck,10,2,3.25,12,2.5,3.5\n1,a,truck,0,2,3.25,12,2.5,3.5\n0,b,car,1,1,,,,\n1,b,car,2,1,,,,\n")
                 .unwrap();
         let pose = traffic.vehicles[0].at(0.5).unwrap();
         assert!((pose.solid.center[0] - 5.0).abs() < 1e-9);
-        assert_eq!((pose.solid.yaw_rad, pose.solid.size), (3.14, [12.0, 2.5, 3.5]));
+        assert_eq!((pose.solid.yaw_rad, pose.solid.size), (3.25, [12.0, 2.5, 3.5]));
         assert_eq!(traffic.vehicles[1].kind.size, Class::Car.size());
     }
 
