@@ -5,9 +5,11 @@
 #   tests/recordings/make.sh --check    compares it bit for bit, changes nothing
 set -eu
 cd "$(dirname "$0")/../.."
+. tests/tools.sh
+need_compilers
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-cargo run --quiet --release -p viewshed-harness --bin viewshed -- \
+cargo run --quiet --release --locked -p viewshed-harness --bin viewshed -- \
     simulate tests/recordings/motorway.toml --duration 30 --out "$work/motorway.mcap"
 if [ "${1:-}" = --check ]; then
     cmp "$work/motorway.mcap" tests/recordings/motorway.mcap
