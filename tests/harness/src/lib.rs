@@ -11,5 +11,6 @@ pub mod options;
 pub mod pictures;
 pub mod recording;
 pub mod report;
+pub mod site;
 pub mod truth;
 pub mod twin;

@@ -5,6 +5,7 @@ pub mod experiment;
 pub mod progress;
 pub mod replay;
 pub mod simulate;
+pub mod site;
 
 use std::io::Write;
 use std::path::Path;
@@ -30,6 +31,7 @@ enum Command {
     Doctor(doctor::Args),
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
+    Site(Box<site::Args>),
 }
 
 impl Cli {
@@ -40,6 +42,7 @@ impl Cli {
             Command::Doctor(args) => doctor::run(args),
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
+            Command::Site(args) => site::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

@@ -3,16 +3,18 @@
 //! Every function takes plain data and gives a [`canvas::Canvas`]; the same input gives the same
 //! bytes. Text is set in DejaVu Sans from inside the program, so no font has to be installed.
 
+pub mod axes;
 pub mod birdseye;
 pub mod canvas;
 pub mod closeup;
+pub mod heatmap;
+pub mod legend;
 pub mod palette;
 pub mod polar;
+pub mod site;
 pub mod tradeoff;
 
-mod axes;
 mod cells;
 mod labels;
-mod legend;
 mod overlay;
 mod text;

@@ -4,7 +4,7 @@ use std::io::{Seek, Write};
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 
 use super::body::{Block, blocks};
@@ -16,12 +16,12 @@ use super::scatter::{Scatterer, scatterers};
 use super::scene::structure::Piece;
 use super::scene::{Look, Scene};
 use super::traffic::types::Class;
-use super::traffic::{self, Region, Traffic, Vehicle};
+use super::traffic::{self, Region, Traffic};
 use super::world::{Body, Sides, World};
 use crate::geometry::solid::Solid;
 use crate::recording::camera::CameraFrame;
 use crate::recording::write::RecordingWriter;
-use crate::recording::{Frame, Sensor};
+use crate::recording::{Frame, RadarDetection, Sensor};
 use crate::truth::Label;
 
 /// Vehicles are known this far beyond the radar's range, metres: tracks begin before the field of view does.
@@ -84,16 +84,26 @@ impl Simulation {
     /// # Errors
     /// Those of the traffic's files.
     pub fn new(scene: Scene, fcd: Option<&Path>) -> Result<Self> {
+        let looks = scene.looks();
+        Self::seen_by(scene, fcd, &looks)
+    }
+
+    /// The same for sensors that look elsewhere than the scene's own; its range is theirs too.
+    ///
+    /// # Errors
+    /// Those of the traffic's files.
+    pub fn seen_by(scene: Scene, fcd: Option<&Path>, looks: &[Look]) -> Result<Self> {
         let source = scene.source(fcd)?;
         let mount = &scene.radar.mount;
+        let center = [mount.x_m, mount.y_m];
+        let farthest_m = looks.iter().map(|look| look.distance(center)).fold(0.0, f64::max);
         let region = Region {
             from_s: scene.from_s(),
             to_s: scene.from_s() + scene.duration_s,
-            center: [mount.x_m, mount.y_m],
-            radius_m: scene.radar.field_of_view.range_m[1] + BEYOND_M,
+            center,
+            radius_m: scene.radar.field_of_view.range_m[1] + farthest_m + BEYOND_M,
         };
         let mut traffic = traffic::read(&source, &region)?;
-        let looks: Vec<Look> = scene.looks();
         traffic.keep(|place| looks.iter().any(|look| look.reaches(place)));
         ensure!(
             !traffic.vehicles.is_empty(),
@@ -143,7 +153,8 @@ impl Simulation {
         let section = &self.scene.radar;
         let since_s = number as f64 / section.rate_hz;
         let time_ns = self.time_ns(since_s);
-        let Instant { bodies, returns, labels } = self.instant(since_s, time_ns)?;
+        let Instant { bodies, returns, labels } = self.instant(since_s, time_ns);
+        self.passes_below(&labels, since_s)?;
         let radar = match outage(&section.outage, since_s) {
             Some(Outage::Missing) => None,
             Some(Outage::Empty) => Some(Vec::new()),
@@ -165,7 +176,8 @@ impl Simulation {
     pub fn camera_step(&self, camera: &Camera, rate_hz: f64, number: u64) -> Result<CameraFrame> {
         let since_s = number as f64 / rate_hz;
         let time_ns = self.time_ns(since_s);
-        let labels = self.instant(since_s, time_ns)?.labels;
+        let labels = self.instant(since_s, time_ns).labels;
+        self.passes_below(&labels, since_s)?;
         let is_vehicle = |l: &&Label| Class::named(&l.class).is_some();
         let targets: Vec<Target> =
             labels.iter().filter(is_vehicle).map(|l| Target { class: &l.class, solid: l.solid }).collect();
@@ -173,7 +185,18 @@ impl Simulation {
         Ok(CameraFrame { time_ns, boxes: camera.detect(&targets, &screens, self.scene.seed, number) })
     }
 
-    fn instant(&self, since_s: f64, time_ns: i64) -> Result<Instant<'_>> {
+    /// Boxes of everything at an instant, whatever looks at it.
+    pub fn labels(&self, since_s: f64) -> Vec<Label> {
+        self.instant(since_s, self.time_ns(since_s)).labels
+    }
+
+    /// What a radar mounted anywhere measures at an instant; `number` makes the draws its own.
+    pub fn scan(&self, radar: &Radar, since_s: f64, number: u64) -> Vec<RadarDetection> {
+        let Instant { bodies, returns, .. } = self.instant(since_s, self.time_ns(since_s));
+        radar.scan(&World::new(radar.pose.position, bodies), &returns, self.scene.seed, number, 0.0)
+    }
+
+    fn instant(&self, since_s: f64, time_ns: i64) -> Instant<'_> {
         let mut instant = Instant { bodies: Vec::new(), returns: Vec::new(), labels: Vec::new() };
         for piece in &self.structures {
             let Piece { label, blocks, scatterers, sides } = piece;
@@ -184,7 +207,6 @@ impl Simulation {
         for (k, pose) in self.traffic.at(self.scene.from_s() + since_s) {
             let (vehicle, prepared) = (&self.traffic.vehicles[k], &self.vehicles[k]);
             let solid = pose.solid;
-            self.passes_below(&solid, vehicle, since_s)?;
             instant.bodies.push(Body {
                 solid,
                 velocity: pose.velocity,
@@ -201,7 +223,7 @@ impl Simulation {
                 solid: Solid { center: [round(x), round(y), z], yaw_rad: round(solid.yaw_rad), size: solid.size },
             });
         }
-        Ok(instant)
+        instant
     }
 
     fn in_view(&self, labels: &[Label]) -> usize {
@@ -210,19 +232,20 @@ impl Simulation {
         labels[self.structures.len()..].iter().filter(view).count()
     }
 
-    fn passes_below(&self, solid: &Solid, vehicle: &Vehicle, since_s: f64) -> Result<()> {
+    /// Every vehicle passes below (or above) every sensor of the scene.
+    fn passes_below(&self, labels: &[Label], since_s: f64) -> Result<()> {
         for (sensor, mount) in self.scene.mounts() {
-            let hit = solid.footprint_distance([mount.x_m, mount.y_m]) <= 0.0 && mount.height_m <= solid.top();
-            ensure!(
-                !hit,
-                "{} `{}` drives through {sensor} at {since_s:.2} s: it is {} m high, the mount at ({}, {}) {} m",
-                vehicle.kind.class.name(),
-                vehicle.id,
-                solid.top(),
-                mount.x_m,
-                mount.y_m,
-                mount.height_m
-            );
+            if let Some(hit) = labels[self.structures.len()..].iter().find(|l| mount.is_inside(&l.solid)) {
+                bail!(
+                    "{} `{}` drives through {sensor} at {since_s:.2} s: it is {} m high, the mount at ({}, {}) {} m",
+                    hit.class,
+                    hit.id,
+                    hit.solid.top(),
+                    mount.x_m,
+                    mount.y_m,
+                    mount.height_m
+                );
+            }
         }
         Ok(())
     }

@@ -247,3 +247,70 @@ fn an_experiment_that_cannot_be_run_says_why() {
         assert!(output.status.code() == Some(2) && text.contains(words) && !text.contains("panicked"), "{text}");
     }
 }
+
+#[test]
+fn a_higher_mount_sees_more_of_dense_traffic_and_of_the_road() {
+    let folder = folder("site-heights");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.toml");
+    let arguments = "--height 4,8 --lateral 0 --yaw 0 --pitch 4 --every 6 --sensors 1 --json site.json";
+    let arguments: Vec<&str> = ["site", scene.to_str().unwrap()].into_iter().chain(arguments.split(' ')).collect();
+    let output = viewshed(&folder, "2", &arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let found = json(&folder.join("site.json"));
+    let [high, low] = [0, 1].map(|k| &found["candidates"][k]);
+    assert_eq!((high["mount"]["height_m"].as_f64(), low["mount"]["height_m"].as_f64()), (Some(8.0), Some(4.0)));
+    for key in ["coverage_rate", "road_share"] {
+        assert!(high[key].as_f64().unwrap() > low[key].as_f64().unwrap() + 0.05, "{key}: {high} {low}");
+    }
+}
+
+#[test]
+fn mounts_are_ranked_alone_and_in_sets_and_impossible_ones_left_out() {
+    let folder = prepared("site", ["duration_s = 3.0", "duration_s = 2.0"], ["", ""]);
+    // over the car's lane at 1 m a car drives through; the truck hides the car's lane from the right only
+    let arguments = [
+        "--height",
+        "1,6",
+        "--along",
+        "40",
+        "--lateral",
+        "-9,3.75,12",
+        "--yaw",
+        "0",
+        "--pitch",
+        "2:4:2",
+        "--every",
+        "0.5",
+        "--stretch",
+        "80,200",
+    ];
+    let results = ["--out", "site.png", "--json", "site.json"];
+    let output = viewshed(&folder, "2", &[&["site", "small.toml"][..], &arguments, &results].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.contains("One sensor, best first") && text.contains("Sets of 2, best first"), "{text}");
+    assert!(text.contains("left out: x 40, y 3.75, h 1, yaw 0, pitch 2: car `car.0` drives through it"), "{text}");
+    let found = json(&folder.join("site.json"));
+    let all = found["candidates"].as_array().unwrap();
+    assert_eq!((all.len(), found["left_out"].as_array().unwrap().len()), (10, 2));
+    let of = |entry: &serde_json::Value, key: &str| entry[key].as_f64().unwrap();
+    assert!(all.windows(2).all(|pair| of(&pair[0], "coverage_rate") >= of(&pair[1], "coverage_rate")));
+    let pair = &found["sets"][0];
+    assert!(of(pair, "coverage_by_one") >= of(&all[0], "coverage_rate"));
+    assert!(
+        of(pair, "coverage_by_two") <= of(pair, "coverage_by_one")
+            && of(pair, "road_by_two") <= of(pair, "road_by_one")
+    );
+    assert_eq!(std::fs::read(folder.join("site.png")).unwrap()[..4], [0x89, b'P', b'N', b'G']);
+    for (arguments, words) in [
+        (&["--height", "-3,0"][..], "none of 36 candidate mounts is possible"),
+        (&["--height", "high"][..], "`high` is no number"),
+        (&["--stretch", "900,1000"][..], "no candidate has a moving vehicle in its field of view on that stretch"),
+        (&["--along", "5000"][..], "an empty scene"),
+        (&["--every", "0"][..], "--every 0"),
+    ] {
+        let output = viewshed(&folder, "2", &[&["site", "small.toml"][..], arguments].concat());
+        let text = stderr(&output);
+        assert!(output.status.code() == Some(2) && text.contains(words) && !text.contains("panicked"), "{text}");
+    }
+}

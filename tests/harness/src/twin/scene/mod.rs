@@ -52,6 +52,7 @@ use super::radar::model::RadarModel;
 use super::traffic::Source;
 use super::traffic::frame::RoadFrame;
 use crate::geometry::pose::SensorPose;
+use crate::geometry::solid::Solid;
 use crate::recording;
 use structure::Structure;
 
@@ -132,6 +133,11 @@ impl Mount {
             self.pitch_deg.to_radians(),
             self.roll_deg.to_radians(),
         )
+    }
+
+    /// Whether the sensor would hang within a box, from the road up.
+    pub fn is_inside(&self, solid: &Solid) -> bool {
+        solid.footprint_distance([self.x_m, self.y_m]) <= 0.0 && self.height_m <= solid.top()
     }
 
     /// # Errors
@@ -250,6 +256,20 @@ impl Look {
     const MARGIN_RAD: f64 = 0.2;
     const NEAR_M: f64 = 30.0;
 
+    /// A radar's, seen from above.
+    pub fn new(mount: &Mount, azimuth_deg: [f64; 2]) -> Self {
+        Self {
+            from: [mount.x_m, mount.y_m],
+            direction_rad: (mount.yaw_deg + (azimuth_deg[0] + azimuth_deg[1]) / 2.0).to_radians(),
+            half_rad: ((azimuth_deg[1] - azimuth_deg[0]) / 2.0).to_radians(),
+        }
+    }
+
+    /// Ground distance of the sensor from a place, metres.
+    pub fn distance(&self, [x, y]: [f64; 2]) -> f64 {
+        (self.from[0] - x).hypot(self.from[1] - y)
+    }
+
     pub fn reaches(&self, [x, y]: [f64; 2]) -> bool {
         let (dx, dy) = (x - self.from[0], y - self.from[1]);
         let turn = dy.atan2(dx) - self.direction_rad;
@@ -342,15 +362,10 @@ impl Scene {
 
     /// Where each sensor looks, seen from above.
     pub fn looks(&self) -> Vec<Look> {
-        let look = |mount: &Mount, azimuth_deg: [f64; 2]| Look {
-            from: [mount.x_m, mount.y_m],
-            direction_rad: (mount.yaw_deg + (azimuth_deg[0] + azimuth_deg[1]) / 2.0).to_radians(),
-            half_rad: ((azimuth_deg[1] - azimuth_deg[0]) / 2.0).to_radians(),
-        };
-        let radar = look(&self.radar.mount, self.radar.field_of_view.azimuth_deg);
+        let radar = Look::new(&self.radar.mount, self.radar.field_of_view.azimuth_deg);
         let camera = self.camera.as_ref().map(|c| {
             let half = c.image.view_deg / 2.0;
-            look(&c.mount, [-half, half])
+            Look::new(&c.mount, [-half, half])
         });
         std::iter::once(radar).chain(camera).collect()
     }
