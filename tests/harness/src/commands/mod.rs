@@ -1,6 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod doctor;
+pub mod detections;
 pub mod experiment;
 pub mod progress;
 pub mod replay;
@@ -32,6 +33,7 @@ enum Command {
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
+    Detections(Box<detections::Args>),
 }
 
 impl Cli {
@@ -43,6 +45,7 @@ impl Cli {
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
+            Command::Detections(args) => detections::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

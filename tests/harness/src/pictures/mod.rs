@@ -11,6 +11,7 @@ pub mod heatmap;
 pub mod legend;
 pub mod palette;
 pub mod polar;
+pub mod returns;
 pub mod site;
 pub mod tradeoff;
 
