@@ -1,7 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
-pub mod doctor;
 pub mod detections;
+pub mod doctor;
 pub mod experiment;
 pub mod progress;
 pub mod replay;

@@ -2,9 +2,9 @@
 
 pub mod ars408;
 pub mod beside;
+pub mod camera;
 pub mod candump;
 pub mod capture;
-pub mod camera;
 pub mod labels;
 pub mod mcap;
 pub mod native;

@@ -4,6 +4,7 @@ mod bad_input;
 mod can_log;
 mod foxglove;
 mod native_capture;
+mod python;
 mod radar_scan;
 mod replay;
 mod scene;

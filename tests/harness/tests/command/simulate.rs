@@ -232,6 +232,41 @@ fn the_shipped_experiment_hides_enough_and_not_too_much() {
 }
 
 #[test]
+fn an_experiment_pools_its_reporting_days_and_tells_each() {
+    let folder = prepared("experiment", ["", ""], ["", ""]);
+    for day in ["b", "c"] {
+        std::fs::copy(folder.join("small.fcd.xml"), folder.join(format!("{day}.fcd.xml"))).unwrap();
+    }
+    let plan = "scene = \"small.toml\"\nduration_s = 3.0\n[training]\nfcd = \"small.fcd.xml\"\nseed = 1\n\
+                [[reporting]]\nfcd = \"b.fcd.xml\"\nseed = 2\n[[reporting]]\nfcd = \"c.fcd.xml\"\nseed = 3\n";
+    std::fs::write(folder.join("plan.toml"), plan).unwrap();
+    let arguments = "experiment plan.toml --bootstrap 0 --json e.json --keep days --beside days/b.mcap";
+    let output = viewshed(&folder, "2", &arguments.split(' ').collect::<Vec<_>>());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.contains("3D radar, perfect occupancy") && text.contains("small (training, not pooled)"), "{text}");
+    assert!(text.contains("b (sensor gantry): "), "{text}");
+    let found = json(&folder.join("e.json"));
+    let names: Vec<&str> =
+        found["estimators"].as_array().unwrap().iter().map(|e| e["name"].as_str().unwrap()).collect();
+    let rows = ["radar-2d", "radar-2d-first", "radar-3d", "reference", "geometry-slice", "geometry-box"];
+    assert_eq!(names, rows);
+    let seeds = found["seeds"].as_array().unwrap();
+    assert_eq!(seeds.iter().map(|s| s["seed"].as_u64().unwrap()).collect::<Vec<_>>(), [2, 3]);
+    assert_eq!(found["training"]["seed"], 1);
+    for (k, name) in rows.iter().enumerate() {
+        for count in ["tv", "fv", "ti", "fi"] {
+            let of = |report: &serde_json::Value| report["estimators"][k][count].as_u64().unwrap();
+            assert_eq!(of(&found), seeds.iter().map(of).sum::<u64>(), "{name} {count}");
+        }
+    }
+    let rate = |report: &serde_json::Value| report["coverage_rate"].as_f64().unwrap();
+    let [low, high] = [rate(&seeds[0]).min(rate(&seeds[1])), rate(&seeds[0]).max(rate(&seeds[1]))];
+    assert!((low..=high).contains(&rate(&found)));
+    assert!(folder.join("days/c.mcap").exists());
+}
+
+#[test]
 fn an_experiment_that_cannot_be_run_says_why() {
     let folder = folder("bad-experiment");
     let plan = "scene = \"s.toml\"\nduration_s = 5.0\n[training]\nfcd = \"a.xml\"\nseed = 1\n";
