@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=4))]
     sensors: u8,
     /// What comes first
-    #[arg(long, value_enum, default_value_t = Rank::Coverage)]
+    #[arg(long, value_enum, default_value_t = Rank::Vehicles)]
     rank: Rank,
     /// Time between the instants that are looked at, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]

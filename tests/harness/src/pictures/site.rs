@@ -41,7 +41,7 @@ pub fn draw(site: &Site, ranked: &[Vec<Ranked>], title: &str) -> Canvas {
     let mut canvas = Canvas::new(WIDTH_PX, bottom + surround.below_px());
     let half = (WIDTH_PX - 30) / 2;
     for (column, (what, of)) in
-        [("vehicles detected, %", coverage as fn(&Ranked) -> f64), ("road in sight, %", road)].into_iter().enumerate()
+        [("vehicles detected, %", detected as fn(&Ranked) -> f64), ("road in sight, %", road)].into_iter().enumerate()
     {
         let left = column as i32 * (half + 15);
         let place =
@@ -75,8 +75,8 @@ pub fn draw(site: &Site, ranked: &[Vec<Ranked>], title: &str) -> Canvas {
     canvas
 }
 
-fn coverage(set: &Ranked) -> f64 {
-    set.coverage[0]
+fn detected(set: &Ranked) -> f64 {
+    set.detected[0]
 }
 
 fn road(set: &Ranked) -> f64 {

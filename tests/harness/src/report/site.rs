@@ -18,7 +18,7 @@ pub fn name(mount: &Mount) -> String {
 /// The tables: single mounts, then sets of each size, the first `top` of each.
 pub fn text(site: &Site, ranked: &[Vec<Ranked>], top: usize) -> String {
     let mut text = format!(
-        "{} candidate mounts, {} instants, {} vehicle-steps, {:.0} m² of road free of vehicles at a time\n",
+        "{} candidate mounts, {} instants; shares are of {} vehicle-steps and of {:.0} m² of road free of vehicles\n",
         site.candidates.len(),
         site.instants,
         site.object_steps,
@@ -38,12 +38,22 @@ pub fn text(site: &Site, ranked: &[Vec<Ranked>], top: usize) -> String {
 }
 
 fn singles(site: &Site, sets: &[Ranked], top: usize) -> String {
-    let heading =
-        ["", "height m", "along m", "across m", "yaw °", "pitch °", "vehicles\ndetected %", "road in\nsight %"];
+    let heading = [
+        "",
+        "height m",
+        "along m",
+        "across m",
+        "yaw °",
+        "pitch °",
+        "vehicles\ndetected %",
+        "road in\nsight %",
+        "coverage rate\nin own view %",
+    ];
     let rows = sets.iter().take(top).enumerate().map(|(k, set)| {
-        let m = &site.candidates[set.members[0]].mount;
+        let candidate = &site.candidates[set.members[0]];
+        let m = &candidate.mount;
         let figures = [m.height_m, m.x_m, m.y_m, m.yaw_deg, m.pitch_deg].map(|v| v.to_string());
-        let shares = [percent(Some(set.coverage[0])), percent(Some(set.road[0]))];
+        let shares = [Some(set.detected[0]), Some(set.road[0]), candidate.coverage_rate()].map(percent);
         std::iter::once((k + 1).to_string()).chain(figures).chain(shares).collect()
     });
     table(&heading, rows).to_string()
@@ -53,7 +63,7 @@ fn several(site: &Site, sets: &[Ranked], top: usize) -> String {
     let heading = ["", "mounts", "vehicles %\nby one", "vehicles %\nby two", "road %\nby one", "road %\nby two"];
     let rows = sets.iter().take(top).enumerate().map(|(k, set)| {
         let names: Vec<String> = set.members.iter().map(|&m| name(&site.candidates[m].mount)).collect();
-        let shares = [set.coverage[0], set.coverage[1], set.road[0], set.road[1]].map(|v| percent(Some(v)));
+        let shares = [set.detected[0], set.detected[1], set.road[0], set.road[1]].map(|v| percent(Some(v)));
         [(k + 1).to_string(), names.join("\n")].into_iter().chain(shares).collect()
     });
     table(&heading, rows).to_string()
@@ -65,7 +75,8 @@ pub fn json(site: &Site, ranked: &[Vec<Ranked>], search: &Search, by: Rank, opti
     let candidate = |set: &Ranked| {
         json!({
             "mount": mounts(set).first(),
-            "coverage_rate": set.coverage[0],
+            "vehicles_share": set.detected[0],
+            "coverage_rate": site.candidates[set.members[0]].coverage_rate(),
             "road_share": set.road[0],
             "road_m2": set.road[0] * site.cell_steps as f64 / site.instants as f64,
         })
@@ -73,8 +84,8 @@ pub fn json(site: &Site, ranked: &[Vec<Ranked>], search: &Search, by: Rank, opti
     let of_set = |set: &Ranked| {
         json!({
             "mounts": mounts(set),
-            "coverage_by_one": set.coverage[0],
-            "coverage_by_two": set.coverage[1],
+            "vehicles_by_one": set.detected[0],
+            "vehicles_by_two": set.detected[1],
             "road_by_one": set.road[0],
             "road_by_two": set.road[1],
         })

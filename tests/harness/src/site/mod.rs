@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::evaluation::Options;
+use crate::evaluation::counts::rate;
 use crate::evaluation::samples::{Cell, associate};
 use crate::geometry::polygon::Convex;
 use crate::geometry::sight::shadow;
@@ -49,10 +50,19 @@ pub struct Search {
 #[derive(Debug, Clone)]
 pub struct Candidate {
     pub mount: Mount,
-    /// Vehicle-time-steps it detects.
+    /// Vehicle-time-steps it detects, of all that count.
     pub detected: Bits,
+    /// Vehicle-time-steps in its own field of view, and those of them that it detects.
+    pub in_view: [u64; 2],
     /// Road-cell-time-steps in its sight.
     pub visible: Bits,
+}
+
+impl Candidate {
+    /// Coverage rate: share of the vehicle-time-steps in its own field of view that it detects.
+    pub fn coverage_rate(&self) -> Option<f64> {
+        rate(self.in_view[1], self.in_view[0])
+    }
 }
 
 /// A mount that cannot be, with the reason.
@@ -136,15 +146,26 @@ impl Site {
         let mut free = vec![0; cells.len()];
         instants.iter().flat_map(|t| &t.cells).for_each(|&(k, _)| free[k] += 1);
         let look = |view: Recording, mount: &Mount| {
-            let mut candidate =
-                Candidate { mount: *mount, detected: Bits::new(object_steps), visible: Bits::new(cell_steps) };
+            let mut candidate = Candidate {
+                mount: *mount,
+                detected: Bits::new(object_steps),
+                in_view: [0, 0],
+                visible: Bits::new(cell_steps),
+            };
             let mut radar = simulation.radar.clone();
             radar.pose = view.pose;
             for (number, instant) in instants.iter().enumerate() {
                 let detections = simulation.scan(&radar, instant.since_s, number as u64);
                 let counts = associate(&view, &instant.objects, &detections, options);
-                for &(_, bit) in instant.counted.iter().filter(|(o, _)| counts[*o] >= options.min_detections) {
-                    candidate.detected.set(bit);
+                for &(object, bit) in &instant.counted {
+                    let [x, y, _] = instant.objects[object].solid.center;
+                    let own = view.sensor.field_of_view.contains(view.pose.to_spherical([x, y, height_m]));
+                    let detected = counts[object] >= options.min_detections;
+                    candidate.in_view[0] += u64::from(own);
+                    candidate.in_view[1] += u64::from(own && detected);
+                    if detected {
+                        candidate.detected.set(bit);
+                    }
                 }
                 let shadows: Vec<Convex> =
                     instant.objects.iter().filter_map(|o| shadow(view.pose.position, &o.solid, height_m)).collect();

@@ -17,7 +17,7 @@ pub struct Ranked {
     /// Indices into [`Site::candidates`], ascending.
     pub members: Vec<usize>,
     /// Vehicle-time-steps detected by at least one of them, and by at least two.
-    pub coverage: [f64; 2],
+    pub detected: [f64; 2],
     /// Free road cells in sight of at least one of them, and of at least two.
     pub road: [f64; 2],
 }
@@ -28,11 +28,11 @@ pub struct Ranked {
 pub enum Rank {
     /// Vehicles detected by at least one sensor
     #[default]
-    Coverage,
+    Vehicles,
     /// Road in sight of at least one sensor
     Road,
     /// Vehicles detected by at least two sensors
-    CoverageTwice,
+    VehiclesTwice,
     /// Road in sight of at least two sensors
     RoadTwice,
 }
@@ -40,11 +40,11 @@ pub enum Rank {
 impl Ranked {
     /// What is compared first, and what decides among equals.
     pub fn key(&self, by: Rank) -> [f64; 4] {
-        let ([c, cc], [r, rr]) = (self.coverage, self.road);
+        let ([c, cc], [r, rr]) = (self.detected, self.road);
         match by {
-            Rank::Coverage => [c, r, cc, rr],
+            Rank::Vehicles => [c, r, cc, rr],
             Rank::Road => [r, c, rr, cc],
-            Rank::CoverageTwice => [cc, rr, c, r],
+            Rank::VehiclesTwice => [cc, rr, c, r],
             Rank::RoadTwice => [rr, cc, r, c],
         }
     }
@@ -89,7 +89,7 @@ impl Site {
             |of: fn(&Candidate) -> &Bits| -> Vec<&Bits> { members.iter().map(|&k| of(&self.candidates[k])).collect() };
         let shares = |rows: Vec<&Bits>, whole: u64| at_least(&rows).map(|n| n as f64 / whole as f64);
         Ranked {
-            coverage: shares(rows(|c| &c.detected), self.object_steps),
+            detected: shares(rows(|c| &c.detected), self.object_steps),
             road: shares(rows(|c| &c.visible), self.cell_steps),
             members,
         }
@@ -98,7 +98,7 @@ impl Site {
 
 fn single(by: Rank) -> Rank {
     match by {
-        Rank::Coverage | Rank::CoverageTwice => Rank::Coverage,
+        Rank::Vehicles | Rank::VehiclesTwice => Rank::Vehicles,
         Rank::Road | Rank::RoadTwice => Rank::Road,
     }
 }
@@ -129,7 +129,7 @@ mod tests {
         let candidate = |set: &&[usize]| {
             let mut bits = Bits::new(10);
             set.iter().for_each(|&k| bits.set(k));
-            Candidate { mount, detected: bits.clone(), visible: bits }
+            Candidate { mount, detected: bits.clone(), visible: bits, in_view: [0, 0] }
         };
         Site {
             candidates: detected.iter().map(candidate).collect(),
@@ -146,13 +146,13 @@ mod tests {
     #[test]
     fn the_best_pair_need_not_hold_the_best_single_mount() {
         let site = site(&[&[0, 1, 2, 3, 4, 5], &[0, 1, 2, 6, 7], &[3, 4, 5, 8, 9]]);
-        assert_eq!(site.ranked(1, Rank::Coverage)[0].members, [0]);
-        let pairs = site.ranked(2, Rank::Coverage);
-        assert_eq!((pairs.len(), pairs[0].members.as_slice(), pairs[0].coverage), (3, &[1, 2][..], [1.0, 0.0]));
-        let twice = site.ranked(2, Rank::CoverageTwice);
-        assert_eq!((twice[0].members.as_slice(), twice[0].coverage[1]), (&[0, 1][..], 0.3));
-        assert_eq!(site.ranked(3, Rank::Coverage)[0].coverage, [1.0, 0.6]);
-        assert!(site.ranked(4, Rank::Coverage).is_empty());
+        assert_eq!(site.ranked(1, Rank::Vehicles)[0].members, [0]);
+        let pairs = site.ranked(2, Rank::Vehicles);
+        assert_eq!((pairs.len(), pairs[0].members.as_slice(), pairs[0].detected), (3, &[1, 2][..], [1.0, 0.0]));
+        let twice = site.ranked(2, Rank::VehiclesTwice);
+        assert_eq!((twice[0].members.as_slice(), twice[0].detected[1]), (&[0, 1][..], 0.3));
+        assert_eq!(site.ranked(3, Rank::Vehicles)[0].detected, [1.0, 0.6]);
+        assert!(site.ranked(4, Rank::Vehicles).is_empty());
     }
 
     #[test]

@@ -294,7 +294,7 @@ fn a_higher_mount_sees_more_of_dense_traffic_and_of_the_road() {
     let found = json(&folder.join("site.json"));
     let [high, low] = [0, 1].map(|k| &found["candidates"][k]);
     assert_eq!((high["mount"]["height_m"].as_f64(), low["mount"]["height_m"].as_f64()), (Some(8.0), Some(4.0)));
-    for key in ["coverage_rate", "road_share"] {
+    for key in ["vehicles_share", "coverage_rate", "road_share"] {
         assert!(high[key].as_f64().unwrap() > low[key].as_f64().unwrap() + 0.05, "{key}: {high} {low}");
     }
 }
@@ -329,11 +329,11 @@ fn mounts_are_ranked_alone_and_in_sets_and_impossible_ones_left_out() {
     let all = found["candidates"].as_array().unwrap();
     assert_eq!((all.len(), found["left_out"].as_array().unwrap().len()), (10, 2));
     let of = |entry: &serde_json::Value, key: &str| entry[key].as_f64().unwrap();
-    assert!(all.windows(2).all(|pair| of(&pair[0], "coverage_rate") >= of(&pair[1], "coverage_rate")));
+    assert!(all.windows(2).all(|pair| of(&pair[0], "vehicles_share") >= of(&pair[1], "vehicles_share")));
     let pair = &found["sets"][0];
-    assert!(of(pair, "coverage_by_one") >= of(&all[0], "coverage_rate"));
+    assert!(of(pair, "vehicles_by_one") >= of(&all[0], "vehicles_share"));
     assert!(
-        of(pair, "coverage_by_two") <= of(pair, "coverage_by_one")
+        of(pair, "vehicles_by_two") <= of(pair, "vehicles_by_one")
             && of(pair, "road_by_two") <= of(pair, "road_by_one")
     );
     assert_eq!(std::fs::read(folder.join("site.png")).unwrap()[..4], [0x89, b'P', b'N', b'G']);
