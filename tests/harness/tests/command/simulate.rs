@@ -142,7 +142,7 @@ fn what_cannot_be_simulated_is_told_with_its_place_and_leaves_no_recording() {
             &["vehicle types", "gone.rou.xml"],
         ),
         ("empty", ["from_s = 10.0", "from_s = 500.0"], none, &["an empty scene", "its times are 9 s to 14.5 s"]),
-        ("away", ["pitch_deg = 4.0", "pitch_deg = 4.0, x_m = 5000.0"], none, &["an empty scene", "m away"]),
+        ("away", ["from_s = 10.0", "from_s = 10.0\norigin = [5000.0, 0.0]"], none, &["an empty scene", "m away"]),
         (
             "below",
             ["height_m = 6.0, pitch_deg = 4.0", "height_m = -1.0"],
