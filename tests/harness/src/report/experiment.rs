@@ -56,9 +56,10 @@ const RATES: [Rate; 6] = [
 pub fn text(experiment: &Experiment) -> String {
     let days = experiment.reporting.len();
     format!(
-        "{days} reporting days of one scene, pooled (below: least and most of a day); beside them the paper's figures\n{}\n{}\n{}\n{}\n",
+        "{days} reporting days of one scene, pooled (below: least and most of a day); beside them the paper's figures\n{}\n{}{}\n{}\n{}\n",
         comparison(experiment),
         expectations(experiment),
+        at_equal_fir(experiment),
         by_day(experiment),
         closing(experiment)
     )
@@ -115,6 +116,23 @@ fn expectations(experiment: &Experiment) -> String {
         ))
     });
     lines.collect::<Vec<_>>().join("\n")
+}
+
+/// How the flat grids fare where they call as much invisible as `radar-3d`, day by day.
+fn at_equal_fir(experiment: &Experiment) -> String {
+    let comparisons = || experiment.reporting.iter().flat_map(|d| &d.replay.summary.comparisons);
+    let line = |of: &str| {
+        let points: Vec<f64> = comparisons().filter(|c| c.of == of).map(|c| c.difference_points).collect();
+        let [least, most] = [
+            points.iter().copied().fold(f64::INFINITY, f64::min),
+            points.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        ];
+        format!(
+            "\nAt equal FIR of {of}, FVR of radar-3d less that of the better of radar-2d and radar-2d-first: \
+             {least:+.1} to {most:+.1} points by day."
+        )
+    };
+    ["objects", "cells"].into_iter().filter(|of| comparisons().any(|c| c.of == *of)).map(line).collect()
 }
 
 fn by_day(experiment: &Experiment) -> String {
