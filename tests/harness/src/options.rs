@@ -30,11 +30,18 @@ struct Config {
     estimators: estimators::Options,
 }
 
-/// Groups of options that subcommands share.
+/// Groups of options that subcommands share: how to read recordings, and how to judge.
 #[derive(Debug, Clone, Default, Args)]
 pub struct SettingsArgs {
     #[command(flatten)]
     reading: ReadingArgs,
+    #[command(flatten)]
+    judging: JudgingArgs,
+}
+
+/// How estimators run and how they are judged, whatever they are given.
+#[derive(Debug, Clone, Default, Args)]
+pub struct JudgingArgs {
     #[command(flatten)]
     evaluation: EvaluationArgs,
     #[command(flatten)]
@@ -155,11 +162,21 @@ impl SettingsArgs {
     /// Defaults, then the file, then the command line.
     ///
     /// # Errors
+    /// Those of [`JudgingArgs::settings`].
+    pub fn settings(&self) -> Result<Settings> {
+        Ok(Settings { reading: self.reading.options(), ..self.judging.settings()? })
+    }
+}
+
+impl JudgingArgs {
+    /// Defaults, then the file, then the command line; recordings are read as they are.
+    ///
+    /// # Errors
     /// A file that cannot be read, a key it should not have (with its line), a value out of range.
     pub fn settings(&self) -> Result<Settings> {
         let config = self.config.as_deref().map(read_config).transpose()?.unwrap_or_default();
         let mut settings =
-            Settings { reading: self.reading.options(), evaluation: config.evaluation, estimators: config.estimators };
+            Settings { reading: ReadOptions::default(), evaluation: config.evaluation, estimators: config.estimators };
         self.evaluation.apply(&mut settings.evaluation);
         self.estimators.apply(&mut settings.estimators);
         settings.evaluation.check()?;

@@ -82,6 +82,16 @@ impl Truth {
 }
 
 impl Track {
+    /// Its boxes, in the order of time.
+    pub fn solids(&self) -> impl Iterator<Item = &Solid> {
+        self.solids.iter()
+    }
+
+    /// Whether it is ever anywhere else.
+    pub fn moves(&self) -> bool {
+        self.solids.windows(2).any(|pair| pair[0].center != pair[1].center)
+    }
+
     /// Central differences, one-sided at the ends.
     fn differences(&self) -> Vec<[f64; 2]> {
         let n = self.times_ns.len();

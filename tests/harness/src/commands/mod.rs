@@ -1,10 +1,14 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod bus;
+pub mod detections;
 pub mod doctor;
+pub mod experiment;
 pub mod listen;
 pub mod progress;
 pub mod replay;
+pub mod simulate;
+pub mod site;
 
 use std::io::Write;
 use std::path::Path;
@@ -30,6 +34,10 @@ enum Command {
     Doctor(doctor::Args),
     Bus(Box<bus::Args>),
     Listen(listen::Args),
+    Simulate(simulate::Args),
+    Experiment(Box<experiment::Args>),
+    Site(Box<site::Args>),
+    Detections(Box<detections::Args>),
 }
 
 impl Cli {
@@ -40,6 +48,10 @@ impl Cli {
             Command::Doctor(args) => doctor::run(args),
             Command::Bus(args) => bus::run(args),
             Command::Listen(args) => listen::run(args),
+            Command::Simulate(args) => simulate::run(args),
+            Command::Experiment(args) => experiment::run(args),
+            Command::Site(args) => site::run(args),
+            Command::Detections(args) => detections::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

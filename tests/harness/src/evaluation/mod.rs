@@ -16,6 +16,7 @@ pub mod curve;
 pub mod examples;
 pub mod mount_error;
 pub mod replay;
+pub mod returns;
 pub mod samples;
 pub mod score;
 pub mod summary;

@@ -72,6 +72,11 @@ impl Convex {
         Self(out)
     }
 
+    /// The part inside of `other`.
+    pub fn within(&self, other: &Convex) -> Self {
+        other.edges().fold(self.clone(), |rest, (a, b)| rest.clip(a, b, 1.0))
+    }
+
     /// `self` without `other`, as disjoint convex pieces.
     fn minus(self, other: &Convex, pieces: &mut Vec<Convex>) {
         let mut rest = self;
@@ -94,6 +99,11 @@ impl Convex {
 
 /// Area of `polygon` that no member of `covers` covers.
 pub fn uncovered_area<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a Convex>) -> f64 {
+    uncovered(polygon, covers).iter().map(Convex::area).sum()
+}
+
+/// What of `polygon` no member of `covers` covers, in disjoint convex pieces.
+pub fn uncovered<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a Convex>) -> Vec<Convex> {
     let mut pieces = vec![polygon];
     for cover in covers {
         let mut next = Vec::with_capacity(pieces.len() + 2);
@@ -102,10 +112,10 @@ pub fn uncovered_area<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a 
         }
         pieces = next;
         if pieces.is_empty() {
-            return 0.0;
+            break;
         }
     }
-    pieces.iter().map(Convex::area).sum()
+    pieces
 }
 
 #[cfg(test)]
@@ -132,6 +142,13 @@ mod tests {
         let u = uncovered_area(square.clone(), [&rect(0.0, 0.0, 6.0, 10.0), &rect(4.0, 0.0, 9.0, 10.0)]);
         assert!((u - 10.0).abs() < 1e-9);
         assert_eq!(uncovered_area(square, [&rect(20.0, 0.0, 30.0, 10.0)]), 100.0);
+    }
+
+    #[test]
+    fn what_lies_within_is_cut_at_the_border() {
+        let square = rect(0.0, 0.0, 10.0, 10.0);
+        assert_eq!(square.within(&rect(-5.0, 2.0, 5.0, 4.0)).area(), 10.0);
+        assert_eq!(square.within(&rect(20.0, 0.0, 30.0, 10.0)).area(), 0.0);
     }
 
     #[test]

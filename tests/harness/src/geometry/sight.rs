@@ -56,8 +56,9 @@ pub fn box_in_sight<'a>(sensor: [f64; 3], target: &Solid, others: impl IntoItera
     uncovered_area(outline, &covers) > VISIBLE_AREA * 1e-6
 }
 
-/// Projection of a box on the image plane, clipped to what lies ahead of the sensor.
-fn outline(toward: &SensorPose, solid: &Solid) -> Option<Convex> {
+/// Projection of a box on the image plane at unit distance (left and up), clipped to what lies ahead of
+/// the sensor.
+pub fn outline(toward: &SensorPose, solid: &Solid) -> Option<Convex> {
     const AHEAD: f64 = 0.05;
     let corners: Vec<[f64; 3]> = [solid.bottom(), solid.top()]
         .iter()
@@ -81,7 +82,7 @@ fn outline(toward: &SensorPose, solid: &Solid) -> Option<Convex> {
 
 /// Whether `a` lies before `b` as seen from the sensor: the sensor is on `a`'s side of a plane
 /// that parts the two. Boxes that overlap (labels do) are ordered by distance.
-fn in_front(sensor: [f64; 3], a: &Solid, b: &Solid) -> bool {
+pub fn in_front(sensor: [f64; 3], a: &Solid, b: &Solid) -> bool {
     let eye = [sensor[0], sensor[1]];
     let interval = |solid: &Solid, axis: Point| {
         solid

@@ -1,4 +1,4 @@
-//! Pictures for people: maps from above, polar grids and trade-off curves, as PNG.
+//! Pictures for people: maps from above, polar grids, trade-off curves, heat maps, as PNG.
 //!
 //! Every function takes plain data and gives a [`canvas::Canvas`]; the same input gives the same
 //! bytes. Text is set in DejaVu Sans from inside the program, so no font has to be installed.
@@ -6,8 +6,11 @@
 pub mod birdseye;
 pub mod canvas;
 pub mod closeup;
+pub mod heatmap;
 pub mod palette;
 pub mod polar;
+pub mod returns;
+pub mod site;
 pub mod tradeoff;
 
 mod axes;

@@ -10,7 +10,7 @@ use crate::geometry::solid::Solid;
 use crate::truth::Label;
 
 /// Length, width, height in metres assumed for a class where the labels give none.
-fn class_size(class: &str) -> Option<[f64; 3]> {
+pub fn class_size(class: &str) -> Option<[f64; 3]> {
     Some(match class {
         "car" => [4.6, 1.8, 1.5],
         "van" => [6.0, 2.05, 2.6],
@@ -23,17 +23,18 @@ fn class_size(class: &str) -> Option<[f64; 3]> {
     })
 }
 
+/// A row as it stands in the file.
 #[derive(Debug, Deserialize)]
-struct LabelRow {
-    time_s: f64,
-    object_id: String,
-    class: String,
-    x_m: f64,
-    y_m: f64,
-    heading_rad: Option<f64>,
-    length_m: Option<f64>,
-    width_m: Option<f64>,
-    height_m: Option<f64>,
+pub struct LabelRow {
+    pub time_s: f64,
+    pub object_id: String,
+    pub class: String,
+    pub x_m: f64,
+    pub y_m: f64,
+    pub heading_rad: Option<f64>,
+    pub length_m: Option<f64>,
+    pub width_m: Option<f64>,
+    pub height_m: Option<f64>,
 }
 
 /// Reads labels in the road frame. Times are seconds on the recording's clock or, where none of
@@ -47,29 +48,8 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<Vec<Label>
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).with_context(place)?;
     let mut labels = Vec::new();
     for (i, row) in csv.deserialize::<LabelRow>().enumerate() {
-        let line = i + 2;
-        let row = row.with_context(|| format!("{}, line {line}", place()))?;
-        let default = class_size(&row.class);
-        let pick = |given: Option<f64>, k: usize| given.or(default.map(|d| d[k]));
-        let (Some(l), Some(w), Some(h)) = (pick(row.length_m, 0), pick(row.width_m, 1), pick(row.height_m, 2)) else {
-            bail!(
-                "{}, line {line}: class `{}` has no default size; give length_m, width_m and height_m",
-                place(),
-                row.class
-            );
-        };
-        let yaw_rad = row.heading_rad.unwrap_or(0.0);
-        if [row.time_s, row.x_m, row.y_m, yaw_rad].iter().any(|v| !v.is_finite())
-            || [l, w, h].iter().any(|v| !(*v > 0.0 && v.is_finite()))
-        {
-            bail!("{}, line {line}: a value is not finite, or a size not positive", place());
-        }
-        labels.push(Label {
-            time_ns: (row.time_s * 1e9).round() as i64,
-            id: row.object_id,
-            class: row.class,
-            solid: Solid { center: [row.x_m, row.y_m, h / 2.0], yaw_rad, size: [l, w, h] },
-        });
+        let place = || format!("{}, line {}", place(), i + 2);
+        labels.push(label(row.with_context(place)?).with_context(place)?);
     }
     if !labels.iter().any(|l| (start_ns..=end_ns).contains(&l.time_ns)) {
         for l in &mut labels {
@@ -77,6 +57,30 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<Vec<Label>
         }
     }
     Ok(labels)
+}
+
+/// A row as a label standing on the road; a missing size is that of the class.
+///
+/// # Errors
+/// A class whose size nobody knows, a value that is not finite, a size that is not positive.
+pub fn label(row: LabelRow) -> Result<Label> {
+    let default = class_size(&row.class);
+    let pick = |given: Option<f64>, k: usize| given.or(default.map(|d| d[k]));
+    let (Some(l), Some(w), Some(h)) = (pick(row.length_m, 0), pick(row.width_m, 1), pick(row.height_m, 2)) else {
+        bail!("class `{}` has no default size; give length_m, width_m and height_m", row.class);
+    };
+    let yaw_rad = row.heading_rad.unwrap_or(0.0);
+    if [row.time_s, row.x_m, row.y_m, yaw_rad].iter().any(|v| !v.is_finite())
+        || [l, w, h].iter().any(|v| !(*v > 0.0 && v.is_finite()))
+    {
+        bail!("a value is not finite, or a size not positive");
+    }
+    Ok(Label {
+        time_ns: (row.time_s * 1e9).round() as i64,
+        id: row.object_id,
+        class: row.class,
+        solid: Solid { center: [row.x_m, row.y_m, h / 2.0], yaw_rad, size: [l, w, h] },
+    })
 }
 
 #[derive(Debug, Deserialize)]

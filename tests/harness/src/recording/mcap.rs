@@ -62,14 +62,22 @@ struct Reader {
 /// is counted in [`Recording::problems`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    beside::complete(parse(&bytes, name, options)?, path, options)
+}
+
+/// A whole recording from the bytes of its file, with nothing beside it.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn parse(bytes: &[u8], name: String, options: &ReadOptions) -> Result<Recording> {
     let mut reader = Reader {
         radar_topic: options.radar_topic.clone(),
         truth_topic: options.truth_topic.clone(),
         ..Default::default()
     };
-    reader.records(&bytes)?;
-    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    beside::complete(reader.finish(name, options)?, path, options)
+    reader.records(bytes)?;
+    reader.finish(name, options)
 }
 
 impl Reader {

@@ -2,6 +2,7 @@
 
 pub mod ars408;
 pub mod beside;
+pub mod camera;
 pub mod candump;
 pub mod capture;
 pub mod labels;

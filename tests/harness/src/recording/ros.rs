@@ -157,6 +157,57 @@ pub struct Detection3DArray {
     pub detections: Vec<Detection3D>,
 }
 
+/// `vision_msgs/msg/BoundingBox2D`
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct BoundingBox2D {
+    /// Middle, pixels.
+    pub center: [f64; 2],
+    pub theta: f64,
+    pub size: [f64; 2],
+}
+
+/// `vision_msgs/msg/Detection2D`
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Detection2D {
+    pub header: Header,
+    pub results: Vec<ObjectHypothesisWithPose>,
+    pub bbox: BoundingBox2D,
+    pub id: String,
+}
+
+/// `vision_msgs/msg/Detection2DArray`
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Detection2DArray {
+    pub header: Header,
+    pub detections: Vec<Detection2D>,
+}
+
+/// `sensor_msgs/msg/RegionOfInterest`
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct RegionOfInterest {
+    pub x_offset: u32,
+    pub y_offset: u32,
+    pub height: u32,
+    pub width: u32,
+    pub do_rectify: bool,
+}
+
+/// `sensor_msgs/msg/CameraInfo`
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct CameraInfo {
+    pub header: Header,
+    pub height: u32,
+    pub width: u32,
+    pub distortion_model: String,
+    pub d: Vec<f64>,
+    pub k: [f64; 9],
+    pub r: [f64; 9],
+    pub p: [f64; 12],
+    pub binning_x: u32,
+    pub binning_y: u32,
+    pub roi: RegionOfInterest,
+}
+
 /// Decodes a CDR message with its four-byte encapsulation header.
 pub fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
     let (header, body) = data.split_at_checked(4).ok_or("shorter than the CDR header")?;

@@ -1,4 +1,4 @@
-//! Recordings out: radar frames, mount and ground truth as an MCAP file by the contract.
+//! Recordings out: radar and camera frames, mounts and ground truth as an MCAP file by the contract.
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
@@ -8,6 +8,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
 use serde::Serialize;
 
+use super::camera::{self, CAMERA_FRAME, CameraFrame, INFO_TOPIC, Intrinsics, OBJECTS_TOPIC, OPTICAL_FRAME};
 use super::mcap::{POINTS_TOPIC, ROAD_FRAME, SENSOR_METADATA, TRUTH_TOPIC};
 use super::ros::{
     Detection3D, Detection3DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose, PointCloud2, PointField, Pose,
@@ -23,10 +24,19 @@ const RADAR_FRAME: &str = "radar";
 /// Name and definition of each message type written.
 const POINT_CLOUD: (&str, &str) = ("sensor_msgs/msg/PointCloud2", include_str!("msg/PointCloud2.msg"));
 const DETECTIONS: (&str, &str) = ("vision_msgs/msg/Detection3DArray", include_str!("msg/Detection3DArray.msg"));
+const BOXES: (&str, &str) = ("vision_msgs/msg/Detection2DArray", include_str!("msg/Detection2DArray.msg"));
+const CAMERA: (&str, &str) = ("sensor_msgs/msg/CameraInfo", include_str!("msg/CameraInfo.msg"));
 const TF: (&str, &str) = ("tf2_msgs/msg/TFMessage", include_str!("msg/TFMessage.msg"));
 
 /// FLOAT32 fields of a point, in this order.
 const FIELDS: [&str; 9] = ["x", "y", "z", "range", "azimuth", "elevation", "radial_velocity", "rcs", "snr"];
+
+/// zstd's level and how much is compressed together: small files are worth more here than fast ones.
+const COMPRESSION_LEVEL: u32 = 6;
+const CHUNK_BYTES: u64 = 4 << 20;
+
+/// Steps of x, y and z, which are there for viewers: range and angles are the measurement.
+const VIEWER_STEP_M: f64 = 1.0 / 8.0;
 
 /// Writes one recording, message by message, in the order of time.
 pub struct RecordingWriter<W: Write + Seek> {
@@ -38,15 +48,43 @@ pub struct RecordingWriter<W: Write + Seek> {
 impl<W: Write + Seek> RecordingWriter<W> {
     /// Begins a recording of a sensor mounted at `pose` since `start_ns`.
     pub fn new(sink: W, sensor: &Sensor, pose: &SensorPose, start_ns: i64) -> Result<Self> {
-        let mut writer = WriteOptions::new().profile("ros2").compression(Some(Compression::Zstd)).create(sink)?;
+        Self::begin(sink, sensor, start_ns, &mount(pose, RADAR_FRAME, start_ns))
+    }
+
+    /// The same with a camera beside the radar.
+    pub fn with_camera(
+        sink: W,
+        sensor: &Sensor,
+        pose: &SensorPose,
+        camera: &SensorPose,
+        start_ns: i64,
+    ) -> Result<Self> {
+        let mut mounts = mount(pose, RADAR_FRAME, start_ns);
+        mounts.transforms.extend(mount(camera, CAMERA_FRAME, start_ns).transforms);
+        mounts.transforms.push(optical(start_ns));
+        Self::begin(sink, sensor, start_ns, &mounts)
+    }
+
+    fn begin(sink: W, sensor: &Sensor, start_ns: i64, mounts: &TfMessage) -> Result<Self> {
+        let options = WriteOptions::new().profile("ros2").compression(Some(Compression::Zstd));
+        // one thread whatever the machine: the bytes must not depend on its processors
+        let options = options.compression_level(COMPRESSION_LEVEL).compression_threads(1).chunk_size(Some(CHUNK_BYTES));
+        let mut writer = options.create(sink)?;
         writer.write_metadata(&sensor_metadata(sensor))?;
         let mut recording = Self { writer, channels: BTreeMap::new(), sequence: 0 };
-        recording.message(TF_TOPIC, TF, start_ns, &mount(pose, RADAR_FRAME, start_ns))?;
+        recording.message(TF_TOPIC, TF, start_ns, mounts)?;
         Ok(recording)
     }
 
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
         self.message(POINTS_TOPIC, POINT_CLOUD, frame.time_ns, &cloud(frame))
+    }
+
+    /// A camera's boxes, and the camera with them.
+    pub fn camera_frame(&mut self, frame: &CameraFrame, intrinsics: &Intrinsics) -> Result<()> {
+        let header = Header { stamp: Stamp::from_nanoseconds(frame.time_ns), frame_id: OPTICAL_FRAME.into() };
+        self.message(INFO_TOPIC, CAMERA, frame.time_ns, &camera::info(intrinsics, &header))?;
+        self.message(OBJECTS_TOPIC, BOXES, frame.time_ns, &camera::message(frame, &header))
     }
 
     /// All objects of one instant; the labels' own times are not written.
@@ -101,6 +139,18 @@ fn mount(pose: &SensorPose, frame_id: &str, time_ns: i64) -> TfMessage {
             child_frame_id: frame_id.to_owned(),
             transform: Transform { translation: Vector3 { x, y, z }, rotation: quaternion(pose) },
         }],
+    }
+}
+
+/// From the camera's x ahead to the optical z ahead, x right, y down.
+fn optical(time_ns: i64) -> TransformStamped {
+    TransformStamped {
+        header: Header { stamp: Stamp::from_nanoseconds(time_ns), frame_id: CAMERA_FRAME.into() },
+        child_frame_id: OPTICAL_FRAME.to_owned(),
+        transform: Transform {
+            translation: Vector3::default(),
+            rotation: Quaternion { x: -0.5, y: 0.5, z: -0.5, w: 0.5 },
+        },
     }
 }
 
@@ -165,7 +215,7 @@ fn cloud(frame: &Frame) -> PointCloud2 {
 
 fn point(d: &RadarDetection) -> [f32; FIELDS.len()] {
     let unit = direction(f64::from(d.azimuth_rad), f64::from(d.elevation_rad.unwrap_or(0.0)));
-    let [x, y, z] = unit.map(|u| (u * f64::from(d.range_m)) as f32);
+    let [x, y, z] = unit.map(|u| ((u * f64::from(d.range_m) / VIEWER_STEP_M).round() * VIEWER_STEP_M) as f32);
     let or_nan = |v: Option<f32>| v.unwrap_or(f32::NAN);
     let (elevation, rcs, snr) = (or_nan(d.elevation_rad), or_nan(d.rcs_dbsm), or_nan(d.snr_db));
     [x, y, z, d.range_m, d.azimuth_rad, elevation, d.radial_velocity_mps, rcs, snr]

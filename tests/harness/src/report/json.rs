@@ -68,7 +68,7 @@ pub struct Estimator {
 
 /// Counts and the rates made of them.
 #[derive(Serialize)]
-struct Rates {
+pub(super) struct Rates {
     tv: u64,
     fv: u64,
     ti: u64,
@@ -166,7 +166,7 @@ fn estimator(row: &Row) -> Estimator {
     }
 }
 
-fn rates(c: &Counts) -> Rates {
+pub(super) fn rates(c: &Counts) -> Rates {
     Rates { tv: c.tv, fv: c.fv, ti: c.ti, fi: c.fi, tvr: c.tvr(), fvr: c.fvr(), tir: c.tir(), fir: c.fir() }
 }
 

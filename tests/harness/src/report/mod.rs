@@ -1,8 +1,10 @@
 //! What people and programs get to see of a replay: a table, JSON, CSV.
 
 pub mod csv;
+pub mod experiment;
 pub mod json;
 pub mod notes;
+pub mod site;
 pub mod table;
 
 /// To be said wherever results are shown.

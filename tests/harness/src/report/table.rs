@@ -41,7 +41,7 @@ fn signed(points: Option<f64>, interval: Option<Interval>) -> String {
     points.map_or_else(|| "n/a".into(), |p| format!("{p:+.1}")) + &spread.unwrap_or_default()
 }
 
-fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+pub fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_FULL_CONDENSED).set_header(heading.to_vec());
     for row in rows {
@@ -54,7 +54,7 @@ fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table
 }
 
 /// Rates in per cent with their intervals, one row an estimator.
-fn rates(summary: &Summary) -> Table {
+pub(super) fn rates(summary: &Summary) -> Table {
     let heading = [
         "estimator",
         "TVR %",

@@ -2,7 +2,7 @@
 
 mod out;
 mod pictures;
-pub(crate) mod shipped;
+pub mod shipped;
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
-//! The recordings that come with the project.
+//! The recordings and scenes that come with the project.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
 /// Where they lie, seen from the project's root and from this crate's sources.
 const FOLDERS: [&str; 2] = ["tests/recordings", concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings")];
@@ -19,6 +19,15 @@ pub fn recordings() -> Result<Vec<PathBuf>> {
         );
     };
     Ok(found)
+}
+
+/// A file that comes with the project.
+///
+/// # Errors
+/// It is not there.
+pub fn file(name: &str) -> Result<PathBuf> {
+    let found = FOLDERS.iter().map(|folder| Path::new(folder).join(name)).find(|path| path.exists());
+    found.with_context(|| format!("{name} is neither in tests/recordings here nor beside the sources; name a file"))
 }
 
 fn within(folder: &Path) -> Vec<PathBuf> {

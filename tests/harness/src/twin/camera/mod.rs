@@ -1,0 +1,168 @@
+//! A camera: the 2D boxes a detector would put around what it sees of the vehicles.
+//!
+//! [`Camera::view`] projects and finds what is not hidden, exactly; [`detector`] errs like a detector.
+//! Pixels count from the upper left corner, u to the right, v down; the camera looks along its x axis
+//! (REP-103), the optical frame with z ahead is written beside it.
+
+pub mod detector;
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::polygon::{Convex, uncovered};
+use crate::geometry::pose::SensorPose;
+use crate::geometry::sight::{in_front, outline};
+use crate::geometry::solid::Solid;
+use crate::recording::camera::{Box2d, Intrinsics};
+use detector::DetectorModel;
+
+/// A mounted camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    pub pose: SensorPose,
+    pub intrinsics: Intrinsics,
+    pub model: DetectorModel,
+}
+
+/// What is seen of one object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// Index of the object.
+    pub object: usize,
+    /// Around what is visible, pixels: left, top, right, bottom.
+    pub edges: [f64; 4],
+    /// Visible share of its outline, what lies outside of the image included.
+    pub share: f64,
+}
+
+impl Camera {
+    /// What is visible of each object past all others (and past `screens`, which are not objects).
+    pub fn view(&self, objects: &[Solid], screens: &[Solid]) -> Vec<Sighting> {
+        let eye = self.pose.position;
+        let all: Vec<(Solid, Option<Convex>)> =
+            objects.iter().chain(screens).map(|s| (*s, outline(&self.pose, s))).collect();
+        let frame = self.frame();
+        let sighting = |object: usize| {
+            let (solid, outline) = &all[object];
+            let outline = outline.clone()?;
+            let whole = outline.area();
+            let covers = all.iter().enumerate().filter_map(|(i, (other, cover))| {
+                (i != object && cover.is_some() && in_front(eye, other, solid)).then_some(cover.as_ref()?)
+            });
+            let pieces: Vec<Convex> =
+                uncovered(outline, covers).iter().map(|p| p.within(&frame)).filter(|p| p.area() > 0.0).collect();
+            let visible: f64 = pieces.iter().map(Convex::area).sum();
+            let none = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+            let edges = pieces.iter().flat_map(Convex::corners).fold(none, |[l, t, r, b], corner| {
+                let [u, v] = self.pixel(*corner);
+                [l.min(u), t.min(v), r.max(u), b.max(v)]
+            });
+            (visible > 1e-9).then(|| Sighting { object, edges, share: (visible / whole).min(1.0) })
+        };
+        (0..objects.len()).filter_map(sighting).collect()
+    }
+
+    /// Pixel of a point of the image plane at unit distance (left and up).
+    fn pixel(&self, [left, up]: [f64; 2]) -> [f64; 2] {
+        let i = &self.intrinsics;
+        [f64::from(i.width_px) / 2.0 - i.focal_px * left, f64::from(i.height_px) / 2.0 - i.focal_px * up]
+    }
+
+    /// The image's border on the plane at unit distance.
+    fn frame(&self) -> Convex {
+        let i = &self.intrinsics;
+        let (x, y) = (f64::from(i.width_px) / 2.0 / i.focal_px, f64::from(i.height_px) / 2.0 / i.focal_px);
+        Convex::hull(vec![[x, y], [-x, y], [-x, -y], [x, -y]])
+    }
+}
+
+/// An object to be looked at: what it is called and where it stands.
+#[derive(Debug, Clone, Copy)]
+pub struct Target<'a> {
+    pub class: &'a str,
+    pub solid: Solid,
+}
+
+/// How a scene writes a camera's image.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Image {
+    pub width_px: u32,
+    pub height_px: u32,
+    /// Horizontal angle of view.
+    pub view_deg: f64,
+}
+
+impl Image {
+    pub fn intrinsics(&self) -> Intrinsics {
+        let half_rad = (self.view_deg / 2.0).to_radians();
+        Intrinsics {
+            width_px: self.width_px,
+            height_px: self.height_px,
+            focal_px: f64::from(self.width_px) / 2.0 / half_rad.tan(),
+        }
+    }
+}
+
+impl Camera {
+    /// The boxes of one frame.
+    pub fn detect(&self, targets: &[Target], screens: &[Solid], seed: u64, number: u64) -> Vec<Box2d> {
+        let solids: Vec<Solid> = targets.iter().map(|t| t.solid).collect();
+        let sightings = self.view(&solids, screens);
+        detector::detect(self, &sightings, targets, seed, number)
+    }
+}
+
+#[cfg(test)]
+pub mod by_hand {
+    use super::*;
+
+    /// At 6 m, level, 60 degrees wide.
+    pub fn camera() -> Camera {
+        Camera {
+            pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
+            intrinsics: Image { width_px: 1920, height_px: 1080, view_deg: 60.0 }.intrinsics(),
+            model: DetectorModel::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::by_hand::camera;
+    use super::*;
+
+    fn solid(x: f64, y: f64, size: [f64; 3]) -> Solid {
+        Solid { center: [x, y, size[2] / 2.0], yaw_rad: 0.0, size }
+    }
+
+    #[test]
+    fn left_is_left_and_down_is_down() {
+        let seen = camera().view(&[solid(50.0, 10.0, [4.0, 2.0, 1.5])], &[]);
+        let [left, top, right, bottom] = seen[0].edges;
+        assert!(right < 960.0 && top > 540.0 && left < right && top < bottom);
+        // focal length 960 / tan(30) = 1663 px; the rear face at 48 m: v = 540 + 1663 x 6 / 48
+        assert!((bottom - (540.0 + 1662.8 * 6.0 / 48.0)).abs() < 0.1, "{bottom}");
+        assert!((left - (960.0 - 1662.8 * 11.0 / 48.0)).abs() < 0.1, "{left}");
+        assert_eq!(seen[0].share, 1.0);
+    }
+
+    #[test]
+    fn the_box_goes_around_what_is_visible_only() {
+        let car = solid(60.0, 0.0, [4.0, 2.0, 1.5]);
+        let wall = solid(50.0, 1.0, [1.0, 2.0, 10.0]);
+        let free = camera().view(&[car], &[])[0];
+        let half = camera().view(&[car], &[wall])[0];
+        assert!(half.share < 0.6 && half.share > 0.3, "{}", half.share);
+        assert!(half.edges[0] > free.edges[0] + 10.0 && half.edges[2] == free.edges[2], "its left half is hidden");
+        assert!(camera().view(&[car], &[solid(50.0, 0.0, [1.0, 6.0, 10.0])]).is_empty());
+    }
+
+    #[test]
+    fn an_object_half_outside_ends_at_the_border() {
+        // the border is at 30 degrees: y = 0.577 x
+        let seen = camera().view(&[solid(40.0, 22.5, [4.0, 2.0, 1.5])], &[]);
+        assert_eq!(seen[0].edges[0], 0.0);
+        assert!(seen[0].share < 1.0);
+        assert!(camera().view(&[solid(-40.0, 0.0, [4.0, 2.0, 1.5])], &[]).is_empty(), "behind");
+    }
+}

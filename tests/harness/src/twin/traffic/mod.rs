@@ -1,0 +1,358 @@
+//! Where every vehicle is at any instant, whatever file it comes from.
+//!
+//! Two kinds of files: SUMO's floating car data ([`fcd_xml`], [`fcd_csv`]) and trajectories as CSV in the
+//! form of labels ([`trajectories`]). Both are read streaming, plain or gzip; what never comes near the
+//! sensor within the time of the recording is not kept. [`read()`] tells the kinds apart.
+//!
+//! # Model
+//! Between two rows of a vehicle its centre follows a cubic through the rows around (finite-difference
+//! tangents, Catmull and Rom 1974), so that speed is continuous; its heading turns the short way. A row is
+//! missing where the next comes later than [`LONGEST_GAP_S`]: the vehicle is another one after it.
+//!
+//! # Limits
+//! The road is flat: heights in the file are not read.
+
+pub mod fcd_csv;
+pub mod fcd_xml;
+pub mod frame;
+pub mod opened;
+pub mod trajectories;
+pub mod types;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::geometry::solid::Solid;
+use frame::RoadFrame;
+use types::{Kind, VehicleTypes};
+
+/// Time between two rows of one vehicle beyond which it is not followed, seconds.
+pub const LONGEST_GAP_S: f64 = 2.5;
+
+/// Rows are kept for this long before and after the recording, so that every vehicle has neighbours.
+const MARGIN_S: f64 = LONGEST_GAP_S;
+
+/// Files that together say where vehicles are.
+#[derive(Debug, Clone, Default)]
+pub struct Source {
+    /// FCD (XML or CSV) or trajectories (CSV), plain or gzip.
+    pub path: PathBuf,
+    /// SUMO files with `vType` elements.
+    pub types: Vec<PathBuf>,
+    /// SUMO net, for its offset.
+    pub net: Option<PathBuf>,
+    /// Origin and heading of the road frame in the file's coordinates.
+    pub frame: RoadFrame,
+}
+
+/// The part of the traffic that is kept.
+#[derive(Debug, Clone, Copy)]
+pub struct Region {
+    pub from_s: f64,
+    pub to_s: f64,
+    /// Road frame, metres.
+    pub center: [f64; 2],
+    pub radius_m: f64,
+}
+
+/// One vehicle at one instant, as a file has it.
+#[derive(Debug, Clone)]
+pub struct Row {
+    pub time_s: f64,
+    pub id: String,
+    pub kind: Kind,
+    /// Middle of the footprint, road frame, metres.
+    pub center: [f64; 2],
+    /// From +x, counter-clockwise, radians.
+    pub heading_rad: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sample {
+    time_s: f64,
+    center: [f64; 2],
+    heading_rad: f64,
+}
+
+/// A vehicle with its way.
+#[derive(Debug, Clone)]
+pub struct Vehicle {
+    pub id: String,
+    pub kind: Kind,
+    samples: Vec<Sample>,
+}
+
+/// A vehicle at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    pub solid: Solid,
+    /// Road frame, m/s.
+    pub velocity: [f64; 2],
+}
+
+/// All vehicles that come near.
+#[derive(Debug, Clone, Default)]
+pub struct Traffic {
+    pub vehicles: Vec<Vehicle>,
+}
+
+/// Reads the vehicles that come within a region.
+///
+/// # Errors
+/// Names the file and the line or element: a file that cannot be read or is cut off, a value that is no
+/// finite number, a type nobody defines, a time that runs backwards. And where nothing comes near: what the file covers.
+pub fn read(source: &Source, region: &Region) -> Result<Traffic> {
+    let types = VehicleTypes::read(&source.types)?;
+    let mut frame = source.frame;
+    if let Some(net) = &source.net {
+        frame.net_offset = frame::net_offset(net)?;
+    }
+    let mut collected = Collector::new(*region);
+    let mut reader = opened::open(&source.path)?;
+    if opened::begins_with(&mut reader, b"<").with_context(|| source.path.display().to_string())? {
+        fcd_xml::read(reader, &source.path, &types, &frame, &mut collected)?;
+    } else {
+        let (mut text, heading) = opened::first_line(reader).with_context(|| source.path.display().to_string())?;
+        if fcd_csv::is_heading(&heading) {
+            fcd_csv::read(&mut text, &source.path, &types, &frame, &mut collected)?;
+        } else if trajectories::is_heading(&heading) {
+            trajectories::read(&mut text, &source.path, &frame, &mut collected)?;
+        } else {
+            bail!(
+                "{}, line 1: `{}` begins neither SUMO's FCD (XML or CSV) nor trajectories (CSV: {})",
+                source.path.display(),
+                heading.chars().take(80).collect::<String>(),
+                trajectories::COLUMNS
+            );
+        }
+    }
+    collected.finish(&source.path)
+}
+
+/// Rows on their way to vehicles.
+#[derive(Debug)]
+pub struct Collector {
+    region: Region,
+    open: BTreeMap<String, Vehicle>,
+    closed: Vec<Vehicle>,
+    /// How often an id was taken up again after a gap.
+    again: BTreeMap<String, u32>,
+    rows: u64,
+    times_s: [f64; 2],
+    nearest_m: f64,
+}
+
+impl Collector {
+    pub fn new(region: Region) -> Self {
+        Self {
+            region,
+            open: BTreeMap::new(),
+            closed: Vec::new(),
+            again: BTreeMap::new(),
+            rows: 0,
+            times_s: [f64::INFINITY, f64::NEG_INFINITY],
+            nearest_m: f64::INFINITY,
+        }
+    }
+
+    /// Whether rows of this time can matter.
+    pub fn wants(&self, time_s: f64) -> bool {
+        (self.region.from_s - MARGIN_S..=self.region.to_s + MARGIN_S).contains(&time_s)
+    }
+
+    /// Takes one row; rows of one vehicle come in the order of time.
+    ///
+    /// # Errors
+    /// Two rows of one vehicle at one time, or one earlier than the one before.
+    pub fn add(&mut self, row: Row) -> Result<()> {
+        self.rows += 1;
+        self.times_s = [self.times_s[0].min(row.time_s), self.times_s[1].max(row.time_s)];
+        if !self.wants(row.time_s) {
+            return Ok(());
+        }
+        let away = (row.center[0] - self.region.center[0]).hypot(row.center[1] - self.region.center[1]);
+        self.nearest_m = self.nearest_m.min(away);
+        if away > self.region.radius_m {
+            return Ok(());
+        }
+        let sample = Sample { time_s: row.time_s, center: row.center, heading_rad: row.heading_rad };
+        if let Some(known) = self.open.get_mut(&row.id) {
+            let last = known.samples[known.samples.len() - 1].time_s;
+            ensure!(
+                row.time_s > last,
+                "time runs from {last} s to {} s; rows of one vehicle must come in the order of time",
+                row.time_s
+            );
+            if row.time_s - last <= LONGEST_GAP_S {
+                known.samples.push(sample);
+                return Ok(());
+            }
+            let times = self.again.entry(row.id.clone()).or_insert(1);
+            *times += 1;
+            let id = format!("{}#{times}", row.id);
+            let next = Vehicle { id, kind: row.kind, samples: vec![sample] };
+            if let Some(before) = self.open.insert(row.id, next) {
+                self.closed.push(before);
+            }
+            return Ok(());
+        }
+        self.open.insert(row.id.clone(), Vehicle { id: row.id, kind: row.kind, samples: vec![sample] });
+        Ok(())
+    }
+
+    fn finish(mut self, path: &Path) -> Result<Traffic> {
+        let Region { from_s, to_s, center: [x, y], radius_m } = self.region;
+        ensure!(self.rows > 0, "{}: it holds no vehicle at all", path.display());
+        self.closed.extend(self.open.into_values());
+        self.closed.retain(|v| v.samples.len() > 1);
+        self.closed.sort_by(|a, b| a.id.cmp(&b.id));
+        if self.closed.is_empty() {
+            let [first, last] = self.times_s;
+            let near = if self.nearest_m.is_finite() {
+                format!("the nearest stays {:.0} m away", self.nearest_m)
+            } else {
+                "it has no row of that time".to_owned()
+            };
+            bail!(
+                "{}: an empty scene: no vehicle within {radius_m:.0} m of ({x:.0}, {y:.0}) from {from_s} s to {to_s} s; {near}, its times are {first} s to {last} s. Check from_s, origin and heading of the scene's traffic.",
+                path.display()
+            );
+        }
+        Ok(Traffic { vehicles: self.closed })
+    }
+}
+
+impl Traffic {
+    /// Every vehicle at an instant, with its index.
+    pub fn at(&self, time_s: f64) -> impl Iterator<Item = (usize, Pose)> {
+        self.vehicles.iter().enumerate().filter_map(move |(k, v)| Some((k, v.at(time_s)?)))
+    }
+}
+
+impl Traffic {
+    /// Keeps of every vehicle the time from its first to its last row that matters, one row more at both ends.
+    pub fn keep(&mut self, matters: impl Fn([f64; 2]) -> bool) {
+        for vehicle in &mut self.vehicles {
+            let place = |s: &Sample| matters(s.center);
+            let (first, last) = (vehicle.samples.iter().position(place), vehicle.samples.iter().rposition(place));
+            match first.zip(last) {
+                Some((first, last)) => {
+                    vehicle.samples.truncate(last + 2);
+                    vehicle.samples.drain(..first.saturating_sub(1));
+                }
+                None => vehicle.samples.clear(),
+            }
+        }
+        self.vehicles.retain(|v| v.samples.len() > 1);
+    }
+}
+
+impl Vehicle {
+    /// Pose between the first and the last row.
+    pub fn at(&self, time_s: f64) -> Option<Pose> {
+        let s = &self.samples;
+        let next = s.partition_point(|p| p.time_s <= time_s).min(s.len() - 1);
+        let before = next.checked_sub(1)?;
+        let (a, b) = (s[before], s[next]);
+        if !(a.time_s..=b.time_s).contains(&time_s) {
+            return None;
+        }
+        let dt = b.time_s - a.time_s;
+        let f = (time_s - a.time_s) / dt;
+        let slope = |k: usize, axis: usize| {
+            let (i, j) = (k.saturating_sub(1), (k + 1).min(s.len() - 1));
+            (s[j].center[axis] - s[i].center[axis]) / (s[j].time_s - s[i].time_s)
+        };
+        let along = [0, 1].map(|axis| {
+            let (p, q) = (a.center[axis], b.center[axis]);
+            let (u, v) = (slope(before, axis) * dt, slope(next, axis) * dt);
+            // cubic Hermite and its derivative
+            let (c2, c3) = (3.0 * (q - p) - 2.0 * u - v, 2.0 * (p - q) + u + v);
+            (p + f * (u + f * (c2 + f * c3)), (u + f * (2.0 * c2 + f * 3.0 * c3)) / dt)
+        });
+        let turn = (b.heading_rad - a.heading_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
+            - std::f64::consts::PI;
+        let size = self.kind.size;
+        Some(Pose {
+            solid: Solid { center: [along[0].0, along[1].0, size[2] / 2.0], yaw_rad: a.heading_rad + f * turn, size },
+            velocity: [along[0].1, along[1].1],
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use types::Class;
+
+    const REGION: Region = Region { from_s: 0.0, to_s: 10.0, center: [0.0, 0.0], radius_m: 100.0 };
+
+    fn row(time_s: f64, x: f64) -> Row {
+        let kind = Kind { class: Class::Car, size: [4.0, 2.0, 1.5] };
+        Row { time_s, id: "a".into(), kind, center: [x, 1.0], heading_rad: 0.0 }
+    }
+
+    fn collect(rows: impl IntoIterator<Item = Row>) -> Result<Traffic> {
+        let mut c = Collector::new(REGION);
+        for r in rows {
+            c.add(r)?;
+        }
+        c.finish(Path::new("f"))
+    }
+
+    #[test]
+    fn a_braking_vehicle_follows_its_parabola_between_rows() {
+        // 20 m/s, braking with 4 m/s^2; rows every half second
+        let x = |t: f64| -50.0 + 20.0 * t - 2.0 * t * t;
+        let traffic = collect((0..9).map(|k| row(f64::from(k) * 0.5, x(f64::from(k) * 0.5)))).unwrap();
+        for k in 5..35 {
+            let t = f64::from(k) * 0.1;
+            let pose = traffic.vehicles[0].at(t).unwrap();
+            assert!((pose.solid.center[0] - x(t)).abs() < 1e-9, "{t}");
+            assert!((pose.velocity[0] - (20.0 - 4.0 * t)).abs() < 1e-9, "{t}");
+        }
+        assert!(traffic.vehicles[0].at(-0.01).is_none() && traffic.vehicles[0].at(4.01).is_none());
+        assert!(traffic.vehicles[0].at(0.0).is_some() && traffic.vehicles[0].at(4.0).is_some());
+    }
+
+    #[test]
+    fn a_long_gap_makes_two_vehicles_of_one_id() {
+        let traffic = collect([0.0, 0.5, 1.0, 6.0, 6.5].map(|t| row(t, t))).unwrap();
+        let ids: Vec<&str> = traffic.vehicles.iter().map(|v| v.id.as_str()).collect();
+        assert_eq!(ids, ["a", "a#2"]);
+        assert_eq!(traffic.at(3.0).count(), 0);
+    }
+
+    #[test]
+    fn a_vehicle_is_kept_without_gaps_from_first_to_last_time_it_matters() {
+        let mut traffic = collect((0..20).map(|k| row(f64::from(k) * 0.5, f64::from(k)))).unwrap();
+        traffic.keep(|[x, _]| x == 5.0 || x == 9.0);
+        let vehicle = &traffic.vehicles[0];
+        assert!(vehicle.at(3.5).is_some(), "between the two it is known too");
+        assert!(
+            vehicle.at(2.0).is_some()
+                && vehicle.at(1.9).is_none()
+                && vehicle.at(5.0).is_some()
+                && vehicle.at(5.1).is_none()
+        );
+        traffic.keep(|_| false);
+        assert!(traffic.vehicles.is_empty());
+    }
+
+    #[test]
+    fn what_never_comes_near_is_said_with_what_there_is() {
+        let far = collect([row(1.0, 500.0), row(1.5, 510.0)]).unwrap_err().to_string();
+        assert!(far.contains("empty scene") && far.contains("500 m away"), "{far}");
+        let late = collect([row(100.0, 0.0), row(100.5, 1.0)]).unwrap_err().to_string();
+        assert!(late.contains("100 s to 100.5 s"), "{late}");
+        assert!(collect([]).unwrap_err().to_string().contains("no vehicle at all"));
+    }
+
+    #[test]
+    fn time_running_backwards_is_an_error() {
+        let error = collect([row(1.0, 0.0), row(0.5, 0.0)]).unwrap_err().to_string();
+        assert!(error.contains("1 s to 0.5 s"), "{error}");
+    }
+}

@@ -1,0 +1,24 @@
+#!/bin/sh
+# Makes the traffic of every day, day-0.fcd.xml.gz to day-5.fcd.xml.gz, anew.
+#
+#   pip install eclipse-sumo==1.28.0        # or Debian's package sumo; another version may give other traffic
+#   tests/recordings/motorway/traffic.sh
+#
+# Day N is SUMO's seed 100 + N. The first 199 s fill the road and are not written.
+set -eu
+cd "$(dirname "$0")"
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+# the net keeps its coordinates: x = 0 is the radar, y = 0 the middle of the median
+netconvert --node-files motorway.nod.xml --edge-files motorway.edg.xml --offset.disable-normalization \
+    --output-file "$work/net.xml" >"$work/log" 2>&1 || { cat "$work/log" >&2; exit 1; }
+for day in 0 1 2 3 4 5; do
+    sumo --net-file "$work/net.xml" --route-files motorway.rou.xml --additional-files motorway.add.xml \
+        --seed $((100 + day)) --step-length 0.1 --lanechange.duration 4 --end 262 \
+        --fcd-output "$work/fcd.xml" --fcd-output.filter-shapes view --fcd-output.attributes x,y,angle,type \
+        --device.fcd.begin 199 --device.fcd.period 0.5 --precision 2 --no-step-log true >"$work/log" 2>&1 ||
+        { cat "$work/log" >&2; exit 1; }
+    # SUMO writes the hour and its command line into a comment; the traffic alone is what has to repeat
+    sed -e '/^<!--/,/^-->/d' "$work/fcd.xml" | gzip -9 --no-name >"day-$day.fcd.xml.gz"
+    echo "day-$day.fcd.xml.gz"
+done
