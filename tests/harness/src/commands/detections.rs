@@ -62,7 +62,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn returns(path: &Path, settings: &Settings) -> Result<Returns> {
-    let recording = recording::mcap::read(path, &settings.reading).with_context(|| path.display().to_string())?;
+    let recording = recording::read(path, &settings.reading).with_context(|| path.display().to_string())?;
     ensure!(recording.truth.is_some(), "{}: no labelled objects, so nothing to count by", path.display());
     let counting = bar(&format!("counting {}", recording.name), recording.frames.len() as u64);
     let samples = samples::collect(&recording, &settings.evaluation, &|| counting.step());

@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn replay(path: &Path, settings: &crate::options::Settings) -> Result<Replay> {
-    let recording = recording::mcap::read(path, &settings.reading).with_context(|| path.display().to_string())?;
+    let recording = recording::read(path, &settings.reading).with_context(|| path.display().to_string())?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let replaying = bar(&format!("replaying {}", recording.name), steps(&recording, running.len()));
     Ok(Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step()))
