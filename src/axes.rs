@@ -18,6 +18,15 @@ use crate::trig::Direction;
 /// Fraction bits of a slope.
 const SLOPE_BITS: u32 = 18;
 
+/// Height above or below the sensor up to which slopes fit, centimetres.
+const FARTHEST_RISE_CM: i32 = 4000;
+
+/// The steepest edge a row can have: 89.8 degrees.
+const STEEPEST: i32 = 1 << (SLOPE_BITS + 8);
+
+/// What lies this close to an angular limit of the field of view lies on it.
+const ON_THE_LIMIT_DEG: f32 = 0.01;
+
 /// The view of a column the slice plane never enters.
 const NOTHING: (u8, u8) = (1, 0);
 
@@ -81,10 +90,17 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             slice_rows: [SliceRow { lower: 0, end: 0 }; E],
             view: [NOTHING; A],
         };
+        // a limit itself is in view, whatever a float makes of it
+        let wide = FieldOfView {
+            azimuth_min_deg: view.azimuth_min_deg - ON_THE_LIMIT_DEG,
+            azimuth_max_deg: view.azimuth_max_deg + ON_THE_LIMIT_DEG,
+            elevation_min_deg: view.elevation_min_deg - ON_THE_LIMIT_DEG,
+            elevation_max_deg: view.elevation_max_deg + ON_THE_LIMIT_DEG,
+            ..*view
+        };
         let in_view = |bearing: f32, ground_cm: f32| {
             let (x, y) = (math::cos(bearing) * ground_cm, math::sin(bearing) * ground_cm);
-            let sensor = levelling.unlevel([math::round_i32(x), math::round_i32(y), -drop]);
-            view.contains(sensor.map(|v| v as f32 / 100.0))
+            wide.contains(levelling.unlevel_exact([x, y, -drop as f32]).map(|v| v / 100.0))
         };
         axes.lay_columns(&in_view).ok_or(ConfigError {
             parameter: "field_of_view.elevation_min_deg",
@@ -110,13 +126,25 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         Some(())
     }
 
+    /// The longest stretch of cells in view: a ray across a turned field of view can leave and enter
+    /// it again, and what lies between must stay unknown.
     fn find_view(&mut self, in_view: &impl Fn(f32, f32) -> bool) {
         for a in 0..A {
             let bearing = self.azimuth_of((a as i32 * 256) + 128).radians();
-            let seen = |r: &usize| in_view(bearing, (*r as f32 + 0.5) * self.cell_cm as f32);
-            let ends = (0..R).find(seen).zip((0..R).rev().find(seen));
-            if let (Some(v), Some((first, last))) = (self.view.get_mut(a), ends) {
-                *v = (first as u8, last as u8);
+            let mut stretch = 0..0;
+            let mut longest = 0..0;
+            for r in 0..R {
+                if !in_view(bearing, (r as f32 + 0.5) * self.cell_cm as f32) {
+                    continue;
+                }
+                let start = if stretch.end == r { stretch.start } else { r };
+                stretch = start..r + 1;
+                if stretch.len() > longest.len() {
+                    longest = stretch.clone();
+                }
+            }
+            if let (Some(v), false) = (self.view.get_mut(a), longest.is_empty()) {
+                *v = (longest.start as u8, (longest.end - 1) as u8);
             }
         }
     }
@@ -129,7 +157,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             // ascending slopes: from near to far if the sensor looks down on the plane, else back
             let k = if drop > 0 { k } else { E - k };
             let root = near + (far - near) * k as f32 / E as f32;
-            math::round_i32(-(drop as f32) / (root * root) * (1 << SLOPE_BITS) as f32)
+            math::round_i32(-(drop as f32) / (root * root) * (1 << SLOPE_BITS) as f32).clamp(-STEEPEST, STEEPEST)
         };
         for (k, edge) in self.row_edges.iter_mut().enumerate() {
             *edge = slope(k);
@@ -159,9 +187,10 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         self.height_cm
     }
 
-    /// Slope under which a point of this height and ground distance is seen.
+    /// Slope under which a point of this height and ground distance is seen; more than 40 m above or
+    /// below the sensor counts as 40 m.
     pub fn slope(&self, height_cm: i32, ground_cm: i32) -> i32 {
-        ((height_cm - self.height_cm) << SLOPE_BITS) / ground_cm.max(1)
+        ((height_cm - self.height_cm).clamp(-FARTHEST_RISE_CM, FARTHEST_RISE_CM) << SLOPE_BITS) / ground_cm.max(1)
     }
 
     /// Height at which a slope passes a ground distance, centimetres.
@@ -183,7 +212,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         }
         match below {
             (_, i32::MIN) => 0,
-            (k, edge) => k * 256 + (((slope - edge) << 8) / (above - edge).max(1)).min(256),
+            (k, edge) => k * 256 + part_of(slope - edge, above - edge),
         }
     }
 
@@ -244,6 +273,18 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
             _ => 0..0,
         }
+    }
+}
+
+/// What part of a row's height lies below a slope, 2^-8; both from its lower edge.
+fn part_of(slope: i32, height: i32) -> i32 {
+    if slope >= height {
+        256
+    } else if slope < 1 << 23 {
+        (slope << 8) / height
+    } else {
+        // rows this high lie at the sensor's feet
+        slope / (height >> 8)
     }
 }
 

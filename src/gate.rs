@@ -1,7 +1,7 @@
 //! Which detections the estimators may use; every rejection is counted by its reason.
 
 use crate::angle::Angle;
-use crate::config::{ConfigError, within};
+use crate::config::{ConfigError, above, within};
 use crate::detection::Detection;
 use crate::field_of_view::Limits;
 use crate::math;
@@ -142,6 +142,7 @@ impl GateConfig {
         let rcs = within("gate.min_rcs_dbsm", self.min_rcs_dbsm, -100.0, 100.0)?;
         let fast = within("gate.max_speed_mps", self.max_speed_mps, 1.0, 327.0)?;
         let slow = within("gate.min_speed_mps", self.min_speed_mps, 0.0, 20.0)?;
+        above("gate.max_speed_mps", fast, slow)?;
         within("gate.max_detections", f32::from(self.max_detections), 1.0, 65_535.0)?;
         let margin = within("gate.elevation_margin_deg", self.elevation_margin_deg, 0.0, 90.0)?;
         let wide = |limit: Angle, by: f32| Angle::from_radians((limit.radians() + by.to_radians()).clamp(-1.57, 1.57));

@@ -114,6 +114,7 @@ pub mod evidence;
 pub mod field_of_view;
 pub mod gate;
 pub mod health;
+pub mod inputs;
 pub mod map;
 mod math;
 pub mod mount;

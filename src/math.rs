@@ -24,6 +24,11 @@ pub(crate) fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
 
+/// Decimal logarithm.
+pub(crate) fn log10(x: f32) -> f32 {
+    libm::log10f(x)
+}
+
 /// Nearest integer, halves away from zero.
 pub(crate) fn round(x: f32) -> f32 {
     libm::roundf(x)

@@ -107,6 +107,12 @@ impl Levelling {
         [turned((x[0], y[0], z[0])), turned((x[1], y[1], z[1])), turned((x[2], y[2], z[2]))]
     }
 
+    /// [`Levelling::unlevel`] without rounding, for start-up tables.
+    pub fn unlevel_exact(&self, v: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = self.rotation.map(|row| row.map(|c| c as f32 / 16384.0));
+        core::array::from_fn(|k| [x, y, z].iter().zip(v).map(|(row, v)| row.get(k).copied().unwrap_or(0.0) * v).sum())
+    }
+
     /// Levelled ground coordinates of a road point, centimetres.
     #[allow(clippy::cast_possible_truncation)] // clamped
     pub fn place(&self, p: RoadPoint) -> (i32, i32) {

@@ -148,7 +148,10 @@ impl Noise {
 fn meet_height(fall: i32, ahead: i32, up: i32) -> (i32, i32) {
     let square = (ahead * ahead + up * up).max(1);
     let fall = fall.clamp(-ONE, ONE);
-    let rest = math::root((square - fall * fall).max(0).unsigned_abs()) as i32;
+    let (fall, rest) = match square - fall * fall {
+        rest @ 0.. => (fall, math::root(rest.unsigned_abs()) as i32),
+        _ => (fall.signum() * math::root(square.unsigned_abs()) as i32, 0),
+    };
     let scaled = |v: i32| (v / (square >> 14).max(1)).clamp(-ONE, ONE);
     (scaled(ahead * fall + up * rest), scaled(up * fall - ahead * rest))
 }

@@ -34,7 +34,7 @@ impl Direction {
 
     /// Component of the vector (x, y) to the left of this direction.
     pub fn across(self, x: i32, y: i32) -> i32 {
-        dot(y, self.x, -x, self.y)
+        dot(y, self.x, x, -self.y)
     }
 
     /// The direction a quarter turn to the left.

@@ -245,3 +245,17 @@ fn spinning_wheels_are_no_vehicles_of_their_own() {
     }
     assert_eq!(report.unwrap().obstacles, 1);
 }
+
+#[test]
+fn both_flanks_of_a_truck_are_one_vehicle() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    rig.drive(&[Vehicle::truck(110.0, 6.0, -25.0)], 30, true);
+    assert_eq!(rig.state.obstacles().iter().count(), 1);
+}
+
+#[test]
+fn two_cars_side_by_side_are_two_vehicles() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    rig.drive(&[Vehicle::car(40.0, 2.0, 20.0), Vehicle::car(40.0, -1.5, 20.0)], 30, true);
+    assert_eq!(rig.state.obstacles().iter().count(), 2);
+}

@@ -2,6 +2,9 @@
 
 use std::mem::size_of;
 
+use viewshed::inputs::ars408::Ars408;
+use viewshed::inputs::native::{Receiver, SerialReceiver};
+use viewshed::inputs::ti::Ti;
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
 use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
@@ -45,4 +48,18 @@ fn a_sensor_at_its_receiver_fits_8_kb_and_its_sender_9_kb() {
     let sender = size_of::<Broadcaster<120, 7>>();
     println!("receiver of 120 x 200: {receiver} B a sensor, sender: {sender} B");
     assert!(receiver <= 8000 && sender <= 9000, "{receiver}, {sender}");
+}
+
+#[test]
+fn a_radar_input_for_256_detections_fits_6500_bytes() {
+    let sizes = [
+        ("ARS408", size_of::<Ars408<256>>()),
+        ("native over CAN FD", size_of::<Receiver<256>>()),
+        ("native over a serial line", size_of::<SerialReceiver<256>>()),
+        ("TI mmWave", size_of::<Ti<256>>()),
+    ];
+    for (input, bytes) in sizes {
+        println!("{input}: {bytes} B");
+        assert!(bytes <= 6_500, "{input}: {bytes}");
+    }
 }

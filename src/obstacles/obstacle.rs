@@ -378,12 +378,14 @@ impl Obstacle {
         }
         let (ox, oy) = other.global(other.extent.middle_cm(), 0);
         let (along, left) = self.local(ox, oy);
-        if left.abs() > t.merge_lateral_cm + ((t.sigmas * (self.lateral_sigma() + other.lateral_sigma())) >> 4) {
-            return false;
-        }
         let half = other.extent.length_cm() / 2;
         let (rear, front) = (along - half, along + half);
         let gap = (rear - self.extent.front_cm).max(self.extent.rear_cm - front);
+        let uncertain = (t.sigmas * (self.lateral_sigma() + other.lateral_sigma())) >> 4;
+        let abreast = if gap <= 0 { t.abreast_cm } else { 0 };
+        if left.abs() > abreast.max(t.merge_lateral_cm + uncertain) {
+            return false;
+        }
         let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
         let coupled = i32::from(self.travelled_cm.min(other.travelled_cm)) >= t.coupled_way_cm
             && hypot_gate(dvx, dvy) <= t.coupled_speed

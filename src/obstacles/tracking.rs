@@ -2,7 +2,7 @@
 
 use super::profile::HIT;
 use super::size::{SizeConfig, Sizes};
-use crate::config::{ConfigError, within};
+use crate::config::{ConfigError, above, within};
 use crate::math;
 use crate::reflection::{Noise, Reflection};
 use crate::trig::Direction;
@@ -128,6 +128,8 @@ pub struct Tracking {
     /// 2^-8 detections per second
     pub hidden_loss: i32,
     pub merge_lateral_cm: i32,
+    /// Least distance between the middles of two vehicles side by side.
+    pub abreast_cm: i32,
     /// 2^-8 cm/s
     pub merge_speed: i32,
     /// Least cosine between headings, 2^-14.
@@ -169,6 +171,12 @@ impl ObstacleConfig {
         let hits = |name, v| within(name, v, 0.0, 1000.0).map(|h| math::round_i32(h * 256.0));
         let gap_cm = cm("obstacles.gap_m", self.gap_m, 0.5, 20.0)?;
         let max_length_cm = cm("obstacles.max_length_m", self.max_length_m, 2.0, 22.0)?;
+        let confirmed = hits("obstacles.confirm_hits", self.confirm_hits)?;
+        let existence_max = hits("obstacles.max_evidence", self.max_evidence)?;
+        if existence_max < confirmed {
+            // nothing would ever be confirmed
+            above("obstacles.max_evidence", self.max_evidence, self.confirm_hits)?;
+        }
         Ok(Tracking {
             min_speed_cm_s: cm("obstacles.min_speed_mps", self.min_speed_mps, 0.3, 20.0)?,
             doppler_gate: cm("obstacles.doppler_gate_mps", self.doppler_gate_mps, 0.1, 10.0)? << 4,
@@ -192,12 +200,13 @@ impl ObstacleConfig {
             outline_share: math::round_i32(within("obstacles.outline_share", self.outline_share, 0.0, 0.4)? * 256.0),
             lateral_memory: seconds("obstacles.lateral_memory_s", self.lateral_memory_s)?,
             drift_gain: math::round_i32(within("obstacles.drift_gain", self.drift_gain, 0.0, 0.5)? * 65536.0),
-            confirmed: hits("obstacles.confirm_hits", self.confirm_hits)?,
-            existence_max: hits("obstacles.max_evidence", self.max_evidence)?,
+            confirmed,
+            existence_max,
             tentative_loss: hits("obstacles.tentative_loss_per_s", self.tentative_loss_per_s)?,
             visible_loss: hits("obstacles.visible_loss_per_s", self.visible_loss_per_s)?,
             hidden_loss: hits("obstacles.hidden_loss_per_s", self.hidden_loss_per_s)?,
             merge_lateral_cm: 100,
+            abreast_cm: 180,
             merge_speed: 200 << 8,
             merge_parallel: 15_500, // 19 degrees
             half_width_cm: 80,

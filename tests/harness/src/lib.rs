@@ -2,6 +2,7 @@
 
 pub mod bus;
 pub mod commands;
+pub mod doctor;
 pub mod estimators;
 pub mod evaluation;
 pub mod foxglove;

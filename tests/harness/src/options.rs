@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Deserialize;
+use viewshed::inputs::ars408::profile::{PROFILES, Profile};
+use viewshed::inputs::ti::Family;
 
 use crate::estimators;
 use crate::evaluation::{self, Grid};
@@ -76,6 +78,18 @@ struct ReadingArgs {
     /// In the sensor frame: azimuth + to the left, elevation + up. Example: --fov -60,60,-16,16,3,200
     #[arg(long, value_name = "AZ,AZ,EL,EL,R,R", value_parser = field_of_view, allow_hyphen_values = true)]
     fov: Option<FieldOfView>,
+    /// Sensor id of the radar in a CAN log or capture that has several
+    #[arg(long, value_name = "ID")]
+    sensor_id: Option<u8>,
+    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
+    #[arg(long, value_name = "NAME", value_parser = profile)]
+    profile: Option<&'static Profile>,
+    /// Bytes of the header in a TI mmWave capture: 36, 40, 44 or 52 [default: learnt from three frames]
+    #[arg(long, value_name = "BYTES", value_parser = ti_header)]
+    ti_header: Option<Family>,
+    /// Time between frames of a TI mmWave capture, which holds none [default: 0.1]
+    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    frame_period: Option<f64>,
     /// Begin this many seconds after the first radar frame
     #[arg(long, value_name = "SECONDS", value_parser = finite)]
     from: Option<f64>,
@@ -168,6 +182,10 @@ impl ReadingArgs {
             field_of_view: self.fov,
             from_s: self.from,
             to_s: self.to,
+            sensor_id: self.sensor_id,
+            profile: self.profile,
+            ti_header: self.ti_header,
+            frame_period_s: self.frame_period,
         }
     }
 }
@@ -210,6 +228,21 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let values = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
     let found = values.len();
     values.try_into().map_err(|_| format!("{found} values, {N} are needed"))
+}
+
+fn profile(text: &str) -> Result<&'static Profile, String> {
+    let names = || PROFILES.map(|p| p.name).join(", ");
+    Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
+}
+
+fn ti_header(text: &str) -> Result<Family, String> {
+    let bytes = text.trim().parse().unwrap_or(0);
+    Family::ALL.into_iter().find(|f| f.header() == bytes).ok_or_else(|| format!("`{text}` is not 36, 40, 44 or 52"))
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    let seconds = finite(text)?;
+    if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
 }
 
 fn mount(text: &str) -> Result<[f64; 6], String> {

@@ -1,6 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod bus;
+pub mod doctor;
 pub mod listen;
 pub mod progress;
 pub mod replay;
@@ -28,6 +29,7 @@ enum Command {
     Replay(Box<replay::Args>),
     Bus(Box<bus::Args>),
     Listen(listen::Args),
+    Doctor(doctor::Args),
 }
 
 impl Cli {
@@ -37,6 +39,7 @@ impl Cli {
             Command::Replay(args) => replay::run(args),
             Command::Bus(args) => bus::run(args),
             Command::Listen(args) => listen::run(args),
+            Command::Doctor(args) => doctor::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

@@ -1,12 +1,14 @@
 //! The input's own messages, raw, to be copied beside the grids.
 
 use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow};
 use mcap::records::{MessageHeader, Record};
 
-use crate::recording::ros;
+use crate::recording::write::RecordingWriter;
+use crate::recording::{Recording, ros};
 
 /// A channel worth copying.
 #[derive(Debug, Clone)]
@@ -33,12 +35,24 @@ pub struct Input {
     pub messages: Vec<RawMessage>,
 }
 
-/// Reads every message whose topic (and schema) `keep` accepts; a damaged file up to the break.
-pub fn read(path: &Path, keep: impl Fn(&str, &str) -> bool) -> Result<Input> {
+/// The bytes of a recording as an MCAP file; one of another kind is written as such first.
+pub fn bytes(path: &Path, recording: &Recording) -> Result<Vec<u8>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if bytes.starts_with(mcap::MAGIC) {
+        return Ok(bytes);
+    }
+    let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
+    let sink = Cursor::new(Vec::new());
+    let mut writer = RecordingWriter::new(sink, &recording.sensor, &recording.pose, start_ns)?;
+    recording.frames.iter().try_for_each(|frame| writer.frame(frame))?;
+    Ok(writer.finish()?.into_inner())
+}
+
+/// Reads every message whose topic (and schema) `keep` accepts; a damaged file up to the break.
+pub fn read(bytes: &[u8], keep: impl Fn(&str, &str) -> bool) -> Result<Input> {
     let options = mcap::read::Options::IgnoreEndMagic.into();
-    let records = mcap::read::ChunkFlattener::new_with_options(&bytes, options)
-        .map_err(|e| anyhow!("{}: not an MCAP file: {e}", path.display()))?;
+    let records =
+        mcap::read::ChunkFlattener::new_with_options(bytes, options).map_err(|e| anyhow!("not an MCAP file: {e}"))?;
     let mut schemas = BTreeMap::new();
     let mut input = Input::default();
     for record in records.map_while(Result::ok) {

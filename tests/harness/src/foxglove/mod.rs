@@ -47,7 +47,8 @@ pub fn write(
     let is_truth = |topic: &str| options.truth_topic.as_deref().unwrap_or(TRUTH_TOPIC) == topic;
     // a mount given by hand stands in place of the one recorded
     let is_mount = |topic: &str| options.mount.is_none() && topic.ends_with("tf_static");
-    let input = input::read(source, |topic, schema| is_radar(topic, schema) || is_truth(topic) || is_mount(topic))?;
+    let bytes = input::bytes(source, recording)?;
+    let input = input::read(&bytes, |topic, schema| is_radar(topic, schema) || is_truth(topic) || is_mount(topic))?;
     let radar =
         |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_radar(&c.topic, &c.schema_name));
     let mount = |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_mount(&c.topic));

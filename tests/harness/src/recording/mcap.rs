@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, anyhow, bail};
 use mcap::records::{MessageHeader, Record};
 
-use super::labels;
+use super::beside;
 use super::points::{self, NOT_A_RANGE, NOT_FINITE, Points};
 use super::problems::Problems;
 use super::ros::{self, Detection3DArray, PointCloud2, RadarScan, TfMessage};
@@ -69,30 +69,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     };
     reader.records(&bytes)?;
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut recording = reader.finish(name, options)?;
-    let beside = |suffix: &str| path.with_file_name(format!("{}.{suffix}.csv", recording.name));
-    let (labels_csv, occlusion_csv) = (beside("labels"), beside("occlusion"));
-    if labels_csv.exists() {
-        let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
-        let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
-        recording.truth = Some(Truth::new(labels::read_labels(&labels_csv, start_ns, end_ns)?));
-    }
-    if occlusion_csv.exists() {
-        recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
-    }
-    restrict(&mut recording, options);
-    if recording.frames.is_empty() {
-        bail!("{}: no radar frame between --from and --to", path.display());
-    }
-    Ok(recording)
-}
-
-fn restrict(recording: &mut Recording, options: &ReadOptions) {
-    let Some(start) = recording.frames.first().map(|f| f.time_ns) else { return };
-    let since = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9;
-    recording
-        .frames
-        .retain(|f| options.from_s.is_none_or(|t| since(f) >= t) && options.to_s.is_none_or(|t| since(f) <= t));
+    beside::complete(reader.finish(name, options)?, path, options)
 }
 
 impl Reader {

@@ -1,15 +1,23 @@
 //! Recordings: radar frames, mount, field of view and ground truth, whatever file they come from.
 
+pub mod ars408;
+pub mod beside;
 pub mod candump;
+pub mod capture;
 pub mod labels;
 pub mod mcap;
+pub mod native;
 pub mod points;
 pub mod problems;
 pub mod ros;
+pub mod ti;
 pub mod transforms;
 pub mod write;
 
 use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
 
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::truth::Truth;
@@ -112,4 +120,33 @@ pub struct ReadOptions {
     /// Seconds since the first radar frame.
     pub from_s: Option<f64>,
     pub to_s: Option<f64>,
+    /// Which sensor of a bus with several.
+    pub sensor_id: Option<u8>,
+    /// Which kind of radar a CAN log is of.
+    pub profile: Option<&'static viewshed::inputs::ars408::profile::Profile>,
+    /// Kind of header of a TI capture.
+    pub ti_header: Option<viewshed::inputs::ti::Family>,
+    /// Time between frames of a TI capture.
+    pub frame_period_s: Option<f64>,
+}
+
+/// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, a capture of a TI mmWave radar or of
+/// the native format.
+///
+/// # Errors
+/// A file that is none of them, and whatever makes replaying it impossible.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let recording = if candump::is_log(&bytes) {
+        ars408::read(name, &bytes, options)?
+    } else if !bytes.starts_with(::mcap::MAGIC) && ti::is_capture(&bytes) {
+        ti::read(name, &bytes, options)?
+    } else if !bytes.starts_with(::mcap::MAGIC) && native::is_capture(&bytes) {
+        let (messages, broken) = native::unstuff(&bytes);
+        native::read(name, &messages, broken, options)?
+    } else {
+        return mcap::read(path, options);
+    };
+    beside::complete(recording, path, options)
 }

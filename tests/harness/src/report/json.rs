@@ -239,6 +239,10 @@ fn reading(options: &ReadOptions) -> Value {
         "truth_topic": options.truth_topic,
         "mount": mount,
         "field_of_view": options.field_of_view.as_ref().map(field_of_view),
+        "sensor_id": options.sensor_id,
+        "profile": options.profile.map(|p| p.name),
+        "ti_header": options.ti_header.map(|f| f.header()),
+        "frame_period_s": options.frame_period_s,
         "from_s": options.from_s,
         "to_s": options.to_s,
     })

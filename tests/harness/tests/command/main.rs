@@ -1,6 +1,10 @@
 //! The `viewshed` command on small recordings made here: results, files, and input that is bad.
 
 mod bad_input;
+mod can_log;
 mod foxglove;
+mod native_capture;
+mod radar_scan;
 mod replay;
 mod scene;
+mod ti_capture;

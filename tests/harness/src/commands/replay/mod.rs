@@ -34,7 +34,8 @@ const SHOWN: &str = "radar-3d";
 /// and FIR compare the map itself with exact lines of sight, wherever traffic passes.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// MCAP recordings [default: those shipped in tests/recordings]
+    /// MCAP recordings, CAN logs of `candump -L` (ARS408), captures of a TI mmWave radar's data port or of the
+    /// native format [default: the MCAP files in tests/recordings]
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// Write everything that was found as JSON: an object, for several recordings an array
@@ -134,7 +135,7 @@ struct Replayed {
 }
 
 fn replay(path: &Path, args: &Args, settings: &Settings) -> Result<Replayed> {
-    let recording = recording::mcap::read(path, &settings.reading).map_err(|error| named(error, path))?;
+    let recording = recording::read(path, &settings.reading).map_err(|error| named(error, path))?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
     let replaying = bar(&format!("replaying {name}"), passes);

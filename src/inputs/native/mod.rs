@@ -1,0 +1,67 @@
+//! A scan format of our own, for every radar that has none of the others: CAN FD and serial lines.
+//!
+//! # Model
+//! A scan is sent in parts, each a message that can be checked and placed alone. All numbers are
+//! little-endian.
+//!
+//! | byte | content |
+//! |---|---|
+//! | 0, 1 | check sum of AUTOSAR E2E profile 05 over bytes 2 to the end and the data ID |
+//! | 2 | counter of the profile, one more with every message |
+//! | 3 | high nibble: version of this format, 1; bit 0: the radar reports a fault; bit 1: all parts but the last hold 22 records, else 5; other bits 0 |
+//! | 4 | sensor |
+//! | 5 | scan number, one more with every scan |
+//! | 6 | part, from 0 |
+//! | 7 | parts of this scan, 1 to 255 |
+//! | 8 to 13 | time of measurement on the sender's clock, microseconds; starts over after 8.9 years |
+//! | 14 on | records of 10 bytes |
+//!
+//! | byte of a record | content |
+//! |---|---|
+//! | 0, 1 | range, centimetres; 0: no record, what CAN FD pads with |
+//! | 2, 3 | azimuth, 2^-16 turn, + left |
+//! | 4, 5 | elevation, 2^-16 turn, + up; 0x8000: not measured |
+//! | 6, 7 | radial velocity, cm/s, + receding |
+//! | 8 | radar cross-section, half dBsm, signed; 0x80: not measured |
+//! | 9 | signal-to-noise ratio, half dB; 0xFF: not measured |
+//!
+//! The data ID is `0x4000 | sensor`. Serial messages are stuffed and ended by a zero as in
+//! [`serial`](crate::wire::serial), CAN FD frames come under one identifier a sensor, by default
+//! `0x100 + sensor`. A scan without detections is one part without records.
+//!
+//! # Limits
+//! 5 detections a CAN FD frame, 22 a serial message; 1 275 and 5 610 a scan. RCS beyond -63.5 to
+//! 63.5 dBsm and SNR beyond 0 to 127 dB are cut to these.
+//!
+//! # Example
+//! ```
+//! use viewshed::angle::Angle;
+//! use viewshed::detection::Detection;
+//! use viewshed::inputs::native::{Config, Medium, Outcome, Receiver, Sender};
+//! use viewshed::time::Time;
+//!
+//! let car = Detection {
+//!     range_cm: 5000,
+//!     azimuth: Angle::from_degrees(10.0),
+//!     elevation: None,
+//!     radial_velocity_cm_s: -2500,
+//!     rcs_half_dbsm: Some(20),
+//!     snr_half_db: None,
+//! };
+//! let mut sender = Sender::new(7);
+//! let mut receiver = Receiver::<256>::new(Config::sensor(7));
+//! for message in sender.scan(Time::from_micros(123_456), false, &[car], Medium::CanFd) {
+//!     match receiver.push(message.bytes(), Time::from_micros(9)) {
+//!         Outcome::Scan(scan) => assert_eq!((scan.time.micros(), scan.detections), (123_456, &[car][..])),
+//!         other => panic!("{other:?}"),
+//!     }
+//! }
+//! ```
+
+mod message;
+mod receiver;
+mod sender;
+
+pub use message::{MOST_BYTES, Medium, Message, VERSION, data_id, id};
+pub use receiver::{Config, Counters, Outcome, Receiver, Refusal, SerialReceiver};
+pub use sender::{Parts, Sender};

@@ -1,0 +1,57 @@
+//! Detections in, messages out.
+
+use core::slice::Chunks;
+
+use super::message::{Header, Medium, Message};
+use crate::detection::Detection;
+use crate::time::Time;
+use crate::wire::e2e::Profile;
+
+/// Numbers the scans and messages of one sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sender {
+    sensor: u8,
+    scan: u8,
+    counter: u8,
+}
+
+impl Sender {
+    /// Before the first scan.
+    pub const fn new(sensor: u8) -> Self {
+        Self { sensor, scan: 0, counter: 0 }
+    }
+
+    /// The messages of a scan. They are numbered as they are taken: all of them are to be sent, in order.
+    #[allow(clippy::cast_possible_truncation)] // at most 255
+    pub fn scan<'a>(&'a mut self, time: Time, fault: bool, detections: &'a [Detection], medium: Medium) -> Parts<'a> {
+        let most = medium.detections() * usize::from(u8::MAX);
+        let sent = detections.get(..most).unwrap_or(detections);
+        let parts = sent.len().div_ceil(medium.detections()).max(1) as u8;
+        let header = Header { sensor: self.sensor, fault, scan: self.scan, part: 0, parts, time, medium };
+        self.scan = self.scan.wrapping_add(1);
+        Parts { counter: &mut self.counter, header, detections: sent.chunks(medium.detections()) }
+    }
+}
+
+/// The messages of a scan.
+#[derive(Debug)]
+pub struct Parts<'a> {
+    counter: &'a mut u8,
+    header: Header,
+    detections: Chunks<'a, Detection>,
+}
+
+impl Iterator for Parts<'_> {
+    type Item = Message;
+
+    fn next(&mut self) -> Option<Message> {
+        if self.header.part >= self.header.parts {
+            return None;
+        }
+        let detections = self.detections.next().unwrap_or(&[]);
+        let message = Message::new(&self.header, detections, *self.counter);
+        *self.counter = Profile::P05.next(*self.counter);
+        self.header.part += 1;
+        Some(message)
+    }
+}

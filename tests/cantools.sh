@@ -1,0 +1,28 @@
+#!/bin/sh
+# An ARS408's log decoded by viewshed and by cantools: tests/cantools.sh [LOG [SENSOR_ID]]. Without a log, the
+# shipped one, both of its sensors.
+set -eu
+cd "$(dirname "$0")/.."
+. tests/tools.sh
+need_compilers
+venv=${CARGO_TARGET_DIR:-target}/cantools
+python=$venv/bin/python
+if ! "$python" -c 'import cantools' 2>/dev/null; then
+    { python3 -m venv "$venv" || { install python3-venv && python3 -m venv "$venv"; }; } >/dev/null 2>&1 &&
+        "$venv/bin/pip" install -q 'cantools>=41' >/dev/null 2>&1 ||
+        { echo "skipped: comparison with cantools, as neither it nor python3-venv can be installed here"; exit 0; }
+fi
+cargo build --release --locked --package viewshed-harness
+viewshed=${CARGO_TARGET_DIR:-target}/release/viewshed
+csv=$(mktemp)
+trap 'rm -f "$csv"' EXIT
+compare() {
+    "$viewshed" doctor "$1" --sensor-id "$2" --detections "$csv" >/dev/null || [ $? = 1 ]
+    "$python" tests/ars408_with_cantools.py check "$1" "$csv" "$2"
+}
+if [ $# -gt 0 ]; then
+    compare "$1" "${2:-0}"
+else
+    compare tests/recordings/ars408-made-up.log 0
+    compare tests/recordings/ars408-made-up.log 3
+fi

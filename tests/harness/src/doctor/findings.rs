@@ -1,0 +1,318 @@
+//! What is wrong, and what to do.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+use viewshed::inputs::ars408::configuration::RadarConfiguration;
+use viewshed::inputs::ars408::message::Message;
+use viewshed::inputs::ars408::motion::{self, standing};
+use viewshed::wire::frame::{CanFrame, CanId};
+
+use super::Report;
+use super::sensor::{Output, Sensor};
+use crate::recording::candump::{Content, Line};
+
+/// How much it matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// There is no usable input until it is mended.
+    Error,
+    /// The input is worse than it could be.
+    Warning,
+    /// Good to know.
+    Note,
+}
+
+/// One thing that is wrong or worth knowing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    pub severity: Severity,
+    pub what: String,
+    #[serde(rename = "do")]
+    pub remedy: String,
+}
+
+/// Frames of 8 bytes that fit into a second of 500 kbit/s, stuff bits included.
+const MOST_FRAMES: usize = 3700;
+
+#[derive(Default)]
+struct Findings(Vec<Finding>);
+
+impl Findings {
+    fn add(&mut self, severity: Severity, what: impl Into<String>, remedy: impl Into<String>) {
+        self.0.push(Finding { severity, what: what.into(), remedy: remedy.into() });
+    }
+}
+
+/// Everything found, the worst first.
+pub fn judge(report: &Report, lines: &[Line]) -> Vec<Finding> {
+    let mut found = Findings::default();
+    bus(&mut found, report, lines);
+    for sensor in &report.sensors {
+        scans(&mut found, sensor, report);
+        settings(&mut found, sensor);
+        faults(&mut found, sensor);
+        told_motion(&mut found, sensor, lines);
+    }
+    lengths(&mut found, report);
+    found.0.sort_by_key(|f| f.severity);
+    found.0
+}
+
+fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
+    let problems: u64 = report.problems.iter().filter(|p| p.what.starts_with("line skipped")).map(|p| p.count).sum();
+    if problems > 0 {
+        found.add(
+            Severity::Warning,
+            format!("{problems} lines of the log are no frames"),
+            "record with `candump -L`, and cut whole lines",
+        );
+    }
+    if report.problems.iter().any(|p| p.what == "time runs backwards") {
+        found.add(
+            Severity::Warning,
+            "time runs backwards in the log",
+            "record one bus a log, and let no clock be set while recording",
+        );
+    }
+    let mut errors: BTreeMap<u32, usize> = BTreeMap::new();
+    for line in lines {
+        if let Content::Error(class) = line.content {
+            *errors.entry(class).or_default() += 1;
+        }
+    }
+    for (class, n) in errors {
+        let (what, remedy) = match class {
+            c if c & 0x40 != 0 => ("the controller went off the bus", "check bit rate, wiring and termination"),
+            c if c & 0x20 != 0 => ("frames are not acknowledged", "a second node must be on the bus, awake"),
+            c if c & 0x04 != 0 => {
+                ("the controller reports errors (overrun, warning or passive level)", "check load, wiring and bit rate")
+            }
+            _ => ("the bus reports errors", "check bit rate, wiring and termination"),
+        };
+        found.add(Severity::Error, format!("{what}: {n} error frames of class {class:03X}"), remedy);
+    }
+    if report.sensors.is_empty() {
+        let seen: Vec<&str> = report.identifiers.iter().map(|i| i.id.as_str()).collect();
+        let listed = match &seen[..] {
+            [] => "no identifier at all".to_owned(),
+            some if some.len() > 20 => format!("{} identifiers, {} to {}", some.len(), some[0], some[some.len() - 1]),
+            some => format!("identifiers {}", some.join(", ")),
+        };
+        found.add(
+            Severity::Error,
+            format!("nothing of an ARS408 or its kin was heard; seen: {listed}"),
+            "check that this is the radar's bus, its supply, 500 kbit/s on both sides, and termination at both ends (the radar has none of its own)",
+        );
+    }
+    extended(found, lines);
+    if report.sensors.len() > 1 {
+        let ids: BTreeSet<u8> = report.sensors.iter().map(|s| s.sensor).collect();
+        let listed: Vec<String> = report.sensors.iter().map(|s| format!("{} on {}", s.sensor, s.interface)).collect();
+        found.add(
+            Severity::Note,
+            format!("several sensors: {}", listed.join(", ")),
+            if ids.len() > 1 {
+                "`viewshed replay --sensor-id ID` reads one of them"
+            } else {
+                "`viewshed replay` reads the interface with more frames"
+            },
+        );
+    }
+    let ours = lines.iter().filter_map(Line::frame).filter(|f| matches!(f.id, CanId::Standard(0x400..=0x4FF))).count();
+    if ours > 0 {
+        found.add(
+            Severity::Note,
+            format!("{ours} frames on 400 to 4FF, where visibility is broadcast by default"),
+            "nothing, if they are; another device there would be taken for a damaged broadcast",
+        );
+    }
+}
+
+/// Extended identifiers whose number is a radar's.
+fn extended(found: &mut Findings, lines: &[Line]) {
+    let alike = |id: CanId| match id {
+        CanId::Extended(raw) => u16::try_from(raw).ok().and_then(CanId::standard).and_then(Message::of).is_some(),
+        CanId::Standard(_) => false,
+    };
+    let n = lines.iter().filter_map(Line::frame).filter(|f| alike(f.id)).count();
+    if n > 0 {
+        found.add(
+            Severity::Warning,
+            format!("{n} frames have a radar's identifier in 29 bits"),
+            "the radar uses 11 bits: set gateway or adapter to standard frames",
+        );
+    }
+}
+
+fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
+    let (name, c) = (of(sensor), &sensor.counters);
+    if sensor.announced == 0 {
+        let heard = match sensor.state.map(|s| s.output) {
+            Some(output) => format!(
+                "it says its output is {}",
+                output.map_or("of an unknown kind".into(), |o| format!("{o:?}").to_lowercase())
+            ),
+            None => "and no state message either".into(),
+        };
+        found.add(
+            Severity::Error,
+            format!("{name} is there but sends no scans; {heard}"),
+            format!("send {} to switch clusters on, and read 2{}1 back", clusters(sensor), sensor.sensor),
+        );
+        return;
+    }
+    if sensor.scans == 0 {
+        found.add(
+            Severity::Error,
+            format!("{name} announces {} scans and none is complete", sensor.announced),
+            "its entries do not arrive: record without filters on identifiers, and check the receive queue",
+        );
+    }
+    let full = format!(
+        "give the receiver a longer queue; the busiest second has {} frames of about {MOST_FRAMES} that 500 kbit/s carries",
+        report.busiest_second
+    );
+    for (n, what) in [
+        (c.incomplete, "scans miss entries or qualities"),
+        (c.broken, "scans miss most of their entries and are dropped"),
+        (c.lost, "scans never came, by the radar's counter"),
+        (c.no_scan, "entries came without a status message"),
+    ] {
+        // a log may begin and end within a scan
+        let severity = if n <= 2 { Severity::Note } else { Severity::Warning };
+        if n > 0 {
+            found.add(severity, format!("{name}: {n} {what}"), full.clone());
+        }
+    }
+    if c.restarts > 0 {
+        found.add(Severity::Warning, format!("{name} started over {} times", c.restarts), "check its supply");
+    }
+    if c.repeated + c.surplus > 0 {
+        found.add(
+            Severity::Warning,
+            format!("{name}: {} entries or status messages came twice or beyond those announced", c.repeated + c.surplus),
+            "two devices with one sensor id, or a log with every frame twice: give each sensor an id of its own (2x0, SensorID)",
+        );
+    }
+    if let Some(period) = sensor.period_ms.filter(|p| !(40.0..=150.0).contains(&p.median)) {
+        found.add(
+            Severity::Warning,
+            format!("{name}: a scan every {:.0} ms; an ARS408 sends one about every 70", period.median),
+            "check the time stamps of the log",
+        );
+    }
+    if sensor.implausible > 0.2 {
+        found.add(
+            Severity::Warning,
+            format!("{name}: {:.0} % of its entries lie beyond 260 m or behind it", 100.0 * sensor.implausible),
+            "a clone with other scales? Try `viewshed replay --profile SR75`, and compare distances",
+        );
+    }
+}
+
+fn settings(found: &mut Findings, sensor: &Sensor) {
+    let name = of(sensor);
+    if sensor.output == Output::Objects {
+        found.add(
+            Severity::Note,
+            format!("{name} sends objects, which it has tracked and thinned out"),
+            format!("clusters show more of what hides what: send {}", clusters(sensor)),
+        );
+    }
+    let Some(state) = sensor.state else {
+        if sensor.announced > 0 {
+            found.add(
+                Severity::Warning,
+                format!("{name} sends no state (2{}1): neither faults nor settings are known", sensor.sensor),
+                "let the log or the gateway pass it",
+            );
+        }
+        return;
+    };
+    if state.sensor_id != sensor.sensor {
+        found.add(
+            Severity::Warning,
+            format!("{name} says that its id is {}", state.sensor_id),
+            "a new id takes effect at the next start: power it off and on",
+        );
+    }
+    if !state.quality && sensor.output != Output::Nothing {
+        found.add(
+            Severity::Warning,
+            format!(
+                "{name} sends no quality: predicted, ambiguous and invalid entries cannot be told from measured ones"
+            ),
+            format!("send {}", clusters(sensor)),
+        );
+    }
+}
+
+fn faults(found: &mut Findings, sensor: &Sensor) {
+    let name = of(sensor);
+    for (fault, n) in &sensor.faults {
+        let (severity, remedy) = match *fault {
+            "interference" => {
+                (Severity::Warning, "another radar of the band faces it: turn one, or set another frequency".to_owned())
+            }
+            "speed missing" | "yaw rate missing" => {
+                let told: Vec<String> = standing(sensor.sensor).map(|f| format!("{f:?}")).collect();
+                (Severity::Warning, format!("tell it that it stands: send {} every 50 ms", told.join(" and ")))
+            }
+            "supply voltage" => (Severity::Error, "it wants 8 to 32 V at its plug, under load".to_owned()),
+            "temperature" => (Severity::Error, "let it cool; shade it".to_owned()),
+            _ => (Severity::Error, "power it off and on; if it stays, replace it".to_owned()),
+        };
+        found.add(severity, format!("{name} reports {fault} in {n} state messages"), remedy);
+    }
+}
+
+/// A fixed sensor that is told it moves.
+fn told_motion(found: &mut Findings, sensor: &Sensor, lines: &[Line]) {
+    let mine = lines.iter().filter(|l| l.interface == sensor.interface).filter_map(Line::frame);
+    let speeds = mine.filter(|f| f.id == Message::Speed.id(sensor.sensor) && f.data().len() >= 2);
+    let fastest = speeds.map(|f| motion::speed_cm_s(f.data()).abs()).max().unwrap_or(0);
+    if fastest > 0 {
+        found.add(
+            if fastest > 50 { Severity::Warning } else { Severity::Note },
+            format!("{} is told that it moves, at up to {:.2} m/s", of(sensor), f64::from(fastest) / 100.0),
+            "a fixed radar is to be told that it stands; velocities of a moving one are wrong here",
+        );
+    }
+}
+
+fn lengths(found: &mut Findings, report: &Report) {
+    for i in &report.identifiers {
+        let (Some(expected), Some(message)) = (i.expected_length, i.message) else { continue };
+        if i.lengths.iter().any(|l| *l < expected) {
+            found.add(
+                Severity::Error,
+                format!("{} ({message}) comes with {:?} bytes instead of {expected}", i.id, i.lengths),
+                "another device uses this identifier, or a gateway cuts it",
+            );
+        } else if i.lengths.iter().any(|l| *l > expected) {
+            found.add(
+                Severity::Note,
+                format!("{} ({message}) comes with {:?} bytes instead of {expected}", i.id, i.lengths),
+                "nothing: longer frames are taken",
+            );
+        }
+        if i.expected && i.frames == 0 && !matches!(message, "SpeedInformation" | "YawRateInformation") {
+            found.add(
+                Severity::Warning,
+                format!("{} ({message}) was expected and not seen", i.id),
+                "let the log or the gateway pass it",
+            );
+        }
+    }
+}
+
+/// The frame that switches clusters on.
+fn clusters(sensor: &Sensor) -> String {
+    RadarConfiguration::CLUSTERS.frame(sensor.sensor).map_or_else(String::new, |f: CanFrame| format!("{f:?}"))
+}
+
+fn of(sensor: &Sensor) -> String {
+    format!("sensor {} on {}", sensor.sensor, sensor.interface)
+}

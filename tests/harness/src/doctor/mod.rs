@@ -1,0 +1,112 @@
+//! What is on the bus or line, what should be, what is wrong, and what to do about it.
+
+pub mod can;
+pub mod findings;
+pub mod native;
+pub mod sensor;
+pub mod text;
+pub mod ti;
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use serde::Serialize;
+
+use crate::recording;
+use crate::recording::ars408::lines;
+use crate::recording::candump;
+use crate::recording::problems::{Problem, Problems};
+use crate::recording::ti::is_capture;
+use can::Identifier;
+use findings::Finding;
+use sensor::Sensor;
+
+/// Everything that is said of one log.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    pub log: String,
+    pub kind: &'static str,
+    pub frames: usize,
+    pub duration_s: f64,
+    /// Frames in the busiest second.
+    pub busiest_second: usize,
+    pub identifiers: Vec<Identifier>,
+    pub sensors: Vec<Sensor>,
+    pub problems: Vec<Problem>,
+    pub findings: Vec<Finding>,
+}
+
+/// A judged log of any kind.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Examined {
+    Can(Report),
+    Ti(ti::Report),
+    Native(native::Report),
+}
+
+impl Examined {
+    pub fn findings(&self) -> &[Finding] {
+        match self {
+            Self::Can(report) => &report.findings,
+            Self::Ti(report) => &report.findings,
+            Self::Native(report) => &report.findings,
+        }
+    }
+
+    /// The report to be read.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Can(report) => text::can(report),
+            Self::Ti(report) => text::ti(report),
+            Self::Native(report) => text::native(report),
+        }
+    }
+}
+
+/// Reads a log and judges it.
+///
+/// # Errors
+/// A file that cannot be read or is no such log.
+pub fn examine(path: &Path) -> Result<Examined> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if candump::is_log(&bytes) {
+        return Ok(can(log, &bytes));
+    }
+    if !bytes.starts_with(mcap::MAGIC) {
+        if is_capture(&bytes) {
+            return Ok(Examined::Ti(ti::examine(log, &bytes)));
+        }
+        if recording::native::is_capture(&bytes) {
+            let (messages, broken) = recording::native::unstuff(&bytes);
+            return Ok(Examined::Native(native::examine(log, &messages, broken)));
+        }
+    }
+    bail!(
+        "{log} is not a log of `candump -L`, whose lines are `(seconds) interface identifier#data`, not a capture of a TI mmWave radar's data port, which has the bytes 02 01 04 03 06 05 08 07 before each frame, nor a capture of the native format. Record a bus with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
+    );
+}
+
+fn can(log: String, bytes: &[u8]) -> Examined {
+    let mut problems = Problems::default();
+    let lines = lines(bytes, &mut problems);
+    let sensors = sensor::all(&lines);
+    let native = recording::native::of_log(&lines);
+    if sensors.is_empty() && !native.is_empty() {
+        return Examined::Native(native::examine(log, &native, 0));
+    }
+    let mut report = Report {
+        log,
+        kind: "candump",
+        frames: lines.len(),
+        duration_s: can::duration_s(&lines),
+        busiest_second: can::busiest_second(&lines),
+        identifiers: can::identifiers(&lines, &sensors),
+        problems: problems.iter().collect(),
+        findings: Vec::new(),
+        sensors,
+    };
+    report.findings = findings::judge(&report, &lines);
+    Examined::Can(report)
+}

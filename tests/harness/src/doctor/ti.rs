@@ -1,0 +1,146 @@
+//! A capture of a TI mmWave radar's data port.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use viewshed::inputs::ti::{Config, Family, Outcome, Ti};
+
+use super::findings::{Finding, Severity};
+use crate::recording::ti::{MAGIC, feed, flaw, flaws, learn};
+
+/// What is said of a capture.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    pub log: String,
+    pub kind: &'static str,
+    pub bytes: usize,
+    /// Bytes of the header, if it could be learnt.
+    pub header: Option<u32>,
+    /// Magic words.
+    pub frames: usize,
+    pub scans: usize,
+    pub empty_scans: usize,
+    pub points: usize,
+    pub points_with_snr: usize,
+    /// Items by their type.
+    pub items: BTreeMap<u32, usize>,
+    /// Frames dropped, by their flaw.
+    pub broken: BTreeMap<&'static str, usize>,
+    pub counters: BTreeMap<&'static str, u32>,
+    pub findings: Vec<Finding>,
+}
+
+/// Judges a capture.
+pub fn examine(log: String, bytes: &[u8]) -> Report {
+    let family = learn(bytes);
+    let mut report = Report {
+        log,
+        kind: "ti",
+        bytes: bytes.len(),
+        header: family.map(Family::header),
+        frames: bytes.windows(MAGIC.len()).filter(|w| *w == MAGIC).count(),
+        scans: 0,
+        empty_scans: 0,
+        points: 0,
+        points_with_snr: 0,
+        items: family.map(|f| items(bytes, f)).unwrap_or_default(),
+        broken: BTreeMap::new(),
+        counters: BTreeMap::new(),
+        findings: Vec::new(),
+    };
+    if let Some(family) = family {
+        let mut radar = Ti::<1024>::new(Config { family: Some(family), ..Config::LEARN });
+        feed(&mut radar, bytes, |outcome| match outcome {
+            Outcome::Scan(s) => {
+                report.scans += 1;
+                report.empty_scans += usize::from(s.detections.is_empty());
+                report.points += s.detections.len();
+                report.points_with_snr += s.detections.iter().filter(|d| d.snr_half_db.is_some()).count();
+            }
+            Outcome::Broken(why) => *report.broken.entry(flaw(why)).or_default() += 1,
+            _ => {}
+        });
+        report.counters = flaws(radar.counters()).into_iter().collect();
+    }
+    report.findings = judge(&report);
+    report
+}
+
+/// Types of the items, as far as the frames hold together.
+fn items(bytes: &[u8], family: Family) -> BTreeMap<u32, usize> {
+    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let mut found = BTreeMap::new();
+    let starts = bytes.windows(MAGIC.len()).enumerate().filter(|(_, w)| *w == MAGIC).map(|(at, _)| at);
+    for start in starts {
+        let (own, count) = match family {
+            Family::Bytes52 => (0, word(start + 48).map(|n| n & 0xFFFF)),
+            _ => (8, word(start + 32)),
+        };
+        let mut at = start + family.header() as usize;
+        for _ in 0..count.unwrap_or(0).min(64) {
+            let (Some(kind), Some(length)) = (word(at), word(at + 4)) else { break };
+            if length > 1 << 19 {
+                break;
+            }
+            *found.entry(kind as u32).or_default() += 1;
+            at += length.max(8 - own) + own;
+        }
+    }
+    found
+}
+
+fn judge(report: &Report) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let mut add = |severity, what: String, remedy: &str| found.push(Finding { severity, what, remedy: remedy.into() });
+    let counted = |what: &str| report.counters.get(what).copied().unwrap_or(0);
+    if report.header.is_none() {
+        add(
+            Severity::Error,
+            format!("{} magic words, but no kind of header fits three frames in a row", report.frames),
+            "capture the data port, 921600 baud, 8N1, binary, for some seconds with something in view; if frames have no items, switch points on (guiMonitor -1 1 ...)",
+        );
+        return found;
+    }
+    if report.scans == 0 {
+        add(Severity::Error, "no frame is whole".into(), "check the baud rate of the data port: 921600");
+    } else if report.points == 0 {
+        let items: Vec<String> = report.items.keys().map(ToString::to_string).collect();
+        add(
+            Severity::Error,
+            format!("no points in {} frames; items of type {}", report.scans, items.join(", ")),
+            "switch points on: the first value behind the sub-frame in guiMonitor is 1 or 2. SDK 1 and 2 send Doppler steps, which need the configuration's velocity resolution",
+        );
+    }
+    let broken: usize = report.broken.values().sum();
+    if broken > 1 {
+        let kinds: Vec<String> = report.broken.iter().map(|(why, n)| format!("{why} ({n})")).collect();
+        add(
+            Severity::Warning,
+            format!("{broken} frames are damaged: {}", kinds.join(", ")),
+            "bytes are lost: use flow control or a larger buffer, a shorter cable, fewer heat maps, a lower frame rate",
+        );
+    }
+    if counted("frame that never came, by its number") > 0 {
+        add(
+            Severity::Warning,
+            format!("{} frames never came, by their number", counted("frame that never came, by its number")),
+            "the line is too slow for what is sent: switch profiles and heat maps off in guiMonitor",
+        );
+    }
+    if counted("byte outside of frames") > 0 {
+        add(
+            Severity::Note,
+            format!("{} bytes outside of frames", counted("byte outside of frames")),
+            "at the start of a capture they are the rest of a frame; else check baud rate and that nothing else writes to the data port",
+        );
+    }
+    if report.points > 0 && report.points_with_snr * 2 < report.points {
+        add(
+            Severity::Note,
+            "points come without a signal-to-noise ratio".into(),
+            "switch side information on (guiMonitor with 1, not 2), so that weak points can be gated",
+        );
+    }
+    found.sort_by_key(|f| f.severity);
+    found
+}

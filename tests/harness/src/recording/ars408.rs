@@ -1,0 +1,166 @@
+//! Recordings from CAN logs of an ARS408 or one of its kin.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail};
+use viewshed::inputs::RadarScan;
+use viewshed::inputs::ars408::message::Message;
+use viewshed::inputs::ars408::profile;
+use viewshed::inputs::ars408::{Ars408, Config, Counters, Outcome};
+use viewshed::time::Time;
+
+use super::candump::Line;
+use super::capture::{self, Kind};
+use super::problems::Problems;
+use super::{Frame, ReadOptions, Recording, native};
+
+/// Entries of a scan that are kept; clones announce more than 255.
+const MOST_ENTRIES: usize = 1024;
+
+/// Reads the scans of one sensor.
+///
+/// # Errors
+/// No scan of such a radar, or several sensors and none named.
+pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    let mut problems = Problems::default();
+    let lines = lines(bytes, &mut problems);
+    let native = native::of_log(&lines);
+    if !native.is_empty() && !lines.iter().any(|l| sensor_of(l).is_some()) {
+        return native::read(name, &native, 0, options);
+    }
+    let (interface, sensor) = choose(&name, &lines, options)?;
+    let mine: Vec<&Line> = lines.iter().filter(|line| line.interface == interface).collect();
+    let elsewhere = lines.iter().filter(|l| l.interface != interface && sensor_of(l) == Some(sensor)).count();
+    let start = mine.first().map_or(0, |l| l.time_ns);
+    problems.add_many(
+        &interface,
+        "frames of the same sensor id on another interface, left out",
+        start,
+        elsewhere as u64,
+    );
+    let profile = *options.profile.unwrap_or(&profile::ARS408);
+    let mut radar = Ars408::<MOST_ENTRIES>::new(Config { profile, ..Config::sensor(sensor) });
+    let mut frames = Vec::new();
+    scans(&mut radar, &mine, |scan| {
+        if scan.fault {
+            problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
+        }
+        let detections = scan.detections.iter().map(capture::detection).collect();
+        frames.push(Frame { time_ns: nanoseconds(scan.time), detections });
+    });
+    if frames.is_empty() {
+        bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");
+    }
+    tell(&mut problems, &interface, start, radar.counters());
+    let kind = Kind {
+        name: format!("{} {sensor} on {interface}", profile.name),
+        azimuth_deg: 60.0,
+        elevation_deg: 10.0,
+        range_m: [0.2, 250.0],
+        has_elevation: profile.cluster.up_cm.is_some(),
+    };
+    Ok(capture::recording(name, kind, frames, problems, options))
+}
+
+/// All lines that are frames, in the order of the log; the others are counted.
+pub fn lines(bytes: &[u8], problems: &mut Problems) -> Vec<Line> {
+    let mut lines: Vec<Line> = Vec::new();
+    for text in String::from_utf8_lossy(bytes).lines().filter(|line| !line.trim().is_empty()) {
+        let last = lines.last().map_or(0, |l| l.time_ns);
+        match Line::parse(text) {
+            Ok(line) => {
+                if !lines.is_empty() && line.time_ns < last {
+                    problems.add(&line.interface, "time runs backwards", line.time_ns);
+                }
+                lines.push(line);
+            }
+            Err(why) => problems.add("log", format!("line skipped: {}", kind_of(&why)), last),
+        }
+    }
+    lines
+}
+
+/// A reason without the text it names, so that many of a kind are one problem.
+fn kind_of(why: &str) -> String {
+    match why.split('`').collect::<Vec<_>>()[..] {
+        [before, _, after] => format!("{before}something{after}").trim().to_owned(),
+        _ => why.to_owned(),
+    }
+}
+
+/// Feeds a radar with frames; `scan` is given every scan that comes of them, to the last.
+pub fn scans<const N: usize>(radar: &mut Ars408<N>, lines: &[&Line], mut scan: impl FnMut(&RadarScan<'_>)) {
+    let mut give = |outcome: Outcome<'_>| {
+        if let Outcome::Scan(s) = outcome {
+            scan(&s);
+        }
+    };
+    let mut end = 0;
+    for line in lines {
+        let Some(frame) = line.frame() else { continue };
+        let micros = u64::try_from(line.time_ns / 1000).unwrap_or(0);
+        let now = Time::from_micros(micros);
+        // what timed out before this frame came
+        radar.poll(now).map(&mut give);
+        give(radar.push(frame, now));
+        radar.poll(now).map(&mut give);
+        end = micros;
+    }
+    radar.poll(Time::from_micros(end.saturating_add(10_000_000))).map(&mut give);
+}
+
+fn nanoseconds(time: Time) -> i64 {
+    i64::try_from(time.micros()).unwrap_or(i64::MAX).saturating_mul(1000)
+}
+
+/// The sensor whose scan a frame belongs to.
+fn sensor_of(line: &Line) -> Option<u8> {
+    let (message, sensor) = Message::of(line.frame().filter(|f| !f.fd)?.id)?;
+    let scan = [Message::ClusterStatus, Message::ClusterGeneral, Message::ObjectStatus, Message::ObjectGeneral];
+    scan.contains(&message).then_some(sensor)
+}
+
+/// Interface and sensor id to be read.
+fn choose(name: &str, lines: &[Line], options: &ReadOptions) -> Result<(String, u8)> {
+    let mut found: BTreeMap<(String, u8), usize> = BTreeMap::new();
+    for line in lines {
+        if let Some(sensor) = sensor_of(line) {
+            *found.entry((line.interface.clone(), sensor)).or_default() += 1;
+        }
+    }
+    let listed = || found.iter().map(|((i, s), n)| format!("{s} on {i} ({n} frames)")).collect::<Vec<_>>().join(", ");
+    let wanted = found.iter().filter(|((_, sensor), _)| options.sensor_id.is_none_or(|id| id == *sensor));
+    let Some((chosen, _)) = wanted.clone().max_by_key(|(_, n)| **n) else {
+        match options.sensor_id {
+            Some(id) if !found.is_empty() => bail!("{name}: no scan of sensor {id}; sensors found: {}", listed()),
+            _ => bail!(
+                "{name}: no scan of an ARS408 or its kin in this log (0x600, 0x60A, 0x60B, 0x701); `viewshed doctor` says what there is"
+            ),
+        }
+    };
+    if wanted.clone().any(|((_, sensor), _)| *sensor != chosen.1) {
+        bail!("{name}: several sensors: {}; choose one with --sensor-id", listed());
+    }
+    Ok(chosen.clone())
+}
+
+/// What the decoder counted, as problems of the input.
+fn tell(problems: &mut Problems, interface: &str, start: i64, c: &Counters) {
+    let told = [
+        ("scan of which entries or qualities are missing", c.incomplete),
+        ("scan of which most is missing, dropped", c.broken),
+        ("scan that never came, by the radar's counter", c.lost),
+        ("radar started over", c.restarts),
+        ("frame too short, refused", c.too_short),
+        ("entry without a status message before it, refused", c.no_scan),
+        ("entry or status that came twice, refused", c.repeated),
+        ("entry beyond those announced, refused", c.surplus),
+        ("quality of an entry that did not arrive", c.unknown_entry),
+        ("entry at no distance or beyond 655 m, dropped", c.no_range),
+        ("entry that the radar itself marks as predicted or invalid, left out", c.unwanted),
+        ("entry beyond what is kept, dropped", c.overflow),
+    ];
+    for (what, n) in told {
+        problems.add_many(interface, what, start, u64::from(n));
+    }
+}

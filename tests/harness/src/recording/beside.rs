@@ -1,0 +1,38 @@
+//! Files beside a recording, and the part of it that is wanted.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+
+use super::{Frame, ReadOptions, Recording, labels};
+use crate::truth::Truth;
+
+/// Adds `NAME.labels.csv` (replaces the labels inside) and `NAME.occlusion.csv`, and cuts to the time asked for.
+///
+/// # Errors
+/// Files that cannot be read, and a time without frames.
+pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) -> Result<Recording> {
+    let beside = |suffix: &str| path.with_file_name(format!("{}.{suffix}.csv", recording.name));
+    let (labels_csv, occlusion_csv) = (beside("labels"), beside("occlusion"));
+    if labels_csv.exists() {
+        let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
+        let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
+        recording.truth = Some(Truth::new(labels::read_labels(&labels_csv, start_ns, end_ns)?));
+    }
+    if occlusion_csv.exists() {
+        recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
+    }
+    restrict(&mut recording, options);
+    if recording.frames.is_empty() {
+        bail!("{}: no radar frame between --from and --to", path.display());
+    }
+    Ok(recording)
+}
+
+fn restrict(recording: &mut Recording, options: &ReadOptions) {
+    let Some(start) = recording.frames.first().map(|f| f.time_ns) else { return };
+    let since = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9;
+    recording
+        .frames
+        .retain(|f| options.from_s.is_none_or(|t| since(f) >= t) && options.to_s.is_none_or(|t| since(f) <= t));
+}

@@ -1,0 +1,151 @@
+//! Recordings from raw captures of a TI mmWave radar's data port.
+
+use anyhow::{Context, Result, bail};
+use viewshed::inputs::RadarScan;
+use viewshed::inputs::ti::{Config, Counters, Family, Flaw, Outcome, Ti};
+use viewshed::time::Time;
+
+use super::capture::{self, Kind};
+use super::problems::Problems;
+use super::{Frame, ReadOptions, Recording};
+
+/// Points of a scan that are kept.
+const MOST_POINTS: usize = 1024;
+
+/// What every frame begins with.
+pub const MAGIC: [u8; 8] = [2, 1, 4, 3, 6, 5, 8, 7];
+
+/// Bytes at the start of a file in which a frame must begin.
+const WITHIN: usize = 1 << 17;
+
+/// Time between frames of TI's own demonstrations.
+const PERIOD_S: f64 = 0.1;
+
+/// Whether a file looks like such a capture.
+pub fn is_capture(bytes: &[u8]) -> bool {
+    bytes[..bytes.len().min(WITHIN)].windows(MAGIC.len()).any(|w| w == MAGIC)
+}
+
+/// Reads every frame of a capture.
+///
+/// # Errors
+/// A kind of header that cannot be learnt, and no frame at all.
+pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    let family = match options.ti_header.or_else(|| learn(bytes)) {
+        Some(family) => family,
+        None => bail!(
+            "{name}: the kind of header cannot be learnt: that takes three frames with items in a row. Name it with --ti-header 36, 40, 44 or 52; `viewshed doctor` says what there is"
+        ),
+    };
+    let mut problems = Problems::default();
+    let period_s = options.frame_period_s.unwrap_or(PERIOD_S);
+    if options.frame_period_s.is_none() {
+        let what =
+            format!("a TI capture holds no times: frames {PERIOD_S} s apart assumed; give it with --frame-period");
+        problems.add("capture", what, 0);
+    }
+    let mut radar = Ti::<MOST_POINTS>::new(Config { family: Some(family), ..Config::LEARN });
+    let mut frames: Vec<Frame> = Vec::new();
+    let mut clock = Clock::new(period_s);
+    scans(&mut radar, bytes, |scan| {
+        let detections = scan.detections.iter().map(capture::detection).collect();
+        frames.push(Frame { time_ns: clock.time_ns(scan.number), detections });
+    });
+    let c = *radar.counters();
+    let first = frames.first().map(|f| f.time_ns).with_context(|| {
+        format!(
+            "{name}: no whole frame with a header of {} bytes; `viewshed doctor` says what there is",
+            family.header()
+        )
+    })?;
+    for (what, n) in flaws(&c) {
+        problems.add_many("capture", what, first, u64::from(n));
+    }
+    let has_elevation = frames.iter().flat_map(|f| &f.detections).any(|d| d.elevation_rad.is_some_and(|e| e != 0.0));
+    if !has_elevation {
+        // an antenna that measures none sends zeros
+        frames.iter_mut().flat_map(|f| &mut f.detections).for_each(|d| d.elevation_rad = None);
+    }
+    let kind = Kind {
+        name: format!("TI mmWave, header of {} bytes", family.header()),
+        azimuth_deg: 60.0,
+        elevation_deg: 20.0,
+        range_m: [0.3, 120.0],
+        has_elevation,
+    };
+    Ok(capture::recording(name, kind, frames, problems, options))
+}
+
+/// The family, if three frames in a row agree on it.
+pub fn learn(bytes: &[u8]) -> Option<Family> {
+    let mut radar = Ti::<1>::new(Config::LEARN);
+    feed(&mut radar, bytes, |_| {});
+    radar.family()
+}
+
+/// Feeds a radar with bytes; `scan` is given every scan that comes of them.
+pub fn scans<const N: usize>(radar: &mut Ti<N>, bytes: &[u8], mut scan: impl FnMut(&RadarScan<'_>)) {
+    feed(radar, bytes, |outcome| {
+        if let Outcome::Scan(s) = outcome {
+            scan(&s);
+        }
+    });
+}
+
+/// Feeds a radar with bytes; `see` is given whatever comes of them.
+pub fn feed<const N: usize>(radar: &mut Ti<N>, mut bytes: &[u8], mut see: impl FnMut(Outcome<'_>)) {
+    while !bytes.is_empty() {
+        let (taken, outcome) = radar.push(bytes, Time::from_micros(0));
+        see(outcome);
+        bytes = &bytes[taken.clamp(1, bytes.len())..];
+    }
+}
+
+/// What the decoder counted, in words.
+pub fn flaws(c: &Counters) -> [(&'static str, u32); 6] {
+    [
+        ("frame cut short or damaged, dropped", c.broken),
+        ("frame that never came, by its number", c.lost),
+        ("radar started over", c.restarts),
+        ("byte outside of frames", c.stray_bytes),
+        ("point with values that are none, dropped", c.no_point),
+        ("point beyond what is kept, dropped", c.overflow),
+    ]
+}
+
+/// A flaw in words.
+pub fn flaw(flaw: Flaw) -> &'static str {
+    match flaw {
+        Flaw::Cut => "the next frame began before its end",
+        Flaw::Header => "lengths in the header that cannot be",
+        Flaw::Items => "items that do not fill the frame",
+        Flaw::Records => "an item that is no whole number of points",
+        Flaw::Points => "most of the points announced are not there",
+    }
+}
+
+/// Times from frame numbers.
+struct Clock {
+    period_ns: i64,
+    last: Option<(u32, i64)>,
+}
+
+impl Clock {
+    fn new(period_s: f64) -> Self {
+        Self { period_ns: (period_s * 1e9) as i64, last: None }
+    }
+
+    /// Later than the time before, whatever the number: sub-frames share one, restarts begin anew.
+    fn time_ns(&mut self, number: u32) -> i64 {
+        let time = match self.last {
+            None => 1_000_000_000,
+            Some((last, time)) => match number.checked_sub(last) {
+                Some(0) => time + self.period_ns / 4,
+                Some(advance) if advance < 10_000 => time + i64::from(advance) * self.period_ns,
+                _ => time + self.period_ns,
+            },
+        };
+        self.last = Some((number, time));
+        time
+    }
+}

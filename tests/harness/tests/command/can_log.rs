@@ -1,0 +1,208 @@
+//! CAN logs of an ARS408: replayed, decoded as cantools decodes them, and judged by the doctor.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::{Value, json};
+use viewshed_harness::recording::{ReadOptions, read};
+
+use crate::scene::{folder, json, replay, stderr, stdout};
+
+const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/ars408-made-up.log");
+
+fn doctor(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(folder).arg("doctor").args(arguments).output().unwrap()
+}
+
+/// Judges lines of a log; exit code and report.
+fn judge(folder: &Path, lines: &[&str]) -> (i32, Value) {
+    std::fs::write(folder.join("a.log"), lines.join("\n")).unwrap();
+    let output = doctor(folder, &["a.log", "--json", "d.json"]);
+    assert!(!stderr(&output).contains("panicked"), "{}", stderr(&output));
+    (output.status.code().unwrap(), json(&folder.join("d.json")))
+}
+
+/// Severity and remedy of the finding that says this.
+fn finding<'a>(report: &'a Value, what: &str) -> Option<(&'a str, &'a str)> {
+    let all = report["findings"].as_array().unwrap();
+    let found = all.iter().find(|f| f["what"].as_str().unwrap().contains(what))?;
+    Some((found["severity"].as_str().unwrap(), found["do"].as_str().unwrap()))
+}
+
+#[test]
+fn every_scan_of_the_shipped_log_is_what_cantools_decodes() {
+    for (sensor, scans, detections) in [(0, 28, 487), (3, 28, 111)] {
+        let options = ReadOptions { sensor_id: Some(sensor), ..Default::default() };
+        let recording = read(Path::new(LOG), &options).unwrap();
+        let mut csv = csv::Reader::from_path(LOG.replace(".log", &format!(".{sensor}.detections.csv"))).unwrap();
+        let rows: Vec<csv::StringRecord> = csv.records().map(Result::unwrap).collect();
+        let number = |row: &csv::StringRecord, column: usize| row[column].parse::<f64>().unwrap();
+        let mut rows = rows.iter();
+        for (k, frame) in recording.frames.iter().enumerate() {
+            for d in &frame.detections {
+                let row = rows.next().unwrap();
+                assert_eq!(number(row, 0), k as f64);
+                assert!((number(row, 1) - frame.time_ns as f64 * 1e-9).abs() < 1e-6);
+                // half a centimetre, three steps of 2^16 to the turn, half a cm/s, half a dB
+                assert!((number(row, 2) - f64::from(d.range_m)).abs() < 0.0051, "{row:?} {d:?}");
+                assert!((number(row, 3) - f64::from(d.azimuth_rad).to_degrees()).abs() < 0.0165, "{row:?} {d:?}");
+                assert!((number(row, 5) - f64::from(d.radial_velocity_mps)).abs() < 0.0053, "{row:?} {d:?}");
+                assert_eq!(number(row, 6) as f32, d.rcs_dbsm.unwrap());
+                assert_eq!((d.elevation_rad, d.snr_db), (None, None));
+            }
+        }
+        assert!(rows.next().is_none());
+        let found: usize = recording.frames.iter().map(|f| f.detections.len()).sum();
+        assert_eq!((recording.frames.len(), found), (scans, detections));
+        assert_eq!(recording.problems.count("left out") as usize, if sensor == 0 { 564 } else { 140 } - detections);
+        assert_eq!(recording.problems.iter().count(), 3, "what was left out, and that mount and view are assumed");
+    }
+}
+
+#[test]
+fn a_can_log_is_replayed_without_rates_and_with_pictures() {
+    let folder = folder("can_log");
+    let arguments =
+        [LOG, "--sensor-id", "0", "--mount", "0,0,5,0,2,0", "--json", "r.json", "--out", "out", "--mcap", "m.mcap"];
+    let output = replay(&folder, &arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report = json(&folder.join("r.json"));
+    assert_eq!((&report["input"]["frames"], &report["input"]["labelled"]), (&json!(28), &json!(false)));
+    let rows = report["estimators"].as_array().unwrap();
+    let radar_3d = rows.iter().find(|r| r["name"] == "radar-3d").unwrap();
+    for rate in ["tvr", "fvr", "tir", "fir", "cell_fvr", "cell_fir"] {
+        assert_eq!(radar_3d[rate], Value::Null, "{rate}");
+    }
+    for picture in ["birdseye-radar-3d.png", "birdseye-radar-2d.png", "polar-radar-3d.png"] {
+        assert!(folder.join("out").join(picture).exists(), "{picture}");
+    }
+    let copy = read(&folder.join("m.mcap"), &ReadOptions::default()).unwrap();
+    let original = read(Path::new(LOG), &ReadOptions { sensor_id: Some(0), ..Default::default() }).unwrap();
+    assert_eq!(copy.frames, original.frames, "the MCAP file has the detections too");
+    assert_eq!(copy.pose.position[2], 5.0);
+}
+
+#[test]
+fn labels_beside_a_can_log_make_rates() {
+    let folder = folder("can_labels");
+    std::fs::copy(LOG, folder.join("a.log")).unwrap();
+    let row = |i: u32| format!("{},7,car,{},-1.75\n", f64::from(i) / 10.0, 20.0 + 2.7 * f64::from(i));
+    let rows: String = (0..=20).map(row).collect();
+    std::fs::write(folder.join("a.labels.csv"), format!("time_s,object_id,class,x_m,y_m\n{rows}")).unwrap();
+    let output = replay(&folder, &["a.log", "--sensor-id", "0", "--json", "r.json", "--bootstrap", "0"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(json(&folder.join("r.json"))["objects"], json!(1));
+}
+
+#[test]
+fn of_several_sensors_one_has_to_be_named() {
+    let folder = folder("can_several");
+    let output = replay(&folder, &[LOG]);
+    assert_eq!(output.status.code(), Some(2));
+    let text = stderr(&output);
+    assert!(text.contains("0 on can0") && text.contains("3 on can0") && text.contains("--sensor-id"), "{text}");
+    let output = replay(&folder, &[LOG, "--sensor-id", "5"]);
+    assert!(stderr(&output).contains("no scan of sensor 5; sensors found: 0 on can0"));
+    std::fs::write(folder.join("b.log"), "(1.0) can0 123#00\n").unwrap();
+    let output = replay(&folder, &["b.log"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("viewshed doctor"), "{}", stderr(&output));
+}
+
+#[test]
+fn the_doctor_lists_what_was_seen_and_what_was_expected() {
+    let folder = folder("doctor");
+    let output = doctor(&folder, &[LOG, "--json", "d.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stdout(&output).contains("Cluster_1_General"));
+    let report = json(&folder.join("d.json"));
+    let clusters = report["identifiers"].as_array().unwrap().iter().find(|i| i["id"] == "701").unwrap();
+    assert_eq!((&clusters["frames"], &clusters["lengths"]), (&json!(564), &json!([8])));
+    assert_eq!((&clusters["expected_length"], &clusters["expected"]), (&json!(8), &json!(true)));
+    let sensors = report["sensors"].as_array().unwrap();
+    assert_eq!((&sensors[0]["output"], &sensors[1]["output"]), (&json!("clusters"), &json!("objects")));
+    for sensor in sensors {
+        assert_eq!(
+            (&sensor["announced"], &sensor["scans"], &sensor["counter_step"]),
+            (&json!(28), &json!(28), &json!(2))
+        );
+        assert_eq!(sensor["counters"]["lost"], json!(0));
+        assert_eq!(sensor["version"], "4.30.1");
+    }
+    assert!(finding(&report, "several sensors").is_some_and(|(_, remedy)| remedy.contains("--sensor-id")));
+    let (_, remedy) = finding(&report, "sensor 3 on can0 sends objects").unwrap();
+    assert!(remedy.contains("230#7800000010240000"));
+}
+
+#[test]
+fn the_doctor_says_what_to_do_about_a_silent_bus() {
+    let folder = folder("doctor_silent");
+    let (code, report) = judge(&folder, &["(1.0) can0 123#00", "(1.5) can0 456#0102"]);
+    assert_eq!(code, 1);
+    let (severity, remedy) = finding(&report, "nothing of an ARS408").unwrap();
+    assert!(severity == "error" && remedy.contains("500 kbit/s") && remedy.contains("termination"));
+    assert!(report["findings"][0]["what"].as_str().unwrap().contains("123, 456"));
+    // there, but its output is switched off
+    let (code, report) = judge(&folder, &["(1.0) can0 221#401F400012000000", "(1.1) can0 720#041E0100"]);
+    assert_eq!(code, 1);
+    let (_, remedy) = finding(&report, "sends no scans; it says its output is nothing").unwrap();
+    assert!(remedy.contains("220#7800000010240000"), "{remedy}");
+    // an error frame
+    let (code, report) = judge(&folder, &["(1.0) can0 20000040#0000000000000000"]);
+    assert_eq!(code, 1);
+    assert!(finding(&report, "went off the bus").is_some());
+}
+
+#[test]
+fn the_doctor_finds_losses_faults_lengths_and_foreign_clocks() {
+    let folder = folder("doctor_ill");
+    let mut lines = vec![
+        // interference, no speed, no yaw rate, no quality; says its id is 1
+        "(1.000) can0 201#401F500011C40000".to_owned(),
+        "(1.001) can0 301#8001000000000000".to_owned(),
+        "(1.002) can0 300#43E8".to_owned(),
+        "what is this".to_owned(),
+        "(1.003) can0 0000060A#00000010".to_owned(),
+    ];
+    for (i, counter) in [0, 2, 4, 6, 8, 10, 16, 18, 20, 22].iter().enumerate() {
+        let t = 1.1 + 0.07 * i as f64;
+        lines.push(format!("({t:.3}) can0 60A#01{counter:04X}10"));
+        // a third of the entries is lost
+        if i % 3 != 1 {
+            lines.push(format!("({:.3}) can0 60B#015143FF80200080", t + 0.001));
+        }
+    }
+    lines.push("(1.900) can0 60B#015143FF802000".to_owned());
+    lines.push("(1.800) can0 700#041E0100".to_owned());
+    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+    let (code, report) = judge(&folder, &lines);
+    assert_eq!(code, 1, "a frame too short is an error");
+    for (what, remedy) in [
+        ("reports interference", "another radar"),
+        ("reports speed missing", "300#0000 and 301#8000"),
+        ("reports yaw rate missing", "300#0000 and 301#8000"),
+        ("sends no quality", "200#78"),
+        ("says that its id is 1", "power it off and on"),
+        ("is told that it moves, at up to 20.00 m/s", "stands"),
+        ("1 lines of the log are no frames", "candump -L"),
+        ("radar's identifier in 29 bits", "11 bits"),
+        ("scans miss most of their entries", "queue"),
+        ("scans never came", "queue"),
+        ("60B (Obj_1_General) comes with [7, 8] bytes", "another device"),
+        ("301 (YawRateInformation) comes with [8] bytes", "longer frames are taken"),
+        ("time runs backwards", "one bus"),
+    ] {
+        let found = finding(&report, what).unwrap_or_else(|| panic!("{what}: {:#}", report["findings"]));
+        assert!(found.1.contains(remedy), "{what}: {}", found.1);
+    }
+}
+
+#[test]
+fn the_doctor_refuses_what_is_no_log() {
+    let folder = folder("doctor_foreign");
+    std::fs::write(folder.join("a.log"), "time,x,y\n").unwrap();
+    let output = doctor(&folder, &["a.log"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("candump -L"), "{}", stderr(&output));
+    assert_eq!(doctor(&folder, &["absent.log"]).status.code(), Some(2));
+}

@@ -1,0 +1,280 @@
+//! The inverse sensor model: what a detection, and the lack of one, say of a cell.
+
+use viewshed::evidence::EvidenceConfig;
+use viewshed::reflection::NoiseConfig;
+
+use crate::geometry::Placed;
+use crate::grid::{Axes, Grid};
+use crate::raycast::Map;
+
+/// Standard deviations of azimuth a detection's evidence reaches.
+const REACH: f64 = 2.0;
+/// Range cells before a detection's own that its line of sight does not clear.
+const SPARED: usize = 2;
+/// Lines of sight of one frame that clear a column.
+const SIGHTS: usize = 6;
+
+/// The model for one grid.
+#[derive(Debug, Clone, Copy)]
+pub struct InverseSensor {
+    config: EvidenceConfig,
+    /// Standard deviation of azimuth, columns.
+    azimuth_sigma: f64,
+    /// Standard deviation of range with that of an even spread over a cell, metres.
+    range_sigma: f64,
+}
+
+/// exp(-x^2 / 2)
+fn bell(x: f64) -> f64 {
+    (-0.5 * x * x).exp()
+}
+
+impl InverseSensor {
+    pub fn new(config: &EvidenceConfig, noise: &NoiseConfig, axes: &Axes) -> Self {
+        let azimuth_rad = f64::from(noise.azimuth_deg).to_radians();
+        Self {
+            config: *config,
+            azimuth_sigma: azimuth_rad / axes.span_rad * axes.azimuths as f64,
+            range_sigma: f64::from(noise.range_m).hypot(axes.cell_m / 12.0_f64.sqrt()),
+        }
+    }
+
+    /// Height of an unmoving reflection and its standard deviation: measured and prior, weighted by
+    /// the inverse of their variances.
+    fn height(&self, d: &Placed) -> (f64, f64) {
+        let (prior, sigma) = (f64::from(self.config.height_prior_m), f64::from(self.config.height_prior_sigma_m));
+        let Some((measured, noise)) = d.height else { return (prior, sigma) };
+        let weights = [sigma.powi(-2), noise.powi(-2)];
+        let sum = weights[0] + weights[1];
+        ((prior * weights[0] + measured * weights[1]) / sum, sum.recip().sqrt())
+    }
+
+    /// Lets all evidence fade by a time step, by how well each cell was seen.
+    pub fn fade(&self, grid: &mut Grid, seen: &Map, axes: &Axes, step_s: f64) {
+        let keep = |memory_s: f32| (-step_s / f64::from(memory_s)).exp();
+        let (hidden, visible) = (keep(self.config.hidden_memory_s), keep(self.config.visible_memory_s));
+        for a in 0..axes.azimuths {
+            for r in 0..axes.ranges {
+                let keep = hidden + (visible - hidden) * seen.grade(a, r).unwrap_or(0.0);
+                for cell in grid.stack_mut(a, r) {
+                    *cell *= keep;
+                }
+            }
+        }
+    }
+
+    /// Clears what stands in the detections' lines of sight, of the first [`SIGHTS`] in a column.
+    pub fn clear(&self, placed: &[Placed], axes: &Axes, grid: &mut Grid) {
+        let mut sights = vec![0; axes.azimuths];
+        for d in placed {
+            let Some(a) = column(axes, d).filter(|a| sights[*a] < SIGHTS) else { continue };
+            sights[a] += 1;
+            self.clear_column(d, a, axes, grid);
+        }
+    }
+
+    /// Clears one line of sight: the rows that lie above it altogether.
+    fn clear_column(&self, d: &Placed, a: usize, axes: &Axes, grid: &mut Grid) {
+        let (height, _) = self.height(d);
+        let row = axes.row_place(axes.slope(height, d.ground())).ceil() as usize;
+        let end = ((d.ground() / axes.cell_m) as usize).saturating_sub(SPARED).min(axes.ranges);
+        for r in 0..end {
+            for cell in grid.stack_mut(a, r).iter_mut().skip(row) {
+                *cell *= 1.0 - f64::from(self.config.clearing);
+            }
+        }
+    }
+
+    /// Adds the evidence of a detection that belongs to no obstacle. In a `first` frame it is all the
+    /// evidence there is and counts in full.
+    pub fn add(&self, d: &Placed, first: bool, axes: &Axes, grid: &mut Grid) {
+        let gain = if first { 1.0 } else { f64::from(self.config.gain) };
+        let (height, sigma) = self.height(d);
+        let place = axes.column_place(d.bearing());
+        let middle = (d.ground() / axes.cell_m) as usize;
+        for a in 0..axes.azimuths {
+            let reach = REACH * self.azimuth_sigma;
+            if (a as f64 + 1.0) < place - reach || a as f64 > place + reach {
+                continue;
+            }
+            for r in middle.saturating_sub(1)..(middle + 2).min(axes.ranges) {
+                let [across, along] = [a as f64 + 0.5 - place, (r as f64 + 0.5) * axes.cell_m - d.ground()];
+                let weight = gain * bell(across / self.azimuth_sigma) * bell(along / self.range_sigma);
+                for (row, cell) in grid.stack_mut(a, r).iter_mut().enumerate() {
+                    let above = axes.height_m + axes.row_centre(row) * d.ground() - height;
+                    *cell += weight * (bell(above.max(0.0) / sigma) - *cell);
+                }
+            }
+        }
+    }
+}
+
+fn column(axes: &Axes, d: &Placed) -> Option<usize> {
+    let place = axes.column_place(d.bearing());
+    (place >= 0.0 && place < axes.azimuths as f64).then_some(place as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Levelled, place};
+    use crate::scene::{self, AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, mounts, raise, within};
+    use viewshed::detection::Measurement;
+    use viewshed::evidence::InverseSensor as IntegerSensor;
+    use viewshed::mount::{Levelling, Mount};
+    use viewshed::polar::PolarMap;
+    use viewshed::reflection::Noise;
+    use viewshed::time::Step;
+
+    /// One mount's model and grid, in integers and in real numbers.
+    struct Both {
+        axes: Box<IntegerAxes>,
+        noise: Noise,
+        levelling: Levelling,
+        integer: IntegerSensor,
+        grid: Box<IntegerGrid>,
+        exact_axes: Axes,
+        levelled: Levelled,
+        exact: InverseSensor,
+        exact_grid: Grid,
+    }
+
+    impl Both {
+        fn new(mount: &Mount) -> Self {
+            let (axes, exact_axes) = scene::axes(mount);
+            let (config, noise) = (EvidenceConfig::default(), NoiseConfig::default());
+            Self {
+                integer: config.inverse_sensor(&noise, &axes).unwrap(),
+                axes,
+                noise: noise.noise().unwrap(),
+                levelling: mount.levelling().unwrap(),
+                grid: Box::default(),
+                exact: InverseSensor::new(&config, &noise, &exact_axes),
+                exact_grid: Grid::new(&exact_axes),
+                exact_axes,
+                levelled: Levelled::new(mount),
+            }
+        }
+
+        fn clear_grids(&mut self) {
+            self.grid.clear();
+            self.exact_grid.clear();
+        }
+
+        fn add(&mut self, m: &Measurement, first: bool) {
+            let r = scene::reflection(m, &self.noise, &self.levelling);
+            self.integer.add(&r, first, &self.axes, &mut self.grid);
+            let d = place(m, &NoiseConfig::default(), &self.levelled);
+            self.exact.add(&d, first, &self.exact_axes, &mut self.exact_grid);
+        }
+
+        fn clear(&mut self, m: &Measurement) {
+            let r = scene::reflection(m, &self.noise, &self.levelling);
+            self.integer.clear(&[r], &self.axes, &mut self.grid);
+            let d = place(m, &NoiseConfig::default(), &self.levelled);
+            self.exact.clear(&[d], &self.exact_axes, &mut self.exact_grid);
+        }
+
+        /// Both grids the same: `value` of 255 wherever `filled` says.
+        fn fill(&mut self, value: u8, filled: impl Fn(usize, usize) -> bool) {
+            for a in 0..AZIMUTHS {
+                for r in (0..RANGES).filter(|r| filled(a, *r)) {
+                    self.grid.column_mut(a).and_then(|c| c.evidence(r)).unwrap().fill(value);
+                    self.exact_grid.stack_mut(a, r).fill(f64::from(value) / 255.0);
+                }
+            }
+        }
+
+        /// Mean and largest absolute difference, steps of 255, and % of cells more than 4 steps off.
+        fn off(&self) -> [f64; 3] {
+            let found: Vec<f64> = scene::differences(&self.grid, &self.exact_grid).iter().map(|f| f.0.abs()).collect();
+            let n = found.len() as f64;
+            let far_off = found.iter().filter(|f| **f > 4.0).count() as f64;
+            [found.iter().sum::<f64>() / n, found.iter().copied().fold(0.0, f64::max), 100.0 * far_off / n]
+        }
+    }
+
+    /// Mean and largest difference after so many detections at one place, over 200 places a mount.
+    fn added(times: usize, first: bool) -> [f64; 2] {
+        let (mut random, [mut mean, mut worst]) = (Random::new(10), [0.0; 2]);
+        for mount in mounts() {
+            let mut both = Both::new(&mount);
+            for _ in 0..200 {
+                both.clear_grids();
+                let m = random.reflection(&both.levelled);
+                (0..times).for_each(|_| both.add(&m, first));
+                mean += both.off()[0] / 600.0;
+                raise(&mut worst, both.off()[1]);
+            }
+        }
+        [mean, worst]
+    }
+
+    #[test]
+    fn a_detection_adds_the_same_evidence() {
+        let [mean, worst] = added(1, false);
+        within("one detection, mean, steps of 255", mean, 0.65);
+        within("one detection, worst, steps of 255", worst, 13.0);
+        // the weight of a measured height has 8 bits: 5 of 256 at 150 m
+        let [mean, worst] = added(1, true);
+        within("first frame, mean, steps of 255", mean, 1.4);
+        within("first frame, worst, steps of 255", worst, 45.0);
+    }
+
+    #[test]
+    fn repeated_detections_stop_short_at_the_rim() {
+        // where weight times what is missing is less than one step, the integer grid stays
+        let [mean, worst] = added(40, false);
+        within("forty detections, mean, steps of 255", mean, 12.5);
+        within("forty detections, worst, steps of 255", worst, 135.0);
+    }
+
+    #[test]
+    fn a_line_of_sight_clears_the_same_cells() {
+        let mut random = Random::new(12);
+        let [mut mean, mut far_off] = [0.0; 2];
+        for mount in mounts() {
+            let mut both = Both::new(&mount);
+            both.fill(200, |a, r| !(a + r).is_multiple_of(3));
+            for _ in 0..300 {
+                let m = random.reflection(&both.levelled);
+                both.clear(&m);
+            }
+            raise(&mut mean, both.off()[0]);
+            raise(&mut far_off, both.off()[2]);
+        }
+        within("mean, steps of 255", mean, 0.6);
+        // a line of sight near the edge of a row, or of a column
+        within("more than 4 steps off, % of cells", far_off, 1.4);
+    }
+
+    /// Largest difference after a second of frames, from full, in a shadow, in half-shadow and in view.
+    fn faded(frames: u64) -> [f64; 3] {
+        [1, 128, 255].map(|grade| {
+            let mut both = Both::new(&mounts()[0]);
+            both.fill(255, |a, r| (a + r).is_multiple_of(7));
+            let mut seen = Box::new(PolarMap::unknown(both.axes.polar(&both.levelling), 128, 128));
+            (0..AZIMUTHS).for_each(|a| seen.rows_mut(a).unwrap().0.fill(grade));
+            let mut exact_seen = Map::unknown(&both.exact_axes);
+            exact_seen.fill(f64::from(grade) / 255.0);
+            for _ in 0..frames {
+                both.integer.fade(&mut both.grid, &seen, Step::from_micros(1_000_000 / frames));
+                both.exact.fade(&mut both.exact_grid, &exact_seen, &both.exact_axes, 1.0 / frames as f64);
+            }
+            both.off()[1]
+        })
+    }
+
+    #[test]
+    fn a_second_of_frames_fades_as_the_exponential_and_faster_the_more_frames() {
+        let [hidden, half, visible] = faded(15);
+        within("15 frames, hidden, steps of 255", hidden, 6.5);
+        within("15 frames, half visible, steps of 255", half, 3.0);
+        within("15 frames, visible, steps of 255", visible, 2.0);
+        // every frame rounds down
+        let [hidden, half, visible] = faded(60);
+        within("60 frames, hidden, steps of 255", hidden, 13.5);
+        within("60 frames, half visible, steps of 255", half, 23.5);
+        within("60 frames, visible, steps of 255", visible, 18.5);
+    }
+}

@@ -1,0 +1,149 @@
+//! Which measurements are used: the limits on single ones, and the strongest of the rest.
+
+use viewshed::detection::{MAX_RANGE_M, Measurement};
+use viewshed::field_of_view::FieldOfView;
+use viewshed::gate::{GateConfig, Rejection};
+use viewshed::reflection::NoiseConfig;
+
+use crate::geometry::{Levelled, Placed, place};
+
+/// Half dB, the step quality and size are judged in.
+fn half_db(value: Option<f32>) -> Option<f64> {
+    value.filter(|v| v.is_finite()).map(|v| (f64::from(v) * 2.0).round())
+}
+
+/// What decides who stays when the list is full: SNR, else RCS, half dB.
+pub fn strength(m: &Measurement) -> f64 {
+    half_db(m.snr_db).or(half_db(m.rcs_dbsm)).unwrap_or(f64::NEG_INFINITY)
+}
+
+/// Whether a measurement is a detection at all.
+pub fn is_detection(m: &Measurement) -> bool {
+    let values = [m.range_m, m.azimuth_rad, m.elevation_rad.unwrap_or(0.0), m.radial_velocity_mps];
+    values.iter().all(|v| v.is_finite())
+        && m.range_m >= 0.005
+        && m.range_m <= MAX_RANGE_M
+        && f64::from(m.azimuth_rad.abs()) <= std::f64::consts::PI
+        && f64::from(m.elevation_rad.unwrap_or(0.0).abs()) <= std::f64::consts::FRAC_PI_2
+        && m.radial_velocity_mps.abs() <= 327.67
+}
+
+/// The first reason a detection may not be used.
+pub fn refusal(m: &Measurement, gate: &GateConfig, view: &FieldOfView) -> Option<Rejection> {
+    let within = |v: f64, low: f32, high: f32| v >= f64::from(low) && v <= f64::from(high);
+    let margin = gate.elevation_margin_deg;
+    let elevation = m.elevation_rad.map(|e| f64::from(e).to_degrees());
+    let speed = f64::from(m.radial_velocity_mps).abs();
+    if !within(f64::from(m.range_m), view.range_min_m, view.range_max_m) {
+        Some(Rejection::Range)
+    } else if !within(f64::from(m.azimuth_rad).to_degrees(), view.azimuth_min_deg, view.azimuth_max_deg) {
+        Some(Rejection::Azimuth)
+    } else if elevation.is_some_and(|e| !within(e, view.elevation_min_deg - margin, view.elevation_max_deg + margin)) {
+        Some(Rejection::Elevation)
+    } else if half_db(m.snr_db).is_some_and(|s| s < f64::from(gate.min_snr_db) * 2.0) {
+        Some(Rejection::Quality)
+    } else if half_db(m.rcs_dbsm).is_some_and(|r| r < f64::from(gate.min_rcs_dbsm) * 2.0) {
+        Some(Rejection::Rcs)
+    } else if !within(speed, gate.min_speed_mps, gate.max_speed_mps) {
+        Some(Rejection::Velocity)
+    } else {
+        None
+    }
+}
+
+/// One frame's measurements after the gate.
+#[derive(Debug, Default)]
+pub struct Scan {
+    pub placed: Vec<Placed>,
+    pub refused: Vec<Rejection>,
+    /// Detections reported, used or not.
+    pub reported: usize,
+}
+
+impl Scan {
+    /// The strongest of a frame, as many as the gate allows. A late one takes the place of the one
+    /// it replaces; of equals the first stays.
+    pub fn new(
+        measurements: &[Measurement],
+        gate: &GateConfig,
+        view: &FieldOfView,
+        noise: &NoiseConfig,
+        levelled: &Levelled,
+    ) -> Self {
+        let mut scan = Self::default();
+        for m in measurements.iter().filter(|m| is_detection(m)) {
+            scan.reported += 1;
+            if let Some(reason) = refusal(m, gate, view) {
+                scan.refused.push(reason);
+                continue;
+            }
+            let new = place(m, noise, levelled);
+            if scan.placed.len() < usize::from(gate.max_detections) {
+                scan.placed.push(new);
+                continue;
+            }
+            scan.refused.push(Rejection::Overflow);
+            // the last of the weakest
+            let weakest = scan.placed.iter_mut().rev().min_by(|a, b| a.strength.total_cmp(&b.strength));
+            if let Some(weakest) = weakest.filter(|w| w.strength < new.strength) {
+                *weakest = new;
+            }
+        }
+        scan
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Random, VIEW, mounts, within};
+    use viewshed::detection::Detection;
+
+    #[test]
+    fn the_same_detections_pass_for_the_same_reasons() {
+        let config = GateConfig { min_speed_mps: 0.5, ..GateConfig::default() };
+        let integer = config.gate(&VIEW.limits().unwrap()).unwrap();
+        let mut random = Random::new(3);
+        let (mut differ, mut reasons) = (0, std::collections::BTreeMap::new());
+        for _ in 0..40_000 {
+            let m = random.any_measurement();
+            let Ok(d) = Detection::new(&m) else {
+                assert!(!is_detection(&m), "{m:?}");
+                continue;
+            };
+            assert!(is_detection(&m), "{m:?}");
+            let (got, exact) = (integer.judge(&d).err(), refusal(&m, &config, &VIEW));
+            *reasons.entry(exact.map(Rejection::name)).or_insert(0) += 1;
+            differ += u32::from(got != exact);
+        }
+        assert_eq!(reasons.len(), 7, "every reason but overflow occurs, and none: {reasons:?}");
+        // measurements within half a step of a limit: 9 of 40 000
+        within("judged differently", f64::from(differ), 12.0);
+    }
+
+    #[test]
+    fn a_crowded_frame_keeps_the_same_detections_in_the_same_order() {
+        let config = GateConfig { max_detections: 64, ..GateConfig::default() };
+        let noise = NoiseConfig::default();
+        let (gate, noises) = (config.gate(&VIEW.limits().unwrap()).unwrap(), noise.noise().unwrap());
+        let mut random = Random::new(4);
+        for mount in mounts() {
+            let levelling = mount.levelling().unwrap();
+            let measurements: Vec<Measurement> = (0..400).map(|_| random.measurement()).collect();
+            let exact = Scan::new(&measurements, &config, &VIEW, &noise, &Levelled::new(&mount));
+            let mut scan = viewshed::scan::Scan::<256>::new();
+            for m in &measurements {
+                scan.add(&Detection::new(m).unwrap(), &gate, &noises, &levelling);
+            }
+            assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
+            for (got, exact) in scan.reflections().iter().zip(&exact.placed) {
+                assert_eq!(f64::from(got.strength), exact.strength);
+                assert!((f64::from(got.ground_cm) / 100.0 - exact.ground()).abs() < 0.07);
+            }
+            for reason in Rejection::ALL {
+                let exact = exact.refused.iter().filter(|r| **r == reason).count();
+                assert_eq!(scan.rejections().count(reason) as usize, exact, "{}", reason.name());
+            }
+        }
+    }
+}

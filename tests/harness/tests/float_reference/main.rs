@@ -1,0 +1,33 @@
+//! The radar-3d pipeline in double precision, and the integer one compared with it.
+//!
+//! Written from the model the library documents, with plain vectors, metres, radians, seconds and
+//! shares of one: exact roots and angles where the library has tables, `exp(-dt / memory)` where it
+//! divides, real numbers where it rounds. One stage one file, in data-flow order; each ends with
+//! the comparison of its stage, [`agreement`] compares the whole over the shipped recording and [`traffic`] on random scenes.
+//!
+//! Parameters come from the library's configurations in SI units. Rules of tracking that are no
+//! configuration are read from [`viewshed::obstacles::tracking::Tracking`] in their stated units.
+//! What differs from the library by design: no sorting by range, no table, no byte.
+
+mod geometry;
+
+mod gate;
+
+mod obstacles;
+
+mod grid;
+
+mod voxelise;
+
+mod evidence;
+
+mod raycast;
+
+mod pipeline;
+
+mod cartesian;
+
+mod agreement;
+mod line_of_sight;
+mod scene;
+mod traffic;

@@ -1,0 +1,288 @@
+//! One moving obstacle: place, motion and outline; metres, seconds, levelled frame.
+
+use viewshed_harness::geometry::solid::Solid;
+
+use super::outline::{BIN_M, Extent, Profile, Tallness, size};
+use super::rules::Rules;
+use crate::geometry::{Ground, Placed, across, along, difference, left, moved};
+
+/// How far a reflection may lie off the middle of a vehicle, standard deviation in metres.
+const ON_VEHICLE_SIGMA: f64 = 0.5;
+/// How far beyond the longest vehicle an outline may be stretched.
+const LENGTH_TO_SPARE: f64 = 1.0;
+/// Fastest drift to one side that turns a heading, m/s.
+const FASTEST_DRIFT: f64 = 1.0;
+
+#[derive(Debug, Clone)]
+pub struct Obstacle {
+    /// A point on the centre line that moves along.
+    pub anchor: Ground,
+    pub velocity: Ground,
+    pub heading: Ground,
+    profile: Profile,
+    pub extent: Extent,
+    /// Inverse variance of the lateral place, 1/m^2.
+    lateral_weight: f64,
+    /// Evidence that it is there, detections.
+    pub existence: f64,
+    pub hits: f64,
+    pub age: u32,
+    travelled: f64,
+    tallness: Tallness,
+    gathered: Gathered,
+}
+
+/// Sums over the detections of one frame.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gathered {
+    count: f64,
+    /// Projection x error, and projection squared.
+    speed: (f64, f64),
+    /// Weight x offset, and weights.
+    lateral: (f64, f64),
+}
+
+fn length(v: Ground) -> f64 {
+    v[0].hypot(v[1])
+}
+
+impl Obstacle {
+    pub fn new(seed: &Placed, heading: Ground, speed: f64) -> Self {
+        Self {
+            anchor: seed.at,
+            velocity: heading.map(|c| c * speed),
+            heading,
+            profile: Profile::EMPTY,
+            extent: Extent { rear: -BIN_M / 2.0, front: BIN_M / 2.0 },
+            lateral_weight: 0.0,
+            existence: 0.0,
+            hits: 0.0,
+            age: 0,
+            travelled: 0.0,
+            tallness: Tallness::default(),
+            gathered: Gathered::default(),
+        }
+    }
+
+    pub fn seen(&self) -> bool {
+        self.gathered.count > 0.0
+    }
+
+    /// Ahead of the anchor and to its left.
+    pub fn local(&self, at: Ground) -> Ground {
+        let d = difference(at, self.anchor);
+        [along(self.heading, d), across(self.heading, d)]
+    }
+
+    /// The place so far ahead of the anchor on the centre line.
+    pub fn ahead(&self, by: f64) -> Ground {
+        moved(self.anchor, self.heading, by)
+    }
+
+    pub fn predict(&mut self, dt: f64, rules: &Rules) {
+        self.anchor = moved(self.anchor, self.velocity, dt);
+        self.travelled += length(self.velocity) * dt;
+        self.lateral_weight *= (-dt / rules.lateral_memory).exp();
+        self.gathered = Gathered::default();
+        self.age += 1;
+    }
+
+    pub fn is_mover(&self, rules: &Rules) -> bool {
+        self.travelled >= rules.mover
+    }
+
+    pub fn is_fixture(&self, rules: &Rules) -> bool {
+        !self.is_mover(rules) && self.age >= 2 && length(self.velocity) < rules.fixture_speed
+    }
+
+    /// Measured radial velocity less the one this motion explains.
+    fn speed_error(&self, d: &Placed) -> f64 {
+        d.radial_velocity - along(d.sight, self.velocity)
+    }
+
+    /// Standard deviations of a detection along and across the heading.
+    fn spread(&self, d: &Placed, rules: &Rules) -> [f64; 2] {
+        let (c, s) = (along(self.heading, d.sight), across(self.heading, d.sight));
+        [(rules.range_sigma * c).hypot(d.sigma_across * s), (rules.range_sigma * s).hypot(d.sigma_across * c)]
+    }
+
+    /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
+    /// other at this speed.
+    fn gap(&self, rules: &Rules) -> f64 {
+        rules.gap.min(self.distance_at(rules.headway, rules))
+    }
+
+    /// Distance that vehicles this fast keep at a headway.
+    fn distance_at(&self, headway: f64, rules: &Rules) -> f64 {
+        rules.standstill + length(self.velocity) * headway
+    }
+
+    /// How badly a detection fits; `None` where it cannot belong to this obstacle.
+    pub fn misfit(&self, d: &Placed, rules: &Rules) -> Option<f64> {
+        self.misfit_with(d, self.speed_error(d), rules)
+    }
+
+    /// The same for a wheel, which returns anything between standstill and twice the obstacle's speed.
+    pub fn misfit_of_wheel(&self, d: &Placed, rules: &Rules) -> Option<f64> {
+        let body = along(d.sight, self.velocity);
+        let spun = d.radial_velocity * if body < 0.0 { -1.0 } else { 1.0 };
+        let fits = spun >= 0.0 && spun <= 2.0 * body.abs() + rules.doppler_gate;
+        self.misfit_with(d, 0.0, rules).filter(|_| fits)
+    }
+
+    fn misfit_with(&self, d: &Placed, error: f64, rules: &Rules) -> Option<f64> {
+        let [forward, left] = self.local(d.at);
+        let [sigma_along, sigma_across] = self.spread(d, rules);
+        let beyond = self.extent.beyond(forward);
+        let beside = (left.abs() - rules.half_width).max(0.0);
+        // far along the vehicle or far to its side, but not both
+        let ahead = beyond / (self.gap(rules) + rules.sigmas * sigma_along);
+        let aside = beside / (rules.lateral_gate + rules.sigmas * sigma_across);
+        let fits = error.abs() <= rules.doppler_gate
+            && ahead.hypot(aside) <= 1.0
+            && self.extent.length() + beyond <= rules.max_length + LENGTH_TO_SPARE;
+        // squared distances in their own scales: 0.7 m along, width and noise across, half a metre a
+        // second (twice) in speed
+        let across = left.powi(2) / (rules.half_width.powi(2) + sigma_across.powi(2));
+        fits.then(|| (beyond / 0.7).powi(2) + across + 2.0 * (error / 0.5).powi(2))
+    }
+
+    /// Takes a detection that belongs to it.
+    pub fn absorb(&mut self, d: &Placed, rules: &Rules) {
+        let [ahead, left] = self.local(d.at);
+        let [_, sigma_across] = self.spread(d, rules);
+        let projection = along(self.heading, d.sight);
+        let error = self.speed_error(d);
+        let weight = (ON_VEHICLE_SIGMA.powi(2) + sigma_across.powi(2)).recip();
+        let g = &mut self.gathered;
+        g.count += 1.0;
+        g.speed.0 += projection * error;
+        g.speed.1 += projection * projection;
+        g.lateral.0 += weight * left;
+        g.lateral.1 += weight;
+        self.profile.add(ahead, 1.0);
+        if let Some((height, sigma)) = d.height {
+            self.tallness.add(height, sigma);
+        }
+    }
+
+    /// Takes a detection of one of its wheels: their Doppler says nothing of its speed.
+    pub fn absorb_wheel(&mut self, d: &Placed) {
+        let [ahead, _] = self.local(d.at);
+        self.profile.add(ahead, 1.0);
+    }
+
+    /// Stretches the outline of a newborn to a detection.
+    pub fn reach(&mut self, d: &Placed) {
+        let [ahead, _] = self.local(d.at);
+        self.extent = Extent { rear: self.extent.rear.min(ahead), front: self.extent.front.max(ahead) };
+    }
+
+    pub fn fade_outline(&mut self, dt: f64, rules: &Rules) {
+        self.profile.fade((-dt / rules.outline_memory).exp());
+    }
+
+    /// Brings motion, place and outline up to date with what was absorbed.
+    pub fn settle(&mut self, dt: f64, rules: &Rules) {
+        let g = self.gathered;
+        if !self.seen() {
+            return;
+        }
+        let young = self.age < rules.young;
+        let inertia = if young { rules.young_inertia } else { rules.inertia };
+        self.velocity = moved(self.velocity, self.heading, g.speed.0 / (g.speed.1 + inertia));
+        self.lateral_weight += g.lateral.1;
+        let offset = g.lateral.0 / self.lateral_weight;
+        self.anchor = moved(self.anchor, left(self.heading), offset);
+        if !young {
+            let drift = (offset * rules.drift_gain / dt).clamp(-FASTEST_DRIFT, FASTEST_DRIFT);
+            self.velocity = moved(self.velocity, left(self.heading), drift);
+            let speed = length(self.velocity);
+            if speed > rules.turning_speed {
+                self.heading = self.velocity.map(|v| v / speed);
+            }
+        }
+        self.update_extent(rules);
+        self.hits += g.count;
+        self.existence = (self.existence + g.count.min(rules.most_hits_a_frame)).min(rules.max_evidence);
+    }
+
+    /// Reads the outline and keeps the anchor near its middle.
+    fn update_extent(&mut self, rules: &Rules) {
+        let Some(extent) = self.profile.extent(rules.outline_min_hits, rules.outline_share) else { return };
+        self.extent = extent;
+        let bins = (extent.middle() / BIN_M).trunc();
+        if bins.abs() >= rules.recentre_bins {
+            self.recentre(bins);
+        }
+    }
+
+    /// Moves the anchor forward by whole bins; everything stays where it is.
+    fn recentre(&mut self, bins: f64) {
+        self.profile.shift(bins as i32);
+        let by = bins * BIN_M;
+        self.anchor = self.ahead(by);
+        self.extent = Extent { rear: self.extent.rear - by, front: self.extent.front - by };
+    }
+
+    /// Whether another obstacle is a part of the same vehicle.
+    pub fn is_one_with(&self, other: &Self, rules: &Rules) -> bool {
+        let [ahead, left] = self.local(other.ahead(other.extent.middle()));
+        let half = other.extent.length() / 2.0;
+        let (rear, front) = (ahead - half, ahead + half);
+        let gap = (rear - self.extent.front).max(self.extent.rear - front);
+        let whole = front.max(self.extent.front) - rear.min(self.extent.rear);
+        let apart = length(difference(self.velocity, other.velocity));
+        let coupled = self.travelled.min(other.travelled) >= rules.coupled_way
+            && apart <= rules.coupled_speed
+            && left.abs() <= rules.merge_lateral;
+        let widest = if coupled { self.distance_at(rules.coupled_headway, rules) } else { self.gap(rules) };
+        let uncertain = rules.sigmas * (self.lateral_sigma() + other.lateral_sigma());
+        let abreast = if gap <= 0.0 { rules.abreast } else { 0.0 };
+        apart <= rules.merge_speed
+            && along(self.heading, other.heading) >= rules.merge_parallel
+            && left.abs() <= abreast.max(rules.merge_lateral + uncertain)
+            && gap <= widest
+            && whole <= rules.max_length
+    }
+
+    /// Whether another obstacle lies within this one, where nothing else can be.
+    pub fn encloses(&self, other: &Self, rules: &Rules) -> bool {
+        let [ahead, left] = self.local(other.ahead(other.extent.middle()));
+        left.abs() <= rules.merge_lateral && self.extent.beyond(ahead) <= 0.0
+    }
+
+    fn lateral_sigma(&self) -> f64 {
+        self.lateral_weight.sqrt().recip().min(10.0)
+    }
+
+    /// Takes over what another obstacle knows of the same vehicle.
+    pub fn join(&mut self, other: &Self, rules: &Rules) {
+        // the histogram is no longer than the longest vehicle: its middle first
+        let [ahead, _] = self.local(other.anchor);
+        let (rear, front) =
+            (self.extent.rear.min(ahead + other.extent.rear), self.extent.front.max(ahead + other.extent.front));
+        self.recentre(((rear + front) / 2.0 / BIN_M).trunc());
+        let [ahead, offset] = self.local(other.anchor);
+        self.profile.merge(&other.profile, ahead);
+        self.lateral_weight += other.lateral_weight;
+        self.anchor = moved(self.anchor, left(self.heading), offset * other.lateral_weight / self.lateral_weight);
+        self.existence = (self.existence + other.existence).min(rules.max_evidence);
+        self.hits += other.hits;
+        self.travelled = self.travelled.max(other.travelled);
+        self.tallness.join(&other.tallness);
+        self.update_extent(rules);
+    }
+
+    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
+    pub fn solid(&self, rules: &Rules) -> Solid {
+        let [length, width, height] = size(&rules.sizes, self.extent.length());
+        let hidden = (length - self.extent.length()).max(0.0) / 2.0;
+        let middle = self.ahead(self.extent.middle());
+        let receding = along(self.heading, middle) >= 0.0;
+        let [x, y] = moved(middle, self.heading, if receding { hidden } else { -hidden });
+        let height = height.max(self.tallness.floor());
+        let yaw_rad = self.heading[1].atan2(self.heading[0]);
+        Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width, height] }
+    }
+}

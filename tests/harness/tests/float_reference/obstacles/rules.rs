@@ -1,0 +1,127 @@
+//! Parameters of tracking in metres and seconds.
+
+use viewshed::obstacles::size::SizeConfig;
+use viewshed::obstacles::tracking::ObstacleConfig;
+use viewshed::reflection::NoiseConfig;
+use viewshed::trig::Direction;
+
+use crate::geometry::{Ground, Placed, along};
+
+/// Least projection of the line of sight on the road that tells motion along it.
+const LEAST_PROJECTION: f64 = 0.15;
+/// Standard deviations of Doppler that what stands still may show.
+const STANDING_SIGMAS: f64 = 4.0;
+/// Fastest an obstacle starts, m/s.
+const FASTEST: f64 = 70.0;
+
+/// Lengths in metres, times in seconds, speeds in m/s, evidence in detections.
+#[derive(Debug, Clone, Copy)]
+pub struct Rules {
+    pub min_speed: f64,
+    pub doppler_gate: f64,
+    pub gap: f64,
+    pub lateral_gate: f64,
+    pub sigmas: f64,
+    pub max_length: f64,
+    pub outline_memory: f64,
+    pub outline_min_hits: f64,
+    pub outline_share: f64,
+    pub lateral_memory: f64,
+    pub drift_gain: f64,
+    pub confirm_hits: f64,
+    pub max_evidence: f64,
+    pub tentative_loss: f64,
+    pub visible_loss: f64,
+    pub hidden_loss: f64,
+    /// Shortest headway between vehicles, and gap where they stand.
+    pub headway: f64,
+    pub standstill: f64,
+    /// Headway below which what has come this far together, equally fast, is one vehicle.
+    pub coupled_headway: f64,
+    pub coupled_way: f64,
+    pub coupled_speed: f64,
+    pub sizes: SizeConfig,
+    pub range_sigma: f64,
+    pub speed_sigma: f64,
+    /// The road's axis in the levelled frame.
+    pub road: Ground,
+    /// How far obstacles are followed.
+    pub limit: f64,
+    // rules that cannot be configured
+    pub merge_lateral: f64,
+    pub abreast: f64,
+    pub merge_speed: f64,
+    /// Least cosine between headings.
+    pub merge_parallel: f64,
+    pub half_width: f64,
+    /// Frames.
+    pub young: u32,
+    pub young_inertia: f64,
+    pub inertia: f64,
+    pub most_hits_a_frame: f64,
+    pub mover: f64,
+    pub fixture_speed: f64,
+    pub turning_speed: f64,
+    pub recentre_bins: f64,
+}
+
+impl Rules {
+    pub fn new(c: &ObstacleConfig, noise: &NoiseConfig, road: Ground, limit: f64) -> Self {
+        let integer = noise.noise().and_then(|n| c.tracking(n, Direction::AHEAD, 0)).expect("checked before");
+        let cm = |v: i32| f64::from(v) / 100.0;
+        let real = f64::from;
+        Self {
+            min_speed: real(c.min_speed_mps),
+            doppler_gate: real(c.doppler_gate_mps),
+            gap: real(c.gap_m),
+            lateral_gate: real(c.lateral_gate_m),
+            sigmas: real(c.gate_sigmas),
+            max_length: real(c.max_length_m),
+            outline_memory: real(c.outline_memory_s),
+            outline_min_hits: real(c.outline_min_hits),
+            outline_share: real(c.outline_share),
+            lateral_memory: real(c.lateral_memory_s),
+            drift_gain: real(c.drift_gain),
+            confirm_hits: real(c.confirm_hits),
+            max_evidence: real(c.max_evidence),
+            tentative_loss: real(c.tentative_loss_per_s),
+            visible_loss: real(c.visible_loss_per_s),
+            hidden_loss: real(c.hidden_loss_per_s),
+            headway: real(c.headway_s),
+            standstill: real(c.standstill_m),
+            coupled_headway: real(c.coupled_headway_s),
+            coupled_way: real(c.coupled_way_m),
+            coupled_speed: real(c.coupled_speed_mps),
+            sizes: c.sizes,
+            range_sigma: real(noise.range_m),
+            speed_sigma: real(noise.radial_velocity_mps),
+            road,
+            limit,
+            merge_lateral: cm(integer.merge_lateral_cm),
+            abreast: cm(integer.abreast_cm),
+            merge_speed: cm(integer.merge_speed) / 256.0,
+            merge_parallel: f64::from(integer.merge_parallel) / 16384.0,
+            half_width: cm(integer.half_width_cm),
+            young: u32::from(integer.young),
+            young_inertia: f64::from(integer.young_inertia) / 16384.0,
+            inertia: f64::from(integer.inertia) / 16384.0,
+            most_hits_a_frame: f64::from(integer.most_hits_a_frame),
+            mover: cm(integer.mover_cm),
+            fixture_speed: cm(integer.fixture_speed) / 256.0,
+            turning_speed: cm(integer.turning_speed) / 16.0,
+            recentre_bins: f64::from(integer.recentre_bins),
+        }
+    }
+
+    /// Heading and speed of something that moves along the road and shows this radial velocity; nothing
+    /// where it may be standing, or nearly crosses the line of sight.
+    pub fn course(&self, d: &Placed) -> Option<(Ground, f64)> {
+        let projection = along(self.road, d.sight);
+        let speed = d.radial_velocity / projection;
+        let tells = projection.abs() >= LEAST_PROJECTION
+            && d.radial_velocity.abs() >= STANDING_SIGMAS * self.speed_sigma
+            && speed.abs() >= self.min_speed
+            && speed.abs() <= FASTEST;
+        tells.then(|| (self.road.map(|c| c * speed.signum()), speed.abs()))
+    }
+}

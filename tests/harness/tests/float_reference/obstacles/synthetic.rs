@@ -1,0 +1,250 @@
+//! A vehicle made up of reflection points, followed in integers and in real numbers.
+
+#[cfg(test)]
+mod tests {
+    use viewshed::detection::Measurement;
+    use viewshed::mount::Mount;
+    use viewshed::obstacles::Obstacles as IntegerObstacles;
+    use viewshed::obstacles::obstacle::Obstacle as IntegerObstacle;
+    use viewshed::obstacles::tracking::ObstacleConfig;
+    use viewshed::reflection::{NoiseConfig, Reflection};
+    use viewshed::time::Step;
+
+    use super::super::{Obstacle, Obstacles, Rules};
+    use crate::geometry::{Ground, Levelled, Placed, across, along, difference, left, moved, place};
+    use crate::scene::{Random, mounts, raise, reflection, within};
+
+    const PERIOD_US: u64 = 66_972;
+    const LIMIT_M: f64 = 225.0;
+
+    /// A box on the road, travelling along it.
+    struct Vehicle {
+        length: f64,
+        width: f64,
+        /// Road frame: middle at the start, and speed along x.
+        start: Ground,
+        speed: f64,
+    }
+
+    impl Vehicle {
+        fn middle(&self, levelled: &Levelled, frame: usize) -> Ground {
+            let t = frame as f64 * PERIOD_US as f64 * 1e-6;
+            levelled.place([self.start[0] + self.speed * t, self.start[1]])
+        }
+
+        /// Noisy reflections of bumpers, axles and corners on both sides.
+        fn measured(&self, levelled: &Levelled, frame: usize, random: &mut Random) -> Vec<Measurement> {
+            let axis = levelled.road_axis();
+            let middle = self.middle(levelled, frame);
+            (0..10)
+                .map(|k| {
+                    let ahead = (f64::from(k % 5) / 4.0 - 0.5) * self.length;
+                    let aside = (f64::from(k / 5) - 0.5) * self.width;
+                    let [x, y] = moved(moved(middle, axis, ahead), left(axis), aside);
+                    random.measured(levelled, [x, y, 0.8], axis.map(|c| c * self.speed))
+                })
+                .collect()
+        }
+    }
+
+    /// Both trackers at the same mount.
+    struct Both {
+        levelled: Levelled,
+        noise: NoiseConfig,
+        levelling: viewshed::mount::Levelling,
+        tracking: viewshed::obstacles::tracking::Tracking,
+        rules: Rules,
+        integer: IntegerObstacles<16>,
+        exact: Obstacles,
+    }
+
+    impl Both {
+        fn new(mount: &Mount) -> Self {
+            let (config, noise) = (ObstacleConfig::default(), NoiseConfig::default());
+            let (levelled, levelling) = (Levelled::new(mount), mount.levelling().unwrap());
+            Self {
+                levelled,
+                levelling,
+                tracking: config.tracking(noise.noise().unwrap(), levelling.road_axis(), LIMIT_M as i32 * 100).unwrap(),
+                rules: Rules::new(&config, &noise, levelled.road_axis(), LIMIT_M),
+                noise,
+                integer: IntegerObstacles::new(),
+                exact: Obstacles::new(16),
+            }
+        }
+
+        fn step(&mut self, measured: &[Measurement]) {
+            let noise = self.noise.noise().unwrap();
+            let reflections: Vec<Reflection> =
+                measured.iter().map(|m| reflection(m, &noise, &self.levelling)).collect();
+            let step = Step::from_micros(PERIOD_US);
+            self.integer.step::<64>(&reflections, step, &self.tracking, |_, _| true);
+            let placed: Vec<Placed> = measured.iter().map(|m| place(m, &self.noise, &self.levelled)).collect();
+            self.exact.step(&placed, PERIOD_US as f64 * 1e-6, &self.rules, |_| true);
+        }
+
+        /// The obstacle with the most detections, in integers and in real numbers.
+        fn followed(&self) -> (&IntegerObstacle, &Obstacle) {
+            let integer = self.integer.iter().max_by_key(|o| o.hits).unwrap();
+            (integer, self.exact.list.iter().max_by(|a, b| a.hits.total_cmp(&b.hits)).unwrap())
+        }
+    }
+
+    fn metres(cm: (i32, i32)) -> Ground {
+        [cm.0, cm.1].map(|v| f64::from(v) / 100.0)
+    }
+
+    /// What is compared of an obstacle: middle, velocity, length.
+    fn state_of(o: &IntegerObstacle) -> (Ground, Ground, f64) {
+        let middle = metres(o.global(o.extent.middle_cm(), 0));
+        (middle, metres(o.velocity()), f64::from(o.extent.length_cm()) / 100.0)
+    }
+
+    /// Largest and mean differences along the road, to the left of travel, in speed and in length.
+    #[derive(Default)]
+    struct Differences {
+        worst: [f64; 4],
+        /// Sum of absolute differences, and of signed ones to the left.
+        sum: [f64; 4],
+        left: f64,
+        n: f64,
+    }
+
+    impl Differences {
+        fn add(&mut self, travel: Ground, a: (Ground, Ground, f64), b: (Ground, Ground, f64)) {
+            let (place, velocity) = (difference(a.0, b.0), difference(a.1, b.1));
+            let all = [along(travel, place), across(travel, place), along(travel, velocity), a.2 - b.2];
+            for (k, off) in all.into_iter().enumerate() {
+                raise(&mut self.worst[k], off);
+                self.sum[k] += off.abs();
+            }
+            self.left += all[1];
+            self.n += 1.0;
+        }
+
+        /// Along and aside in metres, speed in m/s, length in metres: means and worst.
+        fn limit(&self, what: &str, means: [f64; 4], worst: [f64; 4]) {
+            for (k, name) in ["along", "aside", "speed", "length"].into_iter().enumerate() {
+                within(&format!("{what}, {name}, mean"), self.sum[k] / self.n, means[k]);
+                within(&format!("{what}, {name}, worst"), self.worst[k], worst[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn vehicles_are_followed_alike_and_where_they_are() {
+        let vehicles = [
+            Vehicle { length: 4.6, width: 1.8, start: [25.0, 5.0], speed: 28.0 },
+            Vehicle { length: 13.5, width: 2.5, start: [30.0, -7.0], speed: 24.0 },
+            Vehicle { length: 4.6, width: 1.8, start: [160.0, 9.0], speed: -30.0 },
+            Vehicle { length: 12.0, width: 2.5, start: [150.0, 12.0], speed: -23.0 },
+        ];
+        let [mut apart, mut integer_off, mut exact_off] = <[Differences; 3]>::default();
+        for (mount, v) in mounts().iter().flat_map(|m| vehicles.iter().map(move |v| (m, v))) {
+            let (mut both, mut random) = (Both::new(mount), Random::new(30));
+            let axis = both.levelled.road_axis();
+            let travel = axis.map(|c| c * v.speed.signum());
+            for frame in 0..75 {
+                both.step(&v.measured(&both.levelled, frame, &mut random));
+                // two seconds until the outline is drawn
+                if frame < 30 {
+                    continue;
+                }
+                let (integer, exact) = both.followed();
+                let exact = (exact.ahead(exact.extent.middle()), exact.velocity, exact.extent.length());
+                let truth = (v.middle(&both.levelled, frame), axis.map(|c| c * v.speed), v.length);
+                apart.add(travel, state_of(integer), exact);
+                integer_off.add(travel, state_of(integer), truth);
+                exact_off.add(travel, exact, truth);
+            }
+        }
+        // a lorry that is followed as two halves side by side is off by half its width
+        apart.limit("integer and exact", [0.02, 0.06, 0.009, 0.01], [0.15, 3.0, 0.06, 0.06]);
+        within("integer to the right of exact", -apart.left / apart.n, 0.05);
+        // bins of half a metre and noise lengthen the outline
+        let (means, worst) = ([0.07, 0.35, 0.045, 0.6], [0.2, 1.6, 0.22, 0.75]);
+        integer_off.limit("integer and truth", means, worst);
+        exact_off.limit("exact and truth", means, worst);
+    }
+
+    #[test]
+    fn an_unseen_vehicle_is_given_up_at_the_same_frame() {
+        let car = Vehicle { length: 4.6, width: 1.8, start: [30.0, 5.0], speed: 10.0 };
+        let c = ObstacleConfig::default();
+        for (seen, in_view) in [(2, true), (30, true), (30, false)] {
+            // two detections a frame up to the most; then down at one rate, and unconfirmed at another
+            let evidence = f64::from((2 * seen) as f32).min(f64::from(c.max_evidence));
+            let loss = f64::from(if in_view { c.visible_loss_per_s } else { c.hidden_loss_per_s });
+            let confirmed = f64::from(c.confirm_hits);
+            let seconds = (evidence - confirmed) / loss + confirmed / f64::from(c.tentative_loss_per_s);
+            let expected = (seconds / (PERIOD_US as f64 * 1e-6)) as usize;
+            let (mut both, mut random) = (Both::new(&mounts()[0]), Random::new(32));
+            for frame in 0..seen {
+                both.step(&car.measured(&both.levelled, frame, &mut random)[..2]);
+            }
+            let mut followed = [0_usize; 2];
+            for _ in 0..200 {
+                both.integer.step::<64>(&[], Step::from_micros(PERIOD_US), &both.tracking, |_, _| in_view);
+                both.exact.step(&[], PERIOD_US as f64 * 1e-6, &both.rules, |_| in_view);
+                followed[0] += usize::from(both.integer.iter().count() > 0);
+                followed[1] += usize::from(!both.exact.list.is_empty());
+            }
+            assert!(followed[1].abs_diff(expected) <= 1, "{followed:?} frames, not {expected}");
+            // the integer loss a frame is rounded down: 15 of 15.4 steps in a shadow
+            assert!(followed[0].abs_diff(followed[1]) <= 1 + expected / 30, "{followed:?} frames");
+        }
+    }
+
+    #[test]
+    fn parts_are_joined_and_neighbours_are_not() {
+        // bumpers may lie as far apart as vehicles never keep for long at this speed
+        let apart = |speed: f64| {
+            let c = ObstacleConfig::default();
+            f64::from(c.standstill_m) + f64::from(c.coupled_headway_s) * speed
+        };
+        let cases = [
+            (apart(22.0) - 1.5, 22.0, 1),
+            (apart(22.0) + 1.5, 22.0, 2),
+            (apart(10.0) - 1.5, 10.0, 1),
+            (apart(10.0) + 1.5, 10.0, 2),
+        ];
+        for (length, speed, expected) in cases {
+            let van = Vehicle { length, width: 2.0, start: [60.0, 5.0], speed };
+            let (mut both, mut random) = (Both::new(&mounts()[0]), Random::new(33));
+            for frame in 0..45 {
+                let measured = van.measured(&both.levelled, frame, &mut random);
+                // bumpers only
+                let ends: Vec<Measurement> = [0, 4, 5, 9].map(|k| measured[k]).into();
+                both.step(&ends);
+            }
+            let lengths = both.integer.iter().map(|o| f64::from(o.extent.length_cm()) / 100.0);
+            let found: Vec<(f64, f64)> = lengths.zip(both.exact.list.iter().map(|o| o.extent.length())).collect();
+            assert_eq!(
+                (both.integer.iter().count(), both.exact.list.len()),
+                (expected, expected),
+                "{length} m at {speed} m/s"
+            );
+            for (got, exact) in found {
+                within("length, m", (got - exact).abs(), 0.05);
+            }
+        }
+    }
+
+    #[test]
+    fn an_unseen_obstacle_coasts_to_the_same_place() {
+        let mut random = Random::new(31);
+        for mount in mounts() {
+            let both = Both::new(&mount);
+            let seed = random.measured(&both.levelled, [60.0, 5.0, 0.8], [20.0, 0.0]);
+            let reflection = reflection(&seed, &both.noise.noise().unwrap(), &both.levelling);
+            let mut integer = IntegerObstacle::new(&reflection, both.tracking.road, 2500);
+            let mut exact = Obstacle::new(&place(&seed, &both.noise, &both.levelled), both.rules.road, 25.0);
+            for _ in 0..15 {
+                integer.predict(Step::from_micros(PERIOD_US), &both.tracking);
+                exact.predict(PERIOD_US as f64 * 1e-6, &both.rules);
+            }
+            let off = difference(metres(integer.anchor()), exact.anchor);
+            within("after 25 m, m", off[0].hypot(off[1]), 0.03);
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! All stages in order, from measurements to a polar map; an estimator for the evaluation.
+
+use viewshed::detection::Measurement;
+use viewshed::gate::Rejection;
+use viewshed::health::{Condition, Continuity, Health, HealthLimits};
+use viewshed::map::{CellState, RoadPoint, VisibilityMap};
+use viewshed::radar_3d::Radar3dConfig;
+use viewshed::sensor::Sensor;
+use viewshed::time::Time;
+use viewshed_harness::evaluation::score::{Estimator, PolarCells};
+use viewshed_harness::recording::Frame;
+
+use crate::evidence::InverseSensor;
+use crate::gate::Scan;
+use crate::geometry::Levelled;
+use crate::grid::{Axes, Grid};
+use crate::obstacles::{Obstacles, Rules};
+use crate::raycast::{Map, cast};
+use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
+use crate::voxelise::voxelise;
+
+/// Obstacles followed at most.
+const OBSTACLES: usize = 64;
+/// How far behind the field of view's range obstacles are followed, metres.
+const BEYOND_M: f64 = 25.0;
+
+pub struct Pipeline {
+    sensor: Sensor,
+    config: Radar3dConfig,
+    levelled: Levelled,
+    pub rules: Rules,
+    inverse_sensor: InverseSensor,
+    pub axes: Axes,
+    health_limits: HealthLimits,
+    health: Health,
+    pub obstacles: Obstacles,
+    grid: Grid,
+    map: Map,
+    refused: Vec<Rejection>,
+}
+
+impl Pipeline {
+    pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Self {
+        let levelled = Levelled::new(&sensor.mount);
+        let slice_height_m = f64::from(config.visibility.slice_height_m);
+        let axes = Axes::new([RANGES, AZIMUTHS, ELEVATIONS], &levelled, &sensor.field_of_view, slice_height_m);
+        let limit = f64::from(sensor.field_of_view.range_max_m) + BEYOND_M;
+        Self {
+            sensor: *sensor,
+            config: *config,
+            rules: Rules::new(&config.obstacles, &sensor.noise, levelled.road_axis(), limit),
+            inverse_sensor: InverseSensor::new(&config.evidence, &sensor.noise, &axes),
+            health_limits: config.health.limits().expect("checked before"),
+            health: Health::NEW,
+            obstacles: Obstacles::new(OBSTACLES),
+            grid: Grid::new(&axes),
+            map: Map::unknown(&axes),
+            refused: Vec::new(),
+            levelled,
+            axes,
+        }
+    }
+
+    /// Takes a frame and brings the map up to its time.
+    pub fn process(&mut self, now: Time, measurements: &[Measurement]) {
+        let (view, noise) = (&self.sensor.field_of_view, &self.sensor.noise);
+        let scan = Scan::new(measurements, &self.config.gate, view, noise, &self.levelled);
+        let continuity = self.health.frame(now, scan.reported, false, &self.health_limits);
+        if continuity.resets() {
+            self.obstacles.list.clear();
+            self.grid.clear();
+        }
+        let (first, dt) = match continuity {
+            Continuity::Follows(micros) => (false, micros as f64 * 1e-6),
+            _ => (true, 0.0),
+        };
+        let (axes, map, visible_from) = (&self.axes, &self.map, self.visible_from());
+        let in_view = |at| axes.locate(at).and_then(|(a, r)| map.grade(a, r)).is_some_and(|g| g >= visible_from);
+        let claimed = self.obstacles.step(&scan.placed, dt, &self.rules, in_view);
+        self.grid.remove_solids();
+        self.inverse_sensor.fade(&mut self.grid, &self.map, &self.axes, dt);
+        self.inverse_sensor.clear(&scan.placed, &self.axes, &mut self.grid);
+        for (d, claimed) in scan.placed.iter().zip(claimed) {
+            // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
+            if first || !(claimed || self.rules.course(d).is_some()) {
+                self.inverse_sensor.add(d, first, &self.axes, &mut self.grid);
+            }
+        }
+        for solid in self.obstacles.solids(&self.rules) {
+            voxelise(&solid, &self.axes, &mut self.grid);
+        }
+        if self.health.condition(now, &self.health_limits) == Condition::Healthy {
+            cast(&self.grid, &self.axes, &mut self.map);
+        } else {
+            self.map.forget();
+        }
+        self.refused.extend(scan.refused);
+    }
+
+    fn visible_from(&self) -> f64 {
+        f64::from(self.config.visibility.visible_from)
+    }
+
+    pub fn cell(&self, azimuth: usize, range: usize) -> CellState {
+        self.map.cell(azimuth, range, self.visible_from(), f64::from(self.config.visibility.occupied_from))
+    }
+}
+
+impl VisibilityMap for Pipeline {
+    fn at(&self, p: RoadPoint) -> CellState {
+        let at = self.levelled.place([p.x_cm, p.y_cm].map(|v| f64::from(v) / 100.0));
+        self.axes.locate(at).map_or(CellState::UNKNOWN, |(a, r)| self.cell(a, r))
+    }
+}
+
+impl Estimator for Pipeline {
+    fn name(&self) -> &str {
+        "radar-3d in double precision"
+    }
+
+    fn reset(&mut self) {
+        self.obstacles.list.clear();
+        self.grid.clear();
+        self.health = Health::NEW;
+        self.map.forget();
+    }
+
+    fn step(&mut self, frame: &Frame) {
+        let measurements: Vec<Measurement> = frame
+            .detections
+            .iter()
+            .map(|d| Measurement {
+                range_m: d.range_m,
+                azimuth_rad: d.azimuth_rad,
+                elevation_rad: d.elevation_rad,
+                radial_velocity_mps: d.radial_velocity_mps,
+                rcs_dbsm: d.rcs_dbsm,
+                snr_db: d.snr_db,
+            })
+            .collect();
+        self.process(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &measurements);
+    }
+
+    fn map(&self) -> &dyn VisibilityMap {
+        self
+    }
+
+    fn polar(&self) -> Option<PolarCells<'_>> {
+        Some(PolarCells {
+            azimuths: self.axes.azimuths,
+            ranges: self.axes.ranges,
+            azimuth_rad: [self.axes.right_rad, self.axes.right_rad + self.axes.span_rad],
+            cell_m: self.axes.cell_m,
+            cell: Box::new(|a, r| self.cell(a, r)),
+        })
+    }
+
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        let count = |reason: Rejection| self.refused.iter().filter(|r| **r == reason).count() as u64;
+        Rejection::ALL.iter().map(|r| (r.name(), count(*r))).filter(|(_, n)| *n > 0).collect()
+    }
+}
