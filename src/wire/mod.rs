@@ -1,4 +1,4 @@
-//! Visibility out, over CAN, CAN FD and serial lines.
+//! Radar frames in and visibility out, over CAN, CAN FD and serial lines.
 //!
 #![doc = include_str!("SPECIFICATION.md")]
 

@@ -27,9 +27,9 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Replay(Box<replay::Args>),
+    Doctor(doctor::Args),
     Bus(Box<bus::Args>),
     Listen(listen::Args),
-    Doctor(doctor::Args),
 }
 
 impl Cli {
@@ -37,9 +37,9 @@ impl Cli {
     pub fn run(&self) -> ExitCode {
         let outcome = match &self.command {
             Command::Replay(args) => replay::run(args),
+            Command::Doctor(args) => doctor::run(args),
             Command::Bus(args) => bus::run(args),
             Command::Listen(args) => listen::run(args),
-            Command::Doctor(args) => doctor::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);
