@@ -48,35 +48,33 @@ impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A
     }
 }
 
-/// Cells whose value reaches a threshold above 0, eight at a time.
+/// Cells whose value reaches a threshold, eight at a time.
 #[allow(clippy::cast_possible_truncation)] // eight bits are left
 fn at_least<const W: usize>(cells: &[u8], threshold: u8) -> Bits<W> {
     const HIGH: u64 = 0x8080_8080_8080_8080;
     let least = u64::from(threshold) * 0x0101_0101_0101_0101;
-    let reached = |cells: u64| {
-        // the highest bit of a byte: whether its lower seven reach the threshold's
-        let low = (cells | HIGH) - (least & !HIGH);
-        let reached = ((cells & !least) | (!(cells ^ least) & low)) & HIGH;
-        // the highest bits of all bytes side by side
-        ((reached >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
-    };
-    let (whole, rest) = cells.as_chunks::<32>();
-    let mut last = [0; 32];
-    last.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
     let mut words = [0; W];
-    // cells are often like those before
-    let (mut before, mut together) = (0, 0);
-    for (word, cells) in words.iter_mut().zip(whole.iter().chain([&last])) {
-        let (eights, _) = cells.as_chunks::<8>();
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| eights.get(i).map_or(0, |eight| u64::from_le_bytes(*eight)));
-        if a != before {
-            (before, together) = (a, reached(a));
+    // eight cells are often like the eight before
+    let (mut before, mut together) = (0, if threshold == 0 { 0xFF } else { 0 });
+    for (word, cells) in words.iter_mut().zip(cells.chunks(32)) {
+        for (place, eight) in cells.chunks(8).enumerate() {
+            let mut bytes = [0; 8];
+            match eight.first_chunk() {
+                Some(whole) => bytes = *whole,
+                // the last of a row; the threshold is above 0
+                None => bytes.iter_mut().zip(eight).for_each(|(to, from)| *to = *from),
+            }
+            let cells = u64::from_le_bytes(bytes);
+            if cells != before {
+                before = cells;
+                // the highest bit of a byte: whether its lower seven reach the threshold's
+                let low = (cells | HIGH) - (least & !HIGH);
+                let reached = ((cells & !least) | (!(cells ^ least) & low)) & HIGH;
+                // the highest bits of all bytes side by side
+                together = (reached >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+            }
+            *word |= (together as u32) << (8 * place);
         }
-        *word = if (a ^ b) | (a ^ c) | (a ^ d) == 0 {
-            together * 0x0101_0101
-        } else {
-            together | reached(b) << 8 | reached(c) << 16 | reached(d) << 24
-        };
     }
     Bits::from_words(words)
 }
