@@ -1,4 +1,5 @@
-//! The DBC describes every classic message: two readers of it find in our frames what we put there.
+//! The descriptions hold every message, classic and CAN FD: two readers of them find in our frames what
+//! we put there.
 
 #![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
 
@@ -14,21 +15,30 @@ use viewshed::angle::Angle;
 use viewshed::map::RoadPoint;
 use viewshed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
-use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, WireMount};
-use viewshed::wire::map_message::{self, LIMITS};
+use viewshed::wire::map_message::{self, LIMITS, Plain};
 use viewshed::wire::message::{Addresses, Epoch, Message, Part, Plane, Received, Word};
+use viewshed::wire::scan_number::ScanNumber;
 use viewshed::wire::status::{Reason, ResetCause, State};
 use viewshed::wire::visible_range;
 
-const DBC: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/dbc/viewshed.dbc");
+const CLASSIC: Medium = Medium::Can(Addresses::STANDARD);
+const FD: Medium = Medium::CanFd(Addresses::STANDARD);
 
 /// Signals of a frame by name.
 type Signals = BTreeMap<String, f64>;
 
-fn described() -> Dbc {
-    Dbc::try_from(std::fs::read_to_string(DBC).unwrap().as_str()).unwrap()
+fn path(medium: Medium) -> &'static str {
+    if medium == CLASSIC {
+        concat!(env!("CARGO_MANIFEST_DIR"), "/tests/dbc/viewshed.dbc")
+    } else {
+        concat!(env!("CARGO_MANIFEST_DIR"), "/tests/dbc/viewshed-fd.dbc")
+    }
+}
+
+fn described(medium: Medium) -> Dbc {
+    Dbc::try_from(std::fs::read_to_string(path(medium)).unwrap().as_str()).unwrap()
 }
 
 fn sent_header() -> Header {
@@ -46,13 +56,9 @@ fn sent_header() -> Header {
 
 const TIME_MS: u64 = 7_000_000_000;
 
-/// A few seconds of a sensor's traffic, all planes, with visible ranges; and the map last sent.
-fn frames() -> (Vec<CanFrame>, Map) {
-    let config = BroadcastConfig {
-        visible_range_ms: Some(200),
-        gap_us: 100,
-        ..BroadcastConfig::new(0, Medium::Can(Addresses::STANDARD))
-    };
+/// A few seconds of a sensor's traffic, all planes, with visible ranges; and the maps by their numbers.
+fn frames(medium: Medium) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
+    let config = BroadcastConfig { visible_range_ms: Some(200), gap_us: 100, ..BroadcastConfig::new(0, medium) };
     let time = |us: u64| Time::from_micros(TIME_MS * 1000 + us);
     let mut sender = Broadcaster::<A, W, 3>::new(config, sent_header(), Epoch::new(11), time(0)).unwrap();
     sender.set_synchronised(true);
@@ -61,42 +67,48 @@ fn frames() -> (Vec<CanFrame>, Map) {
         (State::Degraded, Reason::IncompleteScans, ResetCause::Watchdog);
     (status.firmware, status.radar_lost, status.e2e_errors, status.bus_off) = ([1, 22, 3], 40_000, 515, 2);
     let mut shadows = Shadows::new(3);
-    let (mut frames, mut map) = (Vec::new(), shadows.next());
+    let (mut frames, mut maps) = (Vec::new(), Vec::new());
     for us in (0..3_000_000).step_by(100) {
         if us % 67_000 == 0 {
-            map = shadows.next();
+            let map = shadows.next();
             let _ = sender.scan(time(us), &map);
+            maps.push((f64::from(ScanNumber::at(time(us)).byte()), map));
         }
         frames.extend(sender.next_frame(time(us)));
     }
-    (frames, map)
+    (frames, maps)
 }
 
-/// The raw value of a Motorola signal.
-fn raw(signal: &Signal, data: &[u8]) -> i64 {
-    assert_eq!(signal.byte_order, ByteOrder::BigEndian);
-    let first = signal.start_bit / 8 * 8 + 7 - signal.start_bit % 8;
-    let bits = (first..first + signal.size).map(|bit| data[bit as usize / 8] >> (7 - bit % 8) & 1);
-    let value = bits.fold(0, |value: u64, bit| value << 1 | u64::from(bit));
+/// The raw value of a signal; `None` where the data ends before it does.
+fn raw(signal: &Signal, data: &[u8]) -> Option<i64> {
+    let bit = |bit: u64| data.get(bit as usize / 8).map(|byte| u64::from(byte >> (bit % 8) & 1));
+    let value = match signal.byte_order {
+        ByteOrder::LittleEndian => (0..signal.size).rev().try_fold(0, |v, i| Some(v << 1 | bit(signal.start_bit + i)?)),
+        ByteOrder::BigEndian => {
+            let first = signal.start_bit / 8 * 8 + 7 - signal.start_bit % 8;
+            (first..first + signal.size).try_fold(0, |v: u64, i| Some(v << 1 | bit(i / 8 * 8 + 7 - i % 8)?))
+        }
+    }?;
     let unused = 64 - signal.size;
-    match signal.value_type {
+    Some(match signal.value_type {
         ValueType::Signed => (value << unused) as i64 >> unused,
         ValueType::Unsigned => value as i64,
-    }
+    })
 }
 
 /// What can-dbc's reading of the file makes of a frame.
 fn decode(dbc: &Dbc, frame: &CanFrame) -> (String, Signals) {
     let message = dbc.messages.iter().find(|m| m.id.raw() == frame.id.raw()).unwrap_or_else(|| panic!("{frame:?}"));
-    assert_eq!(message.size as usize, frame.data().len());
+    // messages of CAN FD end where there is no more to say
+    assert!(message.size as usize == frame.data().len() || (frame.fd && message.size as usize > frame.data().len()));
     let switch = message.signals.iter().find(|s| s.multiplexer_indicator == MultiplexIndicator::Multiplexor);
-    let switch = switch.map(|s| raw(s, frame.data()) as u64);
+    let switch = switch.and_then(|s| raw(s, frame.data())).map(|raw| raw as u64);
     let present = message.signals.iter().filter(|s| match s.multiplexer_indicator {
         MultiplexIndicator::MultiplexedSignal(page) => Some(page) == switch,
         _ => true,
     });
-    let value = |s: &Signal| raw(s, frame.data()) as f64 * s.factor + s.offset;
-    (message.name.clone(), present.map(|s| (s.name.clone(), value(s))).collect())
+    let value = |s: &Signal| Some((s.name.clone(), raw(s, frame.data())? as f64 * s.factor + s.offset));
+    (message.name.clone(), present.filter_map(value).collect())
 }
 
 /// Every signal's last value, over all frames.
@@ -105,29 +117,36 @@ fn all_signals(dbc: &Dbc, frames: &[CanFrame]) -> Signals {
 }
 
 #[test]
-fn every_classic_message_is_described_and_no_other() {
-    let dbc = described();
-    let sent = [Message::Status, Message::Header, Message::VisibleRange].into_iter().chain(
-        Plane::ALL.into_iter().flat_map(|plane| {
+fn every_message_is_described_and_no_other() {
+    for medium in [CLASSIC, FD] {
+        let parts = |plane| {
             let words = [Word::Second, Word::Third, Word::Fourth].map(Part::More);
-            [Part::Refresh, Part::Delta, Part::Plain]
-                .into_iter()
-                .chain(words)
-                .map(move |part| Message::Map(plane, part))
-        }),
-    );
-    let mut ids: Vec<u32> = sent.map(|m| Addresses::STANDARD.id(0, m).unwrap().raw()).collect();
-    let mut found: Vec<u32> = dbc.messages.iter().map(|m| m.id.raw()).collect();
-    ids.sort_unstable();
-    found.sort_unstable();
-    assert_eq!(found, ids);
-    assert!(dbc.messages.iter().all(|m| m.size == 8));
+            let words = words.into_iter().filter(|_| medium == CLASSIC);
+            let parts = [Part::Refresh, Part::Delta, Part::Plain].into_iter().chain(words);
+            parts.map(move |part| Message::Map(plane, part))
+        };
+        let others = [Message::Status, Message::Header, Message::VisibleRange];
+        let sent = others.into_iter().chain(Plane::ALL.into_iter().flat_map(parts));
+        let mut ids: Vec<u32> = sent.map(|m| Addresses::STANDARD.id(0, m).unwrap().raw()).collect();
+        let dbc = described(medium);
+        let mut found: Vec<u32> = dbc.messages.iter().map(|m| m.id.raw()).collect();
+        ids.sort_unstable();
+        found.sort_unstable();
+        assert_eq!(found, ids);
+        assert!(medium == FD || dbc.messages.iter().all(|m| m.size == 8));
+    }
 }
 
 #[test]
 fn header_and_status_read_as_they_were_sent() {
-    let (frames, _) = frames();
-    let got = all_signals(&described(), &frames);
+    for medium in [CLASSIC, FD] {
+        header_and_status(medium);
+    }
+}
+
+fn header_and_status(medium: Medium) {
+    let (frames, _) = frames(medium);
+    let got = all_signals(&described(medium), &frames);
     let turn = 360.0 / 65536.0;
     let expected = [
         ("Epoch", 11.0),
@@ -169,49 +188,79 @@ fn header_and_status_read_as_they_were_sent() {
 
 #[test]
 fn ranges_words_and_cells_read_as_they_were_sent() {
-    let (frames, map) = frames();
-    let dbc = described();
-    let mut seen = BTreeMap::new();
+    for medium in [CLASSIC, FD] {
+        ranges_words_and_cells(medium);
+    }
+}
+
+fn ranges_words_and_cells(medium: Medium) {
+    let (frames, maps) = frames(medium);
+    let dbc = described(medium);
+    let (mut seen, mut ranges) = (BTreeMap::new(), 0);
     for frame in &frames {
         let (name, got) = decode(&dbc, frame);
         *seen.entry(name).or_insert(0) += 1;
         let received = Received::from_frame(frame, &Addresses::STANDARD).unwrap();
         assert_eq!(got["E2E_Counter"], f64::from(received.counter));
+        if received.message == Message::VisibleRange {
+            let (_, map) = maps.iter().find(|(number, _)| *number == got["Range_Scan"]).unwrap();
+            for (azimuth, ray) in map.0.iter().enumerate() {
+                let Some(range) = got.get(&format!("Visible_Range_{azimuth:03}")) else { continue };
+                assert_eq!(*range, 2.0 * f64::from(visible_range::steps(ray, 200)));
+                ranges += 1;
+            }
+        }
         if let Message::Map(_, part) = received.message {
-            let message = map_message::parse(received.own, false).unwrap();
+            let message = map_message::parse(received.own, frame.fd).unwrap();
             assert_eq!(got["Scan"], f64::from(message.scan.byte()));
-            if part == Part::Plain {
-                let whole = ((got["Segment"] as u64) << 29) + got["Cells"] as u64;
-                assert_eq!((got["Azimuth"], whole), (message.start as f64, message.words()[0]));
-                assert!(got["Segment"] <= f64::from(LIMITS));
-            } else {
-                assert_eq!((got["Start_Azimuth"], got["Word"]), (message.start as f64, message.words()[0] as f64));
+            let start = if part == Part::Plain { "Azimuth" } else { "Start_Azimuth" };
+            assert_eq!(got[start], message.start as f64);
+            match (part, frame.fd) {
+                (Part::Plain, false) => {
+                    let whole = ((got["Segment"] as u64) << 29) + got["Cells"] as u64;
+                    assert!(whole == message.words()[0] && got["Segment"] <= f64::from(LIMITS));
+                }
+                (Part::Plain, true) => {
+                    let Some(Plain::Whole(ray)) = message.plain::<W>(received.own, true) else { panic!("no ray") };
+                    let [near, last] = ray.known.limits().map(f64::from);
+                    assert_eq!((got["First_Known"], got["Last_Known"]), (near, last));
+                    let cells = got.get("Cells_000").copied().unwrap_or(0.0);
+                    assert_eq!(cells, f64::from(ray.bits().words()[0].reverse_bits()));
+                }
+                (_, false) => assert_eq!(got["Word"], message.words()[0] as f64),
+                (_, true) => {
+                    for (k, word) in message.words().iter().enumerate() {
+                        assert_eq!(got[&format!("Word_{:02}", k + 1)], *word as f64);
+                    }
+                }
             }
         }
     }
-    assert!(seen.len() >= 15, "{seen:?}");
-    // the ranges of the last map, by azimuth
-    let got = all_signals(&dbc, &frames);
-    let right = (0..A).filter(|azimuth| {
-        let ray: &Ray<W> = &map.0[*azimuth];
-        got[&format!("Visible_Range_{azimuth:03}")] == 2.0 * f64::from(visible_range::steps(ray, 200))
-    });
-    // those of the last scan only; the others are up to 200 ms older
-    assert!(right.count() > A / 2);
+    assert!(seen.len() >= if medium == CLASSIC { 15 } else { 9 }, "{seen:?}");
+    assert!(ranges > A, "{ranges} ranges");
 }
 
 #[test]
 fn cantools_reads_the_same() {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+    // where tests/cantools.sh puts it
+    let installed = concat!(env!("CARGO_TARGET_TMPDIR"), "/../cantools/bin/python");
+    let installed = if std::path::Path::new(installed).exists() { installed } else { "python3" };
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| installed.into());
     if !Command::new(&python).args(["-c", "import cantools"]).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
     {
-        println!("skipped: {python} cannot import cantools (pip install cantools)");
+        println!("skipped: {python} cannot import cantools (tests/cantools.sh installs it)");
         return;
     }
-    let (frames, _) = frames();
+    for medium in [CLASSIC, FD] {
+        with_cantools(&python, medium);
+    }
+}
+
+fn with_cantools(python: &str, medium: Medium) {
+    let (frames, _) = frames(medium);
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/dbc/decode.py");
     let mut child =
-        Command::new(&python).args([script, DBC]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        Command::new(python).args([script, path(medium)]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let mut lines = String::new();
     for frame in &frames {
         let data: String = frame.data().iter().map(|b| format!("{b:02X}")).collect();
@@ -222,7 +271,7 @@ fn cantools_reads_the_same() {
     let output = child.wait_with_output().unwrap();
     writer.join().unwrap().unwrap();
     assert!(output.status.success());
-    let dbc = described();
+    let dbc = described(medium);
     let text = String::from_utf8(output.stdout).unwrap();
     let mut compared = 0;
     for (line, frame) in text.lines().zip(&frames) {

@@ -149,3 +149,27 @@ fn of_ten_million_messages_profile_11_accepts_at_most_39_660_and_profile_05_190(
     println!("accepted of 10^7 random messages: profile 11 {p11}, profile 05 {p05}");
     assert!(p11 <= 39_660 && p05 <= 190, "{p11}, {p05}");
 }
+
+#[test]
+fn another_implementation_of_the_standard_takes_our_messages_and_we_take_its() {
+    use autosar_e2e::profile5::{Profile5, Profile5Config};
+    use autosar_e2e::profile11::{Profile11, Profile11Config, Profile11IdMode};
+    use autosar_e2e::{E2EProfile, E2EStatus};
+    let mut random = Random::new(3);
+    for _ in 0..100 {
+        let data_id = 0x8000 | random.next() as u16;
+        let mut message: Vec<u8> = (0..8).map(|_| random.next() as u8).collect();
+        let config = Profile11Config { mode: Profile11IdMode::Both, data_id, data_length: 64, ..Default::default() };
+        Profile::P11.protect(&mut message, data_id, 0);
+        assert_eq!(Profile11::new(config.clone()).unwrap().check(&message).unwrap(), E2EStatus::Ok);
+        Profile11::new(config).unwrap().protect(&mut message).unwrap();
+        assert_eq!(Profile::P11.check(&message, data_id), Ok(0));
+
+        let mut message: Vec<u8> = (0..64).map(|_| random.next() as u8).collect();
+        let config = Profile5Config { data_length: 512, data_id, ..Default::default() };
+        Profile::P05.protect(&mut message, data_id, 0);
+        assert_eq!(Profile5::new(config.clone()).unwrap().check(&message).unwrap(), E2EStatus::Ok);
+        Profile5::new(config).unwrap().protect(&mut message).unwrap();
+        assert_eq!(Profile::P05.check(&message, data_id), Ok(0));
+    }
+}

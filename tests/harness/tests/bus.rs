@@ -1,0 +1,112 @@
+//! `viewshed bus` and `viewshed listen` on the shipped recording: the figures that have to be met.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn viewshed(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_viewshed")).args(arguments).output().expect("the program runs")
+}
+
+fn scratch(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).expect("written")).expect("JSON")
+}
+
+/// Sends the shipped recording; unoptimised only its first seconds.
+fn sent(name: &str, more: &[&str]) -> (Value, PathBuf) {
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
+    let (report, log) = (scratch(&format!("{name}.json")), scratch(&format!("{name}.log")));
+    let to = if cfg!(debug_assertions) { "8" } else { "30" };
+    let paths = [report.to_str().expect("UTF-8"), log.to_str().expect("UTF-8")];
+    let arguments = [&["bus", recording, "--to", to, "--json", paths[0], "--log", paths[1]], more].concat();
+    let output = viewshed(&arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    (json(&report), log)
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("no {key} in {value}"))
+}
+
+#[test]
+fn maps_fit_their_buses_and_arrive() {
+    let (report, log) = sent("bus-classic", &[]);
+    let most = [
+        ("classic-500k", 0.08, 0.25),
+        ("classic-1M", 0.04, 0.125),
+        ("fd-500k-2M", 0.02, 0.03),
+        ("serial-230400", 0.25, 0.3),
+    ];
+    let buses = report["buses"].as_array().expect("buses");
+    assert_eq!(buses.len(), most.len());
+    for (bus, (name, median, worst)) in buses.iter().zip(most) {
+        assert_eq!(bus["name"], name);
+        assert!(number(bus, "load_median") <= median && number(bus, "load_worst") <= worst, "{bus}");
+        assert!(number(bus, "load_median") > 0.003 && number(bus, "frames_per_scan") > 1.0, "{bus}");
+        assert!(number(bus, "bytes_per_scan") > number(&report["entropy_bytes_per_scan"], "previous_scan"), "{bus}");
+    }
+    for received in report["received"].as_array().expect("received") {
+        let least = match number(received, "loss") {
+            0.0 => 1.0,
+            0.01 => 0.97,
+            0.05 => 0.90,
+            _ => 0.4,
+        };
+        assert!(number(received, "visible_median") >= least, "{received}");
+        assert_eq!(number(received, "wrongly_visible"), 0.0, "{received}");
+        if least == 1.0 {
+            assert_eq!(number(received, "equal"), 1.0, "every cell of every scan: {received}");
+        }
+    }
+    listens(&log, report["scans"].as_u64().expect("scans"));
+}
+
+#[test]
+fn a_can_fd_log_with_visible_ranges_is_understood_as_well() {
+    let (report, log) = sent("bus-fd", &["--bus", "fd-500k-2M", "--visible-range", "500"]);
+    listens(&log, report["scans"].as_u64().expect("scans"));
+}
+
+fn listens(log: &Path, scans: u64) {
+    let heard = log.with_extension("heard.json");
+    let pictures = log.with_extension("pictures");
+    let arguments = [
+        "listen",
+        log.to_str().expect("UTF-8"),
+        "--json",
+        heard.to_str().expect("UTF-8"),
+        "--out",
+        pictures.to_str().expect("UTF-8"),
+    ];
+    let output = viewshed(&arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let heard = json(&heard);
+    let sensor = &heard["sensors"][0];
+    assert_eq!((&sensor["sensor"], &sensor["condition"], &heard["foreign"]), (&0.into(), &"ok".into(), &0.into()));
+    assert_eq!((number(&sensor["header"], "height_m"), number(&sensor["header"], "cell_m")), (6.0, 1.0));
+    for wrong in ["protection", "lost", "repeated", "out_of_sequence", "late", "malformed"] {
+        assert_eq!(number(&sensor["counters"], wrong), 0.0, "{wrong}");
+    }
+    let maps = sensor["maps"].as_array().expect("maps");
+    // once a second, but for the first two
+    assert!(maps.len() as u64 >= scans / 15 - 2);
+    assert!(maps.iter().all(|map| number(map, "visible") > 5000.0));
+    let drawn = std::fs::read_dir(pictures).expect("a folder").count();
+    assert_eq!(drawn, maps.len());
+}
+
+#[test]
+fn what_is_no_broadcast_is_told() {
+    let log = scratch("other.log");
+    std::fs::write(&log, "(1.0) can0 701#0011223344556677\n").expect("written");
+    let output = viewshed(&["listen", log.to_str().expect("UTF-8")]);
+    assert!(!output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("none of its 1 frames is of a broadcast"));
+    let output = viewshed(&["bus", "--bus", "classic-250k"]);
+    assert!(!output.status.success());
+}
