@@ -11,7 +11,8 @@ use crate::reflection::{Noise, Reflection};
 ///
 /// # Limits
 /// When the list is full the weakest makes room for a stronger one and is counted as
-/// [`Rejection::Overflow`]; of equals the first stays. Each replacement costs one pass over `D`.
+/// [`Rejection::Overflow`]; of equals the first stays. A replacement costs one pass over `D` at most, and one
+/// in all for those of equal strength.
 #[derive(Debug, Clone)]
 pub struct Scan<const D: usize> {
     reflections: Vec<Reflection, D, u16>,
@@ -64,9 +65,18 @@ impl<const D: usize> Scan<D> {
             if let Some(slot) = self.reflections.get_mut(weakest) {
                 *slot = place();
             }
-            self.weakest = Some(self.find_weakest());
+            self.weakest = Some(self.next_weakest(weakest, strength));
         } else {
             self.weakest = Some((weakest, strength));
+        }
+    }
+
+    /// The weakest once the one at a place has gone: its equals all stand before it.
+    fn next_weakest(&self, gone: usize, strength: i16) -> (usize, i16) {
+        let before = self.reflections.get(..gone).unwrap_or(&[]);
+        match before.iter().rposition(|r| r.strength == strength) {
+            Some(i) => (i, strength),
+            None => self.find_weakest(),
         }
     }
 
