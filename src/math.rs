@@ -56,6 +56,7 @@ pub(crate) fn hypot_gate(a: i32, b: i32) -> i32 {
 ///
 /// A table of eight bits and one Newton step: a third of what the exact `u32::isqrt` costs.
 #[allow(clippy::cast_possible_truncation)] // the root of 32 bits has 16
+#[inline]
 pub(crate) fn root(v: u32) -> u32 {
     if v < 64 * 64 {
         return v.isqrt();
@@ -86,6 +87,7 @@ const fn roots() -> [u8; 256] {
 
 /// Length of a ground vector; beyond 46 340 along an axis it is taken to lie there.
 #[allow(clippy::cast_possible_wrap)] // a root of 32 bits
+#[inline]
 pub(crate) fn length(x: i32, y: i32) -> i32 {
     let (x, y) = (x.unsigned_abs().min(46_340), y.unsigned_abs().min(46_340));
     root(x * x + y * y) as i32

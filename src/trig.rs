@@ -127,6 +127,7 @@ pub fn direction(angle: Angle) -> Direction {
 ///
 /// Lengths up to 2^16 per component.
 #[allow(clippy::cast_possible_truncation)] // an octant's angle fits, the sum wraps by design
+#[inline]
 pub fn bearing(x: i32, y: i32) -> Angle {
     let (long, short) = (x.abs().max(y.abs()), x.abs().min(y.abs()));
     if long == 0 {
