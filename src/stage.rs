@@ -1,0 +1,43 @@
+//! The stages of a frame, for whoever measures what each costs.
+
+/// A stage of the radar-3d estimator, in the order of its picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Stage {
+    /// Gate, and reflections on the ground.
+    Gate,
+    /// Moving obstacles.
+    Obstacles,
+    /// Evidence of the frames before fades.
+    Fade,
+    /// Lines of sight clear what they pass.
+    Clear,
+    /// Detections add evidence.
+    Add,
+    /// Obstacles become occupied cells.
+    Voxelise,
+    /// Ray casting and slice.
+    RayCast,
+}
+
+impl Stage {
+    /// How many there are.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// All, in the order they run.
+    pub const ALL: [Self; 7] =
+        [Self::Gate, Self::Obstacles, Self::Fade, Self::Clear, Self::Add, Self::Voxelise, Self::RayCast];
+
+    /// Short name for reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gate => "gate",
+            Self::Obstacles => "obstacles",
+            Self::Fade => "fade",
+            Self::Clear => "clear",
+            Self::Add => "add",
+            Self::Voxelise => "voxelise",
+            Self::RayCast => "ray cast",
+        }
+    }
+}
