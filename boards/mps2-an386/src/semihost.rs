@@ -1,0 +1,59 @@
+//! The bench over semihosting files: `job.bin` in, `answer.bin` out, in the emulator's folder.
+
+use core::ffi::CStr;
+
+use semihosting::fd::{AsFd, OwnedFd};
+use semihosting::process;
+use semihosting::sys::arm_compat::{OpenMode, sys_open};
+use semihosting::sys;
+use viewshed::pil::Bench;
+
+use crate::stack;
+use crate::timer::{TICKS_PER_256, Timer};
+
+const JOB: &CStr = c"job.bin";
+const ANSWER: &CStr = c"answer.bin";
+
+/// Both files and the timer.
+pub struct Files {
+    job: OwnedFd,
+    answer: OwnedFd,
+    timer: Timer,
+}
+
+impl Files {
+    /// Opens them; `None` without a debugger or emulator that has them.
+    pub fn open() -> Option<Self> {
+        let job = sys_open(JOB, OpenMode::RDONLY_BINARY).ok()?;
+        let answer = sys_open(ANSWER, OpenMode::WRONLY_TRUNC_BINARY).ok()?;
+        Some(Self { job, answer, timer: Timer::start() })
+    }
+}
+
+impl Bench for Files {
+    fn read(&mut self, buffer: &mut [u8]) -> usize {
+        sys::read(self.job.as_fd(), buffer).unwrap_or(0)
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            match sys::write(self.answer.as_fd(), rest) {
+                Ok(n) if n > 0 => rest = rest.get(n..).unwrap_or(&[]),
+                _ => process::exit(3),
+            }
+        }
+    }
+
+    fn ticks(&mut self) -> u32 {
+        self.timer.ticks()
+    }
+
+    fn ticks_per_256(&self) -> u32 {
+        TICKS_PER_256
+    }
+
+    fn stack(&self) -> [u32; 2] {
+        stack::used()
+    }
+}
