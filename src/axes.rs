@@ -264,7 +264,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Range cell of a ground distance.
     pub fn range_cell(&self, ground_cm: i32) -> Option<usize> {
-        usize::try_from(ground_cm / self.cell_cm).ok().filter(|r| *r < R)
+        usize::try_from(ground_cm / self.cell_cm.max(1)).ok().filter(|r| *r < R)
     }
 
     /// Range cells of a column that are in view on the slice plane.

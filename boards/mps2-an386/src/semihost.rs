@@ -2,7 +2,7 @@
 
 use core::ffi::CStr;
 
-use semihosting::fd::{AsFd, OwnedFd};
+use semihosting::fd::BorrowedFd;
 use semihosting::process;
 use semihosting::sys::arm_compat::{OpenMode, sys_open};
 use semihosting::sys;
@@ -16,29 +16,35 @@ const ANSWER: &CStr = c"answer.bin";
 
 /// Both files and the timer.
 pub struct Files {
-    job: OwnedFd,
-    answer: OwnedFd,
+    job: BorrowedFd<'static>,
+    answer: BorrowedFd<'static>,
     timer: Timer,
 }
 
 impl Files {
     /// Opens them; `None` without a debugger or emulator that has them.
     pub fn open() -> Option<Self> {
-        let job = sys_open(JOB, OpenMode::RDONLY_BINARY).ok()?;
-        let answer = sys_open(ANSWER, OpenMode::WRONLY_TRUNC_BINARY).ok()?;
+        let job = open(JOB, OpenMode::RDONLY_BINARY)?;
+        let answer = open(ANSWER, OpenMode::WRONLY_TRUNC_BINARY)?;
         Some(Self { job, answer, timer: Timer::start() })
     }
 }
 
+fn open(name: &CStr, mode: OpenMode) -> Option<BorrowedFd<'static>> {
+    let file = sys_open(name, mode).ok()?.into_raw_fd();
+    // SAFETY: open until the emulator ends
+    (file != -1).then(|| unsafe { BorrowedFd::borrow_raw(file) })
+}
+
 impl Bench for Files {
     fn read(&mut self, buffer: &mut [u8]) -> usize {
-        sys::read(self.job.as_fd(), buffer).unwrap_or(0)
+        sys::read(self.job, buffer).unwrap_or(0)
     }
 
     fn write(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
-            match sys::write(self.answer.as_fd(), rest) {
+            match sys::write(self.answer, rest) {
                 Ok(n) if n > 0 => rest = rest.get(n..).unwrap_or(&[]),
                 _ => process::exit(3),
             }
