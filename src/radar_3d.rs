@@ -109,6 +109,11 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         PolarMap::unknown(self.axes.polar(&self.levelling), self.visible_from, self.occupied_from)
     }
 
+    /// Makes a map one for these parameters, where it lies: controllers have no stack for a second.
+    pub fn prepare(&self, map: &mut PolarMap<R, A>) {
+        map.prepare(self.axes.polar(&self.levelling), self.visible_from, self.occupied_from);
+    }
+
     /// The grid's axes.
     pub fn axes(&self) -> &Axes<R, A, E> {
         &self.axes

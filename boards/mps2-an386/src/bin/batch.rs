@@ -6,25 +6,25 @@ use cortex_m_rt::entry;
 use mps2_an386::profile::{Map, Parameters, State};
 use mps2_an386::semihost::Files;
 use semihosting::process::exit;
-use static_cell::{ConstStaticCell, StaticCell};
+use static_cell::ConstStaticCell;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Memory, run};
 
 /// Detections of a recorded scan, before the gate.
-const MOST_DETECTIONS: usize = 4096;
+const MOST_DETECTIONS: usize = 16_384;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
-static MAP: StaticCell<Map> = StaticCell::new();
+static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
 #[unsafe(link_section = ".bench")]
-static SCAN: StaticCell<ScanBuffer<MOST_DETECTIONS>> = StaticCell::new();
+static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS>> = ConstStaticCell::new(ScanBuffer::new());
 
 #[entry]
 fn main() -> ! {
     let Some(mut files) = Files::open() else { exit(2) };
     let Ok(job) = Job::read(&mut files) else { exit(1) };
     let Ok(parameters) = Parameters::new(&job.settings.sensor, &job.settings.radar_3d()) else { exit(1) };
-    let (Some(state), Some(map)) = (STATE.try_take(), MAP.try_init_with(|| parameters.map())) else { exit(4) };
-    let Some(scan) = SCAN.try_init_with(ScanBuffer::new) else { exit(4) };
+    let (Some(state), Some(map), Some(scan)) = (STATE.try_take(), MAP.try_take(), SCAN.try_take()) else { exit(4) };
+    parameters.prepare(map);
 
     let memory = Memory { state, parameters: &parameters, map, scan };
     exit(if run(&mut files, &job, memory).is_ok() { 0 } else { 1 })

@@ -1,0 +1,29 @@
+//! Building a board's image.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+use super::{Board, Profile};
+
+/// Builds the batch image and gives its path.
+///
+/// # Errors
+/// What the compiler says, or that there is none for the board.
+pub fn build(board: Board, profile: Profile) -> Result<PathBuf> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../boards/build.sh");
+    if !script.exists() {
+        bail!("{} is not there: --board builds the firmware from the project's sources", script.display());
+    }
+    let mut command = Command::new("sh");
+    command.arg(&script).args([board.folder(), "batch"]).stderr(Stdio::piped());
+    if profile == Profile::Small {
+        command.args(["--features", "small"]);
+    }
+    let output = command.output().context("cannot run sh")?;
+    if !output.status.success() {
+        bail!("cannot build the firmware of {}: {}", board.name(), String::from_utf8_lossy(&output.stderr).trim());
+    }
+    Ok(PathBuf::from(String::from_utf8_lossy(&output.stdout).trim()))
+}
