@@ -7,6 +7,7 @@ use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::stage::Stage;
 
+use super::image::Image;
 use super::scans::Scan;
 
 /// What came out of a run.
@@ -21,6 +22,8 @@ pub struct Checked {
     /// Instructions of each frame by stage; empty where they are not counted.
     pub instructions: Vec<[u32; Stage::COUNT]>,
     pub difference: Option<Difference>,
+    /// The image that ran.
+    pub image: Option<Image>,
 }
 
 /// The first frame that differs, cell by cell. Rows are azimuths, from right to left.
@@ -97,6 +100,7 @@ pub fn compare(answer: &[u8], expected: &[u64], scans: usize) -> Result<Checked>
         first_difference,
         instructions: if opening.ticks_per_256 > 0 { frames.iter().map(instructions).collect() } else { Vec::new() },
         difference: None,
+        image: None,
     })
 }
 

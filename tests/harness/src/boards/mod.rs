@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod firmware;
+pub mod image;
 pub mod machine;
 pub mod report;
 pub mod scans;
@@ -92,6 +93,7 @@ impl Run<'_> {
         let expected = check::fingerprints(&mut state, &parameters, self.scans);
         let answer = machine::batch(self.board, &image, self.settings, self.scans, None)?;
         let mut checked = check::compare(&answer, &expected, self.scans.len())?;
+        checked.image = Some(image::Image::read(&image)?);
         if let Some(frame) = checked.first_difference {
             let dumped = machine::batch(self.board, &image, self.settings, self.scans, Some(frame))?;
             checked.difference = check::difference(&mut state, &parameters, self.scans, frame, &dumped)?;

@@ -10,6 +10,7 @@ use viewshed::stage::Stage;
 
 use super::Run;
 use super::check::{Checked, Difference};
+use super::image::Image;
 use crate::pictures::polar::{self, PolarGrid};
 
 /// Median and worst of a number of instructions.
@@ -49,6 +50,9 @@ pub struct Row {
     pub map_bytes: u32,
     pub stack_used_bytes: u32,
     pub stack_bytes: u32,
+    /// The image in flash, and its variables in RAM, stack and test buffers not counted.
+    pub flash_bytes: u64,
+    pub ram_bytes: u64,
 }
 
 impl Row {
@@ -70,23 +74,29 @@ impl Row {
             map_bytes,
             stack_used_bytes,
             stack_bytes,
+            flash_bytes: checked.image.as_ref().map_or(0, Image::flash_bytes),
+            ram_bytes: checked.image.as_ref().map_or(0, Image::ram_bytes),
         }
     }
 }
+
+/// Headings of the memory an image takes, bytes.
+const MEMORY: [&str; 3] = ["flash", "RAM", "stack\nused"];
 
 /// All runs as one table.
 pub fn table(rows: &[Row]) -> String {
     let mut table = Table::new();
     table.load_style(presets::UTF8_FULL_CONDENSED);
     let stages = Stage::ALL.map(|s| s.name().to_owned());
-    let fixed = ["recording", "board", "profile", "equal frames", "thousand instructions\nmedian / worst"];
-    let heading = fixed.map(str::to_owned).into_iter().chain(stages).chain(["stack used\nbytes".to_owned()]);
+    let fixed = ["recording", "board", "profile", "equal frames", "1000 instructions\nmedian / worst"];
+    let heading = fixed.map(str::to_owned).into_iter().chain(stages).chain(MEMORY.map(str::to_owned));
     table.set_header(heading.collect::<Vec<_>>());
     for row in rows {
         let words = [row.recording.clone(), row.board.into(), row.profile.into()].map(Cell::new);
         let numbers = [format!("{} / {}", row.equal, row.frames), Cost::text(row.instructions)]
             .into_iter()
             .chain(row.stages.iter().map(|(_, cost)| Cost::text(*cost)))
+            .chain([row.flash_bytes.to_string(), row.ram_bytes.to_string()])
             .chain([if row.stack_bytes > 0 { row.stack_used_bytes.to_string() } else { "–".into() }]);
         let numbers = numbers.map(|n| Cell::new(n).set_alignment(CellAlignment::Right));
         table.add_row(words.into_iter().chain(numbers).collect::<Vec<_>>());
