@@ -1,8 +1,7 @@
 //! Firmware on emulated controllers. They need QEMU and a compiler for the target, so they are ignored
 //! unless asked for: `tests/firmware.sh` sees to both.
 
-mod batch;
-mod image;
+mod mps2;
 
 use std::path::Path;
 

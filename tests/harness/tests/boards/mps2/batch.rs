@@ -7,7 +7,7 @@ use viewshed_harness::boards::check::{self, Checked};
 use viewshed_harness::boards::scans::Scan;
 use viewshed_harness::boards::{Board, Profile, Run, firmware, machine, stress};
 
-use super::shipped;
+use crate::shipped;
 
 /// Instructions a frame may take.
 const BUDGET: [(Profile, u32); 2] = [(Profile::Reference, 3_000_000), (Profile::Small, 600_000)];

@@ -3,7 +3,7 @@
 use viewshed_harness::boards::image::Image;
 use viewshed_harness::boards::{Board, Profile, Run, firmware};
 
-use super::shipped;
+use crate::shipped;
 
 /// Bytes a controller of each size has for everything: variables, stack, image.
 const LIMITS: [(Profile, u64, u64); 2] = [(Profile::Reference, 512_000, 64_000), (Profile::Small, 96_000, 64_000)];

@@ -1,0 +1,4 @@
+//! The Cortex-M4F of the MPS2 board.
+
+mod batch;
+mod image;
