@@ -22,15 +22,8 @@ pub fn batch(board: Board, image: &Path, settings: &Settings, scans: &[Scan], du
     let folder = Folder::new()?;
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     std::fs::write(folder.0.join("job.bin"), job(settings, scans, dump)).context("cannot write the job")?;
-    let (program, arguments) = emulator(board);
-    let mut command = Command::new(program);
-    command.args(arguments).arg("-kernel").arg(image).current_dir(&folder.0);
-    let log = std::fs::File::create(folder.0.join("log")).context("cannot write the emulator's log")?;
-    command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
-    let child = command
-        .spawn()
-        .with_context(|| format!("cannot run {program}; on Debian and Ubuntu: apt-get install qemu-system-arm"))?;
-    let code = wait(child)?;
+    let mut child = Emulator::start(board, image, &folder.0)?;
+    let code = child.wait()?;
     let answer = std::fs::read(folder.0.join("answer.bin")).unwrap_or_default();
     // 1: refused, with its reason in the closing record
     if code != Some(0) && (code != Some(1) || answer.is_empty()) {
@@ -40,31 +33,123 @@ pub fn batch(board: Board, image: &Path, settings: &Settings, scans: &[Scan], du
     Ok(answer)
 }
 
-/// The emulator without the image. An instruction takes 64 ns, so that its timers count instructions.
-fn emulator(board: Board) -> (&'static str, Vec<&'static str>) {
-    let machine = match board {
-        Board::Mps2An386 => "mps2-an386",
-        Board::Mps2An500 => "mps2-an500",
-    };
-    let mut arguments = vec!["-M", machine, "-icount", "shift=6"];
-    arguments.extend(["-display", "none", "-monitor", "none", "-serial", "none"]);
-    arguments.extend(["-semihosting-config", "enable=on,target=native"]);
-    ("qemu-system-arm", arguments)
+/// A running emulator; ends when dropped.
+pub struct Emulator {
+    child: Child,
 }
 
-fn wait(mut child: Child) -> Result<Option<i32>> {
-    let started = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait()? {
-            return Ok(status.code());
+impl Emulator {
+    /// Starts a board with an image; its files lie in the folder.
+    ///
+    /// # Errors
+    /// No emulator.
+    pub fn start(board: Board, image: &Path, folder: &Path) -> Result<Self> {
+        let mut command = match board {
+            Board::Mps2An386 => cortex_m("mps2-an386", image),
+            Board::Mps2An500 => cortex_m("mps2-an500", image),
+            Board::Zcu102R5 => cortex_r(image),
+        };
+        command.args(["-display", "none", "-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
+        let log = std::fs::File::create(folder.join("log")).context("cannot write the emulator's log")?;
+        command.current_dir(folder).stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
+        let program = command.get_program().to_string_lossy().into_owned();
+        let child = command
+            .spawn()
+            .with_context(|| format!("cannot run {program}; on Debian and Ubuntu: apt-get install qemu-system-arm"))?;
+        let emulator = Self { child };
+        if board == Board::Zcu102R5 {
+            power_on(&folder.join(CONTROL))?;
         }
-        if started.elapsed() > TIME_LIMIT {
-            child.kill()?;
-            child.wait()?;
-            bail!("the emulator did not end within {} s", TIME_LIMIT.as_secs());
-        }
-        std::thread::sleep(Duration::from_millis(10));
+        Ok(emulator)
     }
+
+    /// Waits for the firmware to end and gives its exit code.
+    ///
+    /// # Errors
+    /// It takes longer than any recording that is worth emulating.
+    pub fn wait(&mut self) -> Result<Option<i32>> {
+        let started = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait()? {
+                return Ok(status.code());
+            }
+            if started.elapsed() > TIME_LIMIT {
+                bail!("the emulator did not end within {} s", TIME_LIMIT.as_secs());
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // it does not always end when asked to
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// An instruction takes 64 ns, so that the board's timers count instructions.
+fn cortex_m(machine: &str, image: &Path) -> Command {
+    let mut command = Command::new("qemu-system-arm");
+    command.args(["-M", machine, "-icount", "shift=6", "-serial", "none", "-kernel"]).arg(image);
+    command
+}
+
+/// Socket the emulator is controlled by, in its folder.
+const CONTROL: &str = "control.sock";
+
+/// The real-time core is processor 4, and off at first.
+fn cortex_r(image: &Path) -> Command {
+    let mut command = Command::new("qemu-system-aarch64");
+    command.args(["-M", "xlnx-zcu102", "-smp", "5", "-m", "256M", "-S", "-serial", "none"]);
+    command.args(["-global", "xlnx-zynqmp.boot-cpu=rpu-cpu[0]"]);
+    command.arg("-qmp").arg(format!("unix:{CONTROL},server=on,wait=off"));
+    command.arg("-device").arg(format!("loader,file={},cpu-num=4", image.display()));
+    command
+}
+
+#[cfg(unix)]
+fn power_on(control: &Path) -> Result<()> {
+    use std::io::{BufRead, BufReader, Write};
+    use std::os::unix::net::UnixStream;
+
+    let started = Instant::now();
+    let mut socket = loop {
+        match UnixStream::connect(control) {
+            Ok(socket) => break socket,
+            Err(error) if started.elapsed() > Duration::from_secs(20) => {
+                return Err(error).context("cannot connect to the emulator");
+            }
+            Err(_) => std::thread::sleep(Duration::from_millis(10)),
+        }
+    };
+    socket.set_read_timeout(Some(Duration::from_secs(20)))?;
+    let mut replies = BufReader::new(socket.try_clone()?).lines();
+    for command in [
+        r#"{"execute":"qmp_capabilities"}"#,
+        r#"{"execute":"qom-set","arguments":{"path":"/machine/soc/rpu-cluster/rpu-cpu[0]","property":"start-powered-off","value":false}}"#,
+        r#"{"execute":"system_reset"}"#,
+        r#"{"execute":"cont"}"#,
+    ] {
+        writeln!(socket, "{command}")?;
+        loop {
+            let reply = replies.next().context("the emulator does not answer")??;
+            if reply.contains("\"error\"") {
+                bail!("the emulator refused {command}: {reply}");
+            }
+            // greetings and events come between
+            if reply.contains("\"return\"") {
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn power_on(_: &Path) -> Result<()> {
+    bail!("this board can be emulated on Unix only")
 }
 
 /// A folder that goes when it is dropped.

@@ -23,6 +23,8 @@ pub enum Board {
     Mps2An386,
     /// Arm Cortex-M7, with the Cortex-M4F's image
     Mps2An500,
+    /// Arm Cortex-R5F of a Zynq UltraScale+
+    Zcu102R5,
 }
 
 impl Board {
@@ -31,6 +33,7 @@ impl Board {
         match self {
             Self::Mps2An386 => "mps2-an386",
             Self::Mps2An500 => "mps2-an500",
+            Self::Zcu102R5 => "zcu102-r5",
         }
     }
 
@@ -38,6 +41,7 @@ impl Board {
     pub fn folder(self) -> &'static str {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => "mps2-an386",
+            Self::Zcu102R5 => "zcu102-r5",
         }
     }
 }
