@@ -55,5 +55,13 @@ else
     cargo_tests mps2 "mps2-an386: every map the same, budgets, contents of the image"
 fi
 
+if ! command -v qemu-system-aarch64 >/dev/null && ! install qemu-system-arm; then
+    skip "zcu102-r5" "no qemu-system-aarch64 (apt-get install qemu-system-arm)"
+elif ! compiler armv7r-none-eabihf; then
+    skip "zcu102-r5" "no compiler for armv7r-none-eabihf (rustup target add armv7r-none-eabihf)"
+else
+    cargo_tests zcu102 "zcu102-r5: every map the same, contents of the image"
+fi
+
 echo "firmware: $passed passed, $skipped skipped"
 [ "$failed" = 0 ]

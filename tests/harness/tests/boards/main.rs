@@ -2,6 +2,7 @@
 //! unless asked for: `tests/firmware.sh` sees to both.
 
 mod mps2;
+mod zcu102;
 
 use std::path::Path;
 
