@@ -281,10 +281,10 @@ fn part_of(slope: i32, height: i32) -> i32 {
     if slope >= height {
         256
     } else if slope < 1 << 23 {
-        (slope << 8) / height
+        (slope << 8) / height.max(1)
     } else {
         // rows this high lie at the sensor's feet
-        slope / (height >> 8)
+        slope / (height >> 8).max(1)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The stages of a frame, for whoever measures what each costs.
 
-/// A stage of the radar-3d estimator, in the order of its picture.
+/// A stage of the radar-3d estimator in the order of its picture, and what follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Stage {
@@ -18,15 +18,28 @@ pub enum Stage {
     Voxelise,
     /// Ray casting and slice.
     RayCast,
+    /// The map into messages; no part of the estimator.
+    Broadcast,
 }
 
 impl Stage {
+    /// How many of them are the estimator's.
+    pub const ESTIMATOR: usize = Self::COUNT - 1;
+
     /// How many there are.
     pub const COUNT: usize = Self::ALL.len();
 
     /// All, in the order they run.
-    pub const ALL: [Self; 7] =
-        [Self::Gate, Self::Obstacles, Self::Fade, Self::Clear, Self::Add, Self::Voxelise, Self::RayCast];
+    pub const ALL: [Self; 8] = [
+        Self::Gate,
+        Self::Obstacles,
+        Self::Fade,
+        Self::Clear,
+        Self::Add,
+        Self::Voxelise,
+        Self::RayCast,
+        Self::Broadcast,
+    ];
 
     /// Short name for reports.
     pub const fn name(self) -> &'static str {
@@ -38,6 +51,7 @@ impl Stage {
             Self::Add => "add",
             Self::Voxelise => "voxelise",
             Self::RayCast => "ray cast",
+            Self::Broadcast => "broadcast",
         }
     }
 }

@@ -13,6 +13,11 @@ use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::{Unit, bench_sender};
+use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::wire::message::Epoch;
+use viewshed::wire::serial::MOST_STUFFED;
+use viewshed::wire::status::State;
 
 use common::{Vehicle, gantry};
 
@@ -55,6 +60,10 @@ fn sensor() -> Sensor {
     gantry(6.0, 0.0)
 }
 
+fn sender(settings: &Settings, parameters: &Radar3dParameters<50, 40, 8>) -> Broadcaster<40, 2> {
+    bench_sender(settings, parameters, Medium::Serial, Epoch::new(0), Time::from_micros(0)).unwrap()
+}
+
 fn scans() -> Vec<Vec<Detection>> {
     let car = Vehicle::car(40.0, 2.0, 22.0);
     (0..8).map(|k| car.at(f64::from(k) / 15.0).detections(&sensor(), true)).collect()
@@ -76,7 +85,9 @@ fn answer(job: Vec<u8>) -> (Result<(), JobError>, Vec<u8>) {
     let outcome = Job::read(&mut streams).and_then(|job| {
         let parameters = Radar3dParameters::new(&job.settings.sensor, &job.settings.radar_3d()).unwrap();
         let (mut state, mut map, mut scan) = (Box::new(Small::new()), parameters.map(), ScanBuffer::<64>::new());
-        let memory = Memory { state: &mut *state, parameters: &parameters, map: &mut map, scan: &mut scan };
+        let mut sender = sender(&job.settings, &parameters);
+        let unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+        let memory = Memory { unit, scan: &mut scan };
         run(&mut streams, &job, memory)
     });
     (outcome, streams.answer)
@@ -93,21 +104,33 @@ fn every_frame_is_answered_with_the_fingerprint_of_its_map() {
     assert_eq!(outcome, Ok(()));
     let records = records(&bytes);
     assert_eq!(records.len(), scans.len() + 2);
-    let parameters = Radar3dParameters::new(&sensor(), &Settings::of(sensor()).radar_3d()).unwrap();
+    let settings = Settings::of(sensor());
+    let parameters = Radar3dParameters::new(&sensor(), &settings.radar_3d()).unwrap();
     let (mut state, mut map) = (Box::new(Small::new()), parameters.map());
-    let mut seen = std::collections::BTreeSet::new();
+    let mut sender = sender(&settings, &parameters);
+    let mut line = [0; MOST_STUFFED];
+    let (mut seen, mut messages) = (std::collections::BTreeSet::new(), 0);
     for (k, scan) in scans.iter().enumerate() {
         if k == 5 {
             state.reset();
             map.forget();
         }
-        let report = state.process(&parameters, Time::from_micros(k as u64 * 66_667), scan, false, &mut map);
+        let now = Time::from_micros(k as u64 * 66_667);
+        let report = state.process(&parameters, now, scan, false, &mut map);
+        let _ = sender.scan(now, &map);
+        sender.status_mut().state = State::Ok;
+        let mut fingerprint = Fingerprint::of_map(&map);
+        while let Some(n) = sender.next_line(now, &mut line) {
+            fingerprint.bytes(&line[..n]);
+            messages += 1;
+        }
         let Record::Frame(frame) = records[k + 1] else { panic!("{:?}", records[k + 1]) };
-        assert_eq!(frame.fingerprint, Fingerprint::of_map(&map).value(), "frame {k}");
+        assert_eq!(frame.fingerprint, fingerprint.value(), "frame {k}");
         assert_eq!((frame.frame, frame.used, frame.condition), (k as u32, report.used, report.condition));
-        assert_eq!(frame.ticks, [1; 7], "one look at the counter a stage");
+        assert_eq!(frame.ticks[..7], [1; 7], "one look at the counter a stage");
         seen.insert(frame.fingerprint);
     }
+    assert!(messages >= 5, "the quiet period is over and maps are sent: {messages}");
     assert!(seen.len() >= 5, "the maps differ: {}", seen.len());
     assert!(matches!(records.last(), Some(Record::Closing(c)) if (c.reason, c.frames) == (0, 8)));
 }

@@ -9,7 +9,7 @@
 //! | 4 | ranges, azimuths (2 each) | frame | frame | frames |
 //! | 4 | elevations, detections (2 each) | fingerprint, low | ranges, azimuths (2 each) | most stack used |
 //! | 4 | ticks to 256 instructions, 0 = not counted | fingerprint, high | 0 | stack |
-//! | 4 x 7 | state, parameters, map, 4 zeros | ticks of each stage | zeros | zeros |
+//! | 4 x 8 | state, parameters, map, 5 zeros | ticks of each stage | zeros | zeros |
 //!
 //! A map record is followed by its grades, then its occupancies, azimuth by azimuth.
 
@@ -148,7 +148,7 @@ mod tests {
             condition: Condition::Blind,
             used: 256,
             fingerprint: 0x0123_4567_89AB_CDEF,
-            ticks: [1, 2, 3, 4, 5, 6, u32::MAX],
+            ticks: [1, 2, 3, 4, 5, 6, 7, u32::MAX],
         };
         for record in [
             Record::Opening(Opening { shape: [200, 120, 16, 256], ticks_per_256: 410, bytes: [1, 2, 3] }),

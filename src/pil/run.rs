@@ -8,6 +8,8 @@ use super::record::{Closing, FrameRecord, Opening, Record};
 use crate::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::stage::Stage;
+use crate::unit::Unit;
+use crate::wire::serial::MOST_STUFFED;
 
 /// What a controller offers: a byte stream each way and a counter.
 pub trait Bench {
@@ -23,6 +25,9 @@ pub trait Bench {
     fn stack(&self) -> [u32; 2];
 }
 
+/// Most messages of a frame.
+const MOST_MESSAGES: usize = 400;
+
 /// Where a run keeps its things.
 pub struct Memory<
     'a,
@@ -34,12 +39,8 @@ pub struct Memory<
     const D: usize,
     const B: usize,
 > {
-    /// The estimator.
-    pub state: &'a mut Radar3d<R, A, E, W, N, D>,
-    /// Its parameters.
-    pub parameters: &'a Radar3dParameters<R, A, E>,
-    /// The result.
-    pub map: &'a mut PolarMap<R, A>,
+    /// Estimator, map and sender.
+    pub unit: Unit<'a, R, A, E, W, N, D>,
     /// The scan at hand.
     pub scan: &'a mut ScanBuffer<B>,
 }
@@ -72,7 +73,8 @@ pub fn run<
         ],
     };
     bench.write(&Record::Opening(opening).to_bytes());
-    let Memory { state, parameters, map, scan } = memory;
+    let Memory { mut unit, scan } = memory;
+    let mut line = [0; MOST_STUFFED];
     let mut frames = 0_u32;
     let outcome = loop {
         let head = match scan.read(bench) {
@@ -81,23 +83,35 @@ pub fn run<
             Err(error) => break Err(error),
         };
         if head.reset {
-            state.reset();
-            map.forget();
+            unit.reset();
         }
         let mut ticks = [0; Stage::COUNT];
         let mut last = bench.ticks();
-        let report = state.process_traced(parameters, head.time, scan.detections(), head.fault, map, |stage| {
+        let report = unit.scan(head.time, scan.detections(), head.fault, |stage| {
             let now = bench.ticks();
             if let Some(t) = ticks.get_mut(stage as usize) {
                 *t = now.wrapping_sub(last);
             }
             last = now;
         });
-        let fingerprint = Fingerprint::of_map(map).value();
+        let mut fingerprint = Fingerprint::of_map(unit.map());
+        let mut sending = 0_u32;
+        // as many as a map can take, and status and header
+        for _ in 0..MOST_MESSAGES {
+            let before = bench.ticks();
+            let message = unit.next_line(head.time, &mut line).and_then(|n| line.get(..n));
+            sending = sending.wrapping_add(bench.ticks().wrapping_sub(before));
+            let Some(message) = message else { break };
+            fingerprint.bytes(message);
+        }
+        if let Some(t) = ticks.get_mut(Stage::Broadcast as usize) {
+            *t = sending.wrapping_add(*t);
+        }
+        let fingerprint = fingerprint.value();
         let record = FrameRecord { frame: frames, condition: report.condition, used: report.used, fingerprint, ticks };
         bench.write(&Record::Frame(record).to_bytes());
         if job.dump == Some(frames) {
-            dump(bench, frames, map);
+            dump(bench, frames, unit.map());
         }
         frames = frames.wrapping_add(1);
     };

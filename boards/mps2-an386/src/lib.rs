@@ -7,6 +7,7 @@ pub mod profile;
 pub mod semihost;
 pub mod stack;
 pub mod timer;
+pub mod uart;
 
 /// A register of a peripheral.
 #[derive(Clone, Copy)]

@@ -6,6 +6,8 @@ mod size {
     pub const RANGES: usize = 200;
     pub const AZIMUTHS: usize = 120;
     pub const ELEVATIONS: usize = 16;
+    /// Words of 32 range cells.
+    pub const WORDS: usize = 7;
 }
 
 #[cfg(feature = "small")]
@@ -14,9 +16,12 @@ mod size {
     pub const RANGES: usize = 100;
     pub const AZIMUTHS: usize = 64;
     pub const ELEVATIONS: usize = 8;
+    /// Words of 32 range cells.
+    pub const WORDS: usize = 4;
 }
 
 pub use size::*;
 
 pub type Parameters = viewshed::radar_3d::Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>;
 pub type Map = viewshed::polar::PolarMap<RANGES, AZIMUTHS>;
+pub type Sender = viewshed::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;

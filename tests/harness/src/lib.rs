@@ -1,7 +1,7 @@
 //! Host-side harness of `viewshed`: recordings in, metrics and pictures out.
 
-pub mod bus;
 pub mod boards;
+pub mod bus;
 pub mod commands;
 pub mod doctor;
 pub mod estimators;

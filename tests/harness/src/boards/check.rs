@@ -1,14 +1,11 @@
-//! Comparing a controller's answer with what the library computes here.
+//! Comparing a controller's answer with the one the library gives here.
 
 use anyhow::{Result, bail, ensure};
-use viewshed::pil::fingerprint::Fingerprint;
 use viewshed::pil::record::{Closing, FrameRecord, Opening, RECORD_LEN, Record};
-use viewshed::polar::PolarMap;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::polar::PolarGeometry;
 use viewshed::stage::Stage;
 
 use super::image::Image;
-use super::scans::Scan;
 
 /// What came out of a run.
 #[derive(Debug, Clone)]
@@ -40,41 +37,13 @@ pub struct Difference {
     pub visible_from: u8,
 }
 
-/// Fingerprints of all maps.
-pub fn fingerprints<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    state: &mut Radar3d<R, A, E, W, N, D>,
-    parameters: &Radar3dParameters<R, A, E>,
-    scans: &[Scan],
-) -> Vec<u64> {
-    let mut all = Vec::with_capacity(scans.len());
-    every_map(state, parameters, scans, |_, map| all.push(Fingerprint::of_map(map).value()));
-    all
-}
-
-fn every_map<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    state: &mut Radar3d<R, A, E, W, N, D>,
-    parameters: &Radar3dParameters<R, A, E>,
-    scans: &[Scan],
-    mut visit: impl FnMut(usize, &PolarMap<R, A>),
-) {
-    let mut map = Box::new(parameters.map());
-    *state = Radar3d::new();
-    for (k, scan) in scans.iter().enumerate() {
-        if scan.reset {
-            state.reset();
-            map.forget();
-        }
-        state.process(parameters, scan.time, &scan.detections, false, &mut map);
-        visit(k, &map);
-    }
-}
-
 /// Reads an answer and compares its fingerprints.
 ///
 /// # Errors
 /// An answer that is not one, or that does not reach the end of the job.
-pub fn compare(answer: &[u8], expected: &[u64], scans: usize) -> Result<Checked> {
+pub fn compare(answer: &[u8], here: &[u8], scans: usize) -> Result<Checked> {
     let records = records(answer);
+    let expected = fingerprints(here);
     let Some(Record::Opening(opening)) = records.first().copied() else { bail!("the controller refused the job") };
     let Some(Record::Closing(closing)) = records.last().copied() else { bail!("the controller's answer breaks off") };
     let frames: Vec<FrameRecord> = records
@@ -87,8 +56,8 @@ pub fn compare(answer: &[u8], expected: &[u64], scans: usize) -> Result<Checked>
     ensure!(closing.reason == 0, "the controller stopped after {} frames, reason {}", closing.frames, closing.reason);
     ensure!(frames.len() == scans, "{} scans sent, {} frames answered", scans, frames.len());
     let differs = |(frame, expected): &(&FrameRecord, &u64)| frame.fingerprint != **expected;
-    let first_difference = frames.iter().zip(expected).position(|pair| differs(&pair));
-    let equal = frames.iter().zip(expected).filter(|pair| !differs(pair)).count();
+    let first_difference = frames.iter().zip(&expected).position(|pair| differs(&pair));
+    let equal = frames.iter().zip(&expected).filter(|pair| !differs(pair)).count();
     let instructions = |f: &FrameRecord| {
         f.ticks.map(|t| u32::try_from(u64::from(t) * 256 / u64::from(opening.ticks_per_256)).unwrap_or(u32::MAX))
     };
@@ -102,6 +71,11 @@ pub fn compare(answer: &[u8], expected: &[u64], scans: usize) -> Result<Checked>
         difference: None,
         image: None,
     })
+}
+
+fn fingerprints(answer: &[u8]) -> Vec<u64> {
+    let fingerprint = |r: Record| if let Record::Frame(f) = r { Some(f.fingerprint) } else { None };
+    records(answer).into_iter().filter_map(fingerprint).collect()
 }
 
 fn records(answer: &[u8]) -> Vec<Record> {
@@ -119,46 +93,32 @@ fn records(answer: &[u8]) -> Vec<Record> {
     all
 }
 
-/// The map of a frame, here and as the controller sent it.
+/// The map of a frame in both answers.
 ///
 /// # Errors
-/// The controller did not send it.
-pub fn difference<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    state: &mut Radar3d<R, A, E, W, N, D>,
-    parameters: &Radar3dParameters<R, A, E>,
-    scans: &[Scan],
-    frame: usize,
-    answer: &[u8],
-) -> Result<Option<Difference>> {
-    let Some(sent) = dumped(answer, frame, R * A) else { bail!("the controller did not send frame {frame}") };
-    let board: Vec<[u8; 2]> = (0..R * A).map(|k| [sent[k], sent[R * A + k]]).collect();
-    let mut found = None;
-    every_map(state, parameters, &scans[..=frame], |k, map| {
-        if k == frame {
-            let geometry = map.geometry();
-            let right = f64::from(geometry.azimuth_origin.radians());
-            let span = f64::from(geometry.azimuth_span) / 65536.0 * std::f64::consts::TAU;
-            let rows = |a| map.grades(a).into_iter().flatten().zip(map.occupancy(a).into_iter().flatten());
-            found = Some(Difference {
-                frame,
-                ranges: R,
-                azimuth_rad: [right, right + span],
-                cell_m: f64::from(geometry.cell_cm) / 100.0,
-                host: (0..A).flat_map(rows).map(|(g, o)| [*g, *o]).collect(),
-                board: board.clone(),
-                visible_from: map.visible_from(),
-            });
-        }
-    });
-    Ok(found)
+/// One of them does not have it.
+pub fn difference(answer: &[u8], here: &[u8], frame: usize, geometry: &PolarGeometry) -> Result<Difference> {
+    let (Some((ranges, board)), Some((_, host))) = (dumped(answer, frame), dumped(here, frame)) else {
+        bail!("the map of frame {frame} was not sent")
+    };
+    let right = f64::from(geometry.azimuth_origin.radians());
+    let span = f64::from(geometry.azimuth_span) / 65536.0 * std::f64::consts::TAU;
+    let azimuth_rad = [right, right + span];
+    let cell_m = f64::from(geometry.cell_cm) / 100.0;
+    Ok(Difference { frame, ranges, azimuth_rad, cell_m, host, board, visible_from: 128 })
 }
 
-fn dumped(answer: &[u8], wanted: usize, cells: usize) -> Option<&[u8]> {
+/// Range cells, and every cell of the map of a frame.
+fn dumped(answer: &[u8], wanted: usize) -> Option<(usize, Vec<[u8; 2]>)> {
     let mut rest = answer;
     while let Some((bytes, behind)) = rest.split_first_chunk::<RECORD_LEN>() {
         rest = behind;
-        if let Record::Map { frame, .. } = Record::from_bytes(bytes)? {
-            return rest.get(..2 * cells).filter(|_| frame as usize == wanted);
+        if let Record::Map { frame, cells } = Record::from_bytes(bytes)? {
+            let [ranges, azimuths] = cells.map(usize::from);
+            let (grades, behind) = rest.split_at_checked(ranges * azimuths)?;
+            let occupancy = behind.get(..ranges * azimuths)?;
+            let cells = grades.iter().zip(occupancy).map(|(g, o)| [*g, *o]).collect();
+            return (frame as usize == wanted).then_some((ranges, cells));
         }
     }
     None
@@ -173,7 +133,7 @@ mod tests {
         let opening = Opening { shape: [2, 1, 1, 4], ticks_per_256: 512, bytes: [0; 3] };
         let mut records = vec![Record::Opening(opening)];
         for (k, &fingerprint) in fingerprints.iter().enumerate() {
-            let (frame, ticks) = (k as u32, [2, 4, 6, 8, 10, 12, 14]);
+            let (frame, ticks) = (k as u32, [2, 4, 6, 8, 10, 12, 14, 16]);
             records.push(Record::Frame(FrameRecord {
                 frame,
                 condition: Condition::Healthy,
@@ -188,15 +148,16 @@ mod tests {
 
     #[test]
     fn the_first_difference_is_found_and_ticks_become_instructions() {
-        let checked = compare(&answer(&[1, 2, 9, 4], 0), &[1, 2, 3, 4], 4).unwrap();
+        let checked = compare(&answer(&[1, 2, 9, 4], 0), &answer(&[1, 2, 3, 4], 0), 4).unwrap();
         assert_eq!((checked.frames, checked.equal, checked.first_difference), (4, 3, Some(2)));
-        assert_eq!(checked.instructions[0], [1, 2, 3, 4, 5, 6, 7]);
-        assert_eq!(compare(&answer(&[1, 2], 0), &[1, 2], 2).unwrap().first_difference, None);
+        assert_eq!(checked.instructions[0], [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(compare(&answer(&[1, 2], 0), &answer(&[1, 2], 0), 2).unwrap().first_difference, None);
     }
 
     #[test]
     fn an_answer_that_is_none_is_an_error() {
-        let error = |answer: &[u8], scans| compare(answer, &[1, 2], scans).unwrap_err().to_string();
+        let error =
+            |answer: &[u8], scans| compare(answer, &super::tests::answer(&[1, 2], 0), scans).unwrap_err().to_string();
         assert!(error(b"", 2).contains("refused"));
         assert!(error(&answer(&[1], 0), 2).contains("2 scans sent, 1 frames answered"));
         assert!(error(&answer(&[1, 2], 3), 2).contains("reason 3"));

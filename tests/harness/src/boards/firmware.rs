@@ -7,19 +7,20 @@ use anyhow::{Context, Result, bail};
 
 use super::{Board, Profile};
 
-/// Builds the batch image and gives its path.
+/// Builds a program of a board and gives its path.
 ///
 /// # Errors
 /// What the compiler says, or that there is none for the board.
-pub fn build(board: Board, profile: Profile) -> Result<PathBuf> {
+pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../boards/build.sh");
     if !script.exists() {
         bail!("{} is not there: --board builds the firmware from the project's sources", script.display());
     }
     let mut command = Command::new("sh");
-    command.arg(&script).args([board.folder(), "batch"]).stderr(Stdio::piped());
+    command.arg(&script).args([board.folder(), program]).stderr(Stdio::piped());
     if profile == Profile::Small {
-        command.args(["--features", "small"]);
+        // for speed and little stack, where the reference grid is built for size
+        command.args(["--features", "small", "--config", "profile.release.opt-level=2"]);
     }
     let output = command.output().context("cannot run sh")?;
     if !output.status.success() {

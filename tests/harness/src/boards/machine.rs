@@ -22,7 +22,7 @@ pub fn batch(board: Board, image: &Path, settings: &Settings, scans: &[Scan], du
     let folder = Folder::new()?;
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     std::fs::write(folder.0.join("job.bin"), job(settings, scans, dump)).context("cannot write the job")?;
-    let mut child = Emulator::start(board, image, &folder.0)?;
+    let mut child = Emulator::start(board, image, &folder.0, Lines::None)?;
     let code = child.wait()?;
     let answer = std::fs::read(folder.0.join("answer.bin")).unwrap_or_default();
     // 1: refused, with its reason in the closing record
@@ -38,18 +38,38 @@ pub struct Emulator {
     child: Child,
 }
 
+/// What the board's serial lines are connected to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lines {
+    /// Nothing.
+    None,
+    /// Sockets in the emulator's folder.
+    Sockets(&'static [&'static str]),
+}
+
 impl Emulator {
     /// Starts a board with an image; its files lie in the folder.
     ///
     /// # Errors
     /// No emulator.
-    pub fn start(board: Board, image: &Path, folder: &Path) -> Result<Self> {
+    pub fn start(board: Board, image: &Path, folder: &Path, lines: Lines) -> Result<Self> {
         let mut command = match board {
             Board::Mps2An386 => cortex_m("mps2-an386", image),
             Board::Mps2An500 => cortex_m("mps2-an500", image),
             Board::Zcu102R5 => cortex_r(image),
         };
         command.args(["-display", "none", "-monitor", "none", "-semihosting-config", "enable=on,target=native"]);
+        match lines {
+            Lines::None => {
+                command.args(["-serial", "none"]);
+            }
+            Lines::Sockets(names) => {
+                for (k, name) in names.iter().enumerate() {
+                    command.arg("-chardev").arg(format!("socket,id=line{k},path={name}"));
+                    command.arg("-serial").arg(format!("chardev:line{k}"));
+                }
+            }
+        }
         let log = std::fs::File::create(folder.join("log")).context("cannot write the emulator's log")?;
         command.current_dir(folder).stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
         let program = command.get_program().to_string_lossy().into_owned();
@@ -92,7 +112,7 @@ impl Drop for Emulator {
 /// An instruction takes 64 ns, so that the board's timers count instructions.
 fn cortex_m(machine: &str, image: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
-    command.args(["-M", machine, "-icount", "shift=6", "-serial", "none", "-kernel"]).arg(image);
+    command.args(["-M", machine, "-icount", "shift=6", "-kernel"]).arg(image);
     command
 }
 
@@ -102,7 +122,7 @@ const CONTROL: &str = "control.sock";
 /// The real-time core is processor 4, and off at first.
 fn cortex_r(image: &Path) -> Command {
     let mut command = Command::new("qemu-system-aarch64");
-    command.args(["-M", "xlnx-zcu102", "-smp", "5", "-m", "256M", "-S", "-serial", "none"]);
+    command.args(["-M", "xlnx-zcu102", "-smp", "5", "-m", "256M", "-S"]);
     command.args(["-global", "xlnx-zynqmp.boot-cpu=rpu-cpu[0]"]);
     command.arg("-qmp").arg(format!("unix:{CONTROL},server=on,wait=off"));
     command.arg("-device").arg(format!("loader,file={},cpu-num=4", image.display()));
@@ -153,10 +173,14 @@ fn power_on(_: &Path) -> Result<()> {
 }
 
 /// A folder that goes when it is dropped.
-struct Folder(PathBuf);
+pub struct Folder(pub PathBuf);
 
 impl Folder {
-    fn new() -> Result<Self> {
+    /// A new one.
+    ///
+    /// # Errors
+    /// It cannot be created.
+    pub fn new() -> Result<Self> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let path = std::env::temp_dir().join(format!("viewshed-board-{}-{number}", std::process::id()));

@@ -2,15 +2,19 @@
 
 pub mod check;
 pub mod firmware;
+pub mod host;
 pub mod image;
+#[cfg(unix)]
+pub mod live;
 pub mod machine;
 pub mod report;
 pub mod scans;
+#[cfg(unix)]
+pub mod serial;
 pub mod stress;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::settings::Settings;
 
 use check::Checked;
@@ -82,25 +86,15 @@ impl Run<'_> {
     /// # Errors
     /// No image, no emulator, an answer that makes no sense. A frame that differs is no error here.
     pub fn check(&self) -> Result<Checked> {
-        match self.profile {
-            Profile::Reference => self.check_sized::<200, 120, 16, 7, 64, 256>(),
-            Profile::Small => self.check_sized::<100, 64, 8, 4, 28, 176>(),
-        }
-    }
-
-    fn check_sized<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-        &self,
-    ) -> Result<Checked> {
-        let image = firmware::build(self.board, self.profile)?;
-        let parameters = Radar3dParameters::<R, A, E>::new(&self.settings.sensor, &self.settings.radar_3d())?;
-        let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
-        let expected = check::fingerprints(&mut state, &parameters, self.scans);
+        let image = firmware::build(self.board, self.profile, "batch")?;
+        let (here, geometry) = host::answer(self.profile, self.settings, self.scans, None)?;
         let answer = machine::batch(self.board, &image, self.settings, self.scans, None)?;
-        let mut checked = check::compare(&answer, &expected, self.scans.len())?;
+        let mut checked = check::compare(&answer, &here, self.scans.len())?;
         checked.image = Some(image::Image::read(&image)?);
         if let Some(frame) = checked.first_difference {
-            let dumped = machine::batch(self.board, &image, self.settings, self.scans, Some(frame))?;
-            checked.difference = check::difference(&mut state, &parameters, self.scans, frame, &dumped)?;
+            let (here, _) = host::answer(self.profile, self.settings, self.scans, Some(frame))?;
+            let answer = machine::batch(self.board, &image, self.settings, self.scans, Some(frame))?;
+            checked.difference = Some(check::difference(&answer, &here, frame, &geometry)?);
         }
         Ok(checked)
     }

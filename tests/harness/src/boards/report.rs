@@ -42,7 +42,7 @@ pub struct Row {
     pub frames: usize,
     pub equal: usize,
     pub first_difference: Option<usize>,
-    /// Instructions a frame in all, and by stage in the order they run.
+    /// Instructions a frame of the estimator in all, and by stage in the order they run.
     pub instructions: Option<Cost>,
     pub stages: Vec<(&'static str, Option<Cost>)>,
     pub state_bytes: u32,
@@ -67,7 +67,7 @@ impl Row {
             frames: checked.frames,
             equal: checked.equal,
             first_difference: checked.first_difference,
-            instructions: Cost::of(checked.instructions.iter().map(|f| f.iter().sum())),
+            instructions: Cost::of(checked.instructions.iter().map(|f| f[..Stage::ESTIMATOR].iter().sum())),
             stages: Stage::ALL.iter().map(|s| (s.name(), stage(*s))).collect(),
             state_bytes,
             parameter_bytes,

@@ -1,11 +1,11 @@
 //! Batch mode: every map of a recording, here and there.
 
 use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::settings::Settings;
+use viewshed::stage::Stage;
 use viewshed_harness::boards::check::{self, Checked};
 use viewshed_harness::boards::scans::Scan;
-use viewshed_harness::boards::{Board, Profile, Run, firmware, machine, stress};
+use viewshed_harness::boards::{Board, Profile, Run, firmware, host, machine, stress};
 
 use crate::shipped;
 
@@ -23,7 +23,7 @@ fn run(board: Board, profile: Profile, name: &str, settings: &Settings, scans: &
 }
 
 fn worst(checked: &Checked) -> u32 {
-    checked.instructions.iter().map(|f| f.iter().sum()).max().unwrap()
+    checked.instructions.iter().map(|f| f[..Stage::ESTIMATOR].iter().sum()).max().unwrap()
 }
 
 #[test]
@@ -70,16 +70,14 @@ fn instruction_counts_repeat_exactly() {
 #[ignore = "needs QEMU"]
 fn a_controller_that_computes_something_else_is_found_out_cell_by_cell() {
     let (settings, scans) = shipped(1.0);
-    let parameters = Radar3dParameters::<100, 64, 8>::new(&settings.sensor, &settings.radar_3d()).unwrap();
-    let mut state = Box::new(Radar3d::<100, 64, 8, 4, 28, 176>::new());
-    let expected = check::fingerprints(&mut state, &parameters, &scans);
-    let image = firmware::build(Board::Mps2An386, Profile::Small).unwrap();
+    let (here, geometry) = host::answer(Profile::Small, &settings, &scans, Some(3)).unwrap();
+    let image = firmware::build(Board::Mps2An386, Profile::Small, "batch").unwrap();
     let mut other = settings;
     other.sensor.mount.pitch_deg += 0.5;
     let answer = machine::batch(Board::Mps2An386, &image, &other, &scans, Some(3)).unwrap();
-    let checked = check::compare(&answer, &expected, scans.len()).unwrap();
+    let checked = check::compare(&answer, &here, scans.len()).unwrap();
     assert!(checked.first_difference.is_some() && checked.equal < scans.len());
-    let difference = check::difference(&mut state, &parameters, &scans, 3, &answer).unwrap().unwrap();
+    let difference = check::difference(&answer, &here, 3, &geometry).unwrap();
     assert!(difference.text().contains("cells differ"), "{}", difference.text());
     assert!(difference.draw(&std::env::temp_dir().join("viewshed-boards-difference"), "test").is_ok());
 }
@@ -90,7 +88,7 @@ fn a_scan_larger_than_the_buffer_ends_the_job_with_its_reason() {
     let (settings, mut scans) = shipped(1.0);
     let one = scans[3].detections[0];
     scans[3].detections = vec![one; 20_000];
-    let image = firmware::build(Board::Mps2An386, Profile::Small).unwrap();
+    let image = firmware::build(Board::Mps2An386, Profile::Small, "batch").unwrap();
     let answer = machine::batch(Board::Mps2An386, &image, &settings, &scans, None).unwrap();
     let last = Record::from_bytes(answer[answer.len() - RECORD_LEN..].try_into().unwrap());
     assert!(matches!(last, Some(Record::Closing(c)) if (c.reason, c.frames) == (3, 3)), "{last:?}");

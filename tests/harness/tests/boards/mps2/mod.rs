@@ -2,3 +2,5 @@
 
 mod batch;
 mod image;
+#[cfg(unix)]
+mod serial;
