@@ -45,7 +45,7 @@ pub fn run(
 ) -> Result<ExitCode> {
     let (mut rows, mut differ) = (Vec::new(), false);
     for path in paths {
-        let recording = recording::mcap::read(path, &settings.reading)?;
+        let recording = recording::read(path, &settings.reading)?;
         let block = block(&recording, settings)?;
         let mut scenes = vec![(recording.name.as_str(), scans::of(&recording))];
         if args.stress {
