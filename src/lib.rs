@@ -109,6 +109,7 @@ pub mod bitmap;
 pub mod bits;
 mod bytes;
 pub mod can_bus;
+pub mod can_session;
 pub mod cartesian;
 pub mod config;
 pub mod detection;

@@ -3,6 +3,7 @@
 //! The only unsafe code of this board is here: start-up, the stack's limits and the panic handler.
 #![no_std]
 
+pub mod can;
 pub mod profile;
 pub mod semihost;
 pub mod stack;

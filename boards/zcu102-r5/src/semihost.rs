@@ -4,8 +4,8 @@ use core::ffi::CStr;
 
 use semihosting::fd::BorrowedFd;
 use semihosting::process;
-use semihosting::sys::arm_compat::{OpenMode, sys_open};
 use semihosting::sys;
+use semihosting::sys::arm_compat::{OpenMode, sys_open};
 use viewshed::pil::Bench;
 
 use crate::stack;
