@@ -45,6 +45,8 @@ pub enum Lines {
     None,
     /// Sockets in the emulator's folder.
     Sockets(&'static [&'static str]),
+    /// A CAN bus between both of the board's controllers; the registers of the second are ours.
+    CanBus,
 }
 
 impl Emulator {
@@ -62,6 +64,11 @@ impl Emulator {
         match lines {
             Lines::None => {
                 command.args(["-serial", "none"]);
+            }
+            Lines::CanBus => {
+                command.args(["-serial", "none", "-object", "can-bus,id=bus"]);
+                command.args(["-machine", "canbus0=bus", "-machine", "canbus1=bus", "-accel", "tcg"]);
+                command.args(["-qtest", "unix:registers.sock", "-qtest-log", "none"]);
             }
             Lines::Sockets(names) => {
                 for (k, name) in names.iter().enumerate() {
@@ -81,6 +88,15 @@ impl Emulator {
             power_on(&folder.join(CONTROL))?;
         }
         Ok(emulator)
+    }
+
+    /// Starts a board with a CAN bus to its second controller and with its registers open to us.
+    ///
+    /// # Errors
+    /// No emulator.
+    #[cfg(unix)]
+    pub fn on_can(board: Board, image: &Path, folder: &Path) -> Result<Self> {
+        Self::start(board, image, folder, Lines::CanBus)
     }
 
     /// Waits for the firmware to end and gives its exit code.

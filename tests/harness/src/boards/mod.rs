@@ -1,5 +1,7 @@
 //! Processor in the loop: the same scans through the library here and on a controller, every frame compared.
 
+#[cfg(unix)]
+pub mod can;
 pub mod check;
 pub mod firmware;
 pub mod host;

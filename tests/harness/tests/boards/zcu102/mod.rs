@@ -1,5 +1,8 @@
 //! The Cortex-R5F of the Zynq UltraScale+.
 
+#[cfg(unix)]
+mod can;
+
 use viewshed_harness::boards::image::Image;
 use viewshed_harness::boards::{Board, Profile, Run, firmware, stress};
 
