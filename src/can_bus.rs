@@ -131,14 +131,13 @@ impl BusKeeper {
     /// To be called at least every 10 ms.
     pub fn poll(&mut self, now: Time, port: &mut impl CanPort) {
         match self.state {
-            BusState::Off(until) => {
-                // a clock that stepped back does not keep it off
-                if until.since(now).is_none_or(|wait| wait == 0 || wait > BACK_OFF_US[1]) {
-                    port.start(self.listen_first);
-                    self.state = if self.listen_first { BusState::Listening(0) } else { BusState::Active };
-                    self.returned = Some(now);
-                }
+            // a clock that stepped back does not keep it off
+            BusState::Off(until) if until.since(now).is_none_or(|us| us == 0 || us > BACK_OFF_US[1]) => {
+                port.start(self.listen_first);
+                self.state = if self.listen_first { BusState::Listening(0) } else { BusState::Active };
+                self.returned = Some(now);
             }
+            BusState::Off(_) => {}
             _ if port.bus_off() => {
                 // nothing old leaves when it returns
                 port.abort();

@@ -132,7 +132,7 @@ impl CanBoard {
         let mut queue: VecDeque<&CanFrame> = frames.iter().collect();
         let mut since = Instant::now();
         while let Some(frame) = queue.front() {
-            if self.sent % ROW == 0 && self.read(NEAR + 0x1C)? & NOT_EMPTY != 0 {
+            if self.sent.is_multiple_of(ROW) && self.read(NEAR + 0x1C)? & NOT_EMPTY != 0 {
                 self.collect()?;
                 if since.elapsed() > Duration::from_secs(30) {
                     bail!("the board takes no more frames");
