@@ -264,7 +264,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Range cell of a ground distance.
     pub fn range_cell(&self, ground_cm: i32) -> Option<usize> {
-        usize::try_from(ground_cm / self.cell_cm).ok().filter(|r| *r < R)
+        usize::try_from(ground_cm / self.cell_cm.max(1)).ok().filter(|r| *r < R)
     }
 
     /// Range cells of a column that are in view on the slice plane.
@@ -281,10 +281,10 @@ fn part_of(slope: i32, height: i32) -> i32 {
     if slope >= height {
         256
     } else if slope < 1 << 23 {
-        (slope << 8) / height
+        (slope << 8) / height.max(1)
     } else {
         // rows this high lie at the sensor's feet
-        slope / (height >> 8)
+        slope / (height >> 8).max(1)
     }
 }
 

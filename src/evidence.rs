@@ -194,7 +194,7 @@ impl InverseSensor {
         column: &mut Column<R, E, W>,
     ) {
         // the detection's own cell and its spread stay
-        let end = (i32::from(r.ground_cm) / axes.cell_cm - 2).max(0) as usize;
+        let end = (i32::from(r.ground_cm) / axes.cell_cm.max(1) - 2).max(0) as usize;
         let mut row = None;
         column.change_before(end, |stack| {
             let row = *row.get_or_insert_with(|| {
@@ -227,7 +227,7 @@ impl InverseSensor {
         let place = axes.column_place(r.bearing());
         let reach = 2 * self.azimuth_sigma;
         let (first, last) = (((place - reach) >> 8).max(0), ((place + reach) >> 8).min(A as i32 - 1));
-        let middle = ground_cm / axes.cell_cm;
+        let middle = ground_cm / axes.cell_cm.max(1);
         for a in first..=last {
             let Some(column) = grid.column_mut(a as usize) else { continue };
             let by_azimuth = self.bell(a * 256 + 128 - place, self.azimuth_sigma);

@@ -48,6 +48,12 @@ pub struct Levelling {
     rotation: [[i32; 3]; 3],
 }
 
+impl Levelling {
+    /// No mount: everything lies at the origin.
+    pub(crate) const NOWHERE: Self =
+        Self { height_cm: 0, origin: RoadPoint::new(0, 0), heading: Direction { x: 0, y: 0 }, rotation: [[0; 3]; 3] };
+}
+
 impl Mount {
     /// Checks the pose and computes its integer form.
     ///

@@ -59,6 +59,21 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
         Self { grades: [[UNKNOWN; R]; A], occupancy: [[0; R]; A], geometry, visible_from, occupied_from }
     }
 
+    /// A map of no sensor, to be placed in static memory; everything is unknown.
+    pub const NOWHERE: Self = Self::unknown(
+        PolarGeometry { levelling: Levelling::NOWHERE, cell_cm: 0, azimuth_origin: Angle::ZERO, azimuth_span: 0 },
+        0,
+        0,
+    );
+
+    /// Makes it a map of a sensor, on which everything is unknown.
+    pub(crate) fn prepare(&mut self, geometry: PolarGeometry, visible_from: u8, occupied_from: u8) {
+        self.forget();
+        self.geometry = geometry;
+        self.visible_from = visible_from;
+        self.occupied_from = occupied_from;
+    }
+
     /// Makes everything unknown.
     pub fn forget(&mut self) {
         self.grades = [[UNKNOWN; R]; A];

@@ -24,6 +24,7 @@ use crate::reflection::Noise;
 use crate::scan::Scan;
 use crate::sensor::Sensor;
 use crate::spherical::SphericalGrid;
+use crate::stage::Stage;
 use crate::time::{Step, Time};
 use crate::voxelise::voxelise;
 
@@ -106,6 +107,11 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
     /// An empty map for these parameters.
     pub fn map(&self) -> PolarMap<R, A> {
         PolarMap::unknown(self.axes.polar(&self.levelling), self.visible_from, self.occupied_from)
+    }
+
+    /// Makes a map one for these parameters, where it lies: controllers have no stack for a second.
+    pub fn prepare(&self, map: &mut PolarMap<R, A>) {
+        map.prepare(self.axes.polar(&self.levelling), self.visible_from, self.occupied_from);
     }
 
     /// The grid's axes.
@@ -193,7 +199,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     /// Takes a radar frame and brings the map up to its time. `fault` is the sensor's own flag.
-    #[allow(clippy::cast_possible_truncation)] // bounded lists
     pub fn process<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
@@ -201,6 +206,20 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         detections: impl IntoIterator<Item = &'a Detection>,
         fault: bool,
         map: &mut PolarMap<R, A>,
+    ) -> FrameReport {
+        self.process_traced(p, now, detections, fault, map, |_| {})
+    }
+
+    /// [`process`](Self::process) that tells each stage as it ends.
+    #[allow(clippy::cast_possible_truncation)] // bounded lists
+    pub fn process_traced<'a>(
+        &mut self,
+        p: &Radar3dParameters<R, A, E>,
+        now: Time,
+        detections: impl IntoIterator<Item = &'a Detection>,
+        fault: bool,
+        map: &mut PolarMap<R, A>,
+        mut ended: impl FnMut(Stage),
     ) -> FrameReport {
         let mut reported = 0;
         self.scan.clear();
@@ -217,14 +236,17 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             Continuity::Follows(micros) => Step::from_micros(micros),
             _ => Step::from_micros(0),
         };
+        ended(Stage::Gate);
         let claimed = self.follow_obstacles(p, step, map);
-        self.update_grid(p, step, continuity, &claimed, map);
+        ended(Stage::Obstacles);
+        self.update_grid(p, step, continuity, &claimed, map, &mut ended);
         let condition = self.health.condition(now, &p.health);
         if condition == Condition::Healthy {
             raycast::cast(&self.grid, &p.axes, map);
         } else {
             map.forget();
         }
+        ended(Stage::RayCast);
         self.rejections.add_all(self.scan.rejections());
         FrameReport {
             continuity,
@@ -248,21 +270,26 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         continuity: Continuity,
         claimed: &Claimed<D>,
         map: &PolarMap<R, A>,
+        ended: &mut impl FnMut(Stage),
     ) {
         let first = !matches!(continuity, Continuity::Follows(_));
         self.grid.remove_solids();
         p.inverse_sensor.fade(&mut self.grid, map, step);
+        ended(Stage::Fade);
         let reflections = self.scan.reflections();
         p.inverse_sensor.clear(reflections, &p.axes, &mut self.grid);
+        ended(Stage::Clear);
         for (i, r) in reflections.iter().enumerate() {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
             if first || !(claimed.contains(i) || p.tracking.course(r).is_some()) {
                 p.inverse_sensor.add(r, first, &p.axes, &mut self.grid);
             }
         }
+        ended(Stage::Add);
         for solid in self.obstacles.solids(&p.tracking) {
             voxelise(&solid, &p.axes, &mut self.grid);
         }
+        ended(Stage::Voxelise);
     }
 
     /// Makes the map unknown when its time has run out; to be called when no frame comes.

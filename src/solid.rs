@@ -55,7 +55,7 @@ impl Solid {
                 continue;
             }
             // up to 2^17 cm, so that the shift stays in 32 bits
-            let at = |side: i32| ((side - start).clamp(-0x1FFFF, 0x1FFFF) << 14) / step;
+            let at = |side: i32| ((side - start).clamp(-0x1FFFF, 0x1FFFF) << 14).checked_div(step).unwrap_or(0);
             let (a, b) = (at(-half), at(half));
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));

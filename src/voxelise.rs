@@ -35,9 +35,9 @@ pub fn voxelise<const R: usize, const A: usize, const E: usize, const W: usize>(
         let ray = trig::direction(axes.azimuth_of((from + to) / 2));
         let Some((enter, leave)) = solid.crossing(origin, ray) else { continue };
         let Some(column) = grid.column_mut(a as usize) else { continue };
-        let nearest = (enter / axes.cell_cm) as usize;
+        let nearest = (enter / axes.cell_cm.max(1)) as usize;
         // the last cell counts where the box reaches its middle
-        let end = ((leave + axes.cell_cm / 2) / axes.cell_cm) as usize;
+        let end = ((leave + axes.cell_cm / 2) / axes.cell_cm.max(1)) as usize;
         for r in nearest..end.max(nearest + 1).min(R) {
             let (near, far) = (r as i32 * axes.cell_cm, (r as i32 + 1) * axes.cell_cm);
             let place = if solid.height_cm < axes.sensor_height_cm() { far.min(leave) } else { near.max(enter) };

@@ -29,11 +29,11 @@ impl Spherical {
     #[allow(clippy::cast_possible_truncation)] // cut to 16 bits
     pub(crate) fn radial(&self, [x, y]: [i32; 2], [vx, vy]: [i32; 2]) -> i16 {
         let dot = i64::from(x) * i64::from(vx) + i64::from(y) * i64::from(vy);
-        let range = i64::from(self.range_cm);
+        let range = i64::from(self.range_cm.max(1));
         let fine = 256 * dot / range;
         // what rounding the range took away, to first order
         let rest = i64::from(self.square) - range * range;
-        let corrected = fine - fine * rest / (2 * i64::from(self.square));
+        let corrected = fine - fine * rest / (2 * i64::from(self.square.max(1)));
         ((corrected + 128) >> 8).clamp(i64::from(i16::MIN), i64::from(i16::MAX)) as i16
     }
 }

@@ -41,7 +41,7 @@ impl<const D: usize> ByRange<D> {
     }
 
     fn bin(&self, ground_cm: i32) -> usize {
-        (ground_cm.max(0) / self.bin_cm).min(BINS as i32 - 1) as usize
+        (ground_cm.max(0) / self.bin_cm.max(1)).min(BINS as i32 - 1) as usize
     }
 
     /// Indices of all reflections between two distances, and of some around them.

@@ -56,7 +56,7 @@ struct Gathered {
 /// Weight of a lateral measurement with a standard deviation in centimetres: the inverse variance,
 /// with half a metre for where on the vehicle it reflects.
 fn weight(sigma_cm: i32) -> i32 {
-    (1 << 24) / (2500 + sigma_cm * sigma_cm)
+    (1 << 24) / (2500 + sigma_cm * sigma_cm).max(1)
 }
 
 /// Standard deviations of a detection along and across a heading, centimetres.
@@ -337,7 +337,7 @@ impl Obstacle {
         let square = i64::from(vx) * i64::from(vx) + i64::from(vy) * i64::from(vy);
         let speed = (square.unsigned_abs().isqrt()) as i64;
         if speed > i64::from(t.turning_speed) {
-            let unit = |v: i32| ((i64::from(v) << 14) / speed) as i16;
+            let unit = |v: i32| ((i64::from(v) << 14) / speed.max(1)) as i16;
             self.heading = Direction { x: unit(vx), y: unit(vy) };
         }
     }

@@ -97,7 +97,7 @@ impl Sizes {
         let mut size = self.points[0];
         for pair in self.points.windows(2) {
             let [a, b] = pair else { continue };
-            let run = length_cm.clamp(a.length_cm, b.length_cm) - a.length_cm;
+            let run = length_cm.max(a.length_cm).min(b.length_cm) - a.length_cm;
             let span = (b.length_cm - a.length_cm).max(1);
             size.width_cm += (b.width_cm - a.width_cm) * run / span;
             size.height_cm += (b.height_cm - a.height_cm) * run / span;

@@ -48,8 +48,8 @@ impl Tallness {
     /// The height that is proven, centimetres; 0 while nothing is.
     pub fn floor_cm(&self) -> i32 {
         let proven = |n: &u16| *n >= PROOF && u32::from(*n) * u32::from(ONE_IN) >= u32::from(self.measured);
-        let mut levels = self.above.iter().zip(LEVELS_CM).rev();
-        levels.find(|(n, _)| proven(n)).map_or(0, |(_, level)| level)
+        let mut levels = self.above.iter().zip(&LEVELS_CM).rev();
+        levels.find(|(n, _)| proven(n)).map_or(0, |(_, level)| *level)
     }
 }
 

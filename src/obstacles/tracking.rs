@@ -237,7 +237,7 @@ impl Tracking {
         if along.abs() < LEAST_PROJECTION || radial.abs() < 4 * self.noise.radial_velocity_cm_s {
             return None;
         }
-        let speed = (radial << 14) / along;
+        let speed = (radial << 14).checked_div(along)?;
         let heading = if speed > 0 { self.road } else { self.road.reversed() };
         (self.min_speed_cm_s..=FASTEST_CM_S).contains(&speed.abs()).then_some((heading, speed.abs()))
     }

@@ -8,7 +8,6 @@ use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use viewshed::angle::Angle;
 use viewshed::detection::{Detection, Measurement};
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
@@ -20,14 +19,12 @@ use viewshed::wire::code::ray::Known;
 use viewshed::wire::header::Header;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 use viewshed::wire::receive::{Limits, Receiver};
+use viewshed_harness::boards::stress;
 use viewshed_harness::estimators;
 use viewshed_harness::recording::mcap::read;
 
 const ESTIMATORS: [&str; 3] = ["radar-3d", "radar-3d-small", "radar-2d"];
 const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
-/// Frames of each adversarial scan.
-const FRAMES: u64 = 45;
-const FRAME_US: u64 = 66_667;
 
 /// What is measured on the recording's maps only.
 const WIRE: [&str; 4] = ["send-can", "receive-can", "send-long", "receive-long"];
@@ -115,7 +112,7 @@ fn work(estimator: &str, scene: &str) {
             .map(|f| (time(f.time_ns), f.detections.iter().filter_map(detection).collect()))
             .collect()
     } else {
-        (0..FRAMES).map(|k| (Time::from_micros(k * FRAME_US), adversarial(scene, k))).collect()
+        stress::scans(scene).into_iter().map(|s| (s.time, s.detections)).collect()
     };
     match estimator {
         "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
@@ -136,33 +133,6 @@ fn detection(d: &viewshed_harness::recording::RadarDetection) -> Option<Detectio
         snr_db: d.snr_db,
     })
     .ok()
-}
-
-/// 256 detections that fit the field of view: along one ray, one a ray, or new ones everywhere in
-/// every frame; with speeds of their own, so that few join.
-fn adversarial(scene: &str, frame: u64) -> Vec<Detection> {
-    let mut seed = if scene == "everywhere" { frame + 1 } else { 1 };
-    let mut random = |range: std::ops::Range<i32>| {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        range.start + ((seed >> 33) % (range.end - range.start) as u64) as i32
-    };
-    (0..256)
-        .map(|i| {
-            let (range_cm, azimuth) = match scene {
-                "one-ray" => (2000 + 69 * i, 500),
-                "all-rays" => (6000, -10_000 + 78 * i),
-                _ => (random(1500..19_900), random(-10_500..10_500)),
-            };
-            Detection {
-                range_cm: range_cm as u16,
-                azimuth: Angle::from_raw(azimuth as i16),
-                elevation: Some(Angle::from_raw(random(-1500..200) as i16)),
-                radial_velocity_cm_s: random(-3000..3000) as i16,
-                rcs_half_dbsm: Some(20),
-                snr_half_db: Some(60),
-            }
-        })
-        .collect()
 }
 
 fn run_3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(

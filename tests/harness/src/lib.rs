@@ -1,5 +1,6 @@
 //! Host-side harness of `viewshed`: recordings in, metrics and pictures out.
 
+pub mod boards;
 pub mod bus;
 pub mod commands;
 pub mod doctor;

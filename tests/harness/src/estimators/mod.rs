@@ -122,7 +122,7 @@ fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCel
 
 /// Turns recorded frames into the library's input and counts what cannot be.
 #[derive(Debug, Default)]
-struct Intake {
+pub(crate) struct Intake {
     detections: Vec<Detection>,
     not_finite: u64,
     range: u64,
@@ -130,7 +130,7 @@ struct Intake {
 }
 
 impl Intake {
-    fn take(&mut self, frame: &Frame) -> (Time, &[Detection]) {
+    pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection]) {
         self.detections.clear();
         for d in &frame.detections {
             let measurement = Measurement {

@@ -1,5 +1,6 @@
 //! `viewshed replay`: recordings in, the paper's table out.
 
+mod board;
 mod out;
 mod pictures;
 pub mod shipped;
@@ -74,6 +75,8 @@ pub struct Args {
     )]
     mount_error: Option<Extent>,
     #[command(flatten)]
+    processor: board::BoardArgs,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -84,6 +87,9 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    if let Some(board) = args.processor.board {
+        return board::run(board, &args.processor, &paths, args.out.as_deref(), args.json.as_deref(), &settings);
+    }
     if args.mcap.is_some() && paths.len() > 1 {
         bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());
     }

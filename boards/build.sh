@@ -1,0 +1,20 @@
+#!/bin/sh
+# Builds one program of a board as a release image and prints the image's path on stdout.
+#
+#   boards/build.sh BOARD PROGRAM [cargo options]
+#   boards/build.sh mps2-an386 batch --features small
+set -eu
+
+[ $# -ge 2 ] || { echo "usage: build.sh BOARD PROGRAM [cargo options]" >&2; exit 2; }
+here=$(cd "$(dirname "$0")" && pwd)
+board=$1
+program=$2
+shift 2
+cd "$here/$board"
+target=$(sed -n 's/^target = "\(.*\)"/\1/p' .cargo/config.toml)
+settings=$("$here/toolchain.sh" "$target")
+eval "$settings"
+# features share a file name, so each set has a folder
+folder=${CARGO_TARGET_DIR:-$here/../target}/boards/$board/$(echo "plain $*" | tr -c 'a-z0-9\n' '-')
+cargo build --quiet --release --target-dir "$folder" --bin "$program" "$@" >&2
+echo "$folder/$target/release/$program"

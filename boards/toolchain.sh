@@ -1,0 +1,95 @@
+#!/bin/sh
+# Makes `cargo build --target TARGET` possible for bare-metal targets, whatever compiler there is.
+#
+#   eval "$(boards/toolchain.sh TARGET...)"
+#
+# First choice: the installed compiler already has the target's core library, or rustup can add it.
+# Nothing is printed then. Second choice: Debian's compiler and library sources (rustc-web, cargo-web,
+# rust-web-src) build it once, without the network, into a directory of their own; the settings that
+# make cargo use it are printed. VIEWSHED_TOOLCHAIN=debian goes straight to the second choice.
+# Exit code 1 and one line on stderr if neither works.
+set -eu
+
+[ $# -gt 0 ] || { echo "usage: toolchain.sh TARGET..." >&2; exit 2; }
+
+# has_core COMPILER TARGET
+has_core() {
+    dir=$("$1" --print target-libdir --target "$2" 2>/dev/null) && ls "$dir"/libcore-*.rlib >/dev/null 2>&1
+}
+
+missing() {
+    for target in $targets; do has_core "$compiler" "$target" || printf '%s ' "$target"; done
+}
+
+targets=$*
+compiler=${RUSTC:-rustc}
+if [ "${VIEWSHED_TOOLCHAIN:-any}" != debian ] && command -v "$compiler" >/dev/null; then
+    absent=$(missing)
+    if [ -n "$absent" ] && command -v rustup >/dev/null; then
+        for target in $absent; do timeout 120 rustup target add "$target" >/dev/null 2>&1 || true; done
+        absent=$(missing)
+    fi
+    [ -n "$absent" ] || exit 0
+fi
+
+debian=/usr/bin/rustc
+library=/usr/lib/rustlib/src/rust/library
+if ! [ -x "$debian" ] || ! [ -x /usr/bin/cargo ] || ! [ -d "$library/core" ]; then
+    echo "no core library for $targets: \`rustup target add $targets\`, or on Debian" \
+        "\`apt-get install rustc-web cargo-web rust-web-src lld\`" >&2
+    exit 1
+fi
+version=$("$debian" -vV | sed -n 's/^commit-hash: //p')
+host=$("$debian" -vV | sed -n 's/^host: //p')
+# a directory a compiler version: libraries of another one do not fit
+root=${VIEWSHED_SYSROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/viewshed-sysroot}/$version
+mkdir -p "$root/bin" "$root/lib/rustlib"
+[ -e "$root/lib/rustlib/$host" ] || ln -s "/usr/lib/rustlib/$host" "$root/lib/rustlib/$host"
+printf '#!/bin/sh\nexec %s --sysroot "%s" "$@"\n' "$debian" "$root" >"$root/bin/rustc"
+chmod +x "$root/bin/rustc"
+
+# build_core TARGET: core and alloc with bitcode, which link-time optimisation asks for
+build_core() {
+    work=$(mktemp -d)
+    mkdir "$work/src"
+    echo '#![no_std]' >"$work/src/lib.rs"
+    cat >"$work/Cargo.toml" <<END
+[package]
+name = "sysroot"
+version = "0.0.0"
+edition = "2021"
+[profile.release]
+panic = "abort"
+[workspace]
+END
+    (
+        cd "$work"
+        unset CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_RUSTFLAGS CARGO_BUILD_TARGET RUSTC_WRAPPER
+        CARGO_HOME=$work/home CARGO_TARGET_DIR=$work/target RUSTC=$debian RUSTC_BOOTSTRAP=1 \
+            RUSTFLAGS=-Cembed-bitcode=yes /usr/bin/cargo build --quiet --offline --release --target "$1" \
+            -Zbuild-std=core,alloc -Zbuild-std-features=compiler-builtins-mem \
+            --config 'source.crates-io.replace-with="vendored"' \
+            --config "source.vendored.directory=\"$library/vendor\""
+    ) >&2
+    mkdir -p "$root/lib/rustlib/$1/lib"
+    for crate in core alloc compiler_builtins; do
+        cp "$work/target/$1/release/deps/lib$crate"-*.rlib "$root/lib/rustlib/$1/lib/"
+    done
+    rm -rf "$work"
+    touch "$root/lib/rustlib/$1/complete"
+}
+
+for target in $targets; do
+    [ -e "$root/lib/rustlib/$target/complete" ] || build_core "$target"
+done
+
+echo "export RUSTC='$root/bin/rustc' PATH=\"/usr/bin:\$PATH\""
+# bare-metal targets ask for rust-lld, which Debian's compiler does not bring
+for name in rust-lld ld.lld ld.lld-19 ld.lld-14; do
+    linker=$(command -v "$name") && break
+done
+[ -n "${linker:-}" ] || { echo "no linker: \`apt-get install lld\`" >&2; exit 1; }
+[ "${linker##*/}" = rust-lld ] && exit 0
+for target in $targets; do
+    echo "export CARGO_TARGET_$(echo "$target" | tr 'a-z-' 'A-Z_')_LINKER='$linker'"
+done

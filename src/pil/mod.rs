@@ -1,0 +1,17 @@
+//! Processor in the loop: recorded scans in, one fingerprint a frame out, to compare a controller with a PC.
+//!
+//! The host writes a [job](job), the controller runs the estimator over it and answers with
+//! [records](record): per frame a fingerprint over every grade, occupancy and bit of the map, and
+//! what each stage cost. The host runs the same estimator over the same job and compares. Time comes
+//! from the job, never from the controller's clock.
+//!
+//! # Model
+//! Both directions are plain byte streams of little-endian numbers, so that files, semihosting and
+//! serial ports carry them alike.
+
+pub mod fingerprint;
+pub mod job;
+pub mod record;
+mod run;
+
+pub use run::{Bench, Memory, run};

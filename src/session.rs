@@ -1,0 +1,250 @@
+//! A unit on two serial lines: bytes of radar and integrator in, messages out, from start to restart.
+//!
+//! # Model
+//! ```text
+//! bytes -> messages -+-> service: block written into a slot, read, restart, time
+//!                    +-> native scans -> unit -> maps, header, status -> bytes
+//! ```
+//! Without a block that holds there is no unit, only a status that says so: the safe state.
+//!
+//! # Limits
+//! Noise and half messages cost the messages they hit, and are counted as damaged.
+
+use crate::inputs::native::{Config, Outcome, Receiver};
+use crate::pil::record::FrameRecord;
+use crate::service::{Reply, Request, ServiceMessage};
+use crate::settings::{BLOCK_LEN, BlockError, Newest, Settings};
+use crate::stage::Stage;
+use crate::time::Time;
+use crate::unit::Unit;
+use crate::wire::message::{Epoch, Message, Packet, Packing};
+use crate::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
+use crate::wire::status::{Reason, State, Status};
+
+/// Where configuration blocks are kept.
+pub trait Slots {
+    /// The bytes of a slot, 0 or 1.
+    fn slot(&self, slot: usize) -> &[u8];
+    /// Writes a slot.
+    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]);
+}
+
+/// The outgoing line and the measurements of a test bench.
+pub trait Line {
+    /// Sends all bytes or none; `false` if the line takes no more now.
+    fn send(&mut self, bytes: &[u8]) -> bool;
+    /// A counter for what stages cost.
+    fn ticks(&mut self) -> u32;
+    /// What a frame gave and cost.
+    fn trace(&mut self, record: &FrameRecord);
+}
+
+/// What comes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flow {
+    /// More bytes.
+    Continue,
+    /// A start with the newest block.
+    Restart,
+}
+
+/// Most messages sent in one go.
+const MOST_MESSAGES: usize = 400;
+/// Time between two status messages in the safe state, microseconds.
+const SAFE_STATUS_US: u64 = 400_000;
+
+/// What lies between the lines and the unit. `D` detections a scan.
+#[derive(Debug)]
+pub struct Session<const D: usize> {
+    sensor: u8,
+    unstuffer: Unstuffer,
+    radar: Receiver<D>,
+    /// The block in use, or why there is none.
+    settings: Result<Newest, BlockError>,
+    now: Time,
+    /// Messages the line did not take.
+    refused: u16,
+    service_counter: u8,
+    frames: u32,
+    safe_status: Option<Time>,
+    safe_counter: u8,
+}
+
+impl<const D: usize> Session<D> {
+    /// Starts with the newest block that holds.
+    pub fn start(sensor: u8, slots: &impl Slots, line: &mut impl Line) -> Self {
+        let settings = Settings::newest([slots.slot(0), slots.slot(1)]).map_err(worst);
+        let mut session = Self {
+            sensor,
+            unstuffer: Unstuffer::new(),
+            radar: Receiver::new(Config::sensor(sensor)),
+            settings,
+            now: Time::from_micros(0),
+            refused: 0,
+            service_counter: 0,
+            frames: 0,
+            safe_status: None,
+            safe_counter: 0,
+        };
+        let slot = settings.ok().and_then(|n| u8::try_from(n.slot).ok());
+        session.reply(&Reply::Started(slot), line);
+        if let Err(reason) = settings {
+            session.reply(&Reply::Refused(&reason), line);
+        }
+        session
+    }
+
+    /// What to work with; none in the safe state.
+    pub fn settings(&self) -> Option<&Settings> {
+        self.settings.as_ref().ok().map(|n| &n.settings)
+    }
+
+    /// The time by what came in.
+    pub fn now(&self) -> Time {
+        self.now
+    }
+
+    /// Takes bytes as they come, cut anywhere, and sends what follows from them.
+    pub fn take<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+        &mut self,
+        bytes: &[u8],
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        slots: &mut impl Slots,
+        line: &mut impl Line,
+    ) -> Flow {
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let (taken, message) = self.unstuffer.push(rest);
+            rest = rest.get(taken..).unwrap_or(&[]);
+            let Some(message) = message else { continue };
+            if let Some(request) = Request::read(message, self.sensor) {
+                match request {
+                    Request::Restart => return Flow::Restart,
+                    Request::Write(block) => {
+                        let outcome = write(block, slots);
+                        let reply = match &outcome {
+                            Ok(sequence) => Reply::Written(*sequence),
+                            Err(reason) => Reply::Refused(reason),
+                        };
+                        send(&reply, self.sensor, &mut self.service_counter, &mut self.refused, line);
+                    }
+                    Request::Read => {
+                        let used = self.settings.as_ref().ok().map_or(&[][..], |n| slots.slot(n.slot));
+                        send(&Reply::Block(used), self.sensor, &mut self.service_counter, &mut self.refused, line);
+                    }
+                    Request::Time(now) => {
+                        self.now = now;
+                        while let Some(outcome) = self.radar.poll(now) {
+                            scan(&outcome, &mut self.now, &mut self.frames, unit, line);
+                        }
+                        if let Some(unit) = unit {
+                            unit.idle(self.now);
+                        }
+                    }
+                }
+            } else {
+                let outcome = self.radar.push(message, self.now);
+                scan(&outcome, &mut self.now, &mut self.frames, unit, line);
+                while let Some(outcome) = self.radar.poll(self.now) {
+                    scan(&outcome, &mut self.now, &mut self.frames, unit, line);
+                }
+            }
+            self.flush(unit, line);
+        }
+        Flow::Continue
+    }
+
+    fn flush<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+        &mut self,
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        line: &mut impl Line,
+    ) {
+        let mut stuffed = [0; MOST_STUFFED];
+        let Some(unit) = unit else { return self.say_safe(line) };
+        let damaged = self.radar.counters().damaged.saturating_add(self.unstuffer.errors());
+        let lost = self.radar.counters().lost;
+        let refused = core::mem::take(&mut self.refused);
+        let status = unit.broadcast().status_mut();
+        status.e2e_errors = u16::try_from(damaged).unwrap_or(u16::MAX);
+        status.radar_lost = u16::try_from(lost).unwrap_or(u16::MAX);
+        status.dropped = status.dropped.saturating_add(refused);
+        for _ in 0..MOST_MESSAGES {
+            let Some(message) = unit.next_line(self.now, &mut stuffed).and_then(|n| stuffed.get(..n)) else { break };
+            if !line.send(message) {
+                self.refused = self.refused.saturating_add(1);
+            }
+        }
+    }
+
+    /// In the safe state only the status is sent.
+    fn say_safe(&mut self, line: &mut impl Line) {
+        let due = self.safe_status.is_none_or(|last| self.now.since(last).is_none_or(|us| us >= SAFE_STATUS_US));
+        if !due {
+            return;
+        }
+        self.safe_status = Some(self.now);
+        let status = Status { state: State::Fault, reason: Reason::Configuration, ..Status::starting(0) };
+        let packet = Packet::new(Packing::Long, self.sensor, Message::Status, Epoch::new(0), &status.emit());
+        let packet = packet.protect(self.safe_counter, None);
+        self.safe_counter = Packing::Long.profile().next(self.safe_counter);
+        let mut stuffed = [0; MOST_STUFFED];
+        if let Some(bytes) = stuff(packet.bytes(), &mut stuffed).and_then(|n| stuffed.get(..n)) {
+            let _ = line.send(bytes);
+        }
+    }
+
+    fn reply(&mut self, reply: &Reply<'_>, line: &mut impl Line) {
+        send(reply, self.sensor, &mut self.service_counter, &mut self.refused, line);
+    }
+}
+
+/// Of two refusals the one that says more: an empty slot says least.
+fn worst([first, second]: [BlockError; 2]) -> BlockError {
+    if first == BlockError::Empty { second } else { first }
+}
+
+/// Checks a block and writes it into the slot not in use; its sequence.
+fn write(block: &[u8], slots: &mut impl Slots) -> Result<u32, BlockError> {
+    let (_, settings) = Settings::from_block(block)?;
+    let newest = Settings::newest([slots.slot(0), slots.slot(1)]);
+    let (slot, sequence) = newest.map_or((0, 1), |n| (n.next_slot, n.next_sequence));
+    slots.write(slot, &settings.to_block(sequence));
+    // what was written counts, not what was meant
+    Settings::from_block(slots.slot(slot)).map(|(sequence, _)| sequence)
+}
+
+fn send(reply: &Reply<'_>, sensor: u8, counter: &mut u8, refused: &mut u16, line: &mut impl Line) {
+    let message: ServiceMessage = reply.message(sensor, *counter);
+    *counter = Packing::Long.profile().next(*counter);
+    let mut stuffed = [0; MOST_STUFFED];
+    let bytes = stuff(message.bytes(), &mut stuffed).and_then(|n| stuffed.get(..n));
+    if !bytes.is_some_and(|bytes| line.send(bytes)) {
+        *refused = refused.saturating_add(1);
+    }
+}
+
+fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+    outcome: &Outcome<'_>,
+    now: &mut Time,
+    frames: &mut u32,
+    unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+    line: &mut impl Line,
+) {
+    let (Outcome::Scan(scan), Some(unit)) = (outcome, unit) else { return };
+    *now = scan.time;
+    let mut ticks = [0; Stage::COUNT];
+    let mut last = line.ticks();
+    let report = unit.scan(scan.time, scan.detections, scan.fault, |stage| {
+        let now = line.ticks();
+        if let Some(t) = ticks.get_mut(stage as usize) {
+            *t = now.wrapping_sub(last);
+        }
+        last = now;
+    });
+    if scan.missing > 0 {
+        unit.broadcast().status_mut().reason = Reason::IncompleteScans;
+    }
+    let record = FrameRecord { frame: *frames, condition: report.condition, used: report.used, fingerprint: 0, ticks };
+    line.trace(&record);
+    *frames = frames.wrapping_add(1);
+}

@@ -1,0 +1,57 @@
+//! The stages of a frame, for whoever measures what each costs.
+
+/// A stage of the radar-3d estimator in the order of its picture, and what follows it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Stage {
+    /// Gate, and reflections on the ground.
+    Gate,
+    /// Moving obstacles.
+    Obstacles,
+    /// Evidence of the frames before fades.
+    Fade,
+    /// Lines of sight clear what they pass.
+    Clear,
+    /// Detections add evidence.
+    Add,
+    /// Obstacles become occupied cells.
+    Voxelise,
+    /// Ray casting and slice.
+    RayCast,
+    /// The map into messages; no part of the estimator.
+    Broadcast,
+}
+
+impl Stage {
+    /// How many of them are the estimator's.
+    pub const ESTIMATOR: usize = Self::COUNT - 1;
+
+    /// How many there are.
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// All, in the order they run.
+    pub const ALL: [Self; 8] = [
+        Self::Gate,
+        Self::Obstacles,
+        Self::Fade,
+        Self::Clear,
+        Self::Add,
+        Self::Voxelise,
+        Self::RayCast,
+        Self::Broadcast,
+    ];
+
+    /// Short name for reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gate => "gate",
+            Self::Obstacles => "obstacles",
+            Self::Fade => "fade",
+            Self::Clear => "clear",
+            Self::Add => "add",
+            Self::Voxelise => "voxelise",
+            Self::RayCast => "ray cast",
+            Self::Broadcast => "broadcast",
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! A sensor's unit: scans in, the map kept up to date, its broadcast and its status out.
+//!
+//! This is the loop every controller runs, without its drivers. Time is always the caller's: on the
+//! road a timer's, in a test bench the recording's. A board calls [`Unit::scan`] with each scan,
+//! [`Unit::idle`] between them, at least ten times a second, and sends what [`Unit::next_line`] or
+//! [`Unit::next_frame`] gives until there is nothing more.
+
+use crate::axes::Axes;
+use crate::detection::Detection;
+use crate::health::{Condition, Continuity};
+use crate::polar::PolarMap;
+use crate::radar_3d::{FrameReport, Radar3d, Radar3dParameters};
+use crate::settings::Settings;
+use crate::stage::Stage;
+use crate::time::Time;
+use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use crate::wire::code::ray::Known;
+use crate::wire::frame::CanFrame;
+use crate::wire::header::{Header, NotAHeader, fingerprint};
+use crate::wire::message::Epoch;
+use crate::wire::status::{Reason, State};
+
+/// Time between two maps that say unknown, microseconds.
+const UNKNOWN_EVERY_US: u64 = 100_000;
+
+/// One sensor's estimator, map and sender; each in the memory the board gave it.
+#[derive(Debug)]
+pub struct Unit<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> {
+    parameters: &'a Radar3dParameters<R, A, E>,
+    state: &'a mut Radar3d<R, A, E, W, N, D>,
+    map: &'a mut PolarMap<R, A>,
+    broadcast: &'a mut Broadcaster<A, W>,
+    /// The last map that was offered to the sender.
+    offered: Option<Time>,
+}
+
+/// The header of a unit's maps.
+///
+/// # Errors
+/// A map that cannot be sent.
+pub fn header<const R: usize, const A: usize, const E: usize>(
+    settings: &Settings,
+    parameters: &Radar3dParameters<R, A, E>,
+) -> Result<Header, NotAHeader> {
+    let axes: &Axes<R, A, E> = parameters.axes();
+    let view = axes.view(A / 2);
+    let geometry = axes.polar(parameters.levelling());
+    let usual = Known::new(view.start, view.end);
+    Header::new::<R, A>(&settings.sensor.mount, &geometry, usual, 1, fingerprint(&settings.to_block(0)))
+}
+
+impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
+    Unit<'a, R, A, E, W, N, D>
+{
+    /// Puts the parts together; the map becomes one of these parameters, everything on it unknown.
+    pub fn new(
+        parameters: &'a Radar3dParameters<R, A, E>,
+        state: &'a mut Radar3d<R, A, E, W, N, D>,
+        map: &'a mut PolarMap<R, A>,
+        broadcast: &'a mut Broadcaster<A, W>,
+    ) -> Self {
+        parameters.prepare(map);
+        state.reset();
+        Self { parameters, state, map, broadcast, offered: None }
+    }
+
+    /// Takes a scan measured at this time and offers its map to the sender.
+    pub fn scan<'d>(
+        &mut self,
+        measured: Time,
+        detections: impl IntoIterator<Item = &'d Detection>,
+        fault: bool,
+        mut ended: impl FnMut(Stage),
+    ) -> FrameReport {
+        let report = self.state.process_traced(self.parameters, measured, detections, fault, self.map, &mut ended);
+        self.tell(report.condition);
+        let status = self.broadcast.status_mut();
+        if fault {
+            status.reason = Reason::RadarFault;
+        } else if report.continuity == Continuity::ClockStepped {
+            status.reason = Reason::ClockStepped;
+        }
+        self.offer(measured);
+        ended(Stage::Broadcast);
+        report
+    }
+
+    /// What is to be done when no scan came: the map runs out, and that is sent.
+    pub fn idle(&mut self, now: Time) -> Condition {
+        let condition = self.state.expire(self.parameters, now, self.map);
+        self.tell(condition);
+        let due = self.offered.is_none_or(|last| now.since(last).is_none_or(|us| us >= UNKNOWN_EVERY_US));
+        if condition != Condition::Healthy && due {
+            self.offer(now);
+        }
+        condition
+    }
+
+    fn offer(&mut self, measured: Time) {
+        self.offered = Some(measured);
+        // not sent while the epoch is new: the next one will be
+        let _ = self.broadcast.scan(measured, &*self.map);
+    }
+
+    fn tell(&mut self, condition: Condition) {
+        let status = self.broadcast.status_mut();
+        (status.state, status.reason) = match condition {
+            Condition::Starting => (State::Starting, Reason::None),
+            Condition::Healthy => (State::Ok, Reason::None),
+            Condition::Blind => (State::Blind, Reason::None),
+            Condition::Stale => (State::Blind, Reason::RadarSilent),
+        };
+    }
+
+    /// Forgets everything but the counters: what comes next does not follow.
+    pub fn reset(&mut self) {
+        self.state.reset();
+        self.map.forget();
+    }
+
+    /// The next message for a serial line, if one is due; see [`Broadcaster::next_line`].
+    pub fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize> {
+        self.broadcast.next_line(now, line)
+    }
+
+    /// The next CAN frame, if one is due.
+    pub fn next_frame(&mut self, now: Time) -> Option<CanFrame> {
+        self.broadcast.next_frame(now)
+    }
+
+    /// The map.
+    pub fn map(&self) -> &PolarMap<R, A> {
+        self.map
+    }
+
+    /// The sender, for its counters and its clock.
+    pub fn broadcast(&mut self) -> &mut Broadcaster<A, W> {
+        self.broadcast
+    }
+}
+
+/// The sender of a unit in a test bench: every message at the moment it is due.
+///
+/// # Errors
+/// A map that cannot be sent.
+pub fn bench_sender<const R: usize, const A: usize, const E: usize, const W: usize>(
+    settings: &Settings,
+    parameters: &Radar3dParameters<R, A, E>,
+    medium: Medium,
+    epoch: Epoch,
+    now: Time,
+) -> Option<Broadcaster<A, W>> {
+    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
+    Broadcaster::new(config, header(settings, parameters).ok()?, epoch, now).ok()
+}

@@ -1,0 +1,67 @@
+#!/bin/sh
+# Builds the boards' firmware and runs it on emulated controllers.
+#
+#   tests/firmware.sh
+#
+# Installs what it needs where it may (root on Debian or Ubuntu), and says in one line what it skipped
+# and why. The last line is `firmware: N passed, M skipped`; the exit code is 0 unless something failed.
+set -u
+
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root" || exit 1
+passed=0
+skipped=0
+failed=0
+
+skip() {
+    echo "skipped: $1: $2"
+    skipped=$((skipped + 1))
+}
+
+# install PACKAGE...: quietly, 1 where that is not possible
+install() {
+    [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 1
+    apt-get install --yes --no-install-recommends "$@" >/dev/null 2>&1 ||
+        { apt-get update >/dev/null 2>&1 && apt-get install --yes --no-install-recommends "$@" >/dev/null 2>&1; }
+}
+
+# compiler TARGET: whether there will be one
+compiler() {
+    boards/toolchain.sh "$1" >/dev/null 2>&1 && return
+    install rustc-web cargo-web rust-web-src lld gcc && boards/toolchain.sh "$1" >/dev/null
+}
+
+# cargo_tests FILTER WHAT: the ignored tests of that name
+cargo_tests() {
+    echo "== $2"
+    log=$(mktemp)
+    if cargo test --quiet --release -p viewshed-harness --test boards -- --ignored "$1" >"$log" 2>&1; then
+        # the line ends with the times that differ from run to run
+        passed=$((passed + $(sed -n 's/^test result: ok. \([0-9]*\) passed.*/\1/p' "$log")))
+        sed -n 's/^test result: \(.*\); finished.*/\1/p' "$log"
+    else
+        cat "$log"
+        failed=$((failed + 1))
+    fi
+    rm -f "$log"
+}
+
+command -v qemu-system-arm >/dev/null || install qemu-system-arm
+if ! command -v qemu-system-arm >/dev/null; then
+    skip "emulated boards" "no qemu-system-arm (apt-get install qemu-system-arm)"
+elif ! compiler thumbv7em-none-eabihf; then
+    skip "mps2-an386" "no compiler for thumbv7em-none-eabihf (rustup target add thumbv7em-none-eabihf)"
+else
+    cargo_tests mps2 "mps2-an386: every map the same, budgets, contents of the image"
+fi
+
+if ! command -v qemu-system-aarch64 >/dev/null && ! install qemu-system-arm; then
+    skip "zcu102-r5" "no qemu-system-aarch64 (apt-get install qemu-system-arm)"
+elif ! compiler armv7r-none-eabihf; then
+    skip "zcu102-r5" "no compiler for armv7r-none-eabihf (rustup target add armv7r-none-eabihf)"
+else
+    cargo_tests zcu102 "zcu102-r5: every map the same, contents of the image"
+fi
+
+echo "firmware: $passed passed, $skipped skipped"
+[ "$failed" = 0 ]

@@ -1,0 +1,30 @@
+//! Building a board's image.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+use super::{Board, Profile};
+
+/// Builds a program of a board and gives its path.
+///
+/// # Errors
+/// What the compiler says, or that there is none for the board.
+pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../boards/build.sh");
+    if !script.exists() {
+        bail!("{} is not there: --board builds the firmware from the project's sources", script.display());
+    }
+    let mut command = Command::new("sh");
+    command.arg(&script).args([board.folder(), program]).stderr(Stdio::piped());
+    if profile == Profile::Small {
+        // for speed and little stack, where the reference grid is built for size
+        command.args(["--features", "small", "--config", "profile.release.opt-level=2"]);
+    }
+    let output = command.output().context("cannot run sh")?;
+    if !output.status.success() {
+        bail!("cannot build the firmware of {}: {}", board.name(), String::from_utf8_lossy(&output.stderr).trim());
+    }
+    Ok(PathBuf::from(String::from_utf8_lossy(&output.stdout).trim()))
+}

@@ -1,0 +1,20 @@
+//! Firmware on emulated controllers. They need QEMU and a compiler for the target, so they are ignored
+//! unless asked for: `tests/firmware.sh` sees to both.
+
+mod mps2;
+mod zcu102;
+
+use std::path::Path;
+
+use viewshed::settings::Settings;
+use viewshed_harness::boards::scans::{self, Scan};
+use viewshed_harness::estimators;
+use viewshed_harness::recording::{ReadOptions, mcap};
+
+/// The shipped recording's settings and its first seconds.
+fn shipped(seconds: f64) -> (Settings, Vec<Scan>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
+    let reading = ReadOptions { to_s: Some(seconds), ..ReadOptions::default() };
+    let recording = mcap::read(&path, &reading).unwrap();
+    (Settings::of(estimators::sensor(&recording, &Default::default())), scans::of(&recording))
+}

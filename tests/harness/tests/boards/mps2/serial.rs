@@ -1,0 +1,206 @@
+//! The serial lines: scans in over one UART, protected maps out over another, and what may go wrong.
+
+use std::time::Duration;
+
+use viewshed::map::Visibility;
+use viewshed::pil::record::{RECORD_LEN, Record};
+use viewshed::service::Request;
+use viewshed::settings::{BLOCK_LEN, Settings};
+use viewshed::time::Time;
+use viewshed::wire::message::{Addresses, Received};
+use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::serial::Unstuffer;
+use viewshed::wire::status::{Reason, State};
+use viewshed_harness::boards::live::{Answered, SENSOR, Script, answer, on_the_line};
+use viewshed_harness::boards::machine::{Emulator, Folder, Lines};
+use viewshed_harness::boards::scans::Scan;
+use viewshed_harness::boards::serial::{LINES, SerialBoard, Waiting};
+use viewshed_harness::boards::{Board, Profile, firmware};
+
+use crate::shipped;
+
+/// A board that runs the live program; the emulator ends with it.
+struct Running {
+    line: SerialBoard,
+    /// What it should have sent.
+    expected: Option<Answered>,
+    _emulator: Emulator,
+    _folder: Folder,
+}
+
+fn start(profile: Profile) -> Running {
+    let image = firmware::build(Board::Mps2An386, profile, "live").unwrap();
+    let folder = Folder::new().unwrap();
+    let waiting = Waiting::new(&folder.0).unwrap();
+    let emulator = Emulator::start(Board::Mps2An386, &image, &folder.0, Lines::Sockets(&LINES)).unwrap();
+    Running { line: waiting.accept().unwrap(), expected: None, _emulator: emulator, _folder: folder }
+}
+
+/// Sends a script and compares every byte that comes back.
+fn same(profile: Profile, script: &Script) -> Running {
+    let mut board = start(profile);
+    let expected = answer(profile, &script.bytes);
+    board.line.send(&script.bytes).unwrap();
+    board.line.wait_for(expected.bytes.len(), Duration::from_secs(10)).unwrap();
+    let got = &board.line.answer;
+    let first = got.iter().zip(&expected.bytes).position(|(a, b)| a != b);
+    assert_eq!((first, got.len()), (None, expected.bytes.len()), "first byte that differs, and how many came");
+    board.expected = Some(expected);
+    board
+}
+
+fn messages(bytes: &[u8]) -> Vec<Vec<u8>> {
+    let (mut unstuffer, mut rest, mut all) = (Unstuffer::new(), bytes, Vec::new());
+    while !rest.is_empty() {
+        let (taken, message) = unstuffer.push(rest);
+        rest = &rest[taken..];
+        all.extend(message.map(<[u8]>::to_vec));
+    }
+    all
+}
+
+type Far = Receiver<1, 120, 7>;
+
+/// A receiver that heard everything when it was sent.
+fn listen(answered: &Answered) -> Far {
+    let mut receiver = Far::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+    let mut from = 0;
+    for (to, now) in &answered.times {
+        for message in messages(&answered.bytes[from..*to]) {
+            if Received::from_bytes(&message).is_ok() {
+                let _ = receiver.message(*now, &message);
+            }
+        }
+        from = *to;
+    }
+    receiver
+}
+
+fn script(settings: &Settings, scans: &[Scan]) -> Script {
+    let mut script = Script::default();
+    script.configure(settings);
+    scans.iter().for_each(|s| script.scan(s, scans[0].time));
+    script
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn every_byte_of_five_seconds_is_the_same() {
+    let (settings, scans) = shipped(5.0);
+    let board = same(Profile::Reference, &script(&settings, &scans));
+    let records = board.line.trace.chunks_exact(RECORD_LEN).map(|r| Record::from_bytes(r.try_into().unwrap()));
+    let frames = records.filter(|r| matches!(r, Some(Record::Frame(f)) if f.used > 0)).count();
+    assert_eq!(frames, scans.len(), "a trace a frame");
+    // the last map as a receiver has it
+    let now = on_the_line(scans.last().unwrap().time, scans[0].time);
+    let far = listen(board.expected.as_ref().unwrap());
+    let map = far.map(SENSOR, now);
+    let visible = (0..120 * 200).filter(|k| map.cell(k / 200, k % 200).visibility == Visibility::Visible).count();
+    assert!(visible > 5000, "{visible}");
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn noise_half_messages_and_jumping_clocks_change_nothing_but_counters() {
+    let (settings, scans) = shipped(4.0);
+    let mut script = Script::default();
+    script.configure(&settings);
+    let (mut seed, first) = (1_u32, scans[0].time);
+    let mut random = move || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        seed >> 16
+    };
+    for (k, scan) in scans.iter().enumerate() {
+        let from = script.bytes.len();
+        script.scan(scan, first);
+        match k % 6 {
+            // a flipped byte, a message cut in half, noise between, the same again
+            1 => {
+                let at = from + random() as usize % (script.bytes.len() - from);
+                script.bytes[at] ^= 0x20;
+            }
+            2 => script.bytes.truncate(from + (script.bytes.len() - from) / 2),
+            3 => script.bytes.extend((0..random() % 300).map(|_| (random() & 0xFF) as u8)),
+            4 => script.bytes.extend_from_within(from..),
+            _ => {}
+        }
+        if k == 20 || k == 40 {
+            // forwards over every hold time, and back
+            let jump = if k == 20 { 5_000_000 } else { 0 };
+            script.time(Time::from_micros(scan.time.micros() + jump), first);
+        }
+    }
+    let board = same(Profile::Small, &script);
+    let mut counted = 0;
+    for message in messages(&board.line.answer) {
+        counted += usize::from(Received::from_bytes(&message).is_ok());
+    }
+    assert!(counted > scans.len() / 2, "maps went on: {counted} messages");
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn a_radar_that_stops_makes_the_map_unknown_and_the_status_blind() {
+    let (settings, scans) = shipped(2.0);
+    let mut script = script(&settings, &scans);
+    let (first, last) = (scans[0].time, scans.last().unwrap().time);
+    let later = |ms: u64| Time::from_micros(last.micros() + ms * 1000);
+    (1..=12).for_each(|k| script.time(later(k * 100), first));
+    let board = same(Profile::Reference, &script);
+    let now = on_the_line(later(1200), first);
+    let far = listen(board.expected.as_ref().unwrap());
+    let map = far.map(SENSOR, now);
+    assert!((0..120 * 200).all(|k| map.cell(k / 200, k % 200).visibility == Visibility::Unknown));
+    let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
+    assert_eq!((status.state, status.reason), (State::Blind, Reason::RadarSilent));
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn a_corrupted_configuration_is_refused_with_its_reason_and_nothing_is_sent_but_the_status() {
+    let (settings, scans) = shipped(1.0);
+    let first = scans[0].time;
+    let mut script = Script::default();
+    let mut block = settings.to_block(1);
+    block[40] ^= 1;
+    script.request(&Request::Write(&block));
+    let mut wrong = settings;
+    wrong.sensor.mount.height_m = 50.0;
+    script.request(&Request::Write(&wrong.to_block(1)));
+    script.request(&Request::Restart);
+    scans.iter().for_each(|s| script.scan(s, first));
+    script.time(scans.last().unwrap().time, first);
+    let board = same(Profile::Small, &script);
+    let all = messages(&board.line.answer);
+    let refusals: Vec<&[u8]> = all.iter().filter(|m| m.get(3) == Some(&132)).map(|m| &m[4..]).collect();
+    assert!(refusals.iter().any(|r| r[0] == 4), "the check sum");
+    assert!(refusals.iter().any(|r| r[0] == 5 && &r[5..] == b"mount.height_m"), "the parameter by name");
+    let far = listen(board.expected.as_ref().unwrap());
+    let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
+    assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+    assert!(far.sensor(SENSOR).unwrap().header().is_none(), "no header, no map");
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn a_configuration_reads_back_and_counts_from_the_restart_on() {
+    let (settings, scans) = shipped(1.0);
+    let mut script = script(&settings, &scans);
+    let mut other = settings;
+    other.visibility.visible_from = 0.8;
+    script.request(&Request::Write(&other.to_block(0)));
+    script.request(&Request::Read);
+    script.request(&Request::Restart);
+    script.request(&Request::Read);
+    scans.iter().for_each(|s| script.scan(s, scans[0].time));
+    let board = same(Profile::Small, &script);
+    let all = messages(&board.line.answer);
+    let blocks: Vec<_> = all
+        .iter()
+        .filter(|m| m.get(3) == Some(&130) && m.len() == 4 + BLOCK_LEN)
+        .map(|m| Settings::from_block(&m[4..]).unwrap())
+        .collect();
+    assert_eq!(blocks.len(), 2);
+    assert_eq!((blocks[0].1, blocks[1].1), (settings, other));
+    assert_eq!((blocks[0].0, blocks[1].0), (1, 2), "sequences");
+}

@@ -1,0 +1,80 @@
+//! A unit on serial lines that take nothing for a while.
+
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // tests may fail loudly
+
+mod common;
+
+use viewshed::inputs::native::{Medium as Native, Sender};
+use viewshed::pil::record::FrameRecord;
+use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::session::{Line, Session, Slots};
+use viewshed::settings::{BLOCK_LEN, Settings};
+use viewshed::time::Time;
+use viewshed::unit::{Unit, bench_sender};
+use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::wire::message::Epoch;
+use viewshed::wire::serial::{MOST_STUFFED, stuff};
+
+use common::{Vehicle, gantry};
+
+struct Block([u8; BLOCK_LEN]);
+
+impl Slots for Block {
+    fn slot(&self, slot: usize) -> &[u8] {
+        if slot == 0 { &self.0 } else { &[] }
+    }
+
+    fn write(&mut self, _: usize, block: &[u8; BLOCK_LEN]) {
+        self.0 = *block;
+    }
+}
+
+#[derive(Default)]
+struct Narrow {
+    open: bool,
+    messages: usize,
+}
+
+impl Line for Narrow {
+    fn send(&mut self, _: &[u8]) -> bool {
+        self.messages += usize::from(self.open);
+        self.open
+    }
+
+    fn ticks(&mut self) -> u32 {
+        0
+    }
+
+    fn trace(&mut self, _: &FrameRecord) {}
+}
+
+#[test]
+fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() {
+    let settings = Settings::of(gantry(6.0, 0.0));
+    let parameters = Radar3dParameters::<50, 40, 8>::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    let mut map = parameters.map();
+    let mut sender: Broadcaster<40, 2> =
+        bench_sender(&settings, &parameters, Medium::Serial, Epoch::new(1), Time::from_micros(0)).unwrap();
+    let mut unit = Some(Unit::new(&parameters, &mut state, &mut map, &mut sender));
+    let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow::default());
+    let mut session = Session::<64>::start(0, &slots, &mut line);
+    assert_eq!(session.settings(), Some(&settings));
+
+    let (mut radar, car) = (Sender::new(0), Vehicle::car(40.0, 2.0, 22.0));
+    let mut after = Vec::new();
+    for k in 0..60_u64 {
+        line.open = k >= 40;
+        let scan = car.at(k as f64 / 15.0).detections(&gantry(6.0, 0.0), true);
+        for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, Native::Serial) {
+            let mut stuffed = [0; MOST_STUFFED];
+            let n = stuff(message.bytes(), &mut stuffed).unwrap();
+            session.take(&stuffed[..n], &mut unit, &mut slots, &mut line);
+        }
+        after.push((line.messages, unit.as_mut().unwrap().broadcast().status_mut().dropped));
+    }
+    assert_eq!(after[39].0, 0);
+    assert!(after[39].1 > 30, "{after:?}");
+    assert!(after[59].0 >= 20, "a map a scan from then on: {after:?}");
+    assert!(after[59].1 <= after[40].1 + 1, "and nothing more is dropped: {after:?}");
+}
