@@ -14,8 +14,13 @@ run() {
     "$@" 2>&1 | tee -a "$log" || status=1
 }
 
-run cargo test --release --locked --workspace
-[ ! -x tests/firmware.sh ] || run tests/firmware.sh
+run cargo test --release --locked --workspace --no-fail-fast
+# overflow checks are on in this one
+run cargo test --locked --package viewshed --test properties
+run tests/recordings/make.sh --check
+run tests/cantools.sh
+run tests/mcap_ros2.sh
+run tests/firmware.sh
 
 echo
 echo "== summary"
