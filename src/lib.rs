@@ -67,6 +67,11 @@
 //! | the flat baseline | [`cartesian`], [`sightlines`] |
 //! | whole estimators | [`radar_3d`], [`radar_2d`] |
 //! | results: the map interface, queries, the 1 m grid, the bitmap | [`map`], [`query`], [`resample`], [`bitmap`] |
+//! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
+//! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
+//! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`service`], [`settings`] |
+//! | a bus looked after: listen first, back off after bus-off | [`can_bus`] |
+//! | the same input on a controller and on a PC, compared | [`pil`], [`stage`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
 //!
 //! # What was decided, and why
@@ -84,7 +89,8 @@
 //!   the grid by the inverse sensor model instead, where evidence decays per second and is cleared only
 //!   where the map says that it could have been seen.
 //! - **Gaps end with headway.** Reflections in line and equally fast belong to one vehicle while the
-//!   gap between them is smaller than vehicles keep at that speed.
+//!   gap between them is smaller than vehicles keep at that speed, and for longer gaps once they have
+//!   come some way at the same distance. What turns (wheels) or lies inside an outline is no vehicle.
 //! - **A thing never hides itself.** Along a row only cells behind the *end* of an occupied run are
 //!   hidden by it, so a vehicle's own cells keep the grade of its front.
 //! - **Elevation only proves a least height.** Seeing reflections *past* an obstacle was tried as a
@@ -92,7 +98,8 @@
 //!   "visible".
 //! - **No floats after start-up**: angles are binary (2^16 a turn), lengths centimetres; `libm` makes
 //!   the start-up tables, `micromath` helps only where a test shows that its error cannot matter, and
-//!   both are named in one file.
+//!   both are named in one file. TI's radars send floats: their decoder computes in them, in software
+//!   that gives the same bits everywhere.
 //! - **Unknown is not invisible.** Outside the field of view, before the first frames, when frames stop
 //!   or come empty, the map is unknown, and every transport, coarsening and resampling may only lose
 //!   visibility, never make any.

@@ -14,11 +14,11 @@ run() {
     "$@" 2>&1 | tee -a "$log" || status=1
 }
 
+run tests/cantools.sh
 run cargo test --release --locked --workspace --no-fail-fast
 # overflow checks are on in this one
 run cargo test --locked --package viewshed --test properties
 run tests/recordings/make.sh --check
-run tests/cantools.sh
 run tests/mcap_ros2.sh
 run tests/firmware.sh
 

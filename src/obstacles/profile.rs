@@ -78,7 +78,7 @@ impl Profile {
         }
     }
 
-    /// The outermost places with enough support: a group of [`END_BINS`] bins with at least `min_hits`
+    /// The outermost places with enough support: a group of `END_BINS` bins with at least `min_hits`
     /// (of [`HIT`]) and at least `share` (2^-8) of all hits, and in it two neighbours with half of
     /// that. Young profiles get by with 40 % of what they have.
     pub fn extent(&self, min_hits: i32, share: i32) -> Option<Extent> {

@@ -1,6 +1,6 @@
 //! Processor in the loop: recorded scans in, one fingerprint a frame out, to compare a controller with a PC.
 //!
-//! The host writes a [job](job), the controller runs the estimator over it and answers with
+//! The host writes a [job], the controller runs the estimator over it and answers with
 //! [records](record): per frame a fingerprint over every grade, occupancy and bit of the map, and
 //! what each stage cost. The host runs the same estimator over the same job and compares. Time comes
 //! from the job, never from the controller's clock.

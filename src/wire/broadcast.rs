@@ -83,7 +83,7 @@ pub struct BroadcastConfig {
     pub status_ms: u16,
     /// Time in which the whole header is sent once, milliseconds.
     pub header_ms: u16,
-    /// Whether messages carry an authenticator; they are then taken by [`Broadcaster::next_sealed`]. Not on
+    /// Whether messages carry an authenticator; they are then taken by `Broadcaster::next_sealed`. Not on
     /// classic CAN, whose frames have no room for it.
     pub secured: bool,
     /// Time in which the visible range of all azimuths is sent once, milliseconds; `None` for never.
