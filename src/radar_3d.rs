@@ -169,6 +169,20 @@ pub struct FrameReport {
     pub obstacles: u16,
 }
 
+#[cfg(feature = "defmt")]
+impl FrameReport {
+    /// Tells what an engineer at the unit should know, and all of it at trace level.
+    fn log(&self) {
+        if self.continuity.resets() {
+            defmt::warn!("grids start over: {}", self.continuity);
+        }
+        if self.condition != Condition::Healthy {
+            defmt::warn!("map unknown: {}", self.condition);
+        }
+        defmt::trace!("{}", self);
+    }
+}
+
 impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> Default
     for Radar3d<R, A, E, W, N, D>
 {
@@ -248,13 +262,16 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         }
         ended(Stage::RayCast);
         self.rejections.add_all(self.scan.rejections());
-        FrameReport {
+        let report = FrameReport {
             continuity,
             condition,
             used: self.scan.reflections().len() as u16,
             rejections: *self.scan.rejections(),
             obstacles: self.obstacles.iter().count() as u16,
-        }
+        };
+        #[cfg(feature = "defmt")]
+        report.log();
+        report
     }
 
     fn follow_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, step: Step, map: &PolarMap<R, A>) -> Claimed<D> {
