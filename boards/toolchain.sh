@@ -45,8 +45,11 @@ host=$("$debian" -vV | sed -n 's/^host: //p')
 root=${VIEWSHED_SYSROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/viewshed-sysroot}/$version
 mkdir -p "$root/bin" "$root/lib/rustlib"
 [ -e "$root/lib/rustlib/$host" ] || ln -s "/usr/lib/rustlib/$host" "$root/lib/rustlib/$host"
-printf '#!/bin/sh\nexec %s --sysroot "%s" "$@"\n' "$debian" "$root" >"$root/bin/rustc"
-chmod +x "$root/bin/rustc"
+# in one move: another build may be running it
+wrapper=$(mktemp "$root/bin/new.XXXXXX")
+printf '#!/bin/sh\nexec %s --sysroot "%s" "$@"\n' "$debian" "$root" >"$wrapper"
+chmod 755 "$wrapper"
+cmp -s "$wrapper" "$root/bin/rustc" && rm "$wrapper" || mv -f "$wrapper" "$root/bin/rustc"
 
 # build_core TARGET: core and alloc with bitcode, which link-time optimisation asks for
 build_core() {

@@ -15,11 +15,13 @@ run() {
 }
 
 run tests/cantools.sh
+run tests/mcap_ros2.sh
+python=$PWD/${CARGO_TARGET_DIR:-target}/mcap_ros2/bin/python
+[ ! -x "$python" ] || export VIEWSHED_PYTHON=$python
 run cargo test --release --locked --workspace --no-fail-fast
 # overflow checks are on in this one
 run cargo test --locked --package viewshed --test properties
 run tests/recordings/make.sh --check
-run tests/mcap_ros2.sh
 run tests/firmware.sh
 
 echo
