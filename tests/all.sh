@@ -16,7 +16,7 @@ run() {
 
 run tests/cantools.sh
 run tests/mcap_ros2.sh
-python=$PWD/${CARGO_TARGET_DIR:-target}/mcap_ros2/bin/python
+python=${CARGO_TARGET_DIR:-$PWD/target}/mcap_ros2/bin/python
 [ ! -x "$python" ] || export VIEWSHED_PYTHON=$python
 run cargo test --release --locked --workspace --no-fail-fast
 # overflow checks are on in this one
