@@ -7,8 +7,9 @@
 # and why. The last line is `firmware: N passed, M skipped`; the exit code is 0 unless something failed.
 set -u
 
-root=$(cd "$(dirname "$0")/.." && pwd)
-cd "$root" || exit 1
+cd "$(dirname "$0")/.." || exit 1
+. tests/tools.sh
+need_compilers
 passed=0
 skipped=0
 failed=0
@@ -16,13 +17,6 @@ failed=0
 skip() {
     echo "skipped: $1: $2"
     skipped=$((skipped + 1))
-}
-
-# install PACKAGE...: quietly, 1 where that is not possible
-install() {
-    [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null || return 1
-    apt-get install --yes --no-install-recommends "$@" >/dev/null 2>&1 ||
-        { apt-get update >/dev/null 2>&1 && apt-get install --yes --no-install-recommends "$@" >/dev/null 2>&1; }
 }
 
 # compiler TARGET: whether there will be one
