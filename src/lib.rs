@@ -69,7 +69,7 @@
 //! | results: the map interface, queries, the 1 m grid, the bitmap | [`map`], [`query`], [`resample`], [`bitmap`] |
 //! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
-//! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`service`], [`settings`] |
+//! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`can_service`], [`service`], [`settings`] |
 //! | a bus looked after: listen first, back off after bus-off | [`can_bus`] |
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
@@ -116,6 +116,7 @@ pub mod bitmap;
 pub mod bits;
 mod bytes;
 pub mod can_bus;
+pub mod can_service;
 pub mod can_session;
 pub mod cartesian;
 pub mod config;

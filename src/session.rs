@@ -199,12 +199,12 @@ impl<const D: usize> Session<D> {
 }
 
 /// Of two refusals the one that says more: an empty slot says least.
-fn worst([first, second]: [BlockError; 2]) -> BlockError {
+pub(crate) fn worst([first, second]: [BlockError; 2]) -> BlockError {
     if first == BlockError::Empty { second } else { first }
 }
 
 /// Checks a block and writes it into the slot not in use; its sequence.
-fn write(block: &[u8], slots: &mut impl Slots) -> Result<u32, BlockError> {
+pub(crate) fn write(block: &[u8], slots: &mut impl Slots) -> Result<u32, BlockError> {
     let (_, settings) = Settings::from_block(block)?;
     let newest = Settings::newest([slots.slot(0), slots.slot(1)]);
     let (slot, sequence) = newest.map_or((0, 1), |n| (n.next_slot, n.next_sequence));

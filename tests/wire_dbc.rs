@@ -12,7 +12,10 @@ use std::process::{Command, Stdio};
 use can_dbc::{ByteOrder, Dbc, MultiplexIndicator, Signal, ValueType};
 use shadows::{A, Map, Shadows, USUAL, W, header};
 use viewshed::angle::Angle;
+use viewshed::can_service::{ANSWER, CanService, CanServiceConfig, REQUEST, Tool};
 use viewshed::map::RoadPoint;
+use viewshed::session::Slots;
+use viewshed::settings::BLOCK_LEN;
 use viewshed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanFrame;
@@ -76,7 +79,33 @@ fn frames(medium: Medium) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
         }
         frames.extend(sender.next_frame(time(us)));
     }
+    frames.extend(configuration(medium));
     (frames, maps)
+}
+
+/// Nothing is kept.
+struct Nowhere;
+
+impl Slots for Nowhere {
+    fn slot(&self, _: usize) -> &[u8] {
+        &[]
+    }
+
+    fn write(&mut self, _: usize, _: &[u8; BLOCK_LEN]) {}
+}
+
+/// An integrator's requests and what a unit without a block answers.
+fn configuration(medium: Medium) -> Vec<CanFrame> {
+    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
+    let mut unit = CanService::start(config, Epoch::new(11), Time::from_micros(0), &Nowhere);
+    let mut tool = Tool::new(0, medium);
+    let mut frames: Vec<CanFrame> = tool.write(&[0x56; 12]).collect();
+    frames.extend([tool.read().unwrap(), tool.restart().unwrap()]);
+    for frame in frames.clone() {
+        let _ = unit.take(&frame, &mut Nowhere);
+        frames.extend(std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &Nowhere)));
+    }
+    frames
 }
 
 /// The raw value of a signal; `None` where the data ends before it does.
@@ -125,7 +154,7 @@ fn every_message_is_described_and_no_other() {
             let parts = [Part::Refresh, Part::Delta, Part::Plain].into_iter().chain(words);
             parts.map(move |part| Message::Map(plane, part))
         };
-        let others = [Message::Status, Message::Header, Message::VisibleRange];
+        let others = [Message::Status, Message::Header, Message::VisibleRange, REQUEST, ANSWER];
         let sent = others.into_iter().chain(Plane::ALL.into_iter().flat_map(parts));
         let mut ids: Vec<u32> = sent.map(|m| Addresses::STANDARD.id(0, m).unwrap().raw()).collect();
         let dbc = described(medium);
@@ -190,6 +219,23 @@ fn header_and_status(medium: Medium) {
 fn ranges_words_and_cells_read_as_they_were_sent() {
     for medium in [CLASSIC, FD] {
         ranges_words_and_cells(medium);
+    }
+}
+
+#[test]
+fn requests_and_answers_read_as_they_were_sent() {
+    for medium in [CLASSIC, FD] {
+        let dbc = described(medium);
+        let read: Vec<_> = configuration(medium).iter().map(|frame| decode(&dbc, frame)).collect();
+        let number = |k: usize, name: &str| read[k].1[name];
+        assert_eq!((number(0, "Request_Kind"), number(0, "Block_Length")), (1.0, 12.0));
+        let word = f64::from(0x5656_5656_u32);
+        assert_eq!((number(3, "Request_Number"), number(3, "Block_Part"), number(4, "Block_Last")), (2.0, word, word));
+        assert_eq!(number(6, "Restart_Word"), f64::from(u32::from_be_bytes(*b"VSCB")));
+        let answers = &read[7..];
+        assert!(answers.iter().all(|(name, _)| name == "Viewshed_Configuration"));
+        assert_eq!((answers[0].1["Answer_Number"], answers[0].1["Started_Sequence"]), (255.0, 0.0));
+        assert!(answers.iter().any(|(_, a)| a["Answer_Kind"] == 132.0 && a["Refused_Detail"] == 0.0));
     }
 }
 

@@ -121,7 +121,8 @@ pub enum Message {
     Freshness,
     /// A part of a map.
     Map(Plane, Part),
-    /// A number this version gives no meaning; 24 to 31 are the configuration's.
+    /// A number that is nothing of a map: 24 and 25 are the configuration's
+    /// ([`can_service`](crate::can_service)), 26 to 31 the installation's own.
     Other(u8),
 }
 

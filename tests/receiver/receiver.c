@@ -486,6 +486,8 @@ static void classic_word(sensor_t *s, int scan, int start, int index, int delta,
 
 static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint8_t *own, int n, bool is_long) {
     bool map = number >= 6 && number < 24;
+    /* from anybody, of no epoch */
+    if (number >= 24) return;
     if (!enter(s, now, epoch, (map || number == 2) && n > 0 ? own[0] : -1)) return;
     if (number == 1) header(s, now, own, n);
     if (number == 2 && n > 2) { if (hear(s, now, own[0])) purge(s, now); }

@@ -225,6 +225,10 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         if message.sealed {
             return Err(Refused::Sealed);
         }
+        // those of integrators and installations come from anybody and know nothing of the sender's epoch
+        if let Message::Other(24..) = message.message {
+            return Ok(Accepted::Other(message.message));
+        }
         let dated = matches!(message.message, Message::Map(..) | Message::VisibleRange);
         let scan = message.own.first().filter(|_| dated).map(|byte| ScanNumber::from_byte(*byte));
         match self.session.enter(now, message.epoch, scan, limits) {

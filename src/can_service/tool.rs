@@ -1,0 +1,160 @@
+//! The integrator's end: what to send, and what the answers say.
+
+use super::{ANSWER, Answer, PARTS, REQUEST, Request, frame, received};
+use crate::settings::BLOCK_LEN;
+use crate::wire::broadcast::Medium;
+use crate::wire::frame::CanFrame;
+use crate::wire::message::Epoch;
+
+/// Makes the messages towards a unit. At most one every millisecond suits every unit.
+#[derive(Debug, Clone)]
+pub struct Tool {
+    sensor: u8,
+    medium: Medium,
+    counter: u8,
+}
+
+impl Tool {
+    /// For the unit of a sensor.
+    pub const fn new(sensor: u8, medium: Medium) -> Self {
+        Self { sensor, medium, counter: 0 }
+    }
+
+    /// A whole block, to be written into the slot not in use. Of one that is not of this library's layout
+    /// the first 1020 bytes at most.
+    pub fn write(&mut self, block: &[u8]) -> impl Iterator<Item = CanFrame> {
+        let length = u16::try_from(block.len()).unwrap_or(u16::MAX);
+        let part = |(number, bytes): (u8, &[u8])| {
+            let mut four = [0; 4];
+            four.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+            Request::Part { number, bytes: four }
+        };
+        let parts = (0..u8::MAX).zip(block.chunks(4)).map(part);
+        let last = block.last_chunk::<4>().copied().unwrap_or([0; 4]);
+        let all = core::iter::once(Request::Begin { length }).chain(parts);
+        all.chain([Request::Complete { last }]).filter_map(|request| self.frame(request))
+    }
+
+    /// A part of a block again, and its completion: after an answer that it is missing.
+    pub fn again(&mut self, block: &[u8], part: u8) -> impl Iterator<Item = CanFrame> {
+        let bytes = block.get(4 * usize::from(part)..).and_then(|rest| rest.first_chunk::<4>()).copied();
+        let last = block.last_chunk::<4>().copied().unwrap_or([0; 4]);
+        let again = bytes.map(|bytes| Request::Part { number: part, bytes });
+        again.into_iter().chain([Request::Complete { last }]).filter_map(|request| self.frame(request))
+    }
+
+    /// Asks for the block in use.
+    pub fn read(&mut self) -> Option<CanFrame> {
+        self.frame(Request::Read)
+    }
+
+    /// Asks for a restart with the newest block.
+    pub fn restart(&mut self) -> Option<CanFrame> {
+        self.frame(Request::Restart)
+    }
+
+    fn frame(&mut self, request: Request) -> Option<CanFrame> {
+        // requests are of no epoch
+        frame(&self.medium, self.sensor, REQUEST, Epoch::new(0), &mut self.counter, request.own())
+    }
+}
+
+/// Why a unit refused a block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Refusal {
+    /// As in [`BlockError::code`](crate::settings::BlockError::code), or [`INCOMPLETE`](super::INCOMPLETE).
+    pub reason: u8,
+    /// What goes with it: a layout, a parameter's value, the first missing part.
+    pub detail: [u8; 4],
+    name: [u8; Refusal::MOST_LETTERS],
+}
+
+impl Refusal {
+    const MOST_LETTERS: usize = 48;
+    /// Reason of a refusal for a parameter: its name follows.
+    const PARAMETER: u8 = 5;
+
+    /// The parameter's name; empty if the refusal is not about one.
+    pub fn parameter(&self) -> &str {
+        let letters = self.name.split(|byte| *byte == 0).next().unwrap_or(&[]);
+        core::str::from_utf8(letters).unwrap_or("")
+    }
+
+    /// The parameter's value.
+    pub fn value(&self) -> f32 {
+        f32::from_be_bytes(self.detail)
+    }
+}
+
+/// What a unit says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant)] // no allocator here
+pub enum Told {
+    /// A block was written, with this sequence.
+    Written(u32),
+    /// The block in use, every part of it; its own check sum is still to be looked at.
+    Block([u8; BLOCK_LEN]),
+    /// The unit starts, with the block of a slot and its sequence or without one.
+    Started(Option<(u8, u32)>),
+    /// A block was refused.
+    Refused(Refusal),
+}
+
+/// Collects a unit's answers.
+#[derive(Debug, Clone)]
+pub struct Answers {
+    sensor: u8,
+    medium: Medium,
+    block: [u8; BLOCK_LEN],
+    /// A bit a part.
+    came: u64,
+    refusal: Option<Refusal>,
+}
+
+impl Answers {
+    /// Of the unit of a sensor.
+    pub const fn new(sensor: u8, medium: Medium) -> Self {
+        Self { sensor, medium, block: [0; BLOCK_LEN], came: 0, refusal: None }
+    }
+
+    /// Takes a frame; what the unit said, once it is complete.
+    pub fn take(&mut self, frame: &CanFrame) -> Option<Told> {
+        let own = received(frame, &self.medium, self.sensor, ANSWER)?;
+        match Answer::read(own)? {
+            Answer::Written { sequence } => Some(Told::Written(sequence)),
+            Answer::Started { slot, sequence } => {
+                self.came = 0;
+                Some(Told::Started((slot != u8::MAX).then_some((slot, sequence))))
+            }
+            Answer::Refused { reason, detail } => {
+                let refusal = Refusal { reason, detail, name: [0; Refusal::MOST_LETTERS] };
+                self.refusal = (reason == Refusal::PARAMETER).then_some(refusal);
+                self.refusal.is_none().then_some(Told::Refused(refusal))
+            }
+            Answer::Name { number, letters } => {
+                let refusal = self.refusal.as_mut()?;
+                let at = 4 * usize::from(number);
+                if let Some(place) = refusal.name.get_mut(at..at + 4) {
+                    place.copy_from_slice(&letters);
+                }
+                if letters.contains(&0) { self.refusal.take().map(Told::Refused) } else { None }
+            }
+            Answer::Part { number, bytes } => self.part(number, bytes),
+        }
+    }
+
+    fn part(&mut self, number: u8, bytes: [u8; 4]) -> Option<Told> {
+        let at = 4 * usize::from(number);
+        if number == 0 {
+            // a block is read from its beginning on
+            self.came = 0;
+        }
+        self.block.get_mut(at..at + 4)?.copy_from_slice(&bytes);
+        self.came |= 1 << number;
+        if self.came.count_ones() as usize == PARTS {
+            self.came = 0;
+            return Some(Told::Block(self.block));
+        }
+        None
+    }
+}

@@ -1,0 +1,320 @@
+//! The unit's end: takes a block, keeps it, tells what it runs with, and what it says without one.
+
+use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
+use crate::session::{Flow, Slots, worst, write};
+use crate::settings::{BLOCK_LEN, BlockError, Newest, Settings};
+use crate::time::Time;
+use crate::wire::broadcast::Medium;
+use crate::wire::frame::CanFrame;
+use crate::wire::message::{Epoch, Message, Packet};
+use crate::wire::status::{PAGES, Reason, State, Status};
+
+/// Time between two status messages in the safe state, microseconds.
+const SAFE_STATUS_US: u64 = 250_000;
+
+/// Where and how a unit answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CanServiceConfig {
+    /// The sensor's number.
+    pub sensor: u8,
+    /// The bus its messages are on, and their identifiers.
+    pub medium: Medium,
+    /// Least time between two answers, microseconds.
+    pub gap_us: u32,
+}
+
+impl CanServiceConfig {
+    /// An answer every 2 ms at most: between them there is room for a map.
+    pub const fn new(sensor: u8, medium: Medium) -> Self {
+        Self { sensor, medium, gap_us: 2000 }
+    }
+}
+
+/// What lies between a bus and the slots of a unit, from start to restart.
+///
+/// # Example
+/// A block is sent in parts, written, and read by the next start:
+/// ```
+/// # use viewshed::can_service::{Answers, CanService, CanServiceConfig, Told, Tool};
+/// # use viewshed::field_of_view::FieldOfView;
+/// # use viewshed::mount::Mount;
+/// # use viewshed::reflection::NoiseConfig;
+/// # use viewshed::sensor::Sensor;
+/// # use viewshed::session::{Flow, Slots};
+/// # use viewshed::settings::{BLOCK_LEN, Settings};
+/// # use viewshed::time::Time;
+/// # use viewshed::wire::broadcast::Medium;
+/// # use viewshed::wire::message::{Addresses, Epoch};
+/// # struct InRam([[u8; BLOCK_LEN]; 2]);
+/// # impl Slots for InRam {
+/// #     fn slot(&self, slot: usize) -> &[u8] { &self.0[slot] }
+/// #     fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) { self.0[slot] = *block }
+/// # }
+/// # let settings = Settings::of(Sensor {
+/// #     mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 },
+/// #     field_of_view: FieldOfView {
+/// #         azimuth_min_deg: -60.0, azimuth_max_deg: 60.0,
+/// #         elevation_min_deg: -16.0, elevation_max_deg: 16.0,
+/// #         range_min_m: 3.0, range_max_m: 200.0,
+/// #     },
+/// #     noise: NoiseConfig::default(),
+/// # });
+/// let medium = Medium::Can(Addresses::STANDARD);
+/// let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(3, medium) };
+/// let (mut slots, now) = (InRam([[0xFF; BLOCK_LEN]; 2]), Time::from_micros(0));
+///
+/// let mut unit = CanService::start(config, Epoch::new(1), now, &slots);
+/// assert!(unit.settings().is_none());
+/// let (mut tool, mut answers) = (Tool::new(3, medium), Answers::new(3, medium));
+/// for frame in tool.write(&settings.to_block(0)) {
+///     unit.take(&frame, &mut slots);
+/// }
+/// let mut told = std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|f| answers.take(&f));
+/// assert!(told.any(|told| told == Told::Written(1)));
+/// let restart = tool.restart().unwrap();
+/// assert_eq!(unit.take(&restart, &mut slots), Some(Flow::Restart));
+///
+/// let unit = CanService::start(config, Epoch::new(2), now, &slots);
+/// assert_eq!(unit.settings(), Some(&settings));
+/// ```
+#[derive(Debug, Clone)]
+pub struct CanService {
+    config: CanServiceConfig,
+    epoch: Epoch,
+    /// The block in use, or why there is none.
+    settings: Result<Newest, BlockError>,
+    incoming: Incoming,
+    outgoing: Outgoing,
+    counter: u8,
+    /// When the next answer may be sent.
+    next: Time,
+    started: Time,
+    /// The last status of the safe state, its counter and the next page.
+    status: Option<Time>,
+    status_counter: u8,
+    page: u8,
+}
+
+impl CanService {
+    /// Starts with the newest block that holds.
+    pub fn start(config: CanServiceConfig, epoch: Epoch, now: Time, slots: &impl Slots) -> Self {
+        let settings = Settings::newest([slots.slot(0), slots.slot(1)]).map_err(worst);
+        let refused = settings.err().map(|error| Refused { what: What::Block(error), next: 0 });
+        Self {
+            config,
+            epoch,
+            settings,
+            incoming: Incoming::NONE,
+            outgoing: Outgoing { started: true, refused, written: None, part: None },
+            counter: 0,
+            next: now,
+            started: now,
+            status: None,
+            status_counter: 0,
+            page: 0,
+        }
+    }
+
+    /// What to work with; none in the safe state.
+    pub fn settings(&self) -> Option<&Settings> {
+        self.settings.as_ref().ok().map(|newest| &newest.settings)
+    }
+
+    /// Why there is no block to work with.
+    pub fn refusal(&self) -> Option<&BlockError> {
+        self.settings.as_ref().err()
+    }
+
+    /// Takes a frame of the bus; `None` if it is none of the integrator's.
+    pub fn take(&mut self, frame: &CanFrame, slots: &mut impl Slots) -> Option<Flow> {
+        let own = received(frame, &self.config.medium, self.config.sensor, REQUEST)?;
+        match Request::read(own)? {
+            Request::Begin { length } => self.incoming.begin(length),
+            Request::Part { number, bytes } => self.incoming.part(number, bytes),
+            Request::Complete { last } => match self.incoming.complete(last, slots) {
+                Ok(sequence) => self.outgoing.written = Some(sequence),
+                Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
+            },
+            Request::Read => match self.settings {
+                Ok(_) => self.outgoing.part = Some(0),
+                Err(error) => self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 }),
+            },
+            Request::Restart => return Some(Flow::Restart),
+        }
+        Some(Flow::Continue)
+    }
+
+    /// The next answer, if one is due.
+    pub fn next_frame(&mut self, now: Time, slots: &impl Slots) -> Option<CanFrame> {
+        let gap_us = u64::from(self.config.gap_us);
+        // a clock that stepped back does not put it off
+        if self.next.since(now).is_some_and(|wait| wait > 0 && wait <= gap_us) {
+            return None;
+        }
+        let answer = self.outgoing.next(&self.settings, slots)?;
+        self.next = Time::from_micros(now.micros().saturating_add(gap_us));
+        let CanServiceConfig { sensor, medium, .. } = self.config;
+        frame(&medium, sensor, ANSWER, self.epoch, &mut self.counter, answer.own())
+    }
+
+    /// The next status of a unit in its safe state, where nothing else of it is sent.
+    pub fn next_status(&mut self, now: Time) -> Option<CanFrame> {
+        let (Medium::Can(addresses) | Medium::CanFd(addresses)) = self.config.medium else { return None };
+        if self.status.and_then(|last| now.since(last)).is_some_and(|us| us < SAFE_STATUS_US) {
+            return None;
+        }
+        self.status = Some(now);
+        let uptime_s = u32::try_from(now.since(self.started).unwrap_or(0) / 1_000_000).unwrap_or(u32::MAX);
+        let status = Status { state: State::Fault, reason: Reason::Configuration, uptime_s, ..Status::starting(0) };
+        let packing = self.config.medium.packing(false);
+        let of = |own: &[u8]| Packet::new(packing, self.config.sensor, Message::Status, self.epoch, own);
+        let (packet, filled) = if packing.is_classic() {
+            (of(&status.emit_page(self.page)), None)
+        } else {
+            let packet = of(&status.emit());
+            (packet, crate::wire::frame::fd_length(packet.bytes().len()))
+        };
+        self.page = (self.page + 1) % PAGES;
+        let protected = packet.protect(self.status_counter, filled);
+        self.status_counter = packing.profile().next(self.status_counter);
+        protected.frame(&addresses)
+    }
+}
+
+/// A block on its way here.
+#[derive(Debug, Clone, Copy)]
+struct Incoming {
+    bytes: [u8; BLOCK_LEN],
+    /// A bit a part.
+    came: u64,
+    /// Of the block that began and is not yet complete.
+    length: Option<usize>,
+    /// Last bytes and sequence of the block that was written last.
+    written: Option<([u8; 4], u32)>,
+}
+
+impl Incoming {
+    const NONE: Self = Self { bytes: [0; BLOCK_LEN], came: 0, length: None, written: None };
+
+    fn begin(&mut self, length: u16) {
+        // what is longer is of another layout, which its first bytes tell
+        (self.came, self.length) = (0, Some(usize::from(length).min(BLOCK_LEN)));
+    }
+
+    fn part(&mut self, number: u8, bytes: [u8; 4]) {
+        let at = 4 * usize::from(number);
+        if let (Some(_), Some(place)) = (self.length, self.bytes.get_mut(at..at + 4)) {
+            place.copy_from_slice(&bytes);
+            self.came |= 1 << number;
+        }
+    }
+
+    /// Checks the block and writes it; its sequence.
+    fn complete(&mut self, last: [u8; 4], slots: &mut impl Slots) -> Result<u32, What> {
+        let Some(length) = self.length else {
+            // the answer may have been lost
+            let again = self.written.filter(|(sum, _)| *sum == last);
+            return again.map(|(_, sequence)| sequence).ok_or(What::Missing(0));
+        };
+        #[allow(clippy::cast_possible_truncation)] // at most 37
+        if let Some(missing) = (0..length.div_ceil(4)).find(|part| self.came >> part & 1 == 0) {
+            return Err(What::Missing(missing as u8));
+        }
+        self.length = None;
+        let block = self.bytes.get(..length).unwrap_or(&[]);
+        if block.last_chunk::<4>().is_some_and(|end| *end != last) {
+            return Err(What::Block(BlockError::CheckSum));
+        }
+        let sequence = write(block, slots).map_err(What::Block)?;
+        self.written = Some((last, sequence));
+        Ok(sequence)
+    }
+}
+
+/// What was refused.
+#[derive(Debug, Clone, Copy)]
+enum What {
+    Block(BlockError),
+    /// The first part that did not come.
+    Missing(u8),
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Refused {
+    what: What,
+    /// Messages sent of it.
+    next: u8,
+}
+
+/// What is to be answered, one message after the other.
+#[derive(Debug, Clone, Copy)]
+struct Outgoing {
+    started: bool,
+    refused: Option<Refused>,
+    written: Option<u32>,
+    /// Next part of the block in use.
+    part: Option<u8>,
+}
+
+impl Outgoing {
+    fn next(&mut self, settings: &Result<Newest, BlockError>, slots: &impl Slots) -> Option<Answer> {
+        if core::mem::take(&mut self.started) {
+            let newest = settings.as_ref().ok();
+            let slot = newest.and_then(|n| u8::try_from(n.slot).ok()).unwrap_or(u8::MAX);
+            return Some(Answer::Started { slot, sequence: newest.map_or(0, |n| n.next_sequence.wrapping_sub(1)) });
+        }
+        if let Some(sequence) = self.written.take() {
+            return Some(Answer::Written { sequence });
+        }
+        if let Some(mut refused) = self.refused.take() {
+            let answer = refused.answer();
+            refused.next = refused.next.saturating_add(1);
+            self.refused = refused.goes_on().then_some(refused);
+            return Some(answer);
+        }
+        let number = self.part.take()?;
+        let slot = slots.slot(settings.as_ref().ok()?.slot);
+        let bytes = *slot.get(4 * usize::from(number)..)?.first_chunk::<4>()?;
+        self.part = (usize::from(number) + 1 < PARTS).then_some(number + 1);
+        Some(Answer::Part { number, bytes })
+    }
+}
+
+impl Refused {
+    fn name(&self) -> &'static [u8] {
+        match &self.what {
+            What::Block(BlockError::Parameter(error)) => error.parameter.as_bytes(),
+            _ => &[],
+        }
+    }
+
+    fn answer(&self) -> Answer {
+        if let Some(number) = self.next.checked_sub(1) {
+            let mut letters = [0; 4];
+            let rest = self.name().get(4 * usize::from(number)..).unwrap_or(&[]);
+            letters.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
+            return Answer::Name { number, letters };
+        }
+        match &self.what {
+            What::Missing(part) => Answer::Refused { reason: INCOMPLETE, detail: [*part, 0, 0, 0] },
+            What::Block(error) => {
+                let detail = match error {
+                    BlockError::Parameter(error) => error.value.to_be_bytes(),
+                    BlockError::Layout(layout) => {
+                        let [high, low] = layout.to_be_bytes();
+                        [high, low, 0, 0]
+                    }
+                    _ => [0; 4],
+                };
+                Answer::Refused { reason: error.code(), detail }
+            }
+        }
+    }
+
+    /// Whether letters are left, or the zero that ends them.
+    fn goes_on(&self) -> bool {
+        let letters = self.name().len();
+        letters > 0 && 4 * (usize::from(self.next) - 1) <= letters
+    }
+}
