@@ -4,7 +4,10 @@
 //! On the road time is the controller's. In a test bench it comes over the radar's bus: a frame with the
 //! identifier [`TIME_ID`] and eight bytes, microseconds, big-endian, before the frames it is for.
 
+use crate::can_bus::{BusKeeper, BusState, CanPort};
+use crate::can_service::CanService;
 use crate::inputs::ars408::{Ars408, Config, Outcome};
+use crate::session::{Flow, Slots};
 use crate::time::Time;
 use crate::unit::Unit;
 use crate::wire::frame::{CanFrame, CanId};
@@ -31,8 +34,16 @@ impl<const D: usize> CanSession<D> {
         self.now
     }
 
-    /// Takes a frame of the radar's bus, in a test bench also its time.
-    pub fn bench_frame<
+    /// Starts a test bench's clock: no unit starts before it is told the time. Whether a frame told it now.
+    pub fn bench_clock(&mut self, keeper: &mut BusKeeper, port: &mut impl CanPort) -> bool {
+        let told = keeper.receive(port).as_ref().and_then(bench_time);
+        self.now = told.unwrap_or(self.now);
+        told.is_some()
+    }
+
+    /// One turn of a test bench's loop on a bus that radar and integrator share: at most one frame in, all
+    /// that is due out.
+    pub fn bench_turn<
         const R: usize,
         const A: usize,
         const E: usize,
@@ -41,15 +52,60 @@ impl<const D: usize> CanSession<D> {
         const G: usize,
     >(
         &mut self,
-        frame: &CanFrame,
-        unit: &mut Unit<'_, R, A, E, W, N, G>,
-    ) {
-        match <[u8; 8]>::try_from(frame.data()) {
-            Ok(micros) if frame.id == TIME_ID => {
-                self.idle(Time::from_micros(u64::from_be_bytes(micros)), unit);
+        (keeper, port): (&mut BusKeeper, &mut impl CanPort),
+        service: &mut CanService,
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        slots: &mut impl Slots,
+    ) -> Flow {
+        keeper.poll(self.now, port);
+        if let Some(frame) = keeper.receive(port) {
+            if self.bench_frame(&frame, service, unit, slots) == Flow::Restart {
+                return Flow::Restart;
             }
-            _ => self.frame(frame, self.now, unit),
         }
+        // nothing is taken from a unit that cannot be sent
+        while keeper.state() == BusState::Active {
+            let Some(frame) = self.next_frame(service, unit, slots) else { break };
+            if !keeper.send(&frame, port) {
+                break;
+            }
+        }
+        Flow::Continue
+    }
+
+    fn bench_frame<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+        &mut self,
+        frame: &CanFrame,
+        service: &mut CanService,
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        slots: &mut impl Slots,
+    ) -> Flow {
+        if let Some(flow) = service.take(frame, slots) {
+            return flow;
+        }
+        match (bench_time(frame), unit) {
+            (Some(now), Some(unit)) => self.idle(now, unit),
+            (Some(now), None) => self.now = now,
+            (None, Some(unit)) => self.frame(frame, self.now, unit),
+            (None, None) => {}
+        }
+        Flow::Continue
+    }
+
+    /// The next frame of a unit and its integrator's answers on one bus; without a unit only the status
+    /// of the safe state and the answers.
+    fn next_frame<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+        &self,
+        service: &mut CanService,
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        slots: &impl Slots,
+    ) -> Option<CanFrame> {
+        let now = self.now;
+        let answer = service.next_frame(now, slots);
+        answer.or_else(|| match unit {
+            Some(unit) => unit.next_frame(now),
+            None => service.next_status(now),
+        })
     }
 
     /// Takes a frame of the radar's bus.
@@ -80,6 +136,12 @@ impl<const D: usize> CanSession<D> {
         let lost = self.radar.counters().lost;
         unit.broadcast().status_mut().radar_lost = u16::try_from(lost).unwrap_or(u16::MAX);
     }
+}
+
+/// The time a frame of a test bench tells.
+pub fn bench_time(frame: &CanFrame) -> Option<Time> {
+    let micros = <[u8; 8]>::try_from(frame.data()).ok().filter(|_| frame.id == TIME_ID)?;
+    Some(Time::from_micros(u64::from_be_bytes(micros)))
 }
 
 fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(

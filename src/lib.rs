@@ -71,7 +71,7 @@
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
 //! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`can_service`], [`service`], [`settings`] |
 //! | a bus looked after: listen first, back off after bus-off | [`can_bus`] |
-//! | the same input on a controller and on a PC, compared | [`pil`], [`stage`] |
+//! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
 //!
 //! # What was decided, and why
@@ -132,6 +132,7 @@ pub mod mount;
 pub mod obstacles;
 pub mod pil;
 pub mod polar;
+pub mod profile;
 pub mod query;
 pub mod radar_2d;
 pub mod radar_3d;

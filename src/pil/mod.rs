@@ -9,7 +9,9 @@
 //! Both directions are plain byte streams of little-endian numbers, so that files, semihosting and
 //! serial ports carry them alike.
 
+pub mod files;
 pub mod fingerprint;
+pub mod flash;
 pub mod job;
 pub mod record;
 mod run;

@@ -3,11 +3,15 @@
 //! The only unsafe code of this board is here: registers, the stack's limits and the panic handler.
 #![no_std]
 
-pub mod profile;
 pub mod semihost;
 pub mod stack;
 pub mod timer;
 pub mod uart;
+
+#[cfg(not(feature = "small"))]
+pub use viewshed::profile::reference as profile;
+#[cfg(feature = "small")]
+pub use viewshed::profile::small as profile;
 
 /// A register of a peripheral.
 #[derive(Clone, Copy)]
@@ -22,6 +26,30 @@ impl Register {
     fn write(self, value: u32) {
         // SAFETY: as above; one core, no interrupts
         unsafe { core::ptr::write_volatile(self.0 as *mut u32, value) }
+    }
+}
+
+/// What the bench wants to know of this core.
+pub struct Core(timer::Timer);
+
+impl Core {
+    /// Starts its counter.
+    pub fn start() -> Self {
+        Self(timer::Timer::start())
+    }
+}
+
+impl viewshed::pil::files::Core for Core {
+    fn ticks(&mut self) -> u32 {
+        self.0.ticks()
+    }
+
+    fn ticks_per_256(&self) -> u32 {
+        timer::TICKS_PER_256
+    }
+
+    fn stack(&self) -> [u32; 2] {
+        stack::used()
     }
 }
 

@@ -1,63 +1,36 @@
-//! The bench over semihosting files: `job.bin` in, `answer.bin` out, in the emulator's folder.
+//! The emulator's files, by the core's semihosting trap.
 
 use core::ffi::CStr;
 
 use semihosting::fd::BorrowedFd;
-use semihosting::process;
 use semihosting::sys;
 use semihosting::sys::arm_compat::{OpenMode, sys_open};
-use viewshed::pil::Bench;
+use viewshed::pil::files;
 
-use crate::stack;
+/// An open file; it stays open until the emulator ends.
+#[derive(Debug)]
+pub struct HostFile(BorrowedFd<'static>);
 
-const JOB: &CStr = c"job.bin";
-const ANSWER: &CStr = c"answer.bin";
-
-/// Both files.
-pub struct Files {
-    job: BorrowedFd<'static>,
-    answer: BorrowedFd<'static>,
-}
-
-impl Files {
-    /// Opens them; `None` without a debugger or emulator that has them.
-    pub fn open() -> Option<Self> {
-        let job = open(JOB, OpenMode::RDONLY_BINARY)?;
-        let answer = open(ANSWER, OpenMode::WRONLY_TRUNC_BINARY)?;
-        Some(Self { job, answer })
-    }
-}
-
-fn open(name: &CStr, mode: OpenMode) -> Option<BorrowedFd<'static>> {
+fn opened(name: &CStr, mode: OpenMode) -> Option<HostFile> {
     let file = sys_open(name, mode).ok()?.into_raw_fd();
-    // SAFETY: open until the emulator ends
-    (file != -1).then(|| unsafe { BorrowedFd::borrow_raw(file) })
+    // SAFETY: never closed
+    (file != -1).then(|| HostFile(unsafe { BorrowedFd::borrow_raw(file) }))
 }
 
-impl Bench for Files {
+impl files::HostFile for HostFile {
+    fn open(name: &CStr) -> Option<Self> {
+        opened(name, OpenMode::RDONLY_BINARY)
+    }
+
+    fn create(name: &CStr) -> Option<Self> {
+        opened(name, OpenMode::WRONLY_TRUNC_BINARY)
+    }
+
     fn read(&mut self, buffer: &mut [u8]) -> usize {
-        sys::read(self.job, buffer).unwrap_or(0)
+        sys::read(self.0, buffer).unwrap_or(0)
     }
 
-    fn write(&mut self, bytes: &[u8]) {
-        let mut rest = bytes;
-        while !rest.is_empty() {
-            match sys::write(self.answer, rest) {
-                Ok(n) if n > 0 => rest = rest.get(n..).unwrap_or(&[]),
-                _ => process::exit(3),
-            }
-        }
-    }
-
-    fn ticks(&mut self) -> u32 {
-        0
-    }
-
-    fn ticks_per_256(&self) -> u32 {
-        0 // the emulator cannot count this core's instructions
-    }
-
-    fn stack(&self) -> [u32; 2] {
-        stack::used()
+    fn write(&mut self, bytes: &[u8]) -> usize {
+        sys::write(self.0, bytes).unwrap_or(0)
     }
 }

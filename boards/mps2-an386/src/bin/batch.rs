@@ -3,10 +3,12 @@
 #![no_main]
 
 use cortex_m_rt::entry;
+use mps2_an386::Core;
 use mps2_an386::profile::{Map, Parameters, Sender, State};
-use mps2_an386::semihost::Files;
+use mps2_an386::semihost::HostFile;
 use semihosting::process::exit;
 use static_cell::{ConstStaticCell, StaticCell};
+use viewshed::pil::files::Files;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Memory, run};
 use viewshed::time::Time;
@@ -25,7 +27,7 @@ static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS>> = ConstStaticCell::new
 
 #[entry]
 fn main() -> ! {
-    let Some(mut files) = Files::open() else { exit(2) };
+    let Some(mut files) = Files::<HostFile, _>::open(Core::start()) else { exit(2) };
     let Ok(job) = Job::read(&mut files) else { exit(1) };
     let Ok(parameters) = Parameters::new(&job.settings.sensor, &job.settings.radar_3d()) else { exit(1) };
     let (Some(state), Some(map), Some(scan)) = (STATE.try_take(), MAP.try_take(), SCAN.try_take()) else { exit(4) };

@@ -4,14 +4,16 @@
 
 use semihosting::process::exit;
 use static_cell::{ConstStaticCell, StaticCell};
+use viewshed::pil::files::Files;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Memory, run};
 use viewshed::time::Time;
 use viewshed::unit::{Unit, bench_sender};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Epoch;
+use zcu102_r5::Core;
 use zcu102_r5::profile::{Map, Parameters, Sender, State};
-use zcu102_r5::semihost::Files;
+use zcu102_r5::semihost::HostFile;
 
 /// Detections of a recorded scan, before the gate.
 const MOST_DETECTIONS: usize = 16_384;
@@ -24,7 +26,7 @@ static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS>> = ConstStaticCell::new
 
 #[unsafe(no_mangle)]
 extern "C" fn main() -> ! {
-    let Some(mut files) = Files::open() else { exit(2) };
+    let Some(mut files) = Files::<HostFile, _>::open(Core) else { exit(2) };
     let Ok(job) = Job::read(&mut files) else { exit(1) };
     let Ok(parameters) = Parameters::new(&job.settings.sensor, &job.settings.radar_3d()) else { exit(1) };
     let (Some(state), Some(map), Some(scan)) = (STATE.try_take(), MAP.try_take(), SCAN.try_take()) else { exit(4) };

@@ -1,51 +1,64 @@
-//! An ARS408's frames in over CAN, the frames of the map out on the same bus; settings from `job.bin`.
+//! An ARS408's frames and the integrator's in over CAN, the frames of the map out on the same bus.
 #![no_std]
 #![no_main]
 
 use semihosting::process::exit;
-use static_cell::{ConstStaticCell, StaticCell};
-use viewshed::can_bus::BusKeeper;
+use static_cell::ConstStaticCell;
+use viewshed::can_bus::{BusConfig, BusKeeper};
+use viewshed::can_service::{CanService, CanServiceConfig};
 use viewshed::can_session::CanSession;
 use viewshed::inputs::ars408::Config;
-use viewshed::pil::job::Job;
-use viewshed::time::Time;
+use viewshed::pil::files::{FlashFile, answer};
+use viewshed::pil::record::{Closing, Record};
+use viewshed::session::{Flow, Slots};
+use viewshed::settings::Settings;
 use viewshed::unit::{Unit, bench_sender};
 use viewshed::wire::broadcast::Medium;
-use viewshed::wire::message::{Addresses, Epoch};
+use viewshed::wire::message::Addresses;
 use zcu102_r5::can::Can;
-use zcu102_r5::profile::{Map, Parameters, Sender, State};
-use zcu102_r5::semihost::Files;
+use zcu102_r5::profile::{DETECTIONS, Map, Parameters, Sender, State};
+use zcu102_r5::semihost::HostFile;
+use zcu102_r5::stack;
 
+const SENSOR: u8 = 0;
+/// Identifiers of this installation: sensor 0's begin at 0x400.
+const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 /// Clock of the CAN controllers, by the boot loader's default.
 const CAN_CLOCK_HZ: u32 = 100_000_000;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
-static SENDER: StaticCell<Sender> = StaticCell::new();
+static SENDER: ConstStaticCell<Option<Sender>> = ConstStaticCell::new(None);
 
 #[unsafe(no_mangle)]
 extern "C" fn main() -> ! {
-    let Some(mut files) = Files::open() else { exit(2) };
-    let Ok(job) = Job::read(&mut files) else { exit(1) };
-    let Ok(parameters) = Parameters::new(&job.settings.sensor, &job.settings.radar_3d()) else { exit(1) };
-    let Some(timing) = job.settings.radar_bus.timing(CAN_CLOCK_HZ) else { exit(1) };
-    let (Some(state), Some(map)) = (STATE.try_take(), MAP.try_take()) else { exit(4) };
-    let medium = Medium::Can(Addresses::STANDARD);
-    let sender = bench_sender(&job.settings, &parameters, medium, Epoch::new(1), Time::from_micros(0));
-    let Some(sender) = sender.and_then(|s| SENDER.try_init(s)) else { exit(1) };
+    let (Some(state), Some(map), Some(sender)) = (STATE.try_take(), MAP.try_take(), SENDER.try_take()) else { exit(4) };
+    let mut flash = FlashFile::<HostFile>::open();
+    // answers without a gap: time comes in steps here
+    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
+    let mut session = CanSession::<DETECTIONS>::new(Config::sensor(SENSOR));
+    let mut starts = 0;
 
-    let mut unit = Unit::new(&parameters, state, map, sender);
-    let mut session = CanSession::<256>::new(Config::sensor(0));
-    let mut can = Can::new(timing);
-    let mut keeper = BusKeeper::start(&job.settings.radar_bus, &mut can);
+    let mut told = false;
+
     loop {
-        keeper.poll(session.now(), &mut can);
-        let Some(frame) = keeper.receive(&mut can) else { continue };
-        session.bench_frame(&frame, &mut unit);
-        while let Some(frame) = unit.next_frame(session.now()) {
-            if !keeper.send(&frame, &mut can) {
-                break;
-            }
+        let epoch = flash.start();
+        starts += 1;
+        let settings = Settings::newest([flash.slot(0), flash.slot(1)]).ok().map(|newest| newest.settings);
+        let bus = settings.map_or(BusConfig::default(), |s| s.radar_bus);
+        let Some(timing) = bus.timing(CAN_CLOCK_HZ) else { exit(1) };
+        let mut can = Can::new(timing);
+        let mut keeper = BusKeeper::start(&bus, &mut can);
+        while !told {
+            told = session.bench_clock(&mut keeper, &mut can);
         }
+        let mut service = CanService::start(config, epoch, session.now(), &flash);
+        let parameters = settings.and_then(|s| Parameters::new(&s.sensor, &s.radar_3d()).ok());
+        let found = settings.as_ref().zip(parameters.as_ref());
+        *sender = found.and_then(|(s, p)| bench_sender(s, p, MEDIUM, epoch, session.now()));
+        let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
+
+        while session.bench_turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}
+        answer::<HostFile>(&Record::Closing(Closing { reason: 0, frames: starts, stack: stack::used() }));
     }
 }

@@ -9,19 +9,13 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use viewshed::can_session::{CanSession, TIME_ID};
-use viewshed::inputs::ars408::Config;
-use viewshed::pil::job::Job;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::settings::Settings;
-use viewshed::time::Time;
-use viewshed::unit::{Unit, bench_sender};
-use viewshed::wire::broadcast::Medium;
+use viewshed::pil::flash::Flash;
+use viewshed::pil::record::{Closing, Record};
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::message::{Addresses, Epoch};
 
 use super::Board;
-use super::machine::{Emulator, Folder};
+use super::can_twin::{self, Sent, Step};
+use super::machine::{CONTROL, Emulator, Folder};
 
 /// Socket of the emulator's register access, in its folder.
 pub const REGISTERS: &str = "registers.sock";
@@ -33,32 +27,6 @@ const NOT_EMPTY: u32 = 1 << 7;
 /// Frames sent in a row.
 const ROW: usize = 16;
 
-/// A frame that tells the board the time.
-pub fn time_frame(time: Time) -> CanFrame {
-    CanFrame::classic(TIME_ID, &time.micros().to_be_bytes()).expect("eight bytes")
-}
-
-/// What a board with the reference grid sends for these frames.
-///
-/// # Errors
-/// Settings the library refuses.
-pub fn answer(settings: &Settings, frames: &[CanFrame]) -> Result<Vec<CanFrame>> {
-    let parameters = Radar3dParameters::<200, 120, 16>::new(&settings.sensor, &settings.radar_3d())?;
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 64, 256>::new());
-    let mut map = Box::new(parameters.map());
-    let (medium, epoch) = (Medium::Can(Addresses::STANDARD), Epoch::new(1));
-    let sender = bench_sender::<200, 120, 16, 7>(settings, &parameters, medium, epoch, Time::from_micros(0));
-    let mut sender = Box::new(sender.context("maps of this sensor cannot be sent")?);
-    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
-    let mut session = CanSession::<256>::new(Config::sensor(0));
-    let mut sent = Vec::new();
-    for frame in frames {
-        session.bench_frame(frame, &mut unit);
-        sent.extend(std::iter::from_fn(|| unit.next_frame(session.now())));
-    }
-    Ok(sent)
-}
-
 /// A board on a CAN bus with us.
 pub struct CanBoard {
     replies: BufReader<UnixStream>,
@@ -66,18 +34,53 @@ pub struct CanBoard {
     sent: usize,
     /// Everything the board sent.
     pub answer: Vec<CanFrame>,
-    _emulator: Emulator,
-    _folder: Folder,
+    emulator: Emulator,
+    folder: Folder,
 }
 
 impl CanBoard {
-    /// Starts a board with its settings.
+    /// Starts a board with what it keeps.
     ///
     /// # Errors
     /// No emulator.
-    pub fn start(image: &Path, settings: &Settings) -> Result<Self> {
+    pub fn start(image: &Path, flash: &Flash) -> Result<Self> {
         let folder = Folder::new()?;
-        std::fs::write(folder.0.join("job.bin"), Job { settings: *settings, dump: None }.to_bytes())?;
+        std::fs::write(folder.0.join("flash.bin"), flash.bytes()).context("cannot write the flash")?;
+        Self::power_on(image, folder)
+    }
+
+    /// Takes its power away and gives it back.
+    ///
+    /// # Errors
+    /// No emulator.
+    pub fn restart(self, image: &Path) -> Result<Self> {
+        let Self { emulator, folder, .. } = self;
+        drop(emulator);
+        Self::power_on(image, folder)
+    }
+
+    /// What it keeps.
+    ///
+    /// # Errors
+    /// Not what a board keeps.
+    pub fn flash(&self) -> Result<Flash> {
+        let bytes = std::fs::read(self.folder.0.join("flash.bin")).context("the board keeps nothing")?;
+        Ok(Flash::new(bytes.try_into().ok().context("the flash has another size")?))
+    }
+
+    /// What it said of itself when it was restarted last.
+    pub fn closing(&self) -> Option<Closing> {
+        let bytes = std::fs::read(self.folder.0.join("answer.bin")).ok()?;
+        match Record::from_bytes(bytes.first_chunk()?)? {
+            Record::Closing(closing) => Some(closing),
+            _ => None,
+        }
+    }
+
+    fn power_on(image: &Path, folder: Folder) -> Result<Self> {
+        for socket in [REGISTERS, CONTROL] {
+            let _ = std::fs::remove_file(folder.0.join(socket));
+        }
         let listener = UnixListener::bind(folder.0.join(REGISTERS)).context("cannot open the register socket")?;
         listener.set_nonblocking(true)?;
         let emulator = Emulator::on_can(Board::Zcu102R5, image, &folder.0)?;
@@ -94,7 +97,7 @@ impl CanBoard {
         registers.set_nonblocking(false)?;
         registers.set_read_timeout(Some(Duration::from_secs(20)))?;
         let replies = BufReader::new(registers.try_clone()?);
-        let mut board = Self { replies, registers, sent: 0, answer: Vec::new(), _emulator: emulator, _folder: folder };
+        let mut board = Self { replies, registers, sent: 0, answer: Vec::new(), emulator, folder };
         emulator_on(&mut board)?;
         Ok(board)
     }
@@ -154,6 +157,34 @@ impl CanBoard {
         Ok(())
     }
 
+    /// Sends a script and compares every frame that comes back with those of the same program here, from
+    /// the board's start on; gives what was sent step by step.
+    ///
+    /// # Errors
+    /// The first frame that differs.
+    pub fn run(&mut self, flash: &mut Flash, steps: &[Step]) -> Result<Vec<Sent>> {
+        let expected = can_twin::answer(flash, steps);
+        let all: Vec<&CanFrame> = expected.iter().flat_map(|sent| &sent.frames).collect();
+        let mut due = 0;
+        for (step, sent) in steps.iter().zip(&expected) {
+            self.send(&step.all().collect::<Vec<_>>())?;
+            due += sent.frames.len();
+            if sent.starts_over {
+                self.wait_for(due, Duration::from_secs(5))?;
+            }
+        }
+        self.wait_for(all.len(), Duration::from_secs(5))?;
+        // and nothing more
+        self.wait_for(all.len() + 1, Duration::from_millis(50))?;
+        if let Some(first) = self.answer.iter().zip(&all).position(|(a, b)| a != *b) {
+            bail!("frame {first} of the board is {:?}, here it is {:?}", self.answer[first], all[first]);
+        }
+        if self.answer.len() != all.len() {
+            bail!("the board sent {} frames, {} are due", self.answer.len(), all.len());
+        }
+        Ok(expected)
+    }
+
     /// Takes frames until there are this many, or none for a while.
     ///
     /// # Errors
@@ -190,8 +221,8 @@ fn emulator_on(board: &mut CanBoard) -> Result<()> {
         board.write(FAR + register, value)?;
     }
     let started = Instant::now();
-    // its status says that it is in normal mode
-    while board.read(NEAR + 0x18)? & 1 << 3 == 0 {
+    // its status says that it takes part, or listens
+    while board.read(NEAR + 0x18)? & (1 << 3 | 1 << 12) == 0 {
         if started.elapsed() > Duration::from_secs(20) {
             bail!("the board does not come to its bus");
         }

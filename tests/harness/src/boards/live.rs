@@ -1,16 +1,16 @@
 //! The live program of the serial boards, run here: the same bytes in, the bytes it has to send.
 
 use viewshed::inputs::native::{Medium as Native, Sender};
+use viewshed::pil::flash::Flash;
 use viewshed::pil::record::FrameRecord;
 use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::service::Request;
-use viewshed::session::{Flow, Line, Session, Slots};
-use viewshed::settings::{BLOCK_LEN, Settings};
+use viewshed::session::{Flow, Line, Session};
+use viewshed::settings::Settings;
 use viewshed::time::Time;
 use viewshed::unit::{Unit, bench_sender};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
-use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
 
 use super::Profile;
@@ -40,15 +40,15 @@ pub fn answer(profile: Profile, bytes: &[u8]) -> Answered {
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
     bytes: &[u8],
 ) -> Answered {
-    let mut slots = InMemory([[0xFF; BLOCK_LEN]; 2]);
+    let mut flash = Flash::ERASED;
     let mut line = Answer(Vec::new());
     let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
     let mut map = Box::new(PolarMap::<R, A>::NOWHERE);
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
-    let (mut epoch, mut rest, mut times) = (Epoch::new(0), bytes, Vec::new());
+    let (mut rest, mut times) = (bytes, Vec::new());
     'start: loop {
-        epoch = epoch.next();
-        let mut session = Session::<D>::start(SENSOR, &slots, &mut line);
+        let epoch = flash.start();
+        let mut session = Session::<D>::start(SENSOR, &flash, &mut line);
         let settings = session.settings();
         let parameters = settings.and_then(|s| Radar3dParameters::<R, A, E>::new(&s.sensor, &s.radar_3d()).ok());
         let found = settings.zip(parameters.as_ref());
@@ -57,7 +57,7 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
         while let Some((byte, behind)) = rest.split_first() {
             rest = behind;
-            if session.take(&[*byte], &mut unit, &mut slots, &mut line) == Flow::Restart {
+            if session.take(&[*byte], &mut unit, &mut flash, &mut line) == Flow::Restart {
                 continue 'start;
             }
             if times.last().is_none_or(|(n, _)| *n < line.0.len()) {
@@ -65,18 +65,6 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
             }
         }
         return Answered { bytes: line.0, times };
-    }
-}
-
-struct InMemory([[u8; BLOCK_LEN]; 2]);
-
-impl Slots for InMemory {
-    fn slot(&self, slot: usize) -> &[u8] {
-        &self.0[slot]
-    }
-
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
-        self.0[slot] = *block;
     }
 }
 

@@ -133,7 +133,7 @@ fn cortex_m(machine: &str, image: &Path) -> Command {
 }
 
 /// Socket the emulator is controlled by, in its folder.
-const CONTROL: &str = "control.sock";
+pub const CONTROL: &str = "control.sock";
 
 /// The real-time core is processor 4, and off at first.
 fn cortex_r(image: &Path) -> Command {

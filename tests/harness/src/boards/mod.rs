@@ -2,10 +2,12 @@
 
 #[cfg(unix)]
 pub mod can;
+pub mod can_twin;
 pub mod check;
 pub mod firmware;
 pub mod host;
 pub mod image;
+pub mod listener;
 #[cfg(unix)]
 pub mod live;
 pub mod machine;

@@ -9,12 +9,16 @@ use std::path::Path;
 use viewshed::settings::Settings;
 use viewshed_harness::boards::scans::{self, Scan};
 use viewshed_harness::estimators;
-use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::recording::{ReadOptions, Recording, mcap};
 
 /// The shipped recording's settings and its first seconds.
 fn shipped(seconds: f64) -> (Settings, Vec<Scan>) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
     let reading = ReadOptions { to_s: Some(seconds), ..ReadOptions::default() };
     let recording = mcap::read(&path, &reading).unwrap();
-    (Settings::of(estimators::sensor(&recording, &Default::default())), scans::of(&recording))
+    (settings_of(&recording), scans::of(&recording))
+}
+
+fn settings_of(recording: &Recording) -> Settings {
+    Settings::of(estimators::sensor(recording, &Default::default()))
 }

@@ -1,0 +1,110 @@
+//! A receiver beside a board's bus, and whether what it tells is what was sent.
+
+use std::collections::VecDeque;
+
+use viewshed::profile::reference::{AZIMUTHS, WORDS};
+use viewshed::time::Time;
+use viewshed::wire::broadcast::Medium;
+use viewshed::wire::frame::CanFrame;
+use viewshed::wire::message::{Addresses, Epoch, Plane};
+use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::scan_number::ScanNumber;
+
+use super::can_twin::{MEDIUM, Map, SENSOR};
+
+const LIMITS: Limits = Limits::DEFAULT;
+const AGE_AND_DELAY_US: u64 = 400_000;
+
+/// A receiver, and what was sent to it.
+pub struct Listener {
+    receiver: Box<Receiver<1, AZIMUTHS, WORDS>>,
+    sent: VecDeque<Map>,
+    /// What each azimuth told last.
+    newest: Vec<Option<(Epoch, Time)>>,
+}
+
+/// What a receiver tells at a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Telling {
+    pub azimuths: usize,
+    pub visible_cells: u32,
+    /// Every cell is that of the map sent last.
+    pub equal: bool,
+}
+
+impl Default for Listener {
+    fn default() -> Self {
+        Self { receiver: Self::deaf(), sent: VecDeque::new(), newest: vec![None; AZIMUTHS] }
+    }
+}
+
+impl Listener {
+    fn deaf() -> Box<Receiver<1, AZIMUTHS, WORDS>> {
+        let addresses = match MEDIUM {
+            Medium::Can(addresses) | Medium::CanFd(addresses) => addresses,
+            Medium::Serial => Addresses::STANDARD,
+        };
+        Box::new(Receiver::new([SENSOR], addresses, LIMITS))
+    }
+
+    /// The receiver loses its power.
+    pub fn restart(&mut self) {
+        self.receiver = Self::deaf();
+        self.newest.fill(None);
+    }
+
+    /// The unit sends a map.
+    pub fn sent(&mut self, map: &Map) {
+        self.sent.push_back(map.clone());
+        if self.sent.len() > 100 {
+            self.sent.pop_front();
+        }
+    }
+
+    /// A frame arrives.
+    pub fn frame(&mut self, now: Time, frame: &CanFrame) {
+        // what is refused is counted there
+        let _ = self.receiver.frame(now, frame);
+    }
+
+    pub fn receiver(&self) -> &Receiver<1, AZIMUTHS, WORDS> {
+        &self.receiver
+    }
+
+    /// What it tells, and whether it may: visible is only what the sender's map of the scan that is told
+    /// had visible, measured at most A + D ago and not before what was told already.
+    ///
+    /// # Errors
+    /// It may not: why.
+    pub fn tell(&mut self, now: Time) -> Result<Telling, String> {
+        let map = self.receiver.map(SENSOR, now);
+        let epoch = self.receiver.sensor(SENSOR).and_then(|s| s.epoch());
+        let last = self.sent.back();
+        let mut told = Telling { equal: last.is_some(), ..Telling::default() };
+        for azimuth in 0..AZIMUTHS {
+            let ray = map.ray(Plane::Visibility, azimuth);
+            told.equal &= last.is_some_and(|last| last.rays.get(azimuth) == Some(&ray));
+            let Some((scan, epoch)) = map.scan(azimuth).zip(epoch) else { continue };
+            told.azimuths += 1;
+            told.visible_cells += ray.bits().count();
+            let is_it = |map: &&Map| map.epoch == epoch && ScanNumber::at(map.measured) == scan;
+            let Some(sent) = self.sent.iter().rev().find(is_it) else {
+                return Err(format!("azimuth {azimuth} tells {scan:?} of {epoch:?}, which was not sent lately"));
+            };
+            let age = now.since(sent.measured).unwrap_or(u64::MAX);
+            if age > AGE_AND_DELAY_US {
+                return Err(format!("azimuth {azimuth} is {age} us old"));
+            }
+            if sent.rays.get(azimuth).is_none_or(|sent| ray.bits().and(sent.bits()) != *ray.bits()) {
+                return Err(format!("azimuth {azimuth} is told visible where it was not at {:?}", sent.measured));
+            }
+            if let Some((e, newest)) = self.newest.get(azimuth).copied().flatten() {
+                if e == epoch && sent.measured < newest {
+                    return Err(format!("azimuth {azimuth} went back from {newest:?} to {:?}", sent.measured));
+                }
+            }
+            self.newest[azimuth] = Some((epoch, sent.measured));
+        }
+        Ok(told)
+    }
+}
