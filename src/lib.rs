@@ -70,7 +70,7 @@
 //! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
 //! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`can_service`], [`service`], [`settings`] |
-//! | a bus looked after: listen first, back off after bus-off | [`can_bus`] |
+//! | a bus looked after: listen first, back off after bus-off; a line that stalls | [`can_bus`], [`transmitter`] |
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
 //!
@@ -149,6 +149,7 @@ pub mod solid;
 pub mod spherical;
 pub mod stage;
 pub mod time;
+pub mod transmitter;
 pub mod trig;
 pub mod unit;
 pub mod voxelise;

@@ -72,6 +72,7 @@ pub struct Session<const D: usize> {
 
 impl<const D: usize> Session<D> {
     /// Starts with the newest block that holds.
+    #[inline(never)] // what it takes of the stack is free again afterwards
     pub fn start(sensor: u8, slots: &impl Slots, line: &mut impl Line) -> Self {
         let settings = Settings::newest([slots.slot(0), slots.slot(1)]).map_err(worst);
         let mut session = Self {

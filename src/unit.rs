@@ -153,3 +153,31 @@ pub fn bench_sender<const R: usize, const A: usize, const E: usize, const W: usi
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     Broadcaster::new(config, header(settings, parameters).ok()?, epoch, now).ok()
 }
+
+/// Puts parameters and sender of a unit in a test bench where they stay, or `None` without settings that can
+/// be worked with. Apart, so that what this takes of the stack is free again before the first scan.
+#[inline(never)]
+pub fn start_bench<const R: usize, const A: usize, const E: usize, const W: usize>(
+    parameters: &mut Option<Radar3dParameters<R, A, E>>,
+    sender: &mut Option<Broadcaster<A, W>>,
+    settings: Option<&Settings>,
+    medium: Medium,
+    epoch: Epoch,
+    now: Time,
+) {
+    *parameters = settings.and_then(|s| Radar3dParameters::new(&s.sensor, &s.radar_3d()).ok());
+    start_bench_sender(parameters.as_ref(), sender, settings, medium, epoch, now);
+}
+
+#[inline(never)]
+fn start_bench_sender<const R: usize, const A: usize, const E: usize, const W: usize>(
+    parameters: Option<&Radar3dParameters<R, A, E>>,
+    sender: &mut Option<Broadcaster<A, W>>,
+    settings: Option<&Settings>,
+    medium: Medium,
+    epoch: Epoch,
+    now: Time,
+) {
+    let found = settings.zip(parameters);
+    *sender = found.and_then(|(settings, parameters)| bench_sender(settings, parameters, medium, epoch, now));
+}

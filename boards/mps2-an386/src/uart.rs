@@ -4,10 +4,12 @@
 //! Arm, "Cortex-M System Design Kit Technical Reference Manual" (DDI 0479), APB UART; base addresses:
 //! "Application Note AN386", memory map.
 
+use viewshed::transmitter::BytePort;
+
 use crate::Register;
 
-/// Polls after which a byte that does not go out is given up.
-const PATIENCE: u32 = 2_000_000;
+/// Looks at a transmitter that takes no byte before its line is stalled: longer than any emulator pauses.
+pub const PATIENCE: u32 = 40_000_000;
 
 /// A UART with its transmitter and receiver on.
 #[derive(Clone, Copy)]
@@ -30,19 +32,14 @@ impl Uart {
     pub fn read(&self) -> Option<u8> {
         (self.state.read() & 2 != 0).then(|| self.data.read() as u8)
     }
+}
 
-    /// Sends all bytes; `false` if the line stops taking them.
-    pub fn write(&self, bytes: &[u8]) -> bool {
-        for byte in bytes {
-            let mut polls = 0;
-            while self.state.read() & 1 != 0 {
-                polls += 1;
-                if polls > PATIENCE {
-                    return false;
-                }
-            }
-            self.data.write(u32::from(*byte));
+impl BytePort for Uart {
+    fn put(&mut self, byte: u8) -> bool {
+        let room = self.state.read() & 1 == 0;
+        if room {
+            self.data.write(u32::from(byte));
         }
-        true
+        room
     }
 }

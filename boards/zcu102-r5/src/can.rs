@@ -24,7 +24,7 @@ const FULL: u32 = 1 << 10;
 /// Frames sent in a row at most: half of the far controller's queue.
 const ROW: u32 = 16;
 /// Looks at the far controller's queue before a frame is given up.
-const PATIENCE: u32 = 5_000_000;
+const PATIENCE: u32 = 500_000_000;
 
 /// A controller, and in the emulator the one at the far end of its bus: sending into its full queue would end
 /// the emulator.

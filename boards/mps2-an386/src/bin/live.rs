@@ -4,30 +4,40 @@
 
 use cortex_m_rt::entry;
 use mps2_an386::profile::{DETECTIONS, Map, Parameters, Sender, State};
+use mps2_an386::stack;
 use mps2_an386::timer::Timer;
-use mps2_an386::uart::Uart;
-use static_cell::ConstStaticCell;
+use mps2_an386::uart::{PATIENCE, Uart};
+use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::pil::flash::Flash;
-use viewshed::pil::record::{FrameRecord, Record};
+use viewshed::pil::record::{Closing, FrameRecord, Record};
 use viewshed::session::{Flow, Line, Session};
-use viewshed::unit::{Unit, bench_sender};
+use viewshed::transmitter::Transmitter;
+use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 
 const SENSOR: u8 = 0;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
-static SENDER: ConstStaticCell<Option<Sender>> = ConstStaticCell::new(None);
+static SENDER: StaticCell<Option<Sender>> = StaticCell::new();
 
 struct Lines {
-    maps: Uart,
-    traces: Uart,
+    maps: (Transmitter, Uart),
+    traces: (Transmitter, Uart),
     timer: Timer,
+}
+
+impl Lines {
+    fn record(&mut self, record: &Record) {
+        let (transmitter, uart) = &mut self.traces;
+        transmitter.send(uart, &record.to_bytes());
+    }
 }
 
 impl Line for Lines {
     fn send(&mut self, bytes: &[u8]) -> bool {
-        self.maps.write(bytes)
+        let (transmitter, uart) = &mut self.maps;
+        transmitter.send(uart, bytes)
     }
 
     fn ticks(&mut self) -> u32 {
@@ -35,27 +45,29 @@ impl Line for Lines {
     }
 
     fn trace(&mut self, record: &FrameRecord) {
-        self.traces.write(&Record::Frame(*record).to_bytes());
+        self.record(&Record::Frame(*record));
     }
 }
 
 #[entry]
 fn main() -> ! {
     let radar = Uart::start(0);
-    let mut lines = Lines { maps: Uart::start(1), traces: Uart::start(2), timer: Timer::start() };
+    let out = |number| (Transmitter::new(PATIENCE), Uart::start(number));
+    let mut lines = Lines { maps: out(1), traces: out(2), timer: Timer::start() };
+    let mut starts = 0;
     // the emulated board has none
     let mut flash = Flash::ERASED;
-    let (Some(state), Some(map), Some(sender)) = (STATE.try_take(), MAP.try_take(), SENDER.try_take()) else {
+    let (Some(state), Some(map), Some(sender)) = (STATE.try_take(), MAP.try_take(), SENDER.try_init(None)) else {
         semihosting::process::exit(4)
     };
 
     loop {
         let epoch = flash.start();
+        starts += 1;
         let mut session = Session::<DETECTIONS>::start(SENSOR, &flash, &mut lines);
         let settings = session.settings();
-        let parameters = settings.and_then(|s| Parameters::new(&s.sensor, &s.radar_3d()).ok());
-        let medium = Medium::Serial;
-        *sender = settings.zip(parameters.as_ref()).and_then(|(s, p)| bench_sender(s, p, medium, epoch, session.now()));
+        let mut parameters: Option<Parameters> = None;
+        start_bench(&mut parameters, sender, settings, Medium::Serial, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         loop {
@@ -64,5 +76,6 @@ fn main() -> ! {
                 break;
             }
         }
+        lines.record(&Record::Closing(Closing { reason: 0, frames: starts, stack: stack::used() }));
     }
 }

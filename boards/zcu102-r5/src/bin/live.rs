@@ -3,7 +3,7 @@
 #![no_main]
 
 use semihosting::process::exit;
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::can_bus::{BusConfig, BusKeeper};
 use viewshed::can_service::{CanService, CanServiceConfig};
 use viewshed::can_session::CanSession;
@@ -12,7 +12,7 @@ use viewshed::pil::files::{FlashFile, answer};
 use viewshed::pil::record::{Closing, Record};
 use viewshed::session::{Flow, Slots};
 use viewshed::settings::Settings;
-use viewshed::unit::{Unit, bench_sender};
+use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Addresses;
 use zcu102_r5::can::Can;
@@ -28,11 +28,13 @@ const CAN_CLOCK_HZ: u32 = 100_000_000;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
-static SENDER: ConstStaticCell<Option<Sender>> = ConstStaticCell::new(None);
+static SENDER: StaticCell<Option<Sender>> = StaticCell::new();
 
 #[unsafe(no_mangle)]
 extern "C" fn main() -> ! {
-    let (Some(state), Some(map), Some(sender)) = (STATE.try_take(), MAP.try_take(), SENDER.try_take()) else { exit(4) };
+    let (Some(state), Some(map), Some(sender)) = (STATE.try_take(), MAP.try_take(), SENDER.try_init(None)) else {
+        exit(4)
+    };
     let mut flash = FlashFile::<HostFile>::open();
     // answers without a gap: time comes in steps here
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
@@ -53,9 +55,8 @@ extern "C" fn main() -> ! {
             told = session.bench_clock(&mut keeper, &mut can);
         }
         let mut service = CanService::start(config, epoch, session.now(), &flash);
-        let parameters = settings.and_then(|s| Parameters::new(&s.sensor, &s.radar_3d()).ok());
-        let found = settings.as_ref().zip(parameters.as_ref());
-        *sender = found.and_then(|(s, p)| bench_sender(s, p, MEDIUM, epoch, session.now()));
+        let mut parameters: Option<Parameters> = None;
+        start_bench(&mut parameters, sender, settings.as_ref(), MEDIUM, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         while session.bench_turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}

@@ -164,18 +164,8 @@ impl CanBoard {
     /// The first frame that differs.
     pub fn run(&mut self, flash: &mut Flash, steps: &[Step]) -> Result<Vec<Sent>> {
         let expected = can_twin::answer(flash, steps);
+        self.exchange(steps, &expected)?;
         let all: Vec<&CanFrame> = expected.iter().flat_map(|sent| &sent.frames).collect();
-        let mut due = 0;
-        for (step, sent) in steps.iter().zip(&expected) {
-            self.send(&step.all().collect::<Vec<_>>())?;
-            due += sent.frames.len();
-            if sent.starts_over {
-                self.wait_for(due, Duration::from_secs(5))?;
-            }
-        }
-        self.wait_for(all.len(), Duration::from_secs(5))?;
-        // and nothing more
-        self.wait_for(all.len() + 1, Duration::from_millis(50))?;
         if let Some(first) = self.answer.iter().zip(&all).position(|(a, b)| a != *b) {
             bail!("frame {first} of the board is {:?}, here it is {:?}", self.answer[first], all[first]);
         }
@@ -183,6 +173,24 @@ impl CanBoard {
             bail!("the board sent {} frames, {} are due", self.answer.len(), all.len());
         }
         Ok(expected)
+    }
+
+    /// Sends a script to a board from which this is expected, and takes what comes.
+    ///
+    /// # Errors
+    /// The board takes no more.
+    pub fn exchange(&mut self, steps: &[Step], expected: &[Sent]) -> Result<()> {
+        let mut due = 0;
+        for (step, sent) in steps.iter().zip(expected) {
+            self.send(&step.all().collect::<Vec<_>>())?;
+            due += sent.frames.len();
+            if sent.starts_over {
+                self.wait_for(due, Duration::from_secs(5))?;
+            }
+        }
+        self.wait_for(due, Duration::from_secs(5))?;
+        // and nothing more
+        self.wait_for(due + 1, Duration::from_millis(50))
     }
 
     /// Takes frames until there are this many, or none for a while.

@@ -9,17 +9,16 @@ use viewshed::can_session::{CanSession, TIME_ID};
 use viewshed::detection::Detection;
 use viewshed::inputs::ars408::Config;
 use viewshed::pil::flash::Flash;
-use viewshed::profile::reference::{AZIMUTHS, DETECTIONS, Map as PolarMap, Parameters, Sender, State, WORDS};
+use viewshed::profile::reference::{DETECTIONS, Map as PolarMap, Parameters, Sender, State};
 use viewshed::session::{Flow, Slots};
 use viewshed::settings::Settings;
 use viewshed::time::Time;
-use viewshed::unit::{Unit, bench_sender};
+use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
-use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::layers::Layers;
-use viewshed::wire::message::{Addresses, Epoch, Plane};
+use viewshed::wire::message::Addresses;
 
+use super::listener::Map;
 use super::scans::Scan;
 use crate::recording::candump::Line;
 
@@ -29,9 +28,6 @@ pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;
-
-/// Age at which a sender sends no map any more.
-const STALE_US: u64 = 100_000;
 
 /// What comes over the bus at a time.
 #[derive(Debug, Clone)]
@@ -46,14 +42,6 @@ impl Step {
         let told = CanFrame::classic(TIME_ID, &self.time.micros().to_be_bytes());
         told.into_iter().chain(self.frames.iter().copied())
     }
-}
-
-/// A map a unit sent.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Map {
-    pub measured: Time,
-    pub epoch: Epoch,
-    pub rays: Vec<Ray<WORDS>>,
 }
 
 /// What a unit sends at a step.
@@ -125,9 +113,8 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
             told = session.bench_clock(&mut keeper, &mut port);
         }
         let mut service = CanService::start(config, epoch, session.now(), flash);
-        let parameters = settings.and_then(|s| Parameters::new(&s.sensor, &s.radar_3d()).ok());
-        let found = settings.as_ref().zip(parameters.as_ref());
-        *sender = found.and_then(|(s, p)| bench_sender(s, p, MEDIUM, epoch, session.now()));
+        let mut parameters: Option<Parameters> = None;
+        start_bench(&mut parameters, &mut sender, settings.as_ref(), MEDIUM, epoch, session.now());
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
         let mut last = None;
@@ -145,10 +132,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
                 let deadline = unit.broadcast().deadline();
                 if deadline != last {
                     last = deadline;
-                    let measured = deadline.map(|t| Time::from_micros(t.micros() - STALE_US));
-                    let map = unit.map();
-                    let rays = (0..AZIMUTHS).map(|a| map.ray(Plane::Visibility, a)).collect();
-                    now.map = measured.map(|measured| Map { measured, epoch, rays });
+                    now.map = Map::offered(unit);
                 }
             }
         }

@@ -101,11 +101,17 @@ pub fn difference(answer: &[u8], here: &[u8], frame: usize, geometry: &PolarGeom
     let (Some((ranges, board)), Some((_, host))) = (dumped(answer, frame), dumped(here, frame)) else {
         bail!("the map of frame {frame} was not sent")
     };
-    let right = f64::from(geometry.azimuth_origin.radians());
-    let span = f64::from(geometry.azimuth_span) / 65536.0 * std::f64::consts::TAU;
-    let azimuth_rad = [right, right + span];
-    let cell_m = f64::from(geometry.cell_cm) / 100.0;
-    Ok(Difference { frame, ranges, azimuth_rad, cell_m, host, board, visible_from: 128 })
+    Ok(Difference::new(frame, ranges, geometry, host, board))
+}
+
+impl Difference {
+    /// Of two maps of the same geometry.
+    pub fn new(frame: usize, ranges: usize, geometry: &PolarGeometry, host: Vec<[u8; 2]>, board: Vec<[u8; 2]>) -> Self {
+        let right = f64::from(geometry.azimuth_origin.radians());
+        let span = f64::from(geometry.azimuth_span) / 65536.0 * std::f64::consts::TAU;
+        let cell_m = f64::from(geometry.cell_cm) / 100.0;
+        Self { frame, ranges, azimuth_rad: [right, right + span], cell_m, host, board, visible_from: 128 }
+    }
 }
 
 /// Range cells, and every cell of the map of a frame.

@@ -4,16 +4,43 @@ use std::collections::VecDeque;
 
 use viewshed::profile::reference::{AZIMUTHS, WORDS};
 use viewshed::time::Time;
+use viewshed::unit::Unit;
 use viewshed::wire::broadcast::Medium;
+use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
+use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::scan_number::ScanNumber;
 
-use super::can_twin::{MEDIUM, Map, SENSOR};
+use super::can_twin::{MEDIUM, SENSOR};
 
 const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
+
+/// Age at which a sender sends no map any more.
+const STALE_US: u64 = 100_000;
+
+/// A map a unit of the reference grid sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Map {
+    pub measured: Time,
+    pub epoch: Epoch,
+    pub rays: Vec<Ray<WORDS>>,
+}
+
+impl Map {
+    /// The map that a unit offered to its sender last; `None` if it offered none.
+    pub fn offered<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+        unit: &mut Unit<'_, R, A, E, W, N, D>,
+    ) -> Option<Self> {
+        let sender = unit.broadcast();
+        let (deadline, epoch) = (sender.deadline()?, sender.epoch());
+        let measured = Time::from_micros(deadline.micros().checked_sub(STALE_US)?);
+        let rays = (0..A).map(|a| unit.map().ray(Plane::Visibility, a)).collect();
+        Some(Self { measured, epoch, rays })
+    }
+}
 
 /// A receiver, and what was sent to it.
 pub struct Listener {
@@ -65,6 +92,11 @@ impl Listener {
     pub fn frame(&mut self, now: Time, frame: &CanFrame) {
         // what is refused is counted there
         let _ = self.receiver.frame(now, frame);
+    }
+
+    /// A message of a serial line arrives.
+    pub fn message(&mut self, now: Time, message: &[u8]) {
+        let _ = self.receiver.message(now, message);
     }
 
     pub fn receiver(&self) -> &Receiver<1, AZIMUTHS, WORDS> {

@@ -1,5 +1,9 @@
 //! The live program of the serial boards, run here: the same bytes in, the bytes it has to send.
 
+use std::cell::RefCell;
+use std::io::{Read, Write};
+use std::{iter, mem};
+
 use viewshed::inputs::native::{Medium as Native, Sender};
 use viewshed::pil::flash::Flash;
 use viewshed::pil::record::FrameRecord;
@@ -9,11 +13,12 @@ use viewshed::service::Request;
 use viewshed::session::{Flow, Line, Session};
 use viewshed::settings::Settings;
 use viewshed::time::Time;
-use viewshed::unit::{Unit, bench_sender};
+use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
 
 use super::Profile;
+use super::listener::Map;
 use super::scans::Scan;
 
 /// The sensor's number on both lines.
@@ -23,56 +28,93 @@ pub const SENSOR: u8 = 0;
 const FIRST_US: u64 = 1_000_000;
 
 /// What a board sends, and when.
+#[derive(Default)]
 pub struct Answered {
     pub bytes: Vec<u8>,
     /// How many bytes there were at which time of the scans.
     pub times: Vec<(usize, Time)>,
+    /// How many bytes there were after each byte that came in.
+    pub lengths: Vec<usize>,
+    /// The maps that were sent, and how many bytes had come in by then.
+    pub maps: Vec<(usize, Map)>,
 }
 
 /// What the board sends for these bytes.
 pub fn answer(profile: Profile, bytes: &[u8]) -> Answered {
+    let mut answered = Answered::default();
+    let sent = RefCell::new(Vec::new());
+    let mut after = |now: Time, map: Option<Map>| {
+        let length = sent.borrow().len();
+        answered.lengths.push(length);
+        if answered.times.last().is_none_or(|(n, _)| *n < length) {
+            answered.times.push((length, now));
+        }
+        answered.maps.extend(map.map(|map| (answered.lengths.len(), map)));
+    };
+    run(profile, &mut bytes.iter().copied(), &mut |bytes| sent.borrow_mut().extend_from_slice(bytes), &mut after);
+    answered.bytes = sent.into_inner();
+    answered
+}
+
+/// A board of this computer: takes bytes from one stream and answers on the other, until there are no more.
+pub fn device(profile: Profile, mut from: impl Read, mut to: impl Write) {
+    let mut bytes = iter::from_fn(|| {
+        let mut byte = [0];
+        from.read_exact(&mut byte).ok().map(|()| byte[0])
+    });
+    // who does not listen any more misses something
+    run(profile, &mut bytes, &mut |bytes| drop(to.write_all(bytes)), &mut |_, _| {});
+}
+
+/// Called after each byte with the time and the map that it led to.
+type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
+
+fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
     match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 64, 256>(bytes),
-        Profile::Small => work::<100, 64, 8, 4, 28, 176>(bytes),
+        Profile::Reference => work::<200, 120, 16, 7, 64, 256>(bytes, send, after),
+        Profile::Small => work::<100, 64, 8, 4, 28, 176>(bytes, send, after),
     }
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    bytes: &[u8],
-) -> Answered {
+    bytes: &mut dyn Iterator<Item = u8>,
+    send: &mut dyn FnMut(&[u8]),
+    after: After<'_>,
+) {
     let mut flash = Flash::ERASED;
-    let mut line = Answer(Vec::new());
+    let mut line = Answer(send);
     let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
     let mut map = Box::new(PolarMap::<R, A>::NOWHERE);
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
-    let (mut rest, mut times) = (bytes, Vec::new());
     'start: loop {
         let epoch = flash.start();
         let mut session = Session::<D>::start(SENSOR, &flash, &mut line);
-        let settings = session.settings();
-        let parameters = settings.and_then(|s| Radar3dParameters::<R, A, E>::new(&s.sensor, &s.radar_3d()).ok());
-        let found = settings.zip(parameters.as_ref());
-        *sender = found.and_then(|(s, p)| bench_sender(s, p, Medium::Serial, epoch, session.now()));
+        let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
+        start_bench(&mut parameters, &mut sender, session.settings(), Medium::Serial, epoch, session.now());
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
-        while let Some((byte, behind)) = rest.split_first() {
-            rest = behind;
-            if session.take(&[*byte], &mut unit, &mut flash, &mut line) == Flow::Restart {
+        let mut last = None;
+        while let Some(byte) = bytes.next() {
+            let flow = session.take(&[byte], &mut unit, &mut flash, &mut line);
+            let offered = unit.as_mut().and_then(|unit| {
+                let deadline = unit.broadcast().deadline();
+                let new = deadline != mem::replace(&mut last, deadline);
+                new.then(|| Map::offered(unit)).flatten()
+            });
+            after(session.now(), offered);
+            if flow == Flow::Restart {
                 continue 'start;
             }
-            if times.last().is_none_or(|(n, _)| *n < line.0.len()) {
-                times.push((line.0.len(), session.now()));
-            }
         }
-        return Answered { bytes: line.0, times };
+        return;
     }
 }
 
-struct Answer(Vec<u8>);
+struct Answer<'a>(&'a mut dyn FnMut(&[u8]));
 
-impl Line for Answer {
+impl Line for Answer<'_> {
     fn send(&mut self, bytes: &[u8]) -> bool {
-        self.0.extend_from_slice(bytes);
+        (self.0)(bytes);
         true
     }
 
@@ -88,11 +130,13 @@ pub struct Script {
     radar: Sender,
     counter: u8,
     pub bytes: Vec<u8>,
+    /// Where scans end, and their times.
+    pub marks: Vec<(usize, Time)>,
 }
 
 impl Default for Script {
     fn default() -> Self {
-        Self { radar: Sender::new(SENSOR), counter: 0, bytes: Vec::new() }
+        Self { radar: Sender::new(SENSOR), counter: 0, bytes: Vec::new(), marks: Vec::new() }
     }
 }
 
@@ -114,6 +158,7 @@ impl Script {
         let time = on_the_line(scan.time, first);
         let messages: Vec<_> = self.radar.scan(time, false, &scan.detections, Native::Serial).collect();
         messages.iter().for_each(|m| self.stuffed(m.bytes()));
+        self.marks.push((self.bytes.len(), time));
     }
 
     /// The time, as scans have it.

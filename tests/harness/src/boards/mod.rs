@@ -8,8 +8,9 @@ pub mod firmware;
 pub mod host;
 pub mod image;
 pub mod listener;
-#[cfg(unix)]
 pub mod live;
+#[cfg(unix)]
+pub mod live_check;
 pub mod machine;
 pub mod report;
 pub mod scans;

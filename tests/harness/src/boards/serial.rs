@@ -6,6 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use serialport::TTYPort;
 
 /// The board's three lines: radar in, maps out, traces out.
 pub const LINES: [&str; 3] = ["radar.sock", "maps.sock", "traces.sock"];
@@ -50,7 +51,7 @@ impl Waiting {
             line.set_nonblocking(true)?;
         }
         let Ok([radar, maps, traces]) = <[UnixStream; 3]>::try_from(lines) else { bail!("a line is missing") };
-        Ok(SerialBoard { radar, maps, traces, answer: Vec::new(), trace: Vec::new() })
+        Ok(SerialBoard { radar, maps, traces, answer: Vec::new(), trace: Vec::new(), deaf: false })
     }
 }
 
@@ -62,25 +63,41 @@ pub struct SerialBoard {
     /// Everything that came on the line of the maps, and of the traces.
     pub answer: Vec<u8>,
     pub trace: Vec<u8>,
+    /// Nobody reads the line of the maps.
+    pub deaf: bool,
 }
 
-impl SerialBoard {
+/// A serial line with a board at its far end, emulated or real.
+pub trait Far {
+    /// Puts in some of the bytes, and tells how many.
+    ///
+    /// # Errors
+    /// The line is gone.
+    fn put(&mut self, bytes: &[u8]) -> Result<usize>;
+
+    /// Collects what came; whether anything did.
+    ///
+    /// # Errors
+    /// The line is gone.
+    fn collect(&mut self) -> Result<bool>;
+
+    /// Everything that came.
+    fn answer(&self) -> &[u8];
+
     /// Sends bytes and collects what comes back meanwhile.
     ///
     /// # Errors
     /// The board takes no more.
-    pub fn send(&mut self, mut bytes: &[u8]) -> Result<()> {
-        let started = Instant::now();
+    fn send(&mut self, mut bytes: &[u8]) -> Result<()> {
+        let mut last = Instant::now();
         while !bytes.is_empty() {
-            match self.radar.write(bytes) {
-                Ok(n) => bytes = &bytes[n..],
-                Err(e) if e.kind() == ErrorKind::WouldBlock => {}
-                Err(e) => return Err(e).context("the board's line is gone"),
-            }
-            if !self.collect()? && !bytes.is_empty() {
-                if started.elapsed() > Duration::from_secs(120) {
-                    bail!("the board takes no more bytes");
-                }
+            let taken = self.put(bytes)?;
+            bytes = &bytes[taken..];
+            if self.collect()? || taken > 0 {
+                last = Instant::now();
+            } else if last.elapsed() > Duration::from_secs(20) {
+                bail!("the board takes no more bytes");
+            } else {
                 std::thread::sleep(Duration::from_micros(200));
             }
         }
@@ -91,9 +108,9 @@ impl SerialBoard {
     ///
     /// # Errors
     /// The line is gone.
-    pub fn wait_for(&mut self, bytes: usize, silence: Duration) -> Result<()> {
+    fn wait_for(&mut self, bytes: usize, silence: Duration) -> Result<()> {
         let mut last = Instant::now();
-        while self.answer.len() < bytes && last.elapsed() < silence {
+        while self.answer().len() < bytes && last.elapsed() < silence {
             if self.collect()? {
                 last = Instant::now();
             } else {
@@ -102,11 +119,69 @@ impl SerialBoard {
         }
         Ok(())
     }
+}
+
+impl Far for SerialBoard {
+    fn put(&mut self, bytes: &[u8]) -> Result<usize> {
+        match self.radar.write(bytes) {
+            Ok(n) => Ok(n),
+            Err(e) if e.kind() == ErrorKind::WouldBlock => Ok(0),
+            Err(e) => Err(e).context("the board's line is gone"),
+        }
+    }
 
     fn collect(&mut self) -> Result<bool> {
-        let maps = drain(&mut self.maps, &mut self.answer)?;
+        let maps = !self.deaf && drain(&mut self.maps, &mut self.answer)?;
         let traces = drain(&mut self.traces, &mut self.trace)?;
         Ok(maps || traces)
+    }
+
+    fn answer(&self) -> &[u8] {
+        &self.answer
+    }
+}
+
+/// A board behind a serial port: radar in and maps out on the same one.
+pub struct Port {
+    port: TTYPort,
+    answer: Vec<u8>,
+}
+
+impl Port {
+    /// Opens a port.
+    ///
+    /// # Errors
+    /// No such port, or one that cannot be set.
+    pub fn open(path: &str, baud: u32) -> Result<Self> {
+        let port = serialport::new(path, baud).timeout(Duration::from_millis(1));
+        let port = TTYPort::open(&port).with_context(|| format!("cannot open {path}"))?;
+        Ok(Self { port, answer: Vec::new() })
+    }
+}
+
+impl Far for Port {
+    fn put(&mut self, bytes: &[u8]) -> Result<usize> {
+        match self.port.write(&bytes[..bytes.len().min(64)]) {
+            Ok(n) => Ok(n),
+            Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => Ok(0),
+            Err(e) => Err(e).context("the port is gone"),
+        }
+    }
+
+    fn collect(&mut self) -> Result<bool> {
+        let mut buffer = [0; 4096];
+        match self.port.read(&mut buffer) {
+            Ok(n) => {
+                self.answer.extend_from_slice(&buffer[..n]);
+                Ok(n > 0)
+            }
+            Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => Ok(false),
+            Err(e) => Err(e).context("the port is gone"),
+        }
+    }
+
+    fn answer(&self) -> &[u8] {
+        &self.answer
     }
 }
 

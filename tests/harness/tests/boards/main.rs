@@ -1,6 +1,8 @@
 //! Firmware on emulated controllers. They need QEMU and a compiler for the target, so they are ignored
 //! unless asked for: `tests/firmware.sh` sees to both.
 
+#[cfg(unix)]
+mod live;
 mod mps2;
 mod zcu102;
 

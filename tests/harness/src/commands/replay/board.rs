@@ -3,14 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use viewshed::settings::Settings as Block;
 
 use crate::boards::report::{Row, table};
 use crate::boards::scans;
 use crate::boards::{Board, Profile, Run, stress};
+#[cfg(unix)]
+use crate::boards::{
+    can_twin,
+    live_check::{self, Live},
+};
 use crate::commands::{complain, print, write_file};
 use crate::options::Settings;
+#[cfg(unix)]
+use crate::recording::candump;
 use crate::{estimators, recording};
 
 #[derive(Debug, clap::Args)]
@@ -24,8 +31,22 @@ pub struct BoardArgs {
     #[arg(long, value_name = "BOARD", value_enum)]
     pub board: Option<Board>,
     /// Grid to run; both if not given
-    #[arg(long, value_name = "PROFILE", value_enum, requires = "board")]
+    #[arg(long, value_name = "PROFILE", value_enum)]
     profile: Option<Profile>,
+    /// Run the board's live program: scans over its serial line or clusters over its CAN bus, maps back
+    ///
+    /// Every message it sends and every cell a receiver of them has are compared with the same program here.
+    /// mps2-an386 has serial lines, zcu102-r5 a CAN bus; to that a CAN log goes as it is.
+    #[arg(long, requires = "board", conflicts_with = "stress")]
+    live: bool,
+    /// Run the live program of a real board behind this serial port, as --board --live does an emulated one
+    ///
+    /// The board is configured first and started over; its grid is --profile's, by default the reference grid.
+    #[arg(long, value_name = "PATH", conflicts_with = "board")]
+    pub port: Option<PathBuf>,
+    /// Bit rate of the port
+    #[arg(long, value_name = "BAUD", default_value_t = 230_400, requires = "port")]
+    baud: u32,
     /// Run scans nobody should send as well, to know the most a frame costs
     #[arg(long, requires = "board")]
     stress: bool,
@@ -36,13 +57,16 @@ pub struct BoardArgs {
 /// # Errors
 /// Recordings that cannot be read, firmware that cannot be built or run.
 pub fn run(
-    board: Board,
     args: &BoardArgs,
     paths: &[PathBuf],
     out: Option<&Path>,
     json: Option<&Path>,
     settings: &Settings,
 ) -> Result<ExitCode> {
+    let board = match (args.board, &args.port) {
+        (Some(board), _) if !args.live => board,
+        _ => return live(args, paths, out, json, settings),
+    };
     let (mut rows, mut differ) = (Vec::new(), false);
     for path in paths {
         let recording = recording::read(path, &settings.reading)?;
@@ -63,6 +87,64 @@ pub fn run(
         write_file(path, &serde_json::to_string_pretty(&rows)?)?;
     }
     Ok(if differ { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// Runs every recording through a live program.
+#[cfg(unix)]
+fn live(
+    args: &BoardArgs,
+    paths: &[PathBuf],
+    out: Option<&Path>,
+    json: Option<&Path>,
+    settings: &Settings,
+) -> Result<ExitCode> {
+    let mut all = Vec::new();
+    for path in paths {
+        let recording = recording::read(path, &settings.reading)?;
+        let (block, name) = (block(&recording, settings)?, recording.name.as_str());
+        let profile = args.profile.unwrap_or(Profile::Reference);
+        let scans = || scans::of(&recording);
+        let live = match (args.board, &args.port) {
+            (_, Some(port)) => live_check::port(port, args.baud, profile, name, &block, &scans())?,
+            (Some(board @ Board::Zcu102R5), _) => {
+                ensure!(profile == Profile::Reference, "the live program of {} has the reference grid", board.name());
+                let text = std::fs::read(path).ok().filter(|bytes| candump::is_log(bytes));
+                let steps = match text {
+                    Some(text) => can_twin::log(&String::from_utf8_lossy(&text)),
+                    None => {
+                        let scans = scans();
+                        can_twin::clusters(&scans, scans.len(), 240)
+                    }
+                };
+                live_check::can(board, name, &block, &steps)?
+            }
+            (Some(board), _) => live_check::serial(board, profile, name, &block, &scans())?,
+            (None, None) => bail!("neither a board nor a port"),
+        };
+        let Live { board, scans, equal, messages, visible_cells, .. } = &live;
+        print(&format!(
+            "{name}, live on {board} ({} grid): {equal} of {scans} scans equal, {messages} messages, {visible_cells} cells visible in the end\n",
+            live.profile
+        ))?;
+        if let Some(what) = &live.first_difference {
+            let title = format!("{name}, live on {board}");
+            let folder = out.unwrap_or(Path::new("out")).join("live");
+            let files = live.difference.as_ref().map(|d| d.draw(&folder, &title)).transpose()?.unwrap_or_default();
+            let files: Vec<String> = files.iter().map(|f| format!("\n  {}", f.display())).collect();
+            complain(&anyhow::anyhow!("{title}: {what}{}", files.concat()));
+        }
+        all.push(live);
+    }
+    if let Some(path) = json {
+        write_file(path, &serde_json::to_string_pretty(&all)?)?;
+    }
+    let same = all.iter().all(|live| live.first_difference.is_none());
+    Ok(if same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+#[cfg(not(unix))]
+fn live(_: &BoardArgs, _: &[PathBuf], _: Option<&Path>, _: Option<&Path>, _: &Settings) -> Result<ExitCode> {
+    bail!("live programs can be run on Unix only")
 }
 
 fn one(run: &Run<'_>, out: Option<&Path>, differ: &mut bool) -> Result<Row> {

@@ -87,8 +87,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
-    if let Some(board) = args.processor.board {
-        return board::run(board, &args.processor, &paths, args.out.as_deref(), args.json.as_deref(), &settings);
+    if args.processor.board.is_some() || args.processor.port.is_some() {
+        return board::run(&args.processor, &paths, args.out.as_deref(), args.json.as_deref(), &settings);
     }
     if args.mcap.is_some() && paths.len() > 1 {
         bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());

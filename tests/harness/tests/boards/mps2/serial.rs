@@ -1,6 +1,6 @@
 //! The serial lines: scans in over one UART, protected maps out over another, and what may go wrong.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use viewshed::map::Visibility;
 use viewshed::pil::record::{RECORD_LEN, Record};
@@ -11,10 +11,11 @@ use viewshed::wire::message::{Addresses, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::Unstuffer;
 use viewshed::wire::status::{Reason, State};
+use viewshed_harness::boards::listener::Listener;
 use viewshed_harness::boards::live::{Answered, SENSOR, Script, answer, on_the_line};
 use viewshed_harness::boards::machine::{Emulator, Folder, Lines};
 use viewshed_harness::boards::scans::Scan;
-use viewshed_harness::boards::serial::{LINES, SerialBoard, Waiting};
+use viewshed_harness::boards::serial::{Far, LINES, SerialBoard, Waiting};
 use viewshed_harness::boards::{Board, Profile, firmware};
 
 use crate::shipped;
@@ -59,11 +60,11 @@ fn messages(bytes: &[u8]) -> Vec<Vec<u8>> {
     all
 }
 
-type Far = Receiver<1, 120, 7>;
+type Hearing = Receiver<1, 120, 7>;
 
 /// A receiver that heard everything when it was sent.
-fn listen(answered: &Answered) -> Far {
-    let mut receiver = Far::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+fn listen(answered: &Answered) -> Hearing {
+    let mut receiver = Hearing::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
     let mut from = 0;
     for (to, now) in &answered.times {
         for message in messages(&answered.bytes[from..*to]) {
@@ -83,14 +84,31 @@ fn script(settings: &Settings, scans: &[Scan]) -> Script {
     script
 }
 
+fn records(board: &Running) -> Vec<Record> {
+    let records = board.line.trace.chunks_exact(RECORD_LEN);
+    records.filter_map(|r| Record::from_bytes(r.try_into().unwrap())).collect()
+}
+
+/// Two kilobytes stay free for what was not met here.
+fn enough_stack(profile: Profile, board: &Running) {
+    let closing =
+        records(board).into_iter().rev().find_map(|r| if let Record::Closing(c) = r { Some(c) } else { None });
+    let [used, there] = closing.expect("told at the end of every start").stack;
+    println!("live, {}: {used} of {there} bytes of stack", profile.name());
+    assert!(used > 500 && used + 2048 <= there, "{used} of {there}");
+}
+
 #[test]
 #[ignore = "needs QEMU"]
 fn every_byte_of_five_seconds_is_the_same() {
     let (settings, scans) = shipped(5.0);
-    let board = same(Profile::Reference, &script(&settings, &scans));
-    let records = board.line.trace.chunks_exact(RECORD_LEN).map(|r| Record::from_bytes(r.try_into().unwrap()));
-    let frames = records.filter(|r| matches!(r, Some(Record::Frame(f)) if f.used > 0)).count();
+    let mut script = script(&settings, &scans);
+    // ends a start and tells what it took
+    script.request(&Request::Restart);
+    let board = same(Profile::Reference, &script);
+    let frames = records(&board).into_iter().filter(|r| matches!(r, Record::Frame(f) if f.used > 0)).count();
     assert_eq!(frames, scans.len(), "a trace a frame");
+    enough_stack(Profile::Reference, &board);
     // the last map as a receiver has it
     let now = on_the_line(scans.last().unwrap().time, scans[0].time);
     let far = listen(board.expected.as_ref().unwrap());
@@ -193,8 +211,10 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     script.request(&Request::Restart);
     script.request(&Request::Read);
     scans.iter().for_each(|s| script.scan(s, scans[0].time));
+    script.request(&Request::Restart);
     let board = same(Profile::Small, &script);
     let all = messages(&board.line.answer);
+    enough_stack(Profile::Small, &board);
     let blocks: Vec<_> = all
         .iter()
         .filter(|m| m.get(3) == Some(&130) && m.len() == 4 + BLOCK_LEN)
@@ -203,4 +223,60 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     assert_eq!(blocks.len(), 2);
     assert_eq!((blocks[0].1, blocks[1].1), (settings, other));
     assert_eq!((blocks[0].0, blocks[1].0), (1, 2), "sequences");
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
+    let (settings, scans) = shipped(6.0);
+    let mut script = script(&settings, &scans);
+    let expected = answer(Profile::Reference, &script.bytes);
+    let mut board = start(Profile::Reference);
+    let (mut listener, mut unstuffer) = (Listener::default(), Unstuffer::new());
+    // nobody reads the maps for two seconds
+    let deaf = 30..60;
+    let (mut from, mut heard, mut offered) = (0, 0, 0);
+    let (mut unequal_us, mut told_while_deaf, mut unknown_while_deaf) = (0, 0, 0);
+    for (k, (to, now)) in std::mem::take(&mut script.marks).into_iter().enumerate() {
+        board.line.deaf = deaf.contains(&k);
+        board.line.send(&script.bytes[from..to]).unwrap();
+        from = to;
+        // the frame is done when its trace is there, and what follows from it on its way
+        let done = |line: &SerialBoard| line.trace.len() / RECORD_LEN > k + 1;
+        let started = Instant::now();
+        while !done(&board.line) && started.elapsed() < Duration::from_secs(20) {
+            board.line.wait_for(usize::MAX, Duration::from_millis(5)).unwrap();
+        }
+        assert!(done(&board.line), "the unit goes on working: scan {k}");
+        board.line.wait_for(usize::MAX, Duration::from_millis(if board.line.deaf { 1 } else { 60 })).unwrap();
+        while let Some((bytes, map)) = expected.maps.get(offered).filter(|(bytes, _)| *bytes <= to) {
+            assert!(*bytes <= to);
+            listener.sent(map);
+            offered += 1;
+        }
+        while heard < board.line.answer.len() {
+            let (taken, message) = unstuffer.push(&board.line.answer[heard..]);
+            heard += taken;
+            if let Some(message) = message.filter(|m| Received::from_bytes(m).is_ok()) {
+                listener.message(now, message);
+            }
+        }
+        let told = listener.tell(now).unwrap_or_else(|why| panic!("scan {k}: {why}"));
+        if deaf.contains(&k) {
+            told_while_deaf += usize::from(told.azimuths > 0);
+            unknown_while_deaf += usize::from(told.azimuths == 0);
+        } else if k >= deaf.end && !told.equal {
+            unequal_us = now.since(on_the_line(scans[deaf.end].time, scans[0].time)).unwrap();
+        } else if k == deaf.start - 1 || k == scans.len() - 1 {
+            assert!(told.equal && told.visible_cells > 5000, "scan {k}: {told:?}");
+        }
+    }
+    let dropped = listener.receiver().sensor(SENSOR).and_then(|s| s.status()).map(|s| s.dropped).unwrap();
+    println!(
+        "deaf for {} scans: {dropped} messages dropped, told for {told_while_deaf} scans more, equal again after {} ms",
+        deaf.len(),
+        unequal_us / 1000
+    );
+    assert!((1..=5).contains(&told_while_deaf) && unknown_while_deaf >= deaf.len() - 5, "maps age to unknown");
+    assert!(dropped > 30 && unequal_us < 1_000_000, "{dropped} dropped, {unequal_us} us");
 }
