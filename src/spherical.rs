@@ -7,6 +7,7 @@
 //! a ray over all elevations is a byte-wise running maximum. Empty stacks are skipped by bit rows.
 
 use crate::bits::Bits;
+use crate::stack;
 
 /// Occupancy around one sensor: `R` ranges, `A` azimuths, `E` elevations; `W` words of 32 bits tell
 /// which of the `R` stacks of an azimuth hold something.
@@ -106,7 +107,7 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
         while let Some(r) = self.used.next(from) {
             if let Some(s) = self.stacks.get_mut(r) {
                 change(r, s);
-                if *s == [0; E] {
+                if stack::is_empty(s) {
                     self.used.clear(r);
                 }
             }
