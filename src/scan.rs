@@ -44,7 +44,9 @@ impl<const D: usize> Scan<D> {
         let mut kept: Vec<&Detection, D, u16> = Vec::new();
         let mut strengths = Strengths([0; STEPS]);
         let (mut reported, mut passed) = (0, 0);
-        for d in detections.clone() {
+        let mut arriving = detections;
+        let mut late = None;
+        while let Some(d) = arriving.next() {
             reported += 1;
             if let Err(reason) = gate.judge(d) {
                 self.rejections.add(reason);
@@ -52,17 +54,20 @@ impl<const D: usize> Scan<D> {
             }
             passed += 1;
             strengths.count(d);
-            if passed <= room {
-                let _ = kept.push(d);
-            } else {
+            if passed > room {
                 self.rejections.add(Rejection::Overflow);
+                continue;
+            }
+            let _ = kept.push(d);
+            if passed == room {
+                late = Some(arriving.clone());
             }
         }
-        if passed > room {
+        if let Some(late) = late.filter(|_| passed > room) {
             let mut strongest = strengths.strongest(room);
-            kept.clear();
-            for d in detections {
-                if gate.judge(d).is_ok() && strongest.takes(d) {
+            kept.retain(|d| strongest.takes(d));
+            for d in late.filter(|d| gate.judge(d).is_ok()) {
+                if strongest.takes(d) {
                     let _ = kept.push(d);
                 }
             }
