@@ -132,8 +132,11 @@ impl<const N: usize> Obstacles<N> {
             let search = o.search(t);
             let confirmed = o.existence >= t.confirmed;
             let (from, to) = search.distances_cm();
-            for &i in by_range.between(from, to) {
-                let i = usize::from(i);
+            for place in by_range.between(from, to) {
+                if !search.reaches(place.x_cm, place.y_cm) {
+                    continue;
+                }
+                let i = usize::from(place.index);
                 let (Some(r), Some((body, wheel))) = (reflections.get(i), best.get_mut(i)) else { continue };
                 let Some(offset) = search.offset(r, t) else { continue };
                 let error = search.speed_error(r);
@@ -203,8 +206,11 @@ impl<const N: usize> Obstacles<N> {
             claimed.insert(i);
             let mut search = newborn.search(t);
             let (from, to) = search.distances_cm();
-            for &j in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
-                let j = usize::from(j);
+            for place in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
+                if !search.reaches(place.x_cm, place.y_cm) {
+                    continue;
+                }
+                let j = usize::from(place.index);
                 let Some(r) = reflections.get(j).filter(|_| !claimed.contains(j)) else { continue };
                 let error = search.speed_error(r);
                 if error <= t.doppler_gate

@@ -88,6 +88,9 @@ pub struct Search {
     gap_cm: i32,
     /// Farthest from the anchor a detection of this obstacle can lie along either axis.
     reach_cm: i32,
+    /// The square which that spans: its corner of least coordinates, and its side.
+    corner: (i32, i32),
+    side_cm: u32,
 }
 
 /// A detection in an obstacle's axes, centimetres.
@@ -116,14 +119,19 @@ impl Search {
         (distance - reach, distance + reach + reach * reach / distance / 2)
     }
 
+    /// Whether a place is near enough to look closer.
+    #[inline]
+    pub fn reaches(&self, x_cm: i32, y_cm: i32) -> bool {
+        // one comparison for both ends
+        let (x, y) = (x_cm.wrapping_sub(self.corner.0), y_cm.wrapping_sub(self.corner.1));
+        x.cast_unsigned() <= self.side_cm && y.cast_unsigned() <= self.side_cm
+    }
+
     /// Where a detection lies in the obstacle's axes; `None` where it is out of reach, whatever the direction
     /// of its noise.
     #[inline]
     pub fn offset(&self, r: &Reflection, t: &Tracking) -> Option<Offset> {
         let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
-        if dx.abs() > self.reach_cm || dy.abs() > self.reach_cm {
-            return None;
-        }
         let noise = (t.sigmas * (t.noise.range_cm + i32::from(r.across_cm))) >> 4;
         let left = self.heading.across(dx, dy);
         let beside = (left.abs() - t.half_width_cm).max(0);
@@ -269,13 +277,17 @@ impl Obstacle {
     pub fn search(&self, t: &Tracking) -> Search {
         let outline = self.extent.front_cm.max(-self.extent.rear_cm);
         let gap_cm = self.gap_cm(t);
+        let anchor = self.anchor();
+        let reach_cm = outline + gap_cm + NOISE_REACH_CM;
         Search {
             heading: self.heading,
             velocity: (self.velocity.0 >> 4, self.velocity.1 >> 4),
             extent: self.extent,
-            anchor: self.anchor(),
+            anchor,
             gap_cm,
-            reach_cm: outline + gap_cm + NOISE_REACH_CM,
+            reach_cm,
+            corner: (anchor.0 - reach_cm, anchor.1 - reach_cm),
+            side_cm: 2 * reach_cm.unsigned_abs(),
         }
     }
 
