@@ -3,7 +3,7 @@
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;
 use super::tracking::Tracking;
-use crate::math::{hypot_gate, length, mul_shift, ratio};
+use crate::math::{hypot_gate, length, mul_shift, ratio, root};
 use crate::reflection::{Noise, Reflection};
 use crate::solid::Solid;
 use crate::time::Step;
@@ -445,7 +445,7 @@ impl Obstacle {
     /// Standard deviation of the lateral place, centimetres.
     fn lateral_sigma(&self) -> i32 {
         let variance = (1_u32 << 24) / self.lateral_weight.max(1).unsigned_abs();
-        variance.isqrt().min(1000) as i32
+        root(variance).min(1000) as i32
     }
 
     /// Takes over what another obstacle knows of the same vehicle.
