@@ -200,20 +200,12 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Place of a slope on the row axis, 2^-8 rows from the first row's lower edge.
     pub fn row_place(&self, slope: i32) -> i32 {
-        let mut below = (0, i32::MIN);
-        let mut above = self.row_top;
-        for (k, &edge) in self.row_edges.iter().enumerate() {
-            if edge <= slope {
-                below = (k as i32, edge);
-            } else {
-                above = edge;
-                break;
-            }
-        }
-        match below {
-            (_, i32::MIN) => 0,
-            (k, edge) => k * 256 + part_of(slope - edge, above - edge),
-        }
+        self.row_places().of(slope)
+    }
+
+    /// [`row_place`](Self::row_place) for slopes that follow one another closely.
+    pub fn row_places(&self) -> RowPlaces<'_, E> {
+        RowPlaces { edges: &self.row_edges, top: self.row_top, row: 0 }
     }
 
     /// Slope of a row's centre.
@@ -273,6 +265,33 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
             _ => 0..0,
         }
+    }
+}
+
+/// Finds slopes on the row axis, beginning with the row of the last.
+#[derive(Debug, Clone)]
+pub struct RowPlaces<'a, const E: usize> {
+    edges: &'a [i32; E],
+    top: i32,
+    row: usize,
+}
+
+impl<const E: usize> RowPlaces<'_, E> {
+    /// Place of a slope, 2^-8 rows from the first row's lower edge.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 64 rows
+    pub fn of(&mut self, slope: i32) -> i32 {
+        while self.row + 1 < E && self.edge(self.row + 1) <= slope {
+            self.row += 1;
+        }
+        while self.row > 0 && self.edge(self.row) > slope {
+            self.row -= 1;
+        }
+        let lower = self.edge(self.row);
+        if slope < lower { 0 } else { self.row as i32 * 256 + part_of(slope - lower, self.edge(self.row + 1) - lower) }
+    }
+
+    fn edge(&self, row: usize) -> i32 {
+        self.edges.get(row).copied().unwrap_or(self.top)
     }
 }
 

@@ -95,11 +95,17 @@ impl<const W: usize> Bits<W> {
 
     /// Set bits in ascending order.
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        let mut from = 0;
+        let mut words = self.0.iter();
+        let mut left = 0;
+        let mut end = 0;
         core::iter::from_fn(move || {
-            let found = self.next(from)?;
-            from = found + 1;
-            Some(found)
+            while left == 0 {
+                left = *words.next()?;
+                end += 32;
+            }
+            let bit = left.trailing_zeros() as usize;
+            left &= left - 1;
+            Some(end - 32 + bit)
         })
     }
 

@@ -147,6 +147,7 @@ pub mod settings;
 pub mod sightlines;
 pub mod solid;
 pub mod spherical;
+mod stack;
 pub mod stage;
 pub mod time;
 pub mod transmitter;

@@ -119,6 +119,16 @@ pub(crate) const fn mul_shift(value: i32, factor: i32, shift: u32) -> i32 {
     ((value as i64 * factor as i64) >> shift) as i32
 }
 
+/// `2^BITS a / b`, rounded towards zero, for `b` from 1 to `2^(30 - BITS / 2)`, without a division of 64 bits,
+/// which a controller has to emulate.
+pub(crate) const fn ratio<const BITS: u32>(a: i32, b: i32) -> i32 {
+    let b = if b > 0 { b } else { 1 };
+    let (high, low) = (BITS / 2, BITS - BITS / 2);
+    let (whole, left) = (a / b, (a % b) << high);
+    let (upper, left) = (left / b, (left % b) << low);
+    (whole << BITS) + (upper << low) + left / b
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,6 +171,23 @@ mod tests {
         let off = |v: u32| i64::from(root(v)) - i64::from(v.isqrt());
         for v in (0..200_000).chain((0..u32::MAX).step_by(9973)).chain(u32::MAX - 70_000..=u32::MAX) {
             assert!((-2..=2).contains(&off(v)), "{v}: {}", off(v));
+        }
+    }
+
+    #[test]
+    fn ratios_are_those_of_64_bits() {
+        let exact = |a: i32, b: i32, bits: u32| i32::try_from((i64::from(a) << bits) / i64::from(b)).ok();
+        for a in [0, 1, -1, 77, -4095, 123_456, -9_999_999, 1 << 28] {
+            for b in [1, 2, 3, 4369, 65_537, 1 << 20, (1 << 22) - 1] {
+                let check = |got: i32, bits| {
+                    if let Some(exact) = exact(a, b, bits) {
+                        assert_eq!(got, exact, "{a} / {b}")
+                    }
+                };
+                check(ratio::<8>(a, b), 8);
+                check(ratio::<12>(a, b), 12);
+                check(ratio::<16>(a, b), 16);
+            }
         }
     }
 

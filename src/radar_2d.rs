@@ -140,15 +140,10 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         &mut self,
         p: &Radar2dParameters,
         now: Time,
-        detections: impl IntoIterator<Item = &'a Detection>,
+        detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
         fault: bool,
     ) -> Condition {
-        let mut reported = 0;
-        self.scan.clear();
-        for d in detections {
-            reported += 1;
-            self.scan.add_flat(d, &p.gate, &p.noise, &p.levelling);
-        }
+        let reported = self.scan.gather(detections.into_iter(), &p.gate, |d| p.noise.place_flat(d, &p.levelling));
         self.rejections.add_all(self.scan.rejections());
         match self.health.frame(now, reported, fault, &p.health) {
             Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros), &p.cartesian),

@@ -217,7 +217,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         &mut self,
         p: &Radar3dParameters<R, A, E>,
         now: Time,
-        detections: impl IntoIterator<Item = &'a Detection>,
+        detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
         fault: bool,
         map: &mut PolarMap<R, A>,
     ) -> FrameReport {
@@ -230,17 +230,12 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         &mut self,
         p: &Radar3dParameters<R, A, E>,
         now: Time,
-        detections: impl IntoIterator<Item = &'a Detection>,
+        detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
         fault: bool,
         map: &mut PolarMap<R, A>,
         mut ended: impl FnMut(Stage),
     ) -> FrameReport {
-        let mut reported = 0;
-        self.scan.clear();
-        for d in detections {
-            reported += 1;
-            self.scan.add(d, &p.gate, &p.noise, &p.levelling);
-        }
+        let reported = self.scan.gather(detections.into_iter(), &p.gate, |d| p.noise.place(d, &p.levelling));
         let continuity = self.health.frame(now, reported, fault, &p.health);
         if continuity.resets() {
             self.obstacles.clear();

@@ -12,6 +12,7 @@
 use crate::axes::{Axes, SliceRow};
 use crate::polar::PolarMap;
 use crate::spherical::{Column, SphericalGrid};
+use crate::stack;
 
 /// Occupancy from which a cell belongs to an object of its own.
 const OCCUPIED: u8 = 128;
@@ -96,14 +97,14 @@ struct Shadow<const E: usize> {
 }
 
 impl<const E: usize> Shadow<E> {
-    fn pass(&mut self, stack: &[u8; E], occupied: bool) {
+    fn pass(&mut self, cells: &[u8; E], occupied: bool) {
         self.in_run |= occupied;
-        raise(if occupied { &mut self.run } else { &mut self.blocked }, stack);
+        stack::raise(if occupied { &mut self.run } else { &mut self.blocked }, cells);
     }
 
     fn leave_run(&mut self) {
         if self.in_run {
-            raise(&mut self.blocked, &self.run);
+            stack::raise(&mut self.blocked, &self.run);
             self.run = [0; E];
             self.in_run = false;
         }
@@ -118,7 +119,7 @@ impl<const E: usize> Shadow<E> {
         from: usize,
         to: usize,
     ) {
-        if self.blocked == [0; E] {
+        if stack::is_empty(&self.blocked) {
             if let Some(clear) = grades.get_mut(from..to) {
                 clear.fill(255);
             }
@@ -144,13 +145,6 @@ impl<const E: usize> Shadow<E> {
     }
 }
 
-/// Byte-wise maximum.
-fn raise<const E: usize>(level: &mut [u8; E], by: &[u8; E]) {
-    for (a, b) in level.iter_mut().zip(by) {
-        *a = (*a).max(*b);
-    }
-}
-
 /// Values on two neighbouring rows.
 #[derive(Clone, Copy)]
 struct Pair {
@@ -167,10 +161,10 @@ fn pair<const E: usize>(rows: &[u8; E], lower: usize) -> Pair {
 
 impl Pair {
     /// Value between the rows, `share` / 256 of the way up.
-    #[allow(clippy::cast_possible_truncation)] // a mean of bytes
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a mean of bytes
     fn at(self, share: u8) -> u8 {
-        let share = u32::from(share);
-        ((u32::from(self.low) * (256 - share) + u32::from(self.high) * share) >> 8) as u8
+        let (low, high) = (i32::from(self.low), i32::from(self.high));
+        ((low * 256 + (high - low) * i32::from(share)) >> 8) as u8
     }
 }
 

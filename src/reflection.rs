@@ -93,23 +93,33 @@ pub struct Reflection {
     pub strength: i16,
 }
 
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
 impl Noise {
-    /// Places a detection on the ground, its height left open.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
+    /// Places a detection on the ground, with its height where its elevation was measured.
     pub fn place(&self, d: &Detection, levelling: &Levelling) -> Reflection {
+        let azimuth = trig::direction(d.azimuth);
+        let height_cm = d.elevation.map(|elevation| self.height(d, azimuth, elevation, levelling));
+        Reflection { height_cm, ..self.place_along(d, azimuth, levelling) }
+    }
+
+    /// Places a detection on the ground, its height left open.
+    pub fn place_flat(&self, d: &Detection, levelling: &Levelling) -> Reflection {
+        self.place_along(d, trig::direction(d.azimuth), levelling)
+    }
+
+    fn place_along(&self, d: &Detection, azimuth: Direction, levelling: &Levelling) -> Reflection {
         let range = i32::from(d.range_cm);
         // the half-plane of this azimuth, levelled: ahead (elevation 0) and up
-        let ahead = levelling.level([trig::cos(d.azimuth), trig::sin(d.azimuth), 0]);
+        let ahead = levelling.level([i32::from(azimuth.x), i32::from(azimuth.y), 0]);
         let up = levelling.up();
         let fall = ((self.reflector_height_cm - levelling.height_cm) << 14) / range.max(1);
         let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
         let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
         let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
-        let ground_cm = math::length(x_cm, y_cm) as u16;
         Reflection {
             x_cm,
             y_cm,
-            ground_cm,
+            ground_cm: math::length(x_cm, y_cm) as u16,
             sight: Direction { x: x as i16, y: y as i16 },
             radial_velocity_cm_s: d.radial_velocity_cm_s,
             across_cm: math::mul_shift(range, self.azimuth, 16).clamp(1, 65_535) as u16,
@@ -117,28 +127,23 @@ impl Noise {
             strength: d.strength(),
         }
     }
+
+    /// Height above the road and its standard deviation, centimetres.
+    fn height(&self, d: &Detection, azimuth: Direction, elevation: Angle, levelling: &Levelling) -> (i16, u16) {
+        let range = i32::from(d.range_cm);
+        let up = trig::direction(elevation);
+        let level = |part: i16| (i32::from(part) * i32::from(up.x)) >> 14;
+        let rise = levelling.rise([level(azimuth.x), level(azimuth.y), i32::from(up.y)]);
+        let height = levelling.height_cm + ((rise * range) >> 14);
+        let sigma = math::mul_shift(range, self.elevation, 16);
+        (height.clamp(-30_000, 30_000) as i16, sigma.clamp(1, 65_535) as u16)
+    }
 }
 
 impl Reflection {
     /// Levelled azimuth.
     pub fn bearing(&self) -> Angle {
         trig::bearing(self.x_cm, self.y_cm)
-    }
-}
-
-impl Noise {
-    /// Height above the road of a detection whose elevation was measured, and its standard
-    /// deviation, centimetres.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
-    pub fn height(&self, d: &Detection, levelling: &Levelling) -> Option<(i16, u16)> {
-        let elevation = d.elevation?;
-        let range = i32::from(d.range_cm);
-        let (ahead, left) = (trig::cos(d.azimuth), trig::sin(d.azimuth));
-        let level = trig::cos(elevation);
-        let rise = levelling.rise([(ahead * level) >> 14, (left * level) >> 14, trig::sin(elevation)]);
-        let height = levelling.height_cm + ((rise * range) >> 14);
-        let sigma = math::mul_shift(range, self.elevation, 16);
-        Some((height.clamp(-30_000, 30_000) as i16, sigma.clamp(1, 65_535) as u16))
     }
 }
 
@@ -172,7 +177,7 @@ mod tests {
             snr_half_db: Some(30),
         };
         let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
-        Reflection { height_cm: noise.height(&d, &levelling), ..noise.place(&d, &levelling) }
+        noise.place(&d, &levelling)
     }
 
     #[test]

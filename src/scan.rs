@@ -4,20 +4,17 @@ use heapless::Vec;
 
 use crate::detection::Detection;
 use crate::gate::{Gate, Rejection, Rejections};
-use crate::mount::Levelling;
-use crate::reflection::{Noise, Reflection};
+use crate::reflection::Reflection;
 
-/// Up to `D` reflections, the strongest of the frame; a late one takes the place of the one it replaced.
+/// Up to `D` reflections, the strongest of the frame, in order of arrival.
 ///
 /// # Limits
-/// When the list is full the weakest makes room for a stronger one and is counted as
-/// [`Rejection::Overflow`]; of equals the first stays. A replacement costs one pass over `D` at most, and one
-/// in all for those of equal strength.
+/// When more pass the gate, the strongest stay, of equals the first to arrive; the others are counted as
+/// [`Rejection::Overflow`]. Strengths below -48 dB and above 79.5 dB count as these. The cost is two looks at
+/// every detection at most, however many there are and in whatever order they come.
 #[derive(Debug, Clone)]
 pub struct Scan<const D: usize> {
     reflections: Vec<Reflection, D, u16>,
-    /// Place and strength of the weakest, known once the list is full.
-    weakest: Option<(usize, i16)>,
     rejections: Rejections,
 }
 
@@ -30,65 +27,55 @@ impl<const D: usize> Default for Scan<D> {
 impl<const D: usize> Scan<D> {
     /// An empty scan.
     pub const fn new() -> Self {
-        Self { reflections: Vec::new(), weakest: None, rejections: Rejections::NONE }
+        Self { reflections: Vec::new(), rejections: Rejections::NONE }
     }
 
-    /// Starts over for the next frame.
-    pub fn clear(&mut self) {
+    /// Takes the detections of a frame that pass the gate, as `place` places them, in the place of the last
+    /// frame's, and counts why others do not. Returns how many there were.
+    pub fn gather<'a>(
+        &mut self,
+        detections: impl Iterator<Item = &'a Detection> + Clone,
+        gate: &Gate,
+        place: impl Fn(&Detection) -> Reflection,
+    ) -> usize {
         self.reflections.clear();
-        self.weakest = None;
         self.rejections = Rejections::NONE;
-    }
-
-    /// Takes a detection with its height, where measured, or counts why not.
-    pub fn add(&mut self, d: &Detection, gate: &Gate, noise: &Noise, levelling: &Levelling) {
-        self.add_with(d, gate, || Reflection { height_cm: noise.height(d, levelling), ..noise.place(d, levelling) });
-    }
-
-    /// Takes a detection without its height, or counts why not.
-    pub fn add_flat(&mut self, d: &Detection, gate: &Gate, noise: &Noise, levelling: &Levelling) {
-        self.add_with(d, gate, || noise.place(d, levelling));
-    }
-
-    fn add_with(&mut self, d: &Detection, gate: &Gate, place: impl Fn() -> Reflection) {
-        if let Err(reason) = gate.judge(d) {
-            self.rejections.add(reason);
-            return;
-        }
-        if self.reflections.len() < D.min(gate.max_detections) {
-            let _ = self.reflections.push(place());
-            return;
-        }
-        self.rejections.add(Rejection::Overflow);
-        let (weakest, strength) = self.weakest.unwrap_or_else(|| self.find_weakest());
-        if d.strength() > strength {
-            if let Some(slot) = self.reflections.get_mut(weakest) {
-                *slot = place();
+        let room = D.min(gate.max_detections);
+        let mut kept: Vec<&Detection, D, u16> = Vec::new();
+        let mut strengths = Strengths([0; STEPS]);
+        let (mut reported, mut passed) = (0, 0);
+        let mut arriving = detections;
+        let mut late = None;
+        while let Some(d) = arriving.next() {
+            reported += 1;
+            if let Err(reason) = gate.judge(d) {
+                self.rejections.add(reason);
+                continue;
             }
-            self.weakest = Some(self.next_weakest(weakest, strength));
-        } else {
-            self.weakest = Some((weakest, strength));
-        }
-    }
-
-    /// The weakest once the one at a place has gone: its equals all stand before it.
-    fn next_weakest(&self, gone: usize, strength: i16) -> (usize, i16) {
-        let before = self.reflections.get(..gone).unwrap_or(&[]);
-        match before.iter().rposition(|r| r.strength == strength) {
-            Some(i) => (i, strength),
-            None => self.find_weakest(),
-        }
-    }
-
-    /// The last of the weakest: of equals the first to arrive stays longest.
-    fn find_weakest(&self) -> (usize, i16) {
-        let mut found = (0, i16::MAX);
-        for (i, r) in self.reflections.iter().enumerate() {
-            if r.strength <= found.1 {
-                found = (i, r.strength);
+            passed += 1;
+            strengths.count(d);
+            if passed > room {
+                self.rejections.add(Rejection::Overflow);
+                continue;
+            }
+            let _ = kept.push(d);
+            if passed == room {
+                late = Some(arriving.clone());
             }
         }
-        found
+        if let Some(late) = late.filter(|_| passed > room) {
+            let mut strongest = strengths.strongest(room);
+            kept.retain(|d| strongest.takes(d));
+            for d in late.filter(|d| gate.judge(d).is_ok()) {
+                if strongest.takes(d) {
+                    let _ = kept.push(d);
+                }
+            }
+        }
+        for d in kept {
+            let _ = self.reflections.push(place(d));
+        }
+        reported
     }
 
     /// What was kept.
@@ -99,6 +86,58 @@ impl<const D: usize> Scan<D> {
     /// What was not, by reason.
     pub fn rejections(&self) -> &Rejections {
         &self.rejections
+    }
+}
+
+/// Steps of strength that are told apart, of half a decibel.
+const STEPS: usize = 256;
+
+/// The first step's strength, half dB.
+const LEAST_HALF_DB: i16 = -96;
+
+fn step_of(d: &Detection) -> u8 {
+    u8::try_from(d.strength().saturating_sub(LEAST_HALF_DB).max(0)).unwrap_or(u8::MAX)
+}
+
+/// How many detections are how strong.
+struct Strengths([u16; STEPS]);
+
+impl Strengths {
+    fn count(&mut self, d: &Detection) {
+        if let Some(n) = self.0.get_mut(usize::from(step_of(d))) {
+            *n = n.saturating_add(1);
+        }
+    }
+
+    /// What it takes to be among the `room` strongest.
+    fn strongest(&self, room: usize) -> Strongest {
+        let mut left = room;
+        let mut least = u8::MAX;
+        for n in self.0.iter().rev() {
+            match left.checked_sub(usize::from(*n)) {
+                Some(rest) => left = rest,
+                None => return Strongest { least, of_least: left },
+            }
+            least = least.saturating_sub(1);
+        }
+        Strongest { least: 0, of_least: left }
+    }
+}
+
+/// All that are stronger than a step, and the first so many of that step.
+struct Strongest {
+    least: u8,
+    of_least: usize,
+}
+
+impl Strongest {
+    fn takes(&mut self, d: &Detection) -> bool {
+        let step = step_of(d);
+        if step != self.least || self.of_least == 0 {
+            return step > self.least;
+        }
+        self.of_least -= 1;
+        true
     }
 }
 
@@ -123,18 +162,22 @@ mod tests {
             range_max_m: 200.0,
         };
         let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
-        let mut scan = Scan::new();
-        for (i, &s) in strengths.iter().enumerate() {
-            let d = Detection {
+        let detections: StdVec<Detection> = strengths
+            .iter()
+            .enumerate()
+            .map(|(i, &s)| Detection {
                 range_cm: 1000 + i as u16 * 100,
                 azimuth: Angle::ZERO,
                 elevation: None,
                 radial_velocity_cm_s: 0,
                 rcs_half_dbsm: None,
                 snr_half_db: Some(s),
-            };
-            scan.add(&d, &gate, &NoiseConfig::default().noise().unwrap(), &mount.levelling().unwrap());
-        }
+            })
+            .collect();
+        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
+        let mut scan = Scan::new();
+        let reported = scan.gather(detections.iter(), &gate, |d| noise.place(d, &levelling));
+        assert_eq!(reported, strengths.len());
         scan
     }
 
@@ -142,7 +185,7 @@ mod tests {
     fn the_strongest_stay_and_the_rest_is_counted() {
         let s: Scan<3> = scan(&[20, 50, 30, 40, 10, 60]);
         let kept: StdVec<i16> = s.reflections().iter().map(|r| r.strength).collect();
-        assert_eq!(kept, [40, 50, 60]);
+        assert_eq!(kept, [50, 40, 60], "in order of arrival");
         assert_eq!(s.rejections().count(Rejection::Overflow), 3);
     }
 
@@ -151,6 +194,21 @@ mod tests {
         let s: Scan<2> = scan(&[20, 20, 20]);
         let kept: StdVec<u16> = s.reflections().iter().map(|r| r.ground_cm / 100).collect();
         assert_eq!(kept, [8, 9]);
+    }
+
+    #[test]
+    fn of_the_weakest_that_stay_the_first_do() {
+        let s: Scan<4> = scan(&[20, 50, 20, 20, 50, 20]);
+        let kept: StdVec<(i16, u16)> = s.reflections().iter().map(|r| (r.strength, r.ground_cm / 100)).collect();
+        assert_eq!(kept, [(20, 8), (50, 9), (20, 10), (50, 12)]);
+        assert_eq!(s.rejections().count(Rejection::Overflow), 2);
+    }
+
+    #[test]
+    fn strengths_beyond_the_scale_count_as_its_end() {
+        let s: Scan<2> = scan(&[159, 160, 400, 12, 10_000]);
+        let kept: StdVec<i16> = s.reflections().iter().map(|r| r.strength).collect();
+        assert_eq!(kept, [159, 160]);
     }
 
     #[test]

@@ -7,6 +7,7 @@
 //! a ray over all elevations is a byte-wise running maximum. Empty stacks are skipped by bit rows.
 
 use crate::bits::Bits;
+use crate::stack;
 
 /// Occupancy around one sensor: `R` ranges, `A` azimuths, `E` elevations; `W` words of 32 bits tell
 /// which of the `R` stacks of an azimuth hold something.
@@ -102,26 +103,22 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
 
     /// Changes every stack that holds something; one left empty is skipped from then on.
     pub fn change(&mut self, mut change: impl FnMut(usize, &mut [u8; E])) {
-        let mut from = 0;
-        while let Some(r) = self.used.next(from) {
-            if let Some(s) = self.stacks.get_mut(r) {
-                change(r, s);
-                if *s == [0; E] {
-                    self.used.clear(r);
-                }
+        let used = self.used;
+        for r in used.iter() {
+            let Some(s) = self.stacks.get_mut(r) else { continue };
+            change(r, s);
+            if stack::is_empty(s) {
+                self.used.clear(r);
             }
-            from = r + 1;
         }
     }
 
     /// Changes every stack nearer than `end` that holds something.
     pub fn change_before(&mut self, end: usize, mut change: impl FnMut(&mut [u8; E])) {
-        let mut from = 0;
-        while let Some(r) = self.used.next(from).filter(|r| *r < end) {
+        for r in self.used.iter().take_while(|r| *r < end) {
             if let Some(s) = self.stacks.get_mut(r) {
                 change(s);
             }
-            from = r + 1;
         }
     }
 

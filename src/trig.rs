@@ -6,6 +6,7 @@
 use core::f64::consts::{FRAC_PI_2, PI};
 
 use crate::angle::Angle;
+use crate::math;
 
 /// A direction in the plane: cosine and sine.
 ///
@@ -27,9 +28,30 @@ impl Direction {
     /// Along x.
     pub const AHEAD: Self = Self { x: 1 << 14, y: 0 };
 
+    /// Direction of the vector (x, y), which has a length.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // no component is longer than the vector
+    pub fn of(x: i32, y: i32) -> Self {
+        // the longer component of 15 bits: squares fit, and a root within two is one within 2 LSB
+        let bits = 32 - (x.unsigned_abs() | y.unsigned_abs()).leading_zeros();
+        let scaled = |v: i32| if bits > 15 { v >> (bits - 15) } else { v << (15 - bits) };
+        let (x, y) = (scaled(x), scaled(y));
+        let length = math::length(x, y).max(1);
+        Self { x: ((x << 14) / length) as i16, y: ((y << 14) / length) as i16 }
+    }
+
     /// Component of the vector (x, y) along this direction.
     pub fn along(self, x: i32, y: i32) -> i32 {
         dot(x, self.x, y, self.y)
+    }
+
+    /// Cosine of the angle to another direction, 2^-14.
+    pub fn cosine(self, other: Self) -> i32 {
+        (i32::from(self.x) * i32::from(other.x) + i32::from(self.y) * i32::from(other.y)) >> 14
+    }
+
+    /// Sine of the angle to another direction, 2^-14; + where that lies to the left.
+    pub fn sine(self, other: Self) -> i32 {
+        (i32::from(self.x) * i32::from(other.y) - i32::from(self.y) * i32::from(other.x)) >> 14
     }
 
     /// Component of the vector (x, y) to the left of this direction.
@@ -120,7 +142,13 @@ pub fn cos(angle: Angle) -> i32 {
 /// Unit vector of an angle.
 #[allow(clippy::cast_possible_truncation)] // both within +-2^14
 pub fn direction(angle: Angle) -> Direction {
-    Direction { x: cos(angle) as i16, y: sin(angle) as i16 }
+    let raw = angle.raw();
+    let quarter = i32::from(raw) & 0x3FFF;
+    let (from_start, from_end) = (interpolate(&SINE, quarter, 6), interpolate(&SINE, 0x4000 - quarter, 6));
+    // the second and the fourth quarter mirror the first and the third
+    let (sine, cosine) = if raw & 0x4000 == 0 { (from_start, from_end) } else { (from_end, from_start) };
+    let ahead = raw.wrapping_add(0x4000) >= 0;
+    Direction { x: if ahead { cosine } else { -cosine } as i16, y: if raw < 0 { -sine } else { sine } as i16 }
 }
 
 /// Angle of the vector (x, y), counter-clockwise from x; zero for no vector.
@@ -143,13 +171,9 @@ pub fn bearing(x: i32, y: i32) -> Angle {
 fn interpolate(table: &[u16; STEPS + 1], position: i32, shift: u32) -> i32 {
     let step = (position >> shift).clamp(0, LAST_STEP);
     let part = position - (step << shift);
-    match table.get(step as usize..step as usize + 2) {
-        Some(&[a, b]) => {
-            let (a, b) = (i32::from(a), i32::from(b));
-            a + (((b - a) * part + (1 << (shift - 1))) >> shift)
-        }
-        _ => 0,
-    }
+    let at = |step: i32| i32::from(table.get(step as usize).copied().unwrap_or(0));
+    let (a, b) = (at(step), at(step + 1));
+    a + (((b - a) * part + (1 << (shift - 1))) >> shift)
 }
 
 #[cfg(test)]
@@ -160,6 +184,7 @@ mod tests {
     fn sine_and_cosine_are_within_two_steps_everywhere() {
         for raw in i16::MIN..=i16::MAX {
             let a = Angle::from_raw(raw);
+            assert_eq!(direction(a), Direction { x: cos(a) as i16, y: sin(a) as i16 }, "direction {raw}");
             let exact = f64::from(raw) / 32768.0 * std::f64::consts::PI;
             assert!((f64::from(sin(a)) - exact.sin() * 16384.0).abs() < 2.0, "sin {raw}");
             assert!((f64::from(cos(a)) - exact.cos() * 16384.0).abs() < 2.0, "cos {raw}");
@@ -183,9 +208,26 @@ mod tests {
     }
 
     #[test]
+    fn the_direction_of_a_vector_is_within_three_steps_at_any_length() {
+        for i in 0..1000 {
+            let angle = f64::from(i) / 1000.0 * std::f64::consts::TAU;
+            for length in [3.0, 500.0, 40_000.0, 9e6, 2e9] {
+                let (x, y) = ((angle.cos() * length).round(), (angle.sin() * length).round());
+                let (d, exact) = (Direction::of(x as i32, y as i32), f64::hypot(x, y));
+                let off = |got: i16, v: f64| (f64::from(got) - v / exact * 16384.0).abs();
+                assert!(off(d.x, x) < 3.0 && off(d.y, y) < 3.0, "({x}, {y}): {d:?}");
+            }
+        }
+        assert_eq!(Direction::of(0, 0), Direction { x: 0, y: 0 });
+    }
+
+    #[test]
     fn along_and_across_follow_the_direction() {
         let d = direction(Angle::from_degrees(90.0));
         assert_eq!((d.along(0, 100), d.across(-100, 0)), (100, 100));
         assert_eq!(d.left().along(-100, 0), 100);
+        let (ahead, half_left) = (Direction::AHEAD, direction(Angle::from_degrees(30.0)));
+        assert_eq!((ahead.cosine(half_left), ahead.sine(half_left)), (14_189, 8192));
+        assert_eq!(half_left.sine(ahead), -8192);
     }
 }

@@ -68,7 +68,7 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
     pub fn scan<'d>(
         &mut self,
         measured: Time,
-        detections: impl IntoIterator<Item = &'d Detection>,
+        detections: impl IntoIterator<Item = &'d Detection, IntoIter: Clone>,
         fault: bool,
         mut ended: impl FnMut(Stage),
     ) -> FrameReport {

@@ -25,6 +25,7 @@ pub fn voxelise<const R: usize, const A: usize, const E: usize, const W: usize>(
     let (low, high) = outline(solid, axes);
     let first = (low >> 8).clamp(0, A as i32);
     let last = (high >> 8).clamp(-1, A as i32 - 1);
+    let mut rows = axes.row_places();
     for a in first..=last {
         let centre = a * 256 + 128;
         let (from, to) = (low.max(centre - WINDOW), high.min(centre + WINDOW));
@@ -41,7 +42,7 @@ pub fn voxelise<const R: usize, const A: usize, const E: usize, const W: usize>(
         for r in nearest..end.max(nearest + 1).min(R) {
             let (near, far) = (r as i32 * axes.cell_cm, (r as i32 + 1) * axes.cell_cm);
             let place = if solid.height_cm < axes.sensor_height_cm() { far.min(leave) } else { near.max(enter) };
-            column.fill(r, axes.row_place(axes.slope(solid.height_cm, place)), share);
+            column.fill(r, rows.of(axes.slope(solid.height_cm, place)), share);
         }
     }
 }

@@ -5,10 +5,18 @@ use crate::reflection::Reflection;
 /// Bins of range.
 const BINS: usize = 64;
 
-/// Indices of up to `D` reflections, nearest bin first, in order of arrival within a bin.
+/// Where a reflection is, centimetres in the levelled frame, and its place in the scan.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    pub x_cm: i32,
+    pub y_cm: i32,
+    pub index: u16,
+}
+
+/// The places of up to `D` reflections, nearest bin first, in order of arrival within a bin.
 pub struct ByRange<const D: usize> {
-    order: [u16; D],
-    /// Where each bin begins in `order`, and where the last ends.
+    places: [Place; D],
+    /// Where each bin begins in `places`, and where the last ends.
     begins: [u16; BINS + 1],
     bin_cm: i32,
 }
@@ -17,7 +25,11 @@ pub struct ByRange<const D: usize> {
 impl<const D: usize> ByRange<D> {
     /// Sorts by counting: two passes over the reflections.
     pub fn sort(reflections: &[Reflection], limit_cm: i32) -> Self {
-        let mut sorted = Self { order: [0; D], begins: [0; BINS + 1], bin_cm: (limit_cm / BINS as i32).max(1) };
+        let mut sorted = Self {
+            places: [Place { x_cm: 0, y_cm: 0, index: 0 }; D],
+            begins: [0; BINS + 1],
+            bin_cm: (limit_cm / BINS as i32).max(1),
+        };
         for r in reflections {
             let bin = sorted.bin(i32::from(r.ground_cm));
             if let Some(n) = sorted.begins.get_mut(bin + 1) {
@@ -32,8 +44,8 @@ impl<const D: usize> ByRange<D> {
         let mut next = sorted.begins;
         for (i, r) in reflections.iter().enumerate() {
             let Some(at) = next.get_mut(sorted.bin(i32::from(r.ground_cm))) else { continue };
-            if let Some(slot) = sorted.order.get_mut(usize::from(*at)) {
-                *slot = i as u16;
+            if let Some(slot) = sorted.places.get_mut(usize::from(*at)) {
+                *slot = Place { x_cm: r.x_cm, y_cm: r.y_cm, index: i as u16 };
             }
             *at += 1;
         }
@@ -44,11 +56,11 @@ impl<const D: usize> ByRange<D> {
         (ground_cm.max(0) / self.bin_cm.max(1)).min(BINS as i32 - 1) as usize
     }
 
-    /// Indices of all reflections between two distances, and of some around them.
-    pub fn between(&self, from_cm: i32, to_cm: i32) -> &[u16] {
+    /// All reflections between two distances, and some around them.
+    pub fn between(&self, from_cm: i32, to_cm: i32) -> &[Place] {
         let begin = self.begins.get(self.bin(from_cm)).copied().unwrap_or(0);
         let end = self.begins.get(self.bin(to_cm) + 1).copied().unwrap_or(0);
-        self.order.get(usize::from(begin)..usize::from(end)).unwrap_or(&[])
+        self.places.get(usize::from(begin)..usize::from(end)).unwrap_or(&[])
     }
 }
 
@@ -75,10 +87,11 @@ mod tests {
             })
             .collect();
         let sorted = ByRange::<8>::sort(&reflections, 22_500);
-        let all: Vec<u16> = sorted.between(0, 50_000).to_vec();
+        let indices = |from, to| -> Vec<u16> { sorted.between(from, to).iter().map(|p| p.index).collect() };
+        let all = indices(0, 50_000);
         assert_eq!(all.len(), 7);
         assert_eq!(all[0], 2);
-        let near: Vec<u16> = sorted.between(4_000, 6_000).to_vec();
+        let near = indices(4_000, 6_000);
         assert!(near.contains(&0) && near.contains(&3) && !near.contains(&1), "{near:?}");
         assert_eq!(sorted.between(30_000, 31_000).len(), 2, "what is beyond the limit is in the last bin");
     }

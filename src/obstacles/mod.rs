@@ -76,7 +76,7 @@ impl<const N: usize> Obstacles<N> {
         self.list.iter()
     }
 
-    /// New obstacles that found no room, saturating.
+    /// New obstacles that found no room, saturating; where none would find any, one for the frame.
     pub fn dropped(&self) -> u32 {
         self.dropped
     }
@@ -96,11 +96,12 @@ impl<const N: usize> Obstacles<N> {
         t: &Tracking,
         in_view: impl Fn(i32, i32) -> bool,
     ) -> Claimed<D> {
+        let kept = t.kept_over(step);
         for o in &mut self.list {
-            o.predict(step, t);
+            o.predict(step, kept.lateral);
         }
         let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
-        let mut claimed = self.associate(reflections, &by_range, step, t);
+        let mut claimed = self.associate(reflections, &by_range, kept.outline, t);
         for o in &mut self.list {
             o.settle(step, t);
         }
@@ -117,7 +118,7 @@ impl<const N: usize> Obstacles<N> {
         &mut self,
         reflections: &[Reflection],
         by_range: &ByRange<D>,
-        step: Step,
+        outline_kept: i32,
         t: &Tracking,
     ) -> Claimed<D> {
         const { assert!(N < u16::MAX as usize) }
@@ -131,18 +132,25 @@ impl<const N: usize> Obstacles<N> {
             let search = o.search(t);
             let confirmed = o.existence >= t.confirmed;
             let (from, to) = search.distances_cm();
-            for &i in by_range.between(from, to) {
-                let i = usize::from(i);
+            for place in by_range.between(from, to) {
+                if !search.reaches(place.x_cm, place.y_cm) {
+                    continue;
+                }
+                let i = usize::from(place.index);
                 let (Some(r), Some((body, wheel))) = (reflections.get(i), best.get_mut(i)) else { continue };
-                let Some(offset) = search.within_reach(r) else { continue };
-                if let Some(misfit) = search.misfit(r, offset, t) {
-                    if misfit < body.0 {
+                let Some(offset) = search.offset(r, t) else { continue };
+                let error = search.speed_error(r);
+                if error <= t.doppler_gate {
+                    if let Some(misfit) = search.misfit(r, offset, error, t)
+                        && misfit < body.0
+                    {
                         *body = (misfit, k as u16);
                     }
                 } else if confirmed
                     && body.1 == u16::MAX
                     && moving.contains(i)
-                    && let Some(misfit) = search.misfit_of_wheel(r, offset, t)
+                    && search.is_speed_of_wheel(r, t)
+                    && let Some(misfit) = search.misfit(r, offset, 0, t)
                     && misfit < wheel.0
                 {
                     *wheel = (misfit, k as u16);
@@ -153,7 +161,7 @@ impl<const N: usize> Obstacles<N> {
         for (i, (r, ((_, body), _))) in reflections.iter().zip(&best).enumerate() {
             let Some(o) = self.list.get_mut(usize::from(*body)) else { continue };
             if !o.seen() {
-                o.fade_outline(step, t);
+                o.fade_outline(outline_kept);
             }
             o.absorb(r, t);
             claimed.insert(i);
@@ -187,16 +195,27 @@ impl<const N: usize> Obstacles<N> {
             if room == 0 {
                 return;
             }
+            if self.list.is_full() && self.list.iter().all(|o| o.existence >= t.confirmed) {
+                // there will be none in this frame
+                self.dropped = self.dropped.saturating_add(1);
+                return;
+            }
             room -= 1;
             let mut newborn = Obstacle::new(seed, heading, speed);
             newborn.absorb(seed, t);
             claimed.insert(i);
             let mut search = newborn.search(t);
             let (from, to) = search.distances_cm();
-            for &j in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
-                let j = usize::from(j);
+            for place in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
+                if !search.reaches(place.x_cm, place.y_cm) {
+                    continue;
+                }
+                let j = usize::from(place.index);
                 let Some(r) = reflections.get(j).filter(|_| !claimed.contains(j)) else { continue };
-                if search.within_reach(r).and_then(|offset| search.misfit(r, offset, t)).is_some() {
+                let error = search.speed_error(r);
+                if error <= t.doppler_gate
+                    && search.offset(r, t).and_then(|offset| search.misfit(r, offset, error, t)).is_some()
+                {
                     newborn.absorb(r, t);
                     newborn.reach(r);
                     claimed.insert(j);
@@ -220,13 +239,16 @@ impl<const N: usize> Obstacles<N> {
     /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
     /// which is left without evidence and so dropped. So is what lies within a vehicle.
     fn join_parts(&mut self, t: &Tracking) {
-        for i in 0..self.list.len() {
-            for j in i + 1..self.list.len() {
-                let Ok([a, b]) = self.list.get_disjoint_mut([i, j]) else { continue };
-                if a.existence <= 0 || b.existence <= 0 {
+        let mut rest = self.list.as_mut_slice();
+        while let Some((a, others)) = rest.split_first_mut() {
+            for b in others.iter_mut().filter(|b| b.existence > 0) {
+                if a.existence <= 0 {
+                    break;
+                }
+                if !a.is_near(b, t) {
                     continue;
                 }
-                let (elder, younger) = if a.hits >= b.hits { (a, b) } else { (b, a) };
+                let (elder, younger) = if a.hits >= b.hits { (&mut *a, b) } else { (b, &mut *a) };
                 if elder.is_one_with(younger, t) {
                     elder.join(younger, t);
                     younger.existence = 0;
@@ -234,6 +256,7 @@ impl<const N: usize> Obstacles<N> {
                     younger.existence = 0;
                 }
             }
+            rest = others;
         }
     }
 

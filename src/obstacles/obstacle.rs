@@ -3,7 +3,7 @@
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;
 use super::tracking::Tracking;
-use crate::math::{hypot_gate, length, mul_shift};
+use crate::math::{hypot_gate, length, mul_shift, ratio, root};
 use crate::reflection::{Noise, Reflection};
 use crate::solid::Solid;
 use crate::time::Step;
@@ -42,6 +42,9 @@ pub struct Obstacle {
     gathered: Gathered,
 }
 
+/// Greatest weight of a lateral estimate: [`ratio`]'s limit.
+const MOST_WEIGHT: i32 = 1 << 26;
+
 /// Sums over the detections of one frame.
 #[derive(Debug, Clone, Copy, Default)]
 struct Gathered {
@@ -59,15 +62,18 @@ fn weight(sigma_cm: i32) -> i32 {
     (1 << 24) / (2500 + sigma_cm * sigma_cm).max(1)
 }
 
-/// Standard deviations of a detection along and across a heading, centimetres.
-fn spread(heading: Direction, r: &Reflection, noise: &Noise) -> (i32, i32) {
+/// Standard deviation of a detection along a heading, centimetres.
+fn sigma_along(heading: Direction, r: &Reflection, noise: &Noise) -> i32 {
     let across_cm = i32::from(r.across_cm);
-    let along = heading.along(i32::from(r.sight.x), i32::from(r.sight.y)).abs();
-    let across = heading.across(i32::from(r.sight.x), i32::from(r.sight.y)).abs();
-    (
-        hypot_gate((noise.range_cm * along) >> 14, (across_cm * across) >> 14),
-        hypot_gate((noise.range_cm * across) >> 14, (across_cm * along) >> 14),
-    )
+    let (along, across) = (heading.cosine(r.sight).abs(), heading.sine(r.sight).abs());
+    hypot_gate((noise.range_cm * along) >> 14, (across_cm * across) >> 14)
+}
+
+/// Standard deviation of a detection across a heading, centimetres.
+fn sigma_across(heading: Direction, r: &Reflection, noise: &Noise) -> i32 {
+    let across_cm = i32::from(r.across_cm);
+    let (along, across) = (heading.cosine(r.sight).abs(), heading.sine(r.sight).abs());
+    hypot_gate((noise.range_cm * across) >> 14, (across_cm * along) >> 14)
 }
 
 /// An obstacle with what every comparison needs at hand.
@@ -82,6 +88,20 @@ pub struct Search {
     gap_cm: i32,
     /// Farthest from the anchor a detection of this obstacle can lie along either axis.
     reach_cm: i32,
+    /// The square which that spans: its corner of least coordinates, and its side.
+    corner: (i32, i32),
+    side_cm: u32,
+}
+
+/// A detection in an obstacle's axes, centimetres.
+#[derive(Debug, Clone, Copy)]
+pub struct Offset {
+    /// To the left of the centre line.
+    left: i32,
+    /// Beside the strip detections of a vehicle spread over.
+    beside: i32,
+    /// Beyond either end of the outline.
+    beyond: i32,
 }
 
 /// How far noise carries a detection beyond its obstacle, centimetres.
@@ -90,54 +110,67 @@ const NOISE_REACH_CM: i32 = 600;
 impl Search {
     /// Least and greatest distance from the sensor a detection of this obstacle can have.
     pub fn distances_cm(&self) -> (i32, i32) {
-        let distance = length(self.anchor.0, self.anchor.1);
-        // the corner of the square that is searched
-        let reach = self.reach_cm * 3 / 2;
-        (distance - reach, distance + reach)
+        let (x, y) = self.anchor;
+        let distance = length(x, y).max(1);
+        // how far the square that is searched, in the obstacle's axes, reaches along the line of sight; and
+        // as far it reaches to its sides, whose corners lie a little farther out
+        let part = (self.heading.along(x, y).abs() + self.heading.across(x, y).abs()).min(3 * distance / 2);
+        let reach = (self.reach_cm * part) / distance;
+        (distance - reach, distance + reach + reach * reach / distance / 2)
     }
 
-    /// A detection's offset from the anchor; `None` where it is out of reach.
+    /// Whether a place is near enough to look closer.
     #[inline]
-    pub fn within_reach(&self, r: &Reflection) -> Option<(i32, i32)> {
+    pub fn reaches(&self, x_cm: i32, y_cm: i32) -> bool {
+        // one comparison for both ends
+        let (x, y) = (x_cm.wrapping_sub(self.corner.0), y_cm.wrapping_sub(self.corner.1));
+        x.cast_unsigned() <= self.side_cm && y.cast_unsigned() <= self.side_cm
+    }
+
+    /// Where a detection lies in the obstacle's axes; `None` where it is out of reach, whatever the direction
+    /// of its noise.
+    #[inline]
+    pub fn offset(&self, r: &Reflection, t: &Tracking) -> Option<Offset> {
         let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
-        (dx.abs() <= self.reach_cm && dy.abs() <= self.reach_cm).then_some((dx, dy))
+        let noise = (t.sigmas * (t.noise.range_cm + i32::from(r.across_cm))) >> 4;
+        let left = self.heading.across(dx, dy);
+        let beside = (left.abs() - t.half_width_cm).max(0);
+        if beside > t.lateral_gate_cm + noise {
+            return None;
+        }
+        let beyond = self.extent.beyond_cm(self.heading.along(dx, dy));
+        (beyond <= self.gap_cm + noise).then_some(Offset { left, beside, beyond })
     }
 
-    /// How badly a detection at an offset fits, 2^-8; `None` where it cannot belong to this obstacle.
+    /// Difference between a detection's radial velocity and the one the obstacle's motion explains, 2^-4 cm/s.
     #[inline]
-    pub fn misfit(&self, r: &Reflection, offset: (i32, i32), t: &Tracking) -> Option<i32> {
-        let error = speed_error(self.velocity, r).abs();
-        if error > t.doppler_gate { None } else { self.misfit_of_place(r, offset, error, t) }
+    pub fn speed_error(&self, r: &Reflection) -> i32 {
+        speed_error(self.velocity, r).abs()
     }
 
-    /// How badly a detection fits as a wheel of this obstacle, which returns anything between
-    /// standstill and twice its speed; `None` where it cannot be one.
+    /// Whether a detection may come from a wheel of this obstacle, which returns anything between standstill
+    /// and twice its speed.
     #[inline]
-    pub fn misfit_of_wheel(&self, r: &Reflection, offset: (i32, i32), t: &Tracking) -> Option<i32> {
+    pub fn is_speed_of_wheel(&self, r: &Reflection, t: &Tracking) -> bool {
         let body = r.sight.along(self.velocity.0, self.velocity.1);
         let wheel = i32::from(r.radial_velocity_cm_s) << 4;
         let spun = if body < 0 { -wheel } else { wheel };
-        if spun < 0 || spun > 2 * body.abs() + t.doppler_gate { None } else { self.misfit_of_place(r, offset, 0, t) }
+        (0..=2 * body.abs() + t.doppler_gate).contains(&spun)
     }
 
-    fn misfit_of_place(&self, r: &Reflection, (dx, dy): (i32, i32), error: i32, t: &Tracking) -> Option<i32> {
-        let (along, left) = (self.heading.along(dx, dy), self.heading.across(dx, dy));
-        let beyond = self.extent.beyond_cm(along);
-        let beside = (left.abs() - t.half_width_cm).max(0);
-        // out of the question whatever the direction of the noise
-        let noise = (t.sigmas * (t.noise.range_cm + i32::from(r.across_cm))) >> 4;
-        if beyond > self.gap_cm + noise || beside > t.lateral_gate_cm + noise {
+    /// How badly a detection with this offset and error of its speed fits, 2^-8; `None` where it cannot belong
+    /// to this obstacle.
+    pub fn misfit(&self, r: &Reflection, offset: Offset, error: i32, t: &Tracking) -> Option<i32> {
+        let Offset { left, beside, beyond } = offset;
+        if self.extent.length_cm() + beyond > t.max_length_cm + 100 {
             return None;
         }
-        let (sigma_along, sigma_across) = spread(self.heading, r, &t.noise);
         // far along the vehicle or far to its side, but not both
         let part = |distance: i32, gate: i32, sigma: i32| (distance << 8) / (gate + ((t.sigmas * sigma) >> 4)).max(1);
-        let (ahead, aside) = (part(beyond, self.gap_cm, sigma_along), part(beside, t.lateral_gate_cm, sigma_across));
-        if ahead > 256
-            || aside > 256
-            || ahead * ahead + aside * aside > 256 * 256
-            || self.extent.length_cm() + beyond > t.max_length_cm + 100
-        {
+        let ahead = if beyond > 0 { part(beyond, self.gap_cm, sigma_along(self.heading, r, &t.noise)) } else { 0 };
+        let sigma_across = sigma_across(self.heading, r, &t.noise);
+        let aside = if beside > 0 { part(beside, t.lateral_gate_cm, sigma_across) } else { 0 };
+        if ahead > 256 || aside > 256 || ahead * ahead + aside * aside > 256 * 256 {
             return None;
         }
         // each term is a squared distance in its own scale: 0.7 m along, the width and noise across,
@@ -205,14 +238,15 @@ impl Obstacle {
         (ax + ((along * hx - left * hy) >> 14), ay + ((along * hy + left * hx) >> 14))
     }
 
-    /// Moves it on by a time step and forgets the last frame's sums.
-    pub fn predict(&mut self, step: Step, t: &Tracking) {
+    /// Moves it on by a time step, which leaves a part (2^-16) of its lateral weight, and forgets the last
+    /// frame's sums.
+    pub fn predict(&mut self, step: Step, lateral_kept: i32) {
         let (dx, dy) = (step.times(self.velocity.0), step.times(self.velocity.1));
         self.position.0 += dx;
         self.position.1 += dy;
         let way = u16::try_from(hypot_gate(dx, dy) >> FRACTION).unwrap_or(u16::MAX);
         self.travelled_cm = self.travelled_cm.saturating_add(way);
-        self.lateral_weight = mul_shift(self.lateral_weight, step.keep(t.lateral_memory), 16);
+        self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
         self.gathered = Gathered::default();
         self.age = self.age.saturating_add(1);
     }
@@ -243,23 +277,26 @@ impl Obstacle {
     pub fn search(&self, t: &Tracking) -> Search {
         let outline = self.extent.front_cm.max(-self.extent.rear_cm);
         let gap_cm = self.gap_cm(t);
+        let anchor = self.anchor();
+        let reach_cm = outline + gap_cm + NOISE_REACH_CM;
         Search {
             heading: self.heading,
             velocity: (self.velocity.0 >> 4, self.velocity.1 >> 4),
             extent: self.extent,
-            anchor: self.anchor(),
+            anchor,
             gap_cm,
-            reach_cm: outline + gap_cm + NOISE_REACH_CM,
+            reach_cm,
+            corner: (anchor.0 - reach_cm, anchor.1 - reach_cm),
+            side_cm: 2 * reach_cm.unsigned_abs(),
         }
     }
 
     /// Takes a detection that belongs to it.
     pub fn absorb(&mut self, r: &Reflection, t: &Tracking) {
         let (along, left) = self.local(r.x_cm, r.y_cm);
-        let (_, sigma_across) = spread(self.heading, r, &t.noise);
-        let projection = self.heading.along(i32::from(r.sight.x), i32::from(r.sight.y));
+        let projection = self.heading.cosine(r.sight);
         let error = speed_error((self.velocity.0 >> 4, self.velocity.1 >> 4), r);
-        let w = weight(sigma_across);
+        let w = weight(sigma_across(self.heading, r, &t.noise));
         let g = &mut self.gathered;
         g.count += 1;
         g.speed.0 = g.speed.0.saturating_add((projection * error) >> 8);
@@ -285,23 +322,22 @@ impl Obstacle {
         self.extent.rear_cm = self.extent.rear_cm.min(along);
     }
 
-    /// Fades the outline; to be called before this frame's detections are absorbed.
-    pub fn fade_outline(&mut self, step: Step, t: &Tracking) {
-        self.profile.fade(step.keep(t.outline_memory));
+    /// Keeps a part (2^-16) of the outline; to be called before this frame's detections are absorbed.
+    pub fn fade_outline(&mut self, kept: i32) {
+        self.profile.fade(kept);
     }
 
     /// Brings motion, place and outline up to date with what was absorbed.
-    #[allow(clippy::cast_possible_truncation)] // speeds and offsets fit after the division
+    #[allow(clippy::cast_possible_truncation)] // counts of one frame
     pub fn settle(&mut self, step: Step, t: &Tracking) {
         let g = self.gathered;
         if g.count == 0 {
             return;
         }
         let inertia = if self.age < t.young { t.young_inertia } else { t.inertia };
-        let gain = (i64::from(g.speed.0) << 12) / i64::from((g.speed.1 + inertia).max(1));
-        self.push_along(gain as i32);
-        let weight = self.lateral_weight.saturating_add(g.lateral.1).max(1);
-        let offset = ((i64::from(g.lateral.0) << FRACTION) / i64::from(weight)) as i32;
+        self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
+        let weight = self.lateral_weight.saturating_add(g.lateral.1).clamp(1, MOST_WEIGHT);
+        let offset = ratio::<FRACTION>(g.lateral.0, weight);
         self.move_left(offset);
         self.lateral_weight = weight;
         if self.age >= t.young {
@@ -326,19 +362,15 @@ impl Obstacle {
     }
 
     /// Lets a lasting drift to one side turn the heading.
-    #[allow(clippy::cast_possible_truncation)] // clamped to a metre a second
     fn turn(&mut self, offset: i32, step: Step, t: &Tracking) {
-        let dv = (i64::from(mul_shift(offset, t.drift_gain, 16)) << 16) / i64::from(step.raw().max(1));
-        let dv = dv.clamp(-(100 << FRACTION), 100 << FRACTION) as i32;
+        // at most a metre a second, which a ratio of one would exceed
+        let (drift, step) = (mul_shift(offset, t.drift_gain, 16), step.raw().clamp(1, 1 << 20));
+        let dv = ratio::<16>(drift.clamp(-step, step), step).clamp(-(100 << FRACTION), 100 << FRACTION);
         let left = self.heading.left();
         self.velocity.0 += mul_shift(dv, i32::from(left.x), 14);
         self.velocity.1 += mul_shift(dv, i32::from(left.y), 14);
-        let (vx, vy) = (self.velocity.0 >> 4, self.velocity.1 >> 4);
-        let square = i64::from(vx) * i64::from(vx) + i64::from(vy) * i64::from(vy);
-        let speed = (square.unsigned_abs().isqrt()) as i64;
-        if speed > i64::from(t.turning_speed) {
-            let unit = |v: i32| ((i64::from(v) << 14) / speed.max(1)) as i16;
-            self.heading = Direction { x: unit(vx), y: unit(vy) };
+        if hypot_gate(self.velocity.0, self.velocity.1) > t.turning_speed {
+            self.heading = Direction::of(self.velocity.0, self.velocity.1);
         }
     }
 
@@ -361,19 +393,22 @@ impl Obstacle {
         self.extent = Extent { rear_cm: self.extent.rear_cm - by, front_cm: self.extent.front_cm - by };
     }
 
-    /// Whether another obstacle is a part of the same vehicle: in line, equally fast, and no farther
+    /// Whether another obstacle is near enough to be a part of the same vehicle, or to lie within it.
+    #[inline]
+    pub fn is_near(&self, other: &Self, t: &Tracking) -> bool {
+        let far = (2 * t.max_length_cm) << FRACTION;
+        (self.position.0 - other.position.0).abs() <= far && (self.position.1 - other.position.1).abs() <= far
+    }
+
+    /// Whether another obstacle, a [near](Self::is_near) one, is a part of the same vehicle: in line, equally fast, and no farther
     /// away than vehicles keep from each other at this speed.
     #[inline]
     pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
-        let far = (2 * t.max_length_cm) << FRACTION;
-        if (self.position.0 - other.position.0).abs() > far || (self.position.1 - other.position.1).abs() > far {
-            return false;
-        }
         let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
         if hypot_gate(dvx, dvy) > t.merge_speed {
             return false;
         }
-        if self.heading.along(i32::from(other.heading.x), i32::from(other.heading.y)) < t.merge_parallel {
+        if self.heading.cosine(other.heading) < t.merge_parallel {
             return false;
         }
         let (ox, oy) = other.global(other.extent.middle_cm(), 0);
@@ -410,7 +445,7 @@ impl Obstacle {
     /// Standard deviation of the lateral place, centimetres.
     fn lateral_sigma(&self) -> i32 {
         let variance = (1_u32 << 24) / self.lateral_weight.max(1).unsigned_abs();
-        variance.isqrt().min(1000) as i32
+        root(variance).min(1000) as i32
     }
 
     /// Takes over what another obstacle knows of the same vehicle.

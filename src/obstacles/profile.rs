@@ -3,8 +3,6 @@
 //! Reflection points sit at bumpers, axles and corners. Counted in the moving frame of their
 //! obstacle they draw its outline within seconds, and a stray detection is outvoted.
 
-use crate::math::mul_shift;
-
 /// Bins of the histogram.
 pub const BINS: usize = 48;
 /// Length of a bin, centimetres.
@@ -73,8 +71,9 @@ impl Profile {
 
     /// Fades every bin by a factor in 2^-16.
     pub fn fade(&mut self, factor: i32) {
+        let factor = factor.clamp(0, 1 << 16).unsigned_abs();
         for b in &mut self.bins {
-            *b = mul_shift(i32::from(*b), factor, 16) as u16;
+            *b = ((u32::from(*b) * factor) >> 16) as u16;
         }
     }
 
@@ -82,15 +81,17 @@ impl Profile {
     /// (of [`HIT`]) and at least `share` (2^-8) of all hits, and in it two neighbours with half of
     /// that. Young profiles get by with 40 % of what they have.
     pub fn extent(&self, min_hits: i32, share: i32) -> Option<Extent> {
-        let total: i32 = self.bins.iter().map(|b| i32::from(*b)).sum();
-        if total == 0 {
-            return None;
-        }
-        let needed = min_hits.min(total * 2 / 5).max((total * share) >> 8);
         let sum = |part: &[u16]| part.iter().map(|b| i32::from(*b)).sum::<i32>();
+        // most bins are empty
+        let begin = self.bins.iter().position(|b| *b > 0)?;
+        let end = self.bins.iter().rposition(|b| *b > 0)? + 1;
+        let held = self.bins.get(begin..end).unwrap_or(&[]);
+        let total = sum(held);
+        let needed = min_hits.min(total * 2 / 5).max((total * share) >> 8).max(1);
         let group = |i: usize| self.bins.get(i..i + END_BINS).unwrap_or(&[]);
-        let first = (0..=BINS - END_BINS).find(|&i| sum(group(i)) >= needed)?;
-        let last = (0..=BINS - END_BINS).rfind(|&i| sum(group(i)) >= needed)?;
+        // the first group's last bin, and the last group's first
+        let first = (begin + filling(held.iter(), needed)?).saturating_sub(END_BINS - 1);
+        let last = end.checked_sub(1 + filling(held.iter().rev(), needed)?)?.min(BINS - END_BINS);
         let first = first + group(first).windows(2).position(|p| 2 * sum(p) >= needed)?;
         let last = last + group(last).windows(2).rposition(|p| 2 * sum(p) >= needed)?;
         Some(Extent { rear_cm: self.centre_of_pair(first), front_cm: self.centre_of_pair(last) })
@@ -124,6 +125,19 @@ impl Profile {
             }
         }
     }
+}
+
+/// Place of the bin with which `END_BINS` neighbours first hold enough.
+fn filling<'a>(bins: impl Iterator<Item = &'a u16> + Clone, needed: i32) -> Option<usize> {
+    let mut leaving = bins.clone();
+    let mut held = 0;
+    bins.enumerate().position(|(i, b)| {
+        if i >= END_BINS {
+            held -= leaving.next().map_or(0, |b| i32::from(*b));
+        }
+        held += i32::from(*b);
+        held >= needed
+    })
 }
 
 #[cfg(test)]

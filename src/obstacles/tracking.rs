@@ -5,6 +5,7 @@ use super::size::{SizeConfig, Sizes};
 use crate::config::{ConfigError, above, within};
 use crate::math;
 use crate::reflection::{Noise, Reflection};
+use crate::time::Step;
 use crate::trig::Direction;
 
 /// How detections become moving obstacles.
@@ -147,7 +148,7 @@ pub struct Tracking {
     pub mover_cm: i32,
     /// Speed below which one that never moved is a fixture, 2^-8 cm/s.
     pub fixture_speed: i32,
-    /// Speed above which motion tells the heading, 2^-4 cm/s.
+    /// Speed above which motion tells the heading, 2^-8 cm/s.
     pub turning_speed: i32,
     /// Bins the outline's middle may leave the anchor.
     pub recentre_bins: i32,
@@ -216,7 +217,7 @@ impl ObstacleConfig {
             most_hits_a_frame: 3,
             mover_cm: 200,
             fixture_speed: math::round_i32(self.min_speed_mps * 100.0) << 7,
-            turning_speed: 200 << 4,
+            turning_speed: 200 << 8,
             recentre_bins: 6,
             sizes: self.sizes.sizes()?,
             noise,
@@ -227,6 +228,11 @@ impl ObstacleConfig {
 }
 
 impl Tracking {
+    /// What a time step leaves of every obstacle's memories.
+    pub fn kept_over(&self, step: Step) -> Kept {
+        Kept { lateral: step.keep(self.lateral_memory), outline: step.keep(self.outline_memory) }
+    }
+
     /// Heading and speed of something that moves along the road and shows this radial velocity;
     /// `None` where it may be standing, or nearly crosses the line of sight.
     pub fn course(&self, r: &Reflection) -> Option<(Direction, i32)> {
@@ -241,6 +247,15 @@ impl Tracking {
         let heading = if speed > 0 { self.road } else { self.road.reversed() };
         (self.min_speed_cm_s..=FASTEST_CM_S).contains(&speed.abs()).then_some((heading, speed.abs()))
     }
+}
+
+/// What a time step leaves of an obstacle's memories, 2^-16.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kept {
+    /// Of the weight of its lateral place.
+    pub lateral: i32,
+    /// Of its outline.
+    pub outline: i32,
 }
 
 /// Least share of a motion along the road that must show in its Doppler, 2^-14: 81 degrees off.

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use viewshed::detection::{Detection, Measurement};
 use viewshed::map::RoadPoint;
+use viewshed::reflection::Reflection;
 use viewshed::trig::{self, Direction};
 
 use crate::cases;
@@ -72,13 +73,13 @@ proptest! {
         let (noise, levelling) = (setup.sensor.noise.noise().unwrap(), setup.sensor.mount.levelling().unwrap());
         let d = Detection { range_cm: d.range_cm.min(40_000), ..d };
         let r = noise.place(&d, &levelling);
+        prop_assert_eq!(noise.place_flat(&d, &levelling), Reflection { height_cm: None, ..r });
         let ground = f64::from(r.x_cm).hypot(f64::from(r.y_cm));
         // unit vectors are good to 2^-14 in every component
         prop_assert!(ground <= f64::from(d.range_cm) * 1.0005 + 2.0, "{} {:?}", ground, r);
         prop_assert!((f64::from(r.ground_cm) - ground.min(65_535.0)).abs() <= 3.0, "{} {:?}", ground, r);
-        let height = noise.height(&d, &levelling);
-        prop_assert_eq!(height.is_some(), d.elevation.is_some());
-        if let Some((height, _)) = height {
+        prop_assert_eq!(r.height_cm.is_some(), d.elevation.is_some());
+        if let Some((height, _)) = r.height_cm {
             let off = (f64::from(height) - f64::from(levelling.height_cm)).abs();
             prop_assert!(off <= f64::from(d.range_cm) * 1.0005 + 2.0);
         }

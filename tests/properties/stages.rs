@@ -61,8 +61,7 @@ fn put(grid: &mut Grid, stacks: &[(usize, usize, [u8; E])]) {
 
 fn reflections(setup: &Setup, seed: u64) -> Vec<Reflection> {
     let (noise, levelling) = (setup.sensor.noise.noise().unwrap(), setup.sensor.mount.levelling().unwrap());
-    let place = |d| Reflection { height_cm: noise.height(d, &levelling), ..noise.place(d, &levelling) };
-    crowd(setup, seed, 60).iter().map(place).collect()
+    crowd(setup, seed, 60).iter().map(|d| noise.place(d, &levelling)).collect()
 }
 
 proptest! {

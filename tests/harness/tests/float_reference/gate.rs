@@ -61,8 +61,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// The strongest of a frame, as many as the gate allows. A late one takes the place of the one
-    /// it replaces; of equals the first stays.
+    /// The strongest of a frame, as many as the gate allows, in order of arrival; of equals the first stay.
     pub fn new(
         measurements: &[Measurement],
         gate: &GateConfig,
@@ -77,18 +76,14 @@ impl Scan {
                 scan.refused.push(reason);
                 continue;
             }
-            let new = place(m, noise, levelled);
-            if scan.placed.len() < usize::from(gate.max_detections) {
-                scan.placed.push(new);
-                continue;
-            }
-            scan.refused.push(Rejection::Overflow);
-            // the last of the weakest
-            let weakest = scan.placed.iter_mut().rev().min_by(|a, b| a.strength.total_cmp(&b.strength));
-            if let Some(weakest) = weakest.filter(|w| w.strength < new.strength) {
-                *weakest = new;
-            }
+            scan.placed.push(place(m, noise, levelled));
         }
+        let mut order: Vec<usize> = (0..scan.placed.len()).collect();
+        order.sort_by(|&a, &b| scan.placed[b].strength.total_cmp(&scan.placed[a].strength));
+        let late = order.split_off(order.len().min(usize::from(gate.max_detections)));
+        scan.refused.extend(late.iter().map(|_| Rejection::Overflow));
+        order.sort_unstable();
+        scan.placed = order.iter().map(|&i| scan.placed[i]).collect();
         scan
     }
 }
@@ -132,9 +127,8 @@ mod tests {
             let measurements: Vec<Measurement> = (0..400).map(|_| random.measurement()).collect();
             let exact = Scan::new(&measurements, &config, &VIEW, &noise, &Levelled::new(&mount));
             let mut scan = viewshed::scan::Scan::<256>::new();
-            for m in &measurements {
-                scan.add(&Detection::new(m).unwrap(), &gate, &noises, &levelling);
-            }
+            let detections: Vec<Detection> = measurements.iter().map(|m| Detection::new(m).unwrap()).collect();
+            scan.gather(detections.iter(), &gate, |d| noises.place(d, &levelling));
             assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
             for (got, exact) in scan.reflections().iter().zip(&exact.placed) {
                 assert_eq!(f64::from(got.strength), exact.strength);

@@ -22,7 +22,7 @@ pub type IntegerGrid = SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>;
 /// What the library makes of a measurement, its height included.
 pub fn reflection(m: &Measurement, noise: &Noise, levelling: &Levelling) -> Reflection {
     let d = Detection::new(m).unwrap();
-    Reflection { height_cm: noise.height(&d, levelling), ..noise.place(&d, levelling) }
+    noise.place(&d, levelling)
 }
 
 pub const VIEW: FieldOfView = FieldOfView {

@@ -239,8 +239,9 @@ mod tests {
             let reflection = reflection(&seed, &both.noise.noise().unwrap(), &both.levelling);
             let mut integer = IntegerObstacle::new(&reflection, both.tracking.road, 2500);
             let mut exact = Obstacle::new(&place(&seed, &both.noise, &both.levelled), both.rules.road, 25.0);
+            let step = Step::from_micros(PERIOD_US);
             for _ in 0..15 {
-                integer.predict(Step::from_micros(PERIOD_US), &both.tracking);
+                integer.predict(step, both.tracking.kept_over(step).lateral);
                 exact.predict(PERIOD_US as f64 * 1e-6, &both.rules);
             }
             let off = difference(metres(integer.anchor()), exact.anchor);
