@@ -58,10 +58,9 @@ impl<const D: usize> CanSession<D> {
         slots: &mut impl Slots,
     ) -> Flow {
         keeper.poll(self.now, port);
-        if let Some(frame) = keeper.receive(port) {
-            if self.bench_frame(&frame, service, unit, slots) == Flow::Restart {
-                return Flow::Restart;
-            }
+        let frame = keeper.receive(port);
+        if frame.is_some_and(|frame| self.bench_frame(&frame, service, unit, slots) == Flow::Restart) {
+            return Flow::Restart;
         }
         // nothing is taken from a unit that cannot be sent
         while keeper.state() == BusState::Active {

@@ -11,7 +11,7 @@ use viewshed::settings::{BLOCK_LEN, BlockError, Settings};
 use viewshed::time::Time;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::message::{Addresses, Epoch};
+use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 use viewshed::wire::receive::{Accepted, Limits, Receiver};
 use viewshed::wire::status::{Reason, State};
 
@@ -227,6 +227,25 @@ fn answers_keep_their_distance_and_identifiers_are_where_the_installation_has_th
 }
 
 proptest! {
+    /// Whatever requests and answers pass their check sums, nothing is written that does not hold.
+    #[test]
+    fn any_requests_and_answers_are_taken(
+        messages in prop::collection::vec((prop_oneof![0_u8..7, 128_u8..136, any::<u8>()], any::<[u8; 5]>()), 0..200),
+    ) {
+        let (mut slots, mut unit) = (empty(), start(CLASSIC, &empty()));
+        let mut answers = Answers::new(SENSOR, CLASSIC);
+        for (kind, [number, rest @ ..]) in messages {
+            let own = [&[kind, number][..], &rest[..]].concat();
+            for message in [REQUEST, ANSWER] {
+                let packet = Packet::new(Packing::Classic, SENSOR, message, Epoch::new(3), &own).protect(0, None);
+                let frame = packet.frame(&Addresses::STANDARD).unwrap();
+                let _ = (unit.take(&frame, &mut slots), answers.take(&frame));
+            }
+            prop_assert!(std::iter::from_fn(|| unit.next_frame(at(0), &slots)).take(200).count() < 200);
+            prop_assert_eq!(slots.1, 0, "no block of random bytes holds");
+        }
+    }
+
     /// Two blocks on a bus that loses, repeats and reorders: whatever is written is one of them, whole.
     #[test]
     fn only_whole_blocks_are_written(

@@ -39,15 +39,14 @@ extern "C" fn main() -> ! {
     // answers without a gap: time comes in steps here
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
     let mut session = CanSession::<DETECTIONS>::new(Config::sensor(SENSOR));
-    let mut starts = 0;
-
-    let mut told = false;
+    let (mut starts, mut told) = (0, false);
 
     loop {
         let epoch = flash.start();
         starts += 1;
         let settings = Settings::newest([flash.slot(0), flash.slot(1)]).ok().map(|newest| newest.settings);
-        let bus = settings.map_or(BusConfig::default(), |s| s.radar_bus);
+        // a bit rate that no divider meets must not make the unit unreachable
+        let bus = settings.map(|s| s.radar_bus).filter(|bus| bus.timing(CAN_CLOCK_HZ).is_some()).unwrap_or_default();
         let Some(timing) = bus.timing(CAN_CLOCK_HZ) else { exit(1) };
         let mut can = Can::new(timing);
         let mut keeper = BusKeeper::start(&bus, &mut can);

@@ -130,10 +130,9 @@ impl Listener {
             if sent.rays.get(azimuth).is_none_or(|sent| ray.bits().and(sent.bits()) != *ray.bits()) {
                 return Err(format!("azimuth {azimuth} is told visible where it was not at {:?}", sent.measured));
             }
-            if let Some((e, newest)) = self.newest.get(azimuth).copied().flatten() {
-                if e == epoch && sent.measured < newest {
-                    return Err(format!("azimuth {azimuth} went back from {newest:?} to {:?}", sent.measured));
-                }
+            let before = self.newest.get(azimuth).copied().flatten().filter(|(e, _)| *e == epoch);
+            if let Some((_, newest)) = before.filter(|(_, newest)| sent.measured < *newest) {
+                return Err(format!("azimuth {azimuth} went back from {newest:?} to {:?}", sent.measured));
             }
             self.newest[azimuth] = Some((epoch, sent.measured));
         }

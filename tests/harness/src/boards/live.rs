@@ -94,7 +94,7 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
         let mut last = None;
-        while let Some(byte) = bytes.next() {
+        for byte in &mut *bytes {
             let flow = session.take(&[byte], &mut unit, &mut flash, &mut line);
             let offered = unit.as_mut().and_then(|unit| {
                 let deadline = unit.broadcast().deadline();

@@ -140,7 +140,7 @@ fn exchange(far: &mut impl Far, profile: Profile, settings: &Settings, scans: &[
         far.wait_for(due, MOST_TIME)?;
         silent = if far.answer().len() > before || due == before { 0 } else { silent + 1 };
         ensure!(silent < MOST_SILENT, "the board has not answered {MOST_SILENT} scans");
-        turns.push(Turn { time: *time, host: host.new(&expected.bytes[..due]), board: board.new(far.answer()) });
+        turns.push(Turn { time: *time, host: host.take(&expected.bytes[..due]), board: board.take(far.answer()) });
     }
     Ok(turns)
 }
@@ -153,7 +153,7 @@ struct Messages {
 }
 
 impl Messages {
-    fn new(&mut self, stream: &[u8]) -> Vec<Heard> {
+    fn take(&mut self, stream: &[u8]) -> Vec<Heard> {
         let mut messages = Vec::new();
         while self.taken < stream.len() {
             let (taken, message) = self.unstuffer.push(&stream[self.taken..]);
