@@ -25,6 +25,11 @@ pub mod reference {
     pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
     /// All of them together.
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+
+    /// What a board of this size says of itself.
+    pub const fn opening(ticks_per_256: u32) -> crate::pil::record::Opening {
+        crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
+    }
 }
 
 /// 100 x 64 x 8 cells: parts with 128 kB.
@@ -52,4 +57,9 @@ pub mod small {
     pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
     /// All of them together.
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+
+    /// What a board of this size says of itself.
+    pub const fn opening(ticks_per_256: u32) -> crate::pil::record::Opening {
+        crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
+    }
 }

@@ -15,6 +15,8 @@
 
 use crate::bytes::{Reader, Writer};
 use crate::health::Condition;
+use crate::polar::PolarMap;
+use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::stage::Stage;
 
 /// Bytes of a record.
@@ -47,6 +49,24 @@ pub struct Opening {
     pub ticks_per_256: u32,
     /// Bytes of state, parameters and map.
     pub bytes: [u32; 3],
+}
+
+impl Opening {
+    /// Of an estimator of this size.
+    #[allow(clippy::cast_possible_truncation)] // sizes of types that fit a controller
+    pub const fn of<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+        ticks_per_256: u32,
+    ) -> Self {
+        Self {
+            shape: [R as u16, A as u16, E as u16, D as u16],
+            ticks_per_256,
+            bytes: [
+                size_of::<Radar3d<R, A, E, W, N, D>>() as u32,
+                size_of::<Radar3dParameters<R, A, E>>() as u32,
+                size_of::<PolarMap<R, A>>() as u32,
+            ],
+        }
+    }
 }
 
 /// What a frame gave and what it cost.

@@ -1,12 +1,9 @@
 //! The controller's side: scans in, estimator, records out.
 
-use core::mem::size_of;
-
 use super::fingerprint::Fingerprint;
 use super::job::{Job, JobError, ScanBuffer};
 use super::record::{Closing, FrameRecord, Opening, Record};
 use crate::polar::PolarMap;
-use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::stage::Stage;
 use crate::unit::Unit;
 use crate::wire::serial::MOST_STUFFED;
@@ -49,7 +46,6 @@ pub struct Memory<
 ///
 /// # Errors
 /// A stream that breaks off or holds a scan that does not fit.
-#[allow(clippy::cast_possible_truncation)] // sizes of types that fit a controller
 pub fn run<
     const R: usize,
     const A: usize,
@@ -63,15 +59,7 @@ pub fn run<
     job: &Job,
     memory: Memory<R, A, E, W, N, D, B>,
 ) -> Result<(), JobError> {
-    let opening = Opening {
-        shape: [R as u16, A as u16, E as u16, D as u16],
-        ticks_per_256: bench.ticks_per_256(),
-        bytes: [
-            size_of::<Radar3d<R, A, E, W, N, D>>() as u32,
-            size_of::<Radar3dParameters<R, A, E>>() as u32,
-            size_of::<PolarMap<R, A>>() as u32,
-        ],
-    };
+    let opening = Opening::of::<R, A, E, W, N, D>(bench.ticks_per_256());
     bench.write(&Record::Opening(opening).to_bytes());
     let Memory { mut unit, scan } = memory;
     let mut line = [0; MOST_STUFFED];

@@ -3,9 +3,9 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use mps2_an386::profile::{DETECTIONS, Map, Parameters, Sender, State};
+use mps2_an386::profile::{DETECTIONS, Map, Parameters, Sender, State, opening};
 use mps2_an386::stack;
-use mps2_an386::timer::Timer;
+use mps2_an386::timer::{TICKS_PER_256, Timer};
 use mps2_an386::uart::{PATIENCE, Uart};
 use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::pil::flash::Flash;
@@ -64,6 +64,7 @@ fn main() -> ! {
     loop {
         let epoch = flash.start();
         starts += 1;
+        lines.record(&Record::Opening(opening(TICKS_PER_256)));
         let mut session = Session::<DETECTIONS>::start(SENSOR, &flash, &mut lines);
         let settings = session.settings();
         let mut parameters: Option<Parameters> = None;

@@ -49,8 +49,8 @@ impl Step {
 pub struct Sent {
     pub time: Time,
     pub frames: Vec<CanFrame>,
-    /// The map among them.
-    pub map: Option<Map>,
+    /// The maps among them; a scan that was not complete is over when the next one begins.
+    pub maps: Vec<Map>,
     /// The unit's controller starts over meanwhile; what comes too early is lost.
     pub starts_over: bool,
 }
@@ -101,7 +101,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut session = CanSession::<DETECTIONS>::new(Config::sensor(SENSOR));
     let frames = steps.iter().enumerate().flat_map(|(k, step)| step.all().map(move |frame| (k, frame))).peekable();
     let mut port = Scripted { frames, step: 0, quiet: false, sent: Vec::new(), starts: 0 };
-    let empty = |step: &Step| Sent { time: step.time, frames: Vec::new(), map: None, starts_over: false };
+    let empty = |step: &Step| Sent { time: step.time, frames: Vec::new(), maps: Vec::new(), starts_over: false };
     let mut sent: Vec<Sent> = steps.iter().map(empty).collect();
     let mut told = false;
     'start: loop {
@@ -132,7 +132,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
                 let deadline = unit.broadcast().deadline();
                 if deadline != last {
                     last = deadline;
-                    now.map = Map::offered(unit);
+                    now.maps.extend(Map::offered(unit));
                 }
             }
         }

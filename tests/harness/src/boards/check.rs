@@ -58,19 +58,43 @@ pub fn compare(answer: &[u8], here: &[u8], scans: usize) -> Result<Checked> {
     let differs = |(frame, expected): &(&FrameRecord, &u64)| frame.fingerprint != **expected;
     let first_difference = frames.iter().zip(&expected).position(|pair| differs(&pair));
     let equal = frames.iter().zip(&expected).filter(|pair| !differs(pair)).count();
-    let instructions = |f: &FrameRecord| {
-        f.ticks.map(|t| u32::try_from(u64::from(t) * 256 / u64::from(opening.ticks_per_256)).unwrap_or(u32::MAX))
-    };
     Ok(Checked {
         opening,
         closing,
         frames: frames.len(),
         equal,
         first_difference,
-        instructions: if opening.ticks_per_256 > 0 { frames.iter().map(instructions).collect() } else { Vec::new() },
+        instructions: if opening.ticks_per_256 > 0 {
+            frames.iter().map(|f| instructions(f, &opening)).collect()
+        } else {
+            Vec::new()
+        },
         difference: None,
         image: None,
     })
+}
+
+/// Instructions of a frame by stage; the counter counts.
+fn instructions(frame: &FrameRecord, opening: &Opening) -> [u32; Stage::COUNT] {
+    let ticks_per_256 = u64::from(opening.ticks_per_256.max(1));
+    frame.ticks.map(|ticks| u32::try_from(u64::from(ticks) * 256 / ticks_per_256).unwrap_or(u32::MAX))
+}
+
+/// Instructions of the estimator, a frame each, in a stream of traces.
+pub fn traced(traces: &[u8]) -> Vec<u32> {
+    let mut opening = None;
+    let mut frames = Vec::new();
+    for record in records(traces) {
+        match record {
+            Record::Opening(new) => opening = Some(new).filter(|new| new.ticks_per_256 > 0),
+            Record::Frame(frame) => frames.extend(opening.as_ref().map(|opening| {
+                let stages = instructions(&frame, opening);
+                stages[..Stage::ESTIMATOR].iter().sum::<u32>()
+            })),
+            _ => {}
+        }
+    }
+    frames
 }
 
 fn fingerprints(answer: &[u8]) -> Vec<u64> {

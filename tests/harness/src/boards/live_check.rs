@@ -16,9 +16,10 @@ use viewshed::wire::serial::Unstuffer;
 
 use super::can::CanBoard;
 use super::can_twin::{self, SENSOR, Step, flashed};
-use super::check::Difference;
+use super::check::{self, Difference};
 use super::live::{self, Script};
 use super::machine::{Emulator, Folder, Lines};
+use super::report::Cost;
 use super::scans::Scan;
 use super::serial::{Far, LINES, Port, Waiting};
 use super::{Board, Profile, firmware};
@@ -58,6 +59,8 @@ pub struct Live {
     /// Messages of the board, and cells a receiver of it reports visible in the end.
     pub messages: usize,
     pub visible_cells: usize,
+    /// Instructions a frame of the estimator, where the board counts them.
+    pub instructions: Option<Cost>,
     /// What differs first.
     pub first_difference: Option<String>,
     #[serde(skip)]
@@ -82,7 +85,8 @@ pub fn serial(board: Board, profile: Profile, name: &str, settings: &Settings, s
     let _emulator = Emulator::start(board, &image, &folder.0, Lines::Sockets(&LINES))?;
     let mut far = waiting.accept()?;
     let turns = exchange(&mut far, profile, settings, scans)?;
-    Ok(judge(&turns, name, board.name(), profile, Past::None))
+    let instructions = Cost::of(check::traced(&far.trace).into_iter());
+    Ok(Live { instructions, ..judge(&turns, name, board.name(), profile, Past::None) })
 }
 
 /// Runs scans through a board behind a serial port.
@@ -215,6 +219,7 @@ fn judge(turns: &[Turn], name: &str, board: &str, profile: Profile, past: Past) 
         equal: 0,
         messages: 0,
         visible_cells: 0,
+        instructions: None,
         first_difference: None,
         difference: None,
     };

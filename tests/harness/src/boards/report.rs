@@ -21,13 +21,15 @@ pub struct Cost {
 }
 
 impl Cost {
-    fn of(counts: impl Iterator<Item = u32>) -> Option<Self> {
+    /// Of all counts; `None` of none.
+    pub fn of(counts: impl Iterator<Item = u32>) -> Option<Self> {
         let mut counts: Vec<u32> = counts.collect();
         counts.sort_unstable();
         Some(Self { median: *counts.get(counts.len() / 2)?, worst: *counts.last()? })
     }
 
-    fn text(cost: Option<Self>) -> String {
+    /// In thousands.
+    pub fn text(cost: Option<Self>) -> String {
         let thousands = |n: u32| format!("{:.1}", f64::from(n) / 1000.0);
         cost.map_or_else(|| "–".into(), |c| format!("{} / {}", thousands(c.median), thousands(c.worst)))
     }

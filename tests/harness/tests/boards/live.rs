@@ -34,6 +34,8 @@ fn mps2_live_from_the_command_line() {
     let live = &json[0];
     assert!(live["scans"].as_u64().unwrap() >= 30 && live["equal"] == live["scans"], "{live}");
     assert!(live["visible_cells"].as_u64().unwrap() > 5000 && live["messages"].as_u64().unwrap() > 60, "{live}");
+    let worst = live["instructions"]["worst"].as_u64().unwrap();
+    assert!((200_000..3_000_000).contains(&worst), "{worst} instructions");
 }
 
 #[test]

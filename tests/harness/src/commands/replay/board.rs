@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail, ensure};
 use viewshed::settings::Settings as Block;
 
-use crate::boards::report::{Row, table};
+use crate::boards::report::{Cost, Row, table};
 use crate::boards::scans;
 use crate::boards::{Board, Profile, Run, stress};
 #[cfg(unix)]
@@ -121,11 +121,14 @@ fn live(
             (Some(board), _) => live_check::serial(board, profile, name, &block, &scans())?,
             (None, None) => bail!("neither a board nor a port"),
         };
-        let Live { board, scans, equal, messages, visible_cells, .. } = &live;
+        let Live { board, profile, scans, equal, messages, visible_cells, .. } = &live;
         print(&format!(
-            "{name}, live on {board} ({} grid): {equal} of {scans} scans equal, {messages} messages, {visible_cells} cells visible in the end\n",
-            live.profile
+            "{name}, live on {board} ({profile} grid): {equal} of {scans} scans equal, {messages} messages, {visible_cells} \
+             cells visible in the end\n"
         ))?;
+        if live.instructions.is_some() {
+            print(&format!("1000 instructions a frame, median / worst: {}\n", Cost::text(live.instructions)))?;
+        }
         if let Some(what) = &live.first_difference {
             let title = format!("{name}, live on {board}");
             let folder = out.unwrap_or(Path::new("out")).join("live");

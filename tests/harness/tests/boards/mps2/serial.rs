@@ -241,8 +241,8 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
         board.line.deaf = deaf.contains(&k);
         board.line.send(&script.bytes[from..to]).unwrap();
         from = to;
-        // the frame is done when its trace is there, and what follows from it on its way
-        let done = |line: &SerialBoard| line.trace.len() / RECORD_LEN > k + 1;
+        // the frame is done when its trace is there, behind those of two starts
+        let done = |line: &SerialBoard| line.trace.len() / RECORD_LEN > k + 3;
         let started = Instant::now();
         while !done(&board.line) && started.elapsed() < Duration::from_secs(20) {
             board.line.wait_for(usize::MAX, Duration::from_millis(5)).unwrap();
@@ -273,7 +273,7 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
     }
     let dropped = listener.receiver().sensor(SENSOR).and_then(|s| s.status()).map(|s| s.dropped).unwrap();
     println!(
-        "deaf for {} scans: {dropped} messages dropped, told for {told_while_deaf} scans more, equal again after {} ms",
+        "deaf for {} scans: {dropped} messages dropped, told for {told_while_deaf} scans more, the last map that differs {} ms afterwards",
         deaf.len(),
         unequal_us / 1000
     );

@@ -25,7 +25,7 @@ fn image() -> PathBuf {
 fn heard(sent: &[Sent]) -> (Listener, Vec<Telling>) {
     let mut listener = Listener::default();
     let told = sent.iter().map(|step| {
-        step.map.iter().for_each(|map| listener.sent(map));
+        step.maps.iter().for_each(|map| listener.sent(map));
         step.frames.iter().for_each(|frame| listener.frame(step.time, frame));
         listener.tell(step.time).unwrap()
     });
@@ -36,10 +36,10 @@ fn heard(sent: &[Sent]) -> (Listener, Vec<Telling>) {
 /// Every map in every cell, from when the receiver trusts its sender: 0.4 s and 8 frames.
 fn every_cell_is_the_same(sent: &[Sent], told: &[Telling]) {
     let first = told.iter().position(|told| told.azimuths > 0).expect("maps are told");
-    let began = sent.iter().position(|step| step.map.is_some()).expect("maps are sent");
+    let began = sent.iter().position(|step| !step.maps.is_empty()).expect("maps are sent");
     let settling = sent[first].time.since(sent[began].time).unwrap();
     assert!(settling <= 600_000, "{settling} us until maps are told");
-    for (step, told) in sent.iter().zip(told).skip(first).filter(|(step, _)| step.map.is_some()) {
+    for (step, told) in sent.iter().zip(told).skip(first).filter(|(step, _)| !step.maps.is_empty()) {
         assert!(told.equal, "at {:?}: {told:?}", step.time);
     }
 }
@@ -56,7 +56,7 @@ fn every_map_of_two_hundred_scans_arrives_cell_by_cell() {
     let mut board = CanBoard::start(&image(), &flash).unwrap();
     let sent = board.run(&mut flash, &steps).unwrap();
     let [frames_in, frames_out] = [steps.iter().map(|s| s.frames.len()).sum::<usize>(), board.answer.len()];
-    let maps = sent.iter().filter(|step| step.map.is_some()).count();
+    let maps = sent.iter().map(|step| step.maps.len()).sum::<usize>();
     let (listener, told) = heard(&sent);
     println!("{count} scans, {frames_in} frames in, {frames_out} frames out, {maps} maps");
     assert!(maps >= count - 10, "{maps} maps: one a scan but for the quiet time at the start");
@@ -82,7 +82,7 @@ fn a_log_of_a_bus_gives_the_same_maps() {
     let mut board = CanBoard::start(&image(), &flash).unwrap();
     let sent = board.run(&mut flash, &steps).unwrap();
     let (_, told) = heard(&sent);
-    let maps = sent.iter().filter(|step| step.map.is_some()).count();
+    let maps = sent.iter().map(|step| step.maps.len()).sum::<usize>();
     let frames: usize = steps.iter().map(|step| step.frames.len()).sum();
     println!("{}: {frames} frames in, {} out, {maps} maps", path.display(), board.answer.len());
     assert!(maps > 15, "{maps}");
@@ -151,7 +151,7 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
     let mut board = CanBoard::start(&image, &rotten).unwrap();
     let sent = board.run(&mut rotten, &traffic).unwrap();
     assert!(matches!(said(&sent)[..], [Told::Started(None), Told::Refused(r)] if r.reason == 4));
-    assert!(sent.iter().all(|step| step.map.is_none()), "no map in the safe state");
+    assert!(sent.iter().all(|step| step.maps.is_empty()), "no map in the safe state");
 }
 
 /// A bus that loses, damages, repeats, delays and reorders what the board sends.
@@ -280,14 +280,14 @@ fn loss_repetition_garbage_and_restarts_never_make_visible_and_are_over_within_a
             last_bad = us;
         }
         bus.deliver(us, &mut listener);
-        step.map.iter().for_each(|map| listener.sent(map));
+        step.maps.iter().for_each(|map| listener.sent(map));
         bus.send(us, &step.frames, bad);
         // whatever moment one asks at
         for later in [0, 9_000, 30_000, 66_000] {
             bus.deliver(us + later, &mut listener);
             let told = listener.tell(Time::from_micros(us + later)).unwrap_or_else(|why| panic!("step {k}: {why}"));
             moments += 1;
-            if later == 9_000 && bad == 0 && step.map.is_some() {
+            if later == 9_000 && bad == 0 && !step.maps.is_empty() {
                 worst = if told.equal { worst } else { worst.max(us - last_bad) };
                 told_at.push((us - last_bad, told.equal));
             }
@@ -298,11 +298,11 @@ fn loss_repetition_garbage_and_restarts_never_make_visible_and_are_over_within_a
     }
     assert!(told_meanwhile > 2000, "a bad bus does not silence the receiver: {told_meanwhile} azimuths told");
     println!(
-        "{moments} moments, {told_meanwhile} azimuths told in bad ones; equal again after {} ms at most",
+        "{moments} moments, {told_meanwhile} azimuths told in bad ones; maps differ for {} ms at most afterwards",
         worst / 1000
     );
     let late: Vec<_> = told_at.iter().filter(|(since, equal)| *since > 1_000_000 && !equal).collect();
     assert!(late.is_empty(), "{late:?}");
     let after: Vec<bool> = told_at.iter().filter(|(since, _)| *since > 1_000_000).map(|(_, equal)| *equal).collect();
-    assert!(after.len() > 40, "{} maps looked at after a second", after.len());
+    assert!(after.len() >= 30, "{} maps looked at after a second", after.len());
 }
