@@ -15,6 +15,11 @@ pub mod reference {
     /// Detections a scan.
     pub const DETECTIONS: usize = 256;
 
+    /// What a board of this size says of itself.
+    pub const fn opening(ticks_per_256: u32) -> crate::pil::record::Opening {
+        crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
+    }
+
     /// The estimator.
     pub type State = crate::radar_3d::ReferenceProfile;
     /// What it works with.
@@ -25,11 +30,6 @@ pub mod reference {
     pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
     /// All of them together.
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
-
-    /// What a board of this size says of itself.
-    pub const fn opening(ticks_per_256: u32) -> crate::pil::record::Opening {
-        crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
-    }
 }
 
 /// 100 x 64 x 8 cells: parts with 128 kB.
@@ -47,6 +47,11 @@ pub mod small {
     /// Detections a scan.
     pub const DETECTIONS: usize = 176;
 
+    /// What a board of this size says of itself.
+    pub const fn opening(ticks_per_256: u32) -> crate::pil::record::Opening {
+        crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
+    }
+
     /// The estimator.
     pub type State = crate::radar_3d::SmallProfile;
     /// What it works with.
@@ -57,9 +62,4 @@ pub mod small {
     pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
     /// All of them together.
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
-
-    /// What a board of this size says of itself.
-    pub const fn opening(ticks_per_256: u32) -> crate::pil::record::Opening {
-        crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
-    }
 }
