@@ -83,31 +83,6 @@ fn frames(medium: Medium) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
     (frames, maps)
 }
 
-/// Nothing is kept.
-struct Nowhere;
-
-impl Slots for Nowhere {
-    fn slot(&self, _: usize) -> &[u8] {
-        &[]
-    }
-
-    fn write(&mut self, _: usize, _: &[u8; BLOCK_LEN]) {}
-}
-
-/// An integrator's requests and what a unit without a block answers.
-fn configuration(medium: Medium) -> Vec<CanFrame> {
-    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
-    let mut unit = CanService::start(config, Epoch::new(11), Time::from_micros(0), &Nowhere);
-    let mut tool = Tool::new(0, medium);
-    let mut frames: Vec<CanFrame> = tool.write(&[0x56; 12]).collect();
-    frames.extend([tool.read().unwrap(), tool.restart().unwrap()]);
-    for frame in frames.clone() {
-        let _ = unit.take(&frame, &mut Nowhere);
-        frames.extend(std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &Nowhere)));
-    }
-    frames
-}
-
 /// The raw value of a signal; `None` where the data ends before it does.
 fn raw(signal: &Signal, data: &[u8]) -> Option<i64> {
     let bit = |bit: u64| data.get(bit as usize / 8).map(|byte| u64::from(byte >> (bit % 8) & 1));
@@ -220,6 +195,31 @@ fn ranges_words_and_cells_read_as_they_were_sent() {
     for medium in [CLASSIC, FD] {
         ranges_words_and_cells(medium);
     }
+}
+
+/// Nothing is kept.
+struct Nowhere;
+
+impl Slots for Nowhere {
+    fn slot(&self, _: usize) -> &[u8] {
+        &[]
+    }
+
+    fn write(&mut self, _: usize, _: &[u8; BLOCK_LEN]) {}
+}
+
+/// An integrator's requests and what a unit without a block answers.
+fn configuration(medium: Medium) -> Vec<CanFrame> {
+    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
+    let mut unit = CanService::start(config, Epoch::new(11), Time::from_micros(0), &Nowhere);
+    let mut tool = Tool::new(0, medium);
+    let mut frames: Vec<CanFrame> = tool.write(&[0x56; 12]).collect();
+    frames.extend([tool.read().unwrap(), tool.restart().unwrap()]);
+    for frame in frames.clone() {
+        let _ = unit.take(&frame, &mut Nowhere);
+        frames.extend(std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &Nowhere)));
+    }
+    frames
 }
 
 #[test]
