@@ -87,6 +87,14 @@ pub trait CanPort {
     /// Puts the controller on the bus, silent (neither acknowledging nor sending) or not; after a
     /// bus-off this is the way back.
     fn start(&mut self, silent: bool);
+    /// Frames in the mailboxes, where the controller tells.
+    fn waiting(&mut self) -> usize {
+        0
+    }
+    /// Frames lost since the last call because the receive queue was full, where they are counted.
+    fn take_lost(&mut self) -> u32 {
+        0
+    }
 }
 
 /// Frames that prove the bit rate right.

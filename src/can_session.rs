@@ -34,6 +34,16 @@ impl<const D: usize> CanSession<D> {
         self.now
     }
 
+    /// Scans the radar has completed.
+    pub fn scans(&self) -> u32 {
+        self.radar.counters().scans
+    }
+
+    /// Scans that never came, by the radar's counter.
+    pub fn lost(&self) -> u32 {
+        self.radar.counters().lost
+    }
+
     /// Starts a test bench's clock: no unit starts before it is told the time. Whether a frame told it now.
     pub fn bench_clock(&mut self, keeper: &mut BusKeeper, port: &mut impl CanPort) -> bool {
         let told = keeper.receive(port).as_ref().and_then(bench_time);

@@ -70,6 +70,7 @@
 //! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
 //! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`can_service`], [`service`], [`settings`] |
+//! | a unit on hardware of its own: the loop, receive queue, settings in flash, status output | [`roadside`], [`frame_queue`], [`flash_slots`], [`status_output`] |
 //! | a bus looked after: listen first, back off after bus-off; a line that stalls | [`can_bus`], [`transmitter`] |
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
@@ -123,6 +124,8 @@ pub mod config;
 pub mod detection;
 pub mod evidence;
 pub mod field_of_view;
+pub mod flash_slots;
+pub mod frame_queue;
 pub mod gate;
 pub mod health;
 pub mod inputs;
@@ -139,6 +142,7 @@ pub mod radar_3d;
 pub mod raycast;
 pub mod reflection;
 pub mod resample;
+pub mod roadside;
 pub mod scan;
 pub mod sensor;
 pub mod service;
@@ -149,6 +153,7 @@ pub mod solid;
 pub mod spherical;
 mod stack;
 pub mod stage;
+pub mod status_output;
 pub mod time;
 pub mod transmitter;
 pub mod trig;

@@ -128,6 +128,11 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         self.broadcast.next_frame(now)
     }
 
+    /// When the last map that was offered to the sender was measured.
+    pub fn offered(&self) -> Option<Time> {
+        self.offered
+    }
+
     /// The map.
     pub fn map(&self) -> &PolarMap<R, A> {
         self.map

@@ -1,0 +1,185 @@
+//! An ARS408 on FDCAN1, maps out on FDCAN2 and on the serial line of the debug probe. Not run on hardware.
+//!
+//! | what | where | taken from |
+//! |---|---|---|
+//! | HSE | 24 MHz crystal | Zephyr, `boards/st/nucleo_g474re/nucleo_g474re.dts`, `clk_hse` |
+//! | core | PLL: 24 MHz / 6 x 85 / 2 = 170 MHz; AHB, APB / 1 | the same, `pll`, `rcc` |
+//! | FDCAN | HSE, 24 MHz | the same, `fdcan1` |
+//! | random numbers | HSI48 | the same, `clk_hsi48`, `rng` |
+//! | FDCAN1, radar | receive PA11, transmit PA12 | the same, `fdcan1` |
+//! | FDCAN2, broadcast | receive PB12, transmit PB13 | pins of the part: Zephyr's `hal_stm32`, `dts/st/g4/stm32g474r(b-c-e)tx-pinctrl.dtsi`; on the board right morpho connector 16 and 30: `boards/st/nucleo_g474re/st_morpho_connector.dtsi` |
+//! | serial line | LPUART1, transmit PA2, receive PA3, 115 200 baud | `nucleo_g474re.dts`, `lpuart1` |
+//! | status output | LD2, PA5, high is on | the same, `green_led` |
+//! | watchdog | IWDG | the same, `iwdg` |
+//! | settings | last two pages of 2 kB, in Zephyr's `storage_partition` | the same, `flash0`; page and word: `stm32-metapac` |
+//!
+//! ST's manual of the board (UM2505) was not at hand: solder bridges are not verified. Both buses need a
+//! transceiver. PB5 and PB6, the other pins of FDCAN2, are left alone: PB6 is the part's USB-C CC1 as well.
+#![no_std]
+#![no_main]
+
+use defmt_rtt as _;
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2, FDCAN1, FDCAN2, LPUART1, RNG};
+use embassy_stm32::rcc::{Hse, HseMode, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::usart::{self, Uart, UartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
+use embassy_time::{Instant, Timer};
+use static_cell::ConstStaticCell;
+use stm32::can::{Queue, Receiver, open, queue};
+use stm32::dma::SEND;
+use stm32::serial::{Line, Out, send};
+use viewshed::flash_slots::FlashSlots;
+use viewshed::polar::PolarMap;
+use viewshed::radar_3d::{Radar3dParameters, SmallProfile};
+use viewshed::roadside::{Memory, Ports, ResetFlags, Roadside, Start, buses};
+use viewshed::session::Flow;
+use viewshed::status_output::StatusOutput;
+use viewshed::time::Time;
+use viewshed::wire::broadcast::Broadcaster;
+use viewshed::wire::message::Epoch;
+
+/// The radar's number on its bus and in the broadcast.
+const SENSOR: u8 = 0;
+const CAN_CLOCK_HZ: u32 = 24_000_000;
+const BAUD: u32 = 115_200;
+/// Frames of a bus between interrupt and loop: 30 ms of a full bus.
+const FRAMES: usize = 128;
+/// The slots of the settings, from the beginning of the flash.
+const SETTINGS: [u32; 2] = [0x7_F000, 0x7_F800];
+/// Several frames.
+const WATCHDOG_US: u32 = 1_000_000;
+
+static STATE: ConstStaticCell<SmallProfile> = ConstStaticCell::new(SmallProfile::new());
+static MAP: ConstStaticCell<PolarMap<100, 64>> = ConstStaticCell::new(PolarMap::NOWHERE);
+static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<100, 64, 8>>> = ConstStaticCell::new(None);
+static BROADCAST: ConstStaticCell<Option<Broadcaster<64, 4>>> = ConstStaticCell::new(None);
+static SERIAL: ConstStaticCell<Option<Broadcaster<64, 4>>> = ConstStaticCell::new(None);
+static RADAR_QUEUE: Queue<FRAMES> = queue();
+static BROADCAST_QUEUE: Queue<FRAMES> = queue();
+static OUT: Out = Out::new();
+static INTERRUPTS: InterruptExecutor = InterruptExecutor::new();
+
+bind_interrupts!(struct Irqs {
+    FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
+    FDCAN1_IT1 => can::IT1InterruptHandler<FDCAN1>;
+    FDCAN2_IT0 => can::IT0InterruptHandler<FDCAN2>;
+    FDCAN2_IT1 => can::IT1InterruptHandler<FDCAN2>;
+    LPUART1 => usart::InterruptHandler<LPUART1>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
+    RNG => rng::InterruptHandler<RNG>;
+});
+
+/// Of a peripheral that is not used: the tasks below run in it, whatever the loop does.
+#[interrupt]
+unsafe fn UART5() {
+    // SAFETY: called from this interrupt only
+    unsafe { INTERRUPTS.on_interrupt() }
+}
+
+#[embassy_executor::task(pool_size = 2)]
+async fn receive(receiver: Receiver, queue: &'static Queue<FRAMES>) -> ! {
+    receiver.run(queue).await
+}
+
+#[embassy_executor::task]
+async fn transmit(transmitter: UartTx<'static, mode::Async>, buffer: &'static mut [u8; SEND]) -> ! {
+    send(transmitter, &OUT, buffer).await
+}
+
+fn config() -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    let rcc = &mut config.rcc;
+    rcc.hse = Some(Hse { freq: Hertz(24_000_000), mode: HseMode::Oscillator });
+    rcc.pll = Some(Pll {
+        source: PllSource::HSE,
+        prediv: PllPreDiv::DIV6,
+        mul: PllMul::MUL85,
+        divp: None,
+        divq: None,
+        divr: Some(PllRDiv::DIV2),
+    });
+    rcc.sys = Sysclk::PLL1_R;
+    // above 150 MHz
+    rcc.boost = true;
+    rcc.mux.fdcansel = mux::Fdcansel::HSE;
+    config
+}
+
+/// Asked once: the flags are cleared.
+fn reset_flags() -> ResetFlags {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    ResetFlags {
+        // this part has one flag for both
+        power_on: flags.borrstf(),
+        brown_out: false,
+        watchdog: flags.iwdgrstf() || flags.wwdgrstf(),
+        software: flags.sftrstf(),
+        crash: stm32::crash::take(),
+        pin: flags.pinrstf(),
+    }
+}
+
+fn now() -> Time {
+    Time::from_micros(Instant::now().as_micros())
+}
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let p = embassy_stm32::init(config());
+    let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
+    watchdog.unleash();
+    let flags = reset_flags();
+    defmt::info!("reset: {}", flags);
+
+    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS);
+    let [radar_timing, broadcast_timing] = buses(&slots).map(|bus| bus.timing(CAN_CLOCK_HZ));
+    let can = can::CanConfigurator::new(p.FDCAN1, p.PA11, p.PA12, Irqs);
+    let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);
+    let can = can::CanConfigurator::new(p.FDCAN2, p.PB12, p.PB13, Irqs);
+    let (broadcast_receiver, broadcast) = open(can, pac::FDCAN2, broadcast_timing, &BROADCAST_QUEUE);
+
+    let mut line = usart::Config::default();
+    line.baudrate = BAUD;
+    let line = Uart::new(p.LPUART1, p.PA3, p.PA2, p.DMA1_CH1, p.DMA1_CH2, Irqs, line).expect("a baud rate it has");
+    let (transmitter, receiver) = line.split();
+    let buffers = stm32::dma::take().expect("taken once");
+    let serial = Line::new(receiver.into_ring_buffered(&mut buffers.receive), &OUT);
+
+    interrupt::UART5.set_priority(Priority::P6);
+    let interrupts = INTERRUPTS.start(interrupt::UART5);
+    interrupts.spawn(receive(radar_receiver, &RADAR_QUEUE).expect("room for two"));
+    interrupts.spawn(receive(broadcast_receiver, &BROADCAST_QUEUE).expect("room for two"));
+    interrupts.spawn(transmit(transmitter, &mut buffers.send).expect("room for one"));
+
+    let memory = Memory {
+        parameters: PARAMETERS.take(),
+        state: STATE.take(),
+        map: MAP.take(),
+        broadcast: BROADCAST.take(),
+        serial: SERIAL.take(),
+    };
+    let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
+    let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };
+    let mut ports = Ports { radar, broadcast, serial, slots };
+    let mut unit = Roadside::<176, 100, 64, 8, 4, 28, 176>::start(start, memory, now(), &mut ports);
+    let mut light = StatusOutput::new(Output::new(p.PA5, Level::Low, Speed::Low));
+
+    loop {
+        let step = unit.step(now(), &mut ports);
+        let _ = light.show(step.state, now());
+        if step.frame_done {
+            watchdog.pet();
+        }
+        if step.flow == Flow::Restart {
+            cortex_m::peripheral::SCB::sys_reset();
+        }
+        Timer::after_micros(500).await;
+    }
+}

@@ -1,0 +1,199 @@
+//! An ARS408 on FDCAN1, maps out on FDCAN2 and on the serial line of the debug probe. Not run on hardware.
+//!
+//! | what | where | taken from |
+//! |---|---|---|
+//! | HSE | 8 MHz from the debug probe, bypass | Zephyr, `boards/st/nucleo_h743zi/nucleo_h743zi.dts`, `clk_hse` |
+//! | core | PLL1: 8 MHz / 2 x 240 / 2 = 480 MHz; AHB / 2, APB / 2 | the same, `pll`, `rcc` |
+//! | FDCAN | PLL2 Q: 8 MHz / 4 x 120 / 3 = 80 MHz | the same, `pll2`, `fdcan1` |
+//! | random numbers | HSI48 | the same, `clk_hsi48`, `rng` |
+//! | FDCAN1, radar | receive PD0, transmit PD1 | the same, `fdcan1` |
+//! | FDCAN2, broadcast | receive PB5, transmit PB6 | pins of the part: Zephyr's `hal_stm32`, `dts/st/h7/stm32h743zitx-pinctrl.dtsi`; on the board D11 and D1: `boards/st/nucleo_h743zi/arduino_r3_connector.dtsi` |
+//! | serial line | USART3, transmit PD8, receive PD9, 115 200 baud | `nucleo_h743zi.dts`, `usart3` |
+//! | status output | LD1, PB0, high is on | the same, `green_led` |
+//! | watchdog | IWDG1 | the same, `iwdg1` |
+//! | settings | last two sectors, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
+//!
+//! ST's manuals of the board (UM1974 for MB1137, UM2407 for MB1364) were not at hand: solder bridges, and
+//! whether D1 and D11 are free of other uses there, are not verified. Both buses need a transceiver. 480 MHz is
+//! more than the part's first revisions allow.
+#![no_std]
+#![no_main]
+
+mod caches;
+
+use defmt_rtt as _;
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::{DMA1_CH0, DMA1_CH1, FDCAN1, FDCAN2, RNG, USART3};
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
+};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::usart::{self, Uart, UartTx};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
+use embassy_time::{Instant, Timer};
+use static_cell::ConstStaticCell;
+use stm32::can::{Queue, Receiver, open, queue};
+use stm32::dma::SEND;
+use stm32::serial::{Line, Out, send};
+use viewshed::flash_slots::FlashSlots;
+use viewshed::polar::PolarMap;
+use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile};
+use viewshed::roadside::{Memory, Ports, ResetFlags, Roadside, Start, buses};
+use viewshed::session::Flow;
+use viewshed::status_output::StatusOutput;
+use viewshed::time::Time;
+use viewshed::wire::broadcast::Broadcaster;
+use viewshed::wire::message::Epoch;
+
+/// The radar's number on its bus and in the broadcast.
+const SENSOR: u8 = 0;
+const CAN_CLOCK_HZ: u32 = 80_000_000;
+const BAUD: u32 = 115_200;
+/// Frames of a bus between interrupt and loop: 60 ms of a full bus.
+const FRAMES: usize = 256;
+const FLASH_BASE: u32 = 0x0800_0000;
+/// The slots of the settings, from the beginning of the flash.
+const SETTINGS: [u32; 2] = [0x1C_0000, 0x1E_0000];
+const SETTINGS_BYTES: u32 = 0x4_0000;
+/// More than a sector takes to be erased, in which the loop stands still: 4 s at worst, from memory of the data
+/// sheet, which was not at hand.
+const WATCHDOG_US: u32 = 5_000_000;
+
+static STATE: ConstStaticCell<ReferenceProfile> = ConstStaticCell::new(ReferenceProfile::new());
+static MAP: ConstStaticCell<PolarMap<200, 120>> = ConstStaticCell::new(PolarMap::NOWHERE);
+static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<200, 120, 16>>> = ConstStaticCell::new(None);
+static BROADCAST: ConstStaticCell<Option<Broadcaster<120, 7>>> = ConstStaticCell::new(None);
+static SERIAL: ConstStaticCell<Option<Broadcaster<120, 7>>> = ConstStaticCell::new(None);
+static RADAR_QUEUE: Queue<FRAMES> = queue();
+static BROADCAST_QUEUE: Queue<FRAMES> = queue();
+static OUT: Out = Out::new();
+static INTERRUPTS: InterruptExecutor = InterruptExecutor::new();
+
+bind_interrupts!(struct Irqs {
+    FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
+    FDCAN1_IT1 => can::IT1InterruptHandler<FDCAN1>;
+    FDCAN2_IT0 => can::IT0InterruptHandler<FDCAN2>;
+    FDCAN2_IT1 => can::IT1InterruptHandler<FDCAN2>;
+    USART3 => usart::InterruptHandler<USART3>;
+    DMA1_STREAM0 => dma::InterruptHandler<DMA1_CH0>;
+    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
+    RNG => rng::InterruptHandler<RNG>;
+});
+
+/// Of a peripheral that is not used: the tasks below run in it, whatever the loop does.
+#[interrupt]
+unsafe fn UART5() {
+    // SAFETY: called from this interrupt only
+    unsafe { INTERRUPTS.on_interrupt() }
+}
+
+#[embassy_executor::task(pool_size = 2)]
+async fn receive(receiver: Receiver, queue: &'static Queue<FRAMES>) -> ! {
+    receiver.run(queue).await
+}
+
+#[embassy_executor::task]
+async fn transmit(transmitter: UartTx<'static, mode::Async>, buffer: &'static mut [u8; SEND]) -> ! {
+    send(transmitter, &OUT, buffer).await
+}
+
+fn config() -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    let rcc = &mut config.rcc;
+    rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
+    let pll = Pll {
+        source: PllSource::HSE,
+        prediv: PllPreDiv::DIV2,
+        mul: PllMul::MUL240,
+        fracn: None,
+        divp: Some(PllDiv::DIV2),
+        divq: None,
+        divr: None,
+    };
+    rcc.pll1 = Some(pll);
+    rcc.pll2 = Some(Pll { prediv: PllPreDiv::DIV4, mul: PllMul::MUL120, divp: None, divq: Some(PllDiv::DIV3), ..pll });
+    rcc.sys = Sysclk::PLL1_P;
+    rcc.voltage_scale = VoltageScale::Scale0;
+    rcc.ahb_pre = AHBPrescaler::DIV2;
+    (rcc.apb1_pre, rcc.apb2_pre) = (APBPrescaler::DIV2, APBPrescaler::DIV2);
+    (rcc.apb3_pre, rcc.apb4_pre) = (APBPrescaler::DIV2, APBPrescaler::DIV2);
+    rcc.mux.fdcansel = mux::Fdcansel::PLL2_Q;
+    config
+}
+
+/// Asked once: the flags are cleared.
+fn reset_flags() -> ResetFlags {
+    let flags = pac::RCC.rsr().read();
+    pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    ResetFlags {
+        power_on: flags.porrstf(),
+        brown_out: flags.borrstf(),
+        watchdog: flags.iwdg1rstf() || flags.wwdg1rstf(),
+        software: flags.sftrstf(),
+        crash: stm32::crash::take(),
+        pin: flags.pinrstf(),
+    }
+}
+
+fn now() -> Time {
+    Time::from_micros(Instant::now().as_micros())
+}
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let p = embassy_stm32::init(config());
+    let mut core = cortex_m::Peripherals::take().expect("taken once");
+    caches::enable(&mut core.MPU, &mut core.SCB, &mut core.CPUID);
+    let mut watchdog = IndependentWatchdog::new(p.IWDG1, WATCHDOG_US);
+    watchdog.unleash();
+    let flags = reset_flags();
+    defmt::info!("reset: {}", flags);
+
+    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS);
+    let [radar_timing, broadcast_timing] = buses(&slots).map(|bus| bus.timing(CAN_CLOCK_HZ));
+    let can = can::CanConfigurator::new(p.FDCAN1, p.PD0, p.PD1, Irqs);
+    let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);
+    let can = can::CanConfigurator::new(p.FDCAN2, p.PB5, p.PB6, Irqs);
+    let (broadcast_receiver, broadcast) = open(can, pac::FDCAN2, broadcast_timing, &BROADCAST_QUEUE);
+
+    let mut line = usart::Config::default();
+    line.baudrate = BAUD;
+    let line = Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, line).expect("a baud rate it has");
+    let (transmitter, receiver) = line.split();
+    let buffers = stm32::dma::take().expect("taken once");
+    let serial = Line::new(receiver.into_ring_buffered(&mut buffers.receive), &OUT);
+
+    interrupt::UART5.set_priority(Priority::P6);
+    let interrupts = INTERRUPTS.start(interrupt::UART5);
+    interrupts.spawn(receive(radar_receiver, &RADAR_QUEUE).expect("room for two"));
+    interrupts.spawn(receive(broadcast_receiver, &BROADCAST_QUEUE).expect("room for two"));
+    interrupts.spawn(transmit(transmitter, &mut buffers.send).expect("room for one"));
+
+    let memory = Memory {
+        parameters: PARAMETERS.take(),
+        state: STATE.take(),
+        map: MAP.take(),
+        broadcast: BROADCAST.take(),
+        serial: SERIAL.take(),
+    };
+    let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
+    let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };
+    let mut ports = Ports { radar, broadcast, serial, slots };
+    let mut unit = Roadside::<256, 200, 120, 16, 7, 64, 256>::start(start, memory, now(), &mut ports);
+    let mut light = StatusOutput::new(Output::new(p.PB0, Level::Low, Speed::Low));
+
+    loop {
+        let step = unit.step(now(), &mut ports);
+        let _ = light.show(step.state, now());
+        if step.frame_done {
+            watchdog.pet();
+        }
+        if step.flow == Flow::Restart {
+            cortex_m::peripheral::SCB::sys_reset();
+        }
+        Timer::after_micros(500).await;
+    }
+}

@@ -1,0 +1,9 @@
+//! What the STM32 boards share: drivers of embassy behind the library's traits.
+//!
+//! Not a board; has no pins, clocks or regions. Unsafe code is in `crash` and `dma` only.
+#![no_std]
+
+pub mod can;
+pub mod crash;
+pub mod dma;
+pub mod serial;

@@ -1,0 +1,206 @@
+//! The two slots of the configuration block in a flash memory.
+//!
+//! Both are read at the start; what the rest of the library sees is that copy. A write erases the slot
+//! it goes to and no other, so that a loss of power leaves the other one.
+//!
+//! # Limits
+//! A slot begins where a page begins and takes as many pages as a block needs, which is one on every
+//! part so far. Whether a read of half-written memory faults is the part's affair: some raise an
+//! exception where their check bits do not hold.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use crate::session::Slots;
+use crate::settings::BLOCK_LEN;
+
+/// A block up to the next whole word of any flash memory, which has at most 32 bytes.
+const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
+
+/// Slots at two places of a memory.
+#[derive(Debug)]
+pub struct FlashSlots<F> {
+    flash: F,
+    places: [u32; 2],
+    copies: [[u8; BLOCK_LEN]; 2],
+}
+
+impl<F: NorFlash> FlashSlots<F> {
+    /// Reads both slots; one that cannot be read is empty.
+    pub fn new(mut flash: F, places: [u32; 2]) -> Self {
+        let copies = places.map(|place| read(&mut flash, place));
+        Self { flash, places, copies }
+    }
+
+    /// Gives the memory back.
+    pub fn free(self) -> F {
+        self.flash
+    }
+}
+
+fn read<F: NorFlash>(flash: &mut F, place: u32) -> [u8; BLOCK_LEN] {
+    let mut stored = [0xFF; STORED_LEN];
+    let mut copy = [0xFF; BLOCK_LEN];
+    if flash.read(place, &mut stored).is_ok() {
+        copy.iter_mut().zip(stored).for_each(|(to, from)| *to = from);
+    }
+    copy
+}
+
+impl<F: NorFlash> Slots for FlashSlots<F> {
+    fn slot(&self, slot: usize) -> &[u8] {
+        self.copies.get(slot).map_or(&[], |copy| copy)
+    }
+
+    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+        let Some(place) = self.places.get(slot).copied() else { return };
+        let mut stored = [0xFF; STORED_LEN];
+        stored.iter_mut().zip(block).for_each(|(to, from)| *to = *from);
+        let page = u32::try_from(F::ERASE_SIZE).unwrap_or(u32::MAX);
+        let needed = u32::try_from(STORED_LEN).unwrap_or(u32::MAX).next_multiple_of(page.max(1));
+        let words = BLOCK_LEN.next_multiple_of(F::WRITE_SIZE.max(1));
+        // what failed shows when the slot is read back
+        if flash_erase(&mut self.flash, place, needed)
+            && let Some(words) = stored.get(..words)
+        {
+            let _ = self.flash.write(place, words);
+        }
+        let copy = read(&mut self.flash, place);
+        if let Some(old) = self.copies.get_mut(slot) {
+            *old = copy;
+        }
+    }
+}
+
+fn flash_erase<F: NorFlash>(flash: &mut F, place: u32, length: u32) -> bool {
+    flash.erase(place, place.saturating_add(length)).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+    use embedded_storage::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+    use std::vec;
+    use std::vec::Vec;
+
+    /// A memory that refuses what real ones refuse, and may lose power after so many words.
+    struct Memory<const WORD: usize, const PAGE: usize> {
+        bytes: Vec<u8>,
+        words_left: usize,
+    }
+
+    #[derive(Debug)]
+    struct Refused;
+
+    impl NorFlashError for Refused {
+        fn kind(&self) -> NorFlashErrorKind {
+            NorFlashErrorKind::Other
+        }
+    }
+
+    impl<const WORD: usize, const PAGE: usize> ErrorType for Memory<WORD, PAGE> {
+        type Error = Refused;
+    }
+
+    impl<const WORD: usize, const PAGE: usize> ReadNorFlash for Memory<WORD, PAGE> {
+        const READ_SIZE: usize = 1;
+
+        fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Refused> {
+            let from = offset as usize;
+            bytes.copy_from_slice(self.bytes.get(from..from + bytes.len()).ok_or(Refused)?);
+            Ok(())
+        }
+
+        fn capacity(&self) -> usize {
+            self.bytes.len()
+        }
+    }
+
+    impl<const WORD: usize, const PAGE: usize> NorFlash for Memory<WORD, PAGE> {
+        const WRITE_SIZE: usize = WORD;
+        const ERASE_SIZE: usize = PAGE;
+
+        fn erase(&mut self, from: u32, to: u32) -> Result<(), Refused> {
+            let (from, to) = (from as usize, to as usize);
+            assert!(from % PAGE == 0 && to % PAGE == 0, "{from} {to}");
+            self.bytes[from..to].fill(0xFF);
+            Ok(())
+        }
+
+        fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refused> {
+            let offset = offset as usize;
+            assert!(offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD));
+            for (k, word) in bytes.chunks(WORD).enumerate() {
+                self.words_left = self.words_left.checked_sub(1).ok_or(Refused)?;
+                let place = &mut self.bytes[offset + k * WORD..][..WORD];
+                assert!(place.iter().all(|b| *b == 0xFF), "written twice without erasing");
+                place.copy_from_slice(word);
+            }
+            Ok(())
+        }
+    }
+
+    fn settings(max_detections: u16) -> Settings {
+        let sensor = crate::sensor::Sensor {
+            mount: crate::mount::Mount {
+                x_m: 0.0,
+                y_m: 0.0,
+                height_m: 6.0,
+                yaw_deg: 0.0,
+                pitch_deg: 4.0,
+                roll_deg: 0.0,
+            },
+            field_of_view: crate::field_of_view::FieldOfView {
+                azimuth_min_deg: -60.0,
+                azimuth_max_deg: 60.0,
+                elevation_min_deg: -16.0,
+                elevation_max_deg: 16.0,
+                range_min_m: 3.0,
+                range_max_m: 200.0,
+            },
+            noise: crate::reflection::NoiseConfig::default(),
+        };
+        let mut settings = Settings::of(sensor);
+        settings.gate.max_detections = max_detections;
+        settings
+    }
+
+    fn newest(slots: &impl Slots) -> Option<u16> {
+        Settings::newest([slots.slot(0), slots.slot(1)]).ok().map(|n| n.settings.gate.max_detections)
+    }
+
+    fn works_on<const WORD: usize, const PAGE: usize>() {
+        let memory = Memory::<WORD, PAGE> { bytes: vec![0xFF; 4 * PAGE], words_left: usize::MAX };
+        let places = [PAGE as u32, 2 * PAGE as u32];
+        let mut slots = FlashSlots::new(memory, places);
+        assert_eq!(newest(&slots), None, "erased");
+        for (number, detections) in [100, 101, 102, 103].into_iter().enumerate() {
+            slots.write(number % 2, &settings(detections).to_block(number as u32));
+            assert_eq!(newest(&slots), Some(detections));
+            slots = FlashSlots::new(slots.free(), places);
+            assert_eq!(newest(&slots), Some(detections), "after a restart");
+        }
+        // power fails after two words of the next one
+        let mut memory = slots.free();
+        assert!(memory.bytes[..PAGE].iter().chain(&memory.bytes[3 * PAGE..]).all(|b| *b == 0xFF), "its pages only");
+        memory.words_left = 2;
+        let mut slots = FlashSlots::new(memory, places);
+        slots.write(0, &settings(104).to_block(4));
+        assert_eq!(newest(&slots), Some(103));
+        assert_eq!(newest(&FlashSlots::new(slots.free(), places)), Some(103));
+    }
+
+    #[test]
+    fn blocks_last_and_a_loss_of_power_leaves_the_other_slot() {
+        works_on::<8, 2048>();
+        works_on::<32, 131_072>();
+        works_on::<4, 128>();
+    }
+
+    #[test]
+    fn a_slot_outside_the_memory_is_empty() {
+        let memory = Memory::<8, 2048> { bytes: vec![0xFF; 2048], words_left: usize::MAX };
+        let slots = FlashSlots::new(memory, [0, 4096]);
+        assert_eq!((slots.slot(1), slots.slot(2)), (&[0xFF; BLOCK_LEN][..], &[][..]));
+    }
+}

@@ -1,0 +1,345 @@
+//! A roadside unit on hardware of its own: a radar's CAN bus in, another bus and a serial line out.
+//!
+//! This is the loop of such a board without its drivers. A `main` sets up clocks and pins, calls
+//! [`Roadside::step`] a thousand times a second with a hardware timer's time, feeds the watchdog where
+//! [`Step::frame_done`] says so, and resets the controller where the flow says restart.
+//!
+//! # Model
+//! ```text
+//! serial line -> requests -> slots of the configuration block
+//! radar's bus -> scans -> unit -> map -+-> frames -> broadcast bus
+//!                                      +-> messages -> serial line
+//! ```
+//! *Frame.* One is done when a scan, or 50 ms without one, became a map and what was due of it was handed
+//! to the drivers. Only this feeds a watchdog: a loop that turns without a timer, or hangs in any of the
+//! stages, is reset. A radar that stops is no reason for a reset; the map runs out and that is sent.
+//!
+//! *Late frames.* A frame that still lies in a mailbox when its map is too old is taken back.
+//!
+//! *Safe state.* Without a block that holds there is no unit, only a status on both lines that says so. The
+//! buses are then only listened to until their bit rate is proven.
+//!
+//! # Limits
+//! 64 frames of each bus and 64 bytes of the serial line a step. Three mailboxes.
+
+mod outbox;
+mod reset;
+mod safe;
+mod service;
+
+use crate::can_bus::{BusConfig, BusKeeper, BusState, CanPort};
+use crate::can_session::CanSession;
+use crate::inputs::ars408;
+use crate::polar::PolarMap;
+use crate::radar_3d::{Radar3d, Radar3dParameters};
+use crate::session::{Flow, Slots};
+use crate::settings::Settings;
+use crate::time::Time;
+use crate::unit::{Unit, header};
+use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use crate::wire::message::{Addresses, Epoch};
+use crate::wire::serial::MOST_STUFFED;
+use crate::wire::status::{Reason, ResetCause, State, Status};
+
+use outbox::Outbox;
+pub use reset::ResetFlags;
+use safe::SafeState;
+use service::Service;
+
+/// Frames of a bus taken in a step.
+const MOST_FRAMES: usize = 64;
+/// Messages sent on the serial line in a step.
+const MOST_MESSAGES: usize = 64;
+/// Time without a scan after which the map's age is looked at, microseconds.
+const IDLE_US: u64 = 50_000;
+/// Age at which a map is not handed to the drivers any more, milliseconds: 20 less than the delay receivers
+/// allow, for frames that lie in a mailbox while the next map is made.
+const STALE_MS: u16 = 80;
+
+/// The serial line, as a board offers it; neither call waits.
+pub trait SerialPort {
+    /// Takes bytes that came; how many.
+    fn receive(&mut self, buffer: &mut [u8]) -> usize;
+    /// Sends all bytes or none; `false` if there is no room now.
+    fn send(&mut self, bytes: &[u8]) -> bool;
+}
+
+/// The drivers.
+#[derive(Debug)]
+pub struct Ports<R, B, L, S> {
+    /// The radar's bus.
+    pub radar: R,
+    /// The bus maps go out on.
+    pub broadcast: B,
+    /// The integrator's line, on which maps go out as well.
+    pub serial: L,
+    /// Where configuration blocks are kept.
+    pub slots: S,
+}
+
+/// What a start is told.
+#[derive(Debug, Clone, Copy)]
+pub struct Start {
+    /// The sensor's number, on its own bus as on the broadcast's.
+    pub sensor: u8,
+    /// One that was not used lately.
+    pub epoch: Epoch,
+    /// Why the controller started.
+    pub reset_cause: ResetCause,
+}
+
+/// Major, minor and patch number of this version.
+pub const VERSION: [u8; 3] = [
+    number(env!("CARGO_PKG_VERSION_MAJOR")),
+    number(env!("CARGO_PKG_VERSION_MINOR")),
+    number(env!("CARGO_PKG_VERSION_PATCH")),
+];
+
+const fn number(digits: &str) -> u8 {
+    let (mut rest, mut value) = (digits.as_bytes(), 0_u8);
+    while let [digit, tail @ ..] = rest {
+        value = value.saturating_mul(10).saturating_add(*digit - b'0');
+        rest = tail;
+    }
+    value
+}
+
+/// The pieces of memory a unit works in.
+#[derive(Debug)]
+pub struct Memory<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize> {
+    /// The estimator's tables.
+    pub parameters: &'u mut Option<Radar3dParameters<R, A, E>>,
+    /// The estimator's state.
+    pub state: &'u mut Radar3d<R, A, E, W, N, G>,
+    /// Its result.
+    pub map: &'u mut PolarMap<R, A>,
+    /// The sender on the broadcast bus.
+    pub broadcast: &'u mut Option<Broadcaster<A, W>>,
+    /// The sender on the serial line.
+    pub serial: &'u mut Option<Broadcaster<A, W>>,
+}
+
+/// What a step led to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Step {
+    /// Whether a frame was done: the only thing that feeds the watchdog.
+    pub frame_done: bool,
+    /// Whether the controller is to be reset.
+    pub flow: Flow,
+    /// What a status output shows.
+    pub state: State,
+}
+
+/// Both buses as the newest block that holds describes them: the radar's, the broadcast's. By default where
+/// there is none.
+pub fn buses(slots: &impl Slots) -> [BusConfig; 2] {
+    Settings::newest([slots.slot(0), slots.slot(1)])
+        .map_or_else(|_| Default::default(), |n| [n.settings.radar_bus, n.settings.broadcast_bus])
+}
+
+/// A unit and its second sender.
+#[derive(Debug)]
+struct Maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize> {
+    unit: Unit<'u, R, A, E, W, N, G>,
+    serial: &'u mut Broadcaster<A, W>,
+}
+
+/// The loop's state; `T` detections of a radar's scan.
+#[derive(Debug)]
+pub struct Roadside<
+    'u,
+    const T: usize,
+    const R: usize,
+    const A: usize,
+    const E: usize,
+    const W: usize,
+    const N: usize,
+    const G: usize,
+> {
+    start: Start,
+    service: Service,
+    maps: Option<Maps<'u, R, A, E, W, N, G>>,
+    safe: SafeState,
+    radar: CanSession<T>,
+    radar_bus: BusKeeper,
+    broadcast_bus: BusKeeper,
+    outbox: Outbox,
+    /// The last scan or look at the map's age.
+    looked: Time,
+    /// Frames of the radar lost between its bus and the loop.
+    lost: u32,
+}
+
+impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>
+    Roadside<'u, T, R, A, E, W, N, G>
+{
+    /// Starts with the newest block that holds, and puts both controllers on their buses.
+    pub fn start<Rp: CanPort, Bp: CanPort, L: SerialPort, S: Slots>(
+        start: Start,
+        memory: Memory<'u, R, A, E, W, N, G>,
+        now: Time,
+        ports: &mut Ports<Rp, Bp, L, S>,
+    ) -> Self {
+        let service = Service::start(start.sensor, &ports.slots, &mut ports.serial);
+        let [radar, broadcast] = buses(&ports.slots);
+        let maps = service.settings().and_then(|settings| maps(&start, settings, memory, now));
+        Self {
+            start,
+            service,
+            maps,
+            safe: SafeState::new(now),
+            radar: CanSession::new(ars408::Config::sensor(start.sensor)),
+            radar_bus: BusKeeper::start(&radar, &mut ports.radar),
+            broadcast_bus: BusKeeper::start(&broadcast, &mut ports.broadcast),
+            outbox: Outbox::new(),
+            looked: now,
+            lost: 0,
+        }
+    }
+
+    /// Takes what came, and sends what is due.
+    pub fn step<Rp: CanPort, Bp: CanPort, L: SerialPort, S: Slots>(
+        &mut self,
+        now: Time,
+        ports: &mut Ports<Rp, Bp, L, S>,
+    ) -> Step {
+        let flow = self.service.poll(&mut ports.serial, &mut ports.slots);
+        self.radar_bus.poll(now, &mut ports.radar);
+        self.broadcast_bus.poll(now, &mut ports.broadcast);
+        for _ in 0..MOST_FRAMES {
+            // others on this bus prove its bit rate; nothing is asked of the unit here
+            if self.broadcast_bus.receive(&mut ports.broadcast).is_none() {
+                break;
+            }
+        }
+        let frame_done = self.receive(now, &mut ports.radar);
+        let state = if let Some(maps) = &mut self.maps {
+            transmit(now, maps, &mut self.outbox, &mut self.broadcast_bus, &mut ports.broadcast);
+            talk(now, maps, &mut ports.serial);
+            maps.unit.broadcast().status_mut().state
+        } else {
+            let status = Status {
+                bus_off: self.bus_off(),
+                reset_cause: self.start.reset_cause,
+                firmware: VERSION,
+                ..Status::starting(0)
+            };
+            let (bus, port) = (&mut self.broadcast_bus, &mut ports.broadcast);
+            self.safe.poll(self.start.sensor, status, now, &mut ports.serial, |frame| bus.send(frame, port))
+        };
+        Step { frame_done, flow, state }
+    }
+
+    /// Takes the radar's frames; whether a scan, or a time without one, was worked up.
+    fn receive(&mut self, now: Time, port: &mut impl CanPort) -> bool {
+        let before = self.radar.scans();
+        self.lost = self.lost.saturating_add(port.take_lost());
+        for _ in 0..MOST_FRAMES {
+            let Some(frame) = self.radar_bus.receive(port) else { break };
+            let Some(maps) = &mut self.maps else { continue };
+            let scans = self.radar.scans();
+            self.radar.frame(&frame, now, &mut maps.unit);
+            if self.radar.scans() != scans {
+                // what was sent of the map before has to leave first
+                break;
+            }
+        }
+        let scanned = self.radar.scans() != before;
+        // a clock that stepped back is looked at, too
+        let due = now.since(self.looked).is_none_or(|us| us >= IDLE_US);
+        if !scanned && !due {
+            return false;
+        }
+        self.looked = now;
+        if let Some(maps) = &mut self.maps {
+            if !scanned {
+                self.radar.idle(now, &mut maps.unit);
+            }
+            self.tell();
+        }
+        true
+    }
+
+    /// Offers the map to the second sender and completes the status of both.
+    fn tell(&mut self) {
+        let bus_off = self.bus_off();
+        let off = [&self.radar_bus, &self.broadcast_bus].iter().any(|k| matches!(k.state(), BusState::Off(_)));
+        let radar_lost = self.radar.lost().saturating_add(self.lost);
+        let start = self.start;
+        let Some(maps) = &mut self.maps else { return };
+        let status = maps.unit.broadcast().status_mut();
+        status.reset_cause = start.reset_cause;
+        status.firmware = VERSION;
+        status.bus_off = bus_off;
+        status.radar_lost = u16::try_from(radar_lost).unwrap_or(u16::MAX);
+        if off && status.state == State::Ok {
+            (status.state, status.reason) = (State::Degraded, Reason::BusOff);
+        }
+        let told = *status;
+        let second = maps.serial.status_mut();
+        *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..told };
+        if let Some(measured) = maps.unit.offered() {
+            // the same one again is refused
+            let _ = maps.serial.scan(measured, maps.unit.map());
+        }
+    }
+
+    fn bus_off(&self) -> u16 {
+        self.radar_bus.bus_off().saturating_add(self.broadcast_bus.bus_off())
+    }
+}
+
+/// Makes the unit and its senders in the memory there is; none where a setting cannot be worked with.
+fn maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+    start: &Start,
+    settings: &Settings,
+    memory: Memory<'u, R, A, E, W, N, G>,
+    now: Time,
+) -> Option<Maps<'u, R, A, E, W, N, G>> {
+    *memory.parameters = Radar3dParameters::new(&settings.sensor, &settings.radar_3d()).ok();
+    let parameters = memory.parameters.as_ref()?;
+    let header = header(settings, parameters).ok()?;
+    let sender = |medium| {
+        let config = BroadcastConfig { stale_ms: STALE_MS, ..BroadcastConfig::new(start.sensor, medium) };
+        Broadcaster::new(config, header, start.epoch, now).ok()
+    };
+    *memory.broadcast = sender(Medium::Can(Addresses::STANDARD));
+    *memory.serial = sender(Medium::Serial);
+    let unit = Unit::new(parameters, memory.state, memory.map, memory.broadcast.as_mut()?);
+    Some(Maps { unit, serial: memory.serial.as_mut()? })
+}
+
+/// Hands the drivers what is due on the broadcast bus.
+fn transmit<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+    now: Time,
+    maps: &mut Maps<'_, R, A, E, W, N, G>,
+    outbox: &mut Outbox,
+    bus: &mut BusKeeper,
+    port: &mut impl CanPort,
+) {
+    let late = outbox.take_back(now, port);
+    let sender = maps.unit.broadcast();
+    let status = sender.status_mut();
+    status.dropped = status.dropped.saturating_add(late);
+    if outbox.flush(now, bus, port)
+        && let Some(frame) = sender.next_frame(now)
+    {
+        outbox.send(frame, sender.deadline(), now, bus, port);
+    }
+}
+
+/// Hands the driver what is due on the serial line.
+fn talk<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+    now: Time,
+    maps: &mut Maps<'_, R, A, E, W, N, G>,
+    port: &mut impl SerialPort,
+) {
+    let mut stuffed = [0; MOST_STUFFED];
+    for _ in 0..MOST_MESSAGES {
+        let Some(message) = maps.serial.next_line(now, &mut stuffed).and_then(|n| stuffed.get(..n)) else { return };
+        if !port.send(message) {
+            let status = maps.serial.status_mut();
+            status.dropped = status.dropped.saturating_add(1);
+        }
+    }
+}
