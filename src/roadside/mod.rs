@@ -6,7 +6,7 @@
 //!
 //! # Model
 //! ```text
-//! serial line -> requests -> slots of the configuration block
+//! serial line, broadcast bus -> requests -> slots of the configuration block
 //! radar's bus -> scans -> unit -> map -+-> frames -> broadcast bus
 //!                                      +-> messages -> serial line
 //! ```
@@ -28,6 +28,7 @@ mod safe;
 mod service;
 
 use crate::can_bus::{BusConfig, BusKeeper, BusState, CanPort};
+use crate::can_service::{CanService, CanServiceConfig};
 use crate::can_session::CanSession;
 use crate::inputs::ars408;
 use crate::polar::PolarMap;
@@ -158,6 +159,7 @@ pub struct Roadside<
 > {
     start: Start,
     service: Service,
+    can_service: CanService,
     maps: Option<Maps<'u, R, A, E, W, N, G>>,
     safe: SafeState,
     radar: CanSession<T>,
@@ -181,11 +183,14 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         ports: &mut Ports<Rp, Bp, L, S>,
     ) -> Self {
         let service = Service::start(start.sensor, &ports.slots, &mut ports.serial);
+        let asked = CanServiceConfig::new(start.sensor, Medium::Can(Addresses::STANDARD));
+        let can_service = CanService::start(asked, start.epoch, now, &ports.slots);
         let [radar, broadcast] = buses(&ports.slots);
         let maps = service.settings().and_then(|settings| maps(&start, settings, memory, now));
         Self {
             start,
             service,
+            can_service,
             maps,
             safe: SafeState::new(now),
             radar: CanSession::new(ars408::Config::sensor(start.sensor)),
@@ -203,29 +208,23 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         now: Time,
         ports: &mut Ports<Rp, Bp, L, S>,
     ) -> Step {
-        let flow = self.service.poll(&mut ports.serial, &mut ports.slots);
+        let mut flow = self.service.poll(&mut ports.serial, &mut ports.slots);
         self.radar_bus.poll(now, &mut ports.radar);
         self.broadcast_bus.poll(now, &mut ports.broadcast);
         for _ in 0..MOST_FRAMES {
-            // others on this bus prove its bit rate; nothing is asked of the unit here
-            if self.broadcast_bus.receive(&mut ports.broadcast).is_none() {
-                break;
+            let Some(frame) = self.broadcast_bus.receive(&mut ports.broadcast) else { break };
+            if self.can_service.take(&frame, &mut ports.slots) == Some(Flow::Restart) {
+                flow = Flow::Restart;
             }
         }
         let frame_done = self.receive(now, &mut ports.radar);
-        let state = if let Some(maps) = &mut self.maps {
-            transmit(now, maps, &mut self.outbox, &mut self.broadcast_bus, &mut ports.broadcast);
-            talk(now, maps, &mut ports.serial);
-            maps.unit.broadcast().status_mut().state
-        } else {
-            let status = Status {
-                bus_off: self.bus_off(),
-                reset_cause: self.start.reset_cause,
-                firmware: VERSION,
-                ..Status::starting(0)
-            };
-            let (bus, port) = (&mut self.broadcast_bus, &mut ports.broadcast);
-            self.safe.poll(self.start.sensor, status, now, &mut ports.serial, |frame| bus.send(frame, port))
+        self.transmit(now, ports);
+        let state = match &mut self.maps {
+            Some(maps) => {
+                talk(now, maps, &mut ports.serial);
+                maps.unit.broadcast().status_mut().state
+            }
+            None => self.say_safe(now, &mut ports.serial),
         };
         Step { frame_done, flow, state }
     }
@@ -284,6 +283,42 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         }
     }
 
+    /// Hands the driver what is due on the broadcast bus.
+    fn transmit<Rp, Bp: CanPort, L, S: Slots>(&mut self, now: Time, ports: &mut Ports<Rp, Bp, L, S>) {
+        let port = &mut ports.broadcast;
+        let late = self.outbox.take_back(now, port);
+        if !self.outbox.flush(now, &mut self.broadcast_bus, port) {
+            return;
+        }
+        let answer = self.can_service.next_frame(now, &ports.slots);
+        let (frame, deadline) = match &mut self.maps {
+            Some(maps) => {
+                let sender = maps.unit.broadcast();
+                let status = sender.status_mut();
+                status.dropped = status.dropped.saturating_add(late);
+                (answer.or_else(|| sender.next_frame(now)), sender.deadline())
+            }
+            None => (answer.or_else(|| self.can_service.next_status(now)), None),
+        };
+        if let Some(frame) = frame {
+            self.outbox.send(frame, deadline, now, &mut self.broadcast_bus, port);
+        }
+    }
+
+    /// Tells the serial line that there are no settings.
+    fn say_safe(&mut self, now: Time, line: &mut impl SerialPort) -> State {
+        let status = Status {
+            state: State::Fault,
+            reason: Reason::Configuration,
+            reset_cause: self.start.reset_cause,
+            firmware: VERSION,
+            bus_off: self.bus_off(),
+            ..Status::starting(0)
+        };
+        self.safe.poll(self.start.sensor, self.start.epoch, status, now, line);
+        status.state
+    }
+
     fn bus_off(&self) -> u16 {
         self.radar_bus.bus_off().saturating_add(self.broadcast_bus.bus_off())
     }
@@ -307,25 +342,6 @@ fn maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, cons
     *memory.serial = sender(Medium::Serial);
     let unit = Unit::new(parameters, memory.state, memory.map, memory.broadcast.as_mut()?);
     Some(Maps { unit, serial: memory.serial.as_mut()? })
-}
-
-/// Hands the drivers what is due on the broadcast bus.
-fn transmit<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
-    now: Time,
-    maps: &mut Maps<'_, R, A, E, W, N, G>,
-    outbox: &mut Outbox,
-    bus: &mut BusKeeper,
-    port: &mut impl CanPort,
-) {
-    let late = outbox.take_back(now, port);
-    let sender = maps.unit.broadcast();
-    let status = sender.status_mut();
-    status.dropped = status.dropped.saturating_add(late);
-    if outbox.flush(now, bus, port)
-        && let Some(frame) = sender.next_frame(now)
-    {
-        outbox.send(frame, sender.deadline(), now, bus, port);
-    }
 }
 
 /// Hands the driver what is due on the serial line.

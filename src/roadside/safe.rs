@@ -1,66 +1,42 @@
-//! What is sent without settings: a status that says why.
+//! What the serial line is told without settings: a status that says why. On the bus this is
+//! [`CanService`](crate::can_service::CanService)'s.
 
 use super::SerialPort;
 use crate::time::Time;
-use crate::wire::frame::CanFrame;
-use crate::wire::message::{Addresses, Epoch, Message, Packet, Packing};
+use crate::wire::message::{Epoch, Message, Packet, Packing};
 use crate::wire::serial::{MOST_STUFFED, stuff};
-use crate::wire::status::{PAGES, Reason, State, Status};
+use crate::wire::status::Status;
 
 /// Time between two status messages, microseconds: at least two a second.
 const PERIOD_US: u64 = 250_000;
 
-/// When, and what was last.
+/// When, and with which counter.
 #[derive(Debug)]
 pub struct SafeState {
     started: Time,
     sent: Option<Time>,
-    page: u8,
-    counters: [u8; 2],
+    counter: u8,
 }
 
 impl SafeState {
     pub const fn new(now: Time) -> Self {
-        Self { started: now, sent: None, page: 0, counters: [0; 2] }
+        Self { started: now, sent: None, counter: 0 }
     }
 
-    /// Sends the status on both lines where it is due; what it says.
-    pub fn poll(
-        &mut self,
-        sensor: u8,
-        status: Status,
-        now: Time,
-        line: &mut impl SerialPort,
-        send: impl FnOnce(&CanFrame) -> bool,
-    ) -> State {
-        let status = Status {
-            state: State::Fault,
-            reason: Reason::Configuration,
-            uptime_s: u32::try_from(now.since(self.started).unwrap_or(0) / 1_000_000).unwrap_or(u32::MAX),
-            ..status
-        };
+    /// Sends the status where it is due.
+    pub fn poll(&mut self, sensor: u8, epoch: Epoch, status: Status, now: Time, line: &mut impl SerialPort) {
         if self.sent.is_some_and(|sent| now.since(sent).is_some_and(|us| us < PERIOD_US)) {
-            return status.state;
+            return;
         }
         self.sent = Some(now);
-        let [long, classic] = &mut self.counters;
-        let packet = protected(Packing::Long, sensor, &status.emit(), long);
+        let uptime_s = now.since(self.started).unwrap_or(0) / 1_000_000;
+        let status = Status { uptime_s: u32::try_from(uptime_s).unwrap_or(u32::MAX), ..status };
+        let packet = Packet::new(Packing::Long, sensor, Message::Status, epoch, &status.emit());
+        let packet = packet.protect(self.counter, None);
+        self.counter = Packing::Long.profile().next(self.counter);
         let mut stuffed = [0; MOST_STUFFED];
         if let Some(bytes) = stuff(packet.bytes(), &mut stuffed).and_then(|n| stuffed.get(..n)) {
             let _ = line.send(bytes);
         }
-        let packet = protected(Packing::Classic, sensor, &status.emit_page(self.page), classic);
-        self.page = (self.page + 1) % PAGES;
-        if let Some(frame) = packet.frame(&Addresses::STANDARD) {
-            // the next one says the same
-            let _ = send(&frame);
-        }
-        status.state
     }
-}
-
-fn protected(packing: Packing, sensor: u8, own: &[u8], counter: &mut u8) -> Packet {
-    let packet = Packet::new(packing, sensor, Message::Status, Epoch::new(0), own).protect(*counter, None);
-    *counter = packing.profile().next(*counter);
-    packet
 }

@@ -29,7 +29,7 @@ use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
 use embassy_time::{Instant, Timer};
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 use stm32::can::{Queue, Receiver, open, queue};
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
@@ -57,8 +57,8 @@ const WATCHDOG_US: u32 = 1_000_000;
 static STATE: ConstStaticCell<SmallProfile> = ConstStaticCell::new(SmallProfile::new());
 static MAP: ConstStaticCell<PolarMap<100, 64>> = ConstStaticCell::new(PolarMap::NOWHERE);
 static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<100, 64, 8>>> = ConstStaticCell::new(None);
-static BROADCAST: ConstStaticCell<Option<Broadcaster<64, 4>>> = ConstStaticCell::new(None);
-static SERIAL: ConstStaticCell<Option<Broadcaster<64, 4>>> = ConstStaticCell::new(None);
+static BROADCAST: StaticCell<Option<Broadcaster<64, 4>>> = StaticCell::new();
+static SERIAL: StaticCell<Option<Broadcaster<64, 4>>> = StaticCell::new();
 static RADAR_QUEUE: Queue<FRAMES> = queue();
 static BROADCAST_QUEUE: Queue<FRAMES> = queue();
 static OUT: Out = Out::new();
@@ -162,8 +162,8 @@ async fn main(_spawner: Spawner) {
         parameters: PARAMETERS.take(),
         state: STATE.take(),
         map: MAP.take(),
-        broadcast: BROADCAST.take(),
-        serial: SERIAL.take(),
+        broadcast: BROADCAST.init(None),
+        serial: SERIAL.init(None),
     };
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };

@@ -34,7 +34,7 @@ use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
 use embassy_time::{Instant, Timer};
-use static_cell::ConstStaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 use stm32::can::{Queue, Receiver, open, queue};
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
@@ -65,8 +65,8 @@ const WATCHDOG_US: u32 = 5_000_000;
 static STATE: ConstStaticCell<ReferenceProfile> = ConstStaticCell::new(ReferenceProfile::new());
 static MAP: ConstStaticCell<PolarMap<200, 120>> = ConstStaticCell::new(PolarMap::NOWHERE);
 static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<200, 120, 16>>> = ConstStaticCell::new(None);
-static BROADCAST: ConstStaticCell<Option<Broadcaster<120, 7>>> = ConstStaticCell::new(None);
-static SERIAL: ConstStaticCell<Option<Broadcaster<120, 7>>> = ConstStaticCell::new(None);
+static BROADCAST: StaticCell<Option<Broadcaster<120, 7>>> = StaticCell::new();
+static SERIAL: StaticCell<Option<Broadcaster<120, 7>>> = StaticCell::new();
 static RADAR_QUEUE: Queue<FRAMES> = queue();
 static BROADCAST_QUEUE: Queue<FRAMES> = queue();
 static OUT: Out = Out::new();
@@ -176,8 +176,8 @@ async fn main(_spawner: Spawner) {
         parameters: PARAMETERS.take(),
         state: STATE.take(),
         map: MAP.take(),
-        broadcast: BROADCAST.take(),
-        serial: SERIAL.take(),
+        broadcast: BROADCAST.init(None),
+        serial: SERIAL.init(None),
     };
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };
