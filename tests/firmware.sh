@@ -57,5 +57,11 @@ else
     cargo_tests zcu102 "zcu102-r5: every map the same, contents of the image"
 fi
 
+if ! compiler thumbv7em-none-eabihf; then
+    skip "nucleo-h743zi, nucleo-g474re" "no compiler for thumbv7em-none-eabihf (rustup target add thumbv7em-none-eabihf)"
+else
+    cargo_tests nucleo "nucleo-h743zi, nucleo-g474re: built and looked at, not run"
+fi
+
 echo "firmware: $passed passed, $skipped skipped"
 [ "$failed" = 0 ]

@@ -322,6 +322,14 @@ fn a_bus_off_is_told_on_the_other_line_and_ends() {
     world.run(2000);
     assert_eq!(world.status().map(|s| (s.state, s.bus_off)), [(State::Ok, 1); 2]);
     assert!(world.visible()[0] > 1000);
+    // twice more: now it stays away for 400 ms
+    for _ in 0..2 {
+        world.ports.broadcast.off = true;
+        world.run(210);
+    }
+    world.run(150);
+    let status = world.status()[1];
+    assert_eq!((status.state, status.reason, status.bus_off), (State::Degraded, Reason::BusOff, 3));
 }
 
 #[test]

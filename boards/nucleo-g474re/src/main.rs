@@ -47,8 +47,10 @@ use viewshed::wire::message::Epoch;
 const SENSOR: u8 = 0;
 const CAN_CLOCK_HZ: u32 = 24_000_000;
 const BAUD: u32 = 115_200;
-/// Frames of a bus between interrupt and loop: 30 ms of a full bus.
+/// Frames of the radar between interrupt and loop: 30 ms of a full bus.
 const FRAMES: usize = 128;
+/// Frames of the broadcast bus there, where an integrator asks one thing a millisecond.
+const REQUESTS: usize = 32;
 /// The slots of the settings, from the beginning of the flash.
 const SETTINGS: [u32; 2] = [0x7_F000, 0x7_F800];
 /// Several frames.
@@ -60,7 +62,7 @@ static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<100, 64, 8>>> = Cons
 static BROADCAST: StaticCell<Option<Broadcaster<64, 4>>> = StaticCell::new();
 static SERIAL: StaticCell<Option<Broadcaster<64, 4>>> = StaticCell::new();
 static RADAR_QUEUE: Queue<FRAMES> = queue();
-static BROADCAST_QUEUE: Queue<FRAMES> = queue();
+static BROADCAST_QUEUE: Queue<REQUESTS> = queue();
 static OUT: Out = Out::new();
 static INTERRUPTS: InterruptExecutor = InterruptExecutor::new();
 
@@ -82,9 +84,14 @@ unsafe fn UART5() {
     unsafe { INTERRUPTS.on_interrupt() }
 }
 
-#[embassy_executor::task(pool_size = 2)]
-async fn receive(receiver: Receiver, queue: &'static Queue<FRAMES>) -> ! {
-    receiver.run(queue).await
+#[embassy_executor::task]
+async fn scans(receiver: Receiver) -> ! {
+    receiver.run(&RADAR_QUEUE).await
+}
+
+#[embassy_executor::task]
+async fn requests(receiver: Receiver) -> ! {
+    receiver.run(&BROADCAST_QUEUE).await
 }
 
 #[embassy_executor::task]
@@ -154,8 +161,8 @@ async fn main(_spawner: Spawner) {
 
     interrupt::UART5.set_priority(Priority::P6);
     let interrupts = INTERRUPTS.start(interrupt::UART5);
-    interrupts.spawn(receive(radar_receiver, &RADAR_QUEUE).expect("room for two"));
-    interrupts.spawn(receive(broadcast_receiver, &BROADCAST_QUEUE).expect("room for two"));
+    interrupts.spawn(scans(radar_receiver).expect("room for one"));
+    interrupts.spawn(requests(broadcast_receiver).expect("room for one"));
     interrupts.spawn(transmit(transmitter, &mut buffers.send).expect("room for one"));
 
     let memory = Memory {

@@ -12,19 +12,25 @@ use super::{Board, Profile};
 /// # Errors
 /// What the compiler says, or that there is none for the board.
 pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
+    // for speed and little stack, where the reference grid is built for size
+    let small = ["--features", "small", "--config", "profile.release.opt-level=2"];
+    build_in(board.folder(), program, if profile == Profile::Small { &small } else { &[] })
+}
+
+/// Builds a program of a folder of `boards/` with options for cargo and gives its path.
+///
+/// # Errors
+/// What the compiler says, or that there is none for the board.
+pub fn build_in(folder: &str, program: &str, options: &[&str]) -> Result<PathBuf> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../boards/build.sh");
     if !script.exists() {
         bail!("{} is not there: --board builds the firmware from the project's sources", script.display());
     }
     let mut command = Command::new("sh");
-    command.arg(&script).args([board.folder(), program]).stderr(Stdio::piped());
-    if profile == Profile::Small {
-        // for speed and little stack, where the reference grid is built for size
-        command.args(["--features", "small", "--config", "profile.release.opt-level=2"]);
-    }
+    command.arg(&script).args([folder, program]).args(options).stderr(Stdio::piped());
     let output = command.output().context("cannot run sh")?;
     if !output.status.success() {
-        bail!("cannot build the firmware of {}: {}", board.name(), String::from_utf8_lossy(&output.stderr).trim());
+        bail!("cannot build the firmware of {folder}: {}", String::from_utf8_lossy(&output.stderr).trim());
     }
     Ok(PathBuf::from(String::from_utf8_lossy(&output.stdout).trim()))
 }

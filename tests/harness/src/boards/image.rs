@@ -10,6 +10,8 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf
 pub struct Image {
     pub sections: Vec<Section>,
     pub symbols: Vec<Symbol>,
+    /// Source files named in what is stored: those with code that can panic.
+    pub sources: Vec<String>,
 }
 
 /// A section that takes memory on the controller.
@@ -58,7 +60,16 @@ impl Image {
             address: s.address(),
             bytes: s.size(),
         });
-        Ok(Self { sections: sections.collect(), symbols: symbols.collect() })
+        let sections: Vec<Section> = sections.collect();
+        let stored = |name: &str| sections.iter().any(|s| s.stored && s.name == name);
+        let mut sources: Vec<String> = file
+            .sections()
+            .filter(|s| s.name().is_ok_and(stored))
+            .flat_map(|s| source_names(s.data().unwrap_or_default()))
+            .collect();
+        sources.sort();
+        sources.dedup();
+        Ok(Self { sections, symbols: symbols.collect(), sources })
     }
 
     /// Bytes of the image.
@@ -79,5 +90,30 @@ impl Image {
     /// The symbol whose name contains all parts.
     pub fn symbol(&self, parts: &[&str]) -> Option<&Symbol> {
         self.symbols.iter().find(|s| parts.iter().all(|part| s.name.contains(part)))
+    }
+}
+
+/// Paths that end in `.rs`, whether or not something else stands between two of them.
+fn source_names(bytes: &[u8]) -> Vec<String> {
+    let mut names = Vec::new();
+    let mut from = 0;
+    while let Some(end) = bytes[from..].windows(3).position(|w| w == b".rs").map(|at| from + at + 3) {
+        let of_a_path = |b: &u8| b.is_ascii_alphanumeric() || b"/\\._-+:".contains(b);
+        let start = bytes[from..end].iter().rposition(|b| !of_a_path(b)).map_or(from, |at| from + at + 1);
+        names.push(String::from_utf8_lossy(&bytes[start..end]).into_owned());
+        from = end;
+    }
+    names.retain(|name| name.len() > 4);
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::source_names;
+
+    #[test]
+    fn names_of_sources_are_found_with_and_without_anything_between_them() {
+        let bytes = b"\x03\x04src/main.rs\0/a/b-1.0/src/x.rs/c/y.rs\xff.rs";
+        assert_eq!(source_names(bytes), ["src/main.rs", "/a/b-1.0/src/x.rs", "/c/y.rs"]);
     }
 }

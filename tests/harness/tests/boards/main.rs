@@ -4,6 +4,7 @@
 #[cfg(unix)]
 mod live;
 mod mps2;
+mod nucleo;
 mod zcu102;
 
 use std::path::Path;

@@ -1,0 +1,112 @@
+//! The STM32 boards: built and looked at, never run.
+
+use std::ops::Range;
+use std::path::Path;
+
+use viewshed_harness::boards::firmware::build_in;
+use viewshed_harness::boards::image::{Image, Section};
+
+/// A board's memories and what may be taken of them.
+struct Board {
+    folder: &'static str,
+    flash: Range<u64>,
+    ram: Range<u64>,
+    /// Where DMA controllers read and write.
+    dma: Range<u64>,
+    /// Where the stack is, when it is not what variables leave of the RAM.
+    stack: Option<Range<u64>>,
+    /// Bytes the image takes at most.
+    most_flash: u64,
+    /// Bytes of variables at most.
+    most_ram: u64,
+    /// Bytes of stack at least: what the emulated Cortex-M4F used of this grid's, and half as much again.
+    least_stack: u64,
+}
+
+const H743: Board = Board {
+    folder: "nucleo-h743zi",
+    flash: 0x0800_0000..0x0810_0000,
+    ram: 0x2400_0000..0x2407_F000,
+    dma: 0x2407_F000..0x2408_0000,
+    stack: Some(0x2000_0000..0x2002_0000),
+    most_flash: 131_072,
+    most_ram: 512_000,
+    least_stack: 41_000,
+};
+
+const G474: Board = Board {
+    folder: "nucleo-g474re",
+    flash: 0x0800_0000..0x0804_0000,
+    ram: 0x2000_0800..0x2002_0000,
+    dma: 0x2000_0000..0x2000_0800,
+    stack: None,
+    most_flash: 147_456,
+    most_ram: 100_000,
+    least_stack: 12_000,
+};
+
+/// Whose panics an image may hold: embassy's and the drivers', not the library's nor what it is made of.
+const MAY_PANIC: [&str; 8] = [
+    "/embassy-",
+    "/stm32-metapac-",
+    "/static_cell-",
+    "/futures-util-",
+    "/defmt-rtt-",
+    "/out/_generated.rs",
+    "/boards/stm32/src/",
+    "src/main.rs",
+];
+
+fn within(section: &Section, region: &Range<u64>) -> bool {
+    region.contains(&section.address) && section.address + section.bytes <= region.end
+}
+
+fn check(board: &Board) {
+    let image = Image::read(&build_in(board.folder, "live", &[]).unwrap()).unwrap();
+    for section in &image.sections {
+        let regions = [&board.flash, &board.ram, &board.dma].into_iter().chain(&board.stack);
+        let place = regions.clone().position(|region| within(section, region));
+        assert!(place.is_some(), "{}: {section:?}", board.folder);
+        let mark = section.name == ".crash";
+        assert!(board.stack.as_ref().is_none_or(|stack| !within(section, stack) || mark), "{section:?}");
+    }
+    let address = |parts: &[&str]| image.symbol(parts).unwrap_or_else(|| panic!("no {parts:?}")).address;
+    for name in ["STATE", "MAP", "RADAR_QUEUE", "BROADCAST_QUEUE"] {
+        assert!(board.ram.contains(&address(&["live", name])), "{name}");
+    }
+    assert!(board.dma.contains(&address(&["stm32", "dma", "SERIAL"])));
+
+    let variables = image.ram_bytes();
+    let highest = image.sections.iter().filter(|s| within(s, &board.ram)).map(|s| s.address + s.bytes).max().unwrap();
+    let stack = board.stack.as_ref().map_or(board.ram.end - highest, |stack| stack.end - stack.start - 32);
+    println!("{}: flash {} B, variables {variables} B, room for {stack} B of stack", board.folder, image.flash_bytes());
+    assert!(image.flash_bytes() <= board.most_flash);
+    assert!(variables <= board.most_ram && stack >= board.least_stack);
+
+    for symbol in &image.symbols {
+        let name = symbol.name.as_str();
+        let double = name.starts_with("__aeabi_d") || name.contains("__adddf3") || name.contains("__muldf3");
+        let heap = ["alloc::", "5alloc", "__rust_alloc", "malloc"].iter().any(|part| name.contains(part));
+        // a division of integers is no double
+        assert!(!heap && (!double || name.contains("div0")), "{name}");
+    }
+    // a panic names its source file; that of the library is nowhere
+    assert!(image.sources.iter().any(|name| name.contains("/embassy-")), "{:?}", image.sources);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap();
+    for name in &image.sources {
+        assert!(MAY_PANIC.iter().any(|part| name.contains(part)), "{name}");
+        assert!(!Path::new(name).starts_with(root.join("src")), "{name}");
+    }
+}
+
+#[test]
+#[ignore = "needs a compiler for the target"]
+fn nucleo_h743zi_fits_and_each_region_holds_what_belongs_there() {
+    check(&H743);
+}
+
+#[test]
+#[ignore = "needs a compiler for the target"]
+fn nucleo_g474re_fits_and_each_region_holds_what_belongs_there() {
+    check(&G474);
+}
