@@ -87,6 +87,10 @@ pub trait CanPort {
     /// Puts the controller on the bus, silent (neither acknowledging nor sending) or not; after a
     /// bus-off this is the way back.
     fn start(&mut self, silent: bool);
+    /// When the frame that was taken last had come, where that is known.
+    fn arrived(&self) -> Option<Time> {
+        None
+    }
     /// Frames in the mailboxes, where the controller tells.
     fn waiting(&mut self) -> usize {
         0

@@ -5,8 +5,8 @@
 //!
 //! # Limits
 //! A slot begins where a page begins and takes as many pages as a block needs, which is one on every
-//! part so far. Whether a read of half-written memory faults is the part's affair: some raise an
-//! exception where their check bits do not hold.
+//! part so far. Some parts raise an exception at a read where power failed while writing, as the check
+//! bits do not hold: their boards remember which slot they were reading, and do not read it again.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -15,6 +15,9 @@ use crate::settings::BLOCK_LEN;
 
 /// A block up to the next whole word of any flash memory, which has at most 32 bytes.
 const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
+
+/// Erased memory.
+const EMPTY: [u8; BLOCK_LEN] = [0xFF; BLOCK_LEN];
 
 /// Slots at two places of a memory.
 #[derive(Debug)]
@@ -25,9 +28,14 @@ pub struct FlashSlots<F> {
 }
 
 impl<F: NorFlash> FlashSlots<F> {
-    /// Reads both slots; one that cannot be read is empty.
-    pub fn new(mut flash: F, places: [u32; 2]) -> Self {
-        let copies = places.map(|place| read(&mut flash, place));
+    /// Reads both slots, if the board lets it read them; one that cannot be read is empty.
+    pub fn new(mut flash: F, places: [u32; 2], mut readable: impl FnMut(usize) -> bool) -> Self {
+        let mut copies = [EMPTY; 2];
+        for (slot, (copy, place)) in copies.iter_mut().zip(places).enumerate() {
+            if readable(slot) {
+                *copy = read(&mut flash, place);
+            }
+        }
         Self { flash, places, copies }
     }
 
@@ -39,7 +47,7 @@ impl<F: NorFlash> FlashSlots<F> {
 
 fn read<F: NorFlash>(flash: &mut F, place: u32) -> [u8; BLOCK_LEN] {
     let mut stored = [0xFF; STORED_LEN];
-    let mut copy = [0xFF; BLOCK_LEN];
+    let mut copy = EMPTY;
     if flash.read(place, &mut stored).is_ok() {
         copy.iter_mut().zip(stored).for_each(|(to, from)| *to = from);
     }
@@ -170,24 +178,25 @@ mod tests {
     }
 
     fn works_on<const WORD: usize, const PAGE: usize>() {
-        let memory = Memory::<WORD, PAGE> { bytes: vec![0xFF; 4 * PAGE], words_left: usize::MAX };
-        let places = [PAGE as u32, 2 * PAGE as u32];
-        let mut slots = FlashSlots::new(memory, places);
+        let length = STORED_LEN.next_multiple_of(PAGE);
+        let memory = Memory::<WORD, PAGE> { bytes: vec![0xFF; 4 * length], words_left: usize::MAX };
+        let places = [length as u32, 2 * length as u32];
+        let mut slots = FlashSlots::new(memory, places, |_| true);
         assert_eq!(newest(&slots), None, "erased");
         for (number, detections) in [100, 101, 102, 103].into_iter().enumerate() {
             slots.write(number % 2, &settings(detections).to_block(number as u32));
             assert_eq!(newest(&slots), Some(detections));
-            slots = FlashSlots::new(slots.free(), places);
+            slots = FlashSlots::new(slots.free(), places, |_| true);
             assert_eq!(newest(&slots), Some(detections), "after a restart");
         }
         // power fails after two words of the next one
         let mut memory = slots.free();
-        assert!(memory.bytes[..PAGE].iter().chain(&memory.bytes[3 * PAGE..]).all(|b| *b == 0xFF), "its pages only");
+        assert!(memory.bytes[..length].iter().chain(&memory.bytes[3 * length..]).all(|b| *b == 0xFF), "its pages only");
         memory.words_left = 2;
-        let mut slots = FlashSlots::new(memory, places);
+        let mut slots = FlashSlots::new(memory, places, |_| true);
         slots.write(0, &settings(104).to_block(4));
         assert_eq!(newest(&slots), Some(103));
-        assert_eq!(newest(&FlashSlots::new(slots.free(), places)), Some(103));
+        assert_eq!(newest(&FlashSlots::new(slots.free(), places, |_| true)), Some(103));
     }
 
     #[test]
@@ -198,9 +207,21 @@ mod tests {
     }
 
     #[test]
+    fn a_slot_that_must_not_be_read_is_empty_and_written_next() {
+        let places = [0, 2048];
+        let memory = Memory::<8, 2048> { bytes: vec![0xFF; 4096], words_left: usize::MAX };
+        let mut slots = FlashSlots::new(memory, places, |_| true);
+        slots.write(0, &settings(100).to_block(1));
+        slots.write(1, &settings(101).to_block(2));
+        let slots = FlashSlots::new(slots.free(), places, |slot| slot != 1);
+        assert_eq!(newest(&slots), Some(100));
+        assert_eq!(Settings::newest([slots.slot(0), slots.slot(1)]).unwrap().next_slot, 1);
+    }
+
+    #[test]
     fn a_slot_outside_the_memory_is_empty() {
         let memory = Memory::<8, 2048> { bytes: vec![0xFF; 2048], words_left: usize::MAX };
-        let slots = FlashSlots::new(memory, [0, 4096]);
+        let slots = FlashSlots::new(memory, [0, 4096], |_| true);
         assert_eq!((slots.slot(1), slots.slot(2)), (&[0xFF; BLOCK_LEN][..], &[][..]));
     }
 }

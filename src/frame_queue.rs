@@ -2,15 +2,17 @@
 //!
 //! # Limits
 //! `N` frames. Of a full queue the new frame is lost, and counted: the scan it belongs to is then known
-//! to be incomplete. 24 bytes a frame.
+//! to be incomplete. 32 bytes a frame.
 
 use heapless::Deque;
 
+use crate::time::Time;
 use crate::wire::frame::{CanFrame, CanId};
 
 /// A classic frame in as few bytes as it needs.
 #[derive(Debug, Clone, Copy)]
 struct Classic {
+    came: Time,
     id: CanId,
     length: u8,
     data: [u8; 8],
@@ -35,22 +37,23 @@ impl<const N: usize> FrameQueue<N> {
         Self { frames: Deque::new(), lost: 0 }
     }
 
-    /// Appends a frame; one that does not fit, or is not classic, is lost.
-    pub fn push(&mut self, frame: &CanFrame) {
+    /// Appends a frame that came at this time; one that does not fit, or is not classic, is lost.
+    pub fn push(&mut self, frame: &CanFrame, came: Time) {
         let mut data = [0; 8];
         let length = frame.data().len();
         let kept = data.get_mut(..length).map(|to| to.copy_from_slice(frame.data()));
         let length = u8::try_from(length).unwrap_or(u8::MAX);
-        let pushed = kept.and_then(|()| self.frames.push_back(Classic { id: frame.id, length, data }).ok());
+        let pushed = kept.and_then(|()| self.frames.push_back(Classic { came, id: frame.id, length, data }).ok());
         if pushed.is_none() {
             self.lost = self.lost.saturating_add(1);
         }
     }
 
-    /// Takes the oldest frame.
-    pub fn pop(&mut self) -> Option<CanFrame> {
+    /// Takes the oldest frame and the time it came.
+    pub fn pop(&mut self) -> Option<(CanFrame, Time)> {
         let classic = self.frames.pop_front()?;
-        CanFrame::classic(classic.id, classic.data.get(..usize::from(classic.length))?)
+        let frame = CanFrame::classic(classic.id, classic.data.get(..usize::from(classic.length))?)?;
+        Some((frame, classic.came))
     }
 
     /// Counts a frame that was lost before it came here.
@@ -68,17 +71,18 @@ impl<const N: usize> FrameQueue<N> {
 mod tests {
     use super::*;
 
-    fn frame(k: u8) -> CanFrame {
-        CanFrame::classic(CanId::Standard(u16::from(k)), &[k; 3]).unwrap()
+    fn frame(k: u8) -> (CanFrame, Time) {
+        (CanFrame::classic(CanId::Standard(u16::from(k)), &[k; 3]).unwrap(), Time::from_micros(u64::from(k)))
     }
 
     #[test]
     fn frames_come_out_as_they_went_in_and_what_does_not_fit_is_counted() {
         let mut queue = FrameQueue::<4>::new();
-        (0..6).for_each(|k| queue.push(&frame(k)));
+        let push = |queue: &mut FrameQueue<4>, k| queue.push(&frame(k).0, frame(k).1);
+        (0..6).for_each(|k| push(&mut queue, k));
         assert_eq!((queue.take_lost(), queue.take_lost()), (2, 0));
         assert_eq!(queue.pop(), Some(frame(0)));
-        queue.push(&frame(9));
+        push(&mut queue, 9);
         let rest = std::iter::from_fn(|| queue.pop()).collect::<std::vec::Vec<_>>();
         assert_eq!(rest, [frame(1), frame(2), frame(3), frame(9)]);
     }
@@ -86,15 +90,16 @@ mod tests {
     #[test]
     fn a_long_frame_is_lost_not_cut() {
         let mut queue = FrameQueue::<4>::new();
-        queue.push(&CanFrame::fd(CanId::Standard(1), &[1; 12]).unwrap());
+        let now = Time::from_micros(1);
+        queue.push(&CanFrame::fd(CanId::Standard(1), &[1; 12]).unwrap(), now);
         assert_eq!((queue.pop(), queue.take_lost()), (None, 1));
         let extended = CanFrame::classic(CanId::Extended(0x0400_0001), &[1; 8]).unwrap();
-        queue.push(&extended);
-        assert_eq!(queue.pop(), Some(extended));
+        queue.push(&extended, now);
+        assert_eq!(queue.pop(), Some((extended, now)));
     }
 
     #[test]
-    fn a_frame_takes_24_bytes() {
-        assert!(size_of::<Classic>() <= 24, "{}", size_of::<Classic>());
+    fn a_frame_takes_32_bytes() {
+        assert!(size_of::<Classic>() <= 32, "{}", size_of::<Classic>());
     }
 }

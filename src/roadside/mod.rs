@@ -237,7 +237,9 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
             let Some(frame) = self.radar_bus.receive(port) else { break };
             let Some(maps) = &mut self.maps else { continue };
             let scans = self.radar.scans();
-            self.radar.frame(&frame, now, &mut maps.unit);
+            // it may have waited while the map before was made
+            let came = port.arrived().filter(|came| *came <= now).unwrap_or(now);
+            self.radar.frame(&frame, came, &mut maps.unit);
             if self.radar.scans() != scans {
                 // what was sent of the map before has to leave first
                 break;

@@ -28,9 +28,10 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
-use embassy_time::{Instant, Timer};
+use embassy_time::Timer;
 use static_cell::{ConstStaticCell, StaticCell};
-use stm32::can::{Queue, Receiver, open, queue};
+use stm32::can::{Queue, Receiver, now, open, queue};
+use stm32::crash;
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
 use viewshed::flash_slots::FlashSlots;
@@ -39,7 +40,6 @@ use viewshed::radar_3d::{Radar3dParameters, SmallProfile};
 use viewshed::roadside::{Memory, Ports, ResetFlags, Roadside, Start, buses};
 use viewshed::session::Flow;
 use viewshed::status_output::StatusOutput;
-use viewshed::time::Time;
 use viewshed::wire::broadcast::Broadcaster;
 use viewshed::wire::message::Epoch;
 
@@ -119,7 +119,7 @@ fn config() -> embassy_stm32::Config {
 }
 
 /// Asked once: the flags are cleared.
-fn reset_flags() -> ResetFlags {
+fn reset_flags(crash: bool) -> ResetFlags {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
     ResetFlags {
@@ -128,13 +128,9 @@ fn reset_flags() -> ResetFlags {
         brown_out: false,
         watchdog: flags.iwdgrstf() || flags.wwdgrstf(),
         software: flags.sftrstf(),
-        crash: stm32::crash::take(),
+        crash,
         pin: flags.pinrstf(),
     }
-}
-
-fn now() -> Time {
-    Time::from_micros(Instant::now().as_micros())
 }
 
 #[embassy_executor::main]
@@ -142,10 +138,12 @@ async fn main(_spawner: Spawner) {
     let p = embassy_stm32::init(config());
     let mut watchdog = IndependentWatchdog::new(p.IWDG, WATCHDOG_US);
     watchdog.unleash();
-    let flags = reset_flags();
+    let last = crash::last();
+    let flags = reset_flags(last.crashed);
     defmt::info!("reset: {}", flags);
 
-    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS);
+    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS, |slot| last.readable(slot));
+    crash::read_done();
     let [radar_timing, broadcast_timing] = buses(&slots).map(|bus| bus.timing(CAN_CLOCK_HZ));
     let can = can::CanConfigurator::new(p.FDCAN1, p.PA11, p.PA12, Irqs);
     let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);

@@ -17,8 +17,10 @@ use embassy_futures::poll_once;
 use embassy_stm32::can::config::{FdCanConfig, GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::{CanConfigurator, CanRx, CanTx, OperatingMode, frame};
 use embassy_stm32::pac::can::Fdcan;
+use embassy_time::Instant;
 use viewshed::can_bus::{BitTiming, CanPort};
 use viewshed::frame_queue::FrameQueue;
+use viewshed::time::Time;
 use viewshed::wire::frame::CanFrame;
 
 /// Looks at a register that follows within a few of the controller's clocks.
@@ -29,6 +31,11 @@ const MAILBOXES: u32 = 0b111;
 /// Frames between the interrupt and the loop: a scan of an ARS408 goes on while the map of the one before
 /// is made, at most four classic frames a millisecond.
 pub type Queue<const N: usize> = Mutex<RefCell<FrameQueue<N>>>;
+
+/// The hardware timer's time.
+pub fn now() -> Time {
+    Time::from_micros(Instant::now().as_micros())
+}
 
 /// An empty queue.
 pub const fn queue<const N: usize>() -> Queue<N> {
@@ -46,6 +53,7 @@ impl Receiver {
     pub async fn run<const N: usize>(mut self, queue: &Queue<N>) -> ! {
         loop {
             let envelope = self.can.read().await;
+            let came = now();
             let lost = self.registers.ir().read().rfl(0);
             if lost {
                 // only ones clear a flag, so the others stay
@@ -58,7 +66,7 @@ impl Receiver {
                 }
                 // errors on the bus are the controller's to count, remote frames carry nothing
                 if let Some(frame) = envelope.ok().and_then(|e| CanFrame::from_embedded(&e.frame)) {
-                    queue.push(&frame);
+                    queue.push(&frame, came);
                 }
             });
         }
@@ -72,6 +80,7 @@ pub struct Port<const N: usize> {
     queue: &'static Queue<N>,
     /// Without a divider for its bit rate a controller stays off the bus.
     usable: bool,
+    arrived: Option<Time>,
 }
 
 /// Sets a controller up. It listens until the port is started.
@@ -95,7 +104,7 @@ pub fn open<const N: usize>(
     );
     let (can, receiver, _) = configurator.start(OperatingMode::BusMonitoringMode).split();
     let usable = nominal.is_some();
-    (Receiver { can: receiver, registers }, Port { can, registers, queue, usable })
+    (Receiver { can: receiver, registers }, Port { can, registers, queue, usable, arrived: None })
 }
 
 fn nominal(timing: BitTiming) -> Option<NominalBitTiming> {
@@ -122,7 +131,13 @@ impl<const N: usize> Port<N> {
 
 impl<const N: usize> CanPort for Port<N> {
     fn receive(&mut self) -> Option<CanFrame> {
-        critical_section::with(|cs| self.queue.borrow_ref_mut(cs).pop())
+        let (frame, came) = critical_section::with(|cs| self.queue.borrow_ref_mut(cs).pop())?;
+        self.arrived = Some(came);
+        Some(frame)
+    }
+
+    fn arrived(&self) -> Option<Time> {
+        self.arrived
     }
 
     fn send(&mut self, frame: &CanFrame) -> bool {
