@@ -30,6 +30,9 @@ pub mod reference {
     pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
     /// All of them together.
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+    /// The loop around them on hardware of its own.
+    pub type Roadside<'a> =
+        crate::roadside::Roadside<'a, DETECTIONS, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
 }
 
 /// 100 x 64 x 8 cells: parts with 128 kB.
@@ -62,4 +65,7 @@ pub mod small {
     pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
     /// All of them together.
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+    /// The loop around them on hardware of its own.
+    pub type Roadside<'a> =
+        crate::roadside::Roadside<'a, DETECTIONS, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
 }

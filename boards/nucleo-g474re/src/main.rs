@@ -35,12 +35,10 @@ use stm32::crash;
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
 use viewshed::flash_slots::FlashSlots;
-use viewshed::polar::PolarMap;
-use viewshed::radar_3d::{Radar3dParameters, SmallProfile};
-use viewshed::roadside::{Memory, Ports, ResetFlags, Roadside, Start, buses};
+use viewshed::profile::small::{Map, Parameters, Roadside, Sender, State};
+use viewshed::roadside::{Memory, Ports, ResetFlags, Start, buses};
 use viewshed::session::Flow;
 use viewshed::status_output::StatusOutput;
-use viewshed::wire::broadcast::Broadcaster;
 use viewshed::wire::message::Epoch;
 
 /// The radar's number on its bus and in the broadcast.
@@ -56,11 +54,11 @@ const SETTINGS: [u32; 2] = [0x7_F000, 0x7_F800];
 /// Several frames.
 const WATCHDOG_US: u32 = 1_000_000;
 
-static STATE: ConstStaticCell<SmallProfile> = ConstStaticCell::new(SmallProfile::new());
-static MAP: ConstStaticCell<PolarMap<100, 64>> = ConstStaticCell::new(PolarMap::NOWHERE);
-static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<100, 64, 8>>> = ConstStaticCell::new(None);
-static BROADCAST: StaticCell<Option<Broadcaster<64, 4>>> = StaticCell::new();
-static SERIAL: StaticCell<Option<Broadcaster<64, 4>>> = StaticCell::new();
+static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
+static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
+static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(None);
+static BROADCAST: StaticCell<Option<Sender>> = StaticCell::new();
+static SERIAL: StaticCell<Option<Sender>> = StaticCell::new();
 static RADAR_QUEUE: Queue<FRAMES> = queue();
 static BROADCAST_QUEUE: Queue<REQUESTS> = queue();
 static OUT: Out = Out::new();
@@ -173,7 +171,7 @@ async fn main(_spawner: Spawner) {
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };
     let mut ports = Ports { radar, broadcast, serial, slots };
-    let mut unit = Roadside::<176, 100, 64, 8, 4, 28, 176>::start(start, memory, now(), &mut ports);
+    let mut unit = Roadside::start(start, memory, now(), &mut ports);
     let mut light = StatusOutput::new(Output::new(p.PA5, Level::Low, Speed::Low));
 
     loop {

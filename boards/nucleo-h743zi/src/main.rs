@@ -40,12 +40,10 @@ use stm32::crash;
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
 use viewshed::flash_slots::FlashSlots;
-use viewshed::polar::PolarMap;
-use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile};
-use viewshed::roadside::{Memory, Ports, ResetFlags, Roadside, Start, buses};
+use viewshed::profile::reference::{Map, Parameters, Roadside, Sender, State};
+use viewshed::roadside::{Memory, Ports, ResetFlags, Start, buses};
 use viewshed::session::Flow;
 use viewshed::status_output::StatusOutput;
-use viewshed::wire::broadcast::Broadcaster;
 use viewshed::wire::message::Epoch;
 
 /// The radar's number on its bus and in the broadcast.
@@ -64,11 +62,11 @@ const SETTINGS_BYTES: u32 = 0x4_0000;
 /// sheet, which was not at hand.
 const WATCHDOG_US: u32 = 5_000_000;
 
-static STATE: ConstStaticCell<ReferenceProfile> = ConstStaticCell::new(ReferenceProfile::new());
-static MAP: ConstStaticCell<PolarMap<200, 120>> = ConstStaticCell::new(PolarMap::NOWHERE);
-static PARAMETERS: ConstStaticCell<Option<Radar3dParameters<200, 120, 16>>> = ConstStaticCell::new(None);
-static BROADCAST: StaticCell<Option<Broadcaster<120, 7>>> = StaticCell::new();
-static SERIAL: StaticCell<Option<Broadcaster<120, 7>>> = StaticCell::new();
+static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
+static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
+static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(None);
+static BROADCAST: StaticCell<Option<Sender>> = StaticCell::new();
+static SERIAL: StaticCell<Option<Sender>> = StaticCell::new();
 static RADAR_QUEUE: Queue<FRAMES> = queue();
 static BROADCAST_QUEUE: Queue<REQUESTS> = queue();
 static OUT: Out = Out::new();
@@ -187,7 +185,7 @@ async fn main(_spawner: Spawner) {
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };
     let mut ports = Ports { radar, broadcast, serial, slots };
-    let mut unit = Roadside::<256, 200, 120, 16, 7, 64, 256>::start(start, memory, now(), &mut ports);
+    let mut unit = Roadside::start(start, memory, now(), &mut ports);
     let mut light = StatusOutput::new(Output::new(p.PB0, Level::Low, Speed::Low));
 
     loop {
