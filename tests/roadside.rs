@@ -360,6 +360,9 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
         assert_eq!(world.status().map(|s| (s.state, s.reason)), [(State::Fault, Reason::Configuration); 2]);
         assert_eq!(world.visible(), [0, 0]);
         assert_eq!(world.frames_done, 40, "the safe state is no reason for a reset");
+        // said once the bus was proven, not into the void before
+        assert!(world.told.contains(&Told::Started(None)), "{:?}", world.told);
+        assert!(world.told.iter().any(|told| matches!(told, Told::Refused(r) if r.reason == 4)), "{:?}", world.told);
 
         let block = settings().to_block(0);
         let mut tool = Tool::new(SENSOR, Medium::Can(ADDRESSES));

@@ -20,7 +20,8 @@
 //! buses are then only listened to until their bit rate is proven.
 //!
 //! # Limits
-//! 64 frames of each bus and 64 bytes of the serial line a step. Three mailboxes.
+//! 64 frames of each bus and 64 bytes of the serial line a step. Three mailboxes. While a block is written
+//! the loop stands still, on parts with large sectors for seconds: the map ends and comes back.
 
 mod outbox;
 mod reset;
@@ -287,6 +288,10 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
 
     /// Hands the driver what is due on the broadcast bus.
     fn transmit<Rp, Bp: CanPort, L, S: Slots>(&mut self, now: Time, ports: &mut Ports<Rp, Bp, L, S>) {
+        // nothing is taken from a unit that cannot be sent
+        if self.broadcast_bus.state() != BusState::Active {
+            return;
+        }
         let port = &mut ports.broadcast;
         let late = self.outbox.take_back(now, port);
         if !self.outbox.flush(now, &mut self.broadcast_bus, port) {

@@ -1,6 +1,6 @@
 //! Frames on their way through a controller's mailboxes, and until when each may leave.
 
-use crate::can_bus::{BusKeeper, BusState, CanPort};
+use crate::can_bus::{BusKeeper, CanPort};
 use crate::time::Time;
 use crate::wire::frame::CanFrame;
 
@@ -62,10 +62,6 @@ impl Outbox {
             if let Some(newest) = self.deadlines.last_mut() {
                 *newest = deadline;
             }
-            return true;
-        }
-        // off the bus nothing is kept for later
-        if bus.state() != BusState::Active {
             return true;
         }
         self.held = Some((frame, deadline));

@@ -14,7 +14,8 @@
 //! | settings | last two pages of 2 kB, in Zephyr's `storage_partition` | the same, `flash0`; page and word: `stm32-metapac` |
 //!
 //! ST's manual of the board (UM2505) was not at hand: solder bridges are not verified. Both buses need a
-//! transceiver. PB5 and PB6, the other pins of FDCAN2, are left alone: PB6 is the part's USB-C CC1 as well.
+//! transceiver. PB5 and PB6, the other pins of FDCAN2, are left alone: PB6 is CC1 of a USB-C port as well
+//! (`stm32-metapac`). The flash is to have two banks (option bit DBANK): embassy stops otherwise.
 #![no_std]
 #![no_main]
 
@@ -30,10 +31,10 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
 use embassy_time::Timer;
 use static_cell::{ConstStaticCell, StaticCell};
-use stm32::can::{Queue, Receiver, now, open, queue};
-use stm32::crash;
+use stm32::can::{Queue, Receiver, open, queue};
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
+use stm32::{crash, now};
 use viewshed::flash_slots::FlashSlots;
 use viewshed::profile::small::{Map, Parameters, Roadside, Sender, State};
 use viewshed::roadside::{Memory, Ports, ResetFlags, Start, buses};
@@ -174,9 +175,13 @@ async fn main(_spawner: Spawner) {
     let mut unit = Roadside::start(start, memory, now(), &mut ports);
     let mut light = StatusOutput::new(Output::new(p.PA5, Level::Low, Speed::Low));
 
+    let mut told = None;
     loop {
         let step = unit.step(now(), &mut ports);
         let _ = light.show(step.state, now());
+        if told.replace(step.state) != Some(step.state) {
+            defmt::info!("{}", step.state);
+        }
         if step.frame_done {
             watchdog.pet();
         }

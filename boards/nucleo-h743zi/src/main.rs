@@ -14,8 +14,8 @@
 //! | settings | last two sectors, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
 //!
 //! ST's manuals of the board (UM1974 for MB1137, UM2407 for MB1364) were not at hand: solder bridges, and
-//! whether D1 and D11 are free of other uses there, are not verified. Both buses need a transceiver. 480 MHz is
-//! more than the part's first revisions allow.
+//! whether D1 and D11 are free of other uses there, are not verified. Both buses need a transceiver. Whether
+//! the part's revision allows 480 MHz is not checked.
 #![no_std]
 #![no_main]
 
@@ -35,10 +35,10 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
 use embassy_time::Timer;
 use static_cell::{ConstStaticCell, StaticCell};
-use stm32::can::{Queue, Receiver, now, open, queue};
-use stm32::crash;
+use stm32::can::{Queue, Receiver, open, queue};
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
+use stm32::{crash, now};
 use viewshed::flash_slots::FlashSlots;
 use viewshed::profile::reference::{Map, Parameters, Roadside, Sender, State};
 use viewshed::roadside::{Memory, Ports, ResetFlags, Start, buses};
@@ -188,9 +188,13 @@ async fn main(_spawner: Spawner) {
     let mut unit = Roadside::start(start, memory, now(), &mut ports);
     let mut light = StatusOutput::new(Output::new(p.PB0, Level::Low, Speed::Low));
 
+    let mut told = None;
     loop {
         let step = unit.step(now(), &mut ports);
         let _ = light.show(step.state, now());
+        if told.replace(step.state) != Some(step.state) {
+            defmt::info!("{}", step.state);
+        }
         if step.frame_done {
             watchdog.pet();
         }

@@ -17,11 +17,12 @@ use embassy_futures::poll_once;
 use embassy_stm32::can::config::{FdCanConfig, GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::{CanConfigurator, CanRx, CanTx, OperatingMode, frame};
 use embassy_stm32::pac::can::Fdcan;
-use embassy_time::Instant;
 use viewshed::can_bus::{BitTiming, CanPort};
 use viewshed::frame_queue::FrameQueue;
 use viewshed::time::Time;
 use viewshed::wire::frame::CanFrame;
+
+use crate::now;
 
 /// Looks at a register that follows within a few of the controller's clocks.
 const PATIENCE: u32 = 100_000;
@@ -31,11 +32,6 @@ const MAILBOXES: u32 = 0b111;
 /// Frames between the interrupt and the loop: a scan of an ARS408 goes on while the map of the one before
 /// is made, at most four classic frames a millisecond.
 pub type Queue<const N: usize> = Mutex<RefCell<FrameQueue<N>>>;
-
-/// The hardware timer's time.
-pub fn now() -> Time {
-    Time::from_micros(Instant::now().as_micros())
-}
 
 /// An empty queue.
 pub const fn queue<const N: usize>() -> Queue<N> {

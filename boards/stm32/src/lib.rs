@@ -7,3 +7,10 @@ pub mod can;
 pub mod crash;
 pub mod dma;
 pub mod serial;
+
+use viewshed::time::Time;
+
+/// The hardware timer's time, in which the loop, the receive queues and the events count.
+pub fn now() -> Time {
+    Time::from_micros(embassy_time::Instant::now().as_micros())
+}
