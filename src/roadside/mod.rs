@@ -331,7 +331,9 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
     }
 }
 
-/// Makes the unit and its senders in the memory there is; none where a setting cannot be worked with.
+/// Makes the unit and its senders in the memory there is; none where a setting cannot be worked with. Apart,
+/// so that what this takes of the stack is free again before the first scan.
+#[inline(never)]
 fn maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
     start: &Start,
     settings: &Settings,
