@@ -13,7 +13,7 @@
 //! | watchdog | IWDG1 | the same, `iwdg1` |
 //! | settings | last two sectors, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
 //!
-//! ST's manuals of the board (UM1974 for MB1137, UM2407 for MB1364) were not at hand: solder bridges, and
+//! Zephyr as of commit 0225b4db0265, `hal_stm32` as of 257c26c17af3. ST's manuals of the board (UM1974 for MB1137, UM2407 for MB1364) were not at hand: solder bridges, and
 //! whether D1 and D11 are free of other uses there, are not verified. Both buses need a transceiver. Whether
 //! the part's revision allows 480 MHz is not checked.
 #![no_std]

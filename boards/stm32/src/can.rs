@@ -100,6 +100,9 @@ pub fn open<const N: usize>(
     );
     let (can, receiver, _) = configurator.start(OperatingMode::BusMonitoringMode).split();
     let usable = nominal.is_some();
+    if !usable {
+        defmt::warn!("no divider meets the bit rate of a bus: it stays off");
+    }
     (Receiver { can: receiver, registers }, Port { can, registers, queue, usable, arrived: None })
 }
 
@@ -137,7 +140,7 @@ impl<const N: usize> CanPort for Port<N> {
     }
 
     fn send(&mut self, frame: &CanFrame) -> bool {
-        let Some(frame) = frame.to_embedded::<frame::Frame>() else { return false };
+        let Some(frame) = frame.to_embedded::<frame::Frame>().filter(|_| self.usable) else { return false };
         // ready at once where a mailbox is free, and nothing is written otherwise
         matches!(poll_once(self.can.write(&frame)), Poll::Ready(None))
     }
