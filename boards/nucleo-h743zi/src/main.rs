@@ -13,9 +13,9 @@
 //! | watchdog | IWDG1 | the same, `iwdg1` |
 //! | settings | last two sectors, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
 //!
-//! Zephyr as of commit 0225b4db0265, `hal_stm32` as of 257c26c17af3. ST's manuals of the board (UM1974 for MB1137, UM2407 for MB1364) were not at hand: solder bridges, and
-//! whether D1 and D11 are free of other uses there, are not verified. Both buses need a transceiver. Whether
-//! the part's revision allows 480 MHz is not checked.
+//! Zephyr as of commit 0225b4db0265, `hal_stm32` as of 257c26c17af3. ST's manuals of the board (UM1974 for
+//! MB1137, UM2407 for MB1364) were not at hand: solder bridges, and whether D1 and D11 are free of other uses
+//! there, are not verified; nor is whether the part's revision allows 480 MHz. Both buses need a transceiver.
 #![no_std]
 #![no_main]
 
