@@ -128,6 +128,12 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         self.broadcast.next_frame(now)
     }
 
+    /// Time of the last map that was offered to the sender: it moves with every scan, and while there are
+    /// none with every map that says unknown.
+    pub fn offered(&self) -> Option<Time> {
+        self.offered
+    }
+
     /// The map.
     pub fn map(&self) -> &PolarMap<R, A> {
         self.map
