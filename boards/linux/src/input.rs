@@ -69,6 +69,10 @@ pub trait Input {
     fn begins(&self) -> Time {
         Time::from_micros(0)
     }
+    /// What the unit's clock shows.
+    fn now(&self, system: Time) -> Time {
+        system
+    }
 }
 
 /// The input that is configured.
@@ -343,5 +347,12 @@ impl Input for NativePort {
 
     fn line(&mut self) -> Option<&mut Serial> {
         Some(&mut self.port)
+    }
+
+    fn now(&self, system: Time) -> Time {
+        match &self.session {
+            Some(session) if self.bench => session.now(),
+            _ => self.clock.now(system),
+        }
     }
 }

@@ -26,19 +26,19 @@ pub fn line_at(text: &str, at: usize) -> usize {
 /// The innermost key whose name or value covers a byte.
 pub fn key_at(text: &str, at: usize) -> Option<String> {
     let document = DeTable::parse(text).ok()?;
-    let (mut table, mut path) = (document.get_ref(), Vec::new());
-    loop {
-        let covers = |span: std::ops::Range<usize>| span.contains(&at);
-        let Some((name, value)) = table.iter().find(|(name, value)| covers(name.span()) || covers(value.span())) else {
-            break;
+    within(document.get_ref(), at)
+}
+
+/// A table's own place is its head only, so all tables are searched.
+fn within(table: &DeTable<'_>, at: usize) -> Option<String> {
+    table.iter().find_map(|(name, value)| {
+        let inner = match value.get_ref() {
+            DeValue::Table(inner) => within(inner, at).map(|inner| format!("{}.{inner}", name.get_ref())),
+            _ => None,
         };
-        path.push(name.get_ref().to_string());
-        match value.get_ref() {
-            DeValue::Table(inner) if !covers(name.span()) => table = inner,
-            _ => break,
-        }
-    }
-    (!path.is_empty()).then(|| path.join("."))
+        let here = name.span().contains(&at) || value.span().contains(&at);
+        inner.or_else(|| here.then(|| name.get_ref().to_string()))
+    })
 }
 
 #[cfg(test)]

@@ -21,8 +21,8 @@ use crate::systemd::Systemd;
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);
 const CALM: Duration = Duration::from_millis(5);
-/// How long is said, at the end, that there is no map any more.
-const FAREWELL: Duration = Duration::from_millis(300);
+/// How long is said, at the end, that there is no map any more, microseconds.
+const FAREWELL_US: u64 = 300_000;
 /// A step of a clock that is told by a log.
 const TICK_US: u64 = 1_000;
 
@@ -54,7 +54,8 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             let medium = config.medium().context("output.base_id is no identifier")?;
             let header =
                 header(settings, parameters).map_err(|e| anyhow!("maps of this sensor cannot be sent: {e:?}"))?;
-            let new = Sender::new(config.broadcast(medium), header, epoch, clock.now()).map_err(|e| anyhow!("{e}"))?;
+            let now = input.now(clock.now());
+            let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
         }
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut state, &mut map, s));
@@ -73,14 +74,11 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             let now = clock.next();
             output.keep_up(now);
             let step = input.step(now, &mut Work { unit: &mut unit, slots: &mut slots, output: &mut output });
-            let (Step::Now(now), Some(unit)) = (step, &mut unit) else {
-                if matches!(step, Step::Now(_)) {
-                    continue;
-                }
-                break step;
-            };
-            output.send(now, unit, input.line());
-            if watch.look(unit) {
+            let Step::Now(now) = step else { break step };
+            if let Some(unit) = &mut unit {
+                output.send(now, unit, input.line());
+            }
+            if watch.look(unit.as_mut(), &output) {
                 systemd.frame_done();
             }
             systemd.status(|| watch.text(&output));
@@ -101,16 +99,20 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
 /// Maps that say unknown, and a status that says that there is none.
 fn farewell(unit: &mut Unit<'_>, input: &mut dyn Input, output: &mut Output, clock: &mut Clock) {
     unit.reset();
-    let (begin, first) = (clock.next(), unit.offered());
+    let begin = clock.next();
+    let start = input.now(begin);
     loop {
-        wait(input, clock, true);
-        let past = clock.next().since(begin).unwrap_or(u64::MAX);
-        if past > FAREWELL.as_micros() as u64 {
+        if !clock.is_steps() {
+            std::thread::sleep(BUSY);
+        }
+        let system = clock.next();
+        let past = system.since(begin).unwrap_or(u64::MAX);
+        if past > FAREWELL_US {
             return;
         }
-        // on the unit's clock, which may be the radar's
-        let now = Time::from_micros(first.unwrap_or(begin).max(begin).micros() + past);
-        output.keep_up(now);
+        // a test bench's clock stands still by now
+        let now = Time::from_micros(start.micros() + past);
+        output.keep_up(system);
         unit.idle(now);
         output.send(now, unit, input.line());
     }
@@ -169,12 +171,19 @@ fn version() -> [u8; 3] {
 struct Watch {
     offered: Option<Time>,
     maps: u64,
+    /// Messages of the safe state.
+    said: u64,
     told: Option<(Told, Reason)>,
 }
 
 impl Watch {
-    /// Whether a frame was completed since the last look: estimated, and its map given to the sender.
-    fn look(&mut self, unit: &mut Unit<'_>) -> bool {
+    /// Whether a frame was completed since the last look: estimated, and its map given to the sender. In the
+    /// safe state, whether that was told.
+    fn look(&mut self, unit: Option<&mut Unit<'_>>, output: &Output) -> bool {
+        let Some(unit) = unit else {
+            let said = output.sent + output.refused;
+            return std::mem::replace(&mut self.said, said) != said;
+        };
         let status = unit.broadcast().status_mut();
         let told = (status.state, status.reason);
         // what one frame does not say the next does: only states are worth a line

@@ -1,0 +1,243 @@
+//! Native scans in on one serial port, protected maps out on another, and what happens to cables.
+
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use viewshed::map::Visibility;
+use viewshed::service::Request;
+use viewshed::settings::Settings;
+use viewshed::time::Time;
+use viewshed::wire::message::{Addresses, Message, Received};
+use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::serial::Unstuffer;
+use viewshed::wire::status::{Reason, State, Status};
+use viewshed_harness::boards::Profile;
+use viewshed_harness::boards::live::{Answered, SENSOR, Script, answer};
+use viewshed_harness::boards::machine::Folder;
+use viewshed_harness::boards::scans::Scan;
+
+use super::daemon::{Daemon, tables};
+use super::terminal::{Ear, Terminal};
+use crate::shipped;
+
+const PORTS: &str = "[output]\nmedium = \"serial\"\nport = \"FOLDER/maps\"\n";
+
+fn messages(bytes: &[u8]) -> Vec<Vec<u8>> {
+    let (mut unstuffer, mut rest, mut all) = (Unstuffer::new(), bytes, Vec::new());
+    while !rest.is_empty() {
+        let (taken, message) = unstuffer.push(rest);
+        rest = &rest[taken..];
+        all.extend(message.map(<[u8]>::to_vec));
+    }
+    all
+}
+
+/// The status in a message, if it is one.
+fn status(message: &[u8]) -> Option<Status> {
+    let received = Received::from_bytes(message).ok()?;
+    let mut status = Status::starting(0);
+    (received.message == Message::Status).then(|| status.take(received.own).unwrap())?;
+    Some(status)
+}
+
+/// A message without its counter and check sum, status messages without the version.
+fn content(message: &[u8]) -> (Vec<u8>, Option<Status>) {
+    match status(message) {
+        Some(status) => (Vec::new(), Some(Status { firmware: [0; 3], ..status })),
+        None => (message[3..].to_vec(), None),
+    }
+}
+
+/// What maps tell, epoch left out.
+fn maps(messages: &[Vec<u8>]) -> Vec<(u8, Vec<u8>)> {
+    let is_map = |m: &&Vec<u8>| Received::from_bytes(m).is_ok_and(|r| matches!(r.message, Message::Map(..)));
+    messages.iter().filter(is_map).map(|m| (m[3], m[6..].to_vec())).collect()
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_in_a_test_bench_every_message_of_five_seconds_is_the_same() {
+    let (settings, scans) = shipped(5.0);
+    let mut script = Script::default();
+    script.request(&Request::Read);
+    script.configure(&settings);
+    scans.iter().for_each(|s| script.scan(s, scans[0].time));
+    let mut broken = settings;
+    broken.sensor.mount.height_m = 50.0;
+    script.request(&Request::Write(&broken.to_block(7)));
+    script.request(&Request::Read);
+    let expected = answer(Profile::Reference, &script.bytes).bytes;
+
+    let folder = Folder::new().unwrap();
+    std::fs::write(folder.0.join("epoch"), "0").unwrap();
+    let ear = Ear::plug(&folder.0.join("maps"), Instant::now());
+    let mut radar = Terminal::plug(&folder.0.join("radar"));
+    let input = "state_dir = \"FOLDER\"\n[input]\nradar = \"native\"\nport = \"FOLDER/radar\"\nclock = \"input\"\n";
+    let daemon = Daemon::start_in(folder, &format!("{input}{PORTS}gap_us = 0\n"), &[]);
+    daemon.wait_for("started");
+    radar.send(&script.bytes);
+    ear.wait_for(expected.len());
+    let (got, expected) = (messages(&ear.bytes()), messages(&expected));
+    assert!(expected.len() > 5 * scans.len() / 2, "{} messages", expected.len());
+    let first = got.iter().zip(&expected).position(|(a, b)| content(a) != content(b));
+    assert_eq!((first, got.len()), (None, expected.len()), "first message that differs, and how many came");
+    println!("{} messages, {} of maps", got.len(), maps(&got).len());
+
+    // the block outlasts the daemon
+    daemon.terminate();
+    let folder = std::fs::read(daemon.folder.0.join("slots")).unwrap();
+    assert_eq!(
+        Settings::newest([&folder[..folder.len() / 2], &folder[folder.len() / 2..]]).unwrap().settings,
+        settings
+    );
+}
+
+type Far = Receiver<1, 120, 7>;
+
+/// What a receiver has of these messages.
+struct Heard {
+    receiver: Far,
+    unstuffer: Unstuffer,
+    taken: usize,
+    status: Option<Status>,
+    now: Time,
+}
+
+impl Heard {
+    fn new() -> Self {
+        let receiver = Far::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+        Self { receiver, unstuffer: Unstuffer::new(), taken: 0, status: None, now: Time::from_micros(0) }
+    }
+
+    /// Takes what came since the last time.
+    fn take(&mut self, ear: &Ear) {
+        let all = ear.heard();
+        for (at, bytes) in &all[self.taken..] {
+            self.bytes(bytes, Time::from_micros(at.as_micros() as u64));
+        }
+        self.taken = all.len();
+    }
+
+    fn bytes(&mut self, mut bytes: &[u8], now: Time) {
+        self.now = now;
+        while !bytes.is_empty() {
+            let (taken, message) = self.unstuffer.push(bytes);
+            bytes = &bytes[taken..];
+            if let Some(message) = message.filter(|m| Received::from_bytes(m).is_ok()) {
+                self.status = status(message).or(self.status);
+                let _ = self.receiver.message(now, message);
+            }
+        }
+    }
+
+    fn cells(&self) -> Vec<Visibility> {
+        let map = self.receiver.map(SENSOR, self.now);
+        (0..120 * 200).map(|k| map.cell(k / 200, k % 200).visibility).collect()
+    }
+
+    fn visible(&self) -> usize {
+        self.cells().iter().filter(|v| **v == Visibility::Visible).count()
+    }
+}
+
+/// Streams scans at their pace, stamped when they are sent; the bytes.
+fn stream(radar: &mut Terminal, script: &mut Script, scans: &[Scan], begin: Instant, garbage: bool) -> Vec<u8> {
+    let mut clean = Vec::new();
+    for (k, scan) in scans.iter().enumerate() {
+        let stamp = Time::from_micros(100_000_000 + begin.elapsed().as_micros() as u64);
+        script.bytes.clear();
+        script.scan(&Scan { time: stamp, ..scan.clone() }, Time::from_micros(1));
+        clean.extend_from_slice(&script.bytes);
+        if garbage && k % 4 == 2 {
+            // noise, and half a message
+            let noise: Vec<u8> = (0..200_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> (k % 16)) as u8).collect();
+            radar.send(&noise);
+            radar.send(&script.bytes[..script.bytes.len().min(90) / 2]);
+            radar.send(&[0]);
+        }
+        radar.send(&script.bytes);
+        sleep(Duration::from_micros(66_667));
+    }
+    clean
+}
+
+/// What the library sends for these scans.
+fn expected(settings: &Settings, scans: &[u8]) -> Answered {
+    let mut script = Script::default();
+    script.configure(settings);
+    let mut all = script.bytes;
+    all.extend_from_slice(scans);
+    answer(Profile::Reference, &all)
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_cables_are_pulled_and_the_daemon_goes_on() {
+    let (settings, scans) = shipped(6.0);
+    let folder = Folder::new().unwrap();
+    let begin = Instant::now();
+    let (radar_name, maps_name) = (folder.0.join("radar"), folder.0.join("maps"));
+    // neither port is there at the start
+    let input = "[input]\nradar = \"native\"\nport = \"FOLDER/radar\"\n";
+    let mut daemon = Daemon::start_in(folder, &format!("{input}{PORTS}{}", tables(&settings)), &[]);
+    daemon.wait_for("radar: No such file or directory");
+    daemon.wait_for("maps: No such file or directory");
+    let mut radar = Terminal::plug(&radar_name);
+    let ear = Ear::plug(&maps_name, begin);
+    daemon.wait_for("radar: open");
+    daemon.wait_for("maps: open");
+
+    // maps are those of the library, whatever noise comes between the scans
+    let (mut script, mut far) = (Script::default(), Heard::new());
+    let sent = stream(&mut radar, &mut script, &scans[..30], begin, true);
+    far.take(&ear);
+    let (got, should) = (maps(&messages(&ear.bytes())), maps(&messages(&expected(&settings, &sent).bytes)));
+    let from = got.iter().position(|m| *m == should[0]).expect("the first map");
+    assert!(should.len() >= 30, "{}", should.len());
+    assert!(got[from..].starts_with(&should), "{} of {} messages", got.len() - from, should.len());
+    assert_eq!(far.status.map(|s| s.state), Some(State::Ok));
+    assert!(far.visible() > 5000, "{}", far.visible());
+    println!("{} map messages the same; {} messages refused as damaged", should.len(), far.status.unwrap().e2e_errors);
+    assert!(far.status.unwrap().e2e_errors >= 7, "{:?}", far.status);
+
+    // silence
+    sleep(Duration::from_millis(1100));
+    far.take(&ear);
+    assert_eq!(far.status.map(|s| (s.state, s.reason)), Some((State::Blind, Reason::RadarSilent)));
+    assert_eq!(far.visible(), 0);
+
+    // the radar's cable is pulled and plugged in again
+    drop(radar);
+    daemon.wait_for("radar: lost");
+    let mut radar = Terminal::plug(&radar_name);
+    daemon.wait_for_times("radar: open", 2);
+    let sent = stream(&mut radar, &mut script, &scans[30..60], begin, false);
+    far.take(&ear);
+    let (mut twin, all, mut from) = (Heard::new(), expected(&settings, &sent), 0);
+    for (to, now) in &all.times {
+        twin.bytes(&all.bytes[from..*to], *now);
+        from = *to;
+    }
+    assert_eq!(far.status.map(|s| s.state), Some(State::Ok));
+    assert!(far.visible() > 5000 && far.cells() == twin.cells(), "{} and {}", far.visible(), twin.visible());
+
+    // and the other one
+    drop(ear);
+    let rest = stream(&mut radar, &mut script, &scans[60..65], begin, false);
+    assert!(!rest.is_empty());
+    daemon.wait_for("maps: lost");
+    let ear = Ear::plug(&maps_name, begin);
+    daemon.wait_for_times("maps: open", 2);
+    (far.taken, far.unstuffer) = (0, Unstuffer::new());
+    stream(&mut radar, &mut script, &scans[65..80], begin, false);
+    far.take(&ear);
+    assert!(far.visible() > 5000, "within a second: {}", far.visible());
+
+    // stopped: the last map says unknown, the last status that there is none
+    daemon.terminate();
+    assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
+    sleep(Duration::from_millis(50));
+    far.take(&ear);
+    assert_eq!((far.status.map(|s| s.state), far.visible()), (Some(State::Starting), 0));
+    assert!(daemon.log().contains("stopping"), "{}", daemon.log());
+}
