@@ -28,12 +28,14 @@ pub struct Interface {
     last_error: String,
     /// How long ago the last frame came.
     pub age: Duration,
+    /// Times its controller went bus-off; the keeper counts every return, those of a missing interface too.
+    pub bus_offs: u16,
 }
 
 impl Interface {
     pub fn new(name: &str, errors_only: bool) -> Self {
         let (name, last_error) = (name.to_owned(), String::new());
-        Self { name, errors_only, socket: None, off: false, last_error, age: Duration::ZERO }
+        Self { name, errors_only, socket: None, off: false, last_error, age: Duration::ZERO, bus_offs: 0 }
     }
 
     /// For waiting until frames come.
@@ -43,6 +45,8 @@ impl Interface {
 
     fn open(&self) -> std::io::Result<CanFdSocket> {
         let socket = CanFdSocket::open(&self.name)?;
+        // an interface that is down can be opened, and says so afterwards
+        socket.as_raw_socket().take_error()?.map_or(Ok(()), Err)?;
         socket.set_nonblocking(true)?;
         socket.set_error_filter_accept_all()?;
         socket.set_recv_timestamp(true)?;
@@ -79,6 +83,7 @@ impl CanPort for Interface {
             if let CanAnyFrame::Error(frame) = &frame
                 && frame.error_bits() & BUS_OFF != 0
             {
+                self.bus_offs = self.bus_offs.saturating_add(1);
                 self.failed("bus-off");
                 return None;
             }

@@ -124,8 +124,8 @@ impl Output {
             }
             self.sent += 1;
         }
-        if let Sink::Can(_, keeper) = &self.sink {
-            unit.broadcast().status_mut().bus_off = keeper.bus_off();
+        if let Sink::Can(interface, _) = &self.sink {
+            unit.broadcast().status_mut().bus_off = interface.bus_offs;
         }
     }
 
