@@ -140,6 +140,8 @@ pub struct Output {
     pub sensor: u8,
     #[serde(default)]
     pub listen_first: bool,
+    #[serde(default)]
+    pub service: bool,
     pub base_id: Option<u32>,
     pub gap_us: Option<u32>,
     pub stale_ms: Option<u16>,
@@ -252,6 +254,9 @@ impl Config {
         if input.clock == ClockSource::Input && output.interface.is_some() {
             add("input.clock", "a bus wants \"system\": its time cannot be another's");
         }
+        if output.service && output.interface.is_none() {
+            add("output.service", "is for a CAN `interface`; the native format's line has it anyway");
+        }
         for (key, baud) in [("input.baud", input.baud), ("output.baud", output.baud)] {
             if baud.is_some_and(|baud| !(1_200..=4_000_000).contains(&baud)) {
                 add(key, "outside 1200 to 4000000");
@@ -263,8 +268,8 @@ impl Config {
         let missing = [("mount", self.mount.is_none()), ("field_of_view", self.field_of_view.is_none())];
         match self.settings() {
             Some(settings) => problems.extend(self.refused(&settings).err().map(|e| of_library(&e))),
-            // a native line can bring them
-            None if input.radar == Radar::Native && missing.iter().all(|(_, missing)| *missing) => {}
+            // the integrator's messages can bring them
+            None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {}
             None => {
                 let missing = missing.iter().filter(|(_, missing)| *missing);
                 problems.extend(missing.map(|(key, _)| ((*key).to_owned(), format!("the table [{key}] is missing"))));
@@ -280,6 +285,11 @@ impl Config {
         let Ok(header) = header(settings, &parameters) else { return Ok(()) };
         let (Some(medium), epoch) = (self.medium(), Epoch::new(0)) else { return Ok(()) };
         Sender::new(self.broadcast(medium), header, epoch, Time::from_micros(0)).map(drop)
+    }
+
+    /// Whether configuration blocks may come over a line.
+    pub fn has_service(&self) -> bool {
+        self.input.radar == Radar::Native || self.output.service
     }
 
     /// What the integrator set; `None` if that is left to a configuration block.

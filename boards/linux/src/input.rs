@@ -145,8 +145,8 @@ impl Bus {
 }
 
 impl Input for Bus {
-    fn start(&mut self, config: &Config, _: &mut FileSlots, _: &mut Output) -> Option<Settings> {
-        config.settings()
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
+        slots.settings(config)
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {
@@ -155,7 +155,10 @@ impl Input for Bus {
 
     fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
         self.keeper.poll(now, &mut self.interface);
-        let Some(unit) = work.unit else { return Step::Now(now) };
+        let Some(unit) = work.unit else {
+            while self.keeper.receive(&mut self.interface).is_some() {}
+            return Step::Now(now);
+        };
         for _ in 0..ROW * ROW {
             let Some(frame) = self.keeper.receive(&mut self.interface) else { break };
             let age = u64::try_from(self.interface.age.as_micros()).unwrap_or(0);
@@ -225,8 +228,8 @@ impl Log {
 }
 
 impl Input for Log {
-    fn start(&mut self, config: &Config, _: &mut FileSlots, _: &mut Output) -> Option<Settings> {
-        config.settings()
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
+        slots.settings(config)
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {
@@ -234,7 +237,7 @@ impl Input for Log {
     }
 
     fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
-        let Some(unit) = work.unit else { return Step::End };
+        let Some(unit) = work.unit else { return Step::Now(now) };
         while let Some((time, frame)) = self.next
             && time <= now
         {
@@ -261,8 +264,8 @@ struct TiPort {
 }
 
 impl Input for TiPort {
-    fn start(&mut self, config: &Config, _: &mut FileSlots, _: &mut Output) -> Option<Settings> {
-        config.settings()
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
+        slots.settings(config)
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {
@@ -271,16 +274,19 @@ impl Input for TiPort {
 
     fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
         self.port.keep_open();
-        let Some(unit) = work.unit else { return Step::Now(now) };
         let mut buffer = [0; CHUNK];
         for _ in 0..ROW {
             let bytes = self.port.read(&mut buffer);
             if bytes.is_empty() {
                 break;
             }
-            self.session.take(bytes, now, unit);
+            if let Some(unit) = work.unit {
+                self.session.take(bytes, now, unit);
+            }
         }
-        self.session.idle(now, unit);
+        if let Some(unit) = work.unit {
+            self.session.idle(now, unit);
+        }
         Step::Now(now)
     }
 }
@@ -298,14 +304,11 @@ struct NativePort {
 }
 
 impl Input for NativePort {
-    fn start(&mut self, _: &Config, slots: &mut FileSlots, output: &mut Output) -> Option<Settings> {
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, output: &mut Output) -> Option<Settings> {
         self.port.keep_open();
         let mut lines = Lines { output, own: Some(&mut self.port) };
-        let session = self.session.insert(Session::start(self.sensor, slots, &mut lines));
-        if session.settings().is_none() {
-            warn!("no configuration that holds: safe state until a block is written");
-        }
-        session.settings().copied()
+        self.session = Some(Session::start(self.sensor, slots, &mut lines));
+        slots.settings(config)
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {

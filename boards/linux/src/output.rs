@@ -7,10 +7,12 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use log::{error, info};
 use viewshed::can_bus::{BusConfig, BusKeeper, BusState};
+use viewshed::can_service::{CanService, CanServiceConfig};
 use viewshed::pil::record::FrameRecord;
-use viewshed::session::Line;
+use viewshed::session::{Flow, Line};
 use viewshed::time::Time;
 use viewshed::wire::frame::CanFrame;
+use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::MOST_STUFFED;
 
 use crate::can::Interface;
@@ -18,6 +20,7 @@ use crate::config::{ClockSource, Config};
 use crate::frames;
 use crate::grid::Unit;
 use crate::serial::Serial;
+use crate::state::FileSlots;
 
 /// A frame is tried for so long, microseconds; then it is dropped and the next has its turn.
 const HELD_US: u64 = 20_000;
@@ -30,6 +33,8 @@ pub struct Output {
     sink: Sink,
     /// The frame there was no room for, and since when.
     held: Option<(CanFrame, Time)>,
+    /// The integrator's messages, if they are listened to.
+    service: Option<CanService>,
     /// Messages that went out, and those that did not.
     pub sent: u64,
     pub refused: u64,
@@ -56,7 +61,7 @@ impl Output {
                 File::create(path).with_context(|| format!("output.candump: cannot create {}", path.display()))?;
             Sink::Log { file: BufWriter::new(file), path: path.clone(), failed: false }
         } else if let Some(name) = &output.interface {
-            let mut interface = Interface::new(name, !output.listen_first);
+            let mut interface = Interface::new(name, !output.listen_first && !output.service);
             let bus = BusConfig { listen_first: output.listen_first, ..BusConfig::default() };
             let keeper = BusKeeper::start(&bus, &mut interface);
             Sink::Can(interface, keeper)
@@ -65,16 +70,28 @@ impl Output {
             let own = output.port.as_ref().filter(|port| config.input.port.as_ref() != Some(*port));
             Sink::Serial(own.map(|port| Serial::new(port, output.baud(), patient)))
         };
-        Ok(Self { sink, held: None, sent: 0, refused: 0 })
+        Ok(Self { sink, held: None, service: None, sent: 0, refused: 0 })
     }
 
-    /// Opens what is to be open and takes note of what the bus says.
-    pub fn keep_up(&mut self, now: Time) {
+    /// A start: from here on the integrator's messages are answered, where that is wanted.
+    pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, slots: &FileSlots) {
+        let medium = config.medium().filter(|_| config.output.service);
+        let service = medium.map(|medium| CanServiceConfig::new(config.output.sensor, medium));
+        self.service = service.map(|service| CanService::start(service, epoch, now, slots));
+    }
+
+    /// Opens what is to be open and takes what the bus says; whether the integrator wants a restart.
+    pub fn keep_up(&mut self, now: Time, slots: &mut FileSlots) -> Flow {
         match &mut self.sink {
             Sink::Can(interface, keeper) => {
                 keeper.poll(now, interface);
                 let before = keeper.state();
-                while keeper.receive(interface).is_some() {}
+                while let Some(frame) = keeper.receive(interface) {
+                    let flow = self.service.as_mut().and_then(|service| service.take(&frame, slots));
+                    if flow == Some(Flow::Restart) {
+                        return Flow::Restart;
+                    }
+                }
                 if matches!((before, keeper.state()), (BusState::Listening(_), BusState::Active)) {
                     info!("frames of others prove the bit rate right: sending");
                 }
@@ -86,6 +103,18 @@ impl Output {
                 port.read(&mut [0; 256]);
             }
             Sink::Serial(None) | Sink::Log { .. } => {}
+        }
+        Flow::Continue
+    }
+
+    /// Answers the integrator; in the safe state, says that it is one.
+    pub fn answer(&mut self, now: Time, safe: bool, slots: &FileSlots) {
+        let Some(service) = &mut self.service else { return };
+        let status = if safe { service.next_status(now) } else { None };
+        let answer = service.next_frame(now, slots);
+        for frame in status.iter().chain(&answer) {
+            let sent = self.put(now, frame);
+            *if sent { &mut self.sent } else { &mut self.refused } += 1;
         }
     }
 

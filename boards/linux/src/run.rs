@@ -7,6 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::polar::PolarMap;
+use viewshed::session::Flow;
 use viewshed::time::Time;
 use viewshed::unit::header;
 use viewshed::wire::status::{Reason, State as Told};
@@ -34,7 +35,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let folder = config.state_dir.as_deref();
     let settings = config.settings();
     let mut slots = FileSlots::open(folder, settings.as_ref());
-    if slots.newest().ok() != settings && settings.is_some() {
+    if config.has_service() && settings.is_some() && slots.newest().ok() != settings {
         warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
     }
     let mut input = input::open(config)?;
@@ -45,7 +46,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let mut systemd = Systemd::new();
     loop {
         let epoch = next_epoch(folder);
-        output.keep_up(clock.now());
+        output.keep_up(clock.now(), &mut slots);
         let settings = input.start(config, &mut slots, &mut output);
         let parameters = settings.map(|s| Parameters::new(&s.sensor, &s.radar_3d())).transpose();
         let parameters = parameters.map_err(|e| anyhow!("{e}"))?;
@@ -62,6 +63,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         if let Some(unit) = &mut unit {
             unit.broadcast().status_mut().firmware = version();
         }
+        output.start(config, epoch, input.now(clock.now()), &slots);
         info!("started, epoch {}", epoch.number());
         systemd.ready();
         let mut watch = Watch::default();
@@ -72,12 +74,15 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             }
             wait(input.as_ref(), &clock, output.is_busy() || unit.as_mut().is_some_and(|u| !u.broadcast().idle()));
             let now = clock.next();
-            output.keep_up(now);
+            if output.keep_up(now, &mut slots) == Flow::Restart {
+                break Step::Restart;
+            }
             let step = input.step(now, &mut Work { unit: &mut unit, slots: &mut slots, output: &mut output });
             let Step::Now(now) = step else { break step };
             if let Some(unit) = &mut unit {
                 output.send(now, unit, input.line());
             }
+            output.answer(now, unit.is_none(), &slots);
             if watch.look(unit.as_mut(), &output) {
                 systemd.frame_done();
             }
@@ -89,7 +94,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         }
         systemd.stopping();
         if let Some(unit) = &mut unit {
-            farewell(unit, input.as_mut(), &mut output, &mut clock);
+            farewell(unit, input.as_mut(), &mut output, &mut slots, &mut clock);
         }
         info!("{}", watch.text(&output));
         return output.finish();
@@ -97,7 +102,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
 }
 
 /// Maps that say unknown, and a status that says that there is none.
-fn farewell(unit: &mut Unit<'_>, input: &mut dyn Input, output: &mut Output, clock: &mut Clock) {
+fn farewell(unit: &mut Unit<'_>, input: &mut dyn Input, output: &mut Output, slots: &mut FileSlots, clock: &mut Clock) {
     unit.reset();
     let begin = clock.next();
     let start = input.now(begin);
@@ -112,7 +117,7 @@ fn farewell(unit: &mut Unit<'_>, input: &mut dyn Input, output: &mut Output, clo
         }
         // a test bench's clock stands still by now
         let now = Time::from_micros(start.micros() + past);
-        output.keep_up(system);
+        output.keep_up(system, slots);
         unit.idle(now);
         output.send(now, unit, input.line());
     }

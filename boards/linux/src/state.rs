@@ -11,6 +11,8 @@ use viewshed::session::Slots;
 use viewshed::settings::{BLOCK_LEN, BlockError, Settings};
 use viewshed::wire::message::Epoch;
 
+use crate::config::Config;
+
 /// The next epoch, a number kept over restarts; from the clock where nothing can be kept.
 pub fn next_epoch(folder: Option<&Path>) -> Epoch {
     let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
@@ -61,6 +63,18 @@ impl FileSlots {
     /// Why neither block is used.
     pub fn newest(&self) -> Result<Settings, [BlockError; 2]> {
         Settings::newest([&self.slots[0], &self.slots[1]]).map(|newest| newest.settings)
+    }
+
+    /// What to work with: the newest block where blocks are taken, else what the file says.
+    pub fn settings(&self, config: &Config) -> Option<Settings> {
+        if !config.has_service() {
+            return config.settings();
+        }
+        self.newest()
+            .inspect_err(|[first, second]| {
+                warn!("no configuration that holds ({first}; {second}): safe state until a block is written")
+            })
+            .ok()
     }
 
     fn keep(&self, slot: usize) -> std::io::Result<()> {

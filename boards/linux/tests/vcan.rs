@@ -6,9 +6,13 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use socketcan::dump::Reader;
-use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame, Id, Socket};
+use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
+use viewshed::can_service::{Answers, Told, Tool};
 use viewshed::map::Visibility;
+use viewshed::sensor::Sensor;
+use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
 use viewshed::wire::receive::{Limits, Receiver};
@@ -56,7 +60,7 @@ impl Daemon {
         let config = sample
             .replace("interface = \"can0\"", &format!("interface = \"{RADAR}\""))
             .replace("interface = \"can1\"", &format!("interface = \"{MAPS}\""))
-            .replace("medium = \"can\"", &format!("medium = \"{medium}\""));
+            .replace("medium = \"can\"", &format!("medium = \"{medium}\"\nservice = true"));
         std::fs::write(folder.join("viewshed.toml"), config).unwrap();
         let log = std::fs::File::create(folder.join("stderr")).unwrap();
         // a copy of this test may run elsewhere than it was built
@@ -66,11 +70,15 @@ impl Daemon {
         Self(child.unwrap(), folder)
     }
 
+    /// What it said.
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.1.join("stderr")).unwrap()
+    }
+
     fn wait_for(&self, text: &str, times: usize) {
         let started = Instant::now();
-        let log = || std::fs::read_to_string(self.1.join("stderr")).unwrap();
-        while log().matches(text).count() < times {
-            assert!(started.elapsed() < Duration::from_secs(20), "no {times} times `{text}` in: {}", log());
+        while self.log().matches(text).count() < times {
+            assert!(started.elapsed() < Duration::from_secs(20), "no {times} times `{text}` in: {}", self.log());
             std::thread::sleep(Duration::from_millis(5));
         }
     }
@@ -97,17 +105,24 @@ struct Bench {
     receiver: Box<Receiver<1, 120, 7>>,
     begin: Instant,
     heard: usize,
+    tool: Tool,
+    answers: Answers,
+    told: Vec<Told>,
 }
 
 impl Bench {
-    fn new() -> Self {
+    fn new(medium: &str) -> Self {
+        let addresses = Addresses::STANDARD;
+        let medium = if medium == "can" { Medium::Can(addresses) } else { Medium::CanFd(addresses) };
         let open = |name| {
             let socket = CanFdSocket::open(name).unwrap();
             socket.set_nonblocking(true).unwrap();
             socket
         };
         let receiver = Box::new(Receiver::new([0], Addresses::STANDARD, Limits::DEFAULT));
-        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin: Instant::now(), heard: 0 }
+        let (tool, answers) = (Tool::new(0, medium), Answers::new(0, medium));
+        let begin = Instant::now();
+        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, told: Vec::new() }
     }
 
     fn now(&self) -> Time {
@@ -125,10 +140,26 @@ impl Bench {
                     frame => CanFrame::classic(id, frame.data()),
                 };
                 self.heard += 1;
-                let _ = self.receiver.frame(self.now(), &frame.unwrap());
+                let frame = frame.unwrap();
+                self.told.extend(self.answers.take(&frame));
+                let _ = self.receiver.frame(self.now(), &frame);
             }
             std::thread::sleep(Duration::from_millis(1));
         }
+    }
+
+    /// Sends the integrator's frames.
+    fn ask(&mut self, frames: &[CanFrame]) {
+        for frame in frames {
+            let id = StandardId::new(frame.id.raw() as u16).unwrap();
+            let frame: CanAnyFrame = match frame.fd {
+                true => CanFdFrame::new(id, frame.data()).unwrap().into(),
+                false => CanDataFrame::new(id, frame.data()).unwrap().into(),
+            };
+            self.maps.write_frame(&frame).unwrap();
+            self.listen(Duration::from_millis(2));
+        }
+        self.listen(Duration::from_millis(200));
     }
 
     /// Plays the shipped log to the radar's bus at its pace.
@@ -153,6 +184,14 @@ impl Bench {
     }
 }
 
+/// Those of the sample file.
+fn settings() -> Settings {
+    let table: toml::Table = include_str!("../viewshed.toml").parse().unwrap();
+    let part = |name: &str| table[name].clone();
+    let (mount, field_of_view) = (part("mount").try_into().unwrap(), part("field_of_view").try_into().unwrap());
+    Settings::of(Sensor { mount, field_of_view, noise: Default::default() })
+}
+
 #[test]
 fn frames_come_and_go_over_the_kernels_buses() {
     let _buses = match Buses::make() {
@@ -160,7 +199,7 @@ fn frames_come_and_go_over_the_kernels_buses() {
         Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
     };
     for medium in ["can", "can-fd"] {
-        let mut bench = Bench::new();
+        let mut bench = Bench::new(medium);
         let mut daemon = Daemon::start(medium);
         daemon.wait_for("started", 1);
         bench.play();
@@ -171,6 +210,20 @@ fn frames_come_and_go_over_the_kernels_buses() {
         assert_eq!((counters.lost, counters.protection, counters.malformed), (0, 0, 0));
         assert!(bench.visible() > 5000, "{medium}: {}", bench.visible());
 
+        // another height, over the bus
+        let mut settings = settings();
+        settings.sensor.mount.height_m = 7.5;
+        let block: Vec<CanFrame> = bench.tool.write(&settings.to_block(0)).collect();
+        bench.ask(&block);
+        assert!(matches!(bench.told.last(), Some(Told::Written(_))), "{medium}: {:?}", bench.told);
+        let restart = bench.tool.restart().unwrap();
+        bench.ask(&[restart]);
+        daemon.wait_for("restart with the newest configuration block", 1);
+        bench.play();
+        bench.listen(Duration::from_millis(600));
+        let header = *bench.receiver.sensor(0).unwrap().header().unwrap();
+        assert_eq!(header.mount.height_cm, 750, "{medium}");
+
         // silence
         bench.listen(Duration::from_millis(1200));
         assert_eq!((bench.state(), bench.visible()), (Some((State::Blind, Reason::RadarSilent)), 0), "{medium}");
@@ -180,17 +233,17 @@ fn frames_come_and_go_over_the_kernels_buses() {
         daemon.wait_for(&format!("{MAPS}: "), 2);
         ip(&format!("link set {MAPS} up")).unwrap();
         daemon.wait_for(&format!("{MAPS}: open"), 2);
-        bench.maps = Bench::new().maps;
+        bench.maps = Bench::new(medium).maps;
         // that of the radar vanishes
         ip(&format!("link del {RADAR}")).unwrap();
         daemon.wait_for(&format!("warning: {RADAR}: "), 1);
         ip(&format!("link add dev {RADAR} type vcan")).unwrap();
         ip(&format!("link set {RADAR} up")).unwrap();
         daemon.wait_for(&format!("{RADAR}: open"), 2);
-        bench.radar = Bench::new().radar;
+        bench.radar = Bench::new(medium).radar;
         bench.play();
         bench.listen(Duration::from_millis(60));
-        assert_eq!(bench.state().map(|s| s.0), Some(State::Ok), "{medium}");
+        assert_eq!(bench.state().map(|s| s.0), Some(State::Ok), "{medium}: {}", daemon.log());
         assert!(bench.visible() > 5000, "{medium}: {}", bench.visible());
 
         assert_eq!(daemon.terminate().code(), Some(0));
