@@ -22,10 +22,10 @@ use crate::systemd::Systemd;
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);
 const CALM: Duration = Duration::from_millis(5);
-/// How long is said, at the end, that there is no map any more, microseconds.
-const FAREWELL_US: u64 = 300_000;
-/// A step of a clock that is told by a log.
+/// A step of a clock that is told by a log, microseconds.
 const TICK_US: u64 = 1_000;
+/// How long is said, at the end, that there is no map any more: a status is due every 250 ms.
+const FAREWELL_TICKS: u64 = 300;
 
 /// Works until it is stopped, or to the end of a log.
 ///
@@ -104,20 +104,14 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
 /// Maps that say unknown, and a status that says that there is none.
 fn farewell(unit: &mut Unit<'_>, input: &mut dyn Input, output: &mut Output, slots: &mut FileSlots, clock: &mut Clock) {
     unit.reset();
-    let begin = clock.next();
-    let start = input.now(begin);
-    loop {
+    let start = input.now(clock.next());
+    // by steps: a machine that is slow at its end says the same
+    for step in 1..=FAREWELL_TICKS {
         if !clock.is_steps() {
             std::thread::sleep(BUSY);
         }
-        let system = clock.next();
-        let past = system.since(begin).unwrap_or(u64::MAX);
-        if past > FAREWELL_US {
-            return;
-        }
-        // a test bench's clock stands still by now
-        let now = Time::from_micros(start.micros() + past);
-        output.keep_up(system, slots);
+        output.keep_up(clock.next(), slots);
+        let now = Time::from_micros(start.micros() + step * TICK_US);
         unit.idle(now);
         output.send(now, unit, input.line());
     }

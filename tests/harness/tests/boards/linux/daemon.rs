@@ -79,13 +79,14 @@ impl Drop for Daemon {
     }
 }
 
-/// The tables of mount and field of view.
+/// The tables of mount, field of view and ends of maps.
 pub fn tables(settings: &viewshed::settings::Settings) -> String {
-    let (m, v) = (settings.sensor.mount, settings.sensor.field_of_view);
+    let (m, v, h) = (settings.sensor.mount, settings.sensor.field_of_view, settings.health);
     format!(
         "[mount]\nx_m = {:?}\ny_m = {:?}\nheight_m = {:?}\nyaw_deg = {:?}\npitch_deg = {:?}\nroll_deg = {:?}\n\
          [field_of_view]\nazimuth_min_deg = {:?}\nazimuth_max_deg = {:?}\nelevation_min_deg = {:?}\n\
-         elevation_max_deg = {:?}\nrange_min_m = {:?}\nrange_max_m = {:?}\n",
+         elevation_max_deg = {:?}\nrange_min_m = {:?}\nrange_max_m = {:?}\n\
+         [health]\nhold_s = {:?}\nblind_after_s = {:?}\nreset_gap_s = {:?}\n",
         m.x_m,
         m.y_m,
         m.height_m,
@@ -97,6 +98,9 @@ pub fn tables(settings: &viewshed::settings::Settings) -> String {
         v.elevation_min_deg,
         v.elevation_max_deg,
         v.range_min_m,
-        v.range_max_m
+        v.range_max_m,
+        h.hold_s,
+        h.blind_after_s,
+        h.reset_gap_s
     )
 }

@@ -92,6 +92,10 @@ fn linux_in_a_test_bench_every_message_of_five_seconds_is_the_same() {
     );
 }
 
+/// Generous ones: the machine that runs the tests may be busy.
+const LIMITS: Limits = Limits { max_age_us: 1_000_000, max_delay_us: 500_000 };
+const PATIENT: &str = "gap_us = 0\nstale_ms = 500\nmax_age_ms = 1000\nmax_delay_ms = 500\n";
+
 type Far = Receiver<1, 120, 7>;
 
 /// What a receiver has of these messages.
@@ -105,7 +109,7 @@ struct Heard {
 
 impl Heard {
     fn new() -> Self {
-        let receiver = Far::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+        let receiver = Far::new([SENSOR], Addresses::STANDARD, LIMITS);
         Self { receiver, unstuffer: Unstuffer::new(), taken: 0, status: None, now: Time::from_micros(0) }
     }
 
@@ -133,6 +137,25 @@ impl Heard {
     fn cells(&self) -> Vec<Visibility> {
         let map = self.receiver.map(SENSOR, self.now);
         (0..120 * 200).map(|k| map.cell(k / 200, k % 200).visibility).collect()
+    }
+
+    /// Listens until something is so; `false` if it is not within ten seconds.
+    fn until(&mut self, ear: &Ear, so: impl Fn(&Self) -> bool) -> bool {
+        let started = Instant::now();
+        loop {
+            self.take(ear);
+            if so(self) {
+                return true;
+            }
+            if started.elapsed() > Duration::from_secs(10) {
+                return false;
+            }
+            sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn is(&self, state: State, reason: Reason) -> bool {
+        self.status.is_some_and(|s| (s.state, s.reason) == (state, reason))
     }
 
     fn visible(&self) -> usize {
@@ -173,13 +196,15 @@ fn expected(settings: &Settings, scans: &[u8]) -> Answered {
 #[test]
 #[ignore = "needs the daemon"]
 fn linux_cables_are_pulled_and_the_daemon_goes_on() {
-    let (settings, scans) = shipped(6.0);
+    let (mut settings, scans) = shipped(6.0);
+    settings.health.hold_s = 2.0;
     let folder = Folder::new().unwrap();
     let begin = Instant::now();
     let (radar_name, maps_name) = (folder.0.join("radar"), folder.0.join("maps"));
     // neither port is there at the start
     let input = "[input]\nradar = \"native\"\nport = \"FOLDER/radar\"\n";
-    let mut daemon = Daemon::start_in(folder, &format!("{input}{PORTS}{}", tables(&settings)), &[]);
+    let config = format!("{input}{PORTS}{PATIENT}{}", tables(&settings));
+    let mut daemon = Daemon::start_in(folder, &config, &[]);
     daemon.wait_for("radar: No such file or directory");
     daemon.wait_for("maps: No such file or directory");
     let mut radar = Terminal::plug(&radar_name);
@@ -190,21 +215,25 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     // maps are those of the library, whatever noise comes between the scans
     let (mut script, mut far) = (Script::default(), Heard::new());
     let sent = stream(&mut radar, &mut script, &scans[..30], begin, true);
-    far.take(&ear);
-    let (got, should) = (maps(&messages(&ear.bytes())), maps(&messages(&expected(&settings, &sent).bytes)));
-    let from = got.iter().position(|m| *m == should[0]).expect("the first map");
+    let should = maps(&messages(&expected(&settings, &sent).bytes));
     assert!(should.len() >= 30, "{}", should.len());
-    assert!(got[from..].starts_with(&should), "{} of {} messages", got.len() - from, should.len());
-    assert_eq!(far.status.map(|s| s.state), Some(State::Ok));
+    let got = || {
+        let got = maps(&messages(&ear.bytes()));
+        let from = got.iter().position(|m| *m == should[0]).unwrap_or(got.len());
+        got[from..].to_vec()
+    };
+    far.until(&ear, |_| got().len() >= should.len());
+    let first = got().iter().zip(&should).position(|(a, b)| a != b);
+    assert!(first.is_none() && got().len() >= should.len(), "{first:?}, {} of {} messages", got().len(), should.len());
     assert!(far.visible() > 5000, "{}", far.visible());
-    println!("{} map messages the same; {} messages refused as damaged", should.len(), far.status.unwrap().e2e_errors);
-    assert!(far.status.unwrap().e2e_errors >= 7, "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None)), "{:?}", far.status);
+    let damaged = far.status.unwrap().e2e_errors;
+    println!("{} map messages the same; {damaged} messages refused as damaged", should.len());
+    assert!(damaged >= 7, "{damaged}");
 
     // silence
-    sleep(Duration::from_millis(1100));
-    far.take(&ear);
-    assert_eq!(far.status.map(|s| (s.state, s.reason)), Some((State::Blind, Reason::RadarSilent)));
-    assert_eq!(far.visible(), 0);
+    let blind = |far: &Heard| far.is(State::Blind, Reason::RadarSilent) && far.visible() == 0;
+    assert!(far.until(&ear, blind), "{:?}, {} visible", far.status, far.visible());
 
     // the radar's cable is pulled and plugged in again
     drop(radar);
@@ -212,32 +241,29 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     let mut radar = Terminal::plug(&radar_name);
     daemon.wait_for_times("radar: open", 2);
     let sent = stream(&mut radar, &mut script, &scans[30..60], begin, false);
-    far.take(&ear);
     let (mut twin, all, mut from) = (Heard::new(), expected(&settings, &sent), 0);
     for (to, now) in &all.times {
         twin.bytes(&all.bytes[from..*to], *now);
         from = *to;
     }
-    assert_eq!(far.status.map(|s| s.state), Some(State::Ok));
-    assert!(far.visible() > 5000 && far.cells() == twin.cells(), "{} and {}", far.visible(), twin.visible());
+    assert!(twin.visible() > 5000, "{}", twin.visible());
+    assert!(far.until(&ear, |far| far.cells() == twin.cells()), "{} and {}", far.visible(), twin.visible());
+    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None)), "{:?}", far.status);
 
     // and the other one
     drop(ear);
-    let rest = stream(&mut radar, &mut script, &scans[60..65], begin, false);
-    assert!(!rest.is_empty());
+    stream(&mut radar, &mut script, &scans[60..65], begin, false);
     daemon.wait_for("maps: lost");
     let ear = Ear::plug(&maps_name, begin);
     daemon.wait_for_times("maps: open", 2);
     (far.taken, far.unstuffer) = (0, Unstuffer::new());
     stream(&mut radar, &mut script, &scans[65..80], begin, false);
-    far.take(&ear);
-    assert!(far.visible() > 5000, "within a second: {}", far.visible());
+    assert!(far.until(&ear, |far| far.visible() > 5000), "{}", far.visible());
 
     // stopped: the last map says unknown, the last status that there is none
     daemon.terminate();
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
-    sleep(Duration::from_millis(50));
-    far.take(&ear);
-    assert_eq!((far.status.map(|s| s.state), far.visible()), (Some(State::Starting), 0));
+    let gone = |far: &Heard| far.is(State::Starting, Reason::None) && far.visible() == 0;
+    assert!(far.until(&ear, gone), "{:?}, {} visible", far.status, far.visible());
     assert!(daemon.log().contains("stopping"), "{}", daemon.log());
 }

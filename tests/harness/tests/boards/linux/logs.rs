@@ -57,10 +57,10 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     }
     unit.reset();
     for past in 1..=300 {
-        // one step is spent on looking at the clock
-        let (now, past) = (now + 1000, 1000 * past);
-        unit.idle(at(now + past));
-        flush(&mut unit, now + past, &mut sent);
+        // the first step begins it
+        let now = now + 1000 + 1000 * past;
+        unit.idle(at(now));
+        flush(&mut unit, now, &mut sent);
     }
     sent
 }
