@@ -44,8 +44,10 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let mut map: Box<Map> = Box::new(PolarMap::NOWHERE);
     let mut clock = Clock::new(config, input.begins());
     let mut systemd = Systemd::new();
+    let mut last_epoch = None;
     loop {
-        let epoch = next_epoch(folder);
+        let epoch = next_epoch(folder, last_epoch);
+        last_epoch = Some(epoch);
         output.keep_up(clock.now(), &mut slots);
         let settings = input.start(config, &mut slots, &mut output);
         let parameters = settings.map(|s| Parameters::new(&s.sensor, &s.radar_3d())).transpose();

@@ -13,14 +13,18 @@ use viewshed::wire::message::Epoch;
 
 use crate::config::Config;
 
-/// The next epoch, a number kept over restarts; from the clock where nothing can be kept.
-pub fn next_epoch(folder: Option<&Path>) -> Epoch {
+/// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
+/// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
+pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
     let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
-    let Some(path) = folder.map(|folder| folder.join("epoch")) else { return Epoch::new(chance) };
-    let last = fs::read_to_string(&path).ok().and_then(|text| text.trim().parse().ok());
-    let next = last.map_or(Epoch::new(chance), |last: u8| Epoch::new(last).next());
-    if let Err(e) = replace(&path, next.number().to_string().as_bytes()) {
-        warn!("{}: {e}: epochs do not go on from start to start", path.display());
+    let path = folder.map(|folder| folder.join("epoch"));
+    let kept = || fs::read_to_string(path.as_ref()?).ok()?.trim().parse().ok().map(Epoch::new);
+    let next = last.or_else(kept).map_or(Epoch::new(chance), Epoch::next);
+    match path.as_ref().map(|path| replace(path, next.number().to_string().as_bytes())) {
+        Some(Ok(())) => {}
+        Some(Err(e)) => warn!("{}: {e}: the epoch is not kept", folder.unwrap_or(Path::new("")).display()),
+        None if last.is_none() => warn!("no state folder: the epoch is by chance, and blocks are not kept"),
+        None => {}
     }
     next
 }
@@ -140,14 +144,16 @@ mod tests {
     #[test]
     fn epochs_go_on_from_start_to_start() {
         let folder = folder("epochs");
-        let first = next_epoch(Some(&folder));
-        assert_eq!(next_epoch(Some(&folder)), first.next());
+        let first = next_epoch(Some(&folder), None);
+        assert_eq!(next_epoch(Some(&folder), None), first.next());
         fs::write(folder.join("epoch"), "15").unwrap();
-        assert_eq!(next_epoch(Some(&folder)).number(), 0);
+        assert_eq!(next_epoch(Some(&folder), None).number(), 0);
         fs::write(folder.join("epoch"), "rubbish").unwrap();
-        next_epoch(Some(&folder));
+        next_epoch(Some(&folder), None);
         assert!(fs::read_to_string(folder.join("epoch")).unwrap().parse::<u8>().is_ok());
         fs::remove_dir_all(folder).unwrap();
+        // also where nothing can be kept, a restart is a new epoch
+        assert_eq!(next_epoch(None, Some(first)), first.next());
     }
 
     #[test]

@@ -113,15 +113,6 @@ impl Heard {
         Self { receiver, unstuffer: Unstuffer::new(), taken: 0, status: None, now: Time::from_micros(0) }
     }
 
-    /// Takes what came since the last time.
-    fn take(&mut self, ear: &Ear) {
-        let all = ear.heard();
-        for (at, bytes) in &all[self.taken..] {
-            self.bytes(bytes, Time::from_micros(at.as_micros() as u64));
-        }
-        self.taken = all.len();
-    }
-
     fn bytes(&mut self, mut bytes: &[u8], now: Time) {
         self.now = now;
         while !bytes.is_empty() {
@@ -143,9 +134,13 @@ impl Heard {
     fn until(&mut self, ear: &Ear, so: impl Fn(&Self) -> bool) -> bool {
         let started = Instant::now();
         loop {
-            self.take(ear);
-            if so(self) {
-                return true;
+            // each chunk at its own time, however late it is looked at
+            for (at, bytes) in ear.heard().iter().skip(self.taken) {
+                self.taken += 1;
+                self.bytes(bytes, Time::from_micros(at.as_micros() as u64));
+                if so(self) {
+                    return true;
+                }
             }
             if started.elapsed() > Duration::from_secs(10) {
                 return false;
@@ -215,6 +210,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     // maps are those of the library, whatever noise comes between the scans
     let (mut script, mut far) = (Script::default(), Heard::new());
     let sent = stream(&mut radar, &mut script, &scans[..30], begin, true);
+    assert!(far.until(&ear, |far| far.visible() > 5000 && far.is(State::Ok, Reason::None)), "{:?}", far.status);
     let should = maps(&messages(&expected(&settings, &sent).bytes));
     assert!(should.len() >= 30, "{}", should.len());
     let got = || {
@@ -222,14 +218,10 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
         let from = got.iter().position(|m| *m == should[0]).unwrap_or(got.len());
         got[from..].to_vec()
     };
-    far.until(&ear, |_| got().len() >= should.len());
+    assert!(far.until(&ear, |far| far.status.is_some_and(|s| s.e2e_errors >= 7)), "{:?}", far.status);
     let first = got().iter().zip(&should).position(|(a, b)| a != b);
     assert!(first.is_none() && got().len() >= should.len(), "{first:?}, {} of {} messages", got().len(), should.len());
-    assert!(far.visible() > 5000, "{}", far.visible());
-    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None)), "{:?}", far.status);
-    let damaged = far.status.unwrap().e2e_errors;
-    println!("{} map messages the same; {damaged} messages refused as damaged", should.len());
-    assert!(damaged >= 7, "{damaged}");
+    println!("{} map messages the same, with noise between the scans", should.len());
 
     // silence
     let blind = |far: &Heard| far.is(State::Blind, Reason::RadarSilent) && far.visible() == 0;
