@@ -21,8 +21,8 @@ use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanId;
 use viewshed::wire::message::{Addresses, Epoch, Message};
 
-use crate::grid::{Parameters, Sender};
 use crate::locate;
+use viewshed::profile::reference::{Parameters, Sender};
 
 /// The whole file.
 #[derive(Debug, Clone, Deserialize)]

@@ -23,10 +23,10 @@ use viewshed::wire::frame::CanFrame;
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;
-use crate::grid::{DETECTIONS, Unit};
 use crate::output::{Lines, Output};
 use crate::serial::Serial;
 use crate::state::FileSlots;
+use viewshed::profile::reference::{DETECTIONS, Unit};
 
 /// Bytes read at once.
 const CHUNK: usize = 4096;

@@ -3,7 +3,6 @@
 mod can;
 mod config;
 mod frames;
-mod grid;
 mod input;
 mod locate;
 mod output;

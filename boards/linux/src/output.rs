@@ -18,9 +18,9 @@ use viewshed::wire::serial::MOST_STUFFED;
 use crate::can::Interface;
 use crate::config::{ClockSource, Config};
 use crate::frames;
-use crate::grid::Unit;
 use crate::serial::Serial;
 use crate::state::FileSlots;
+use viewshed::profile::reference::Unit;
 
 /// A frame is tried for so long, microseconds; then it is dropped and the next has its turn.
 const HELD_US: u64 = 20_000;

@@ -13,11 +13,11 @@ use viewshed::unit::header;
 use viewshed::wire::status::{Reason, State as Told};
 
 use crate::config::{ClockSource, Config};
-use crate::grid::{Map, Parameters, Sender, State, Unit};
 use crate::input::{self, Input, Step, Work};
 use crate::output::Output;
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
+use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
 
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);

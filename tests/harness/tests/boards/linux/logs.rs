@@ -6,18 +6,19 @@ use std::process::Command;
 use viewshed::can_session::CanSession;
 use viewshed::inputs::ars408::Config;
 use viewshed::polar::PolarMap;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::profile::reference::{DETECTIONS, Parameters, Sender, State, Unit};
 use viewshed::settings::Settings;
 use viewshed::time::Time;
-use viewshed::unit::{Unit, header};
-use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::unit::header;
+use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Epoch};
+use viewshed_harness::boards::can_twin::clusters;
+use viewshed_harness::boards::machine::Folder;
 use viewshed_harness::recording::candump::{Content, Line};
 
 use super::daemon::{Daemon, tables};
 use crate::shipped;
-use crate::zcu102::can::clusters;
 
 /// The daemon's epoch after one that was kept as 4.
 const EPOCH: Epoch = Epoch::new(5);
@@ -27,19 +28,19 @@ type Sent = Vec<(u64, CanFrame)>;
 
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second behind the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
-    let parameters = Radar3dParameters::<200, 120, 16>::new(&settings.sensor, &settings.radar_3d()).unwrap();
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 64, 256>::new());
+    let parameters = Parameters::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
     let (first, last) = (log.first().unwrap().0, log.last().unwrap().0);
     let at = Time::from_micros;
     let config = BroadcastConfig::new(0, medium);
     let header = header(settings, &parameters).unwrap();
-    let mut sender = Box::new(Broadcaster::<120, 7>::new(config, header, EPOCH, at(first)).unwrap());
+    let mut sender = Box::new(Sender::new(config, header, EPOCH, at(first)).unwrap());
     let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
     unit.broadcast().status_mut().firmware = [0, 1, 0];
-    let mut session = CanSession::<256>::new(Config::sensor(radar));
+    let mut session = CanSession::<DETECTIONS>::new(Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
-    let flush = |unit: &mut Unit<'_, 200, 120, 16, 7, 64, 256>, now: u64, sent: &mut Sent| {
+    let flush = |unit: &mut Unit<'_>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
     };
     loop {
@@ -82,7 +83,7 @@ fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> String {
 
 /// Runs the daemon over a log and compares every frame and its time.
 fn same(settings: &Settings, log: &Path, radar: u8, name: &str, medium: Medium) -> (Daemon, Sent) {
-    let folder = viewshed_harness::boards::machine::Folder::new().unwrap();
+    let folder = Folder::new().unwrap();
     std::fs::write(folder.0.join("epoch"), "4").unwrap();
     let mut daemon = Daemon::start_in(folder, &config(settings, log, radar, name), &[]);
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
@@ -116,14 +117,13 @@ fn linux_every_frame_of_the_shipped_log_is_the_same() {
 #[ignore = "needs the daemon"]
 fn linux_every_frame_of_the_motorway_is_the_same_and_listen_decodes_all() {
     let (settings, scans) = shipped(20.0);
-    let folder = viewshed_harness::boards::machine::Folder::new().unwrap();
+    let folder = Folder::new().unwrap();
     let log = folder.0.join("motorway.log");
     let mut text = String::new();
-    for (k, scan) in scans.iter().enumerate() {
-        let count = scan.detections.len().min(240);
+    for scan in clusters(&scans, scans.len(), 240) {
         // as they come on a bus of 500 kbit/s, four in a millisecond
-        for (n, frame) in clusters(k as u16, &scan.detections[..count]).into_iter().enumerate() {
-            let micros = 1_700_000_000_000_000 + 66_667 * k as i64 + 250 * n as i64;
+        for (n, frame) in scan.frames.into_iter().enumerate() {
+            let micros = 1_700_000_000_000_000 + scan.time.micros() as i64 + 250 * n as i64;
             let line = Line { time_ns: 1000 * micros, interface: "can0".into(), content: Content::Data(frame) };
             text += &format!("{line}\n");
         }
