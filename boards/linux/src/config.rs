@@ -11,6 +11,7 @@ use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfigurat
 use viewshed::inputs::ars408::profile::{self, Profile};
 use viewshed::inputs::ti;
 use viewshed::mount::Mount;
+use viewshed::profile::reference::{Parameters, Sender};
 use viewshed::radar_3d::VisibilityConfig;
 use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
@@ -22,7 +23,6 @@ use viewshed::wire::frame::CanId;
 use viewshed::wire::message::{Addresses, Epoch, Message};
 
 use crate::locate;
-use viewshed::profile::reference::{Parameters, Sender};
 
 /// The whole file.
 #[derive(Debug, Clone, Deserialize)]

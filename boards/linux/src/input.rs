@@ -13,6 +13,7 @@ use viewshed::can_session::CanSession;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::state::RadarState;
 use viewshed::inputs::ars408::upkeep::Upkeep;
+use viewshed::profile::reference::{DETECTIONS, Unit};
 use viewshed::radar_clock::RadarClock;
 use viewshed::session::{Flow, Session};
 use viewshed::settings::Settings;
@@ -26,7 +27,6 @@ use crate::frames::from_socketcan;
 use crate::output::{Lines, Output};
 use crate::serial::Serial;
 use crate::state::FileSlots;
-use viewshed::profile::reference::{DETECTIONS, Unit};
 
 /// Bytes read at once.
 const CHUNK: usize = 4096;

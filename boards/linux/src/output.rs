@@ -9,6 +9,7 @@ use log::{error, info};
 use viewshed::can_bus::{BusConfig, BusKeeper, BusState};
 use viewshed::can_service::{CanService, CanServiceConfig};
 use viewshed::pil::record::FrameRecord;
+use viewshed::profile::reference::Unit;
 use viewshed::session::{Flow, Line};
 use viewshed::time::Time;
 use viewshed::wire::frame::CanFrame;
@@ -20,7 +21,6 @@ use crate::config::{ClockSource, Config};
 use crate::frames;
 use crate::serial::Serial;
 use crate::state::FileSlots;
-use viewshed::profile::reference::Unit;
 
 /// A frame is tried for so long, microseconds; then it is dropped and the next has its turn.
 const HELD_US: u64 = 20_000;
@@ -75,6 +75,8 @@ impl Output {
 
     /// A start: from here on the integrator's messages are answered, where that is wanted.
     pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, slots: &FileSlots) {
+        // nothing of the epoch before
+        self.held = None;
         let medium = config.medium().filter(|_| config.output.service);
         let service = medium.map(|medium| CanServiceConfig::new(config.output.sensor, medium));
         self.service = service.map(|service| CanService::start(service, epoch, now, slots));

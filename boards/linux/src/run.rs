@@ -7,6 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::polar::PolarMap;
+use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
 use viewshed::session::Flow;
 use viewshed::time::Time;
 use viewshed::unit::header;
@@ -17,7 +18,6 @@ use crate::input::{self, Input, Step, Work};
 use crate::output::Output;
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
-use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
 
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);
@@ -33,6 +33,8 @@ const FAREWELL_TICKS: u64 = 300;
 /// What cannot be retried: a log, a folder, settings.
 pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let folder = config.state_dir.as_deref();
+    // if it cannot be made, what is written there says so
+    let _ = folder.map(std::fs::create_dir_all);
     let settings = config.settings();
     let mut slots = FileSlots::open(folder, settings.as_ref());
     if config.has_service() && settings.is_some() && slots.newest().ok() != settings {

@@ -40,9 +40,12 @@ impl Terminal {
     }
 }
 
+/// What came, and when.
+type Chunks = Vec<(Duration, Vec<u8>)>;
+
 /// Hears what a port sends, with the time of each chunk, until it is unplugged by dropping this.
 pub struct Ear {
-    heard: Arc<Mutex<Vec<(Duration, Vec<u8>)>>>,
+    heard: Arc<Mutex<Chunks>>,
     gone: Arc<Mutex<bool>>,
     thread: Option<thread::JoinHandle<()>>,
 }
@@ -50,7 +53,7 @@ pub struct Ear {
 impl Ear {
     pub fn plug(name: &Path, since: Instant) -> Self {
         let mut terminal = Terminal::plug(name);
-        let (heard, gone) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(false)));
+        let (heard, gone) = (Arc::new(Mutex::new(Chunks::new())), Arc::new(Mutex::new(false)));
         let (to, end) = (heard.clone(), gone.clone());
         let thread = thread::spawn(move || {
             let mut buffer = [0; 4096];
@@ -66,7 +69,7 @@ impl Ear {
     }
 
     /// Everything so far.
-    pub fn heard(&self) -> Vec<(Duration, Vec<u8>)> {
+    pub fn heard(&self) -> Chunks {
         self.heard.lock().unwrap().clone()
     }
 
