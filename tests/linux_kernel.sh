@@ -32,7 +32,6 @@ fi
 cargo build --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target"
 tests=$(cargo test --release --locked --no-run --test vcan --manifest-path boards/linux/Cargo.toml --target-dir "$target" 2>&1 |
     sed -n 's/.*Executable.*(\(.*\))$/\1/p')
-case $tests in /*) ;; *) tests=boards/linux/$tests ;; esac
 disk=$kernel/disk
 rm -rf "$disk"
 mkdir -p "$disk/bin" "$disk/modules" "$disk/proc" "$disk/sys" "$disk/dev" "$disk/tmp"
