@@ -69,7 +69,7 @@
 //! | results: the map interface, queries, the 1 m grid, the bitmap | [`map`], [`query`], [`resample`], [`bitmap`] |
 //! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
-//! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`can_service`], [`service`], [`settings`] |
+//! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`ti_session`], [`radar_clock`], [`can_service`], [`service`], [`settings`] |
 //! | a unit on hardware of its own: the loop, receive queue, settings in flash, status output | [`roadside`], [`frame_queue`], [`flash_slots`], [`status_output`] |
 //! | a bus looked after: listen first, back off after bus-off; a line that stalls | [`can_bus`], [`transmitter`] |
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
@@ -139,6 +139,7 @@ pub mod profile;
 pub mod query;
 pub mod radar_2d;
 pub mod radar_3d;
+pub mod radar_clock;
 pub mod raycast;
 pub mod reflection;
 pub mod resample;
@@ -154,6 +155,7 @@ pub mod spherical;
 mod stack;
 pub mod stage;
 pub mod status_output;
+pub mod ti_session;
 pub mod time;
 pub mod transmitter;
 pub mod trig;

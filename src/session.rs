@@ -133,15 +133,7 @@ impl<const D: usize> Session<D> {
                         let used = self.settings.as_ref().ok().map_or(&[][..], |n| slots.slot(n.slot));
                         send(&Reply::Block(used), self.sensor, &mut self.service_counter, &mut self.refused, line);
                     }
-                    Request::Time(now) => {
-                        self.now = now;
-                        while let Some(outcome) = self.radar.poll(now) {
-                            scan(&outcome, &mut self.now, &mut self.frames, unit, line);
-                        }
-                        if let Some(unit) = unit {
-                            unit.idle(self.now);
-                        }
-                    }
+                    Request::Time(now) => self.wait(now, unit, line),
                 }
             } else {
                 let outcome = self.radar.push(message, self.now);
@@ -153,6 +145,34 @@ impl<const D: usize> Session<D> {
             self.flush(unit, line);
         }
         Flow::Continue
+    }
+
+    /// What is to be done when no bytes came, where the unit has a clock; it has to be the one its scans
+    /// are stamped by, see [`RadarClock`](crate::radar_clock::RadarClock).
+    pub fn idle<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+        &mut self,
+        now: Time,
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        line: &mut impl Line,
+    ) {
+        self.wait(now, unit, line);
+        self.flush(unit, line);
+    }
+
+    /// Time went on.
+    fn wait<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+        &mut self,
+        now: Time,
+        unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
+        line: &mut impl Line,
+    ) {
+        self.now = now;
+        while let Some(outcome) = self.radar.poll(now) {
+            scan(&outcome, &mut self.now, &mut self.frames, unit, line);
+        }
+        if let Some(unit) = unit {
+            unit.idle(self.now);
+        }
     }
 
     fn flush<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(

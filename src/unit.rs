@@ -128,7 +128,8 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         self.broadcast.next_frame(now)
     }
 
-    /// When the last map that was offered to the sender was measured.
+    /// Time of the last map that was offered to the sender: it moves with every scan, and while there are
+    /// none with every map that says unknown.
     pub fn offered(&self) -> Option<Time> {
         self.offered
     }

@@ -14,6 +14,7 @@ use viewshed::unit::{Unit, bench_sender};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
+use viewshed::wire::status::{Reason, State};
 
 use common::{Vehicle, gantry};
 
@@ -77,4 +78,45 @@ fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() 
     assert!(after[39].1 > 30, "{after:?}");
     assert!(after[59].0 >= 20, "a map a scan from then on: {after:?}");
     assert!(after[59].1 <= after[40].1 + 1, "and nothing more is dropped: {after:?}");
+}
+
+#[test]
+fn a_radar_that_stops_is_told_by_the_units_own_clock() {
+    let settings = Settings::of(gantry(6.0, 0.0));
+    let parameters = Radar3dParameters::<50, 40, 8>::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    let mut map = parameters.map();
+    let mut sender: Broadcaster<40, 2> =
+        bench_sender(&settings, &parameters, Medium::Serial, Epoch::new(1), Time::from_micros(0)).unwrap();
+    let mut unit = Some(Unit::new(&parameters, &mut state, &mut map, &mut sender));
+    let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow { open: true, messages: 0 });
+    let mut session = Session::<64>::start(0, &slots, &mut line);
+
+    let (mut radar, car) = (Sender::new(0), Vehicle::car(40.0, 2.0, 22.0));
+    for k in 0..20_u64 {
+        let scan = car.at(k as f64 / 15.0).detections(&gantry(6.0, 0.0), true);
+        for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, Native::Serial) {
+            let mut stuffed = [0; MOST_STUFFED];
+            let n = stuff(message.bytes(), &mut stuffed).unwrap();
+            session.take(&stuffed[..n], &mut unit, &mut slots, &mut line);
+        }
+    }
+    let last = session.now();
+    assert_eq!(unit.as_ref().unwrap().offered(), Some(last));
+    let mut told = Vec::new();
+    for ms in [400, 500, 501, 550, 601, 700, 702] {
+        let before = line.messages;
+        session.idle(Time::from_micros(last.micros() + 1000 * ms), &mut unit, &mut line);
+        let unit = unit.as_mut().unwrap();
+        let offered = unit.offered().and_then(|t| t.since(last)).unwrap();
+        let status = unit.broadcast().status_mut();
+        told.push((ms, status.state, status.reason, offered / 1000, line.messages > before));
+    }
+    // held for half a second, then unknown, ten times a second
+    let (ok, silent) = ((State::Ok, Reason::None), (State::Blind, Reason::RadarSilent));
+    let expected = [(400, ok, 0), (500, ok, 0), (501, silent, 501), (550, silent, 501), (601, silent, 601)];
+    for (told, (ms, (state, reason), offered)) in told.iter().zip(expected) {
+        assert_eq!((told.0, told.1, told.2, told.3), (ms, state, reason, offered));
+    }
+    assert!(told[2].4 && told[4].4, "{told:?}");
 }

@@ -6,6 +6,7 @@ mod frames;
 mod framing;
 mod points;
 mod random;
+mod session;
 
 use viewshed::detection::Detection;
 use viewshed::inputs::ti::{Config, Dialect, Family, Flaw, Outcome, Ti};

@@ -1,6 +1,9 @@
-//! Firmware on emulated controllers. They need QEMU and a compiler for the target, so they are ignored
-//! unless asked for: `tests/firmware.sh` sees to both.
+//! Firmware on emulated controllers, and the daemon. The former needs QEMU and a compiler for the target, the
+//! latter a build of its own, so they are ignored unless asked for: `tests/firmware.sh` and `tests/linux.sh`
+//! see to that.
 
+#[cfg(target_os = "linux")]
+mod linux;
 #[cfg(unix)]
 mod live;
 mod mps2;

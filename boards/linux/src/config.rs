@@ -1,0 +1,439 @@
+//! The configuration file: TOML in, what the daemon works with out, every problem with its key and line.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use viewshed::config::ConfigError;
+use viewshed::field_of_view::FieldOfView;
+use viewshed::gate::GateConfig;
+use viewshed::health::HealthConfig;
+use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfiguration};
+use viewshed::inputs::ars408::profile::{self, Profile};
+use viewshed::inputs::ti;
+use viewshed::mount::Mount;
+use viewshed::profile::reference::{Parameters, Sender};
+use viewshed::radar_3d::VisibilityConfig;
+use viewshed::reflection::NoiseConfig;
+use viewshed::sensor::Sensor;
+use viewshed::settings::Settings;
+use viewshed::time::Time;
+use viewshed::unit::header;
+use viewshed::wire::broadcast::{BroadcastConfig, Medium};
+use viewshed::wire::frame::CanId;
+use viewshed::wire::message::{Addresses, Epoch, Message};
+
+use crate::locate;
+
+/// The whole file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Where the epoch and the configuration blocks are kept.
+    pub state_dir: Option<PathBuf>,
+    pub input: Input,
+    pub output: Output,
+    pub mount: Option<Mount>,
+    pub field_of_view: Option<FieldOfView>,
+    #[serde(default)]
+    pub noise: NoiseConfig,
+    #[serde(default)]
+    pub gate: GateConfig,
+    #[serde(default)]
+    pub visibility: VisibilityConfig,
+    #[serde(default)]
+    pub health: HealthConfig,
+}
+
+/// The radar.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Input {
+    pub radar: Radar,
+    pub interface: Option<String>,
+    pub port: Option<PathBuf>,
+    pub baud: Option<u32>,
+    pub candump: Option<PathBuf>,
+    #[serde(default)]
+    pub sensor_id: u8,
+    #[serde(default)]
+    pub clock: ClockSource,
+    pub ars408: Option<Ars408>,
+    pub ti: Option<Ti>,
+}
+
+/// Its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Radar {
+    Ars408,
+    Ti,
+    Native,
+}
+
+/// Whose time counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClockSource {
+    /// The system's monotonic clock.
+    #[default]
+    System,
+    /// What comes in: a test bench.
+    Input,
+}
+
+/// An ARS408 or its kin.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Ars408 {
+    pub profile: String,
+    pub configure: Option<Wanted>,
+}
+
+impl Default for Ars408 {
+    fn default() -> Self {
+        Self { profile: profile::ARS408.name.into(), configure: None }
+    }
+}
+
+/// What the radar is told to send.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Wanted {
+    Clusters,
+    Objects,
+}
+
+/// A TI mmWave radar.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Ti {
+    pub header_bytes: Option<u32>,
+    pub has_elevation: bool,
+    pub doppler_step_mps: Option<f32>,
+    pub angles: Angles,
+}
+
+impl Default for Ti {
+    fn default() -> Self {
+        Self { header_bytes: None, has_elevation: true, doppler_step_mps: None, angles: Angles::Radians }
+    }
+}
+
+/// Unit of spherical points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Angles {
+    Radians,
+    Degrees,
+}
+
+/// The broadcast.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Output {
+    pub medium: Carrier,
+    pub interface: Option<String>,
+    pub port: Option<PathBuf>,
+    pub baud: Option<u32>,
+    pub candump: Option<PathBuf>,
+    #[serde(default)]
+    pub sensor: u8,
+    #[serde(default)]
+    pub listen_first: bool,
+    #[serde(default)]
+    pub service: bool,
+    pub base_id: Option<u32>,
+    pub gap_us: Option<u32>,
+    pub stale_ms: Option<u16>,
+    pub max_age_ms: Option<u16>,
+    pub max_delay_ms: Option<u16>,
+    pub status_ms: Option<u16>,
+    pub header_ms: Option<u16>,
+    pub visible_range_ms: Option<u16>,
+}
+
+/// What maps are sent over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Carrier {
+    Can,
+    CanFd,
+    Serial,
+}
+
+/// Bits per second of a serial port where none are given: what TI's data ports run at.
+const USUAL_BAUD: u32 = 921_600;
+
+/// A key and what is wrong with it.
+type Problem = (String, String);
+
+impl Config {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// One line for each problem: file, line, key, what is wrong.
+    pub fn read(path: &Path) -> Result<Self, Vec<String>> {
+        let shown = path.display();
+        let text = std::fs::read_to_string(path).map_err(|e| vec![format!("{shown}: cannot be read: {e}")])?;
+        Self::parse(&text).map_err(|problems| {
+            let line = |(line, what): (Option<usize>, String)| match line {
+                Some(line) => format!("{shown}:{line}: {what}"),
+                None => format!("{shown}: {what}"),
+            };
+            problems.into_iter().map(line).collect()
+        })
+    }
+
+    /// Reads and checks a text; problems come with their lines.
+    fn parse(text: &str) -> Result<Self, Vec<(Option<usize>, String)>> {
+        let config: Self = toml::from_str(text).map_err(|e| {
+            let at = e.span().map(|span| span.start);
+            let key = at.and_then(|at| locate::key_at(text, at)).map_or(String::new(), |key| format!("{key}: "));
+            vec![(at.map(|at| locate::line_at(text, at)), format!("{key}{}", e.message().replace('\n', " ")))]
+        })?;
+        let problems = config.problems();
+        if problems.is_empty() {
+            return Ok(config);
+        }
+        Err(problems.into_iter().map(|(key, what)| (locate::line_of(text, &key), format!("{key}: {what}"))).collect())
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        let mut problems = Vec::new();
+        let mut add = |key: &str, what: &str| problems.push((key.to_owned(), what.to_owned()));
+        let (input, output) = (&self.input, &self.output);
+        let on_can = input.radar == Radar::Ars408;
+        match (on_can, &input.interface, &input.candump, &input.port) {
+            (true, _, _, Some(_)) => {
+                add("input.port", "an ARS408 is on a CAN bus: `interface`, or `candump` for a log")
+            }
+            (true, None, None, _) => add("input.interface", "missing: the CAN interface of the radar, as \"can0\""),
+            (false, Some(_), ..) => add("input.interface", "this radar is on a serial line: `port`"),
+            (false, _, Some(_), _) => add("input.candump", "logs of CAN buses are for radar = \"ars408\""),
+            (false, _, _, None) => add("input.port", "missing: the serial port of the radar, as \"/dev/ttyUSB0\""),
+            _ => {}
+        }
+        if input.clock == ClockSource::Input && input.candump.is_none() && input.radar != Radar::Native {
+            add("input.clock", "\"input\" is for logs and the native format, whose input tells the time");
+        }
+        if on_can && input.sensor_id > 7 {
+            add("input.sensor_id", "an ARS408's is 0 to 7");
+        }
+        if let Some(ars408) = &input.ars408 {
+            if !on_can {
+                add("input.ars408", "this radar is none");
+            }
+            if Profile::named(&ars408.profile).is_none() {
+                let known: Vec<&str> = profile::PROFILES.iter().map(|p| p.name).collect();
+                add("input.ars408.profile", &format!("\"{}\" is none of {}", ars408.profile, known.join(", ")));
+            }
+        }
+        if let Some(ti) = &input.ti {
+            if input.radar != Radar::Ti {
+                add("input.ti", "this radar is none");
+            }
+            if ti.header_bytes.is_some_and(|bytes| family(bytes).is_none()) {
+                add("input.ti.header_bytes", "36, 40, 44 or 52; without it is learnt");
+            }
+        }
+        let serial = output.medium == Carrier::Serial;
+        match (serial, &output.interface, &output.candump, &output.port) {
+            (true, Some(_), ..) => add("output.interface", "medium = \"serial\" goes to a `port`"),
+            (true, _, Some(_), _) => add("output.candump", "medium = \"serial\" goes to a `port`"),
+            (true, _, _, None) if input.radar != Radar::Native => {
+                add("output.port", "missing: the serial port maps go to, as \"/dev/ttyS1\"");
+            }
+            (false, _, _, Some(_)) => add("output.port", "maps on CAN go to an `interface`, or a `candump` log"),
+            (false, None, None, _) => add("output.interface", "missing: the CAN interface maps go to, as \"can1\""),
+            (false, Some(_), Some(_), _) => add("output.candump", "either this or `interface`"),
+            _ => {}
+        }
+        if output.port.is_some() && output.port == input.port && input.radar != Radar::Native {
+            add("output.port", "this is the radar's");
+        }
+        if input.clock == ClockSource::Input && output.interface.is_some() {
+            add("input.clock", "a bus wants \"system\": its time cannot be another's");
+        }
+        if output.service && output.interface.is_none() {
+            add("output.service", "is for a CAN `interface`; the native format's line has it anyway");
+        }
+        for (key, baud) in [("input.baud", input.baud), ("output.baud", output.baud)] {
+            if baud.is_some_and(|baud| !(1_200..=4_000_000).contains(&baud)) {
+                add(key, "outside 1200 to 4000000");
+            }
+        }
+        if self.addresses().is_none() {
+            add("output.base_id", "not a multiple of 32 within 11 bits, or 29 if above 0x7FF");
+        }
+        let missing = [("mount", self.mount.is_none()), ("field_of_view", self.field_of_view.is_none())];
+        match self.settings() {
+            Some(settings) => problems.extend(self.refused(&settings).err().map(|e| of_library(&e))),
+            // the integrator's messages can bring them
+            None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {}
+            None => {
+                let missing = missing.iter().filter(|(_, missing)| *missing);
+                problems.extend(missing.map(|(key, _)| ((*key).to_owned(), format!("the table [{key}] is missing"))));
+            }
+        }
+        problems
+    }
+
+    /// What the library says of the figures.
+    fn refused(&self, settings: &Settings) -> Result<(), ConfigError> {
+        settings.check()?;
+        let parameters = Parameters::new(&settings.sensor, &settings.radar_3d())?;
+        let Ok(header) = header(settings, &parameters) else { return Ok(()) };
+        let (Some(medium), epoch) = (self.medium(), Epoch::new(0)) else { return Ok(()) };
+        Sender::new(self.broadcast(medium), header, epoch, Time::from_micros(0)).map(drop)
+    }
+
+    /// Whether configuration blocks may come over a line.
+    pub fn has_service(&self) -> bool {
+        self.input.radar == Radar::Native || self.output.service
+    }
+
+    /// What the integrator set; `None` if that is left to a configuration block.
+    pub fn settings(&self) -> Option<Settings> {
+        let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise: self.noise };
+        let settings = Settings::of(sensor);
+        Some(Settings { gate: self.gate, visibility: self.visibility, health: self.health, ..settings })
+    }
+
+    /// What the file means, in words.
+    pub fn summary(&self, path: &Path) -> String {
+        let mut lines = vec![format!("{}: ok", path.display())];
+        let (input, output) = (&self.input, &self.output);
+        let radar = match input.radar {
+            Radar::Ars408 => format!("ARS408 of sensor id {}", input.sensor_id),
+            Radar::Ti => "TI mmWave radar".to_owned(),
+            Radar::Native => format!("native scans of sensor {}", input.sensor_id),
+        };
+        let place = |interface: &Option<String>, port: &Option<PathBuf>, baud, candump: &Option<PathBuf>| match (
+            candump, interface, port,
+        ) {
+            (Some(log), _, _) => format!("log {}", log.display()),
+            (_, Some(name), _) => format!("interface {name}"),
+            (_, _, Some(port)) => format!("{} at {baud} baud", port.display()),
+            _ => "the radar's own line".to_owned(),
+        };
+        let from = place(&input.interface, &input.port, input.baud(), &input.candump);
+        let to = place(&output.interface, &output.port, output.baud(), &output.candump);
+        lines.push(format!("in:    {radar} from {from}"));
+        let ids = self.addresses().and_then(|a| a.id(output.sensor, Message::Status)).map(|id| match id {
+            CanId::Standard(raw) => format!(", identifiers from 0x{raw:03X}"),
+            CanId::Extended(raw) => format!(", identifiers from 0x{raw:08X}"),
+        });
+        let (medium, ids) = match output.medium {
+            Carrier::Can => ("CAN frames", ids.unwrap_or_default()),
+            Carrier::CanFd => ("CAN FD frames", ids.unwrap_or_default()),
+            Carrier::Serial => ("serial messages", String::new()),
+        };
+        lines.push(format!("out:   {medium} of sensor {} to {to}{ids}", output.sensor));
+        let state = self.state_dir.as_ref().map_or("nowhere".to_owned(), |folder| folder.display().to_string());
+        lines.push(format!("state: {state}"));
+        match (self.mount, self.field_of_view) {
+            (Some(m), Some(v)) => lines.push(format!(
+                "mount: {} m high, looks {} degrees down; sees {} to {} degrees, {} to {} m",
+                m.height_m, m.pitch_deg, v.azimuth_min_deg, v.azimuth_max_deg, v.range_min_m, v.range_max_m
+            )),
+            _ => lines.push("mount: from a configuration block; the safe state until there is one".to_owned()),
+        }
+        lines.extend(self.absent().iter().map(|device| format!("not there now, would be waited for: {device}")));
+        lines.join("\n")
+    }
+
+    /// Devices that are not there at this moment.
+    fn absent(&self) -> Vec<String> {
+        let interfaces = [(&self.input.interface, &self.input.candump), (&self.output.interface, &self.output.candump)];
+        let live = interfaces.into_iter().filter(|(_, candump)| candump.is_none()).filter_map(|(name, _)| name.clone());
+        let interfaces = live.filter(|name| !Path::new("/sys/class/net").join(name).exists());
+        let ports = [&self.input.port, &self.output.port].into_iter().flatten().filter(|port| !port.exists());
+        interfaces.map(|name| format!("interface {name}")).chain(ports.map(|port| port.display().to_string())).collect()
+    }
+
+    fn addresses(&self) -> Option<Addresses> {
+        let Some(base) = self.output.base_id else { return Some(Addresses::STANDARD) };
+        let id = match u16::try_from(base) {
+            Ok(base) if base <= 0x7FF => CanId::standard(base),
+            _ => CanId::extended(base),
+        };
+        id.and_then(Addresses::new)
+    }
+
+    /// What maps travel on.
+    pub fn medium(&self) -> Option<Medium> {
+        Some(match self.output.medium {
+            Carrier::Can => Medium::Can(self.addresses()?),
+            Carrier::CanFd => Medium::CanFd(self.addresses()?),
+            Carrier::Serial => Medium::Serial,
+        })
+    }
+
+    /// How the sender behaves.
+    pub fn broadcast(&self, medium: Medium) -> BroadcastConfig {
+        let o = &self.output;
+        let usual = BroadcastConfig::new(o.sensor, medium);
+        BroadcastConfig {
+            gap_us: o.gap_us.unwrap_or(usual.gap_us),
+            stale_ms: o.stale_ms.unwrap_or(usual.stale_ms),
+            max_age_ms: o.max_age_ms.unwrap_or(usual.max_age_ms),
+            max_delay_ms: o.max_delay_ms.unwrap_or(usual.max_delay_ms),
+            status_ms: o.status_ms.unwrap_or(usual.status_ms),
+            header_ms: o.header_ms.unwrap_or(usual.header_ms),
+            visible_range_ms: o.visible_range_ms,
+            ..usual
+        }
+    }
+}
+
+impl Input {
+    pub fn baud(&self) -> u32 {
+        self.baud.unwrap_or(USUAL_BAUD)
+    }
+
+    /// The ARS408's decoder.
+    pub fn ars408(&self) -> viewshed::inputs::ars408::Config {
+        let name = self.ars408.as_ref().map_or(profile::ARS408.name, |a| &a.profile);
+        let profile = *Profile::named(name).unwrap_or(&profile::ARS408);
+        viewshed::inputs::ars408::Config { profile, ..viewshed::inputs::ars408::Config::sensor(self.sensor_id) }
+    }
+
+    /// What the ARS408 is to be told, if anything.
+    pub fn configure(&self) -> Option<RadarConfiguration> {
+        let output = match self.ars408.as_ref()?.configure? {
+            Wanted::Clusters => Entries::Clusters,
+            Wanted::Objects => Entries::Objects,
+        };
+        Some(RadarConfiguration { output: Some(output), ..RadarConfiguration::CLUSTERS })
+    }
+
+    /// TI's decoder.
+    pub fn ti(&self) -> ti::Config {
+        let told = self.ti.clone().unwrap_or_default();
+        let angles = match told.angles {
+            Angles::Radians => ti::AngleUnit::Radians,
+            Angles::Degrees => ti::AngleUnit::Degrees,
+        };
+        let (has_elevation, doppler_step_mps) = (told.has_elevation, told.doppler_step_mps);
+        let dialect = ti::Dialect { angles, has_elevation, doppler_step_mps, ..ti::Dialect::USUAL };
+        ti::Config { family: told.header_bytes.and_then(family), dialect }
+    }
+}
+
+impl Output {
+    pub fn baud(&self) -> u32 {
+        self.baud.unwrap_or(USUAL_BAUD)
+    }
+}
+
+fn family(bytes: u32) -> Option<ti::Family> {
+    ti::Family::ALL.into_iter().find(|family| family.header() == bytes)
+}
+
+/// The library's name of a parameter is the file's, but for the broadcast's table.
+fn of_library(e: &ConfigError) -> Problem {
+    let key = e.parameter.replace("broadcast.", "output.");
+    let text = e.to_string();
+    let what = text.strip_prefix(e.parameter).unwrap_or(&text).trim().to_owned();
+    (key, what)
+}

@@ -1,0 +1,361 @@
+//! Where scans come from: an ARS408 on a CAN bus or in a log of one, a TI radar or the native format on a
+//! serial port.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::os::fd::BorrowedFd;
+
+use anyhow::{Context, Result, bail};
+use log::{info, warn};
+use socketcan::dump::{ParseError, Reader};
+use viewshed::can_bus::{BusConfig, BusKeeper};
+use viewshed::can_session::CanSession;
+use viewshed::inputs::ars408::message::Message;
+use viewshed::inputs::ars408::state::RadarState;
+use viewshed::inputs::ars408::upkeep::Upkeep;
+use viewshed::profile::reference::{DETECTIONS, Unit};
+use viewshed::radar_clock::RadarClock;
+use viewshed::session::{Flow, Session};
+use viewshed::settings::Settings;
+use viewshed::ti_session::TiSession;
+use viewshed::time::Time;
+use viewshed::wire::frame::CanFrame;
+
+use crate::can::Interface;
+use crate::config::{ClockSource, Config, Radar};
+use crate::frames::from_socketcan;
+use crate::output::{Lines, Output};
+use crate::serial::Serial;
+use crate::state::FileSlots;
+
+/// Bytes read at once.
+const CHUNK: usize = 4096;
+/// Reads in a row before the rest of the daemon has its turn.
+const ROW: usize = 16;
+/// How long a log goes on behind its last frame: the radar is silent, and that is to be seen.
+const SILENCE_US: u64 = 1_000_000;
+
+/// What an input works on.
+pub struct Work<'w, 'u> {
+    pub unit: &'w mut Option<Unit<'u>>,
+    pub slots: &'w mut FileSlots,
+    pub output: &'w mut Output,
+}
+
+/// What came of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// It is this time on the unit's clock.
+    Now(Time),
+    /// The integrator wants a start with the newest configuration.
+    Restart,
+    /// The log is over.
+    End,
+}
+
+/// A radar.
+pub trait Input {
+    /// A start: what to work with, `None` in the safe state.
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, output: &mut Output) -> Option<Settings>;
+    /// For waiting until something comes.
+    fn fd(&self) -> Option<BorrowedFd<'_>>;
+    /// Takes what came up to now, and what follows from time alone.
+    fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step;
+    /// The radar's own line, where it takes messages.
+    fn line(&mut self) -> Option<&mut Serial> {
+        None
+    }
+    /// First moment of its clock.
+    fn begins(&self) -> Time {
+        Time::from_micros(0)
+    }
+    /// What the unit's clock shows.
+    fn now(&self, system: Time) -> Time {
+        system
+    }
+}
+
+/// The input that is configured.
+///
+/// # Errors
+/// A log that cannot be read.
+pub fn open(config: &Config) -> Result<Box<dyn Input>> {
+    let input = &config.input;
+    let port = |patient| {
+        let path = input.port.as_ref().context("input.port is missing")?;
+        anyhow::Ok(Serial::new(path, input.baud(), patient))
+    };
+    Ok(match (input.radar, &input.candump, &input.interface) {
+        (Radar::Ars408, Some(_), _) => Box::new(Log::open(config)?),
+        (Radar::Ars408, None, Some(name)) => Box::new(Bus::new(config, name)),
+        (Radar::Ars408, None, None) => bail!("input.interface is missing"),
+        (Radar::Ti, ..) => Box::new(TiPort { port: port(false)?, session: TiSession::new(input.ti()) }),
+        (Radar::Native, ..) => {
+            let bench = input.clock == ClockSource::Input;
+            Box::new(NativePort {
+                port: port(bench)?,
+                bench,
+                sensor: input.sensor_id,
+                session: None,
+                clock: RadarClock::NEW,
+                rest: Vec::new(),
+            })
+        }
+    })
+}
+
+/// An ARS408 on a bus.
+struct Bus {
+    interface: Interface,
+    keeper: BusKeeper,
+    session: CanSession<DETECTIONS>,
+    sensor: u8,
+    upkeep: Option<Upkeep>,
+    holds: bool,
+    last: Time,
+}
+
+impl Bus {
+    fn new(config: &Config, name: &str) -> Self {
+        let input = &config.input;
+        let upkeep = input.configure().map(|settings| Upkeep::new(input.sensor_id, settings));
+        let mut interface = Interface::new(name, false);
+        // the radar's frames prove the bit rate before it is told anything
+        let keeper = BusKeeper::start(&BusConfig::default(), &mut interface);
+        let session = CanSession::new(input.ars408());
+        Self { interface, keeper, session, sensor: input.sensor_id, upkeep, holds: false, last: Time::from_micros(0) }
+    }
+
+    /// Tells the radar what it is to send, and that it stands.
+    fn look_after(&mut self, frame: Option<&CanFrame>, now: Time) {
+        let Some(upkeep) = &mut self.upkeep else { return };
+        let state =
+            frame.filter(|f| f.id == Message::RadarState.id(self.sensor)).and_then(|f| RadarState::read(f.data()));
+        if let Some(state) = state {
+            upkeep.state(&state);
+            if self.holds != upkeep.holds() {
+                self.holds = upkeep.holds();
+                info!("the radar {} as it is to be", if self.holds { "is configured" } else { "is not configured" });
+            }
+        }
+        while let Some(frame) = upkeep.poll(now) {
+            self.keeper.send(&frame, &mut self.interface);
+        }
+    }
+}
+
+impl Input for Bus {
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
+        slots.settings(config)
+    }
+
+    fn fd(&self) -> Option<BorrowedFd<'_>> {
+        self.interface.fd()
+    }
+
+    fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
+        self.keeper.poll(now, &mut self.interface);
+        let Some(unit) = work.unit else {
+            while self.keeper.receive(&mut self.interface).is_some() {}
+            return Step::Now(now);
+        };
+        for _ in 0..ROW * ROW {
+            let Some(frame) = self.keeper.receive(&mut self.interface) else { break };
+            let age = u64::try_from(self.interface.age.as_micros()).unwrap_or(0);
+            // when the kernel had it, but never before what is already known
+            self.last = Time::from_micros(now.micros().saturating_sub(age)).max(self.last);
+            self.session.frame(&frame, self.last, unit);
+            work.output.send(self.last, unit, None);
+            self.look_after(Some(&frame), now);
+        }
+        self.look_after(None, now);
+        self.last = now;
+        self.session.idle(now, unit);
+        Step::Now(now)
+    }
+}
+
+/// An ARS408 in a log.
+struct Log {
+    reader: Reader<BufReader<File>>,
+    interface: Option<String>,
+    next: Option<(Time, CanFrame)>,
+    begins: Time,
+    last: Time,
+    skipped: u64,
+    session: CanSession<DETECTIONS>,
+}
+
+impl Log {
+    fn open(config: &Config) -> Result<Self> {
+        let path = config.input.candump.as_ref().context("input.candump is missing")?;
+        let reader = Reader::from_file(path).with_context(|| format!("input.candump: {}", path.display()))?;
+        let (session, begins) = (CanSession::new(config.input.ars408()), Time::from_micros(0));
+        let interface = config.input.interface.clone();
+        let mut log = Self { reader, interface, next: None, begins, last: begins, skipped: 0, session };
+        log.advance();
+        let Some((first, _)) = log.next else {
+            bail!("input.candump: {}: no frame in it, as `candump -L` writes them", path.display())
+        };
+        (log.begins, log.last) = (first, first);
+        Ok(log)
+    }
+
+    /// Reads on to the next frame of the interface.
+    fn advance(&mut self) {
+        self.next = loop {
+            match self.reader.next_record() {
+                Ok(Some(record)) if self.interface.as_ref().is_none_or(|name| *name == record.device) => {
+                    if let Some(frame) = from_socketcan(&record.frame) {
+                        break Some((Time::from_micros(record.t_us), frame));
+                    }
+                }
+                Ok(Some(_)) => {}
+                Ok(None) => break None,
+                Err(ParseError::Io(e)) => {
+                    warn!("the log ends here: {e}");
+                    break None;
+                }
+                Err(e) => {
+                    if self.skipped == 0 {
+                        warn!("a line of the log is skipped, as will be others: {e}");
+                    }
+                    self.skipped += 1;
+                }
+            }
+        };
+    }
+}
+
+impl Input for Log {
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
+        slots.settings(config)
+    }
+
+    fn fd(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
+        let Some(unit) = work.unit else { return Step::Now(now) };
+        while let Some((time, frame)) = self.next
+            && time <= now
+        {
+            // a log that steps back is as good as one that stands still
+            self.last = time.max(self.last);
+            self.session.frame(&frame, self.last, unit);
+            work.output.send(self.last, unit, None);
+            self.advance();
+        }
+        self.session.idle(now, unit);
+        let over = self.next.is_none() && now.since(self.last).is_some_and(|us| us >= SILENCE_US);
+        if over { Step::End } else { Step::Now(now) }
+    }
+
+    fn begins(&self) -> Time {
+        self.begins
+    }
+}
+
+/// A TI radar's data port.
+struct TiPort {
+    port: Serial,
+    session: TiSession<DETECTIONS>,
+}
+
+impl Input for TiPort {
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
+        slots.settings(config)
+    }
+
+    fn fd(&self) -> Option<BorrowedFd<'_>> {
+        self.port.fd()
+    }
+
+    fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
+        self.port.keep_open();
+        let mut buffer = [0; CHUNK];
+        for _ in 0..ROW {
+            let bytes = self.port.read(&mut buffer);
+            if bytes.is_empty() {
+                break;
+            }
+            if let Some(unit) = work.unit {
+                self.session.take(bytes, now, unit);
+            }
+        }
+        if let Some(unit) = work.unit {
+            self.session.idle(now, unit);
+        }
+        Step::Now(now)
+    }
+}
+
+/// Native scans and service messages on a serial port.
+struct NativePort {
+    port: Serial,
+    /// Time is what the input says.
+    bench: bool,
+    sensor: u8,
+    session: Option<Session<DETECTIONS>>,
+    clock: RadarClock,
+    /// What came behind a restart.
+    rest: Vec<u8>,
+}
+
+impl Input for NativePort {
+    fn start(&mut self, config: &Config, slots: &mut FileSlots, output: &mut Output) -> Option<Settings> {
+        self.port.keep_open();
+        let mut lines = Lines { output, own: Some(&mut self.port) };
+        self.session = Some(Session::start(self.sensor, slots, &mut lines));
+        slots.settings(config)
+    }
+
+    fn fd(&self) -> Option<BorrowedFd<'_>> {
+        self.port.fd()
+    }
+
+    fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
+        self.port.keep_open();
+        self.port.push_rest(std::time::Instant::now());
+        let Some(session) = &mut self.session else { return Step::Now(now) };
+        for _ in 0..ROW {
+            let mut buffer = [0; CHUNK];
+            if self.rest.is_empty() {
+                self.rest.extend_from_slice(self.port.read(&mut buffer));
+            }
+            if self.rest.is_empty() {
+                break;
+            }
+            let bytes = std::mem::take(&mut self.rest);
+            // byte by byte: what stands behind a restart belongs to the next session
+            for (k, byte) in bytes.iter().enumerate() {
+                let before = session.now();
+                let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
+                if session.take(&[*byte], work.unit, work.slots, &mut lines) == Flow::Restart {
+                    self.rest.extend_from_slice(bytes.get(k + 1..).unwrap_or(&[]));
+                    return Step::Restart;
+                }
+                if session.now() != before {
+                    self.clock.stamp(session.now(), now);
+                }
+            }
+        }
+        if !self.bench {
+            let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
+            session.idle(self.clock.now(now), work.unit, &mut lines);
+        }
+        Step::Now(session.now())
+    }
+
+    fn line(&mut self) -> Option<&mut Serial> {
+        Some(&mut self.port)
+    }
+
+    fn now(&self, system: Time) -> Time {
+        match &self.session {
+            Some(session) if self.bench => session.now(),
+            _ => self.clock.now(system),
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! Where maps go: a CAN bus, a log of one, or a serial line.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use log::{error, info};
+use viewshed::can_bus::{BusConfig, BusKeeper, BusState};
+use viewshed::can_service::{CanService, CanServiceConfig};
+use viewshed::pil::record::FrameRecord;
+use viewshed::profile::reference::Unit;
+use viewshed::session::{Flow, Line};
+use viewshed::time::Time;
+use viewshed::wire::frame::CanFrame;
+use viewshed::wire::message::Epoch;
+use viewshed::wire::serial::MOST_STUFFED;
+
+use crate::can::Interface;
+use crate::config::{ClockSource, Config};
+use crate::frames;
+use crate::serial::Serial;
+use crate::state::FileSlots;
+
+/// A frame is tried for so long, microseconds; then it is dropped and the next has its turn.
+const HELD_US: u64 = 20_000;
+
+/// Name of the bus in logs.
+const LOG_DEVICE: &str = "can0";
+
+/// The way out.
+pub struct Output {
+    sink: Sink,
+    /// The frame there was no room for, and since when.
+    held: Option<(CanFrame, Time)>,
+    /// The integrator's messages, if they are listened to.
+    service: Option<CanService>,
+    /// Messages that went out, and those that did not.
+    pub sent: u64,
+    pub refused: u64,
+}
+
+enum Sink {
+    Can(Interface, BusKeeper),
+    Log {
+        file: BufWriter<File>,
+        path: PathBuf,
+        failed: bool,
+    },
+    /// `None`: back on the radar's own line.
+    Serial(Option<Serial>),
+}
+
+impl Output {
+    /// # Errors
+    /// A log that cannot be written.
+    pub fn new(config: &Config) -> Result<Self> {
+        let output = &config.output;
+        let sink = if let Some(path) = &output.candump {
+            let file =
+                File::create(path).with_context(|| format!("output.candump: cannot create {}", path.display()))?;
+            Sink::Log { file: BufWriter::new(file), path: path.clone(), failed: false }
+        } else if let Some(name) = &output.interface {
+            let mut interface = Interface::new(name, !output.listen_first && !output.service);
+            let bus = BusConfig { listen_first: output.listen_first, ..BusConfig::default() };
+            let keeper = BusKeeper::start(&bus, &mut interface);
+            Sink::Can(interface, keeper)
+        } else {
+            let patient = config.input.clock == ClockSource::Input;
+            let own = output.port.as_ref().filter(|port| config.input.port.as_ref() != Some(*port));
+            Sink::Serial(own.map(|port| Serial::new(port, output.baud(), patient)))
+        };
+        Ok(Self { sink, held: None, service: None, sent: 0, refused: 0 })
+    }
+
+    /// A start: from here on the integrator's messages are answered, where that is wanted.
+    pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, slots: &FileSlots) {
+        // nothing of the epoch before
+        self.held = None;
+        let medium = config.medium().filter(|_| config.output.service);
+        let service = medium.map(|medium| CanServiceConfig::new(config.output.sensor, medium));
+        self.service = service.map(|service| CanService::start(service, epoch, now, slots));
+    }
+
+    /// Opens what is to be open and takes what the bus says; whether the integrator wants a restart.
+    pub fn keep_up(&mut self, now: Time, slots: &mut FileSlots) -> Flow {
+        match &mut self.sink {
+            Sink::Can(interface, keeper) => {
+                keeper.poll(now, interface);
+                let before = keeper.state();
+                while let Some(frame) = keeper.receive(interface) {
+                    let flow = self.service.as_mut().and_then(|service| service.take(&frame, slots));
+                    if flow == Some(Flow::Restart) {
+                        return Flow::Restart;
+                    }
+                }
+                if matches!((before, keeper.state()), (BusState::Listening(_), BusState::Active)) {
+                    info!("frames of others prove the bit rate right: sending");
+                }
+            }
+            Sink::Serial(Some(port)) => {
+                port.keep_open();
+                port.push_rest(std::time::Instant::now());
+                // nobody's bytes are expected here
+                port.read(&mut [0; 256]);
+            }
+            Sink::Serial(None) | Sink::Log { .. } => {}
+        }
+        Flow::Continue
+    }
+
+    /// Answers the integrator; in the safe state, says that it is one.
+    pub fn answer(&mut self, now: Time, safe: bool, slots: &FileSlots) {
+        let Some(service) = &mut self.service else { return };
+        let status = if safe { service.next_status(now) } else { None };
+        let answer = service.next_frame(now, slots);
+        for frame in status.iter().chain(&answer) {
+            let sent = self.put(now, frame);
+            *if sent { &mut self.sent } else { &mut self.refused } += 1;
+        }
+    }
+
+    /// Whether the sender is to be asked again in a millisecond.
+    pub fn is_busy(&self) -> bool {
+        self.held.is_some()
+    }
+
+    /// Sends what is due; `own` is the radar's line.
+    pub fn send(&mut self, now: Time, unit: &mut Unit<'_>, own: Option<&mut Serial>) {
+        if matches!(self.sink, Sink::Serial(_)) {
+            let mut line = [0; MOST_STUFFED];
+            let mut lines = Lines { output: self, own };
+            while let Some(message) = unit.next_line(now, &mut line).and_then(|n| line.get(..n)) {
+                if !lines.send(message) {
+                    dropped(unit);
+                }
+            }
+            return;
+        }
+        if let Some((frame, since)) = self.held.take() {
+            if self.put(now, &frame) {
+                self.sent += 1;
+            } else if now.since(since).is_some_and(|us| us < HELD_US) {
+                self.held = Some((frame, since));
+                return;
+            } else {
+                self.refused += 1;
+                dropped(unit);
+            }
+        }
+        while let Some(frame) = unit.next_frame(now) {
+            if !self.put(now, &frame) {
+                self.held = Some((frame, now));
+                break;
+            }
+            self.sent += 1;
+        }
+        if let Sink::Can(interface, _) = &self.sink {
+            unit.broadcast().status_mut().bus_off = interface.bus_offs;
+        }
+    }
+
+    fn put(&mut self, now: Time, frame: &CanFrame) -> bool {
+        match &mut self.sink {
+            Sink::Can(interface, keeper) => keeper.send(frame, interface),
+            Sink::Log { file, path, failed } => {
+                let Some(line) = frames::line(now, LOG_DEVICE, frame) else { return false };
+                let written = writeln!(file, "{line}");
+                if let (Err(e), false) = (&written, *failed) {
+                    error!("{}: {e}", path.display());
+                    *failed = true;
+                }
+                written.is_ok()
+            }
+            Sink::Serial(_) => false,
+        }
+    }
+
+    /// Writes what a log holds back.
+    ///
+    /// # Errors
+    /// A log that cannot be written.
+    pub fn finish(&mut self) -> Result<()> {
+        match &mut self.sink {
+            Sink::Log { file, path, .. } => file.flush().with_context(|| path.display().to_string()),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn dropped(unit: &mut Unit<'_>) {
+    let status = unit.broadcast().status_mut();
+    status.dropped = status.dropped.saturating_add(1);
+}
+
+/// A serial session's way out: the maps' line, or back on the radar's where maps go over CAN.
+pub struct Lines<'a> {
+    pub output: &'a mut Output,
+    pub own: Option<&'a mut Serial>,
+}
+
+impl Line for Lines<'_> {
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        let sent = match (&mut self.output.sink, &mut self.own) {
+            (Sink::Serial(Some(port)), _) => port.send(bytes),
+            (_, Some(own)) => own.send(bytes),
+            _ => false,
+        };
+        *if sent { &mut self.output.sent } else { &mut self.output.refused } += 1;
+        sent
+    }
+
+    fn ticks(&mut self) -> u32 {
+        0
+    }
+
+    fn trace(&mut self, _: &FrameRecord) {}
+}

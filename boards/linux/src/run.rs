@@ -1,0 +1,211 @@
+//! The daemon's loop: receive, process, encode, transmit, sign of life.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, anyhow};
+use log::{info, warn};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use viewshed::polar::PolarMap;
+use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
+use viewshed::session::Flow;
+use viewshed::time::Time;
+use viewshed::unit::header;
+use viewshed::wire::status::{Reason, State as Told};
+
+use crate::config::{ClockSource, Config};
+use crate::input::{self, Input, Step, Work};
+use crate::output::Output;
+use crate::state::{FileSlots, next_epoch};
+use crate::systemd::Systemd;
+
+/// Waits between two looks: while something is to be sent, and otherwise.
+const BUSY: Duration = Duration::from_millis(1);
+const CALM: Duration = Duration::from_millis(5);
+/// A step of a clock that is told by a log, microseconds.
+const TICK_US: u64 = 1_000;
+/// How long is said, at the end, that there is no map any more: a status is due every 250 ms.
+const FAREWELL_TICKS: u64 = 300;
+
+/// Works until it is stopped, or to the end of a log.
+///
+/// # Errors
+/// What cannot be retried: a log, a folder, settings.
+pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
+    let folder = config.state_dir.as_deref();
+    // if it cannot be made, what is written there says so
+    let _ = folder.map(std::fs::create_dir_all);
+    let settings = config.settings();
+    let mut slots = FileSlots::open(folder, settings.as_ref());
+    if config.has_service() && settings.is_some() && slots.newest().ok() != settings {
+        warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
+    }
+    let mut input = input::open(config)?;
+    let mut output = Output::new(config)?;
+    let mut state = Box::new(State::new());
+    let mut map: Box<Map> = Box::new(PolarMap::NOWHERE);
+    let mut clock = Clock::new(config, input.begins());
+    let mut systemd = Systemd::new();
+    let mut last_epoch = None;
+    loop {
+        let epoch = next_epoch(folder, last_epoch);
+        last_epoch = Some(epoch);
+        output.keep_up(clock.now(), &mut slots);
+        let settings = input.start(config, &mut slots, &mut output);
+        let parameters = settings.map(|s| Parameters::new(&s.sensor, &s.radar_3d())).transpose();
+        let parameters = parameters.map_err(|e| anyhow!("{e}"))?;
+        let mut sender = None;
+        if let Some((settings, parameters)) = settings.as_ref().zip(parameters.as_ref()) {
+            let medium = config.medium().context("output.base_id is no identifier")?;
+            let header =
+                header(settings, parameters).map_err(|e| anyhow!("maps of this sensor cannot be sent: {e:?}"))?;
+            let now = input.now(clock.now());
+            let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
+            sender = Some(Box::new(new));
+        }
+        let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut state, &mut map, s));
+        if let Some(unit) = &mut unit {
+            unit.broadcast().status_mut().firmware = version();
+        }
+        output.start(config, epoch, input.now(clock.now()), &slots);
+        info!("started, epoch {}", epoch.number());
+        systemd.ready();
+        let mut watch = Watch::default();
+        let last = loop {
+            if stop.load(Ordering::Relaxed) {
+                info!("stopping");
+                break Step::End;
+            }
+            wait(input.as_ref(), &clock, output.is_busy() || unit.as_mut().is_some_and(|u| !u.broadcast().idle()));
+            let now = clock.next();
+            if output.keep_up(now, &mut slots) == Flow::Restart {
+                break Step::Restart;
+            }
+            let step = input.step(now, &mut Work { unit: &mut unit, slots: &mut slots, output: &mut output });
+            let Step::Now(now) = step else { break step };
+            if let Some(unit) = &mut unit {
+                output.send(now, unit, input.line());
+            }
+            output.answer(now, unit.is_none(), &slots);
+            if watch.look(unit.as_mut(), &output) {
+                systemd.frame_done();
+            }
+            systemd.status(|| watch.text(&output));
+        };
+        if last == Step::Restart {
+            info!("restart with the newest configuration block");
+            continue;
+        }
+        systemd.stopping();
+        if let Some(unit) = &mut unit {
+            farewell(unit, input.as_mut(), &mut output, &mut slots, &mut clock);
+        }
+        info!("{}", watch.text(&output));
+        return output.finish();
+    }
+}
+
+/// Maps that say unknown, and a status that says that there is none.
+fn farewell(unit: &mut Unit<'_>, input: &mut dyn Input, output: &mut Output, slots: &mut FileSlots, clock: &mut Clock) {
+    unit.reset();
+    let start = input.now(clock.next());
+    // by steps: a machine that is slow at its end says the same
+    for step in 1..=FAREWELL_TICKS {
+        if !clock.is_steps() {
+            std::thread::sleep(BUSY);
+        }
+        output.keep_up(clock.next(), slots);
+        let now = Time::from_micros(start.micros() + step * TICK_US);
+        unit.idle(now);
+        output.send(now, unit, input.line());
+    }
+}
+
+/// Until something comes, or it is time to look again.
+fn wait(input: &dyn Input, clock: &Clock, busy: bool) {
+    if clock.is_steps() {
+        return;
+    }
+    let timeout = Timespec::try_from(if busy { BUSY } else { CALM }).unwrap_or(Timespec { tv_sec: 0, tv_nsec: 0 });
+    let fd = input.fd();
+    let mut fds: Vec<PollFd<'_>> = fd.iter().map(|fd| PollFd::new(fd, PollFlags::IN)).collect();
+    // a signal ends it early, and is seen by the loop
+    let _ = poll(&mut fds, Some(&timeout));
+}
+
+/// The unit's time where the input has none of its own.
+struct Clock {
+    steps: bool,
+    base: Time,
+    started: Instant,
+    ticks: u64,
+}
+
+impl Clock {
+    fn new(config: &Config, base: Time) -> Self {
+        let steps = config.input.clock == ClockSource::Input && config.input.candump.is_some();
+        Self { steps, base, started: Instant::now(), ticks: 0 }
+    }
+
+    fn is_steps(&self) -> bool {
+        self.steps
+    }
+
+    fn now(&self) -> Time {
+        let past = if self.steps { self.ticks * TICK_US } else { self.started.elapsed().as_micros() as u64 };
+        Time::from_micros(self.base.micros() + past)
+    }
+
+    /// Goes on: by itself, or by a step.
+    fn next(&mut self) -> Time {
+        self.ticks += u64::from(self.steps);
+        self.now()
+    }
+}
+
+/// Version of the daemon, for the status.
+fn version() -> [u8; 3] {
+    let mut parts = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse().unwrap_or(0));
+    std::array::from_fn(|_| parts.next().unwrap_or(0))
+}
+
+/// Looks at what the unit does.
+#[derive(Default)]
+struct Watch {
+    offered: Option<Time>,
+    maps: u64,
+    /// Messages of the safe state.
+    said: u64,
+    told: Option<(Told, Reason)>,
+}
+
+impl Watch {
+    /// Whether a frame was completed since the last look: estimated, and its map given to the sender. In the
+    /// safe state, whether that was told.
+    fn look(&mut self, unit: Option<&mut Unit<'_>>, output: &Output) -> bool {
+        let Some(unit) = unit else {
+            let said = output.sent + output.refused;
+            return std::mem::replace(&mut self.said, said) != said;
+        };
+        let status = unit.broadcast().status_mut();
+        let told = (status.state, status.reason);
+        // what one frame does not say the next does: only states are worth a line
+        if self.told.is_none_or(|before| before.0 != told.0) {
+            let reason = if told.1 == Reason::None { String::new() } else { format!(": {:?}", told.1) };
+            match told.0 {
+                Told::Starting | Told::Ok => info!("radar {:?}{reason}", told.0),
+                _ => warn!("radar {:?}{reason}", told.0),
+            }
+        }
+        self.told = Some(told);
+        let done = unit.offered() != self.offered;
+        self.offered = unit.offered();
+        self.maps += u64::from(done);
+        done
+    }
+
+    fn text(&self, output: &Output) -> String {
+        let state = self.told.map_or("Starting".to_owned(), |(state, _)| format!("{state:?}"));
+        format!("radar {state}; {} maps, {} messages sent, {} refused", self.maps, output.sent, output.refused)
+    }
+}

@@ -1,0 +1,184 @@
+//! What outlasts the daemon: the epoch of its maps and the configuration blocks, in the state folder.
+
+use std::fs;
+use std::io::Write;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use log::{error, warn};
+use viewshed::session::Slots;
+use viewshed::settings::{BLOCK_LEN, BlockError, Settings};
+use viewshed::wire::message::Epoch;
+
+use crate::config::Config;
+
+/// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
+/// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
+pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
+    let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
+    let path = folder.map(|folder| folder.join("epoch"));
+    let kept = || fs::read_to_string(path.as_ref()?).ok()?.trim().parse().ok().map(Epoch::new);
+    let next = last.or_else(kept).map_or(Epoch::new(chance), Epoch::next);
+    match path.as_ref().map(|path| replace(path, next.number().to_string().as_bytes())) {
+        Some(Ok(())) => {}
+        Some(Err(e)) => warn!("{}: {e}: the epoch is not kept", folder.unwrap_or(Path::new("")).display()),
+        None if last.is_none() => warn!("no state folder: the epoch is by chance, and blocks are not kept"),
+        None => {}
+    }
+    next
+}
+
+/// Writes a file whole or not at all.
+fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let new = path.with_extension("new");
+    let mut file = fs::File::create(&new)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    fs::rename(new, path)
+}
+
+/// The two slots of configuration blocks: in a file once one was written, before that the settings of the
+/// configuration file.
+pub struct FileSlots {
+    path: Option<PathBuf>,
+    slots: [[u8; BLOCK_LEN]; 2],
+}
+
+impl FileSlots {
+    /// Reads the slots. Where none was written, the first holds these settings.
+    pub fn open(folder: Option<&Path>, settings: Option<&Settings>) -> Self {
+        let path = folder.map(|folder| folder.join("slots"));
+        let mut slots = [[0xFF; BLOCK_LEN]; 2];
+        let kept = path.as_ref().and_then(|path| fs::read(path).ok()).unwrap_or_default();
+        for (slot, bytes) in slots.iter_mut().zip(kept.chunks(BLOCK_LEN)) {
+            slot[..bytes.len()].copy_from_slice(bytes);
+        }
+        let written = !kept.is_empty();
+        if let (false, Some(settings)) = (written, settings) {
+            slots[0] = settings.to_block(1);
+        }
+        Self { path, slots }
+    }
+
+    /// The settings to work with.
+    ///
+    /// # Errors
+    /// Why neither block is used.
+    pub fn newest(&self) -> Result<Settings, [BlockError; 2]> {
+        Settings::newest([&self.slots[0], &self.slots[1]]).map(|newest| newest.settings)
+    }
+
+    /// What to work with: the newest block where blocks are taken, else what the file says.
+    pub fn settings(&self, config: &Config) -> Option<Settings> {
+        if !config.has_service() {
+            return config.settings();
+        }
+        self.newest()
+            .inspect_err(|[first, second]| {
+                warn!("no configuration that holds ({first}; {second}): safe state until a block is written")
+            })
+            .ok()
+    }
+
+    fn keep(&self, slot: usize) -> std::io::Result<()> {
+        let Some(path) = &self.path else {
+            warn!("a configuration block was written; without a state folder it is kept until the daemon ends");
+            return Ok(());
+        };
+        let file = fs::OpenOptions::new().create(true).truncate(false).write(true).open(path)?;
+        if file.metadata()?.len() == 0 {
+            file.write_all_at(self.slots.as_flattened(), 0)?;
+        }
+        file.write_all_at(&self.slots[slot], (slot * BLOCK_LEN) as u64)?;
+        file.sync_all()
+    }
+}
+
+impl Slots for FileSlots {
+    fn slot(&self, slot: usize) -> &[u8] {
+        self.slots.get(slot).map_or(&[], |block| block)
+    }
+
+    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+        let Some(place) = self.slots.get_mut(slot) else { return };
+        let before = std::mem::replace(place, *block);
+        if let Err(e) = self.keep(slot) {
+            error!("{}: {e}: a configuration block is lost", self.path.as_deref().unwrap_or(Path::new("")).display());
+            // reading it back is to show that it was not written
+            self.slots[slot] = before;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewshed::field_of_view::FieldOfView;
+    use viewshed::mount::Mount;
+    use viewshed::reflection::NoiseConfig;
+    use viewshed::sensor::Sensor;
+
+    fn settings(height_m: f32) -> Settings {
+        Settings::of(Sensor {
+            mount: Mount { x_m: 0.0, y_m: 0.0, height_m, yaw_deg: 0.0, pitch_deg: 4.0, roll_deg: 0.0 },
+            field_of_view: FieldOfView {
+                azimuth_min_deg: -60.0,
+                azimuth_max_deg: 60.0,
+                elevation_min_deg: -16.0,
+                elevation_max_deg: 16.0,
+                range_min_m: 3.0,
+                range_max_m: 200.0,
+            },
+            noise: NoiseConfig::default(),
+        })
+    }
+
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("viewshedd-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    #[test]
+    fn epochs_go_on_from_start_to_start() {
+        let folder = folder("epochs");
+        let first = next_epoch(Some(&folder), None);
+        assert_eq!(next_epoch(Some(&folder), None), first.next());
+        fs::write(folder.join("epoch"), "15").unwrap();
+        assert_eq!(next_epoch(Some(&folder), None).number(), 0);
+        fs::write(folder.join("epoch"), "rubbish").unwrap();
+        next_epoch(Some(&folder), None);
+        assert!(fs::read_to_string(folder.join("epoch")).unwrap().parse::<u8>().is_ok());
+        fs::remove_dir_all(folder).unwrap();
+        // also where nothing can be kept, a restart is a new epoch
+        assert_eq!(next_epoch(None, Some(first)), first.next());
+    }
+
+    #[test]
+    fn the_files_settings_count_until_a_block_is_written_and_a_damaged_block_is_not_used() {
+        let folder = folder("slots");
+        let height = |slots: &FileSlots| slots.newest().map(|s| s.sensor.mount.height_m);
+        let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
+        assert_eq!(height(&slots), Ok(6.0));
+        assert!(!folder.join("slots").exists());
+        slots.write(1, &settings(7.0).to_block(2));
+        let slots = FileSlots::open(Some(&folder), Some(&settings(8.0)));
+        assert_eq!(height(&slots), Ok(7.0), "a written block goes before the file");
+        let mut bytes = fs::read(folder.join("slots")).unwrap();
+        bytes[BLOCK_LEN + 40] ^= 1;
+        fs::write(folder.join("slots"), &bytes).unwrap();
+        assert_eq!(height(&FileSlots::open(Some(&folder), Some(&settings(8.0)))), Ok(6.0), "the older one");
+        bytes[40] ^= 1;
+        fs::write(folder.join("slots"), &bytes).unwrap();
+        let damaged = FileSlots::open(Some(&folder), Some(&settings(8.0)));
+        assert_eq!(height(&damaged), Err([BlockError::CheckSum; 2]), "never silently another");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn without_settings_and_blocks_there_is_nothing_to_work_with() {
+        assert_eq!(FileSlots::open(None, None).newest(), Err([BlockError::Empty; 2]));
+    }
+}

@@ -1,0 +1,270 @@
+//! The daemon on virtual CAN buses of the kernel: frames in and out, buses that go and come back.
+//!
+//! Skipped, with a line that says why, where the kernel has none or this user may not make them.
+
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use socketcan::dump::Reader;
+use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
+use viewshed::can_service::{Answers, Told, Tool};
+use viewshed::map::Visibility;
+use viewshed::sensor::Sensor;
+use viewshed::settings::Settings;
+use viewshed::time::Time;
+use viewshed::wire::broadcast::Medium;
+use viewshed::wire::frame::{CanFrame, CanId};
+use viewshed::wire::message::Addresses;
+use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::status::{Reason, State};
+
+const RADAR: &str = "vsradar";
+const MAPS: &str = "vsmaps";
+
+fn ip(arguments: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(arguments.split(' ')).output().map_err(|e| format!("ip: {e}"))?;
+    if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()) }
+}
+
+/// Two virtual buses; they go with this.
+struct Buses;
+
+impl Buses {
+    fn make() -> Result<Self, String> {
+        for name in [RADAR, MAPS] {
+            ip(&format!("link add dev {name} type vcan"))?;
+            // room for CAN FD frames
+            ip(&format!("link set {name} mtu 72"))?;
+            ip(&format!("link set {name} up"))?;
+        }
+        Ok(Self)
+    }
+}
+
+impl Drop for Buses {
+    fn drop(&mut self) {
+        for name in [RADAR, MAPS] {
+            let _ = ip(&format!("link del {name}"));
+        }
+    }
+}
+
+/// The daemon; it ends with this.
+struct Daemon(Child, std::path::PathBuf);
+
+impl Daemon {
+    fn start(medium: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("viewshedd-vcan-{}-{medium}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let sample = include_str!("../viewshed.toml");
+        let config = sample
+            .replace("interface = \"can0\"", &format!("interface = \"{RADAR}\""))
+            .replace("interface = \"can1\"", &format!("interface = \"{MAPS}\""))
+            .replace("medium = \"can\"", &format!("medium = \"{medium}\"\nservice = true"));
+        std::fs::write(folder.join("viewshed.toml"), config).unwrap();
+        let log = std::fs::File::create(folder.join("stderr")).unwrap();
+        // a copy of this test may run elsewhere than it was built
+        let program = std::env::var("VIEWSHEDD").unwrap_or(env!("CARGO_BIN_EXE_viewshedd").into());
+        let mut command = Command::new(program);
+        let child = command.arg("--config").arg(folder.join("viewshed.toml")).stdout(Stdio::null()).stderr(log).spawn();
+        Self(child.unwrap(), folder)
+    }
+
+    /// What it said.
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.1.join("stderr")).unwrap()
+    }
+
+    fn wait_for(&self, text: &str, times: usize) {
+        let started = Instant::now();
+        while self.log().matches(text).count() < times {
+            assert!(started.elapsed() < Duration::from_secs(20), "no {times} times `{text}` in: {}", self.log());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn terminate(&mut self) -> ExitStatus {
+        let pid = rustix::process::Pid::from_child(&self.0);
+        rustix::process::kill_process(pid, rustix::process::Signal::TERM).unwrap();
+        self.0.wait().unwrap()
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+        let _ = std::fs::remove_dir_all(&self.1);
+    }
+}
+
+/// Both ends of the buses, and what a receiver makes of the maps.
+struct Bench {
+    radar: CanFdSocket,
+    maps: CanFdSocket,
+    receiver: Box<Receiver<1, 120, 7>>,
+    begin: Instant,
+    heard: usize,
+    tool: Tool,
+    answers: Answers,
+    told: Vec<Told>,
+}
+
+impl Bench {
+    fn new(medium: &str) -> Self {
+        let addresses = Addresses::STANDARD;
+        let medium = if medium == "can" { Medium::Can(addresses) } else { Medium::CanFd(addresses) };
+        let open = |name| {
+            let socket = CanFdSocket::open(name).unwrap();
+            socket.set_nonblocking(true).unwrap();
+            socket
+        };
+        let receiver = Box::new(Receiver::new([0], Addresses::STANDARD, Limits::DEFAULT));
+        let (tool, answers) = (Tool::new(0, medium), Answers::new(0, medium));
+        let begin = Instant::now();
+        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, told: Vec::new() }
+    }
+
+    fn now(&self) -> Time {
+        Time::from_micros(self.begin.elapsed().as_micros() as u64)
+    }
+
+    fn listen(&mut self, time: Duration) {
+        let started = Instant::now();
+        while started.elapsed() < time {
+            while let Ok(frame) = self.maps.read_frame() {
+                let Id::Standard(id) = frame.id() else { continue };
+                let id = CanId::standard(id.as_raw()).unwrap();
+                let frame = match &frame {
+                    CanAnyFrame::Fd(frame) => CanFrame::fd(id, frame.data()),
+                    frame => CanFrame::classic(id, frame.data()),
+                };
+                self.heard += 1;
+                let frame = frame.unwrap();
+                self.told.extend(self.answers.take(&frame));
+                let _ = self.receiver.frame(self.now(), &frame);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Sends the integrator's frames.
+    fn ask(&mut self, frames: &[CanFrame]) {
+        for frame in frames {
+            let id = StandardId::new(frame.id.raw() as u16).unwrap();
+            let frame: CanAnyFrame = match frame.fd {
+                true => CanFdFrame::new(id, frame.data()).unwrap().into(),
+                false => CanDataFrame::new(id, frame.data()).unwrap().into(),
+            };
+            self.maps.write_frame(&frame).unwrap();
+            self.listen(Duration::from_millis(2));
+        }
+        self.listen(Duration::from_millis(200));
+    }
+
+    /// Plays the shipped log to the radar's bus, at its pace and up to five times, until something is so.
+    fn play_until(&mut self, so: impl Fn(&Self) -> bool) -> bool {
+        let log = include_bytes!("../../../tests/recordings/ars408-made-up.log");
+        for _ in 0..5 {
+            let mut reader = Reader::from_reader(&log[..]);
+            let (started, mut first, mut count) = (Instant::now(), None, 0_u32);
+            while let Some(record) = reader.next_record().unwrap() {
+                let due = Duration::from_micros(record.t_us - *first.get_or_insert(record.t_us));
+                self.listen(due.saturating_sub(started.elapsed()));
+                self.radar.write_frame(&record.frame).unwrap();
+                count += 1;
+                if count.is_multiple_of(50) && so(self) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    /// Whether maps come and show something.
+    fn is_ok(&self) -> bool {
+        self.state().is_some_and(|(state, _)| state == State::Ok) && self.visible() > 5000
+    }
+
+    /// Listens until something is so; `false` if it is not within ten seconds.
+    fn until(&mut self, so: impl Fn(&Self) -> bool) -> bool {
+        let started = Instant::now();
+        while !so(self) {
+            if started.elapsed() > Duration::from_secs(10) {
+                return false;
+            }
+            self.listen(Duration::from_millis(10));
+        }
+        true
+    }
+
+    fn state(&self) -> Option<(State, Reason)> {
+        self.receiver.sensor(0).and_then(|sensor| sensor.status()).map(|status| (status.state, status.reason))
+    }
+
+    fn visible(&self) -> usize {
+        let map = self.receiver.map(0, self.now());
+        (0..120 * 200).filter(|k| map.cell(k / 200, k % 200).visibility == Visibility::Visible).count()
+    }
+}
+
+/// Those of the sample file.
+fn settings() -> Settings {
+    let table: toml::Table = include_str!("../viewshed.toml").parse().unwrap();
+    let part = |name: &str| table[name].clone();
+    let (mount, field_of_view) = (part("mount").try_into().unwrap(), part("field_of_view").try_into().unwrap());
+    Settings::of(Sensor { mount, field_of_view, noise: Default::default() })
+}
+
+#[test]
+fn frames_come_and_go_over_the_kernels_buses() {
+    let _buses = match Buses::make() {
+        Ok(buses) => buses,
+        Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
+    };
+    for medium in ["can", "can-fd"] {
+        let mut bench = Bench::new(medium);
+        let mut daemon = Daemon::start(medium);
+        daemon.wait_for("started", 1);
+        assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}", bench.state());
+        let counters = *bench.receiver.sensor(0).unwrap().counters();
+        println!("{medium}: {} frames, {counters:?}, {} cells visible", bench.heard, bench.visible());
+        assert_eq!((counters.protection, counters.malformed), (0, 0));
+
+        // another height, over the bus
+        let mut settings = settings();
+        settings.sensor.mount.height_m = 7.5;
+        let block: Vec<CanFrame> = bench.tool.write(&settings.to_block(0)).collect();
+        bench.ask(&block);
+        assert!(matches!(bench.told.last(), Some(Told::Written(_))), "{medium}: {:?}", bench.told);
+        let restart = bench.tool.restart().unwrap();
+        bench.ask(&[restart]);
+        daemon.wait_for("restart with the newest configuration block", 1);
+        let height = |bench: &Bench| bench.receiver.sensor(0).and_then(|s| s.header()).map(|h| h.mount.height_cm);
+        assert!(bench.until(|bench| height(bench) == Some(750)), "{medium}: {:?}", height(&bench));
+        assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}", bench.state());
+
+        // silence
+        let blind = Some((State::Blind, Reason::RadarSilent));
+        assert!(bench.until(|bench| bench.state() == blind && bench.visible() == 0), "{medium}: {:?}", bench.state());
+
+        // the bus of the maps goes down and comes back
+        ip(&format!("link set {MAPS} down")).unwrap();
+        daemon.wait_for(&format!("{MAPS}: "), 2);
+        ip(&format!("link set {MAPS} up")).unwrap();
+        daemon.wait_for(&format!("{MAPS}: open"), 2);
+        bench.maps = Bench::new(medium).maps;
+        // that of the radar vanishes
+        ip(&format!("link del {RADAR}")).unwrap();
+        daemon.wait_for(&format!("warning: {RADAR}: "), 1);
+        ip(&format!("link add dev {RADAR} type vcan")).unwrap();
+        ip(&format!("link set {RADAR} up")).unwrap();
+        daemon.wait_for(&format!("{RADAR}: open"), 2);
+        bench.radar = Bench::new(medium).radar;
+        assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}, {}", bench.state(), daemon.log());
+
+        assert_eq!(daemon.terminate().code(), Some(0));
+        let gone = Some((State::Starting, Reason::None));
+        assert!(bench.until(|bench| bench.state() == gone && bench.visible() == 0), "{medium}: {:?}", bench.state());
+    }
+}

@@ -1,0 +1,158 @@
+//! A log of a bus in, the log of the broadcast out: frame by frame what the library's session gives.
+
+use std::path::Path;
+use std::process::Command;
+
+use viewshed::can_session::CanSession;
+use viewshed::inputs::ars408::Config;
+use viewshed::polar::PolarMap;
+use viewshed::profile::reference::{DETECTIONS, Parameters, Sender, State, Unit};
+use viewshed::settings::Settings;
+use viewshed::time::Time;
+use viewshed::unit::header;
+use viewshed::wire::broadcast::{BroadcastConfig, Medium};
+use viewshed::wire::frame::CanFrame;
+use viewshed::wire::message::{Addresses, Epoch};
+use viewshed_harness::boards::can_twin::clusters;
+use viewshed_harness::boards::machine::Folder;
+use viewshed_harness::recording::candump::{Content, Line};
+
+use super::daemon::{Daemon, tables};
+use crate::shipped;
+
+/// The daemon's epoch after one that was kept as 4.
+const EPOCH: Epoch = Epoch::new(5);
+
+/// Everything that is sent, and when.
+type Sent = Vec<(u64, CanFrame)>;
+
+/// What a unit sends that hears a log, looks once a millisecond, and is stopped a second behind the log's end.
+fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
+    let parameters = Parameters::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let mut state = Box::new(State::new());
+    let mut map = Box::new(PolarMap::NOWHERE);
+    let (first, last) = (log.first().unwrap().0, log.last().unwrap().0);
+    let at = Time::from_micros;
+    let config = BroadcastConfig::new(0, medium);
+    let header = header(settings, &parameters).unwrap();
+    let mut sender = Box::new(Sender::new(config, header, EPOCH, at(first)).unwrap());
+    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+    unit.broadcast().status_mut().firmware = [0, 1, 0];
+    let mut session = CanSession::<DETECTIONS>::new(Config::sensor(radar));
+    let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
+    let flush = |unit: &mut Unit<'_>, now: u64, sent: &mut Sent| {
+        sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
+    };
+    loop {
+        now += 1000;
+        while let Some(((time, frame), behind)) = rest.split_first().filter(|((time, _), _)| *time <= now) {
+            rest = behind;
+            session.frame(frame, at(*time), &mut unit);
+            flush(&mut unit, *time, &mut sent);
+        }
+        session.idle(at(now), &mut unit);
+        if now >= last + 1_000_000 {
+            break;
+        }
+        flush(&mut unit, now, &mut sent);
+    }
+    unit.reset();
+    for past in 1..=300 {
+        // the first step begins it
+        let now = now + 1000 + 1000 * past;
+        unit.idle(at(now));
+        flush(&mut unit, now, &mut sent);
+    }
+    sent
+}
+
+fn read(path: &Path) -> Sent {
+    let text = std::fs::read_to_string(path).unwrap();
+    let lines = text.lines().map(|line| Line::parse(line).unwrap());
+    lines.map(|line| (line.time_ns as u64 / 1000, *line.frame().unwrap())).collect()
+}
+
+fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> String {
+    format!(
+        "state_dir = \"FOLDER\"\n[input]\nradar = \"ars408\"\ncandump = \"{}\"\nclock = \"input\"\nsensor_id = {radar}\n\
+         [output]\nmedium = \"{medium}\"\ncandump = \"FOLDER/maps.log\"\n{}",
+        log.display(),
+        tables(settings)
+    )
+}
+
+/// Runs the daemon over a log and compares every frame and its time.
+fn same(settings: &Settings, log: &Path, radar: u8, name: &str, medium: Medium) -> (Daemon, Sent) {
+    let folder = Folder::new().unwrap();
+    std::fs::write(folder.0.join("epoch"), "4").unwrap();
+    let mut daemon = Daemon::start_in(folder, &config(settings, log, radar, name), &[]);
+    assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
+    let sent = read(&daemon.folder.0.join("maps.log"));
+    let expected = twin(settings, &read(log), radar, medium);
+    println!("{}, sensor {radar}, {name}: {} frames", log.file_name().unwrap().display(), sent.len());
+    let first = sent.iter().zip(&expected).position(|(a, b)| a != b);
+    assert_eq!((first, sent.len()), (None, expected.len()), "first frame that differs, and how many came");
+    (daemon, sent)
+}
+
+fn made_up() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/ars408-made-up.log")
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_every_frame_of_the_shipped_log_is_the_same() {
+    let (settings, _) = shipped(0.1);
+    for radar in [0, 3] {
+        for (name, medium) in
+            [("can", Medium::Can(Addresses::STANDARD)), ("can-fd", Medium::CanFd(Addresses::STANDARD))]
+        {
+            let (_, sent) = same(&settings, &made_up(), radar, name, medium);
+            assert!(sent.len() > 50, "{}", sent.len());
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_every_frame_of_the_motorway_is_the_same_and_listen_decodes_all() {
+    let (settings, scans) = shipped(20.0);
+    let folder = Folder::new().unwrap();
+    let log = folder.0.join("motorway.log");
+    let mut text = String::new();
+    for scan in clusters(&scans, scans.len(), 240) {
+        // as they come on a bus of 500 kbit/s, four in a millisecond
+        for (n, frame) in scan.frames.into_iter().enumerate() {
+            let micros = 1_700_000_000_000_000 + scan.time.micros() as i64 + 250 * n as i64;
+            let line = Line { time_ns: 1000 * micros, interface: "can0".into(), content: Content::Data(frame) };
+            text += &format!("{line}\n");
+        }
+    }
+    std::fs::write(&log, text).unwrap();
+    let (daemon, sent) = same(&settings, &log, 0, "can", Medium::Can(Addresses::STANDARD));
+    assert!(sent.len() > 15 * scans.len(), "{} frames of {} scans", sent.len(), scans.len());
+
+    let (maps, json) = (daemon.folder.0.join("maps.log"), daemon.folder.0.join("listen.json"));
+    let listen = Command::new(env!("CARGO_BIN_EXE_viewshed"))
+        .arg("listen")
+        .args([&maps, Path::new("--json"), &json])
+        .output()
+        .unwrap();
+    assert!(listen.status.success(), "{}", String::from_utf8_lossy(&listen.stderr));
+    let heard: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    let sensor = &heard["sensors"][0];
+    assert_eq!(sensor["status"]["firmware"], serde_json::json!([0, 1, 0]));
+    assert_eq!(sensor["status"]["state"], "Starting", "it said good-bye");
+    let counters = &sensor["counters"];
+    for wrong in ["protection", "lost", "repeated", "out_of_sequence", "epoch", "malformed"] {
+        assert_eq!(counters[wrong], 0, "{wrong}: {counters}");
+    }
+    // the first refresh of a map comes before the header is whole
+    let (accepted, early) = (counters["accepted"].as_u64().unwrap(), counters["early"].as_u64().unwrap());
+    assert_eq!(accepted + early + counters["late"].as_u64().unwrap(), sent.len() as u64);
+    assert!(early < 100, "{counters}");
+    let maps = sensor["maps"].as_array().unwrap();
+    let visible = |k: usize| maps[k]["visible"].as_u64().unwrap();
+    assert!(visible(10) > 5000, "{:?}", maps[10]);
+    assert_eq!(visible(maps.len() - 1), 0, "and its last map says unknown");
+}

@@ -1,0 +1,36 @@
+#!/bin/sh
+# Builds the daemon of boards/linux and runs it: on logs of CAN buses, on pseudo-terminals, as a service, and
+# on a virtual CAN bus where the kernel has one.
+#
+#   tests/linux.sh
+#
+# Needs Rust and a C compiler, which it installs where it may. The runners' own summary lines come last; what
+# was skipped is said in one line.
+set -u
+
+cd "$(dirname "$0")/.." || exit 1
+. tests/tools.sh
+if [ "$(uname)" != Linux ]; then
+    echo "skipped: boards/linux: not on Linux"
+    exit 0
+fi
+need_compilers
+status=0
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+run() {
+    "$@" >"$log" 2>&1 || { status=1; cat "$log"; }
+    grep -E '^(test result:|skipped:)' "$log"
+}
+
+target=${CARGO_TARGET_DIR:-$PWD/target}
+echo "== the daemon's own tests"
+run cargo test --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target/boards/linux" -- --nocapture
+cargo build --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target/boards/linux" || exit 1
+VIEWSHEDD=$target/boards/linux/release/viewshedd
+export VIEWSHEDD
+"$VIEWSHEDD" --version
+echo "== every frame the library's, cables pulled, service and mistakes"
+run cargo test --quiet --release --locked --package viewshed-harness --test boards -- --ignored linux
+exit $status

@@ -1,0 +1,70 @@
+#!/bin/sh
+# Runs the daemon's test on virtual CAN buses under Debian's kernel in QEMU: for machines whose own kernel has
+# no CAN. Downloads 80 MB, once, into the target folder; takes about half a minute then.
+#
+#   tests/linux_kernel.sh
+set -eu
+
+cd "$(dirname "$0")/.."
+. tests/tools.sh
+skip() {
+    echo "skipped: virtual CAN buses under QEMU: $1"
+    exit 0
+}
+
+[ "$(uname -m)" = x86_64 ] || skip "written for x86-64"
+need_compilers
+for program in qemu-system-x86_64:qemu-system-x86 busybox:busybox-static ip:iproute2; do
+    PATH=$PATH:/usr/sbin:/sbin command -v "${program%:*}" >/dev/null || install "${program#*:}" || skip "no ${program%:*}"
+done
+target=${CARGO_TARGET_DIR:-$PWD/target}/boards/linux
+kernel=$target/kernel
+if [ ! -e "$kernel/done" ]; then
+    rm -rf "$kernel"
+    mkdir -p "$kernel/root"
+    package=$(apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/^ *Depends: //p' | head -n 1)
+    [ -n "$package" ] || skip "no package linux-image-amd64"
+    (cd "$kernel" && apt-get download "$package" >/dev/null 2>&1 && dpkg -x ./*.deb root) || skip "cannot download $package"
+    touch "$kernel/done"
+fi
+
+# the test's program, and what the kernel is to run
+cargo build --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target"
+tests=$(cargo test --release --locked --no-run --test vcan --manifest-path boards/linux/Cargo.toml --target-dir "$target" 2>&1 |
+    sed -n 's/.*Executable.*(\(.*\))$/\1/p')
+disk=$kernel/disk
+rm -rf "$disk"
+mkdir -p "$disk/bin" "$disk/modules" "$disk/proc" "$disk/sys" "$disk/dev" "$disk/tmp"
+cp "$(command -v busybox)" "$disk/bin/busybox"
+cp "$target/release/viewshedd" "$disk/bin/viewshedd"
+cp "$tests" "$disk/bin/vcan"
+cp "$(PATH=$PATH:/usr/sbin:/sbin command -v ip)" "$disk/bin/ip"
+for program in "$disk"/bin/*; do ldd "$program" 2>/dev/null | grep -o '/[^ ]*' || true; done | sort -u |
+    while read -r library; do
+        mkdir -p "$disk$(dirname "$library")"
+        cp -L "$library" "$disk$library"
+    done
+for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev drivers/net/can/vcan; do
+    cp "$kernel"/root/lib/modules/*/kernel/$module.ko "$disk/modules/"
+done
+cat >"$disk/init" <<'END'
+#!/bin/busybox sh
+for kind in proc sys; do /bin/busybox mount -t ${kind}fs $kind /$kind 2>/dev/null || /bin/busybox mount -t $kind $kind /$kind; done
+/bin/busybox mount -t devtmpfs dev /dev
+for module in can can-raw can-dev vcan; do /bin/busybox insmod /modules/$module.ko; done
+export PATH=/bin VIEWSHEDD=/bin/viewshedd
+echo "kernel $(/bin/busybox uname -r)"
+/bin/vcan --nocapture
+/bin/busybox poweroff -f
+END
+chmod +x "$disk/init"
+(cd "$disk" && find . | busybox cpio -o -H newc 2>/dev/null) | gzip -1 >"$kernel/disk.gz"
+
+log=$kernel/log
+timeout -k 5 300 qemu-system-x86_64 -m 512 -nographic -no-reboot -net none -kernel "$kernel"/root/boot/vmlinuz-* \
+    -initrd "$kernel/disk.gz" -append "console=ttyS0 quiet panic=1" </dev/null 2>&1 | tr -d '\r' >"$log" || true
+grep -E '^kernel |frames, Counters' "$log" || true
+if ! grep '^test result: ok' "$log"; then
+    cat "$log"
+    exit 1
+fi

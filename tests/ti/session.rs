@@ -1,0 +1,63 @@
+//! A unit behind a radar's data port.
+
+use viewshed::field_of_view::FieldOfView;
+use viewshed::inputs::ti::{Config, Dialect, Family};
+use viewshed::mount::Mount;
+use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::reflection::NoiseConfig;
+use viewshed::sensor::Sensor;
+use viewshed::settings::Settings;
+use viewshed::ti_session::TiSession;
+use viewshed::time::Time;
+use viewshed::unit::{Unit, bench_sender};
+use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::wire::message::{Addresses, Epoch};
+use viewshed::wire::status::{Reason, State};
+
+use crate::frames::Frame;
+
+#[test]
+fn every_frame_becomes_a_map_and_silence_is_told() {
+    let settings = Settings::of(Sensor {
+        mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 },
+        field_of_view: FieldOfView {
+            azimuth_min_deg: -60.0,
+            azimuth_max_deg: 60.0,
+            elevation_min_deg: -16.0,
+            elevation_max_deg: 16.0,
+            range_min_m: 3.0,
+            range_max_m: 100.0,
+        },
+        noise: NoiseConfig::default(),
+    });
+    let parameters = Radar3dParameters::<50, 40, 8>::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    let mut map = parameters.map();
+    let (medium, start) = (Medium::Can(Addresses::STANDARD), Time::from_micros(0));
+    let mut sender: Broadcaster<40, 2> = bench_sender(&settings, &parameters, medium, Epoch::new(1), start).unwrap();
+    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+    let config = Config { family: Some(Family::Bytes40), dialect: Dialect::USUAL };
+    let mut session = TiSession::<64>::new(config);
+
+    let mut now = start;
+    for k in 0..30_u32 {
+        now = Time::from_micros(500_000 + 50_000 * u64::from(k));
+        // frame 7 never comes
+        let frame = Frame::new(Family::Bytes40, if k < 7 { k } else { k + 1 });
+        let bytes = frame.cartesian(&[[1.0, 30.0, -5.0, -12.0], [2.0, 40.0, -5.0, -12.0]]).bytes();
+        for chunk in bytes.chunks(17) {
+            session.take(chunk, now, &mut unit);
+        }
+        session.idle(now, &mut unit);
+        assert_eq!(unit.offered(), Some(now), "scan {k}");
+        assert_eq!(unit.next_line(now, &mut [0; 242]), None, "a sender for CAN gives no lines");
+        assert!(unit.next_frame(now).is_some());
+    }
+    assert_eq!(session.counters().scans, 30);
+    let status = *unit.broadcast().status_mut();
+    assert_eq!((status.state, status.radar_lost), (State::Ok, 1));
+    session.take(&[0x55; 300], now, &mut unit);
+    session.idle(Time::from_micros(now.micros() + 600_000), &mut unit);
+    let status = *unit.broadcast().status_mut();
+    assert_eq!((status.state, status.reason), (State::Blind, Reason::RadarSilent));
+}
