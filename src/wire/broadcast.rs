@@ -30,7 +30,7 @@ use super::header::{Clock, GROUPS, Header};
 use super::layer::{Layer, Next, Telling};
 use super::layers::Layers;
 use super::map_message::{self, LIMITS, SEGMENTS};
-use super::message::{Addresses, CLASSIC_BYTES, Epoch, LONG_BYTES, Message, Packet, Packing, Part, Plane, Word};
+use super::message::{Addresses, Epoch, Message, Packet, Packing, Part, Plane, Word};
 use super::scan_number::ScanNumber;
 #[cfg(feature = "secoc")]
 use super::secoc::{Key, Sealer};
@@ -478,76 +478,73 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     fn map_packet(&mut self, now: Time) -> Option<Packet> {
-        let mut scan = self.scan?;
+        let scan = self.scan.as_ref()?;
         if now.since(scan.measured).is_none_or(|age| age > u64::from(self.config.stale_ms) * 1000) {
             self.drop_scan();
             return None;
         }
-        let mut running = match scan.running {
-            Some(running) => running,
-            None => self.next_running(&scan)?,
-        };
-        let (part, own, last) = self.message(&scan, &running)?;
-        let plane = Plane::ALL.get(running.plane).copied()?;
-        let packet = self.packet(Message::Map(plane, part), own.bytes());
-        running.sent += 1;
-        scan.running = Some(running);
-        if last {
-            let layer = self.layers.get_mut(running.plane)?;
-            match running.next {
-                Next::Block { kind, start, block } => {
-                    layer.told(Some(kind), start, block.end, scan.number);
-                    self.from = block.end;
-                }
-                Next::Plain { azimuth } => {
-                    layer.told(None, azimuth, azimuth + 1, scan.number);
-                    self.from = azimuth + 1;
-                }
-            }
-            scan.running = None;
+        if scan.running.is_none() {
+            let running = self.next_running(scan.number, scan.all)?;
+            self.scan.as_mut()?.running = Some(running);
         }
-        self.scan = Some(scan);
-        if scan.running.is_none() && self.layers.iter().all(|layer| layer.pending() == 0) {
+        let scan = self.scan.as_ref()?;
+        let (running, number) = (scan.running.as_ref()?, scan.number);
+        let (packet, last) = self.message(number, running)?;
+        if !last {
+            self.scan.as_mut()?.running.as_mut()?.sent += 1;
+            return Some(packet);
+        }
+        let (kind, start, end) = match running.next {
+            Next::Block { kind, start, ref block } => (Some(kind), start, block.end),
+            Next::Plain { azimuth } => (None, azimuth, azimuth + 1),
+        };
+        self.layers.get_mut(running.plane)?.told(kind, start, end, number);
+        self.from = end;
+        self.scan.as_mut()?.running = None;
+        if self.layers.iter().all(|layer| layer.pending() == 0) {
             // complete: the next one begins at the right edge again
             (self.scan, self.from) = (None, 0);
         }
         Some(packet)
     }
 
-    fn next_running(&mut self, scan: &Scan) -> Option<Running> {
-        let context = self.header.context(self.packing().form());
-        let telling = Telling { context, scan: scan.number, all: scan.all };
+    fn next_running(&mut self, scan: ScanNumber, all: bool) -> Option<Running> {
+        let telling = Telling { context: self.header.context(self.packing().form()), scan, all };
         let from = self.from;
         let mut layers = self.layers.iter_mut().enumerate();
         layers.find_map(|(plane, layer)| layer.next(&telling, from).map(|next| Running { plane, next, sent: 0 }))
     }
 
     /// The message that is next of a block or a ray, and whether it is the last.
-    fn message(&self, scan: &Scan, running: &Running) -> Option<(Part, Own, bool)> {
+    fn message(&self, scan: ScanNumber, running: &Running) -> Option<(Packet, bool)> {
         let sent = usize::from(running.sent);
         let long = !self.packing().is_classic();
+        let plane = Plane::ALL.get(running.plane).copied()?;
+        let packet = |part, own: &[u8]| self.packet(Message::Map(plane, part), own);
         match running.next {
             Next::Block { kind, start, ref block } => {
                 let first = if kind == Kind::Refresh { Part::Refresh } else { Part::Delta };
                 if long {
-                    return Some((first, Own::long(map_message::words(scan.number, start, block.words())), true));
+                    let (own, length) = map_message::words(scan, start, block.words());
+                    return Some((packet(first, own.get(..length)?), true));
                 }
                 let part = Word::at(sent).map_or(first, Part::More);
-                let own = map_message::word(scan.number, start, *block.words().get(sent)?);
-                Some((part, Own::classic(own), sent + 1 == block.words().len()))
+                let own = map_message::word(scan, start, *block.words().get(sent)?);
+                Some((packet(part, &own), sent + 1 == block.words().len()))
             }
             Next::Plain { azimuth } => {
                 let ray = self.layers.get(running.plane)?.now(azimuth);
                 if long {
-                    return Some((Part::Plain, Own::long(map_message::plain(scan.number, azimuth, ray)), true));
+                    let (own, length) = map_message::plain(scan, azimuth, ray);
+                    return Some((packet(Part::Plain, own.get(..length)?), true));
                 }
                 let mut segments = [LIMITS]
                     .into_iter()
                     .chain(0..SEGMENTS)
                     .filter(|s| map_message::has_segment(ray.known, *s))
                     .skip(sent);
-                let own = map_message::segment(scan.number, azimuth, ray, segments.next()?);
-                Some((Part::Plain, Own::classic(own), segments.next().is_none()))
+                let own = map_message::segment(scan, azimuth, ray, segments.next()?);
+                Some((packet(Part::Plain, &own), segments.next().is_none()))
             }
         }
     }
@@ -574,26 +571,4 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 /// A bit for each of the first planes.
 fn planes(count: usize) -> u8 {
     Plane::ALL.iter().take(count).fold(0, |bits, plane| bits | 1 << plane.index())
-}
-
-/// Own bytes of a message.
-struct Own {
-    bytes: [u8; LONG_BYTES],
-    length: usize,
-}
-
-impl Own {
-    fn classic(own: [u8; CLASSIC_BYTES]) -> Self {
-        let mut bytes = [0; LONG_BYTES];
-        bytes.iter_mut().zip(own).for_each(|(to, from)| *to = from);
-        Self { bytes, length: CLASSIC_BYTES }
-    }
-
-    fn long((bytes, length): ([u8; LONG_BYTES], usize)) -> Self {
-        Self { bytes, length }
-    }
-
-    fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.length).unwrap_or(&[])
-    }
 }

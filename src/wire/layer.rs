@@ -45,6 +45,8 @@ pub(super) struct Layer<const A: usize, const W: usize> {
     was_scan: [ScanNumber; A],
     /// Which azimuths have one to build on.
     refreshed: Azimuths,
+    /// How many ticks older it is than the scan being told, where it may be built on; else 0.
+    ticks: [u8; A],
 }
 
 /// The azimuths of a layer that are told in one way, from a start on.
@@ -74,16 +76,23 @@ impl<const A: usize, const W: usize> Layer<A, W> {
             was: [Ray::UNKNOWN; A],
             was_scan: [ScanNumber::from_byte(0); A],
             refreshed: Azimuths::NONE,
+            ticks: [0; A],
         }
     }
 
     /// Takes a scan; what was still to be told of the one before is not told any more.
     pub fn offer(&mut self, scan: ScanNumber, azimuths: usize, ray: impl Fn(usize) -> Ray<W>) {
         self.pending = Azimuths::span(0, azimuths.min(A));
-        for (azimuth, (now, was)) in self.now.iter_mut().zip(self.was_scan).enumerate().take(azimuths) {
+        let was = self.was.iter().zip(&self.was_scan);
+        let azimuths = self.now.iter_mut().zip(&mut self.ticks).zip(was).enumerate().take(azimuths);
+        for (azimuth, ((now, ticks), (was, was_scan))) in azimuths {
             *now = ray(azimuth);
-            if scan.ticks_after(was) > MOST_TICKS {
+            *ticks = scan.ticks_after(*was_scan);
+            if *ticks > MOST_TICKS {
                 self.refreshed.clear(azimuth);
+            }
+            if now.known != was.known || !self.refreshed.get(azimuth) {
+                *ticks = 0;
             }
         }
     }
@@ -106,14 +115,10 @@ impl<const A: usize, const W: usize> Layer<A, W> {
 
     /// How an azimuth is told.
     fn kind(&self, azimuth: usize, telling: &Telling) -> Kind {
-        let (Some(now), Some(was), Some(was_scan)) =
-            (self.now.get(azimuth), self.was.get(azimuth), self.was_scan.get(azimuth))
-        else {
-            return Kind::Refresh;
-        };
-        let ticks = telling.scan.ticks_after(*was_scan);
-        let builds = self.refreshed.get(azimuth) && now.known == was.known && (1..=MOST_TICKS).contains(&ticks);
-        if builds && !telling.all { Kind::Delta { ticks } } else { Kind::Refresh }
+        match self.ticks.get(azimuth) {
+            Some(&ticks @ 1..) if !telling.all => Kind::Delta { ticks },
+            _ => Kind::Refresh,
+        }
     }
 
     /// What goes out next, looking from an azimuth on and then from the first.
@@ -124,6 +129,9 @@ impl<const A: usize, const W: usize> Layer<A, W> {
         if block.end == start && kind != Kind::Refresh {
             // against its refresh it does not fit
             self.refreshed.clear(start);
+            if let Some(ticks) = self.ticks.get_mut(start) {
+                *ticks = 0;
+            }
             kind = Kind::Refresh;
             block = self.block(telling, kind, start);
         }

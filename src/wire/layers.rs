@@ -23,8 +23,7 @@ impl<const R: usize, const A: usize, const W: usize> Layers<W> for VisibilityBit
 impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A> {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let Some((grades, occupancy)) = self.grades(azimuth).zip(self.occupancy(azimuth)) else { return Ray::UNKNOWN };
-        let near = grades.iter().position(|grade| *grade > 0);
-        let known = match near.zip(grades.iter().rposition(|grade| *grade > 0)) {
+        let known = match first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0)) {
             Some((near, last)) => Known::new(near, last + 1),
             None => return Ray::UNKNOWN,
         };
@@ -48,35 +47,60 @@ impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A
     }
 }
 
-/// Cells whose value reaches a threshold, eight at a time.
-#[allow(clippy::cast_possible_truncation)] // eight bits are left
+/// The first cell whose value is above 0, eight at a time.
+fn first_above_0(cells: &[u8]) -> Option<usize> {
+    let (eights, rest) = cells.as_chunks::<8>();
+    for (place, eight) in eights.iter().enumerate() {
+        let eight = u64::from_le_bytes(*eight);
+        if eight != 0 {
+            return Some(8 * place + eight.trailing_zeros() as usize / 8);
+        }
+    }
+    rest.iter().position(|cell| *cell > 0).map(|place| 8 * eights.len() + place)
+}
+
+/// Cells whose value reaches a threshold.
 fn at_least<const W: usize>(cells: &[u8], threshold: u8) -> Bits<W> {
-    const HIGH: u64 = 0x8080_8080_8080_8080;
-    let least = u64::from(threshold) * 0x0101_0101_0101_0101;
     let mut words = [0; W];
-    // eight cells are often like the eight before
-    let (mut before, mut together) = (0, if threshold == 0 { 0xFF } else { 0 });
-    for (word, cells) in words.iter_mut().zip(cells.chunks(32)) {
-        for (place, eight) in cells.chunks(8).enumerate() {
-            let mut bytes = [0; 8];
-            match eight.first_chunk() {
-                Some(whole) => bytes = *whole,
-                // the last of a row; the threshold is above 0
-                None => bytes.iter_mut().zip(eight).for_each(|(to, from)| *to = *from),
-            }
-            let cells = u64::from_le_bytes(bytes);
-            if cells != before {
-                before = cells;
-                // the highest bit of a byte: whether its lower seven reach the threshold's
-                let low = (cells | HIGH) - (least & !HIGH);
-                let reached = ((cells & !least) | (!(cells ^ least) & low)) & HIGH;
-                // the highest bits of all bytes side by side
-                together = (reached >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-            }
-            *word |= (together as u32) << (8 * place);
+    // most often all are like the one before
+    let (mut before, mut all) = (0, if threshold == 0 { u32::MAX } else { 0 });
+    let (chunks, rest) = cells.as_chunks::<32>();
+    for (word, chunk) in words.iter_mut().zip(chunks) {
+        let (eights, _) = chunk.as_chunks();
+        if !eights.iter().all(|eight| u64::from_le_bytes(*eight) == before) {
+            all = eights.iter().rev().fold(0, |bits, eight| bits << 8 | reached(*eight, threshold));
+            before = u64::from(chunk[31]) * EACH;
+            *word = all;
+            all = if all >> 31 == 1 { u32::MAX } else { 0 };
+        } else {
+            *word = all;
+        }
+    }
+    if let Some(word) = words.get_mut(chunks.len()) {
+        for (place, cells) in rest.chunks(8).enumerate() {
+            let mut eight = [0; 8];
+            eight.iter_mut().zip(cells).for_each(|(to, from)| *to = *from);
+            *word |= reached(eight, threshold) << (8 * place);
         }
     }
     Bits::from_words(words)
+}
+
+/// 1 in each of eight bytes.
+const EACH: u64 = 0x0101_0101_0101_0101;
+
+/// A bit for each of eight cells.
+#[allow(clippy::cast_possible_truncation)] // eight bits are left
+#[inline]
+fn reached(cells: [u8; 8], threshold: u8) -> u32 {
+    const HIGH: u64 = 0x80 * EACH;
+    let cells = u64::from_le_bytes(cells);
+    // added to a cell's lower seven bits, this carries into the highest where they reach the threshold's
+    let low = (cells & !HIGH) + u64::from(128 - (threshold & 0x7F)) * EACH;
+    // a threshold of 128 and more takes the cell's highest bit, too, a smaller one is content with it
+    let reached = if threshold < 128 { cells | low } else { cells & low };
+    // the highest bits of all bytes side by side
+    (((reached & HIGH) >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32
 }
 
 #[cfg(test)]
@@ -114,13 +138,20 @@ mod tests {
     }
 
     #[test]
-    fn eight_cells_at_a_time_say_what_one_says() {
-        for threshold in [1, 2, 100, 127, 128, 129, 200, 255] {
-            let cells: std::vec::Vec<u8> = (0..60_u32).map(|i| (i * 37 + u32::from(threshold)) as u8).collect();
-            let bits = at_least::<2>(&cells, threshold);
-            let expected: std::vec::Vec<usize> = (0..60).filter(|i| cells[*i] >= threshold).collect();
+    fn many_cells_at_a_time_say_what_one_says() {
+        for threshold in 1..=255 {
+            // all values, and stretches of the same
+            let value = |i: u32| if i % 100 < 36 { 40 * (i / 100) } else { 37 * i + u32::from(threshold) };
+            let cells: std::vec::Vec<u8> = (0..603_u32).map(|i| value(i) as u8).collect();
+            let bits = at_least::<19>(&cells, threshold);
+            let expected: std::vec::Vec<usize> = (0..603).filter(|i| cells[*i] >= threshold).collect();
             assert_eq!(bits.iter().collect::<std::vec::Vec<_>>(), expected, "{threshold}");
         }
+        for first in 0..20 {
+            let cells: std::vec::Vec<u8> = (0..20).map(|i| u8::from(i >= first) * 3).collect();
+            assert_eq!(first_above_0(&cells), Some(first));
+        }
+        assert_eq!((first_above_0(&[0; 20]), first_above_0(&[])), (None, None));
     }
 
     #[test]

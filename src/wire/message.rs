@@ -356,8 +356,8 @@ impl Packet {
             (bytes[3], bytes[4], bytes[5]) = (message.number(), sensor, epoch.0 | secured);
         }
         let own = own.get(..most).unwrap_or(own);
-        for (to, from) in bytes.iter_mut().skip(start).zip(own) {
-            *to = *from;
+        if let Some(to) = bytes.get_mut(start..start + own.len()) {
+            to.copy_from_slice(own);
         }
         let length = if packing.is_classic() { 8 } else { start + own.len() };
         Self { sensor, message, packing, length: length as u8, bytes }
@@ -442,7 +442,12 @@ impl<'a> Received<'a> {
     /// # Errors
     /// A frame that is not ours, or not intact.
     pub fn from_frame(frame: &'a CanFrame, addresses: &Addresses) -> Result<Self, NotAMessage> {
-        let (sensor, message) = addresses.message(frame.id).ok_or(NotAMessage::Foreign)?;
+        let label = addresses.message(frame.id).ok_or(NotAMessage::Foreign)?;
+        Self::labelled(frame, label)
+    }
+
+    /// Checks a frame whose identifier says sensor and message.
+    pub(super) fn labelled(frame: &'a CanFrame, (sensor, message): (u8, Message)) -> Result<Self, NotAMessage> {
         let bytes = frame.data();
         if frame.fd {
             let received = Self::from_bytes(bytes)?;

@@ -53,12 +53,16 @@ impl ScanNumber {
         matches!(self.ticks_after(other), 1..=127)
     }
 
+    /// When this tick begins within the period, microseconds.
+    pub const fn begins_us(self) -> u32 {
+        self.0 as u32 * TICK_US
+    }
+
     /// How far a clock is past the beginning of this tick, modulo the period; microseconds.
     #[allow(clippy::cast_possible_truncation)] // modulo
     pub const fn lag(self, now: Time) -> u32 {
-        let beginning = self.0 as u32 * TICK_US;
-        let now = (now.micros() % PERIOD_US as u64) as u32;
-        (now + PERIOD_US - beginning) % PERIOD_US
+        let (now, begins) = ((now.micros() % PERIOD_US as u64) as u32, self.begins_us());
+        if now < begins { now + PERIOD_US - begins } else { now - begins }
     }
 }
 

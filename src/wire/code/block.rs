@@ -14,11 +14,10 @@
 //! 256 azimuths, 256 range cells. Decoding a block never loops more than (azimuths x 2 cells) times,
 //! whatever the words say.
 
-use super::expectation::{
-    Before, Expected, Last, Progress, distance_table, edge_table, end_table, first_table, ray_table, shift, stop_table,
-};
-use super::interval::{Coder, Encoder, Form};
-use super::model::{AS_EXPECTED, EDGES, GONE, KNOWN, MODEL, NEW, REACH, STOPS_BELOW, TOLD};
+use super::edges::{EdgeList, Hints};
+use super::expectation::{EdgeTables, Last, Progress, distance_table, first_table, shift, stop_table};
+use super::interval::{Coder, Encoder, Form, Words};
+use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH, STOPS_BELOW, TOLD};
 use super::ray::{Known, Ray};
 
 /// Bits that tell how many ticks older a delta's refresh is, less one.
@@ -66,7 +65,8 @@ pub trait Rays<const W: usize> {
 /// A block as words.
 #[derive(Debug, Clone, Copy)]
 pub struct Block {
-    encoder: Encoder,
+    words: Words,
+    room: u32,
     /// First azimuth behind the block; the start itself if nothing fitted.
     pub end: usize,
 }
@@ -74,26 +74,29 @@ pub struct Block {
 impl Block {
     /// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray.
     pub fn new<const W: usize>(context: &Context, kind: Kind, start: usize, rays: &impl Rays<W>) -> Self {
-        let mut encoder = Encoder::new(context.form);
+        let mut words = Words::NONE;
+        let mut encoder = Encoder::new(&mut words, context.form);
         let end = encode(&mut encoder, context, kind, start, rays);
-        Self { encoder, end }
+        let room = encoder.room();
+        encoder.finish();
+        Self { words, room, end }
     }
 
     /// Bits left.
     pub fn room(&self) -> u32 {
-        self.encoder.room()
+        self.room
     }
 
     /// The words, the first the most significant.
     pub fn words(&self) -> &[u64] {
-        self.encoder.words()
+        self.words.as_slice()
     }
 }
 
 /// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray; returns
 /// the first azimuth behind them.
 pub fn encode<const W: usize>(
-    coder: &mut (impl Coder + Clone),
+    coder: &mut impl Coder,
     context: &Context,
     kind: Kind,
     start: usize,
@@ -104,12 +107,12 @@ pub fn encode<const W: usize>(
         let _ = coder.plain(AGE_BITS, usize::from(ticks.saturating_sub(1)));
     }
     let azimuths = context.azimuths;
-    let mut progress = Progress::new(context.usual);
+    let mut progress = Progress::new(kind, context.usual);
     for azimuth in start..azimuths {
-        let before = coder.clone();
-        let told = tell(&mut progress, coder, kind, azimuth, rays);
+        let before = coder.mark();
+        let told = tell(&mut progress, coder, azimuth, rays);
         if told.is_none() || (azimuth + 1 < azimuths && !can_stop(coder)) {
-            *coder = before;
+            coder.rewind(before);
             if azimuth > start {
                 let _ = stop(coder);
             }
@@ -119,11 +122,20 @@ pub fn encode<const W: usize>(
     azimuths
 }
 
-fn can_stop(coder: &(impl Coder + Clone)) -> bool {
+#[inline(always)]
+fn can_stop(coder: &mut impl Coder) -> bool {
+    let room = coder.room();
     // "no further ray" takes 8 bits at most
-    coder.room() < STOPS_BELOW || coder.room() > 10 || stop(&mut coder.clone()).is_some()
+    if room < STOPS_BELOW || room > 10 {
+        return true;
+    }
+    let before = coder.mark();
+    let stops = stop(coder).is_some();
+    coder.rewind(before);
+    stops
 }
 
+#[inline(always)]
 fn stop(coder: &mut impl Coder) -> Option<()> {
     stop_table(coder.room()).map_or(Some(()), |table| coder.symbol(table, 1))
 }
@@ -132,99 +144,102 @@ fn stop(coder: &mut impl Coder) -> Option<()> {
 fn tell<const W: usize>(
     progress: &mut Progress<W>,
     coder: &mut impl Coder,
-    kind: Kind,
     azimuth: usize,
     rays: &impl Rays<W>,
 ) -> Option<()> {
     let ray = rays.now(azimuth)?;
-    let was = match kind {
+    let was = match progress.kind {
         Kind::Refresh => &Ray::UNKNOWN,
         Kind::Delta { .. } => rays.was(azimuth).filter(|was| was.known == ray.known)?,
     };
     if !progress.before.first {
         coder.symbol(stop_table(coder.room())?, 0)?;
     }
-    let expected = progress.expected(kind, was);
-    encode_ray(coder, kind, progress.before, ray, &expected)?;
-    progress.advance(ray, &expected, was);
+    let expected = progress.expect(was);
+    let table = progress.table();
+    let as_expected = *ray == expected;
+    if as_expected {
+        coder.symbol(table, AS_EXPECTED)?;
+    } else {
+        if ray.known == expected.known {
+            coder.symbol(table, EDGES)?;
+        } else {
+            coder.symbol(table, KNOWN)?;
+            encode_limit(coder, ray.known.near(), expected.known.near())?;
+            encode_limit(coder, ray.known.end(), expected.known.end())?;
+        }
+        let tables = EdgeTables::of(progress.kind);
+        let (hints, edges) = progress.edges();
+        edges.read(ray);
+        encode_edges(coder, tables, (ray, edges), (&expected, hints))?;
+    }
+    progress.advance(ray, was, as_expected);
     Some(())
 }
 
-/// Tells a ray; `None` if it does not fit.
-fn encode_ray<const W: usize>(
+/// Tells the edges of a ray; `None` if they do not fit.
+fn encode_edges<const W: usize>(
     coder: &mut impl Coder,
-    kind: Kind,
-    before: Before,
-    ray: &Ray<W>,
-    expected: &Ray<W>,
+    tables: EdgeTables,
+    (ray, edges): (&Ray<W>, &EdgeList),
+    (expected, hints): (&Ray<W>, &EdgeList),
 ) -> Option<()> {
-    let table = ray_table(kind, before, expected);
-    if ray == expected {
-        return coder.symbol(table, AS_EXPECTED);
-    }
-    if ray.known == expected.known {
-        coder.symbol(table, EDGES)?;
-    } else {
-        coder.symbol(table, KNOWN)?;
-        encode_limit(coder, ray.known.near(), expected.known.near())?;
-        encode_limit(coder, ray.known.end(), expected.known.end())?;
-    }
     if ray.known.is_empty() {
         return Some(());
     }
     let (mut bit, expected_bit) = (ray.first(), expected.known.is_empty() || expected.first());
     coder.symbol(first_table(expected_bit), usize::from(bit != expected_bit))?;
-    let toggles = ray.toggles();
-    let mut hints = Expected::new(expected);
     let (mut place, mut last) = (ray.known.near(), Last::None);
-    hints.from = place + 1;
+    let mut hints = Hints::new(hints, expected_bit, place + 1, ray.known.end());
+    let mut told = 0;
     loop {
-        let edge = toggles.next(place + 1);
-        match (hints.next(bit, ray.known.end()), edge) {
-            (Some(hint), edge) => {
-                let table = edge_table(kind, bit, last);
-                match edge {
-                    Some(edge) if edge + REACH >= hint && edge <= hint + REACH => {
-                        coder.symbol(table, edge + REACH - hint)?;
-                        last = shift(edge, hint);
-                        place = edge;
-                    }
-                    Some(edge) if edge < hint => {
-                        coder.symbol(table, NEW)?;
-                        encode_distance(coder, bit, edge - place)?;
-                        last = Last::Other;
-                        place = edge;
-                    }
-                    _ => {
-                        coder.symbol(table, GONE)?;
-                        last = Last::Other;
-                        hints.from = hint + 1;
-                        continue;
-                    }
+        let edge = edges.get(told);
+        if let Some(hint) = hints.next(bit) {
+            let table = tables.edge(bit, last);
+            match edge {
+                Some(edge) if edge + REACH >= hint && edge <= hint + REACH => {
+                    coder.symbol(table, edge + REACH - hint)?;
+                    last = shift(edge, hint);
+                    place = edge;
+                }
+                Some(edge) if edge < hint => {
+                    coder.symbol(table, NEW)?;
+                    encode_distance(coder, bit, edge - place)?;
+                    last = Last::Other;
+                    place = edge;
+                }
+                _ => {
+                    coder.symbol(table, GONE)?;
+                    last = Last::Other;
+                    hints.pass(hint + 1);
+                    continue;
                 }
             }
-            (None, Some(edge)) => {
-                coder.symbol(end_table(kind, bit, last), 1)?;
-                encode_distance(coder, bit, edge - place)?;
-                last = Last::Other;
-                place = edge;
-            }
-            (None, None) => return coder.symbol(end_table(kind, bit, last), 0),
+        } else {
+            let table = tables.end(bit, last);
+            let Some(edge) = edge else { return coder.symbol(table, 0) };
+            coder.symbol(table, 1)?;
+            encode_distance(coder, bit, edge - place)?;
+            last = Last::Other;
+            place = edge;
         }
+        told += 1;
         bit = !bit;
-        hints.from = hints.from.max(place + 1);
+        hints.pass(place + 1);
     }
 }
 
+#[inline(always)]
 fn encode_distance(coder: &mut impl Coder, bit: bool, distance: usize) -> Option<()> {
     let bits = distance.checked_ilog2()?;
     coder.symbol(distance_table(bit), bits as usize)?;
     coder.plain(bits, distance)
 }
 
+#[inline(always)]
 fn encode_limit(coder: &mut impl Coder, limit: usize, expected: usize) -> Option<()> {
     let near = [expected, expected.wrapping_sub(1), expected + 1];
     let symbol = near.iter().position(|n| *n == limit).unwrap_or(TOLD);
-    coder.symbol(&MODEL.limit, symbol)?;
+    coder.symbol(&BELOW.limit, symbol)?;
     if symbol == TOLD { coder.plain(9, limit) } else { Some(()) }
 }

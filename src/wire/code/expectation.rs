@@ -1,9 +1,9 @@
 //! What both sides of a block know before each symbol: what is expected, and how frequent what is.
 
 use super::block::Kind;
-use super::model::{MODEL, STOP_CLASSES, STOPS_BELOW};
+use super::edges::EdgeList;
+use super::model::{BELOW, STOP_CLASSES, STOPS_BELOW};
 use super::ray::{Known, Ray};
-use crate::bits::Bits;
 
 /// What went before a ray, and how a ray is told by it: the index into the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,15 +18,11 @@ impl Before {
     pub const START: Self = Self { first: true, as_expected: true, still: true };
 
     pub fn index(self, kind: Kind) -> usize {
-        match (kind, self) {
-            (Kind::Refresh, Self { first: true, .. }) => 0,
-            (Kind::Refresh, Self { as_expected: true, .. }) => 1,
-            (Kind::Refresh, _) => 2,
-            (_, Self { first: true, .. }) => 3,
-            (_, Self { still: true, as_expected: true, .. }) => 4,
-            (_, Self { still: true, .. }) => 5,
-            (_, Self { as_expected: true, .. }) => 6,
-            _ => 7,
+        match kind {
+            Kind::Refresh if self.first => 0,
+            Kind::Refresh => 1 + usize::from(!self.as_expected),
+            Kind::Delta { .. } if self.first => 3,
+            Kind::Delta { .. } => 4 + usize::from(!self.as_expected) + 2 * usize::from(!self.still),
         }
     }
 }
@@ -41,78 +37,61 @@ pub(super) enum Last {
     Other,
 }
 
-/// The frequencies for an edge after another.
-pub(super) fn edge_table(kind: Kind, bit: bool, last: Last) -> &'static [u8] {
-    let [a, b] = &MODEL.edge;
-    let [dark, light] = if kind.index() == 0 { a } else { b };
-    let [none, same, nearer, farther, other] = if bit { light } else { dark };
-    match last {
-        Last::None => none,
-        Last::Same => same,
-        Last::Nearer => nearer,
-        Last::Farther => farther,
-        Last::Other => other,
+/// The frequencies for the edges of a block.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct EdgeTables {
+    edge: &'static [[[u8; 13]; 5]; 2],
+    end: &'static [[[u8; 2]; 2]; 2],
+}
+
+impl EdgeTables {
+    pub fn of(kind: Kind) -> Self {
+        let ([refresh, delta], [refresh_end, delta_end]) = (&BELOW.edge, &BELOW.end);
+        match kind {
+            Kind::Refresh => Self { edge: refresh, end: refresh_end },
+            Kind::Delta { .. } => Self { edge: delta, end: delta_end },
+        }
+    }
+
+    /// Where an edge is expected.
+    pub fn edge(&self, bit: bool, last: Last) -> &'static [u8; 13] {
+        let [dark, light] = self.edge;
+        let tables = if bit { light } else { dark };
+        tables.get(last as usize).unwrap_or(&tables[0])
+    }
+
+    /// Where none is expected any more.
+    pub fn end(&self, bit: bool, last: Last) -> &'static [u8; 2] {
+        let [dark, light] = self.end;
+        let [shift, other] = if bit { light } else { dark };
+        if matches!(last, Last::None | Last::Other) { other } else { shift }
     }
 }
 
-pub(super) fn end_table(kind: Kind, bit: bool, last: Last) -> &'static [u8] {
-    let [a, b] = &MODEL.end;
-    let [dark, light] = if kind.index() == 0 { a } else { b };
-    let [shift, other] = if bit { light } else { dark };
-    if matches!(last, Last::None | Last::Other) { other } else { shift }
-}
-
-pub(super) fn distance_table(bit: bool) -> &'static [u8] {
-    let [dark, light] = &MODEL.distance;
+pub(super) fn distance_table(bit: bool) -> &'static [u8; 8] {
+    let [dark, light] = &BELOW.distance;
     if bit { light } else { dark }
 }
 
-pub(super) fn first_table(bit: bool) -> &'static [u8] {
-    let [dark, light] = &MODEL.first;
+pub(super) fn first_table(bit: bool) -> &'static [u8; 2] {
+    let [dark, light] = &BELOW.first;
     if bit { light } else { dark }
-}
-
-pub(super) fn ray_table<const W: usize>(kind: Kind, before: Before, expected: &Ray<W>) -> &'static [u8] {
-    let edges = expected.has_toggles();
-    let tables = MODEL.ray.get(before.index(kind)).unwrap_or(&MODEL.ray[0]);
-    let [without, with] = tables;
-    if edges { with } else { without }
 }
 
 /// The frequencies of "no further ray" with this room; `None` where it goes without saying.
-pub(super) fn stop_table(room: u32) -> Option<&'static [u8]> {
+#[inline]
+pub(super) fn stop_table(room: u32) -> Option<&'static [u8; 2]> {
     if room < STOPS_BELOW {
         return None;
     }
     // most often there is plenty
-    let most = STOP_CLASSES.len();
-    let plenty = STOP_CLASSES.last().is_some_and(|from| room >= *from);
-    let class = if plenty { most } else { STOP_CLASSES.iter().filter(|from| room >= **from).count() };
-    MODEL.stop.get(class).map(|t| t.as_slice())
+    let [.., plenty] = &BELOW.stop;
+    if STOP_CLASSES.last().is_some_and(|from| room >= *from) { Some(plenty) } else { scarce_table(room) }
 }
 
-/// Follows the expected edges of a ray while its edges are told.
-pub(super) struct Expected<'a, const W: usize> {
-    pub ray: &'a Ray<W>,
-    pub toggles: Bits<W>,
-    /// Expected edges before this cell are behind.
-    pub from: usize,
-}
-
-impl<'a, const W: usize> Expected<'a, W> {
-    pub fn new(ray: &'a Ray<W>) -> Self {
-        Self { ray, toggles: ray.toggles(), from: 0 }
-    }
-
-    /// The first expected edge that turns `bit` over, before cell `end`.
-    pub fn next(&self, bit: bool, end: usize) -> Option<usize> {
-        let mut at = self.toggles.next(self.from)?;
-        if self.ray.get(at) == bit {
-            // edges alternate, so the one after it turns the other way
-            at = self.toggles.next(at + 1)?;
-        }
-        (at < end).then_some(at)
-    }
+#[inline(never)]
+fn scarce_table(room: u32) -> Option<&'static [u8; 2]> {
+    BELOW.stop.get(STOP_CLASSES.iter().filter(|from| room >= **from).count())
 }
 
 pub(super) fn shift(edge: usize, hint: usize) -> Last {
@@ -124,31 +103,66 @@ pub(super) fn shift(edge: usize, hint: usize) -> Last {
 }
 
 /// What the rays told so far say of the next.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Progress<const W: usize> {
+    pub kind: Kind,
     pub before: Before,
     /// The ray before, or the usual one.
-    pub neighbour: Ray<W>,
+    neighbour: Ray<W>,
     /// What it was in the refresh.
-    pub neighbour_was: Ray<W>,
+    neighbour_was: Ray<W>,
+    /// The expected edges of the next ray, and those of the ray at hand, where they are told.
+    lists: [EdgeList; 2],
+    swapped: bool,
 }
 
 impl<const W: usize> Progress<W> {
-    pub fn new(usual: Known) -> Self {
-        Self { before: Before::START, neighbour: Ray::clear(usual), neighbour_was: Ray::UNKNOWN }
+    /// At a block's start.
+    pub fn new(kind: Kind, usual: Known) -> Self {
+        Self::behind(kind, Before::START, Ray::clear(usual), Ray::UNKNOWN)
+    }
+
+    /// Behind an azimuth.
+    pub fn behind(kind: Kind, before: Before, neighbour: Ray<W>, neighbour_was: Ray<W>) -> Self {
+        let mut lists = [EdgeList::NONE; 2];
+        lists[0].read(&neighbour);
+        Self { kind, before, neighbour, neighbour_was, lists, swapped: false }
+    }
+
+    /// The expected edges of the next ray, and a place for its own.
+    pub fn edges(&mut self) -> (&EdgeList, &mut EdgeList) {
+        let [a, b] = &mut self.lists;
+        if self.swapped { (b, a) } else { (a, b) }
+    }
+
+    fn hints(&mut self) -> &mut EdgeList {
+        let [a, b] = &mut self.lists;
+        if self.swapped { b } else { a }
+    }
+
+    /// The frequencies of how the next ray is told.
+    pub fn table(&mut self) -> &'static [u8; 3] {
+        let [without, with] = BELOW.ray.get(self.before.index(self.kind)).unwrap_or(&BELOW.ray[0]);
+        if self.hints().is_empty() { without } else { with }
     }
 
     /// What the next ray is expected to be; `was` is its ray in the refresh.
-    pub fn expected(&self, kind: Kind, was: &Ray<W>) -> Ray<W> {
-        match kind {
-            Kind::Refresh => self.neighbour,
-            Kind::Delta { .. } if self.before.first => *was,
+    pub fn expect(&mut self, was: &Ray<W>) -> Ray<W> {
+        let expected = match self.kind {
+            // the hints are the neighbour's already
+            Kind::Refresh => return self.neighbour,
+            // as is the first
+            Kind::Delta { .. } if self.before.still => *was,
             Kind::Delta { .. } => was.expected(&self.neighbour, &self.neighbour_was),
-        }
+        };
+        self.hints().read(&expected);
+        expected
     }
 
-    pub fn advance(&mut self, ray: &Ray<W>, expected: &Ray<W>, was: &Ray<W>) {
-        self.before = Before { first: false, as_expected: ray == expected, still: ray == was };
+    /// Goes on behind a ray; unless it is as expected, its edges were noted.
+    pub fn advance(&mut self, ray: &Ray<W>, was: &Ray<W>, as_expected: bool) {
+        self.swapped ^= !as_expected;
+        self.before = Before { first: false, as_expected, still: ray == was };
         (self.neighbour, self.neighbour_was) = (*ray, *was);
     }
 }

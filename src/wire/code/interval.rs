@@ -44,93 +44,164 @@ const NARROW: u64 = 1 << 16;
 
 /// Something that takes symbols.
 pub trait Coder {
-    /// A symbol of a table of frequencies that sum to 256; `None` if it does not fit.
-    fn symbol(&mut self, table: &'static [u8], symbol: usize) -> Option<()>;
+    /// A point to come back to.
+    type Mark: Copy;
+
+    /// A symbol of a table, which tells for each symbol the frequencies below it, of 256; `None` if it
+    /// does not fit.
+    fn symbol<const N: usize>(&mut self, below: &'static [u8; N], symbol: usize) -> Option<()>;
 
     /// The lowest `count` bits of a value, the highest of them first; `None` if they do not fit.
     fn plain(&mut self, count: u32, value: usize) -> Option<()>;
 
     /// Bits left, at most.
     fn room(&self) -> u32;
+
+    /// This point.
+    fn mark(&self) -> Self::Mark;
+
+    /// Forgets what came after a point.
+    fn rewind(&mut self, mark: Self::Mark);
 }
 
-/// Codes symbols. A copy is a point to come back to.
-#[derive(Debug, Clone, Copy)]
-pub struct Encoder {
+/// The words of a message, the first the most significant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Words {
     words: [u64; MOST_WORDS],
-    used: usize,
-    width: u64,
-    form: Form,
+    count: usize,
 }
 
-impl Encoder {
-    /// No symbol coded yet.
-    pub const fn new(form: Form) -> Self {
-        Self { words: [0; MOST_WORDS], used: 1, width: 1 << form.bits, form }
-    }
+impl Words {
+    /// No word yet.
+    pub const NONE: Self = Self { words: [0; MOST_WORDS], count: 0 };
 
-    /// The words so far.
-    pub fn words(&self) -> &[u64] {
-        self.words.get(..self.used).unwrap_or(&[])
-    }
-
-    fn join(&mut self) {
-        if self.width < NARROW && self.used < self.form.most.min(MOST_WORDS) {
-            self.used += 1;
-            self.width <<= self.form.bits;
+    /// The part of the interval's lower end that lies in a word, the carries of what follows not yet taken
+    /// over; it becomes the last word.
+    #[inline(never)]
+    fn put(&mut self, count: usize, low: u64) {
+        if let Some(word) = count.checked_sub(1).and_then(|last| self.words.get_mut(last)) {
+            (*word, self.count) = (low, count);
         }
     }
 
-    /// Keeps `[from, to)` of the interval.
+    /// One after another.
+    pub fn as_slice(&self) -> &[u64] {
+        self.words.get(..self.count).unwrap_or(&[])
+    }
+}
+
+/// Codes symbols into words.
+#[derive(Debug)]
+pub struct Encoder<'a> {
+    words: &'a mut Words,
+    at: Mark,
+    form: Form,
+}
+
+/// A point of an encoder.
+#[derive(Debug, Clone, Copy)]
+pub struct Mark {
+    /// Lower end of the interval, as far as it came since the last word was joined on.
+    low: u64,
+    width: u64,
+    used: usize,
+}
+
+impl<'a> Encoder<'a> {
+    /// No symbol coded yet.
+    pub fn new(words: &'a mut Words, form: Form) -> Self {
+        let form = Form { most: form.most.min(MOST_WORDS), ..form };
+        Self { words, at: Mark { low: 0, width: 1 << form.bits, used: 1 }, form }
+    }
+
+    /// Completes the words.
+    pub fn finish(self) {
+        let Self { words, at, form } = self;
+        words.put(at.used, at.low);
+        let mut carry = 0;
+        for word in words.words.iter_mut().take(at.used).rev() {
+            carry += *word;
+            *word = carry & ((1 << form.bits) - 1);
+            carry >>= form.bits;
+        }
+    }
+
+    #[inline]
+    fn widen(&mut self) {
+        if self.at.width < NARROW && self.at.used < self.form.most {
+            self.words.put(self.at.used, self.at.low);
+            self.at = Mark { low: 0, width: self.at.width << self.form.bits, used: self.at.used + 1 };
+        }
+    }
+
+    /// Keeps `[from, to)` of the interval. What is added to `low` within a word is less than the width the
+    /// word began with.
+    #[inline]
     fn keep(&mut self, from: u64, to: u64) -> Option<()> {
         if from >= to {
             return None;
         }
-        self.width = to - from;
-        if from == 0 {
-            return Some(());
-        }
-        let mut carry = from;
-        // bounded by the number of words
-        for word in self.words.iter_mut().take(self.used).rev() {
-            carry += *word;
-            *word = carry & ((1 << self.form.bits) - 1);
-            carry >>= self.form.bits;
-            if carry == 0 {
-                break;
-            }
-        }
+        self.at.low += from;
+        self.at.width = to - from;
         Some(())
     }
 }
 
-impl Coder for Encoder {
+impl Coder for Encoder<'_> {
+    type Mark = Mark;
+
     #[inline]
-    fn symbol(&mut self, table: &'static [u8], symbol: usize) -> Option<()> {
-        self.join();
-        let below: u64 = table.iter().take(symbol).map(|f| u64::from(*f)).sum();
-        let frequency = u64::from(*table.get(symbol)?);
-        self.keep((self.width * below) >> 8, (self.width * (below + frequency)) >> 8)
+    fn symbol<const N: usize>(&mut self, below: &'static [u8; N], symbol: usize) -> Option<()> {
+        self.widen();
+        let width = self.at.width;
+        let part = |below: &u8| (width * u64::from(*below)) >> 8;
+        // below the first there is nothing
+        let from = if symbol == 0 { 0 } else { part(below.get(symbol)?) };
+        let to = below.get(symbol + 1).map_or(width, part);
+        self.keep(from, to)
     }
 
+    #[inline(always)]
     fn plain(&mut self, count: u32, value: usize) -> Option<()> {
         for bit in (0..count).rev() {
-            self.join();
-            let half = self.width >> 1;
-            if value >> bit & 1 == 0 { self.keep(0, half)? } else { self.keep(half, self.width)? }
+            self.widen();
+            let (half, width) = (self.at.width >> 1, self.at.width);
+            if value >> bit & 1 == 0 { self.keep(0, half)? } else { self.keep(half, width)? }
         }
         Some(())
     }
 
+    #[inline]
     fn room(&self) -> u32 {
-        room(self.width, self.used, self.form)
+        room(self.at.width, self.at.used, self.form)
+    }
+
+    #[inline]
+    fn mark(&self) -> Mark {
+        self.at
+    }
+
+    #[inline]
+    fn rewind(&mut self, mark: Mark) {
+        self.at = mark;
     }
 }
 
 /// Bits left in the interval and in words not yet joined on, rounded down.
+#[inline]
+#[allow(clippy::cast_possible_truncation)] // 14 words
 fn room(width: u64, used: usize, form: Form) -> u32 {
-    let more = u32::try_from(form.most.saturating_sub(used)).unwrap_or(0);
-    width.checked_ilog2().unwrap_or(0) + more * form.bits
+    (width | 1).ilog2() + form.most.saturating_sub(used) as u32 * form.bits
+}
+
+/// What a decoder holds with a further word joined on, if one is allowed.
+#[inline(never)]
+fn joined(words: &[u64], form: Form, (used, value, width): (usize, u64, u64)) -> Result<(usize, u64, u64), OutOfWords> {
+    if used >= form.most {
+        return Ok((used, value, width));
+    }
+    let word = *words.get(used).ok_or(OutOfWords)?;
+    Ok((used + 1, (value << form.bits) | word, width << form.bits))
 }
 
 /// A word is needed that is not there.
@@ -168,6 +239,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// Bits left, at most: what the encoder had left at this point.
+    #[inline]
     pub fn room(&self) -> u32 {
         room(self.width, self.used, self.form)
     }
@@ -182,45 +254,51 @@ impl<'a> Decoder<'a> {
         self.used
     }
 
-    fn join(&mut self) -> Result<(), OutOfWords> {
-        if self.width < NARROW && self.used < self.form.most.min(MOST_WORDS) {
-            let word = *self.words.get(self.used).ok_or(OutOfWords)?;
-            self.value = (self.value << self.form.bits) | word;
-            self.width <<= self.form.bits;
-            self.used += 1;
+    #[inline]
+    fn widen(&mut self) -> Result<(), OutOfWords> {
+        if self.width < NARROW {
+            (self.used, self.value, self.width) = joined(self.words, self.form, self.state())?;
         }
         Ok(())
     }
 
-    /// The next symbol of a table.
+    /// The next symbol of a table, which tells for each symbol the frequencies below it, of 256.
     ///
     /// # Errors
     /// A word is needed that is not there.
-    pub fn symbol(&mut self, table: &[u8]) -> Result<usize, OutOfWords> {
-        self.join()?;
-        let (mut below, mut from) = (0, 0);
-        for (symbol, frequency) in table.iter().enumerate() {
-            below += u64::from(*frequency);
-            let to = (self.width * below) >> 8;
-            if self.value < to {
-                self.value -= from;
-                self.width = to - from;
-                return Ok(symbol);
+    #[inline]
+    pub fn symbol<const N: usize>(&mut self, below: &[u8; N]) -> Result<usize, OutOfWords> {
+        self.widen()?;
+        let part = |symbol: usize| below.get(symbol).map(|below| (self.width * u64::from(*below)) >> 8);
+        let (mut symbol, mut from) = (0, 0);
+        let mut look = |step: usize| match part(symbol + step) {
+            Some(next) if self.value >= next => {
+                (symbol, from) = (symbol + step, next);
+                true
             }
-            from = to;
+            _ => false,
+        };
+        if N <= 4 {
+            // the first is the most frequent
+            while look(1) {}
+        } else {
+            [8, 4, 2, 1].into_iter().for_each(|step| _ = look(step));
         }
-        // frequencies sum to 256 and the value lies below the width, so this is not reached
-        Ok(0)
+        let to = part(symbol + 1).unwrap_or(self.width);
+        self.value -= from;
+        self.width = to - from;
+        Ok(symbol)
     }
 
     /// The next `count` plain bits.
     ///
     /// # Errors
     /// A word is needed that is not there.
+    #[inline(always)]
     pub fn plain(&mut self, count: u32) -> Result<usize, OutOfWords> {
         let mut value = 0;
         for _ in 0..count {
-            self.join()?;
+            self.widen()?;
             let half = self.width >> 1;
             let upper = self.value >= half;
             if upper {
@@ -241,13 +319,15 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    static SKEWED: [u8; 3] = [250, 5, 1];
-    static EVEN: [u8; 4] = [64; 4];
+    static SKEWED: [u8; 3] = [0, 250, 255];
+    static EVEN: [u8; 4] = [0, 64, 128, 192];
+    static MANY: [u8; 13] = [0, 1, 6, 20, 60, 100, 101, 120, 180, 200, 210, 220, 255];
 
     #[derive(Debug, Clone, Copy)]
     enum Step {
         Skewed(usize),
         Even(usize),
+        Many(usize),
         Plain(u32, usize),
     }
 
@@ -256,16 +336,18 @@ mod tests {
             prop_oneof![
                 4 => (0..3_usize).prop_map(Step::Skewed),
                 1 => (0..4_usize).prop_map(Step::Even),
+                2 => (0..13_usize).prop_map(Step::Many),
                 1 => (1..8_u32, 0..256_usize).prop_map(|(n, v)| Step::Plain(n, v & ((1 << n) - 1))),
             ],
             0..200,
         )
     }
 
-    fn code(e: &mut Encoder, step: Step) -> Option<()> {
+    fn code(e: &mut Encoder<'_>, step: Step) -> Option<()> {
         match step {
             Step::Skewed(s) => e.symbol(&SKEWED, s),
             Step::Even(s) => e.symbol(&EVEN, s),
+            Step::Many(s) => e.symbol(&MANY, s),
             Step::Plain(n, v) => e.plain(n, v),
         }
     }
@@ -273,28 +355,35 @@ mod tests {
     proptest! {
         #[test]
         fn what_fits_comes_back(steps in steps(), form in prop::sample::select(&[Form::CLASSIC, Form::LONG][..])) {
-            let mut e = Encoder::new(form);
+            let mut words = Words::NONE;
+            let mut e = Encoder::new(&mut words, form);
             let mut coded = Vec::new();
             for step in steps {
-                let before = e;
+                let before = e.mark();
+                // what is coded and taken back again leaves no trace
+                let _ = (code(&mut e, Step::Even(3)), code(&mut e, Step::Plain(7, 127)));
+                e.rewind(before);
                 if code(&mut e, step).is_none() {
-                    e = before;
+                    e.rewind(before);
                     break;
                 }
                 coded.push((step, e.room()));
             }
-            let mut d = Decoder::new(e.words(), form).unwrap();
+            e.finish();
+            prop_assert!(words.as_slice().iter().all(|word| word >> form.bits == 0));
+            let mut d = Decoder::new(words.as_slice(), form).unwrap();
             for (step, room) in coded {
                 let (got, want) = match step {
                     Step::Skewed(s) => (d.symbol(&SKEWED), s),
                     Step::Even(s) => (d.symbol(&EVEN), s),
+                    Step::Many(s) => (d.symbol(&MANY), s),
                     Step::Plain(n, v) => (d.plain(n), v),
                 };
                 prop_assert_eq!(got, Ok(want));
                 prop_assert_eq!(d.room(), room, "both sides know what is left");
             }
             prop_assert_eq!(d.rest(), 0);
-            prop_assert_eq!(d.used(), e.words().len());
+            prop_assert_eq!(d.used(), words.as_slice().len());
         }
 
         #[test]
@@ -312,20 +401,25 @@ mod tests {
     #[test]
     fn the_interval_is_used_to_the_last_bits() {
         // four words of 33 bits hold 66 symbols of two bits
-        let mut e = Encoder::new(Form::CLASSIC);
+        let mut words = Words::NONE;
+        let mut e = Encoder::new(&mut words, Form::CLASSIC);
         let mut symbols = 0;
         while e.symbol(&EVEN, 1 + symbols % 3).is_some() {
             symbols += 1;
         }
-        assert_eq!((symbols, e.words().len(), e.room()), (66, 4, 0));
+        assert_eq!(e.room(), 0);
+        e.finish();
+        assert_eq!((symbols, words.as_slice().len()), (66, 4));
     }
 
     #[test]
     fn a_missing_word_is_told() {
-        let mut e = Encoder::new(Form::CLASSIC);
+        let mut words = Words::NONE;
+        let mut e = Encoder::new(&mut words, Form::CLASSIC);
         (0..20).for_each(|_| e.symbol(&EVEN, 3).unwrap());
-        assert_eq!(e.words().len(), 2);
-        let mut d = Decoder::new(&e.words()[..1], Form::CLASSIC).unwrap();
+        e.finish();
+        assert_eq!(words.as_slice().len(), 2);
+        let mut d = Decoder::new(&words.as_slice()[..1], Form::CLASSIC).unwrap();
         let seen = (0..20).take_while(|_| d.symbol(&EVEN) == Ok(3)).count();
         assert_eq!(seen, 9, "33 bits less 9 symbols are below 2^16");
         assert!(Decoder::new(&[], Form::LONG).is_err());

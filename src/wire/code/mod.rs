@@ -1,6 +1,7 @@
 //! The code of the map: rays in, words out, whatever they travel on.
 
 pub mod block;
+pub mod edges;
 mod expectation;
 pub mod interval;
 pub mod model;

@@ -49,7 +49,42 @@ pub struct Model {
 }
 
 /// The tables of wire version 1.
-pub static MODEL: Model = include!("model.in");
+pub static MODEL: Model = VERSION_1;
+
+/// For each symbol of [`MODEL`], the frequencies of those before it in its table.
+pub static BELOW: Model = VERSION_1.below();
+
+const VERSION_1: Model = include!("model.in");
+
+impl Model {
+    const fn below(mut self) -> Self {
+        add_up(self.ray.as_flattened_mut());
+        add_up(&mut self.first);
+        add_up(self.edge.as_flattened_mut().as_flattened_mut());
+        add_up(self.end.as_flattened_mut().as_flattened_mut());
+        add_up(&mut self.distance);
+        add_up(core::slice::from_mut(&mut self.limit));
+        add_up(&mut self.stop);
+        self
+    }
+}
+
+#[allow(clippy::indexing_slicing)] // evaluated by the compiler
+const fn add_up<const N: usize>(tables: &mut [[u8; N]]) {
+    let mut table = 0;
+    while table < tables.len() {
+        let (mut below, mut symbol) = (0, 0);
+        while symbol < N {
+            let frequency = tables[table][symbol];
+            tables[table][symbol] = below;
+            below = below.wrapping_add(frequency);
+            symbol += 1;
+        }
+        // sums to 256
+        assert!(below == 0);
+        table += 1;
+    }
+}
 
 #[cfg(test)]
 mod tests {
@@ -69,6 +104,13 @@ mod tests {
         MODEL.distance.iter().for_each(|t| sums_to_256(t));
         sums_to_256(&MODEL.limit);
         MODEL.stop.iter().for_each(|t| sums_to_256(t));
+    }
+
+    #[test]
+    fn below_a_symbol_are_those_before_it() {
+        assert_eq!((MODEL.ray[2][1], BELOW.ray[2][1]), ([58, 196, 2], [0, 58, 254]));
+        assert_eq!((MODEL.stop[7], BELOW.stop[7], BELOW.limit), ([255, 1], [0, 255], [0, 100, 124, 183]));
+        assert_eq!(BELOW.edge[1][1][4], [0, 1, 8, 23, 40, 54, 108, 129, 147, 162, 170, 171, 240]);
     }
 
     #[test]

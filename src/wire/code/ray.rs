@@ -1,5 +1,6 @@
 //! One azimuth of a map as it travels: which cells are known, and a bit for each of them.
 
+use super::edges::Edges;
 use crate::bitmap::Row;
 use crate::bits::Bits;
 
@@ -7,49 +8,49 @@ use crate::bits::Bits;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Known {
-    near: u8,
-    last: u8,
+    /// First and last cell.
+    limits: [u8; 2],
 }
 
 impl Known {
     /// Nothing is known.
-    pub const NONE: Self = Self { near: 1, last: 0 };
+    pub const NONE: Self = Self { limits: [1, 0] };
 
     /// The cells `near..end`; none if that is empty or reaches beyond 256 cells.
     #[allow(clippy::cast_possible_truncation)] // checked
     pub const fn new(near: usize, end: usize) -> Self {
-        if near < end && end <= 256 { Self { near: near as u8, last: (end - 1) as u8 } } else { Self::NONE }
+        if near < end && end <= 256 { Self { limits: [near as u8, (end - 1) as u8] } } else { Self::NONE }
     }
 
     /// First and last cell as bytes; 1 and 0 where nothing is known.
     pub const fn limits(self) -> [u8; 2] {
-        [self.near, self.last]
+        self.limits
     }
 
     /// From first and last cell; `None` if they are in the wrong order, unless they are 1 and 0.
     pub const fn from_limits(limits: [u8; 2]) -> Option<Self> {
         let [near, last] = limits;
-        if near <= last || (near == 1 && last == 0) { Some(Self { near, last }) } else { None }
+        if near <= last || (near == 1 && last == 0) { Some(Self { limits }) } else { None }
     }
 
     /// Whether no cell is known.
     pub const fn is_empty(self) -> bool {
-        self.near > self.last
+        self.limits[0] > self.limits[1]
     }
 
     /// First known cell.
     pub const fn near(self) -> usize {
-        self.near as usize
+        self.limits[0] as usize
     }
 
     /// First cell beyond; not above [`Known::near`] where nothing is known.
     pub const fn end(self) -> usize {
-        if self.is_empty() { 0 } else { self.last as usize + 1 }
+        if self.is_empty() { 0 } else { self.limits[1] as usize + 1 }
     }
 
     /// Whether a cell is known.
     pub const fn contains(self, cell: usize) -> bool {
-        cell >= self.near as usize && cell < self.end()
+        cell >= self.near() && cell < self.end()
     }
 }
 
@@ -109,25 +110,13 @@ impl<const W: usize> Ray<W> {
     }
 
     /// Cells whose bit differs from the one before, within the known cells.
-    pub fn toggles(&self) -> Bits<W> {
-        let mut before = 0;
-        let words = self.bits.words().map(|word| {
-            let shifted = (word << 1) | before;
-            before = word >> 31;
-            word ^ shifted
-        });
-        let mut toggles = Bits::from_words(words);
-        // no bit is set outside, so the limits are the only other places that differ
-        if !self.known.is_empty() {
-            toggles.clear(self.known.near());
-            toggles.clear(self.known.end());
-        }
-        toggles
+    pub fn edges(&self) -> Edges<'_, W> {
+        Edges::new(self, 0)
     }
 
     /// Whether any of the known cells differs from the one before.
-    pub fn has_toggles(&self) -> bool {
-        !self.toggles().is_empty()
+    pub fn has_edges(&self) -> bool {
+        self.edges().next().is_some()
     }
 
     /// From bits none of which is set outside the known cells.
@@ -138,9 +127,6 @@ impl<const W: usize> Ray<W> {
     /// What this ray of the refresh will probably be by now: where the neighbour changed since the
     /// same refresh, what the neighbour is now; elsewhere as it was.
     pub fn expected(&self, neighbour: &Self, neighbour_was: &Self) -> Self {
-        if neighbour == neighbour_was {
-            return *self;
-        }
         let mut words = *self.bits.words();
         let neighbours = neighbour.bits.words().iter().zip(neighbour_was.bits.words());
         for (word, (now, was)) in words.iter_mut().zip(neighbours) {
@@ -157,7 +143,7 @@ impl<const W: usize> Ray<W> {
         if self.known.is_empty() || !self.first() {
             return 0;
         }
-        self.toggles().next(0).unwrap_or(self.known.end())
+        self.edges().next().unwrap_or(self.known.end())
     }
 }
 
@@ -165,6 +151,7 @@ impl<const W: usize> Ray<W> {
 mod tests {
     use super::*;
     use std::string::String;
+    use std::vec;
     use std::vec::Vec;
 
     /// `.` visible, `#` not, blanks unknown.
@@ -192,13 +179,16 @@ mod tests {
     }
 
     #[test]
-    fn toggles_lie_within_the_known_cells() {
-        let toggles = |p: &str| ray(p).toggles().iter().collect::<Vec<_>>();
-        assert_eq!(toggles("  ..##.  "), [4, 6]);
-        assert_eq!(toggles("####"), [0_usize; 0]);
-        assert_eq!(toggles("  .  "), [0_usize; 0]);
+    fn edges_lie_within_the_known_cells() {
+        let edges = |p: &str| ray(p).edges().collect::<Vec<_>>();
+        assert_eq!(edges("  ..##.  "), [4, 6]);
+        assert_eq!((edges("####"), edges("  .  "), edges("")), (vec![], vec![], vec![]));
         let whole = Ray::<7>::new(Known::new(0, 224), Bits::span(31, 33));
-        assert_eq!(whole.toggles().iter().collect::<Vec<_>>(), [31, 33]);
+        assert_eq!(whole.edges().collect::<Vec<_>>(), [31, 33]);
+        assert_eq!(Edges::new(&whole, 32).collect::<Vec<_>>(), [33]);
+        assert!(!whole.edges().any(|edge| edge == 0) && Edges::new(&whole, 224).next().is_none());
+        let last = Ray::<7>::new(Known::new(3, 224), Bits::span(3, 223));
+        assert_eq!((last.edges().collect::<Vec<_>>(), last.has_edges()), (vec![223], true));
     }
 
     #[test]

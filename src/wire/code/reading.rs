@@ -1,13 +1,13 @@
 //! The words of a block in, as far as they are there, rays out.
 
 use super::block::{AGE_BITS, Context, Kind};
-use super::expectation::{
-    Before, Expected, Last, Progress, distance_table, edge_table, end_table, first_table, ray_table, shift, stop_table,
-};
+use super::edges::{EdgeList, Hints};
+use super::expectation::{Before, EdgeTables, Last, Progress, distance_table, first_table, shift, stop_table};
 use super::interval::{Decoder, Form, OutOfWords};
-use super::model::{AS_EXPECTED, EDGES, GONE, KNOWN, MODEL, NEW, REACH};
+use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH};
 use super::ray::{Known, Ray};
 use crate::bits::Bits;
+use core::ops::Range;
 
 /// Why a block's decoding ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,8 +25,8 @@ pub enum Ending {
 
 /// How many ticks older the refresh is that a delta with this first word names.
 pub fn age(words: &[u64], form: Form) -> Option<u8> {
-    let mut decoder = Decoder::new(words, form).ok()?;
-    let age = decoder.plain(AGE_BITS).ok()?;
+    // plain bits at the start are the first word's own
+    let age = words.first()? >> form.bits.saturating_sub(AGE_BITS);
     u8::try_from(age + 1).ok()
 }
 
@@ -60,32 +60,21 @@ impl Place {
     /// At the block's start.
     pub const START: Self = Self { azimuth: 0, as_expected: true, still: true, used: 0, value: 0, width: 0 };
 
-    fn of<const W: usize>(azimuth: usize, progress: &Progress<W>, decoder: &Decoder<'_>) -> Self {
-        let (used, value, width) = decoder.state();
-        let Before { as_expected, still, .. } = progress.before;
+    fn of(azimuth: usize, before: Before, (used, value, width): (usize, u64, u64)) -> Self {
+        let Before { as_expected, still, .. } = before;
         let number = |n: usize| u8::try_from(n).ok();
         match number(azimuth).zip(number(used)) {
-            Some((azimuth, used)) if !progress.before.first => Self { azimuth, as_expected, still, used, value, width },
+            Some((azimuth, used)) if !before.first => Self { azimuth, as_expected, still, used, value, width },
             _ => Self::START,
         }
     }
 
-    /// Goes on here: the decoder, what is known of the next azimuth, and which it is. `None` if the
-    /// azimuth before is not at hand any more.
-    fn go_on<'a, const W: usize>(
-        &self,
-        words: &'a [u64],
-        context: &Context,
-        kind: Kind,
-        reader: &impl Reader<W>,
-    ) -> Option<(Decoder<'a>, Progress<W>, usize)> {
-        let azimuth = usize::from(self.azimuth);
-        let before = azimuth.checked_sub(1)?;
+    /// What went before the azimuth to go on with: the ray, and what it was in the refresh. `None` at the
+    /// start, or if it is not at hand any more.
+    fn behind<const W: usize>(&self, kind: Kind, reader: &impl Reader<W>) -> Option<(Ray<W>, Ray<W>)> {
+        let before = usize::from(self.azimuth).checked_sub(1)?;
         let neighbour = reader.taken(before)?;
-        let neighbour_was = if kind == Kind::Refresh { Ray::UNKNOWN } else { reader.was(before)? };
-        let before = Before { first: false, as_expected: self.as_expected, still: self.still };
-        let decoder = Decoder::resume(words, context.form, (usize::from(self.used), self.value, self.width));
-        Some((decoder, Progress { before, neighbour, neighbour_was }, azimuth))
+        Some((neighbour, if kind == Kind::Refresh { Ray::UNKNOWN } else { reader.was(before)? }))
     }
 }
 
@@ -98,43 +87,66 @@ pub fn decode<const W: usize>(
     place: &mut Place,
     reader: &mut impl Reader<W>,
 ) -> Ending {
-    let (mut decoder, mut progress, from) = match place.go_on(words, context, kind, reader) {
-        Some(there) => there,
+    let Ok(mut decoder) = Decoder::new(words, context.form) else { return Ending::OutOfWords };
+    let (mut before, mut from) = (Before::START, start);
+    let (neighbour, neighbour_was) = match place.behind(kind, reader) {
+        Some(behind) => {
+            from = usize::from(place.azimuth);
+            before = Before { first: false, as_expected: place.as_expected, still: place.still };
+            decoder = Decoder::resume(words, context.form, (usize::from(place.used), place.value, place.width));
+            behind
+        }
         None => {
-            let Ok(mut decoder) = Decoder::new(words, context.form) else { return Ending::OutOfWords };
             if kind != Kind::Refresh && decoder.plain(AGE_BITS).is_err() {
                 return Ending::OutOfWords;
             }
-            (decoder, Progress::new(context.usual), start)
+            (Ray::clear(context.usual), Ray::UNKNOWN)
         }
     };
-    for azimuth in from..context.azimuths {
-        *place = Place::of(azimuth, &progress, &decoder);
+    let mut progress = Progress::behind(kind, before, neighbour, neighbour_was);
+    let (ending, (azimuth, before, state)) = go(&mut decoder, &mut progress, from..context.azimuths, reader);
+    *place = Place::of(azimuth, before, state);
+    ending
+}
+
+/// Where an azimuth begins.
+type At = (usize, Before, (usize, u64, u64));
+
+/// Reads azimuths; also where the last begins that was looked at.
+fn go<const W: usize>(
+    decoder: &mut Decoder<'_>,
+    progress: &mut Progress<W>,
+    azimuths: Range<usize>,
+    reader: &mut impl Reader<W>,
+) -> (Ending, At) {
+    let mut at = (azimuths.start, progress.before, decoder.state());
+    for azimuth in azimuths {
+        at = (azimuth, progress.before, decoder.state());
         if !progress.before.first {
             match stop_table(decoder.room()).map(|table| decoder.symbol(table)) {
-                None | Some(Ok(1)) => return complete(&decoder),
-                Some(Err(OutOfWords)) => return Ending::OutOfWords,
+                None | Some(Ok(1)) => return (complete(decoder), at),
+                Some(Err(OutOfWords)) => return (Ending::OutOfWords, at),
                 Some(Ok(_)) => {}
             }
         }
-        let refreshed = match kind {
+        let refreshed = match progress.kind {
             Kind::Refresh => Ray::UNKNOWN,
             Kind::Delta { .. } => match reader.was(azimuth) {
                 Some(ray) => ray,
-                None => return Ending::NoRefresh,
+                None => return (Ending::NoRefresh, at),
             },
         };
-        let expected = progress.expected(kind, &refreshed);
-        match decode_ray(&mut decoder, kind, progress.before, &expected) {
-            Ok(ray) => {
+        let mut ray = progress.expect(&refreshed);
+        match decode_ray(decoder, progress, &mut ray) {
+            Ok(as_expected) => {
                 reader.take(azimuth, &ray);
-                progress.advance(&ray, &expected, &refreshed);
+                progress.advance(&ray, &refreshed, as_expected);
             }
-            Err(NotARay::OutOfWords) => return Ending::OutOfWords,
-            Err(NotARay::Malformed) => return Ending::Malformed,
+            Err(NotARay::OutOfWords) => return (Ending::OutOfWords, at),
+            Err(NotARay::Malformed) => return (Ending::Malformed, at),
         }
     }
-    complete(&decoder)
+    (complete(decoder), at)
 }
 
 /// Behind an intact block nothing is left of the number.
@@ -158,23 +170,28 @@ impl From<OutOfWords> for NotARay {
     }
 }
 
+/// Makes the expected ray the one that is told; whether it is as expected.
 fn decode_ray<const W: usize>(
     decoder: &mut Decoder<'_>,
-    kind: Kind,
-    before: Before,
-    expected: &Ray<W>,
-) -> Result<Ray<W>, NotARay> {
-    let known = match decoder.symbol(ray_table(kind, before, expected))? {
-        AS_EXPECTED => return Ok(*expected),
-        EDGES => expected.known,
-        KNOWN if kind == Kind::Refresh => {
-            let near = decode_limit(decoder, expected.known.near())?;
-            let end = decode_limit(decoder, expected.known.end())?;
+    progress: &mut Progress<W>,
+    ray: &mut Ray<W>,
+) -> Result<bool, NotARay> {
+    let known = match decoder.symbol(progress.table())? {
+        AS_EXPECTED => return Ok(true),
+        EDGES => ray.known,
+        KNOWN if progress.kind == Kind::Refresh => {
+            let near = decode_limit(decoder, ray.known.near())?;
+            let end = decode_limit(decoder, ray.known.end())?;
             limits::<W>(near, end)?
         }
         _ => return Err(NotARay::Malformed),
     };
-    decode_edges(decoder, kind, known, expected)
+    let tables = EdgeTables::of(progress.kind);
+    let (hints, edges) = progress.edges();
+    let told = decode_edges(decoder, tables, known, (ray, hints), edges)?;
+    let as_expected = *ray == told;
+    *ray = told;
+    Ok(as_expected)
 }
 
 /// Known cells as told: nothing, or within the row.
@@ -187,27 +204,31 @@ fn limits<const W: usize>(near: usize, end: usize) -> Result<Known, NotARay> {
 /// Reads edges up to the end of a ray with these known cells.
 fn decode_edges<const W: usize>(
     decoder: &mut Decoder<'_>,
-    kind: Kind,
+    tables: EdgeTables,
     known: Known,
-    expected: &Ray<W>,
+    (expected, hints): (&Ray<W>, &EdgeList),
+    edges: &mut EdgeList,
 ) -> Result<Ray<W>, NotARay> {
+    edges.clear();
     if known.is_empty() {
         return Ok(Ray::UNKNOWN);
     }
     let expected_bit = expected.known.is_empty() || expected.first();
     let first = expected_bit ^ (decoder.symbol(first_table(expected_bit))? == 1);
     let mut bit = first;
-    let mut toggles = Bits::NONE;
-    let mut hints = Expected::new(expected);
     let (mut place, mut last) = (known.near(), Last::None);
-    hints.from = place + 1;
+    let mut painted = Painter::NONE;
+    if first {
+        painted.turn(place);
+    }
+    let mut hints = Hints::new(hints, expected_bit, place + 1, known.end());
     // each turn leaves an expected or a told edge behind
     for _ in 0..2 * Bits::<W>::CAPACITY {
-        if let Some(hint) = hints.next(bit, known.end()) {
-            match decoder.symbol(edge_table(kind, bit, last))? {
+        if let Some(hint) = hints.next(bit) {
+            match decoder.symbol(tables.edge(bit, last))? {
                 GONE => {
                     last = Last::Other;
-                    hints.from = hint + 1;
+                    hints.pass(hint + 1);
                     continue;
                 }
                 NEW => {
@@ -220,8 +241,11 @@ fn decode_edges<const W: usize>(
                     place = edge;
                 }
             }
-        } else if decoder.symbol(end_table(kind, bit, last))? == 0 {
-            return Ok(ray_of(known, &toggles, first));
+        } else if decoder.symbol(tables.end(bit, last))? == 0 {
+            if bit {
+                painted.turn(known.end());
+            }
+            return Ok(Ray::within(known, painted.bits()));
         } else {
             place += decode_distance(decoder, bit)?;
             last = Last::Other;
@@ -229,37 +253,56 @@ fn decode_edges<const W: usize>(
         if place >= known.end() {
             return Err(NotARay::Malformed);
         }
-        toggles.set(place);
+        edges.push(place);
+        painted.turn(place);
         bit = !bit;
-        hints.from = hints.from.max(place + 1);
+        hints.pass(place + 1);
     }
     Err(NotARay::Malformed)
 }
 
-/// The ray with these edges whose first known cell has this bit.
-fn ray_of<const W: usize>(known: Known, toggles: &Bits<W>, first: bool) -> Ray<W> {
-    let mut lit = first;
-    let words = toggles.words().map(|mut word| {
-        // each bit the parity of the edges up to it
-        for shift in [1, 2, 4, 8, 16] {
-            word ^= word << shift;
-        }
-        let parity = word >> 31 == 1;
-        let bits = if lit { !word } else { word };
-        lit ^= parity;
-        bits
-    });
-    Ray::new(known, Bits::from_words(words))
+/// A row of bits, painted from edge to edge.
+struct Painter<const W: usize> {
+    /// As each word is if no cell before it is set.
+    words: [u32; W],
+    /// Words with an odd number of edges, a bit each.
+    odd: u32,
 }
 
+impl<const W: usize> Painter<W> {
+    const NONE: Self = Self { words: [0; W], odd: 0 };
+
+    /// Turns the bits over from a cell on; beyond the row nothing happens.
+    #[inline]
+    fn turn(&mut self, cell: usize) {
+        if let Some(word) = self.words.get_mut(cell / 32) {
+            *word ^= u32::MAX << (cell % 32);
+            self.odd ^= 1 << (cell / 32);
+        }
+    }
+
+    /// All that was painted.
+    fn bits(mut self) -> Bits<W> {
+        let mut before = 0;
+        for word in &mut self.words {
+            *word ^= before;
+            before ^= 0_u32.wrapping_sub(self.odd & 1);
+            self.odd >>= 1;
+        }
+        Bits::from_words(self.words)
+    }
+}
+
+#[inline(always)]
 fn decode_distance(decoder: &mut Decoder<'_>, bit: bool) -> Result<usize, NotARay> {
     let bits = decoder.symbol(distance_table(bit))?;
     let low = decoder.plain(u32::try_from(bits).unwrap_or(0))?;
     Ok((1 << bits) | low)
 }
 
+#[inline(always)]
 fn decode_limit(decoder: &mut Decoder<'_>, expected: usize) -> Result<usize, NotARay> {
-    match decoder.symbol(&MODEL.limit)? {
+    match decoder.symbol(&BELOW.limit)? {
         0 => Ok(expected),
         1 => expected.checked_sub(1).ok_or(NotARay::Malformed),
         2 => Ok(expected + 1),

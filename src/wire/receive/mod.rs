@@ -69,10 +69,9 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
     /// # Errors
     /// Why it is not used.
     pub fn frame(&mut self, now: Time, frame: &CanFrame) -> Result<Accepted, Refused> {
-        let addresses = self.addresses;
-        let received = Received::from_frame(frame, &addresses);
-        let sensor = addresses.message(frame.id).map(|(sensor, _)| sensor);
-        self.received(now, received, sensor)
+        let label = self.addresses.message(frame.id);
+        let received = label.ok_or(NotAMessage::Foreign).and_then(|label| Received::labelled(frame, label));
+        self.received(now, received, label.map(|(sensor, _)| sensor))
     }
 
     /// Takes a message from a serial line.

@@ -69,13 +69,16 @@ impl<const A: usize, const W: usize> Sectors<A, W> {
 
     /// Takes a ray from a block; order follows the scans.
     pub fn take(&mut self, azimuth: usize, scan: ScanNumber, ray: &Ray<W>, refresh: bool) {
-        let same = self.there.get(azimuth) && self.now_scan.get(azimuth) == Some(&scan);
-        if self.is_older(azimuth, scan) || same {
+        let same = self.now_scan.get(azimuth) == Some(&scan);
+        if same || self.is_older(azimuth, scan) {
             self.set(azimuth, scan, ray);
+        }
+        if !refresh {
+            return;
         }
         let newest = !self.refreshed.get(azimuth) || self.was_scan.get(azimuth).is_none_or(|was| !was.newer_than(scan));
         let same_cells = self.known.get(azimuth) == Some(&ray.known);
-        if refresh && newest && same_cells && self.there.get(azimuth) {
+        if newest && same_cells && self.there.get(azimuth) {
             let place = (self.was.get_mut(azimuth), self.was_scan.get_mut(azimuth));
             if let (Some(was), Some(was_scan)) = place {
                 (*was, *was_scan) = (*ray.bits(), scan);
@@ -110,11 +113,11 @@ impl<const A: usize, const W: usize> Sectors<A, W> {
     /// Drops what is too old, before its number comes again.
     pub fn purge(&mut self, too_old: impl Fn(ScanNumber) -> bool) {
         for (azimuth, (now, was)) in self.now_scan.iter().zip(&self.was_scan).enumerate() {
-            if self.there.get(azimuth) && too_old(*now) {
+            if too_old(*now) {
                 self.there.clear(azimuth);
                 self.refreshed.clear(azimuth);
             }
-            if self.refreshed.get(azimuth) && too_old(*was) {
+            if too_old(*was) {
                 self.refreshed.clear(azimuth);
             }
         }

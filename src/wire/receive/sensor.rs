@@ -313,7 +313,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         let map = map_message::parse(message.own, long).ok_or(Refused::Malformed)?;
         // the lag is looked at before there is a header, so that a session settles meanwhile
         self.hear(now, map.scan, limits)?;
-        let header = *self.header().ok_or(Refused::NoHeader)?;
+        let header = self.collector.header().filter(|_| self.usable).ok_or(Refused::NoHeader)?;
         let accepted = Accepted::Map { scan: map.scan };
         if map.start >= usize::from(header.azimuths) {
             return Err(Refused::Malformed);
@@ -382,10 +382,9 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         self.purged = Some(scan);
         // what a delta may name, and a late delta's delay
         let most_us = 400_000 + 2 * limits.max_delay_us.max(limits.max_age_us);
-        let session = self.session;
-        let too_old = |scan| session.age_us(now, scan) > most_us;
-        self.planes.iter_mut().for_each(|sectors| sectors.purge(too_old));
-        self.assembly.purge(too_old);
+        let too_old = self.session.older_than(now, most_us);
+        self.planes.iter_mut().for_each(|sectors| sectors.purge(&too_old));
+        self.assembly.purge(&too_old);
     }
 }
 

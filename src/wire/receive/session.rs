@@ -231,6 +231,17 @@ impl Session {
         self.begun.map_or(PERIOD_US, |(_, least, _)| behind(scan.lag(now), least))
     }
 
+    /// Whether scans are older than this at one time.
+    #[allow(clippy::cast_possible_truncation)] // below 256
+    pub fn older_than(&self, now: Time, most_us: u32) -> impl Fn(ScanNumber) -> bool + use<> {
+        // how much younger a scan is than the one numbered 0 is a number of ticks
+        let age_us = self.age_us(now, ScanNumber::from_byte(0));
+        let ticks = (age_us / TICK_US) as u8;
+        let most_ticks = (most_us.saturating_sub(age_us % TICK_US) / TICK_US).min(255) as u8;
+        let any = self.begun.is_none();
+        move |scan| any || ScanNumber::from_byte(ticks).ticks_after(scan) > most_ticks
+    }
+
     /// Whether anything may be told now.
     pub fn trusted(&self, now: Time, limits: &Limits) -> bool {
         let settled = self.begun.is_some_and(|(begun, ..)| now.since(begun).is_some_and(|t| t >= limits.sum_us()));
@@ -247,7 +258,7 @@ impl Session {
 
 /// How much a lag is more than another, modulo the period.
 fn behind(lag: u32, least: u32) -> u32 {
-    (lag + PERIOD_US - least) % PERIOD_US
+    if lag < least { lag + PERIOD_US - least } else { lag - least }
 }
 
 #[allow(clippy::cast_possible_truncation)] // modulo
@@ -312,6 +323,20 @@ mod tests {
     fn age_counts_from_the_measurement() {
         let s = trusting();
         assert!(s.fresh(ms(700), scan(450), &LIMITS) && !s.fresh(ms(760), scan(450), &LIMITS));
+    }
+
+    #[test]
+    fn what_is_older_is_known_for_all_scans_at_once() {
+        let s = trusting();
+        for at in [480, 481, 499, 3000] {
+            for most_us in [30_000, 299_999, 600_000, 1_000_000, 5_119_999] {
+                let older = s.older_than(ms(at), most_us);
+                for number in (0..=255).map(ScanNumber::from_byte) {
+                    assert_eq!(older(number), s.age_us(ms(at), number) > most_us, "{number:?} at {at} ms, {most_us}");
+                }
+            }
+        }
+        assert!(Session::NONE.older_than(ms(0), 1_000_000)(scan(0)));
     }
 
     #[test]

@@ -1,10 +1,9 @@
 //! How often radar-3d's maps use each symbol of the wire's code: where its tables come from.
 
 use viewshed::wire::code::block::{self, Context, Kind, Rays};
-use viewshed::wire::code::interval::{Coder, Encoder, Form};
-use viewshed::wire::code::model::MODEL;
+use viewshed::wire::code::interval::{Coder, Encoder, Form, Mark, Words};
+use viewshed::wire::code::model::{BELOW, Model};
 use viewshed::wire::code::ray::{Known, Ray};
-use viewshed::wire::code::{interval, model::Model};
 
 /// Counts per symbol, table after table in the order of [`Model`].
 #[derive(Debug, Clone, Default)]
@@ -24,16 +23,17 @@ fn tables(model: &'static Model) -> Vec<&'static [u8]> {
 }
 
 /// An encoder that remembers the symbols it took.
-#[derive(Clone)]
-struct Counting {
-    encoder: Encoder,
+struct Counting<'a> {
+    encoder: Encoder<'a>,
     seen: Vec<(*const u8, usize)>,
 }
 
-impl Coder for Counting {
-    fn symbol(&mut self, table: &'static [u8], symbol: usize) -> Option<()> {
-        self.encoder.symbol(table, symbol)?;
-        self.seen.push((table.as_ptr(), symbol));
+impl Coder for Counting<'_> {
+    type Mark = (Mark, usize);
+
+    fn symbol<const N: usize>(&mut self, below: &'static [u8; N], symbol: usize) -> Option<()> {
+        self.encoder.symbol(below, symbol)?;
+        self.seen.push((below.as_ptr(), symbol));
         Some(())
     }
 
@@ -43,6 +43,15 @@ impl Coder for Counting {
 
     fn room(&self) -> u32 {
         self.encoder.room()
+    }
+
+    fn mark(&self) -> Self::Mark {
+        (self.encoder.mark(), self.seen.len())
+    }
+
+    fn rewind(&mut self, (mark, seen): Self::Mark) {
+        self.encoder.rewind(mark);
+        self.seen.truncate(seen);
     }
 }
 
@@ -64,23 +73,26 @@ impl<const W: usize> Rays<W> for Scan<'_, W> {
 
 impl Symbols {
     pub fn new() -> Self {
-        Self(tables(&MODEL).iter().map(|t| vec![0; t.len()]).collect())
+        Self(tables(&BELOW).iter().map(|t| vec![0; t.len()]).collect())
     }
 
     /// Counts the symbols of one scan; returns the words it took.
     pub fn count<const W: usize>(&mut self, scan: &Scan<'_, W>, form: Form, kind: Kind, usual: Known) -> usize {
         let context = Context { form, usual, azimuths: scan.now.len() };
-        let all = tables(&MODEL);
+        let all = tables(&BELOW);
         let (mut at, mut words) = (0, 0);
         while at < scan.now.len() {
-            let mut coder = Counting { encoder: interval::Encoder::new(form), seen: Vec::new() };
+            let mut told = Words::NONE;
+            let mut coder = Counting { encoder: Encoder::new(&mut told, form), seen: Vec::new() };
             let end = block::encode(&mut coder, &context, kind, at, scan);
-            for (table, symbol) in coder.seen {
+            let Counting { encoder, seen } = coder;
+            encoder.finish();
+            for (table, symbol) in seen {
                 if let Some(place) = all.iter().position(|t| t.as_ptr() == table) {
                     self.0[place][symbol] += 1;
                 }
             }
-            words += if end == at { 12 } else { coder.encoder.words().len() };
+            words += if end == at { 12 } else { told.as_slice().len() };
             at = end.max(at + 1);
         }
         words
