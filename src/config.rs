@@ -49,6 +49,7 @@ impl core::error::Error for ConfigError {}
 ///
 /// # Errors
 /// Names the parameter.
+#[inline(never)] // called for every parameter, once
 pub(crate) fn within(parameter: &'static str, value: f32, min: f32, max: f32) -> Result<f32, ConfigError> {
     let problem = if !value.is_finite() {
         Problem::NotFinite
@@ -64,6 +65,7 @@ pub(crate) fn within(parameter: &'static str, value: f32, min: f32, max: f32) ->
 ///
 /// # Errors
 /// Names the parameter.
+#[inline(never)]
 pub(crate) fn above(parameter: &'static str, value: f32, lower: f32) -> Result<f32, ConfigError> {
     if value > lower {
         Ok(value)

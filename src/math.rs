@@ -50,6 +50,7 @@ pub(crate) fn log10(x: f32) -> f32 {
 }
 
 /// Nearest integer, halves away from zero.
+#[inline(never)] // for parameters only
 pub(crate) fn round(x: f32) -> f32 {
     libm::roundf(x)
 }
@@ -61,6 +62,7 @@ pub(crate) fn exp_coarse(x: f32) -> f32 {
 
 /// `round(x)` as an `i32`, saturating; not a number becomes 0.
 #[allow(clippy::cast_possible_truncation)] // float casts saturate
+#[inline(never)] // for parameters only
 pub(crate) fn round_i32(x: f32) -> i32 {
     round(x) as i32
 }

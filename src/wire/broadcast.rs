@@ -127,6 +127,7 @@ impl BroadcastConfig {
 }
 
 #[allow(clippy::cast_precision_loss)] // for the message only
+#[inline(never)]
 fn within(parameter: &'static str, value: u32, min: u32, max: u32) -> Result<(), ConfigError> {
     if (min..=max).contains(&value) {
         return Ok(());
@@ -484,7 +485,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             return None;
         }
         if scan.running.is_none() {
-            let running = self.next_running(scan.number, scan.all)?;
+            let running = self.next_running(scan.all)?;
             self.scan.as_mut()?.running = Some(running);
         }
         let scan = self.scan.as_ref()?;
@@ -508,8 +509,8 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         Some(packet)
     }
 
-    fn next_running(&mut self, scan: ScanNumber, all: bool) -> Option<Running> {
-        let telling = Telling { context: self.header.context(self.packing().form()), scan, all };
+    fn next_running(&mut self, all: bool) -> Option<Running> {
+        let telling = Telling { context: self.header.context(self.packing().form()), all };
         let from = self.from;
         let mut layers = self.layers.iter_mut().enumerate();
         layers.find_map(|(plane, layer)| layer.next(&telling, from).map(|next| Running { plane, next, sent: 0 }))

@@ -20,7 +20,6 @@ pub const MOST_TICKS: u8 = 16;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Telling {
     pub context: Context,
-    pub scan: ScanNumber,
     /// Whether everything is refreshed.
     pub all: bool,
 }
@@ -68,7 +67,7 @@ impl<const A: usize, const W: usize> Rays<W> for Run<'_, A, W> {
 }
 
 impl<const A: usize, const W: usize> Layer<A, W> {
-    /// Nothing to tell.
+    /// Nothing to tell. All bits are 0, so that no image holds a copy.
     pub const fn new() -> Self {
         Self {
             now: [Ray::UNKNOWN; A],

@@ -36,12 +36,6 @@ pub enum Kind {
     },
 }
 
-impl Kind {
-    pub(super) fn index(self) -> usize {
-        usize::from(self != Self::Refresh)
-    }
-}
-
 /// What sender and receiver of a block agree on beforehand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Context {
@@ -122,7 +116,6 @@ pub fn encode<const W: usize>(
     azimuths
 }
 
-#[inline(always)]
 fn can_stop(coder: &mut impl Coder) -> bool {
     let room = coder.room();
     // "no further ray" takes 8 bits at most
@@ -135,7 +128,6 @@ fn can_stop(coder: &mut impl Coder) -> bool {
     stops
 }
 
-#[inline(always)]
 fn stop(coder: &mut impl Coder) -> Option<()> {
     stop_table(coder.room()).map_or(Some(()), |table| coder.symbol(table, 1))
 }
@@ -229,14 +221,14 @@ fn encode_edges<const W: usize>(
     }
 }
 
-#[inline(always)]
+#[inline(never)]
 fn encode_distance(coder: &mut impl Coder, bit: bool, distance: usize) -> Option<()> {
     let bits = distance.checked_ilog2()?;
     coder.symbol(distance_table(bit), bits as usize)?;
     coder.plain(bits, distance)
 }
 
-#[inline(always)]
+#[inline(never)]
 fn encode_limit(coder: &mut impl Coder, limit: usize, expected: usize) -> Option<()> {
     let near = [expected, expected.wrapping_sub(1), expected + 1];
     let symbol = near.iter().position(|n| *n == limit).unwrap_or(TOLD);

@@ -77,7 +77,6 @@ impl Words {
 
     /// The part of the interval's lower end that lies in a word, the carries of what follows not yet taken
     /// over; it becomes the last word.
-    #[inline(never)]
     fn put(&mut self, count: usize, low: u64) {
         if let Some(word) = count.checked_sub(1).and_then(|last| self.words.get_mut(last)) {
             (*word, self.count) = (low, count);
@@ -128,9 +127,17 @@ impl<'a> Encoder<'a> {
 
     #[inline]
     fn widen(&mut self) {
-        if self.at.width < NARROW && self.at.used < self.form.most {
-            self.words.put(self.at.used, self.at.low);
-            self.at = Mark { low: 0, width: self.at.width << self.form.bits, used: self.at.used + 1 };
+        if self.at.width < NARROW {
+            self.join();
+        }
+    }
+
+    #[inline(never)]
+    fn join(&mut self) {
+        let at = &mut self.at;
+        if at.used < self.form.most {
+            self.words.put(at.used, at.low);
+            *at = Mark { low: 0, width: at.width << self.form.bits, used: at.used + 1 };
         }
     }
 
@@ -161,7 +168,7 @@ impl Coder for Encoder<'_> {
         self.keep(from, to)
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn plain(&mut self, count: u32, value: usize) -> Option<()> {
         for bit in (0..count).rev() {
             self.widen();
