@@ -12,8 +12,7 @@ use super::{Board, Profile};
 /// # Errors
 /// What the compiler says, or that there is none for the board.
 pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
-    // for speed and little stack, where the reference grid is built for size
-    let small = ["--features", "small", "--config", "profile.release.opt-level=2"];
+    let small = ["--features", "small"];
     build_in(board.folder(), program, if profile == Profile::Small { &small } else { &[] })
 }
 
