@@ -416,6 +416,20 @@ pub enum NotAMessage {
     },
 }
 
+/// Why a message is not authentic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum NotAuthentic {
+    /// It carries no authenticator.
+    Bare,
+    /// The freshness value is not known yet.
+    NoFreshness,
+    /// A freshness message that is not above the last value.
+    Old,
+    /// The authenticator is another's.
+    Code,
+}
+
 /// A checked message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Received<'a> {

@@ -19,6 +19,7 @@ use aes::Aes128;
 use cmac::{Cmac, KeyInit, Mac};
 
 use super::frame::fd_length;
+pub use super::message::NotAuthentic;
 use super::message::{Message, Packet, Packing, Received, SEAL_BYTES, data_id};
 
 /// Where the key comes from: a fuse, a secure element, a file.
@@ -90,20 +91,6 @@ impl<K: Key> Sealer<K> {
 /// First own byte of a long message.
 const OWN: usize = 6;
 
-/// Why a message is not authentic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum NotAuthentic {
-    /// It carries no authenticator.
-    Bare,
-    /// The freshness value is not known yet.
-    NoFreshness,
-    /// A freshness message that is not above the last value.
-    Old,
-    /// The authenticator is another's.
-    Code,
-}
-
 /// Opens the messages of one sensor.
 #[derive(Debug, Clone)]
 pub struct Opener<K> {
@@ -120,6 +107,11 @@ impl<K: Key> Opener<K> {
     /// Takes only what is above this freshness value.
     pub const fn resume(key: K, last: u64) -> Self {
         Self { key, last: Some(last) }
+    }
+
+    /// Takes only what is above this freshness value, from now on.
+    pub(super) const fn resume_at(&mut self, last: u64) {
+        self.last = Some(last);
     }
 
     /// The freshness value accepted last.
