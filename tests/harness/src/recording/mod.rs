@@ -11,6 +11,7 @@ pub mod native;
 pub mod points;
 pub mod problems;
 pub mod ros;
+pub mod serial_log;
 pub mod ti;
 pub mod transforms;
 pub mod write;
