@@ -29,6 +29,9 @@ pub const SEAL_BYTES: usize = 8;
 /// In a long message's byte 5: it is secured.
 const SECURED: u8 = 0x80;
 
+/// In the same byte: not used, 0.
+const RESERVED: u8 = 0x70;
+
 /// Own bytes of a classic message.
 pub const CLASSIC_BYTES: usize = 6;
 
@@ -489,6 +492,10 @@ impl<'a> Received<'a> {
         };
         let counter = Profile::P05.check(bytes, data_id(*sensor, message)).map_err(NotAMessage::Protection)?;
         let sealed = epoch & SECURED != 0;
+        if sealed && epoch & RESERVED != 0 {
+            // no sender says so, and its authenticator would not cover it
+            return Err(NotAMessage::Mislabelled { number: *number, sensor: *sensor });
+        }
         let packing = if sealed { Packing::Secured } else { Packing::Long };
         Ok(Self { sensor: *sensor, message, packing, epoch: Epoch::new(*epoch), counter, own, sealed })
     }
