@@ -3,7 +3,7 @@
 //! The first byte says which header is set, and how bytes are chunked. A byte 0xB5 stands for the
 //! magic word, 0xB6 for a header that announces a frame of the length and items behind it.
 
-use viewshed::inputs::ti::{AngleUnit, Config, Dialect, Family, Outcome, PolarPoints, Ti};
+use viewshed::inputs::ti::{AngleUnit, Config, Dialect, Entries, Family, Outcome, PolarPoints, Ti};
 use viewshed::time::Time;
 
 const MAGIC: [u8; 8] = [2, 1, 4, 3, 6, 5, 8, 7];
@@ -55,6 +55,7 @@ pub fn run(bytes: &[u8]) {
         polar_points: if how & 16 == 0 { PolarPoints::Flat } else { PolarPoints::Raised },
         has_elevation: how & 32 == 0,
         doppler_step_mps: (how & 64 == 0).then_some(0.1),
+        entries: if how & 128 == 0 { Entries::Points } else { Entries::Targets },
     };
     let config = Config { family: Family::ALL.get(usize::from(how & 7)).copied(), dialect };
     assert_eq!(outcomes(config, &bytes, 1), outcomes(config, &bytes, 61));

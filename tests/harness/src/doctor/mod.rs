@@ -12,6 +12,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
 
+use crate::options::TiArgs;
 use crate::recording;
 use crate::recording::ars408::lines;
 use crate::recording::candump;
@@ -64,11 +65,11 @@ impl Examined {
     }
 }
 
-/// Reads a log and judges it.
+/// Reads a log and judges it, a TI capture by what is known of its firmware.
 ///
 /// # Errors
 /// A file that cannot be read or is no such log.
-pub fn examine(path: &Path) -> Result<Examined> {
+pub fn examine(path: &Path, known: &TiArgs) -> Result<Examined> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if candump::is_log(&bytes) {
@@ -76,7 +77,7 @@ pub fn examine(path: &Path) -> Result<Examined> {
     }
     if !bytes.starts_with(mcap::MAGIC) {
         if is_capture(&bytes) {
-            return Ok(Examined::Ti(ti::examine(log, &bytes)));
+            return Ok(Examined::Ti(ti::examine(log, &bytes, known)));
         }
         if recording::native::is_capture(&bytes) {
             let (messages, broken) = recording::native::unstuff(&bytes);
