@@ -269,8 +269,7 @@ fn and_so_they_are_with_one_epoch_if_their_headers_differ() {
 
 fn conflict(others: Epoch) {
     let mut line = Line::<1>::new(MEDIA[0], BroadcastConfig::new(SENSOR, MEDIA[0]));
-    let mut other =
-        Broadcaster::<A, W>::new(BroadcastConfig::new(SENSOR, MEDIA[0]), header(9), others, ms(0)).unwrap();
+    let mut other = Broadcaster::<A, W>::new(BroadcastConfig::new(SENSOR, MEDIA[0]), header(9), others, ms(0)).unwrap();
     let map = Shadows::new(2).next();
     for now in 0..8000 {
         if now % 67 == 0 {
