@@ -45,7 +45,7 @@ impl Sender {
 
     /// What is sent in a millisecond.
     fn send(&mut self, now: u64) -> Option<Packet> {
-        if now % PERIOD == 0 {
+        if now.is_multiple_of(PERIOD) {
             self.map = self.shadows.next();
             let _ = self.broadcaster.scan(ms(now), &self.map);
         }

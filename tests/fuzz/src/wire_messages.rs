@@ -13,12 +13,11 @@ pub fn run(bytes: &[u8]) {
     let mut collector = Collector::NEW;
     let mut status = Status::default();
     for own in bytes.chunks(6).chain([bytes]) {
-        if collector.take(own).is_ok() {
-            if let Some(header) = collector.header() {
-                assert!(
-                    header.azimuths <= 128 && header.ranges <= 256 && header.usual.end() <= usize::from(header.ranges)
-                );
-            }
+        if collector.take(own).is_ok()
+            && let Some(header) = collector.header()
+        {
+            assert!(header.azimuths <= 128 && header.ranges <= 256);
+            assert!(header.usual.end() <= usize::from(header.ranges));
         }
         if status.take(own).is_ok() && own.len() >= 26 {
             assert_eq!(status.emit()[1..22], own[1..22]);
