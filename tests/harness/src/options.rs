@@ -88,11 +88,8 @@ struct ReadingArgs {
     /// Sensor id of the radar in a CAN log or capture that has several
     #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
-    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
-    #[arg(long, value_name = "NAME", value_parser = profile)]
-    profile: Option<&'static Profile>,
     #[command(flatten)]
-    ti: TiArgs,
+    kind: KindArgs,
     /// Time between frames of a TI mmWave capture, which holds none [default: 0.1]
     #[arg(long, value_name = "SECONDS", value_parser = period)]
     frame_period: Option<f64>,
@@ -104,9 +101,12 @@ struct ReadingArgs {
     to: Option<f64>,
 }
 
-/// What a TI mmWave capture does not tell of its radar.
-#[derive(Debug, Clone, Default, Args)]
-pub struct TiArgs {
+/// What a raw log or capture does not tell of its radar.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct KindArgs {
+    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
+    #[arg(long, value_name = "NAME", value_parser = profile)]
+    pub profile: Option<&'static Profile>,
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
     pub ti_header: Option<Family>,
@@ -216,9 +216,9 @@ impl ReadingArgs {
             from_s: self.from,
             to_s: self.to,
             sensor_id: self.sensor_id,
-            profile: self.profile,
-            ti_header: self.ti.ti_header,
-            ti_dialect: self.ti.ti_dialect,
+            profile: self.kind.profile,
+            ti_header: self.kind.ti_header,
+            ti_dialect: self.kind.ti_dialect,
             frame_period_s: self.frame_period,
         }
     }
