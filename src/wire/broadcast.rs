@@ -5,7 +5,7 @@
 //! [`Broadcaster::next_frame`] (CAN, CAN FD) or [`Broadcaster::next_line`] (serial) gives the next frame
 //! that is due, or none yet. It never waits. A caller asks after every frame and once a millisecond.
 //!
-//! What goes first: status, header, map, visible range. Between two frames lies the minimum gap.
+//! What goes first: freshness value, status, header, map, visible range. Between two frames lies the minimum gap.
 //!
 //! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are told
 //! against it. The header's groups and the pages of the status go round all the time, so who joins late
@@ -413,8 +413,9 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         if !self.gap.due(now) {
             return None;
         }
-        let packet = self.status_packet(now).or_else(|| self.header_packet(now));
-        let packet = packet.or_else(|| self.freshness_packet(now)).or_else(|| self.map_packet(now));
+        // without its freshness value nothing else is understood
+        let packet = self.freshness_packet(now).or_else(|| self.status_packet(now));
+        let packet = packet.or_else(|| self.header_packet(now)).or_else(|| self.map_packet(now));
         let packet = packet.or_else(|| self.range_packet(now))?;
         self.gap.next = Time::from_micros(now.micros() + self.gap.period_us);
         Some(packet)
