@@ -413,7 +413,6 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         if !self.gap.due(now) {
             return None;
         }
-        // without its freshness value nothing else is understood
         let packet = self.freshness_packet(now).or_else(|| self.status_packet(now));
         let packet = packet.or_else(|| self.header_packet(now)).or_else(|| self.map_packet(now));
         let packet = packet.or_else(|| self.range_packet(now))?;

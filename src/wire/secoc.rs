@@ -51,10 +51,16 @@ fn code(key: &impl Key, sensor: u8, message: Message, freshness: u64, bytes: &[&
 }
 
 /// Seals the messages of one sensor.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Sealer<K> {
     key: K,
     freshness: u64,
+}
+
+impl<K> core::fmt::Debug for Sealer<K> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Sealer").field("freshness", &self.freshness).finish_non_exhaustive()
+    }
 }
 
 impl<K: Key> Sealer<K> {
@@ -92,10 +98,16 @@ impl<K: Key> Sealer<K> {
 const OWN: usize = 6;
 
 /// Opens the messages of one sensor.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Opener<K> {
     key: K,
     last: Option<u64>,
+}
+
+impl<K> core::fmt::Debug for Opener<K> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Opener").field("last", &self.last).finish_non_exhaustive()
+    }
 }
 
 impl<K: Key> Opener<K> {
@@ -200,6 +212,12 @@ mod tests {
         let filled = sealed(&mut sealer, Message::Status, &[1, 2, 3], true);
         assert_eq!(filled.bytes().len(), 20);
         assert_eq!(filled.bytes()[6..14], [1, 2, 3, 0, 0, 0, 0x03, 0x06]);
+    }
+
+    #[test]
+    fn keys_do_not_get_into_logs() {
+        let shown = std::format!("{:?} {:?}", Sealer::new(KEY, 7), Opener::resume(KEY, 8));
+        assert_eq!(shown, "Sealer { freshness: 7, .. } Opener { last: Some(8), .. }");
     }
 
     #[test]
