@@ -81,7 +81,7 @@ pub struct BroadcastConfig {
     pub max_delay_ms: u16,
     /// Time between two status messages, milliseconds; at most 500.
     pub status_ms: u16,
-    /// Time in which the whole header is sent once, milliseconds.
+    /// Time in which the whole header, and the freshness value, is sent once, milliseconds.
     pub header_ms: u16,
     /// Whether messages carry an authenticator; they are then taken by `Broadcaster::next_sealed`. Not on
     /// classic CAN, whose frames have no room for it.
@@ -245,7 +245,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             status_due: Every::new(now, u64::from(config.status_ms) * 1000),
             header_due: Every::new(now, 1),
             range_due: None,
-            freshness_due: Every::new(now, 1_000_000),
+            freshness_due: Every::new(now, u64::from(config.header_ms) * 1000),
             page: 0,
             group: 0,
             range_from: 0,
@@ -465,7 +465,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         Some(self.packet(Message::Header, &own))
     }
 
-    /// Room for the freshness value, once a second.
+    /// Room for the freshness value.
     fn freshness_packet(&mut self, now: Time) -> Option<Packet> {
         if !self.config.secured || !self.freshness_due.due(now) {
             return None;

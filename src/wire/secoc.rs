@@ -4,7 +4,7 @@
 //! The last 8 bytes of a secured message are the lowest 16 bits of its freshness value and the first 6
 //! bytes of AES-128-CMAC over data ID, freshness value and the bytes from the third on. The value grows
 //! by one with every message of a sensor. A receiver takes the nearest value above the last it accepted;
-//! the freshness message, once a second, has all of it, so that either side may begin anew.
+//! the freshness message, twice a second, has all of it, so that either side may begin anew.
 //!
 //! # Limits
 //! A forged message passes once in 2^48. More than 65 535 messages lost in a row are made up for by the
