@@ -160,6 +160,6 @@ fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     let Outcome::Scan(scan) = outcome else { return };
     unit.scan(scan.time, scan.detections, scan.fault, |_| {});
     if scan.missing > 0 {
-        unit.broadcast().status_mut().reason = Reason::IncompleteScans;
+        unit.degrade(scan.time, Reason::IncompleteScans);
     }
 }

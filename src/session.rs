@@ -263,7 +263,7 @@ fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N:
         last = now;
     });
     if scan.missing > 0 {
-        unit.broadcast().status_mut().reason = Reason::IncompleteScans;
+        unit.degrade(scan.time, Reason::IncompleteScans);
     }
     let record = FrameRecord { frame: *frames, condition: report.condition, used: report.used, fingerprint: 0, ticks };
     line.trace(&record);

@@ -20,6 +20,9 @@ use crate::wire::header::{Header, NotAHeader, fingerprint};
 use crate::wire::message::Epoch;
 use crate::wire::status::{Reason, State};
 
+/// What went wrong is told in the status for this long, microseconds: in several messages, should some be lost.
+const DEGRADED_US: u64 = 1_000_000;
+
 /// Time between two maps that say unknown, microseconds.
 const UNKNOWN_EVERY_US: u64 = 100_000;
 
@@ -32,6 +35,10 @@ pub struct Unit<'a, const R: usize, const A: usize, const E: usize, const W: usi
     broadcast: &'a mut Broadcaster<A, W>,
     /// The last map that was offered to the sender.
     offered: Option<Time>,
+    /// Whether the radar says that it has a fault.
+    fault: bool,
+    /// What went wrong last, and when.
+    trouble: Option<(Time, Reason)>,
 }
 
 /// The header of a unit's maps.
@@ -61,7 +68,7 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
     ) -> Self {
         parameters.prepare(map);
         state.reset();
-        Self { parameters, state, map, broadcast, offered: None }
+        Self { parameters, state, map, broadcast, offered: None, fault: false, trouble: None }
     }
 
     /// Takes a scan measured at this time and offers its map to the sender.
@@ -73,13 +80,11 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         mut ended: impl FnMut(Stage),
     ) -> FrameReport {
         let report = self.state.process_traced(self.parameters, measured, detections, fault, self.map, &mut ended);
-        self.tell(report.condition);
-        let status = self.broadcast.status_mut();
-        if fault {
-            status.reason = Reason::RadarFault;
-        } else if report.continuity == Continuity::ClockStepped {
-            status.reason = Reason::ClockStepped;
+        self.fault = fault;
+        if report.continuity == Continuity::ClockStepped {
+            self.degrade(measured, Reason::ClockStepped);
         }
+        self.tell(report.condition, measured);
         self.offer(measured);
         ended(Stage::Broadcast);
         report
@@ -88,7 +93,7 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
     /// What is to be done when no scan came: the map runs out, and that is sent.
     pub fn idle(&mut self, now: Time) -> Condition {
         let condition = self.state.expire(self.parameters, now, self.map);
-        self.tell(condition);
+        self.tell(condition, now);
         let due = self.offered.is_none_or(|last| now.since(last).is_none_or(|us| us >= UNKNOWN_EVERY_US));
         if condition != Condition::Healthy && due {
             self.offer(now);
@@ -102,13 +107,25 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         let _ = self.broadcast.scan(measured, &*self.map);
     }
 
-    fn tell(&mut self, condition: Condition) {
+    /// Maps go on, but something went wrong just now: told in the status for a second.
+    pub fn degrade(&mut self, now: Time, reason: Reason) {
+        self.trouble = Some((now, reason));
         let status = self.broadcast.status_mut();
-        (status.state, status.reason) = match condition {
-            Condition::Starting => (State::Starting, Reason::None),
-            Condition::Healthy => (State::Ok, Reason::None),
-            Condition::Blind => (State::Blind, Reason::None),
-            Condition::Stale => (State::Blind, Reason::RadarSilent),
+        if status.state == State::Ok {
+            (status.state, status.reason) = (State::Degraded, reason);
+        }
+    }
+
+    fn tell(&mut self, condition: Condition, now: Time) {
+        let recent = |(since, reason)| now.since(since).is_some_and(|us| us < DEGRADED_US).then_some(reason);
+        let status = self.broadcast.status_mut();
+        (status.state, status.reason) = match (condition, self.trouble.and_then(recent)) {
+            (Condition::Stale, _) => (State::Blind, Reason::RadarSilent),
+            _ if self.fault => (State::Fault, Reason::RadarFault),
+            (Condition::Starting, _) => (State::Starting, Reason::None),
+            (Condition::Blind, _) => (State::Blind, Reason::None),
+            (Condition::Healthy, Some(reason)) => (State::Degraded, reason),
+            (Condition::Healthy, None) => (State::Ok, Reason::None),
         };
     }
 

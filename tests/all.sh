@@ -23,6 +23,7 @@ run cargo test --release --locked --workspace --no-fail-fast
 run cargo test --locked --package viewshed --test properties
 run tests/recordings/make.sh --check
 run tests/firmware.sh
+run tests/fuzz.sh
 
 echo
 echo "== summary"

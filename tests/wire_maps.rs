@@ -259,9 +259,17 @@ fn an_unknown_version_and_a_larger_map_are_reported_and_unknown() {
 
 #[test]
 fn two_senders_with_one_number_are_a_conflict() {
+    conflict(Epoch::new(8));
+}
+
+#[test]
+fn and_so_they_are_with_one_epoch_if_their_headers_differ() {
+    conflict(Epoch::new(3));
+}
+
+fn conflict(others: Epoch) {
     let mut line = Line::<1>::new(MEDIA[0], BroadcastConfig::new(SENSOR, MEDIA[0]));
-    let mut other =
-        Broadcaster::<A, W>::new(BroadcastConfig::new(SENSOR, MEDIA[0]), header(9), Epoch::new(8), ms(0)).unwrap();
+    let mut other = Broadcaster::<A, W>::new(BroadcastConfig::new(SENSOR, MEDIA[0]), header(9), others, ms(0)).unwrap();
     let map = Shadows::new(2).next();
     for now in 0..8000 {
         if now % 67 == 0 {

@@ -171,3 +171,38 @@ fn the_example_reads_as_the_pictures() {
     assert_eq!(collector.header(), Some(&header()));
     assert_eq!(complete, 2);
 }
+
+/// What a sender with a key says first, on CAN FD.
+#[cfg(feature = "secoc")]
+fn secured() -> Vec<viewshed::wire::frame::CanFrame> {
+    use viewshed::time::Time;
+    use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+    let start = Time::from_micros(1000 * 0x0102_0304);
+    let medium = Medium::CanFd(Addresses::STANDARD);
+    let config = BroadcastConfig { secured: true, ..BroadcastConfig::new(0, medium) };
+    let mut sender = Broadcaster::<AZIMUTHS, 1>::new(config, header(), EPOCH, start).unwrap();
+    let mut sealer = viewshed::wire::secoc::Sealer::new(KEY, 0x0000_0102_0304_0507);
+    let mut next = |ms: u64| sender.next_sealed(Time::from_micros(start.micros() + 1000 * ms), &mut sealer).unwrap();
+    [next(0), next(1)].iter().map(|p| p.frame(&Addresses::STANDARD).unwrap()).collect()
+}
+
+#[cfg(feature = "secoc")]
+const KEY: [u8; 16] = [0x2B, 0x7E, 0x15, 0x16, 0x28, 0xAE, 0xD2, 0xA6, 0xAB, 0xF7, 0x15, 0x88, 0x09, 0xCF, 0x4F, 0x3C];
+
+#[cfg(feature = "secoc")]
+#[test]
+fn the_authenticated_example_is_what_is_sent_and_opens() {
+    let page: Vec<String> =
+        fenced("secured").iter().map(|line| line.split_whitespace().next().unwrap().to_owned()).collect();
+    let frames = secured();
+    let sent: Vec<String> = frames.iter().map(|frame| format!("{frame:?}")).collect();
+    assert_eq!(page, sent, "\n{}", sent.join("\n"));
+    let key: String = KEY.iter().map(|byte| format!("{byte:02X}")).collect();
+    assert!(PAGE.contains(&key));
+    let mut opener = viewshed::wire::secoc::Opener::new(KEY);
+    for (frame, freshness) in frames.iter().zip([0x0000_0102_0304_0508, 0x0000_0102_0304_0509]) {
+        let received = Received::from_frame(frame, &Addresses::STANDARD).unwrap();
+        assert!(opener.open(&received).is_ok());
+        assert_eq!(opener.freshness(), Some(freshness));
+    }
+}

@@ -5,7 +5,7 @@
 //! [`Broadcaster::next_frame`] (CAN, CAN FD) or [`Broadcaster::next_line`] (serial) gives the next frame
 //! that is due, or none yet. It never waits. A caller asks after every frame and once a millisecond.
 //!
-//! What goes first: status, header, map, visible range. Between two frames lies the minimum gap.
+//! What goes first: freshness value, status, header, map, visible range. Between two frames lies the minimum gap.
 //!
 //! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are told
 //! against it. The header's groups and the pages of the status go round all the time, so who joins late
@@ -81,7 +81,7 @@ pub struct BroadcastConfig {
     pub max_delay_ms: u16,
     /// Time between two status messages, milliseconds; at most 500.
     pub status_ms: u16,
-    /// Time in which the whole header is sent once, milliseconds.
+    /// Time in which the whole header, and the freshness value, is sent once, milliseconds.
     pub header_ms: u16,
     /// Whether messages carry an authenticator; they are then taken by `Broadcaster::next_sealed`. Not on
     /// classic CAN, whose frames have no room for it.
@@ -246,7 +246,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             status_due: Every::new(now, u64::from(config.status_ms) * 1000),
             header_due: Every::new(now, 1),
             range_due: None,
-            freshness_due: Every::new(now, 1_000_000),
+            freshness_due: Every::new(now, u64::from(config.header_ms) * 1000),
             page: 0,
             group: 0,
             range_from: 0,
@@ -417,8 +417,8 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         if !self.gap.due(now) {
             return None;
         }
-        let packet = self.status_packet(now).or_else(|| self.header_packet(now));
-        let packet = packet.or_else(|| self.freshness_packet(now)).or_else(|| self.map_packet(now));
+        let packet = self.freshness_packet(now).or_else(|| self.status_packet(now));
+        let packet = packet.or_else(|| self.header_packet(now)).or_else(|| self.map_packet(now));
         let packet = packet.or_else(|| self.range_packet(now))?;
         self.gap.next = Time::from_micros(now.micros() + self.gap.period_us);
         Some(packet)
@@ -469,7 +469,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         Some(self.packet(Message::Header, &own))
     }
 
-    /// Room for the freshness value, once a second.
+    /// Room for the freshness value.
     fn freshness_packet(&mut self, now: Time) -> Option<Packet> {
         if !self.config.secured || !self.freshness_due.due(now) {
             return None;

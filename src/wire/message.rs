@@ -29,6 +29,9 @@ pub const SEAL_BYTES: usize = 8;
 /// In a long message's byte 5: it is secured.
 const SECURED: u8 = 0x80;
 
+/// In the same byte: not used, 0.
+const RESERVED: u8 = 0x70;
+
 /// Own bytes of a classic message.
 pub const CLASSIC_BYTES: usize = 6;
 
@@ -417,6 +420,20 @@ pub enum NotAMessage {
     },
 }
 
+/// Why a message is not authentic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum NotAuthentic {
+    /// It carries no authenticator.
+    Bare,
+    /// The freshness value is not known yet.
+    NoFreshness,
+    /// A freshness message that is not above the last value.
+    Old,
+    /// The authenticator is another's.
+    Code,
+}
+
 /// A checked message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Received<'a> {
@@ -481,6 +498,10 @@ impl<'a> Received<'a> {
         };
         let counter = Profile::P05.check(bytes, data_id(*sensor, message)).map_err(NotAMessage::Protection)?;
         let sealed = epoch & SECURED != 0;
+        if sealed && epoch & RESERVED != 0 {
+            // no sender says so, and its authenticator would not cover it
+            return Err(NotAMessage::Mislabelled { number: *number, sensor: *sensor });
+        }
         let packing = if sealed { Packing::Secured } else { Packing::Long };
         Ok(Self { sensor: *sensor, message, packing, epoch: Epoch::new(*epoch), counter, own, sealed })
     }

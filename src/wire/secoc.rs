@@ -4,7 +4,7 @@
 //! The last 8 bytes of a secured message are the lowest 16 bits of its freshness value and the first 6
 //! bytes of AES-128-CMAC over data ID, freshness value and the bytes from the third on. The value grows
 //! by one with every message of a sensor. A receiver takes the nearest value above the last it accepted;
-//! the freshness message, once a second, has all of it, so that either side may begin anew.
+//! the freshness message, twice a second, has all of it, so that either side may begin anew.
 //!
 //! # Limits
 //! A forged message passes once in 2^48. More than 65 535 messages lost in a row are made up for by the
@@ -19,6 +19,7 @@ use aes::Aes128;
 use cmac::{Cmac, KeyInit, Mac};
 
 use super::frame::fd_length;
+pub use super::message::NotAuthentic;
 use super::message::{Message, Packet, Packing, Received, SEAL_BYTES, data_id};
 
 /// Where the key comes from: a fuse, a secure element, a file.
@@ -50,10 +51,16 @@ fn code(key: &impl Key, sensor: u8, message: Message, freshness: u64, bytes: &[&
 }
 
 /// Seals the messages of one sensor.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Sealer<K> {
     key: K,
     freshness: u64,
+}
+
+impl<K> core::fmt::Debug for Sealer<K> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Sealer").field("freshness", &self.freshness).finish_non_exhaustive()
+    }
 }
 
 impl<K: Key> Sealer<K> {
@@ -90,25 +97,17 @@ impl<K: Key> Sealer<K> {
 /// First own byte of a long message.
 const OWN: usize = 6;
 
-/// Why a message is not authentic.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum NotAuthentic {
-    /// It carries no authenticator.
-    Bare,
-    /// The freshness value is not known yet.
-    NoFreshness,
-    /// A freshness message that is not above the last value.
-    Old,
-    /// The authenticator is another's.
-    Code,
-}
-
 /// Opens the messages of one sensor.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Opener<K> {
     key: K,
     last: Option<u64>,
+}
+
+impl<K> core::fmt::Debug for Opener<K> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Opener").field("last", &self.last).finish_non_exhaustive()
+    }
 }
 
 impl<K: Key> Opener<K> {
@@ -120,6 +119,11 @@ impl<K: Key> Opener<K> {
     /// Takes only what is above this freshness value.
     pub const fn resume(key: K, last: u64) -> Self {
         Self { key, last: Some(last) }
+    }
+
+    /// Takes only what is above this freshness value, from now on.
+    pub(super) const fn resume_at(&mut self, last: u64) {
+        self.last = Some(last);
     }
 
     /// The freshness value accepted last.
@@ -138,19 +142,16 @@ impl<K: Key> Opener<K> {
         }
         let [high, low, code_sent @ ..] = *seal;
         let lowest = u64::from(u16::from_be_bytes([high, low]));
-        let freshness = match (message.message, own.first_chunk()) {
-            (Message::Freshness, Some(full)) => {
-                let full = u64::from_be_bytes(*full);
-                if self.last.is_some_and(|last| full <= last) || full & 0xFFFF != lowest {
-                    return Err(NotAuthentic::Old);
-                }
-                full
+        let freshness = if message.message == Message::Freshness {
+            let full = u64::from_be_bytes(*own.first_chunk().ok_or(NotAuthentic::Old)?);
+            if self.last.is_some_and(|last| full <= last) || full & 0xFFFF != lowest {
+                return Err(NotAuthentic::Old);
             }
-            _ => {
-                let last = self.last.ok_or(NotAuthentic::NoFreshness)?;
-                let same = (last & !0xFFFF) | lowest;
-                if same > last { same } else { same.saturating_add(0x1_0000) }
-            }
+            full
+        } else {
+            let last = self.last.ok_or(NotAuthentic::NoFreshness)?;
+            let same = (last & !0xFFFF) | lowest;
+            if same > last { same } else { same.saturating_add(0x1_0000) }
         };
         // what comes before the own bytes, as it was sent
         let begin = [message.message.number(), message.sensor, message.epoch.number() | 0x80];
@@ -181,16 +182,16 @@ mod tests {
             0xA3, 0x5C, 0xE4, 0x11, 0xE5, 0xFB, 0xC1, 0x19, 0x1A, 0x0A, 0x52, 0xEF, 0xF6, 0x9F, 0x24, 0x45, 0xDF, 0x4F,
             0x9B, 0x17, 0xAD, 0x2B, 0x41, 0x7B, 0xE6, 0x6C, 0x37, 0x10,
         ];
-        let expected: [(usize, [u8; 4]); 4] = [
-            (0, [0xBB, 0x1D, 0x69, 0x29]),
-            (16, [0x07, 0x0A, 0x16, 0xB4]),
-            (40, [0xDF, 0xA6, 0x67, 0x47]),
-            (64, [0x51, 0xF0, 0xBE, 0xBF]),
+        let expected: [(usize, u128); 4] = [
+            (0, 0xBB1D_6929_E959_3728_7FA3_7D12_9B75_6746),
+            (16, 0x070A_16B4_6B4D_4144_F79B_DD9D_D04A_287C),
+            (40, 0xDFA6_6747_DE9A_E630_30CA_3261_1497_C827),
+            (64, 0x51F0_BEBF_7E3B_9D92_FC49_7417_7936_3CFE),
         ];
-        for (length, begin) in expected {
+        for (length, code) in expected {
             let mut mac = Cmac::<Aes128>::new(&KEY.into());
             mac.update(&message[..length]);
-            assert_eq!(mac.finalize().into_bytes()[..4], begin, "{length} bytes");
+            assert_eq!(u128::from_be_bytes(mac.finalize().into_bytes().into()), code, "{length} bytes");
         }
     }
 
@@ -211,6 +212,12 @@ mod tests {
         let filled = sealed(&mut sealer, Message::Status, &[1, 2, 3], true);
         assert_eq!(filled.bytes().len(), 20);
         assert_eq!(filled.bytes()[6..14], [1, 2, 3, 0, 0, 0, 0x03, 0x06]);
+    }
+
+    #[test]
+    fn keys_do_not_get_into_logs() {
+        let shown = std::format!("{:?} {:?}", Sealer::new(KEY, 7), Opener::resume(KEY, 8));
+        assert_eq!(shown, "Sealer { freshness: 7, .. } Opener { last: Some(8), .. }");
     }
 
     #[test]

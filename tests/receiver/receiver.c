@@ -1,14 +1,14 @@
 /* A receiver of visibility maps in C, written from src/wire/SPECIFICATION.md.
  *
- *     cc -O2 -o receiver receiver.c && ./receiver LOG
+ *     cc -O2 -o receiver receiver.c && ./receiver LOG [KEY]
  *
- * Reads a log of `candump -L` (classic CAN and CAN FD, sensors 0 to 7 from 0x400 on, the visibility plane) and
- * prints, whenever 100 ms of the log are over, for every sensor whose map is told:
+ * Reads a log of `candump -L` (classic CAN and CAN FD, sensors 0 to 7 from 0x400 on, the visibility plane), or of a serial line, chunk by
+ * chunk: `(seconds) device bytes`. With a key, 32 hexadecimal digits, it takes authenticated messages and no others. Prints, whenever 100 ms of the log are over, for every sensor whose map is told:
  *
  *     microseconds sensor visible invisible hash
  *
  * with the number of visible and of invisible cells and a hash (FNV-1a) of all cells: 0 unknown, 1 not visible, 2 visible,
- * azimuth by azimuth, near to far. Rules by their numbers are those of "What a receiver does".
+ * azimuth by azimuth, near to far. `receiver --cmac KEY [MESSAGE]` prints a message's authentication code. Rules by their numbers are those of "What a receiver does".
  */
 #include <inttypes.h>
 #include <stdbool.h>
@@ -17,6 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cmac.h"
 #include "tables.h"
 
 #define SENSORS 8
@@ -68,9 +69,13 @@ typedef struct {
     int now_scan[AZIMUTHS], was_scan[AZIMUTHS];
     ray_t now[AZIMUTHS], was[AZIMUTHS];
     slot_t slot[SLOTS]; unsigned touches;
+    /* authentication */
+    bool fresh; uint64_t freshness;
 } sensor_t;
 
 static sensor_t sensors[SENSORS];
+static uint8_t key[16];
+static bool keyed;
 
 /* ---- check sums ---- */
 
@@ -484,7 +489,7 @@ static void classic_word(sensor_t *s, int scan, int start, int index, int delta,
     if (words > before) block(s, slot->delta, scan, start, slot->word, words, 33, 4);
 }
 
-static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint8_t *own, int n, bool is_long) {
+static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint8_t *own, int n, bool is_long, int most) {
     bool map = number >= 6 && number < 24;
     /* from anybody, of no epoch */
     if (number >= 24) return;
@@ -500,7 +505,7 @@ static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint
     uint64_t word[14] = {0};
     int words = 1;
     if (is_long) {
-        words = (n - 2) / 4 < 14 ? (n - 2) / 4 : 14;
+        words = (n - 2) / 4 < most ? (n - 2) / 4 : most;
         for (int i = 0; i < words; i++)
             for (int k = 0; k < 4; k++) word[i] = word[i] << 8 | own[2 + 4 * i + k];
     } else {
@@ -508,26 +513,87 @@ static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint
         for (int k = 2; k < 6; k++) word[0] = word[0] << 8 | own[k];
     }
     if (part == 5) plain_cells(s, scan, start, own, n, word[0], is_long);
-    else if (is_long) { if (part < 2 && words > 0) block(s, part, scan, start, word, words, 32, 14); }
+    else if (is_long) { if (part < 2 && words > 0) block(s, part, scan, start, word, words, 32, most); }
     else classic_word(s, scan, start, part < 2 ? 0 : part - 1, part == 1, word[0]);
+}
+
+/* Whether the last 8 bytes of a message are its sender's, and it is new. */
+static bool authentic(sensor_t *s, unsigned data_id, const uint8_t *data, int n) {
+    if (n < 6 + 8) return false;
+    const uint8_t *seal = data + n - 8;
+    uint64_t low = (uint64_t)(seal[0] << 8 | seal[1]), f = 0;
+    if (data[3] == 3) {
+        if (n < 6 + 8 + 8) return false;
+        for (int i = 0; i < 8; i++) f = f << 8 | data[6 + i];
+        if ((f & 0xFFFF) != low || (s->fresh && f <= s->freshness)) return false;
+    } else {
+        if (!s->fresh) return false;
+        f = (s->freshness & ~UINT64_C(0xFFFF)) | low;
+        if (f <= s->freshness) f += 0x10000;
+    }
+    uint8_t covered[10 + 64] = {(uint8_t)(data_id >> 8), (uint8_t)data_id}, code[16];
+    for (int i = 0; i < 8; i++) covered[2 + i] = (uint8_t)(f >> (56 - 8 * i));
+    memcpy(covered + 10, data + 3, (size_t)(n - 3 - 8));
+    cmac(key, covered, 10 + n - 3 - 8, code);
+    if (memcmp(code, seal + 2, 6) != 0) return false;
+    s->fresh = true;
+    s->freshness = f;
+    return true;
+}
+
+/* Checks a long message and takes it. */
+static void long_message(uint64_t now, const uint8_t *data, int n) {
+    if (n < 6 || n > 64 || data[3] >= 32 || data[4] >= SENSORS) return;
+    int number = data[3];
+    sensor_t *s = &sensors[data[4]];
+    unsigned data_id = 0x8000u + 32u * data[4] + (unsigned)number;
+    uint8_t data_id_bytes[2] = {(uint8_t)data_id, (uint8_t)(data_id >> 8)};
+    if (crc16(crc16(0xFFFF, data + 2, n - 2), data_id_bytes, 2) != (data[0] | data[1] << 8)) return;
+    bool secured = data[5] & 0x80;
+    if (secured != keyed || (secured && !authentic(s, data_id, data, n))) return;
+    message(s, now, number, data[5] & 15, data + 6, n - 6 - (secured ? 8 : 0), true, secured ? 12 : 14);
 }
 
 /* Checks a frame and takes it. */
 static void frame(uint64_t now, unsigned id, const uint8_t *data, int n, bool fd) {
     if (id < 0x400 || id >= 0x500) return;
     int sensor = (int)(id - 0x400) / 32, number = (int)id % 32;
+    if (fd) {
+        if (n >= 6 && data[3] == number && data[4] == sensor) long_message(now, data, n);
+        return;
+    }
     uint16_t data_id = (uint16_t)(0x8000 + 32 * sensor + number);
     uint8_t data_id_bytes[2] = {(uint8_t)data_id, (uint8_t)(data_id >> 8)};
-    if (!fd) {
-        if (n < 8 || (data[1] & 15) == 15) return;
-        if (crc8(crc8(0, data_id_bytes, 2), data + 1, n - 1) != data[0]) return;
-        message(&sensors[sensor], now, number, data[1] >> 4, data + 2, n - 2, false);
-    } else {
-        /* without a key, authenticated messages are left alone */
-        if (n < 6 || data[3] != number || data[4] != sensor || data[5] & 0x80) return;
-        if (crc16(crc16(0xFFFF, data + 2, n - 2), data_id_bytes, 2) != (data[0] | data[1] << 8)) return;
-        message(&sensors[sensor], now, number, data[5] & 15, data + 6, n - 6, true);
+    if (keyed || n < 8 || (data[1] & 15) == 15) return;
+    if (crc8(crc8(0, data_id_bytes, 2), data + 1, n - 1) != data[0]) return;
+    message(&sensors[sensor], now, number, data[1] >> 4, data + 2, n - 2, false, 4);
+}
+
+/* A byte of a serial line: at the end of a message takes the stuffing out of it. */
+static void serial_byte(uint64_t now, uint8_t byte) {
+    static uint8_t stuffed[256];
+    static int length;
+    if (byte != 0) {
+        if (length < 256) stuffed[length++] = byte;
+        return;
     }
+    uint8_t data[256];
+    int n = 0, at = 0;
+    while (at < length && length < 256) {
+        int block = stuffed[at++];
+        if (at + block - 1 > length) { n = 0; break; }
+        for (int i = 1; i < block; i++) data[n++] = stuffed[at++];
+        if (block < 255 && at < length) data[n++] = 0;
+    }
+    length = 0;
+    long_message(now, data, n);
+}
+
+/* Bytes of hexadecimal digits; how many, at most `most`. */
+static int bytes_of(const char *digits, uint8_t *bytes, int most) {
+    int n = 0;
+    for (unsigned byte; n < most && sscanf(digits + 2 * n, "%2x", &byte) == 1; n++) bytes[n] = (uint8_t)byte;
+    return n;
 }
 
 static void print_maps(uint64_t now) {
@@ -549,31 +615,44 @@ static void print_maps(uint64_t now) {
 }
 
 int main(int argc, char **argv) {
-    FILE *log = argc == 2 ? fopen(argv[1], "r") : NULL;
-    if (!log) { fprintf(stderr, "usage: receiver LOG\n"); return 2; }
+    if (argc >= 3 && !strcmp(argv[1], "--cmac")) {
+        uint8_t bytes[256], code[16];
+        bytes_of(argv[2], key, 16);
+        cmac(key, bytes, argc > 3 ? bytes_of(argv[3], bytes, 256) : 0, code);
+        for (int i = 0; i < 16; i++) printf("%02x", code[i]);
+        return 0;
+    }
+    FILE *log = argc == 2 || argc == 3 ? fopen(argv[1], "r") : NULL;
+    keyed = argc == 3;
+    if (!log || (keyed && bytes_of(argv[2], key, 16) != 16)) {
+        fprintf(stderr, "usage: receiver LOG [KEY]\n");
+        return 2;
+    }
     for (int i = 0; i < SENSORS; i++) {
         sensors[i].epoch = sensors[i].previous = -1;
         sensors[i].conflict = NEVER;
         for (int e = 0; e < 16; e++) sensors[i].left[e] = NEVER;
         begin_measure(&sensors[i]);
     }
-    char line[512], text[400];
+    char line[1024], text[900];
     uint64_t next = NEVER;
     while (fgets(line, sizeof line, log)) {
         unsigned long long seconds, micros;
-        if (sscanf(line, "(%llu.%6llu) %*s %399s", &seconds, &micros, text) != 3) continue;
-        char *hex = strchr(text, '#');
-        if (!hex) continue;
-        bool fd = hex[1] == '#';
-        *hex = 0;
-        unsigned id = (unsigned)strtoul(text, NULL, 16);
-        hex += fd ? 3 : 1;
-        uint8_t data[64];
-        int n = 0;
-        for (unsigned byte; n < 64 && sscanf(hex + 2 * n, "%2x", &byte) == 1; n++) data[n] = (uint8_t)byte;
+        if (sscanf(line, "(%llu.%6llu) %*s %899s", &seconds, &micros, text) != 3) continue;
         uint64_t now = seconds * 1000000 + micros;
         if (next == NEVER) next = now + 100000;
         if (now >= next) { print_maps(now); next = now + 100000; }
+        uint8_t data[400];
+        char *hex = strchr(text, '#');
+        if (!hex) {
+            int n = bytes_of(text, data, 400);
+            for (int i = 0; i < n; i++) serial_byte(now, data[i]);
+            continue;
+        }
+        bool fd = hex[1] == '#';
+        *hex = 0;
+        unsigned id = (unsigned)strtoul(text, NULL, 16);
+        int n = bytes_of(hex + (fd ? 3 : 1), data, 64);
         frame(now, id, data, n, fd);
     }
     fclose(log);

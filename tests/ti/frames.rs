@@ -35,7 +35,7 @@ impl Frame {
     }
 
     pub fn bytes(&self) -> Vec<u8> {
-        let own = if self.family == Family::Bytes52 { 8 } else { 0 };
+        let own = if matches!(self.family, Family::Bytes48 | Family::Bytes52) { 8 } else { 0 };
         let items: Vec<u8> = self
             .items
             .iter()
@@ -44,6 +44,12 @@ impl Frame {
         let length = self.family.header() as usize + items.len();
         let total = length.next_multiple_of(32);
         let header = match self.family {
+            Family::Bytes48 => [
+                words(&[self.version, total as u32, 0xA6843, self.number, self.sub_frame, 0, 0, 0, 0]),
+                (self.items.len() as u16).to_le_bytes().to_vec(),
+                vec![0xAB, 0xCD],
+            ]
+            .concat(),
             Family::Bytes52 => [
                 words(&[self.version, 0xA6843, 0, total as u32, self.number, self.sub_frame, 0, 0, 0, 0]),
                 (self.items.len() as u16).to_le_bytes().to_vec(),

@@ -13,6 +13,14 @@ fn usual(family: Family, number: u32) -> Frame {
             .item(6, 2, floats(&[[y, 0.1, 1.0, 100.0], [y, -0.1, 1.0, 100.0]]))
             .item(7, 0, vec![1; 68])
             .item(8, 0, vec![0; 2]),
+        Family::Bytes48 => Frame::new(family, number)
+            .item(
+                6,
+                2,
+                [floats(&[[0.01, 0.01, 0.1, 0.01, 1.0]]), shorts(&[0, 0, 100 * y as i16, 9, 0, 1, 900, 9])].concat(),
+            )
+            .item(7, 0, vec![1; 112])
+            .item(8, 0, vec![0; 2]),
         Family::Bytes36 => {
             Frame::new(family, number).item(1, 1, shorts(&[1, 0, 5, 1, 9, 0, y as i16, 0])).item(2, 0, vec![9; 512])
         }
@@ -74,7 +82,10 @@ fn frames_without_items_are_empty_scans_and_teach_nothing() {
         let mut radar = Ti::<64>::new(Config::LEARN);
         let empty = |n| Frame::new(family, n).bytes();
         let bytes: Vec<u8> = (1..10).flat_map(empty).collect();
-        assert!(feed(&mut radar, &bytes, 100).is_empty(), "36, 40 and 44 bytes look alike");
+        assert!(
+            feed(&mut radar, &bytes, 100).is_empty(),
+            "36, 40 and 44 bytes look alike, and the others are not certain"
+        );
         let mut bytes = stream(family, 10..12);
         bytes.extend(empty(12));
         bytes.extend(usual(family, 13).bytes());

@@ -67,6 +67,10 @@ proptest! {
     ) {
         let frame = |n: u32| match family {
             Family::Bytes52 => Frame::new(family, n).item(6, 1, crate::frames::floats(&[[9.0, 0.0, 0.0, 9.0]])),
+            Family::Bytes48 => {
+                let point = [crate::frames::floats(&[[0.0, 0.0, 0.0, 0.01, 1.0]]), vec![0, 0, 0, 0, 3, 3, 9, 9]].concat();
+                Frame::new(family, n).item(6, 1, point)
+            }
             _ => Frame::new(family, n).item(1000, 1, crate::frames::floats(&[[9.0, 0.0, 0.0, 9.0]])),
         };
         let mut bytes: Vec<u8> = (0..30).flat_map(|n| frame(n).bytes()).collect();

@@ -1,4 +1,4 @@
-//! The four kinds of header.
+//! The five kinds of header.
 
 /// A kind of header, by its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -10,6 +10,8 @@ pub enum Family {
     Bytes40,
     /// 44 bytes: area scanner.
     Bytes44,
+    /// 48 bytes: 3D people counting of older toolboxes.
+    Bytes48,
     /// 52 bytes: people counting and traffic monitoring of older toolboxes.
     Bytes52,
 }
@@ -53,7 +55,7 @@ impl Header {
 
 impl Family {
     /// All families.
-    pub const ALL: [Self; 4] = [Self::Bytes36, Self::Bytes40, Self::Bytes44, Self::Bytes52];
+    pub const ALL: [Self; 5] = [Self::Bytes36, Self::Bytes40, Self::Bytes44, Self::Bytes48, Self::Bytes52];
 
     /// Bytes of the header.
     pub const fn header(self) -> u32 {
@@ -61,6 +63,7 @@ impl Family {
             Self::Bytes36 => 36,
             Self::Bytes40 => 40,
             Self::Bytes44 => 44,
+            Self::Bytes48 => 48,
             Self::Bytes52 => 52,
         }
     }
@@ -71,6 +74,14 @@ impl Family {
         let word = |at: usize| bytes.get(at..).and_then(|b| b.first_chunk::<4>()).map_or(0, |b| u32::from_le_bytes(*b));
         let version = (word(8) >> 24) as u8;
         let header = match self {
+            Self::Bytes48 => Header {
+                total: word(12),
+                items: word(44) & 0xFFFF,
+                number: word(20),
+                points: None,
+                sub_frame: word(24),
+                sdk: version,
+            },
             Self::Bytes52 => Header {
                 total: word(20),
                 items: word(48) & 0xFFFF,
@@ -96,7 +107,7 @@ impl Family {
     /// Bytes of an item's payload by its length field; `None` if it cannot be.
     pub(super) const fn payload(self, length: u32) -> Option<u32> {
         let payload = match self {
-            Self::Bytes52 => length.checked_sub(ITEM_HEADER),
+            Self::Bytes48 | Self::Bytes52 => length.checked_sub(ITEM_HEADER),
             _ => Some(length),
         };
         match payload {

@@ -8,7 +8,7 @@ const ENOUGH: u8 = 3;
 /// Follows a stream as each family would read it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Learning {
-    readings: [Reading; 4],
+    readings: [Reading; Family::ALL.len()],
 }
 
 /// A frame as one family reads it.
@@ -24,7 +24,7 @@ struct Reading {
 
 impl Learning {
     pub(super) const NEW: Self =
-        Self { readings: [Reading { header: None, next: 0, items_left: 0, consistent: 0 }; 4] };
+        Self { readings: [Reading { header: None, next: 0, items_left: 0, consistent: 0 }; Family::ALL.len()] };
 
     /// Takes a byte of a frame: its position counted from the magic word, one for the first byte;
     /// `window` has the eight bytes up to it, `head` the frame's first ones.

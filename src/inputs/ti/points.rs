@@ -23,6 +23,16 @@ pub enum PolarPoints {
     Raised,
 }
 
+/// What becomes a detection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Entries {
+    /// Points: single reflections, what the estimators want.
+    Points,
+    /// Targets: objects the radar tracks, for a firmware that sends nothing else.
+    Targets,
+}
+
 /// What a firmware's messages do not tell of themselves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -36,15 +46,18 @@ pub struct Dialect {
     /// Velocity of one Doppler step, m/s: SDK 1 and 2 send the step's number. Their points are left
     /// out without it.
     pub doppler_step_mps: Option<f32>,
+    /// What becomes a detection.
+    pub entries: Entries,
 }
 
 impl Dialect {
-    /// Radians, an antenna with elevation, no Doppler step.
+    /// Radians, an antenna with elevation, no Doppler step, points.
     pub const USUAL: Self = Self {
         angles: AngleUnit::Radians,
         polar_points: PolarPoints::Flat,
         has_elevation: true,
         doppler_step_mps: None,
+        entries: Entries::Points,
     };
 }
 
@@ -65,12 +78,20 @@ pub(super) enum Layout {
     Compressed([f32; 5]),
     /// Range, azimuth, (elevation,) velocity, ratio.
     Polar(PolarPoints),
+    /// Units and numbers, to come.
+    ExtendedHead,
+    /// x, y, z, velocity, ratio, noise: in these units of place, velocity and ratio, and so many; 0 where that is not told.
+    Extended([f32; 3], u16),
+    /// Number, x, y, z, their velocities, and what is of no interest.
+    Targets,
+    /// The same without z.
+    FlatTargets,
     /// Ratios of the points before.
     SideInfo,
 }
 
-/// Bytes of the longest record.
-pub(super) const LONGEST_RECORD: usize = 20;
+/// Most bytes of a record that are of interest.
+pub(super) const LONGEST_RECORD: usize = 28;
 
 /// What a record holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,8 +111,22 @@ impl Layout {
             Self::Compressed(_) => 8,
             Self::Indexed(_) => 12,
             Self::Cartesian | Self::Spherical | Self::Polar(PolarPoints::Flat) => 16,
-            Self::CompressedHead | Self::Polar(PolarPoints::Raised) => 20,
+            Self::CompressedHead | Self::ExtendedHead | Self::Polar(PolarPoints::Raised) => 20,
+            Self::Extended(..) => 10,
+            Self::Targets => 112,
+            Self::FlatTargets => 68,
         }
+    }
+
+    /// Whether its own count of points is another.
+    pub(super) const fn miscounts(self, points: u16) -> bool {
+        matches!(self, Self::Extended(_, told) if told != 0 && told != points)
+    }
+
+    /// Whether it makes detections or belongs to them, given what is wanted.
+    pub(super) const fn wanted(self, entries: Entries) -> bool {
+        let target = matches!(self, Self::Targets | Self::FlatTargets);
+        target == matches!(entries, Entries::Targets)
     }
 
     /// Reads a record of [`record`](Self::record) bytes.
@@ -101,13 +136,13 @@ impl Layout {
         let signed = |at: usize| chunk(bytes, at).map_or(0, i16::from_le_bytes);
         let byte = |at: usize| chunk(bytes, at).map_or(0, i8::from_le_bytes);
         match self {
-            Self::Cartesian => Record::Point(cartesian([float(0), float(1), float(2)], float(3), dialect)),
+            Self::Cartesian => Record::Point(cartesian([float(0), float(1), float(2)], float(3), None, dialect)),
             Self::IndexedHead => Record::Head(Self::Indexed(short(2).min(15))),
             Self::Indexed(places) => {
                 let one = f32::from(1_u16 << places);
                 let metres = |at| f32::from(signed(at)) / one;
                 let step = dialect.doppler_step_mps.unwrap_or(f32::NAN);
-                Record::Point(cartesian([metres(6), metres(8), metres(10)], f32::from(signed(2)) * step, dialect))
+                Record::Point(cartesian([metres(6), metres(8), metres(10)], f32::from(signed(2)) * step, None, dialect))
             }
             Self::Spherical => {
                 let unit = match dialect.angles {
@@ -132,6 +167,23 @@ impl Layout {
             Self::Polar(PolarPoints::Raised) => {
                 Record::Point(spherical(float(0), float(1), Some(float(2)), float(3), Some(float(4)), dialect))
             }
+            Self::ExtendedHead => {
+                let told = short(16).saturating_add(short(18));
+                Record::Head(Self::Extended([float(0), float(1), float(2)], told))
+            }
+            Self::Extended([place, velocity, ratio], _) => {
+                let metres = |at| f32::from(signed(at)) * place;
+                let snr_db = f32::from(u8::from_ne_bytes(byte(8).to_ne_bytes())) * ratio;
+                let velocity = f32::from(signed(6)) * velocity;
+                Record::Point(cartesian([metres(0), metres(2), metres(4)], velocity, Some(snr_db), dialect))
+            }
+            Self::Targets => {
+                Record::Point(target([float(1), float(2), float(3)], [float(4), float(5), float(6)], dialect))
+            }
+            Self::FlatTargets => {
+                let flat = Dialect { has_elevation: false, ..*dialect };
+                Record::Point(target([float(1), float(2), 0.0], [float(3), float(4), 0.0], &flat))
+            }
             Self::SideInfo => Record::Snr(halves(signed(0))),
         }
     }
@@ -148,8 +200,20 @@ fn chunk<const N: usize>(bytes: &[u8; LONGEST_RECORD], at: usize) -> Option<[u8;
     bytes.get(at..)?.first_chunk().copied()
 }
 
+/// A target's place and velocity, x to the right, y ahead, z up.
+fn target(place: [f32; 3], velocity: [f32; 3], dialect: &Dialect) -> Result<Detection, NotADetection> {
+    let along = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
+    let radial = along(velocity, place) / math::sqrt(along(place, place));
+    cartesian(place, radial, None, dialect)
+}
+
 /// A point x to the right, y ahead, z up.
-fn cartesian([x, y, z]: [f32; 3], velocity: f32, dialect: &Dialect) -> Result<Detection, NotADetection> {
+fn cartesian(
+    [x, y, z]: [f32; 3],
+    velocity: f32,
+    snr_db: Option<f32>,
+    dialect: &Dialect,
+) -> Result<Detection, NotADetection> {
     let ground = math::sqrt(x * x + y * y);
     Detection::new(&Measurement {
         range_m: math::sqrt(x * x + y * y + z * z),
@@ -157,7 +221,7 @@ fn cartesian([x, y, z]: [f32; 3], velocity: f32, dialect: &Dialect) -> Result<De
         elevation_rad: dialect.has_elevation.then(|| math::atan2(z, ground)),
         radial_velocity_mps: velocity,
         rcs_dbsm: None,
-        snr_db: None,
+        snr_db,
     })
 }
 

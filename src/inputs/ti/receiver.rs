@@ -2,7 +2,7 @@
 
 use super::family::{Family, Header, ITEM_HEADER, LONGEST, MAGIC, PADDING};
 use super::learning::Learning;
-use super::points::{Dialect, LONGEST_RECORD, Layout, Record};
+use super::points::{Dialect, Entries, LONGEST_RECORD, Layout, Record};
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
 use crate::time::Time;
@@ -300,7 +300,7 @@ impl<const N: usize> Ti<N> {
                 };
                 if payload == 0 { self.item_ends() } else { Ok(()) }
             }
-            Stage::Records if self.filled > 0 => Err(Flaw::Records),
+            Stage::Records if self.filled > 0 || self.layout.miscounts(self.points) => Err(Flaw::Records),
             Stage::Records | Stage::Other => self.item_ends(),
             Stage::Searching | Stage::Padding => Ok(()),
         }
@@ -326,8 +326,9 @@ impl<const N: usize> Ti<N> {
     fn fill(&mut self, byte: u8) {
         if let Some(place) = self.record.get_mut(self.filled) {
             *place = byte;
-            self.filled += 1;
         }
+        // of the longest records the rest is of no interest
+        self.filled += 1;
         if self.filled == self.layout.record() {
             self.filled = 0;
             self.take_record();
@@ -336,16 +337,22 @@ impl<const N: usize> Ti<N> {
 
     /// How an item is laid out; `None` if it is of no interest.
     fn layout(&self, family: Family, kind: u32) -> Option<Layout> {
-        match (family, kind) {
+        let layout = match (family, kind) {
+            (Family::Bytes48, 6) => Some(Layout::CompressedHead),
+            (Family::Bytes48, 7) => Some(Layout::Targets),
             (Family::Bytes52, 6) => Some(Layout::Polar(self.config.dialect.polar_points)),
-            (Family::Bytes52, _) => None,
+            (Family::Bytes52, 7) => Some(Layout::FlatTargets),
+            (Family::Bytes48 | Family::Bytes52, _) => None,
             (_, 1) if self.header.sdk <= 2 => Some(Layout::IndexedHead),
             (_, 1) => Some(Layout::Cartesian),
             (_, 7) => Some(Layout::SideInfo),
             (_, 1000) => Some(Layout::Spherical),
             (_, 1020) => Some(Layout::CompressedHead),
+            (_, 301) => Some(Layout::ExtendedHead),
+            (_, 308 | 1010) => Some(Layout::Targets),
             _ => None,
-        }
+        };
+        layout.filter(|layout| layout.wanted(self.config.dialect.entries))
     }
 
     /// Takes a whole record.
@@ -372,7 +379,9 @@ impl<const N: usize> Ti<N> {
 
     fn complete(&mut self) -> Outcome<'_> {
         let header = self.header;
-        let announced = header.points.unwrap_or(self.points);
+        // points, not targets, are announced
+        let told = header.points.filter(|_| self.config.dialect.entries == Entries::Points);
+        let announced = told.unwrap_or(self.points);
         if !usable(announced, self.points) {
             count(&mut self.counters.broken);
             return Outcome::Broken(Flaw::Points);

@@ -38,10 +38,14 @@
 mod assembly;
 mod map;
 mod sectors;
+#[cfg(feature = "secoc")]
+mod secured;
 mod sensor;
 mod session;
 
 pub use map::{ReceivedMap, Together};
+#[cfg(feature = "secoc")]
+pub use secured::SecuredReceiver;
 pub use sensor::{Accepted, Condition, Counters, Refused, SensorReceiver};
 pub use session::{ENOUGH, Limits};
 
@@ -107,6 +111,13 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
             Ok(received) => sensor.take(now, &received, &limits),
             Err(error) => Err(sensor.refuse(Refused::NotAMessage(error))),
         }
+    }
+
+    /// Counts what is refused before it is looked at.
+    #[cfg(feature = "secoc")]
+    fn refuse(&mut self, sensor: u8, why: Refused) -> Refused {
+        let found = self.sensors.iter_mut().find(|(number, _)| *number == sensor);
+        found.map_or(why, |(_, sensor)| sensor.refuse(why))
     }
 
     /// Frames of nobody's, or of sensors that are not listened to.

@@ -10,7 +10,7 @@ use crate::wire::code::reading::{self, Ending, Reader};
 use crate::wire::e2e::{Counter, Sequence};
 use crate::wire::header::{Brought, Clock, Collector, Header, NotAHeader};
 use crate::wire::map_message;
-use crate::wire::message::{Epoch, Message, NotAMessage, Part, Plane, Received};
+use crate::wire::message::{Epoch, Message, NotAMessage, NotAuthentic, Part, Plane, Received};
 use crate::wire::scan_number::ScanNumber;
 use crate::wire::status::Status;
 use crate::wire::visible_range::Ranges;
@@ -40,6 +40,8 @@ pub enum Refused {
     NotAMessage(NotAMessage),
     /// Secured, and its authenticator was not looked at.
     Sealed,
+    /// Not of the sender that has the key, or not new.
+    NotAuthentic(NotAuthentic),
     /// Of an epoch that is over.
     OldEpoch,
     /// Two senders use this sensor's number.
@@ -66,6 +68,8 @@ pub struct Counters {
     pub accepted: u32,
     /// Failed the protection, or mislabelled.
     pub protection: u32,
+    /// Not authentic, or nobody had the key to see.
+    pub not_authentic: u32,
     /// Lost, by the protection's counters.
     pub lost: u32,
     /// Came with the counter of the one before.
@@ -133,6 +137,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         counters: Counters {
             accepted: 0,
             protection: 0,
+            not_authentic: 0,
             lost: 0,
             repeated: 0,
             out_of_sequence: 0,
@@ -200,7 +205,8 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     pub(super) fn refuse(&mut self, why: Refused) -> Refused {
         let c = &mut self.counters;
         let count = match why {
-            Refused::NotAMessage(_) | Refused::Sealed => &mut c.protection,
+            Refused::NotAMessage(_) => &mut c.protection,
+            Refused::Sealed | Refused::NotAuthentic(_) => &mut c.not_authentic,
             Refused::OldEpoch | Refused::Conflict => &mut c.epoch,
             Refused::Late => &mut c.late,
             Refused::NoHeader | Refused::NoRefresh => &mut c.early,

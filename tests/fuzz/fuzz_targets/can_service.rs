@@ -1,35 +1,3 @@
-//! Any requests and answers of an integrator on CAN, six own bytes each, with check sums that hold.
-
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-use viewshed::can_service::{ANSWER, Answers, CanService, CanServiceConfig, REQUEST};
-use viewshed::pil::flash::Flash;
-use viewshed::session::Slots;
-use viewshed::settings::{BlockError, Settings};
-use viewshed::time::Time;
-use viewshed::wire::broadcast::Medium;
-use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
-
-fuzz_target!(|bytes: &[u8]| {
-    let medium = Medium::Can(Addresses::STANDARD);
-    let mut flash = Flash::ERASED;
-    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
-    let mut unit = CanService::start(config, Epoch::new(0), Time::from_micros(0), &flash);
-    let mut answers = Answers::new(0, medium);
-    for own in bytes.chunks(6) {
-        for message in [REQUEST, ANSWER] {
-            let packet = Packet::new(Packing::Classic, 0, message, Epoch::new(3), own).protect(0, None);
-            let frame = packet.frame(&Addresses::STANDARD).unwrap();
-            let _ = unit.take(&frame, &mut flash);
-            let _ = answers.take(&frame);
-        }
-        // an answer has an end
-        let said = std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &flash)).take(200).count();
-        assert!(said < 200);
-        for slot in 0..2 {
-            let read = Settings::from_block(flash.slot(slot));
-            assert!(read.is_ok() || read == Err(BlockError::Empty));
-        }
-    }
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| viewshed_fuzz::can_service::run(bytes));

@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde::Deserialize;
 use viewshed::inputs::ars408::profile::{PROFILES, Profile};
-use viewshed::inputs::ti::Family;
+use viewshed::inputs::ti::{AngleUnit, Dialect, Entries, Family, PolarPoints};
 
 use crate::estimators;
 use crate::evaluation::{self, Grid};
@@ -88,12 +88,8 @@ struct ReadingArgs {
     /// Sensor id of the radar in a CAN log or capture that has several
     #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
-    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
-    #[arg(long, value_name = "NAME", value_parser = profile)]
-    profile: Option<&'static Profile>,
-    /// Bytes of the header in a TI mmWave capture: 36, 40, 44 or 52 [default: learnt from three frames]
-    #[arg(long, value_name = "BYTES", value_parser = ti_header)]
-    ti_header: Option<Family>,
+    #[command(flatten)]
+    kind: KindArgs,
     /// Time between frames of a TI mmWave capture, which holds none [default: 0.1]
     #[arg(long, value_name = "SECONDS", value_parser = period)]
     frame_period: Option<f64>,
@@ -103,6 +99,26 @@ struct ReadingArgs {
     /// End this many seconds after the first radar frame
     #[arg(long, value_name = "SECONDS", value_parser = finite)]
     to: Option<f64>,
+}
+
+/// What a raw log or capture does not tell of its radar.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct KindArgs {
+    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
+    #[arg(long, value_name = "NAME", value_parser = profile)]
+    pub profile: Option<&'static Profile>,
+    /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
+    #[arg(long, value_name = "BYTES", value_parser = ti_header)]
+    pub ti_header: Option<Family>,
+    /// What a TI mmWave capture does not tell of its firmware, between commas [default: none of it]
+    ///
+    /// degrees       angles of spherical points (type 1000) are in degrees, not radians
+    /// raised        points behind 52 bytes have an elevation
+    /// no-elevation  the antenna measures none
+    /// targets       take the tracked targets in place of the points
+    /// doppler=M/S   velocity of a Doppler step, without which SDK 1 and 2 tell none
+    #[arg(long, value_name = "LIST", value_parser = ti_dialect, verbatim_doc_comment)]
+    pub ti_dialect: Option<Dialect>,
 }
 
 /// The rules by which objects and cells are counted.
@@ -200,8 +216,9 @@ impl ReadingArgs {
             from_s: self.from,
             to_s: self.to,
             sensor_id: self.sensor_id,
-            profile: self.profile,
-            ti_header: self.ti_header,
+            profile: self.kind.profile,
+            ti_header: self.kind.ti_header,
+            ti_dialect: self.kind.ti_dialect,
             frame_period_s: self.frame_period,
         }
     }
@@ -254,7 +271,22 @@ fn profile(text: &str) -> Result<&'static Profile, String> {
 
 fn ti_header(text: &str) -> Result<Family, String> {
     let bytes = text.trim().parse().unwrap_or(0);
-    Family::ALL.into_iter().find(|f| f.header() == bytes).ok_or_else(|| format!("`{text}` is not 36, 40, 44 or 52"))
+    Family::ALL.into_iter().find(|f| f.header() == bytes).ok_or_else(|| format!("`{text}` is not 36, 40, 44, 48 or 52"))
+}
+
+fn ti_dialect(text: &str) -> Result<Dialect, String> {
+    text.split(',').map(str::trim).try_fold(Dialect::USUAL, |mut dialect, word| {
+        match (word, word.strip_prefix("doppler=").map(finite)) {
+            ("degrees", _) => dialect.angles = AngleUnit::Degrees,
+            ("raised", _) => dialect.polar_points = PolarPoints::Raised,
+            ("no-elevation", _) => dialect.has_elevation = false,
+            ("targets", _) => dialect.entries = Entries::Targets,
+            (_, Some(Ok(step))) if step > 0.0 => dialect.doppler_step_mps = Some(step as f32),
+            (_, Some(_)) => return Err(format!("`{word}`: a Doppler step is a number of m/s above 0")),
+            _ => return Err(format!("no `{word}`; there are degrees, raised, no-elevation, targets, doppler=M/S")),
+        }
+        Ok(dialect)
+    })
 }
 
 fn period(text: &str) -> Result<f64, String> {
@@ -316,6 +348,23 @@ mod tests {
         assert!(error(&["--fov", "60,-60,-16,16,3,200"]).contains("azimuth from 60 to -60 is no interval"));
         assert!(error(&["--fov", "nan,60,-16,16,3,200"]).contains("not finite"));
         assert!(error(&["--min-detections", "0"]).contains("`min_detections` is 0"));
+    }
+
+    #[test]
+    fn a_dialect_is_a_list() {
+        let dialect = |text: &str| parse(&["--ti-dialect", text]).map(|s| s.reading.ti_dialect.unwrap());
+        let all = dialect("degrees,raised, no-elevation,targets,doppler=0.12").unwrap();
+        let expected = Dialect {
+            angles: AngleUnit::Degrees,
+            polar_points: PolarPoints::Raised,
+            has_elevation: false,
+            doppler_step_mps: Some(0.12),
+            entries: Entries::Targets,
+        };
+        assert_eq!(all, expected);
+        assert_eq!(dialect("targets").unwrap(), Dialect { entries: Entries::Targets, ..Dialect::USUAL });
+        assert!(dialect("radians").unwrap_err().to_string().contains("there are degrees"));
+        assert!(dialect("doppler=0").is_err() && dialect("doppler=x").is_err() && dialect("").is_err());
     }
 
     #[test]

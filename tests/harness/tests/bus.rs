@@ -112,3 +112,54 @@ fn what_is_no_broadcast_is_told() {
     let output = viewshed(&["bus", "--bus", "classic-250k"]);
     assert!(!output.status.success());
 }
+
+const KEY: &str = "000102030405060708090a0b0c0d0e0f";
+
+/// Listens with these options; what it wrote as JSON, or what it complained of.
+fn heard(log: &Path, more: &[&str]) -> Result<Value, String> {
+    let heard = log.with_extension("heard.json");
+    let paths = [log, &heard].map(|path| path.to_str().expect("UTF-8"));
+    let output = viewshed(&[&["listen", paths[0], "--json", paths[1]], more].concat());
+    if output.status.success() { Ok(json(&heard)) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
+}
+
+#[test]
+fn authenticated_logs_need_their_key_and_cost_little() {
+    let file = scratch("key.txt");
+    std::fs::write(&file, KEY).expect("written");
+    let file = file.to_str().expect("UTF-8");
+    for bus in ["fd-500k-2M", "serial-230400"] {
+        let (report, log) = sent(&format!("secured-{bus}"), &["--key", KEY, "--bus", bus]);
+        let buses = report["buses"].as_array().expect("buses");
+        let names: Vec<&str> = buses.iter().map(|bus| bus["name"].as_str().expect("a name")).collect();
+        assert_eq!(names[4..], ["fd-500k-2M-authenticated", "serial-230400-authenticated"]);
+        for (bare, authenticated) in [(2, 4), (3, 5)] {
+            let cost = number(&buses[authenticated], "load_median") / number(&buses[bare], "load_median");
+            assert!((1.02..1.6).contains(&cost), "{bus}: {cost}");
+        }
+        for received in report["received"].as_array().expect("received") {
+            assert_eq!(number(received, "wrongly_visible"), 0.0, "{received}");
+            if number(received, "loss") == 0.0 {
+                assert_eq!(number(received, "equal"), 1.0, "every cell of every scan: {received}");
+            }
+        }
+        let right = heard(&log, &["--key-file", file]).expect("understood");
+        let sensor = &right["sensors"][0];
+        assert_eq!(sensor["condition"], "ok");
+        assert_eq!(number(&sensor["counters"], "not_authentic"), 0.0, "{sensor}");
+        let maps = sensor["maps"].as_array().expect("maps");
+        assert!(maps.len() > 4 && maps.iter().all(|map| number(map, "visible") > 5000.0));
+        let keyless = heard(&log, &[]).unwrap_err();
+        assert!(keyless.contains("are authenticated; give the sender's key"), "{keyless}");
+        let wrong = heard(&log, &["--key", &KEY.replace("0f", "1f")]).unwrap_err();
+        assert!(wrong.contains("none is authentic with this key"), "{wrong}");
+        // who has a key does not take what is not authenticated
+        let (_, bare) = sent(&format!("bare-{bus}"), &["--bus", bus]);
+        assert!(heard(&bare, &[]).is_ok());
+        let refused = heard(&bare, &["--key-file", file]).unwrap_err();
+        assert!(refused.contains("none is authentic"), "{refused}");
+    }
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
+    let output = viewshed(&["bus", recording, "--key", KEY, "--log", "classic.log"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no room for an authenticator"));
+}

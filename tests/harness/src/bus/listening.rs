@@ -1,12 +1,17 @@
 //! What a log of a bus tells of the maps on it.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use viewshed::map::{CellState, Visibility};
 use viewshed::time::Time;
 use viewshed::wire::message::{Addresses, Plane};
-use viewshed::wire::receive::{Condition, Limits, ReceivedMap, Receiver};
+use viewshed::wire::receive::{Condition, Limits, ReceivedMap};
+use viewshed::wire::serial::Unstuffer;
 
+use super::ears::{Ears, Key};
 use crate::recording::candump::Line;
+use crate::recording::serial_log::Chunk;
 
 /// Sensors, azimuths, words of ranges and planes there is room for: all of them.
 pub const SENSORS: u8 = 8;
@@ -19,7 +24,9 @@ pub type Map<'a> = ReceivedMap<'a, A, W, P>;
 
 /// Listens to a log.
 pub struct Listening {
-    receiver: Box<Receiver<{ SENSORS as usize }, A, W, P>>,
+    ears: Ears<{ SENSORS as usize }, A, W, P>,
+    /// Serial lines by their device.
+    lines: BTreeMap<String, Unstuffer>,
     limits: Limits,
     frames: u64,
     last: Time,
@@ -85,6 +92,7 @@ pub struct Told {
 pub struct Counted {
     pub accepted: u32,
     pub protection: u32,
+    pub not_authentic: u32,
     pub lost: u32,
     pub repeated: u32,
     pub out_of_sequence: u32,
@@ -95,11 +103,12 @@ pub struct Counted {
 }
 
 impl Listening {
-    pub fn new(addresses: Addresses) -> Self {
+    /// With a key, to authenticated messages and no others.
+    pub fn new(addresses: Addresses, key: Option<&Key>) -> Self {
         let sensors = std::array::from_fn(|number| number as u8);
         let limits = Limits::DEFAULT;
-        let receiver = Box::new(Receiver::new(sensors, addresses, limits));
-        Self { receiver, limits, frames: 0, last: Time::from_micros(0) }
+        let ears = Ears::new(sensors, addresses, limits, key);
+        Self { ears, lines: BTreeMap::new(), limits, frames: 0, last: Time::from_micros(0) }
     }
 
     /// Takes a line of the log.
@@ -108,7 +117,22 @@ impl Listening {
         self.frames += 1;
         self.last = Time::from_micros(u64::try_from(line.time_ns / 1000).unwrap_or(0));
         // what is refused is counted there
-        let _ = self.receiver.frame(self.last, frame);
+        let _ = self.ears.frame(self.last, frame);
+    }
+
+    /// Takes bytes of a serial line.
+    pub fn take_bytes(&mut self, chunk: &Chunk) {
+        self.last = Time::from_micros(u64::try_from(chunk.time_ns / 1000).unwrap_or(0));
+        let unstuffer = self.lines.entry(chunk.device.clone()).or_default();
+        let mut rest = &chunk.bytes[..];
+        while !rest.is_empty() {
+            let (taken, message) = unstuffer.push(rest);
+            if let Some(message) = message.filter(|message| !message.is_empty()) {
+                self.frames += 1;
+                let _ = self.ears.message(self.last, message);
+            }
+            rest = &rest[taken..];
+        }
     }
 
     /// Frames so far.
@@ -118,18 +142,24 @@ impl Listening {
 
     /// Frames that are of none of the sensors.
     pub fn foreign(&self) -> u32 {
-        self.receiver.foreign()
+        self.ears.receiver().foreign()
     }
 
     /// The sensors heard, by number.
     pub fn sensors(&self) -> Vec<u8> {
-        let heard = |number: &u8| self.receiver.sensor(*number).is_some_and(|s| s.epoch().is_some());
+        let heard = |number: &u8| self.ears.receiver().sensor(*number).is_some_and(|s| s.epoch().is_some());
         (0..SENSORS).filter(heard).collect()
+    }
+
+    /// Messages of all sensors that are not authentic, or that there was no key for.
+    pub fn not_authentic(&self) -> u32 {
+        let sensors = (0..SENSORS).filter_map(|number| self.ears.receiver().sensor(number));
+        sensors.map(|sensor| sensor.counters().not_authentic).fold(0, u32::saturating_add)
     }
 
     /// A sensor's map as it is now.
     pub fn map(&self, sensor: u8) -> Map<'_> {
-        self.receiver.map(sensor, self.last)
+        self.ears.receiver().map(sensor, self.last)
     }
 
     /// Counts a sensor's map as it is now; `None` where it is unknown what there is to count.
@@ -149,7 +179,7 @@ impl Listening {
 
     /// Everything heard of a sensor; `maps` as counted on the way.
     pub fn heard(&self, number: u8, maps: Vec<Moment>) -> Option<Heard> {
-        let sensor = self.receiver.sensor(number)?;
+        let sensor = self.ears.receiver().sensor(number)?;
         let header = sensor.header().map(|h| {
             let degrees = |angle: viewshed::angle::Angle| f64::from(angle.radians()).to_degrees();
             let right = degrees(h.azimuth_origin);
@@ -184,6 +214,7 @@ impl Listening {
         let counters = Counted {
             accepted: c.accepted,
             protection: c.protection,
+            not_authentic: c.not_authentic,
             lost: c.lost,
             repeated: c.repeated,
             out_of_sequence: c.out_of_sequence,

@@ -6,9 +6,10 @@ use serde::Serialize;
 use viewshed::time::Time;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::Limits;
 use viewshed::wire::serial::Unstuffer;
 
+use super::ears::{Ears, Key};
 use super::traffic::{A, Maps, Traffic, W};
 
 /// Shares of frames lost.
@@ -36,12 +37,12 @@ pub struct Arrived {
 
 impl Arrived {
     /// Feeds what was sent into a receiver and compares after every scan.
-    pub fn new(maps: &Maps, traffic: &Traffic, loss: f64, sensor: u8) -> Self {
+    pub fn new(maps: &Maps, traffic: &Traffic, loss: f64, sensor: u8, key: Option<&Key>) -> Self {
         let addresses = match traffic.bus.medium {
             Medium::Can(addresses) | Medium::CanFd(addresses) => addresses,
             Medium::Serial => Addresses::STANDARD,
         };
-        let mut receiver = Box::new(Receiver::<1, A, W>::new([sensor], addresses, Limits::DEFAULT));
+        let mut ears = Ears::<1, A, W, 1>::new([sensor], addresses, Limits::DEFAULT, key);
         let mut unstuffer = Unstuffer::new();
         let mut random = Pcg64::seed_from_u64(1);
         let (mut shares, mut equal, mut wrongly_visible) = (Vec::new(), 0, 0);
@@ -54,16 +55,16 @@ impl Arrived {
                 }
                 let at = Time::from_micros(one.at.micros() + (one.duration_s * 1e6) as u64);
                 match &one.frame {
-                    Some(frame) => drop(receiver.frame(at, frame).is_ok()),
+                    Some(frame) => drop(ears.frame(at, frame).is_ok()),
                     None => {
                         if let (_, Some(message)) = unstuffer.push(&one.bytes) {
-                            let _ = receiver.message(at, message);
+                            let _ = ears.message(at, message);
                         }
                     }
                 }
             }
             let Some(next) = maps.scans.get(k + 1).filter(|_| scan.measured.micros() >= settled) else { continue };
-            let map = receiver.map(sensor, next.measured);
+            let map = ears.receiver().map(sensor, next.measured);
             let (mut visible, mut arrived, mut same) = (0, 0, true);
             for (azimuth, ray) in scan.rays.iter().enumerate() {
                 let received = map.ray(Plane::Visibility, azimuth);

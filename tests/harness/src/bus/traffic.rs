@@ -9,9 +9,11 @@ use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, fingerprint};
 use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
-use viewshed::wire::serial::MOST_STUFFED;
+use viewshed::wire::secoc::Sealer;
+use viewshed::wire::serial::{self, MOST_STUFFED};
 
 use super::bits;
+use super::ears::Key;
 use crate::estimators::{self, radar_3d};
 use crate::recording::Recording;
 
@@ -35,6 +37,10 @@ pub const BUSES: [Bus; 4] = [
     Bus { name: "fd-500k-2M", medium: Medium::CanFd(Addresses::STANDARD), rates: [500e3, 2e6] },
     Bus { name: "serial-230400", medium: Medium::Serial, rates: [230_400.0; 2] },
 ];
+
+/// The same with authenticated messages, where there is room for them.
+pub const AUTHENTICATED: [Bus; 2] =
+    [Bus { name: "fd-500k-2M-authenticated", ..BUSES[2] }, Bus { name: "serial-230400-authenticated", ..BUSES[3] }];
 
 /// A scan as it was sent.
 #[derive(Debug, Clone)]
@@ -124,16 +130,19 @@ impl Layers<W> for Scan {
 const POLL_US: u64 = 250;
 
 impl Traffic {
-    /// Sends maps over a bus.
+    /// Sends maps over a bus, with a key authenticated.
     ///
     /// # Errors
     /// A configuration the library refuses.
-    pub fn new(maps: &Maps, bus: Bus, visible_range_ms: Option<u16>, sensor: u8) -> Result<Self> {
+    pub fn new(maps: &Maps, bus: Bus, visible_range_ms: Option<u16>, sensor: u8, key: Option<&Key>) -> Result<Self> {
         let begin = maps.scans.first().map_or(Time::from_micros(0), |scan| scan.measured);
-        let config = BroadcastConfig { visible_range_ms, ..BroadcastConfig::new(sensor, bus.medium) };
+        let secured = key.is_some();
+        let config = BroadcastConfig { visible_range_ms, secured, ..BroadcastConfig::new(sensor, bus.medium) };
         let mut sender = Broadcaster::<A, W>::new(config, maps.header, Epoch::new(1), begin)
             .map_err(|error| anyhow!("{}: {error}", bus.name))?;
         sender.status_mut().state = viewshed::wire::status::State::Ok;
+        // a clock in microseconds runs ahead of any number of messages
+        let mut sealer = key.map(|key| Sealer::new(*key, begin.micros()));
         let (mut sent, mut scans) = (Vec::new(), 0);
         // the bus is busy up to here
         let mut free = begin;
@@ -142,7 +151,7 @@ impl Traffic {
             let end = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_667, |next| next.measured.micros());
             let mut now = scan.measured.max(free);
             while now.micros() < end {
-                if let Some(one) = Sent::next(&mut sender, &bus, now, k + 1) {
+                if let Some(one) = Sent::next(&mut sender, sealer.as_mut(), &bus, now, k + 1) {
                     free = Time::from_micros(now.micros() + (one.duration_s * 1e6).ceil() as u64);
                     sent.push(one);
                 }
@@ -154,15 +163,25 @@ impl Traffic {
 }
 
 impl Sent {
-    fn next(sender: &mut Broadcaster<A, W>, bus: &Bus, at: Time, scans: usize) -> Option<Self> {
-        if bus.medium == Medium::Serial {
+    fn next(
+        sender: &mut Broadcaster<A, W>,
+        sealer: Option<&mut Sealer<Key>>,
+        bus: &Bus,
+        at: Time,
+        scans: usize,
+    ) -> Option<Self> {
+        let packet = match sealer {
+            Some(sealer) => sender.next_sealed(at, sealer)?,
+            None => sender.next_packet(at)?,
+        };
+        let (Medium::Can(addresses) | Medium::CanFd(addresses)) = bus.medium else {
             let mut line = [0; MOST_STUFFED];
-            let n = sender.next_line(at, &mut line)?;
+            let n = serial::stuff(packet.bytes(), &mut line)?;
             // start and stop bit
             let duration_s = 10.0 * n as f64 / bus.rates[0];
             return Some(Self { at, duration_s, bytes: line[..n].to_vec(), frame: None, scans });
-        }
-        let frame = sender.next_frame(at)?;
+        };
+        let frame = packet.frame(&addresses)?;
         let bits = bits::of(&frame);
         let duration_s = f64::from(bits.nominal) / bus.rates[0] + f64::from(bits.data) / bus.rates[1];
         Some(Self { at, duration_s, bytes: frame.data().to_vec(), frame: Some(frame), scans })

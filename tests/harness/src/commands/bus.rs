@@ -6,27 +6,31 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::builder::PossibleValuesParser;
+use viewshed::wire::broadcast::Medium;
 use viewshed::wire::code::block::Kind;
 use viewshed::wire::code::interval::Form;
 
+use super::key::KeyArgs;
 use super::progress::bar;
 use super::replay::shipped;
 use super::{print, write_file};
+use crate::bus::ears::Key;
 use crate::bus::entropy::Entropy;
 use crate::bus::load::Load;
 use crate::bus::loss::{Arrived, LOSSES};
 use crate::bus::report::Report;
 use crate::bus::symbols::{self, Symbols};
-use crate::bus::traffic::{BUSES, Maps, Traffic};
+use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
 use crate::options::SettingsArgs;
 use crate::recording;
 use crate::recording::candump::{Content, Line};
+use crate::recording::serial_log::Chunk;
 
 /// Send a recording's maps over CAN, CAN FD and a serial line and report what they cost
 ///
 /// Every frame the sender sends is counted: maps, header and status, with the stuff bits of its actual
 /// bytes and the intermission. Then frames are lost at random, and a receiver's map is compared with the
-/// sender's after every scan.
+/// sender's after every scan. With a key, CAN FD and the serial line appear twice: bare and authenticated.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// MCAP recordings [default: those shipped in tests/recordings]
@@ -36,6 +40,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
     /// Write the frames of one bus as `candump -L` does, to be read by viewshed listen and others
+    ///
+    /// Those of the serial line as `(seconds) device bytes`. With a key they are authenticated.
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     log: Option<PathBuf>,
     /// The bus of --log
@@ -57,6 +63,8 @@ pub struct Args {
     #[arg(long, help_heading = "Results")]
     count_symbols: bool,
     #[command(flatten)]
+    key: KeyArgs,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -70,6 +78,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.log.is_some() && paths.len() > 1 {
         bail!("--log writes one recording and {} are to be sent; name one", paths.len());
     }
+    let key = args.key.key()?;
+    let classic = BUSES.iter().any(|bus| bus.name == args.bus && matches!(bus.medium, Medium::Can(_)));
+    if key.is_some() && args.log.is_some() && classic {
+        bail!("--log: classic CAN has no room for an authenticator; name --bus fd-500k-2M or serial-230400");
+    }
     let (mut reports, mut symbols) = (Vec::new(), Symbols::new());
     for path in &paths {
         let recording = recording::mcap::read(path, &settings.reading)?;
@@ -80,7 +93,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             count(&mut symbols, &maps);
             continue;
         }
-        let report = send(&recording.name, &maps, args)?;
+        let report = send(&recording.name, &maps, args, key.as_ref())?;
         print(&report.text())?;
         reports.push(report);
     }
@@ -96,17 +109,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn send(name: &str, maps: &Maps, args: &Args) -> Result<Report> {
+fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>) -> Result<Report> {
     let (mut buses, mut received, mut dropped) = (Vec::new(), Vec::new(), 0);
-    for bus in BUSES {
-        let traffic = Traffic::new(maps, bus, args.visible_range, args.sensor)?;
+    let logged = if key.is_some() { format!("{}-authenticated", args.bus) } else { args.bus.clone() };
+    let authenticated = AUTHENTICATED.into_iter().filter_map(|bus| key.map(|key| (bus, Some(key))));
+    for (bus, key) in BUSES.into_iter().map(|bus| (bus, None)).chain(authenticated) {
+        let traffic = Traffic::new(maps, bus, args.visible_range, args.sensor, key)?;
         buses.push(Load::new(&traffic));
         // the same frames travel over both classic buses
         if bus.name != "classic-1M" {
-            received.extend(LOSSES.map(|loss| Arrived::new(maps, &traffic, loss, args.sensor)));
+            received.extend(LOSSES.map(|loss| Arrived::new(maps, &traffic, loss, args.sensor, key)));
         }
         dropped = dropped.max(traffic.dropped);
-        if let Some(path) = args.log.as_deref().filter(|_| bus.name == args.bus) {
+        if let Some(path) = args.log.as_deref().filter(|_| bus.name == logged) {
             write_log(path, &traffic)?;
         }
     }
@@ -127,9 +142,14 @@ fn send(name: &str, maps: &Maps, args: &Args) -> Result<Report> {
 fn write_log(path: &Path, traffic: &Traffic) -> Result<()> {
     let mut text = String::new();
     for sent in &traffic.sent {
-        let Some(frame) = sent.frame else { bail!("--log: {} carries no CAN frames", traffic.bus.name) };
         let time_ns = i64::try_from(sent.at.micros()).unwrap_or(i64::MAX / 1000) * 1000;
-        let line = Line { time_ns, interface: "can0".to_owned(), content: Content::Data(frame) };
+        let line = match sent.frame {
+            Some(frame) => Line { time_ns, interface: "can0".to_owned(), content: Content::Data(frame) }.to_string(),
+            None => {
+                let time_ns = time_ns + (sent.duration_s * 1e9) as i64;
+                Chunk { time_ns, device: "ttyS0".to_owned(), bytes: sent.bytes.clone() }.to_string()
+            }
+        };
         writeln!(text, "{line}").context("a line of the log")?;
     }
     write_file(path, &text)

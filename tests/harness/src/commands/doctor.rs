@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use super::{print, write_file};
 use crate::doctor::examine;
 use crate::doctor::findings::Severity;
+use crate::options::KindArgs;
 use crate::recording::{self, ReadOptions};
 
 /// Exit code for a log in which something is wrong.
@@ -31,6 +32,8 @@ pub struct Args {
     /// Sensor id for --detections, if there are several
     #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
+    #[command(flatten)]
+    kind: KindArgs,
 }
 
 /// Examines one log.
@@ -38,13 +41,14 @@ pub struct Args {
 /// # Errors
 /// Files that cannot be read or written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let report = examine(&args.log)?;
+    let report = examine(&args.log, &args.kind)?;
     print(&report.text())?;
     if let Some(path) = &args.json {
         write_file(path, &(serde_json::to_string_pretty(&report)? + "\n"))?;
     }
     if let Some(path) = &args.detections {
-        let options = ReadOptions { sensor_id: args.sensor_id, ..Default::default() };
+        let KindArgs { profile, ti_header, ti_dialect } = args.kind;
+        let options = ReadOptions { sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
         write_detections(path, &recording::read(&args.log, &options)?)?;
     }
     let wrong = report.findings().iter().any(|f| f.severity == Severity::Error);

@@ -7,17 +7,20 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use viewshed::wire::message::Addresses;
 
+use super::key::KeyArgs;
 use super::{print, write_file};
 use crate::bus::listening::{Heard, Listening, Moment, SENSORS, shown};
 use crate::pictures::polar::{self, PolarGrid};
 use crate::recording::candump::Line;
+use crate::recording::serial_log::Chunk;
 
-/// Decode the maps that sensors broadcast in a log written by candump -L
+/// Decode the maps that sensors broadcast in a log written by candump -L or viewshed bus
 ///
-/// Prints what every sensor says of itself, what happened to its frames, and what its maps show.
+/// Prints what every sensor says of itself, what happened to its frames, and what its maps show. With a key
+/// only authentic messages count, without one only those that are not authenticated.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Log of classic CAN or CAN FD, as candump -L and viewshed bus --log write it
+    /// Log of classic CAN or CAN FD as candump -L writes it, or of CAN FD or a serial line by viewshed bus --log
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// Write what was found as JSON
@@ -32,6 +35,8 @@ pub struct Args {
     /// Sensors on 29-bit identifiers from 0x4000000 on, instead of 0x400 to 0x4FF
     #[arg(long)]
     extended: bool,
+    #[command(flatten)]
+    key: KeyArgs,
 }
 
 /// Listens to a log.
@@ -47,21 +52,33 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         std::fs::create_dir_all(dir).with_context(|| format!("cannot make the folder {}", dir.display()))?;
     }
     let addresses = if args.extended { Addresses::EXTENDED } else { Addresses::STANDARD };
-    let mut listening = Listening::new(addresses);
+    let key = args.key.key()?;
+    let mut listening = Listening::new(addresses, key.as_ref());
     let mut maps: Vec<Vec<Moment>> = vec![Vec::new(); usize::from(SENSORS)];
     let (mut unread, mut next) = (0, None);
     let every_ns = (args.every * 1e9) as i64;
     for line in text.lines().filter(|line| !line.trim().is_empty()) {
-        let Ok(line) = Line::parse(line) else {
-            unread += 1;
-            continue;
+        let logged = match (Line::parse(line), Chunk::parse(line)) {
+            (Ok(frame), _) => Logged::Frame(frame),
+            (_, Ok(chunk)) => Logged::Chunk(chunk),
+            _ => {
+                unread += 1;
+                continue;
+            }
         };
-        let due = *next.get_or_insert(line.time_ns + every_ns);
-        if line.time_ns >= due {
+        let time_ns = match &logged {
+            Logged::Frame(line) => line.time_ns,
+            Logged::Chunk(chunk) => chunk.time_ns,
+        };
+        let due = *next.get_or_insert(time_ns + every_ns);
+        if time_ns >= due {
             look(&listening, &mut maps, args.out.as_deref())?;
-            next = Some(due + (line.time_ns - due) / every_ns * every_ns + every_ns);
+            next = Some(due + (time_ns - due) / every_ns * every_ns + every_ns);
         }
-        listening.take(&line);
+        match &logged {
+            Logged::Frame(line) => listening.take(line),
+            Logged::Chunk(chunk) => listening.take_bytes(chunk),
+        }
     }
     look(&listening, &mut maps, args.out.as_deref())?;
     let sensors: Vec<Heard> = listening
@@ -70,7 +87,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .filter_map(|n| listening.heard(n, std::mem::take(&mut maps[usize::from(n)])))
         .collect();
     if sensors.is_empty() {
-        bail!("{}: none of its {} frames is of a broadcast", args.log.display(), listening.frames());
+        let (log, frames, not_authentic) = (args.log.display(), listening.frames(), listening.not_authentic());
+        match (not_authentic, key) {
+            (0, _) => bail!("{log}: none of its {frames} frames is of a broadcast"),
+            (n, None) => {
+                bail!("{log}: {n} of its {frames} frames are authenticated; give the sender's key with --key-file")
+            }
+            (n, Some(_)) => {
+                bail!("{log}: {n} of its {frames} frames are of a broadcast, and none is authentic with this key")
+            }
+        }
     }
     print(&report(&sensors, &listening, unread))?;
     if let Some(path) = &args.json {
@@ -83,6 +109,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         write_file(path, &(serde_json::to_string_pretty(&report).context("the report as JSON")? + "\n"))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A line of a log.
+enum Logged {
+    Frame(Line),
+    Chunk(Chunk),
 }
 
 /// Counts, and draws, every sensor's map as it is now.
@@ -159,9 +191,18 @@ fn report(sensors: &[Heard], listening: &Listening, unread: usize) -> String {
         let c = &heard.counters;
         let _ = writeln!(
             text,
-            "  frames: {} used; {} failed the protection, {} missing by their counters, {} repeated, {} out of sequence, \
+            "  frames: {} used; {} failed the protection, {} not authentic, {} missing by their counters, {} repeated, {} out of sequence, \
              {} late, {} of another epoch, {} before their header or refresh, {} malformed",
-            c.accepted, c.protection, c.lost, c.repeated, c.out_of_sequence, c.late, c.epoch, c.early, c.malformed
+            c.accepted,
+            c.protection,
+            c.not_authentic,
+            c.lost,
+            c.repeated,
+            c.out_of_sequence,
+            c.late,
+            c.epoch,
+            c.early,
+            c.malformed
         );
         if let Some(m) = heard.maps.last() {
             let all = (m.visible + m.invisible + m.unknown).max(1) as f64;

@@ -4,6 +4,7 @@ pub mod bus;
 pub mod detections;
 pub mod doctor;
 pub mod experiment;
+pub mod key;
 pub mod listen;
 pub mod progress;
 pub mod replay;

@@ -11,7 +11,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
+use viewshed::inputs::ars408::profile::ARS408;
 
+use crate::options::KindArgs;
 use crate::recording;
 use crate::recording::ars408::lines;
 use crate::recording::candump;
@@ -64,19 +66,19 @@ impl Examined {
     }
 }
 
-/// Reads a log and judges it.
+/// Reads a log and judges it by what is known of its radar.
 ///
 /// # Errors
 /// A file that cannot be read or is no such log.
-pub fn examine(path: &Path) -> Result<Examined> {
+pub fn examine(path: &Path, known: &KindArgs) -> Result<Examined> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if candump::is_log(&bytes) {
-        return Ok(can(log, &bytes));
+        return Ok(can(log, &bytes, known));
     }
     if !bytes.starts_with(mcap::MAGIC) {
         if is_capture(&bytes) {
-            return Ok(Examined::Ti(ti::examine(log, &bytes)));
+            return Ok(Examined::Ti(ti::examine(log, &bytes, known)));
         }
         if recording::native::is_capture(&bytes) {
             let (messages, broken) = recording::native::unstuff(&bytes);
@@ -88,10 +90,10 @@ pub fn examine(path: &Path) -> Result<Examined> {
     );
 }
 
-fn can(log: String, bytes: &[u8]) -> Examined {
+fn can(log: String, bytes: &[u8], known: &KindArgs) -> Examined {
     let mut problems = Problems::default();
     let lines = lines(bytes, &mut problems);
-    let sensors = sensor::all(&lines);
+    let sensors = sensor::all(&lines, known.profile.unwrap_or(&ARS408));
     let native = recording::native::of_log(&lines);
     if sensors.is_empty() && !native.is_empty() {
         return Examined::Native(native::examine(log, &native, 0));

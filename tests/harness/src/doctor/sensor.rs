@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use viewshed::inputs::ars408::message::Message;
+use viewshed::inputs::ars408::profile::Profile;
 use viewshed::inputs::ars408::quality::Wanted;
 use viewshed::inputs::ars408::receiver::{cluster_status, object_status};
 use viewshed::inputs::ars408::state::{RadarState, Version};
@@ -64,7 +65,7 @@ impl Spread {
 }
 
 /// Every sensor that sent something.
-pub fn all(lines: &[Line]) -> Vec<Sensor> {
+pub fn all(lines: &[Line], profile: &Profile) -> Vec<Sensor> {
     let mut of_sensor: BTreeMap<(&str, u8), Vec<&Line>> = BTreeMap::new();
     for line in lines {
         let Some(frame) = line.frame().filter(|f| !f.fd) else { continue };
@@ -74,11 +75,11 @@ pub fn all(lines: &[Line]) -> Vec<Sensor> {
             of_sensor.entry((&line.interface, sensor)).or_default().push(line);
         }
     }
-    of_sensor.into_iter().map(|((interface, sensor), lines)| examine(interface, sensor, &lines)).collect()
+    of_sensor.into_iter().map(|((interface, sensor), lines)| examine(interface, sensor, &lines, profile)).collect()
 }
 
-fn examine(interface: &str, sensor: u8, lines: &[&Line]) -> Sensor {
-    let mut radar = Ars408::<1024>::new(Config { wanted: Wanted::ALL, ..Config::sensor(sensor) });
+fn examine(interface: &str, sensor: u8, lines: &[&Line], profile: &Profile) -> Sensor {
+    let mut radar = Ars408::<1024>::new(Config { wanted: Wanted::ALL, profile: *profile, ..Config::sensor(sensor) });
     let (mut times, mut entries, mut odd) = (Vec::new(), 0, 0);
     scans(&mut radar, lines, |scan| {
         times.push(scan.time.micros());

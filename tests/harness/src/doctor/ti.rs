@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use viewshed::inputs::ti::{Config, Family, Outcome, Ti};
+use viewshed::inputs::ti::{Config, Dialect, Entries, Family, Outcome, Ti};
 
 use super::findings::{Finding, Severity};
+use crate::options::KindArgs;
 use crate::recording::ti::{MAGIC, feed, flaw, flaws, learn};
 
 /// What is said of a capture.
@@ -30,9 +31,10 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
-/// Judges a capture.
-pub fn examine(log: String, bytes: &[u8]) -> Report {
-    let family = learn(bytes);
+/// Judges a capture, by the header and the dialect that are known or else by what can be learnt.
+pub fn examine(log: String, bytes: &[u8], known: &KindArgs) -> Report {
+    let family = known.ti_header.or_else(|| learn(bytes));
+    let dialect = known.ti_dialect.unwrap_or(Dialect::USUAL);
     let mut report = Report {
         log,
         kind: "ti",
@@ -49,7 +51,7 @@ pub fn examine(log: String, bytes: &[u8]) -> Report {
         findings: Vec::new(),
     };
     if let Some(family) = family {
-        let mut radar = Ti::<1024>::new(Config { family: Some(family), ..Config::LEARN });
+        let mut radar = Ti::<1024>::new(Config { family: Some(family), dialect });
         feed(&mut radar, bytes, |outcome| match outcome {
             Outcome::Scan(s) => {
                 report.scans += 1;
@@ -62,7 +64,7 @@ pub fn examine(log: String, bytes: &[u8]) -> Report {
         });
         report.counters = flaws(radar.counters()).into_iter().collect();
     }
-    report.findings = judge(&report);
+    report.findings = judge(&report, family, dialect.entries);
     report
 }
 
@@ -73,6 +75,7 @@ fn items(bytes: &[u8], family: Family) -> BTreeMap<u32, usize> {
     let starts = bytes.windows(MAGIC.len()).enumerate().filter(|(_, w)| *w == MAGIC).map(|(at, _)| at);
     for start in starts {
         let (own, count) = match family {
+            Family::Bytes48 => (0, word(start + 44).map(|n| n & 0xFFFF)),
             Family::Bytes52 => (0, word(start + 48).map(|n| n & 0xFFFF)),
             _ => (8, word(start + 32)),
         };
@@ -89,7 +92,12 @@ fn items(bytes: &[u8], family: Family) -> BTreeMap<u32, usize> {
     found
 }
 
-fn judge(report: &Report) -> Vec<Finding> {
+/// What items of a type are, where that helps to say what is missing.
+fn is_targets(kind: u32, family: Option<Family>) -> bool {
+    matches!((kind, family), (308 | 1010, _) | (7, Some(Family::Bytes48 | Family::Bytes52)))
+}
+
+fn judge(report: &Report, family: Option<Family>, entries: Entries) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut add = |severity, what: String, remedy: &str| found.push(Finding { severity, what, remedy: remedy.into() });
     let counted = |what: &str| report.counters.get(what).copied().unwrap_or(0);
@@ -97,18 +105,28 @@ fn judge(report: &Report) -> Vec<Finding> {
         add(
             Severity::Error,
             format!("{} magic words, but no kind of header fits three frames in a row", report.frames),
-            "capture the data port, 921600 baud, 8N1, binary, for some seconds with something in view; if frames have no items, switch points on (guiMonitor -1 1 ...)",
+            "name the header with --ti-header if you know it; else capture the data port, 921600 baud, 8N1, binary, for some seconds with something in view; if frames have no items, switch points on (guiMonitor -1 1 ...)",
         );
         return found;
     }
     if report.scans == 0 {
-        add(Severity::Error, "no frame is whole".into(), "check the baud rate of the data port: 921600");
-    } else if report.points == 0 {
-        let items: Vec<String> = report.items.keys().map(ToString::to_string).collect();
         add(
             Severity::Error,
-            format!("no points in {} frames; items of type {}", report.scans, items.join(", ")),
-            "switch points on: the first value behind the sub-frame in guiMonitor is 1 or 2. SDK 1 and 2 send Doppler steps, which need the configuration's velocity resolution",
+            "no frame is whole".into(),
+            "check the baud rate of the data port, 921600, and --ti-header if it was given",
+        );
+    } else if report.points == 0 {
+        let items: Vec<String> = report.items.keys().map(ToString::to_string).collect();
+        let what = if entries == Entries::Targets { "targets" } else { "points" };
+        let tracked = entries == Entries::Points && report.items.keys().any(|kind| is_targets(*kind, family));
+        add(
+            Severity::Error,
+            format!("no {what} in {} frames; items of type {}", report.scans, items.join(", ")),
+            if tracked {
+                "switch points on, or take the targets that are there with --ti-dialect targets"
+            } else {
+                "switch points on: the first value behind the sub-frame in guiMonitor is 1 or 2. SDK 1 and 2 send Doppler steps, which need the configuration's velocity resolution: --ti-dialect doppler=M/S"
+            },
         );
     }
     let broken: usize = report.broken.values().sum();
@@ -134,7 +152,7 @@ fn judge(report: &Report) -> Vec<Finding> {
             "at the start of a capture they are the rest of a frame; else check baud rate and that nothing else writes to the data port",
         );
     }
-    if report.points > 0 && report.points_with_snr * 2 < report.points {
+    if entries == Entries::Points && report.points > 0 && report.points_with_snr * 2 < report.points {
         add(
             Severity::Note,
             "points come without a signal-to-noise ratio".into(),

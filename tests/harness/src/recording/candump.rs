@@ -53,7 +53,7 @@ impl Line {
 }
 
 /// `(seconds.fraction)` with any number of digits.
-fn nanoseconds(text: &str) -> Result<i64, String> {
+pub(super) fn nanoseconds(text: &str) -> Result<i64, String> {
     let wrong = || format!("`{text}` is not a time in brackets");
     let inside = text.strip_prefix('(').and_then(|t| t.strip_suffix(')')).ok_or_else(wrong)?;
     let (seconds, fraction) = inside.split_once('.').unwrap_or((inside, "0"));
@@ -90,7 +90,7 @@ fn content(text: &str) -> Result<Content, String> {
 }
 
 /// Bytes of hexadecimal digits, with or without points between them.
-fn bytes(digits: &str) -> Option<Vec<u8>> {
+pub(super) fn bytes(digits: &str) -> Option<Vec<u8>> {
     let digits: Vec<u8> = digits.bytes().filter(|b| *b != b'.').collect();
     let pairs = digits.chunks(2).map(|pair| match std::str::from_utf8(pair) {
         Ok(text) if text.len() == 2 && text.bytes().all(|b| b.is_ascii_hexdigit()) => u8::from_str_radix(text, 16).ok(),

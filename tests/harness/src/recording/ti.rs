@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use viewshed::inputs::RadarScan;
-use viewshed::inputs::ti::{Config, Counters, Family, Flaw, Outcome, Ti};
+use viewshed::inputs::ti::{Config, Counters, Dialect, Family, Flaw, Outcome, Ti};
 use viewshed::time::Time;
 
 use super::capture::{self, Kind};
@@ -34,9 +34,10 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
     let family = match options.ti_header.or_else(|| learn(bytes)) {
         Some(family) => family,
         None => bail!(
-            "{name}: the kind of header cannot be learnt: that takes three frames with items in a row. Name it with --ti-header 36, 40, 44 or 52; `viewshed doctor` says what there is"
+            "{name}: the kind of header cannot be learnt: that takes three frames with items in a row. Name it with --ti-header 36, 40, 44, 48 or 52; `viewshed doctor` says what there is"
         ),
     };
+    let dialect = options.ti_dialect.unwrap_or(Dialect::USUAL);
     let mut problems = Problems::default();
     let period_s = options.frame_period_s.unwrap_or(PERIOD_S);
     if options.frame_period_s.is_none() {
@@ -44,7 +45,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
             format!("a TI capture holds no times: frames {PERIOD_S} s apart assumed; give it with --frame-period");
         problems.add("capture", what, 0);
     }
-    let mut radar = Ti::<MOST_POINTS>::new(Config { family: Some(family), ..Config::LEARN });
+    let mut radar = Ti::<MOST_POINTS>::new(Config { family: Some(family), dialect });
     let mut frames: Vec<Frame> = Vec::new();
     let mut clock = Clock::new(period_s);
     scans(&mut radar, bytes, |scan| {

@@ -198,6 +198,61 @@ fn the_doctor_finds_losses_faults_lengths_and_foreign_clocks() {
 }
 
 #[test]
+fn the_doctor_knows_a_clone_by_its_distances_and_judges_it_by_its_profile() {
+    let folder = folder("doctor_clone");
+    let mut lines = Vec::new();
+    for i in 0..20 {
+        let t = 1.0 + 0.07 * f64::from(i);
+        lines.push(format!("({t:.3}) can0 600#0002{:04X}10", 2 * i));
+        // raw 4200 and 3400: 110 and 70 m by its own scales, 340 and 180 m by the original's
+        lines.push(format!("({:.3}) can0 701#01834064A0640094", t + 0.001));
+        lines.push(format!("({:.3}) can0 701#026A4064A0640094", t + 0.002));
+    }
+    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+    let (_, report) = judge(&folder, &lines);
+    let (_, remedy) = finding(&report, "50 % of its entries lie beyond 260 m").expect("a finding");
+    assert!(remedy.contains("--profile SR75"), "{remedy}");
+    let output = doctor(&folder, &["a.log", "--profile", "SR75", "--json", "d.json", "--detections", "d.csv"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report = json(&folder.join("d.json"));
+    assert_eq!(finding(&report, "beyond 260 m"), None);
+    assert_eq!(report["sensors"][0]["entries"], json!(40));
+    let csv = std::fs::read_to_string(folder.join("d.csv")).unwrap();
+    let ranges: Vec<f64> = csv.lines().skip(1).map(|row| row.split(',').nth(2).unwrap().parse().unwrap()).collect();
+    assert!(ranges.iter().all(|range| (60.0..125.0).contains(range)), "{ranges:?}");
+}
+
+#[test]
+fn the_doctor_tells_two_devices_with_one_id_restarts_and_heat() {
+    let folder = folder("doctor_twice");
+    let mut lines = vec!["(0.900) can0 201#401F480010140000".to_owned()];
+    for (i, counter) in [500, 502, 504, 506, 508, 0, 2, 4].iter().enumerate() {
+        // a scan every 200 ms, every frame twice
+        let t = 1.0 + 0.2 * i as f64;
+        for _ in 0..2 {
+            lines.push(format!("({t:.3}) can0 60A#01{counter:04X}10"));
+        }
+        for _ in 0..2 {
+            lines.push(format!("({:.3}) can0 60B#015143FF80200080", t + 0.001));
+        }
+        lines.push(format!("({:.3}) can0 60C#010000000000C8", t + 0.002));
+    }
+    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+    let (code, report) = judge(&folder, &lines);
+    assert_eq!(code, 1, "a fault is an error");
+    for (what, severity, remedy) in [
+        ("came twice or beyond those announced", "warning", "two devices with one sensor id"),
+        ("started over 1 times", "warning", "supply"),
+        ("reports temperature", "error", "cool"),
+        ("a scan every 200 ms", "warning", "time stamps"),
+        ("700 (VersionID) was expected and not seen", "warning", "gateway"),
+    ] {
+        let found = finding(&report, what).unwrap_or_else(|| panic!("{what}: {:#}", report["findings"]));
+        assert!(found.0 == severity && found.1.contains(remedy), "{what}: {found:?}");
+    }
+}
+
+#[test]
 fn the_doctor_refuses_what_is_no_log() {
     let folder = folder("doctor_foreign");
     std::fs::write(folder.join("a.log"), "time,x,y\n").unwrap();

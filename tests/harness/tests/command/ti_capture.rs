@@ -106,3 +106,58 @@ fn the_doctor_says_what_a_capture_holds_and_lacks() {
     assert_eq!(code, 1);
     assert!(report["findings"][0]["do"].as_str().unwrap().contains("guiMonitor"));
 }
+
+/// A frame behind 48 bytes: two compressed points and a target that comes nearer on the left.
+fn people_counting(number: u32, points: bool) -> Vec<u8> {
+    let floats = |v: &[f32]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+    let words = |w: &[u32]| w.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();
+    let ahead = 3000 - 100 * number as u16;
+    let mut items = Vec::new();
+    if points {
+        items.extend(words(&[6, 8 + 20 + 16]));
+        items.extend(floats(&[0.01, 0.01, 0.1, 0.01, 1.0]));
+        for azimuth in [246, 250] {
+            items.extend([0, azimuth, 0xF6, 0xFF]);
+            items.extend([ahead, 100].iter().flat_map(|v| v.to_le_bytes()));
+        }
+    }
+    items.extend(words(&[7, 8 + 112, 3]));
+    items.extend(floats(&[-2.0, f32::from(ahead) / 100.0, 0.5, 0.0, -10.0, 0.0]));
+    items.extend([0; 84]);
+    let total = (48 + items.len()).next_multiple_of(32);
+    let mut bytes = vec![2, 1, 4, 3, 6, 5, 8, 7];
+    bytes.extend(words(&[0x0305_0004, total as u32, 0xA6843, number, 0, 0, 0, 0, 0, 1 + u32::from(points)]));
+    bytes.extend(items);
+    bytes.resize(total, 0);
+    bytes
+}
+
+#[test]
+fn a_header_of_48_bytes_is_learnt_and_targets_are_taken_on_demand() {
+    let folder = folder("ti_48");
+    let capture = |points| (0..25).flat_map(|i| people_counting(i, points)).collect::<Vec<u8>>();
+    std::fs::write(folder.join("a.bin"), capture(true)).unwrap();
+    let output = replay(&folder, &["a.bin", "--json", "r.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    // the first three taught it
+    assert_eq!(json(&folder.join("r.json"))["input"]["frames"], json!(25));
+    let (code, report) = judge(&folder, &capture(true));
+    assert_eq!((code, &report["header"], &report["points"]), (0, &json!(48), &json!(50)));
+    assert_eq!(report["items"], json!({"6": 25, "7": 25}));
+    // a firmware that sends targets only
+    let (code, report) = judge(&folder, &capture(false));
+    assert_eq!((code, &report["points"]), (1, &json!(0)));
+    assert!(report["findings"][0]["do"].as_str().unwrap().contains("--ti-dialect targets"));
+    let arguments = ["doctor", "a.bin", "--ti-header", "48", "--ti-dialect", "targets", "--detections", "d.csv"];
+    let output = Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(&folder).args(arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let csv = std::fs::read_to_string(folder.join("d.csv")).unwrap();
+    let first: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
+    // 2 m to the left, 30 m ahead, 0.5 m up, 10 m/s nearer
+    assert_eq!((first[2], first[3], first[5]), ("30.07", "3.8123", "-9.98"), "{first:?}");
+    let output = replay(&folder, &["a.bin", "--ti-dialect", "targets", "--json", "r.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let output = replay(&folder, &["a.bin", "--ti-header", "40"]);
+    assert_eq!(output.status.code(), Some(2), "another header gives no frame");
+    assert_eq!(replay(&folder, &["a.bin", "--ti-dialect", "radian"]).status.code(), Some(2));
+}
