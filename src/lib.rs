@@ -69,9 +69,7 @@
 //! | results: the map interface, queries, the 1 m grid, the bitmap | [`map`], [`query`], [`resample`], [`bitmap`] |
 //! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
-//! | a whole unit: sessions on its lines, service messages, stored settings | [`mod@unit`], [`session`], [`can_session`], [`ti_session`], [`radar_clock`], [`can_service`], [`service`], [`settings`] |
-//! | a unit on hardware of its own: the loop, receive queue, settings in flash, status output | [`roadside`], [`frame_queue`], [`flash_slots`], [`status_output`] |
-//! | a bus looked after: listen first, back off after bus-off; a line that stalls | [`can_bus`], [`transmitter`] |
+//! | a whole unit: sessions on its lines, stored settings, buses looked after, the loop of a board | [`mod@unit`] |
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
 //!
@@ -116,16 +114,11 @@ pub mod axes;
 pub mod bitmap;
 pub mod bits;
 mod bytes;
-pub mod can_bus;
-pub mod can_service;
-pub mod can_session;
 pub mod cartesian;
 pub mod config;
 pub mod detection;
 pub mod evidence;
 pub mod field_of_view;
-pub mod flash_slots;
-pub mod frame_queue;
 pub mod gate;
 pub mod health;
 pub mod inputs;
@@ -139,25 +132,17 @@ pub mod profile;
 pub mod query;
 pub mod radar_2d;
 pub mod radar_3d;
-pub mod radar_clock;
 pub mod raycast;
 pub mod reflection;
 pub mod resample;
-pub mod roadside;
 pub mod scan;
 pub mod sensor;
-pub mod service;
-pub mod session;
-pub mod settings;
 pub mod sightlines;
 pub mod solid;
 pub mod spherical;
 mod stack;
 pub mod stage;
-pub mod status_output;
-pub mod ti_session;
 pub mod time;
-pub mod transmitter;
 pub mod trig;
 pub mod unit;
 pub mod voxelise;

@@ -32,7 +32,7 @@ pub mod reference {
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
     /// The loop around them on hardware of its own.
     pub type Roadside<'a> =
-        crate::roadside::Roadside<'a, DETECTIONS, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+        crate::unit::roadside::Roadside<'a, DETECTIONS, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
 }
 
 /// 100 x 64 x 8 cells: parts with 128 kB.
@@ -67,5 +67,5 @@ pub mod small {
     pub type Unit<'a> = crate::unit::Unit<'a, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
     /// The loop around them on hardware of its own.
     pub type Roadside<'a> =
-        crate::roadside::Roadside<'a, DETECTIONS, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+        crate::unit::roadside::Roadside<'a, DETECTIONS, RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
 }

@@ -5,10 +5,10 @@
 mod common;
 
 use proptest::prelude::*;
-use viewshed::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
-use viewshed::session::{Flow, Slots};
-use viewshed::settings::{BLOCK_LEN, BlockError, Settings};
 use viewshed::time::Time;
+use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
+use viewshed::unit::session::{Flow, Slots};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};

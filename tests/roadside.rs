@@ -6,15 +6,15 @@ mod common;
 
 use std::collections::VecDeque;
 
-use viewshed::can_bus::CanPort;
-use viewshed::can_service::{Answers, Told, Tool};
 use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::roadside::{Memory, Ports, Roadside, SerialPort, Start, Step, VERSION};
-use viewshed::service::Request;
-use viewshed::session::{Flow, Slots};
-use viewshed::settings::{BLOCK_LEN, Settings};
 use viewshed::time::Time;
+use viewshed::unit::can_bus::CanPort;
+use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::roadside::{Memory, Ports, Roadside, SerialPort, Start, Step, VERSION};
+use viewshed::unit::service::Request;
+use viewshed::unit::session::{Flow, Slots};
+use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};

@@ -5,8 +5,8 @@
 mod common;
 
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::settings::Settings;
 use viewshed::unit::{Unit, bench_sender};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};

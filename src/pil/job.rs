@@ -8,7 +8,7 @@
 //! | 2 | layout, 1 |
 //! | 2 | 0 |
 //! | 4 | frame whose map is wanted cell by cell, 2^32 - 1 for none |
-//! | 148 | configuration block ([`settings`](crate::settings)) |
+//! | 148 | configuration block ([`settings`](crate::unit::settings)) |
 //!
 //! then, until the stream ends, a scan after the other:
 //!
@@ -25,8 +25,8 @@ use super::Bench;
 use crate::angle::Angle;
 use crate::bytes::{Reader, Writer};
 use crate::detection::Detection;
-use crate::settings::{BLOCK_LEN, BlockError, Settings};
 use crate::time::Time;
+use crate::unit::settings::{BLOCK_LEN, BlockError, Settings};
 
 /// Bytes before the scans.
 pub const HEADER_LEN: usize = 12 + BLOCK_LEN;

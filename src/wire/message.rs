@@ -125,7 +125,7 @@ pub enum Message {
     /// A part of a map.
     Map(Plane, Part),
     /// A number that is nothing of a map: 24 and 25 are the configuration's
-    /// ([`can_service`](crate::can_service)), 26 to 31 the installation's own.
+    /// ([`can_service`](crate::unit::can_service)), 26 to 31 the installation's own.
     Other(u8),
 }
 

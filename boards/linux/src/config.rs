@@ -15,7 +15,7 @@ use viewshed::profile::reference::{Parameters, Sender};
 use viewshed::radar_3d::VisibilityConfig;
 use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::settings::Settings;
+use viewshed::unit::settings::Settings;
 use viewshed::time::Time;
 use viewshed::unit::header;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};

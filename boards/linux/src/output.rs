@@ -6,11 +6,11 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use log::{error, info};
-use viewshed::can_bus::{BusConfig, BusKeeper, BusState};
-use viewshed::can_service::{CanService, CanServiceConfig};
+use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
+use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::pil::record::FrameRecord;
 use viewshed::profile::reference::Unit;
-use viewshed::session::{Flow, Line};
+use viewshed::unit::session::{Flow, Line};
 use viewshed::time::Time;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Epoch;

@@ -8,7 +8,7 @@ use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::polar::PolarMap;
 use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
-use viewshed::session::Flow;
+use viewshed::unit::session::Flow;
 use viewshed::time::Time;
 use viewshed::unit::header;
 use viewshed::wire::status::{Reason, State as Told};

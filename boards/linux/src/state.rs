@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::session::Slots;
-use viewshed::settings::{BLOCK_LEN, BlockError, Settings};
+use viewshed::unit::session::Slots;
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
 use viewshed::wire::message::Epoch;
 
 use crate::config::Config;

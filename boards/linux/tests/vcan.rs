@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 
 use socketcan::dump::Reader;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
-use viewshed::can_service::{Answers, Told, Tool};
+use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::settings::Settings;
+use viewshed::unit::settings::Settings;
 use viewshed::time::Time;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};

@@ -4,7 +4,7 @@
 //! Arm, "Cortex-M System Design Kit Technical Reference Manual" (DDI 0479), APB UART; base addresses:
 //! "Application Note AN386", memory map.
 
-use viewshed::transmitter::BytePort;
+use viewshed::unit::transmitter::BytePort;
 
 use crate::Register;
 

@@ -39,11 +39,11 @@ use stm32::can::{Queue, Receiver, open, queue};
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
 use stm32::{crash, now};
-use viewshed::flash_slots::FlashSlots;
+use viewshed::unit::flash_slots::FlashSlots;
 use viewshed::profile::reference::{Map, Parameters, Roadside, Sender, State};
-use viewshed::roadside::{Memory, Ports, ResetFlags, Start, buses};
-use viewshed::session::Flow;
-use viewshed::status_output::StatusOutput;
+use viewshed::unit::roadside::{Memory, Ports, ResetFlags, Start, buses};
+use viewshed::unit::session::Flow;
+use viewshed::unit::status_output::StatusOutput;
 use viewshed::wire::message::Epoch;
 
 /// The radar's number on its bus and in the broadcast.

@@ -3,7 +3,7 @@
 //! # References
 //! AMD, "Zynq UltraScale+ Device Technical Reference Manual" (UG1085) and register reference (UG1087), CAN.
 
-use viewshed::can_bus::{BitTiming, CanPort};
+use viewshed::unit::can_bus::{BitTiming, CanPort};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 const RESET: usize = 0x00;

@@ -1,10 +1,10 @@
 //! Any requests and answers of an integrator on CAN, six own bytes each, with check sums that hold.
 
-use viewshed::can_service::{ANSWER, Answers, CanService, CanServiceConfig, REQUEST};
 use viewshed::pil::flash::Flash;
-use viewshed::session::Slots;
-use viewshed::settings::{BlockError, Settings};
 use viewshed::time::Time;
+use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, REQUEST};
+use viewshed::unit::session::Slots;
+use viewshed::unit::settings::{BlockError, Settings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 

@@ -6,8 +6,8 @@ use viewshed::mount::Mount;
 use viewshed::pil::record::{RECORD_LEN, Record};
 use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::service::{Reply, Request, data_id};
-use viewshed::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::service::{Reply, Request, data_id};
+use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::e2e::Profile;
 
 fn crc32(bytes: &[u8]) -> u32 {

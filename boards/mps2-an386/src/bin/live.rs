@@ -10,8 +10,8 @@ use mps2_an386::uart::{PATIENCE, Uart};
 use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::pil::flash::Flash;
 use viewshed::pil::record::{Closing, FrameRecord, Record};
-use viewshed::session::{Flow, Line, Session};
-use viewshed::transmitter::Transmitter;
+use viewshed::unit::session::{Flow, Line, Session};
+use viewshed::unit::transmitter::Transmitter;
 use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 

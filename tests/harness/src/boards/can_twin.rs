@@ -3,16 +3,16 @@
 use std::iter::Peekable;
 use std::mem;
 
-use viewshed::can_bus::{BusConfig, BusKeeper, CanPort};
-use viewshed::can_service::{CanService, CanServiceConfig};
-use viewshed::can_session::{CanSession, TIME_ID};
 use viewshed::detection::Detection;
 use viewshed::inputs::ars408::Config;
 use viewshed::pil::flash::Flash;
 use viewshed::profile::reference::{DETECTIONS, Map as PolarMap, Parameters, Sender, State};
-use viewshed::session::{Flow, Slots};
-use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::can_bus::{BusConfig, BusKeeper, CanPort};
+use viewshed::unit::can_service::{CanService, CanServiceConfig};
+use viewshed::unit::can_session::{CanSession, TIME_ID};
+use viewshed::unit::session::{Flow, Slots};
+use viewshed::unit::settings::Settings;
 use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};

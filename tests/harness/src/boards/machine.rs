@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use viewshed::settings::Settings;
+use viewshed::unit::settings::Settings;
 
 use super::Board;
 use super::scans::{Scan, job};

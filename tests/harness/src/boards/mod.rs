@@ -20,7 +20,7 @@ pub mod stress;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use viewshed::settings::Settings;
+use viewshed::unit::settings::Settings;
 
 use check::Checked;
 use scans::Scan;

@@ -2,8 +2,8 @@
 
 use viewshed::detection::Detection;
 use viewshed::pil::job::{Job, ScanHead, detection_to_bytes};
-use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::settings::Settings;
 
 use crate::estimators::Intake;
 use crate::recording::Recording;

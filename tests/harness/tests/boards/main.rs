@@ -12,7 +12,7 @@ mod zcu102;
 
 use std::path::Path;
 
-use viewshed::settings::Settings;
+use viewshed::unit::settings::Settings;
 use viewshed_harness::boards::scans::{self, Scan};
 use viewshed_harness::estimators;
 use viewshed_harness::recording::{ReadOptions, Recording, mcap};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Result, bail, ensure};
-use viewshed::settings::Settings as Block;
+use viewshed::unit::settings::Settings as Block;
 
 use crate::boards::report::{Cost, Row, table};
 use crate::boards::scans;

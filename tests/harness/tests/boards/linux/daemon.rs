@@ -80,7 +80,7 @@ impl Drop for Daemon {
 }
 
 /// The tables of mount, field of view and ends of maps.
-pub fn tables(settings: &viewshed::settings::Settings) -> String {
+pub fn tables(settings: &viewshed::unit::settings::Settings) -> String {
     let (m, v, h) = (settings.sensor.mount, settings.sensor.field_of_view, settings.health);
     format!(
         "[mount]\nx_m = {:?}\ny_m = {:?}\nheight_m = {:?}\nyaw_deg = {:?}\npitch_deg = {:?}\nroll_deg = {:?}\n\

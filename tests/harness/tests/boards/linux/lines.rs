@@ -4,9 +4,9 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use viewshed::map::Visibility;
-use viewshed::service::Request;
-use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::service::Request;
+use viewshed::unit::settings::Settings;
 use viewshed::wire::message::{Addresses, Message, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::Unstuffer;

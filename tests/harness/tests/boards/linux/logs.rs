@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::process::Command;
 
-use viewshed::can_session::CanSession;
 use viewshed::inputs::ars408::Config;
 use viewshed::polar::PolarMap;
 use viewshed::profile::reference::{DETECTIONS, Parameters, Sender, State, Unit};
-use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::can_session::CanSession;
 use viewshed::unit::header;
+use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Epoch};

@@ -1,8 +1,8 @@
 //! Batch mode: every map of a recording, here and there.
 
 use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::settings::Settings;
 use viewshed::stage::Stage;
+use viewshed::unit::settings::Settings;
 use viewshed_harness::boards::check::{self, Checked};
 use viewshed_harness::boards::scans::Scan;
 use viewshed_harness::boards::{Board, Profile, Run, firmware, host, machine, stress};

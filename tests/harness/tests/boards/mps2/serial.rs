@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use viewshed::map::Visibility;
 use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::service::Request;
-use viewshed::settings::{BLOCK_LEN, Settings};
 use viewshed::time::Time;
+use viewshed::unit::service::Request;
+use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::message::{Addresses, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::Unstuffer;

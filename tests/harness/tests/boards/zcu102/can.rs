@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use viewshed::can_service::{Answers, Told, Tool};
 use viewshed::pil::flash::Flash;
-use viewshed::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, State};
 use viewshed_harness::boards::can::CanBoard;

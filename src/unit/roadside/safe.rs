@@ -1,5 +1,5 @@
 //! What the serial line is told without settings: a status that says why. On the bus this is
-//! [`CanService`](crate::can_service::CanService)'s.
+//! [`CanService`](crate::unit::can_service::CanService)'s.
 
 use super::SerialPort;
 use crate::time::Time;

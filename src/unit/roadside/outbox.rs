@@ -1,7 +1,7 @@
 //! Frames on their way through a controller's mailboxes, and until when each may leave.
 
-use crate::can_bus::{BusKeeper, CanPort};
 use crate::time::Time;
+use crate::unit::can_bus::{BusKeeper, CanPort};
 use crate::wire::frame::CanFrame;
 
 /// Frames a controller holds at most, first in, first out.
@@ -72,7 +72,7 @@ impl Outbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::can_bus::BusConfig;
+    use crate::unit::can_bus::BusConfig;
     use crate::wire::frame::CanId;
     use std::collections::VecDeque;
 

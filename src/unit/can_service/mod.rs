@@ -4,7 +4,7 @@
 //! Two messages of a sensor, packed and protected as all of its messages are
 //! ([`message`](crate::wire::message)): [`REQUEST`] towards the unit, [`ANSWER`] from it. Both have six own
 //! bytes, on classic CAN and on CAN FD: a kind, a number, and four more. The block is the one of
-//! [`settings`](crate::settings); it travels in parts of four bytes.
+//! [`settings`](crate::unit::settings); it travels in parts of four bytes.
 //!
 //! | kind | towards the unit | number | four bytes |
 //! |---|---|---|---|
@@ -22,7 +22,7 @@
 //! | 132 | a block was refused | reason | see below |
 //! | 133 | letters of the refused parameter's name | n | letters 4 n to 4 n + 3; zeros behind the last |
 //!
-//! Reasons are those of [`BlockError::code`](crate::settings::BlockError::code), with the layout that was
+//! Reasons are those of [`BlockError::code`](crate::unit::settings::BlockError::code), with the layout that was
 //! found (2 bytes, big-endian) or the parameter's value (`f32`, big-endian), and
 //! [`INCOMPLETE`], with the first missing part in the first byte.
 //!
@@ -41,7 +41,7 @@ mod unit;
 pub use tool::{Answers, Refusal, Told, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
-use crate::settings::BLOCK_LEN;
+use crate::unit::settings::BLOCK_LEN;
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet, Received};

@@ -10,8 +10,8 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::session::Slots;
-use crate::settings::BLOCK_LEN;
+use crate::unit::session::Slots;
+use crate::unit::settings::BLOCK_LEN;
 
 /// A block up to the next whole word of any flash memory, which has at most 32 bytes.
 const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
@@ -86,7 +86,7 @@ fn flash_erase<F: NorFlash>(flash: &mut F, place: u32, length: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Settings;
+    use crate::unit::settings::Settings;
     use embedded_storage::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
     use std::vec;
     use std::vec::Vec;

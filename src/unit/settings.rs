@@ -18,7 +18,6 @@
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 
 use crate::bytes::{Reader, Writer};
-use crate::can_bus::BusConfig;
 use crate::config::{ConfigError, within};
 use crate::field_of_view::FieldOfView;
 use crate::gate::GateConfig;
@@ -27,6 +26,7 @@ use crate::mount::Mount;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
 use crate::reflection::NoiseConfig;
 use crate::sensor::Sensor;
+use crate::unit::can_bus::BusConfig;
 
 /// Everything an integrator sets for one installation.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,9 @@
 //! The integrator's requests on the serial line.
 
 use super::SerialPort;
-use crate::service::{Reply, Request};
-use crate::session::{Flow, Slots, worst, write};
-use crate::settings::{BlockError, Newest, Settings};
+use crate::unit::service::{Reply, Request};
+use crate::unit::session::{Flow, Slots, worst, write};
+use crate::unit::settings::{BlockError, Newest, Settings};
 use crate::wire::message::Packing;
 use crate::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 

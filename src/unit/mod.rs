@@ -4,15 +4,36 @@
 //! road a timer's, in a test bench the recording's. A board calls [`Unit::scan`] with each scan,
 //! [`Unit::idle`] between them, at least ten times a second, and sends what [`Unit::next_line`] or
 //! [`Unit::next_frame`] gives until there is nothing more.
+//!
+//! | around it | modules |
+//! |---|---|
+//! | sessions: what comes over a line becomes scans and requests | [`session`], [`can_session`], [`ti_session`], [`radar_clock`] |
+//! | settings: the checked block, asked for and written over serial lines and CAN, kept in flash | [`settings`], [`service`], [`can_service`], [`flash_slots`] |
+//! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
+//! | a unit on hardware of its own: the loop, and what its lamp shows | [`roadside`], [`status_output`] |
+
+pub mod can_bus;
+pub mod can_service;
+pub mod can_session;
+pub mod flash_slots;
+pub mod frame_queue;
+pub mod radar_clock;
+pub mod roadside;
+pub mod service;
+pub mod session;
+pub mod settings;
+pub mod status_output;
+pub mod ti_session;
+pub mod transmitter;
 
 use crate::axes::Axes;
 use crate::detection::Detection;
 use crate::health::{Condition, Continuity};
 use crate::polar::PolarMap;
 use crate::radar_3d::{FrameReport, Radar3d, Radar3dParameters};
-use crate::settings::Settings;
 use crate::stage::Stage;
 use crate::time::Time;
+use crate::unit::settings::Settings;
 use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use crate::wire::code::ray::Known;
 use crate::wire::frame::CanFrame;

@@ -1,7 +1,7 @@
 //! The integrator's end: what to send, and what the answers say.
 
 use super::{ANSWER, Answer, PARTS, REQUEST, Request, frame, received};
-use crate::settings::BLOCK_LEN;
+use crate::unit::settings::BLOCK_LEN;
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -62,7 +62,7 @@ impl Tool {
 /// Why a unit refused a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refusal {
-    /// As in [`BlockError::code`](crate::settings::BlockError::code), or [`INCOMPLETE`](super::INCOMPLETE).
+    /// As in [`BlockError::code`](crate::unit::settings::BlockError::code), or [`INCOMPLETE`](super::INCOMPLETE).
     pub reason: u8,
     /// What goes with it: a layout, a parameter's value, the first missing part.
     pub detail: [u8; 4],

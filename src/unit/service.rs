@@ -14,7 +14,7 @@
 //!
 //! | kind | towards the unit | body |
 //! |---|---|---|
-//! | 1 | write a configuration block into the slot not in use | block ([`settings`](crate::settings)) |
+//! | 1 | write a configuration block into the slot not in use | block ([`settings`](crate::unit::settings)) |
 //! | 2 | read the block in use | |
 //! | 3 | restart with the newest block | |
 //! | 4 | the time, where the unit has no clock of its own | microseconds, 8 bytes |
@@ -28,8 +28,8 @@
 
 use crate::bytes::Reader;
 use crate::config::ConfigError;
-use crate::settings::{BLOCK_LEN, BlockError};
 use crate::time::Time;
+use crate::unit::settings::{BLOCK_LEN, BlockError};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
 

@@ -12,11 +12,11 @@
 
 use crate::inputs::native::{Config, Outcome, Receiver};
 use crate::pil::record::FrameRecord;
-use crate::service::{Reply, Request, ServiceMessage};
-use crate::settings::{BLOCK_LEN, BlockError, Newest, Settings};
 use crate::stage::Stage;
 use crate::time::Time;
 use crate::unit::Unit;
+use crate::unit::service::{Reply, Request, ServiceMessage};
+use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
 use crate::wire::message::{Epoch, Message, Packet, Packing};
 use crate::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 use crate::wire::status::{Reason, State, Status};
@@ -148,7 +148,7 @@ impl<const D: usize> Session<D> {
     }
 
     /// What is to be done when no bytes came, where the unit has a clock; it has to be the one its scans
-    /// are stamped by, see [`RadarClock`](crate::radar_clock::RadarClock).
+    /// are stamped by, see [`RadarClock`](crate::unit::radar_clock::RadarClock).
     pub fn idle<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
         &mut self,
         now: Time,

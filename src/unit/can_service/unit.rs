@@ -1,9 +1,9 @@
 //! The unit's end: takes a block, keeps it, tells what it runs with, and what it says without one.
 
 use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
-use crate::session::{Flow, Slots, worst, write};
-use crate::settings::{BLOCK_LEN, BlockError, Newest, Settings};
 use crate::time::Time;
+use crate::unit::session::{Flow, Slots, worst, write};
+use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::{Epoch, Message, Packet};
@@ -36,13 +36,13 @@ impl CanServiceConfig {
 /// # Example
 /// A block is sent in parts, written, and read by the next start:
 /// ```
-/// # use viewshed::can_service::{Answers, CanService, CanServiceConfig, Told, Tool};
+/// # use viewshed::unit::can_service::{Answers, CanService, CanServiceConfig, Told, Tool};
 /// # use viewshed::field_of_view::FieldOfView;
 /// # use viewshed::mount::Mount;
 /// # use viewshed::reflection::NoiseConfig;
 /// # use viewshed::sensor::Sensor;
-/// # use viewshed::session::{Flow, Slots};
-/// # use viewshed::settings::{BLOCK_LEN, Settings};
+/// # use viewshed::unit::session::{Flow, Slots};
+/// # use viewshed::unit::settings::{BLOCK_LEN, Settings};
 /// # use viewshed::time::Time;
 /// # use viewshed::wire::broadcast::Medium;
 /// # use viewshed::wire::message::{Addresses, Epoch};
