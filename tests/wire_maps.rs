@@ -4,6 +4,8 @@
 
 mod shadows;
 
+use std::collections::VecDeque;
+
 use shadows::{A, Map, Shadows, W, header};
 use viewshed::map::RoadPoint;
 use viewshed::query::{self, Answer};
@@ -211,6 +213,39 @@ fn stale_frames_are_dropped_and_every_azimuth_has_its_turn() {
     let late = &line.frames[maps..];
     assert!(late.iter().all(|frame| frame.id.raw() % 32 < 2), "no frame of a map: {late:?}");
     assert!(line.sender.idle() && line.sender.status_mut().dropped > 0);
+}
+
+/// Scan numbers come again after 5.12 s. Were late frames enough to keep a session's maps told, the last map
+/// that came in time would be told once more then.
+#[test]
+fn late_frames_keep_no_map_until_its_number_comes_again() {
+    let medium = Medium::Can(Addresses::STANDARD);
+    let mut line = Line::<1>::new(medium, BroadcastConfig::new(SENSOR, medium));
+    let mut shadows = Shadows::new(6);
+    let mut under_way = VecDeque::new();
+    let visible = |line: &Line<1>, now| {
+        let rays = line.received(Plane::Visibility, now);
+        rays.iter().map(|ray| ray.bits().count()).sum::<u32>()
+    };
+    let mut late = 0;
+    for now in 0..7350 {
+        if now % 67 == 0 {
+            let _ = line.sender.scan(ms(now), &shadows.next());
+        }
+        if now < 2000 {
+            line.pass(ms(now));
+            continue;
+        }
+        // from here on everything is under way for 200 ms, twice what it may be
+        under_way.extend(line.sender.next_frame(ms(now)).map(|frame| (now + 200, frame)));
+        while let Some((_, frame)) = under_way.front().copied().filter(|(due, _)| *due <= now) {
+            under_way.pop_front();
+            late += u32::from(line.receiver.frame(ms(now), &frame) == Err(Refused::Late));
+        }
+        let told = visible(&line, ms(now));
+        assert!(if now == 2000 { told > 1000 } else { now < 2300 || told == 0 }, "{told} cells at {now} ms");
+    }
+    assert!(late > 500, "{late}");
 }
 
 #[test]
