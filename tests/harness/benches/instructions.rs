@@ -2,10 +2,11 @@
 //!
 //! Counts everything from the gate to the map, for the shipped recording and for three adversarial
 //! scans of 256 detections; and sending and receiving the maps, from map to packets and back. Names
-//! behind `--` measure only those. Counts repeat exactly and do not depend on the machine's speed.
+//! behind `--` measure only those, `--recording PATH` takes another recording. Counts repeat exactly and do not
+//! depend on the machine's speed.
 
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use viewshed::detection::{Detection, Measurement};
@@ -17,7 +18,7 @@ use viewshed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::Known;
 use viewshed::wire::header::Header;
-use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
+use viewshed::wire::message::{Addresses, Epoch, Packet};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed_harness::boards::stress;
 use viewshed_harness::estimators;
@@ -27,24 +28,33 @@ const ESTIMATORS: [&str; 3] = ["radar-3d", "radar-3d-small", "radar-2d"];
 const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
 
 /// What is measured on the recording's maps only.
-const WIRE: [&str; 4] = ["send-can", "receive-can", "send-long", "receive-long"];
+const WIRE: [&str; 6] = ["send-can", "receive-can", "send-fd", "receive-fd", "send-long", "receive-long"];
+
+/// Instructions a scan that sending and receiving may take, median, on every bus.
+const WIRE_BUDGET: u64 = 150_000;
 
 /// The function whose instructions are counted, as callgrind names it.
 fn measured(estimator: &str) -> &'static str {
     match estimator {
         "radar-2d" => "instructions::measured_frame_2d",
-        "send-can" | "send-long" => "instructions::measured_send",
-        "receive-can" | "receive-long" => "instructions::measured_receive",
+        "send-can" | "send-fd" | "send-long" => "instructions::measured_send",
+        "receive-can" | "receive-fd" | "receive-long" => "instructions::measured_receive",
         _ => "instructions::measured_frame_3d",
     }
 }
 
 fn main() -> ExitCode {
-    let args: Vec<String> = std::env::args().collect();
-    if let Some([_, estimator, scene]) = args.iter().position(|a| a == "--work").and_then(|i| args.get(i..i + 3)) {
-        work(estimator, scene);
+    let mut args: Vec<String> = std::env::args().collect();
+    if let Some([_, estimator, scene, recording]) =
+        args.iter().position(|a| a == "--work").and_then(|i| args.get(i..i + 4))
+    {
+        work(estimator, scene, Path::new(recording));
         return ExitCode::SUCCESS;
     }
+    let recording = args.iter().position(|a| a == "--recording").map(|i| args.drain(i..(i + 2).min(args.len())));
+    let recording = recording.and_then(|mut option| option.nth(1));
+    let recording =
+        recording.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap").into());
     if Command::new("valgrind").arg("--version").output().is_err() {
         eprintln!("valgrind is not installed; on Debian and Ubuntu: apt-get install valgrind");
         return ExitCode::FAILURE;
@@ -56,7 +66,7 @@ fn main() -> ExitCode {
         if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
             continue;
         }
-        let counts = measure(estimator, scene);
+        let counts = measure(estimator, scene, &recording);
         let Some(worst) = counts.last() else {
             eprintln!("callgrind counted nothing for {estimator} on {scene}");
             return ExitCode::FAILURE;
@@ -64,12 +74,16 @@ fn main() -> ExitCode {
         let mean = counts.iter().sum::<u64>() / counts.len() as u64;
         let median = counts[counts.len() / 2];
         println!("{estimator:<16} {scene:<12} {:>9} {mean:>12} {median:>12} {worst:>12}", counts.len());
+        if WIRE.contains(&estimator) && median > WIRE_BUDGET {
+            eprintln!("{estimator} takes {median} instructions a scan, more than {WIRE_BUDGET}");
+            return ExitCode::FAILURE;
+        }
     }
     ExitCode::SUCCESS
 }
 
 /// Instructions of every frame, ascending.
-fn measure(estimator: &str, scene: &str) -> Vec<u64> {
+fn measure(estimator: &str, scene: &str, recording: &str) -> Vec<u64> {
     let folder = std::env::temp_dir().join(format!("viewshed-bench-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).expect("a folder for callgrind's files");
@@ -80,7 +94,7 @@ fn measure(estimator: &str, scene: &str) -> Vec<u64> {
         .arg(format!("--dump-after={}", measured(estimator)))
         .arg(format!("--callgrind-out-file={}", folder.join("out").display()))
         .arg(me)
-        .args(["--work", estimator, scene])
+        .args(["--work", estimator, scene, recording])
         .stderr(std::process::Stdio::null())
         .status();
     assert!(status.is_ok_and(|s| s.success()), "valgrind failed on {estimator} {scene}");
@@ -100,9 +114,8 @@ fn totals(path: &Path) -> Option<u64> {
 }
 
 /// Runs an estimator over a scene; this is what runs under callgrind.
-fn work(estimator: &str, scene: &str) {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap"));
-    let recording = read(&path, &Default::default()).expect("the shipped recording");
+fn work(estimator: &str, scene: &str, recording: &Path) {
+    let recording = read(recording, &Default::default()).expect("the recording");
     let sensor = estimators::sensor(&recording, &Default::default());
     let frames: Vec<(Time, Vec<Detection>)> = if scene == "recording" {
         let time = |ns: i64| Time::from_micros(u64::try_from(ns / 1000).unwrap_or(0));
@@ -117,6 +130,7 @@ fn work(estimator: &str, scene: &str) {
     match estimator {
         "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
         "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
+        "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),
         "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
         "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &frames),
         _ => run_2d(&sensor, &frames),
@@ -166,7 +180,9 @@ fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) 
     let mut state = Box::new(Radar3d::<200, 120, 16, 7, 64, 256>::new());
     let mut map = Box::new(parameters.map());
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
-    let header = Header::new::<200, 120>(&sensor.mount, map.geometry(), Known::new(15, 200), 1, 0).expect("sendable");
+    let view = parameters.axes().view(60);
+    let usual = Known::new(view.start, view.end);
+    let header = Header::new::<200, 120>(&sensor.mount, map.geometry(), usual, 1, 0).expect("sendable");
     let begin = frames.first().map_or(Time::from_micros(0), |f| f.0);
     let mut sender =
         Box::new(Broadcaster::<120, 7>::new(config, header, Epoch::new(1), begin).expect("defaults are valid"));
@@ -175,7 +191,7 @@ fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) 
         state.process(&parameters, *now, detections, false, &mut map);
         let mut packets = Vec::with_capacity(1000);
         measured_send(&mut sender, *now, &map, &mut packets);
-        measured_receive(&mut receiver, *now, &packets);
+        measured_receive(&mut receiver, *now, &packets, medium);
     }
     black_box(&receiver);
 }
@@ -189,11 +205,13 @@ fn measured_send(sender: &mut Broadcaster<120, 7>, now: Time, map: &PolarMap<200
 }
 
 #[inline(never)]
-fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Packet]) {
+fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Packet], medium: Medium) {
     for packet in packets {
-        let _ = black_box(match packet.packing {
-            Packing::Classic => receiver.frame(now, &packet.frame(&Addresses::STANDARD).expect("an identifier")),
-            Packing::Long | Packing::Secured => receiver.message(now, packet.bytes()),
+        let _ = black_box(match medium {
+            Medium::Serial => receiver.message(now, packet.bytes()),
+            Medium::Can(addresses) | Medium::CanFd(addresses) => {
+                receiver.frame(now, &packet.frame(&addresses).expect("an identifier"))
+            }
         });
     }
 }
