@@ -1,5 +1,5 @@
 #!/bin/bash
-# Every test: host, and firmware under emulation where boards/ has it. Installs what it needs or says what it skipped.
+# Every test: host, the Linux daemon, and firmware under emulation. Installs what it needs or says what it skipped.
 # The runners' own summary lines come last.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -22,6 +22,8 @@ run cargo test --release --locked --workspace --no-fail-fast
 # overflow checks are on in this one
 run cargo test --locked --package viewshed --test properties
 run tests/recordings/make.sh --check
+run tests/linux.sh
+run tests/linux_kernel.sh
 run tests/firmware.sh
 run tests/fuzz.sh
 
