@@ -119,7 +119,7 @@ pub fn encode<const W: usize>(
 fn can_stop(coder: &mut impl Coder) -> bool {
     let room = coder.room();
     // "no further ray" takes 8 bits at most
-    if room < STOPS_BELOW || room > 10 {
+    if !(STOPS_BELOW..=10).contains(&room) {
         return true;
     }
     let before = coder.mark();

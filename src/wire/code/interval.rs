@@ -289,6 +289,7 @@ impl<'a> Decoder<'a> {
             // the first is the most frequent
             while look(1) {}
         } else {
+            const { assert!(N <= 16) };
             [8, 4, 2, 1].into_iter().for_each(|step| _ = look(step));
         }
         let to = part(symbol + 1).unwrap_or(self.width);
