@@ -12,8 +12,14 @@ use super::{Board, Profile};
 /// # Errors
 /// What the compiler says, or that there is none for the board.
 pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
-    let small = ["--features", "small"];
-    build_in(board.folder(), program, if profile == Profile::Small { &small } else { &[] })
+    // the serial program takes less stack when it is compiled for speed, and has flash for that
+    let small = ["--features", "small", "--config", "profile.release.opt-level=2"];
+    let options: &[&str] = match (profile, program) {
+        (Profile::Reference, _) => &[],
+        (Profile::Small, "live") => &small,
+        (Profile::Small, _) => &small[..2],
+    };
+    build_in(board.folder(), program, options)
 }
 
 /// Builds a program of a folder of `boards/` with options for cargo and gives its path.
