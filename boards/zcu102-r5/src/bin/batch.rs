@@ -8,7 +8,7 @@ use viewshed::pil::files::Files;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Memory, run};
 use viewshed::time::Time;
-use viewshed::unit::{Unit, bench_sender};
+use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Epoch;
 use zcu102_r5::Core;
@@ -20,7 +20,8 @@ const MOST_DETECTIONS: usize = 16_384;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
-static SENDER: StaticCell<Sender> = StaticCell::new();
+static PARAMETERS: StaticCell<Option<Parameters>> = StaticCell::new();
+static SENDER: StaticCell<Option<Sender>> = StaticCell::new();
 #[unsafe(link_section = ".bench")]
 static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS>> = ConstStaticCell::new(ScanBuffer::new());
 
@@ -28,11 +29,11 @@ static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS>> = ConstStaticCell::new
 extern "C" fn main() -> ! {
     let Some(mut files) = Files::<HostFile, _>::open(Core) else { exit(2) };
     let Ok(job) = Job::read(&mut files) else { exit(1) };
-    let Ok(parameters) = Parameters::new(&job.settings.sensor, &job.settings.radar_3d()) else { exit(1) };
     let (Some(state), Some(map), Some(scan)) = (STATE.try_take(), MAP.try_take(), SCAN.try_take()) else { exit(4) };
-    let sender = bench_sender(&job.settings, &parameters, Medium::Serial, Epoch::new(0), Time::from_micros(0));
-    let Some(sender) = sender.and_then(|s| SENDER.try_init(s)) else { exit(1) };
+    let (Some(parameters), Some(sender)) = (PARAMETERS.try_init(None), SENDER.try_init(None)) else { exit(4) };
+    start_bench(parameters, sender, Some(&job.settings), Medium::Serial, Epoch::new(0), Time::from_micros(0));
+    let (Some(parameters), Some(sender)) = (parameters, sender) else { exit(1) };
 
-    let memory = Memory { unit: Unit::new(&parameters, state, map, sender), scan };
+    let memory = Memory { unit: Unit::new(parameters, state, map, sender), scan };
     exit(if run(&mut files, &job, memory).is_ok() { 0 } else { 1 })
 }

@@ -54,6 +54,11 @@ pub fn compare(answer: &[u8], here: &[u8], scans: usize) -> Result<Checked> {
         })
         .collect();
     ensure!(closing.reason == 0, "the controller stopped after {} frames, reason {}", closing.frames, closing.reason);
+    let [used, there] = closing.stack;
+    ensure!(
+        there == 0 || used < there,
+        "the stack of {there} bytes was used to its end, and what lies behind it overwritten"
+    );
     ensure!(frames.len() == scans, "{} scans sent, {} frames answered", scans, frames.len());
     let differs = |(frame, expected): &(&FrameRecord, &u64)| frame.fingerprint != **expected;
     let first_difference = frames.iter().zip(&expected).position(|pair| differs(&pair));
