@@ -6,12 +6,12 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use log::{error, info};
-use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
-use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::pil::record::FrameRecord;
 use viewshed::profile::reference::Unit;
-use viewshed::unit::session::{Flow, Line};
 use viewshed::time::Time;
+use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
+use viewshed::unit::can_service::{CanService, CanServiceConfig};
+use viewshed::unit::session::{Flow, Line};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::MOST_STUFFED;

@@ -8,9 +8,9 @@ use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::polar::PolarMap;
 use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
-use viewshed::unit::session::Flow;
 use viewshed::time::Time;
 use viewshed::unit::header;
+use viewshed::unit::session::Flow;
 use viewshed::wire::status::{Reason, State as Told};
 
 use crate::config::{ClockSource, Config};

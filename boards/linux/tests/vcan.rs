@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use socketcan::dump::Reader;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
-use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::unit::settings::Settings;
 use viewshed::time::Time;
+use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;

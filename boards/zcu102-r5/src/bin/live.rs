@@ -4,12 +4,12 @@
 
 use semihosting::process::exit;
 use static_cell::{ConstStaticCell, StaticCell};
-use viewshed::unit::can_bus::{BusConfig, BusKeeper};
-use viewshed::unit::can_service::{CanService, CanServiceConfig};
-use viewshed::unit::can_session::CanSession;
 use viewshed::inputs::ars408::Config;
 use viewshed::pil::files::{FlashFile, answer};
 use viewshed::pil::record::{Closing, Record};
+use viewshed::unit::can_bus::{BusConfig, BusKeeper};
+use viewshed::unit::can_service::{CanService, CanServiceConfig};
+use viewshed::unit::can_session::CanSession;
 use viewshed::unit::session::{Flow, Slots};
 use viewshed::unit::settings::Settings;
 use viewshed::unit::{Unit, start_bench};
