@@ -3,7 +3,7 @@
 use crate::reflection::Reflection;
 
 /// Bins of range.
-const BINS: usize = 64;
+const BINS: usize = 128;
 
 /// Where a reflection is, centimetres in the levelled frame, and its place in the scan.
 #[derive(Debug, Clone, Copy)]

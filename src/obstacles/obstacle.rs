@@ -122,9 +122,9 @@ impl Search {
     /// Whether a place is near enough to look closer.
     #[inline]
     pub fn reaches(&self, x_cm: i32, y_cm: i32) -> bool {
-        // one comparison for both ends
-        let (x, y) = (x_cm.wrapping_sub(self.corner.0), y_cm.wrapping_sub(self.corner.1));
-        x.cast_unsigned() <= self.side_cm && y.cast_unsigned() <= self.side_cm
+        // one comparison for both ends; across the road first, for what is compared lies at the same range
+        let within = |v: i32, corner: i32| v.wrapping_sub(corner).cast_unsigned() <= self.side_cm;
+        within(y_cm, self.corner.1) && within(x_cm, self.corner.0)
     }
 
     /// Where a detection lies in the obstacle's axes; `None` where it is out of reach, whatever the direction

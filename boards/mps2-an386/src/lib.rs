@@ -3,6 +3,7 @@
 //! The only unsafe code of this board is here: registers, the stack's limits and the panic handler.
 #![no_std]
 
+mod interrupts;
 pub mod semihost;
 pub mod stack;
 pub mod timer;

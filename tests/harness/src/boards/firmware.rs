@@ -12,12 +12,10 @@ use super::{Board, Profile};
 /// # Errors
 /// What the compiler says, or that there is none for the board.
 pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
-    // the serial program takes less stack when it is compiled for speed, and has flash for that
-    let small = ["--features", "small", "--config", "profile.release.opt-level=2"];
-    let options: &[&str] = match (profile, program) {
-        (Profile::Reference, _) => &[],
-        (Profile::Small, "live") => &small,
-        (Profile::Small, _) => &small[..2],
+    // the small grid is for small controllers, which want fewer instructions and have the flash for that
+    let options: &[&str] = match profile {
+        Profile::Reference => &[],
+        Profile::Small => &["--features", "small", "--config", "profile.release.opt-level=2"],
     };
     build_in(board.folder(), program, options)
 }
