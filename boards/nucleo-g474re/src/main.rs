@@ -13,8 +13,8 @@
 //! | watchdog | IWDG | the same, `iwdg` |
 //! | settings | last two pages of 2 kB, in Zephyr's `storage_partition` | the same, `flash0`; page and word: `stm32-metapac` |
 //!
-//! Zephyr as of commit 19a6a69e3473, `hal_stm32` as of 161c4b2a1b86. ST's manual of the board (UM2505) was
-//! not at hand: solder bridges are not verified. Both buses need a transceiver. PB5 and PB6, the other pins of
+//! Zephyr as of commit 19a6a69e3473, `hal_stm32` as of 161c4b2a1b86. Not verified against ST's manual of the
+//! board (UM2505): solder bridges. Both buses need a transceiver. PB5 and PB6, the other pins of
 //! FDCAN2, are left alone: PB6 is CC1 of a USB-C port as well (`stm32-metapac`). The flash is to have two banks
 //! (option bit DBANK): embassy stops otherwise.
 #![no_std]

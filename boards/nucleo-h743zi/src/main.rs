@@ -13,9 +13,9 @@
 //! | watchdog | IWDG1 | the same, `iwdg1` |
 //! | settings | last two sectors, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
 //!
-//! Zephyr as of commit 0225b4db0265, `hal_stm32` as of 257c26c17af3. ST's manuals of the board (UM1974 for
-//! MB1137, UM2407 for MB1364) were not at hand: solder bridges, and whether D1 and D11 are free of other uses
-//! there, are not verified; nor is whether the part's revision allows 480 MHz. Both buses need a transceiver.
+//! Zephyr as of commit 0225b4db0265, `hal_stm32` as of 257c26c17af3. Not verified against ST's manuals of the
+//! board (UM1974 for MB1137, UM2407 for MB1364): solder bridges, and whether D1 and D11 are free of other uses
+//! there; nor is whether the part's revision allows 480 MHz. Both buses need a transceiver.
 #![no_std]
 #![no_main]
 
@@ -58,8 +58,8 @@ const FLASH_BASE: u32 = 0x0800_0000;
 /// The slots of the settings, from the beginning of the flash.
 const SETTINGS: [u32; 2] = [0x1C_0000, 0x1E_0000];
 const SETTINGS_BYTES: u32 = 0x4_0000;
-/// More than a sector takes to be erased, in which the loop stands still: 4 s at worst, from memory of the data
-/// sheet, which was not at hand.
+/// More than a sector takes to be erased, in which the loop stands still: taken as 4 s at worst, which is not
+/// verified against the data sheet.
 const WATCHDOG_US: u32 = 5_000_000;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());

@@ -5,8 +5,8 @@
 //!
 //! # References
 //! ST, "STM32H742, STM32H743/753 and STM32H750 Value line" (RM0433) and "STM32G4 series" (RM0440) reference
-//! manuals, FDCAN: CCCR, PSR, TXBRP, TXBCR. Register names and bits are those of `stm32-metapac`; the
-//! manuals' pages were not at hand.
+//! manuals, FDCAN: CCCR, PSR, TXBRP, TXBCR. Register names and bits are those of `stm32-metapac`, not
+//! verified against the manuals' pages.
 
 use core::cell::RefCell;
 use core::num::{NonZeroU8, NonZeroU16};
