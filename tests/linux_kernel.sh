@@ -21,10 +21,10 @@ target=${CARGO_TARGET_DIR:-$PWD/target}/boards/linux
 kernel=$target/kernel
 if [ ! -e "$kernel/done" ]; then
     rm -rf "$kernel"
-    mkdir -p "$kernel/root"
+    mkdir -p "$kernel/files"
     package=$(apt-cache depends linux-image-amd64 2>/dev/null | sed -n 's/^ *Depends: //p' | head -n 1)
     [ -n "$package" ] || skip "no package linux-image-amd64"
-    (cd "$kernel" && apt-get download "$package" >/dev/null 2>&1 && dpkg -x ./*.deb root) || skip "cannot download $package"
+    (cd "$kernel" && apt-get download "$package" >/dev/null 2>&1 && dpkg -x ./*.deb files) || skip "cannot download $package"
     touch "$kernel/done"
 fi
 
@@ -45,7 +45,7 @@ for program in "$disk"/bin/*; do ldd "$program" 2>/dev/null | grep -o '/[^ ]*' |
         cp -L "$library" "$disk$library"
     done
 for module in net/can/can net/can/can-raw drivers/net/can/dev/can-dev drivers/net/can/vcan; do
-    cp "$kernel"/root/lib/modules/*/kernel/$module.ko "$disk/modules/"
+    cp "$kernel"/files/lib/modules/*/kernel/$module.ko "$disk/modules/"
 done
 cat >"$disk/init" <<'END'
 #!/bin/busybox sh
@@ -61,7 +61,7 @@ chmod +x "$disk/init"
 (cd "$disk" && find . | busybox cpio -o -H newc 2>/dev/null) | gzip -1 >"$kernel/disk.gz"
 
 log=$kernel/log
-timeout -k 5 300 qemu-system-x86_64 -m 512 -nographic -no-reboot -net none -kernel "$kernel"/root/boot/vmlinuz-* \
+timeout -k 5 300 qemu-system-x86_64 -m 512 -nographic -no-reboot -net none -kernel "$kernel"/files/boot/vmlinuz-* \
     -initrd "$kernel/disk.gz" -append "console=ttyS0 quiet panic=1" </dev/null 2>&1 | tr -d '\r' >"$log" || true
 grep -E '^kernel |frames, Counters' "$log" || true
 if ! grep '^test result: ok' "$log"; then
