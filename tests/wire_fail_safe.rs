@@ -51,6 +51,7 @@ struct Tally {
 }
 
 struct World {
+    seed: u64,
     random: Random,
     medium: Medium,
     shadows: Shadows,
@@ -89,6 +90,7 @@ impl World {
     fn new(seed: u64, medium: Medium) -> Self {
         let config = BroadcastConfig::new(SENSOR, medium);
         Self {
+            seed,
             random: Random::new(seed),
             medium,
             shadows: Shadows::new(seed),
@@ -215,7 +217,7 @@ impl World {
             };
             let sent = &sent.0[azimuth];
             told_azimuths += 1;
-            assert!(us - measured <= AGE_AND_DELAY_US, "azimuth {azimuth} is {} us old", us - measured);
+            assert!(us - measured <= AGE_AND_DELAY_US, "azimuth {azimuth} is {} us old in world {}", us - measured, self.seed);
             assert_eq!(told.bits().and(sent.bits()), *told.bits(), "visible what was not");
             if let Some((e, newest)) = self.newest[azimuth] {
                 assert!(e != epoch || newest <= measured, "azimuth {azimuth} went back by {} us", newest - measured);
