@@ -510,8 +510,8 @@ static bool header_holds(uint8_t group[7][5]) {
 }
 
 static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
-    if (n < 6) return;
-    if ((own[0] & 15) != 1) { s->other_version = now; return; }
+    if (n > 0 && (own[0] & 15) != 1) s->other_version = now;
+    if (n < 6 || (own[0] & 15) != 1) return;
     int first = own[0] >> 4 & 7;
     uint8_t all[7][5];
     if (n >= 36) {
@@ -688,6 +688,7 @@ static void serial_byte(uint64_t now, uint8_t byte) {
         if (length < 256) stuffed[length++] = byte;
         return;
     }
+    if (length == 0) return;
     uint8_t data[256];
     int n = 0, at = 0;
     while (at < length && length < 256) {
