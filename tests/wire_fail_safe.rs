@@ -31,8 +31,9 @@ const SENSOR: u8 = 2;
 const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
 const DELAY_US: u64 = 100_000;
-/// Frames are displaced by less than the period of the scan numbers, less D.
-const MOST_DISPLACED_US: u64 = 4_900_000;
+/// Frames are displaced by so much; in every fifth world by almost the period of the scan numbers, less D, which
+/// is as safe, but tells little.
+const MOST_DISPLACED_US: [u64; 5] = [3_500_000, 3_500_000, 2_450_000, 3_500_000, 4_900_000];
 /// A bus or gateway stands still for at most as long.
 const MOST_STANDSTILL_US: u64 = 3_000_000;
 
@@ -132,7 +133,8 @@ impl World {
             return;
         }
         let in_time = (us + r.below(8000)).min(us.max(measured + DELAY_US));
-        let late = |r: &mut Random| us + r.below(MOST_DISPLACED_US);
+        let most_us = MOST_DISPLACED_US[(self.seed / 2 % 5) as usize];
+        let late = |r: &mut Random| us + r.below(most_us);
         let mut data = frame.data().to_vec();
         if r.chance(0.01) {
             data.truncate(r.below(data.len() as u64) as usize);
