@@ -219,7 +219,12 @@ impl World {
             };
             let sent = &sent.0[azimuth];
             told_azimuths += 1;
-            assert!(us - measured <= AGE_AND_DELAY_US, "azimuth {azimuth} is {} us old in world {}", us - measured, self.seed);
+            assert!(
+                us - measured <= AGE_AND_DELAY_US,
+                "azimuth {azimuth} is {} us old in world {}",
+                us - measured,
+                self.seed
+            );
             assert_eq!(told.bits().and(sent.bits()), *told.bits(), "visible what was not");
             if let Some((e, newest)) = self.newest[azimuth] {
                 assert!(e != epoch || newest <= measured, "azimuth {azimuth} went back by {} us", newest - measured);
