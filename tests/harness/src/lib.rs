@@ -10,6 +10,7 @@ pub mod experiment;
 pub mod foxglove;
 pub mod geometry;
 pub mod options;
+pub mod output;
 pub mod pictures;
 pub mod recording;
 pub mod report;

@@ -105,7 +105,7 @@ struct ReadingArgs {
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct KindArgs {
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
-    #[arg(long, value_name = "NAME", value_parser = profile)]
+    #[arg(long = "radar", value_name = "NAME", value_parser = profile)]
     pub profile: Option<&'static Profile>,
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
@@ -175,6 +175,11 @@ struct EstimatorArgs {
 }
 
 impl SettingsArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.judging.files()
+    }
+
     /// Defaults, then the file, then the command line.
     ///
     /// # Errors
@@ -185,6 +190,11 @@ impl SettingsArgs {
 }
 
 impl JudgingArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.config.clone().into_iter()
+    }
+
     /// Defaults, then the file, then the command line; recordings are read as they are.
     ///
     /// # Errors

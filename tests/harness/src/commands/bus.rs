@@ -1,7 +1,7 @@
 //! `viewshed bus`: what a recording's maps cost on a bus.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -11,9 +11,9 @@ use viewshed::wire::code::block::Kind;
 use viewshed::wire::code::interval::Form;
 
 use super::key::KeyArgs;
+use super::print;
 use super::progress::bar;
 use super::replay::shipped;
-use super::{print, write_file};
 use crate::bus::ears::Key;
 use crate::bus::entropy::Entropy;
 use crate::bus::load::Load;
@@ -22,6 +22,7 @@ use crate::bus::report::Report;
 use crate::bus::symbols::{self, Symbols};
 use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
 use crate::options::SettingsArgs;
+use crate::output::{OutputArgs, Target};
 use crate::recording;
 use crate::recording::candump::{Content, Line};
 use crate::recording::serial_log::Chunk;
@@ -65,6 +66,8 @@ pub struct Args {
     #[command(flatten)]
     key: KeyArgs,
     #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -78,6 +81,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.log.is_some() && paths.len() > 1 {
         bail!("--log writes one recording and {} are to be sent; name one", paths.len());
     }
+    let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
+    outputs.reads(args.settings.files().chain(args.key.file()));
+    let json = outputs.file("--json", args.json.as_deref())?;
+    let log = outputs.file("--log", args.log.as_deref())?;
     let key = args.key.key()?;
     let classic = BUSES.iter().any(|bus| bus.name == args.bus && matches!(bus.medium, Medium::Can(_)));
     if key.is_some() && args.log.is_some() && classic {
@@ -93,23 +100,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             count(&mut symbols, &maps);
             continue;
         }
-        let report = send(&recording.name, &maps, args, key.as_ref())?;
+        let report = send(&recording.name, &maps, args, key.as_ref(), log.as_ref())?;
         print(&report.text())?;
         reports.push(report);
     }
     if args.count_symbols {
         print(&symbols.model())?;
-    } else if let Some(path) = &args.json {
+    } else if let Some(file) = json {
         let text = match &reports[..] {
             [one] => serde_json::to_string_pretty(one),
             several => serde_json::to_string_pretty(several),
         };
-        write_file(path, &(text.context("the report as JSON")? + "\n"))?;
+        file.write(text.context("the report as JSON")? + "\n")?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>) -> Result<Report> {
+fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Target>) -> Result<Report> {
     let (mut buses, mut received, mut dropped) = (Vec::new(), Vec::new(), 0);
     let logged = if key.is_some() { format!("{}-authenticated", args.bus) } else { args.bus.clone() };
     let authenticated = AUTHENTICATED.into_iter().filter_map(|bus| key.map(|key| (bus, Some(key))));
@@ -121,8 +128,8 @@ fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>) -> Result<Repor
             received.extend(LOSSES.map(|loss| Arrived::new(maps, &traffic, loss, args.sensor, key)));
         }
         dropped = dropped.max(traffic.dropped);
-        if let Some(path) = args.log.as_deref().filter(|_| bus.name == logged) {
-            write_log(path, &traffic)?;
+        if let Some(log) = log.filter(|_| bus.name == logged) {
+            write_log(log, &traffic)?;
         }
     }
     let (first, last) = (maps.scans.first(), maps.scans.last());
@@ -139,7 +146,7 @@ fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>) -> Result<Repor
     })
 }
 
-fn write_log(path: &Path, traffic: &Traffic) -> Result<()> {
+fn write_log(log: &Target, traffic: &Traffic) -> Result<()> {
     let mut text = String::new();
     for sent in &traffic.sent {
         let time_ns = i64::try_from(sent.at.micros()).unwrap_or(i64::MAX / 1000) * 1000;
@@ -152,7 +159,7 @@ fn write_log(path: &Path, traffic: &Traffic) -> Result<()> {
         };
         writeln!(text, "{line}").context("a line of the log")?;
     }
-    write_file(path, &text)
+    log.write(text)
 }
 
 /// Scans from one refresh to the next, as a sender does at 15 a second.

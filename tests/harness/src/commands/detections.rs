@@ -6,12 +6,13 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
 
+use super::print;
 use super::progress::bar;
 use super::replay::shipped;
-use super::{print, write_file};
 use crate::evaluation::returns::{Group, Returns};
 use crate::evaluation::samples;
 use crate::options::{Settings, SettingsArgs};
+use crate::output::OutputArgs;
 use crate::pictures;
 use crate::recording;
 use crate::report::table::table;
@@ -35,6 +36,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
     #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -48,15 +51,19 @@ const STRETCHES: [[f64; 2]; 5] = [[12.5, 25.0], [25.0, 50.0], [50.0, 100.0], [10
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    let mut outputs = args.outputs.beside(paths.iter().chain(&args.real).flat_map(|path| recording::files(path)));
+    outputs.reads(args.settings.files());
+    let picture = outputs.file("--out", args.out.as_deref())?;
+    let json = outputs.file("--json", args.json.as_deref())?;
     let all = paths.iter().chain(&args.real).map(|path| returns(path, &settings)).collect::<Result<Vec<_>>>()?;
     print(&text(&all, args.real.is_some()))?;
-    if let Some(file) = &args.out {
+    if let Some(file) = picture {
         let caption = "Lines are medians, bands quartiles, of objects with a line of sight to some part of their box.";
-        pictures::returns::draw(&all, caption).save(file)?;
+        pictures::returns::draw(&all, caption).save(&file)?;
     }
-    if let Some(file) = &args.json {
+    if let Some(file) = json {
         let real = args.real.as_ref().and_then(|_| all.last()).map(|r| &r.recording);
-        write_file(file, &(serde_json::to_string_pretty(&json!({ "recordings": all, "real": real }))? + "\n"))?;
+        file.write(serde_json::to_string_pretty(&json!({ "recordings": all, "real": real }))? + "\n")?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,14 +1,15 @@
 //! `viewshed doctor`: what is wrong with a radar's log, and what to do.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
-use super::{print, write_file};
+use super::print;
 use crate::doctor::examine;
 use crate::doctor::findings::Severity;
 use crate::options::KindArgs;
+use crate::output::{OutputArgs, Target};
 use crate::recording::{self, ReadOptions};
 
 /// Exit code for a log in which something is wrong.
@@ -34,6 +35,8 @@ pub struct Args {
     sensor_id: Option<u8>,
     #[command(flatten)]
     kind: KindArgs,
+    #[command(flatten)]
+    outputs: OutputArgs,
 }
 
 /// Examines one log.
@@ -41,23 +44,26 @@ pub struct Args {
 /// # Errors
 /// Files that cannot be read or written.
 pub fn run(args: &Args) -> Result<ExitCode> {
+    let mut outputs = args.outputs.beside(recording::files(&args.log));
+    let json = outputs.file("--json", args.json.as_deref())?;
+    let detections = outputs.file("--detections", args.detections.as_deref())?;
     let report = examine(&args.log, &args.kind)?;
     print(&report.text())?;
-    if let Some(path) = &args.json {
-        write_file(path, &(serde_json::to_string_pretty(&report)? + "\n"))?;
+    if let Some(file) = json {
+        file.write(serde_json::to_string_pretty(&report)? + "\n")?;
     }
-    if let Some(path) = &args.detections {
+    if let Some(file) = detections {
         let KindArgs { profile, ti_header, ti_dialect } = args.kind;
         let options = ReadOptions { sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
-        write_detections(path, &recording::read(&args.log, &options)?)?;
+        write_detections(&file, &recording::read(&args.log, &options)?)?;
     }
     let wrong = report.findings().iter().any(|f| f.severity == Severity::Error);
     Ok(if wrong { ExitCode::from(WRONG) } else { ExitCode::SUCCESS })
 }
 
 /// One row a detection; a scan without any has a row without values.
-fn write_detections(path: &Path, recording: &recording::Recording) -> Result<()> {
-    let mut csv = csv::Writer::from_path(path).with_context(|| format!("cannot write {}", path.display()))?;
+fn write_detections(target: &Target, recording: &recording::Recording) -> Result<()> {
+    let mut csv = csv::Writer::from_writer(target.create()?);
     csv.write_record([
         "scan",
         "time_s",
@@ -87,5 +93,6 @@ fn write_detections(path: &Path, recording: &recording::Recording) -> Result<()>
             ])?;
         }
     }
-    csv.flush().with_context(|| format!("cannot write {}", path.display()))
+    let file = csv.into_inner().map_err(|e| e.into_error());
+    file.with_context(|| format!("cannot write {}", target.path().display()))?.finish()
 }

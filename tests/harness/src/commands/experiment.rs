@@ -1,18 +1,20 @@
 //! `viewshed experiment`: the paper's experiment on the digital twin, the paper's table out.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use serde_json::json;
 
+use super::print;
 use super::progress::bar;
 use super::replay::shipped;
-use super::{print, write_file};
 use crate::evaluation::replay::{Replay, steps};
 use crate::experiment::plan::{Day, Plan};
 use crate::experiment::{Experiment, total_steps};
 use crate::options::JudgingArgs;
+use crate::output::{OutputArgs, Outputs, Target};
 use crate::report::{experiment as report, json as replay_json};
 use crate::{estimators, recording};
 
@@ -40,6 +42,8 @@ pub struct Args {
     #[arg(long, value_name = "RECORDING", help_heading = "Results")]
     beside: Vec<PathBuf>,
     #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
     judging: JudgingArgs,
 }
 
@@ -54,14 +58,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         None => shipped::file("experiment.toml")?,
     };
     let plan = Plan::read(&path)?;
-    if let Some(folder) = &args.keep {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
-    }
-    let keep = |day: &Day, bytes: &[u8]| {
-        let Some(folder) = &args.keep else { return Ok(()) };
-        let file = folder.join(format!("{}.mcap", day.name()));
-        std::fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))
-    };
+    let mut outputs = args.outputs.beside(args.beside.iter().flat_map(|path| recording::files(path)));
+    outputs.reads(args.judging.files().chain([path.clone()]).chain(plan.files()?));
+    let json_file = outputs.file("--json", args.json.as_deref())?;
+    let kept = args.keep.as_deref().map(|folder| kept(folder, &plan, &mut outputs)).transpose()?.unwrap_or_default();
+    let keep = |day: &Day, bytes: &[u8]| kept.get(&day.name()).map_or(Ok(()), |file| file.write(bytes));
     let running = bar("simulating and replaying", total_steps(&plan, ESTIMATORS)?);
     let experiment = Experiment::run(&plan, &settings, &keep, &|| running.step())?;
     drop(running);
@@ -77,11 +78,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         print(&format!("\n{}", report::beside(&replay)))?;
         beside.push(replay_json::report(&replay, None, &[], options));
     }
-    if let Some(file) = &args.json {
+    if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
-        write_file(file, &report::json(&experiment, &beside, &plan, options)?)?;
+        file.write(report::json(&experiment, &beside, &plan, options)?)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The recording of each reporting day. They are worth more than pictures: what exists needs `--force`.
+fn kept(folder: &Path, plan: &Plan, outputs: &mut Outputs) -> Result<BTreeMap<String, Target>> {
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let days = plan.reporting.iter().map(Day::name);
+    let file = |day: String| {
+        let path = folder.join(format!("{day}.mcap"));
+        Ok(outputs.file("--keep", Some(&path))?.map(|target| (day, target)))
+    };
+    Ok(days.map(file).collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
 fn replay(path: &Path, settings: &crate::options::Settings) -> Result<Replay> {

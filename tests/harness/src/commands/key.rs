@@ -21,6 +21,11 @@ pub struct KeyArgs {
 }
 
 impl KeyArgs {
+    /// The file the key is read from.
+    pub fn file(&self) -> Option<PathBuf> {
+        self.key_file.clone()
+    }
+
     /// The key, if one is given.
     ///
     /// # Errors

@@ -1,15 +1,16 @@
 //! `viewshed listen`: a log of a bus in, the maps on it out.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use viewshed::wire::message::Addresses;
 
 use super::key::KeyArgs;
-use super::{print, write_file};
+use super::print;
 use crate::bus::listening::{Heard, Listening, Moment, SENSORS, shown};
+use crate::output::{Folder, OutputArgs, Target};
 use crate::pictures::polar::{self, PolarGrid};
 use crate::recording::candump::Line;
 use crate::recording::serial_log::Chunk;
@@ -36,6 +37,8 @@ pub struct Args {
     #[arg(long)]
     extended: bool,
     #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
     key: KeyArgs,
 }
 
@@ -48,9 +51,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("--every {} is not above 0", args.every);
     }
     let text = std::fs::read_to_string(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
-    if let Some(dir) = &args.out {
-        std::fs::create_dir_all(dir).with_context(|| format!("cannot make the folder {}", dir.display()))?;
-    }
+    let mut outputs = args.outputs.beside([args.log.clone()].into_iter().chain(args.key.file()));
+    let json = outputs.file("--json", args.json.as_deref())?;
+    let pictures = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     let addresses = if args.extended { Addresses::EXTENDED } else { Addresses::STANDARD };
     let key = args.key.key()?;
     let mut listening = Listening::new(addresses, key.as_ref());
@@ -72,7 +75,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         };
         let due = *next.get_or_insert(time_ns + every_ns);
         if time_ns >= due {
-            look(&listening, &mut maps, args.out.as_deref())?;
+            look(&listening, &mut maps, pictures.as_ref())?;
             next = Some(due + (time_ns - due) / every_ns * every_ns + every_ns);
         }
         match &logged {
@@ -80,7 +83,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             Logged::Chunk(chunk) => listening.take_bytes(chunk),
         }
     }
-    look(&listening, &mut maps, args.out.as_deref())?;
+    look(&listening, &mut maps, pictures.as_ref())?;
     let sensors: Vec<Heard> = listening
         .sensors()
         .into_iter()
@@ -99,14 +102,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     print(&report(&sensors, &listening, unread))?;
-    if let Some(path) = &args.json {
+    if let Some(file) = json {
         let report = serde_json::json!({
             "frames": listening.frames(),
             "foreign": listening.foreign(),
             "lines_not_read": unread,
             "sensors": sensors,
         });
-        write_file(path, &(serde_json::to_string_pretty(&report).context("the report as JSON")? + "\n"))?;
+        file.write(serde_json::to_string_pretty(&report).context("the report as JSON")? + "\n")?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -118,19 +121,19 @@ enum Logged {
 }
 
 /// Counts, and draws, every sensor's map as it is now.
-fn look(listening: &Listening, maps: &mut [Vec<Moment>], out: Option<&Path>) -> Result<()> {
+fn look(listening: &Listening, maps: &mut [Vec<Moment>], out: Option<&Folder>) -> Result<()> {
     for sensor in listening.sensors() {
         let Some(moment) = listening.moment(sensor) else { continue };
-        if let Some(dir) = out {
+        if let Some(folder) = out {
             let name = format!("sensor-{sensor}-{:04}.png", maps[usize::from(sensor)].len());
-            draw(listening, sensor, moment.time_s, &dir.join(name))?;
+            draw(listening, sensor, moment.time_s, &folder.file(name)?)?;
         }
         maps[usize::from(sensor)].push(moment);
     }
     Ok(())
 }
 
-fn draw(listening: &Listening, sensor: u8, time_s: f64, path: &Path) -> Result<()> {
+fn draw(listening: &Listening, sensor: u8, time_s: f64, target: &Target) -> Result<()> {
     let map = listening.map(sensor);
     let Some(header) = map.header() else { return Ok(()) };
     let right = f64::from(header.azimuth_origin.radians());
@@ -144,7 +147,7 @@ fn draw(listening: &Listening, sensor: u8, time_s: f64, path: &Path) -> Result<(
         title: format!("sensor {sensor} as received, {time_s:.3} s"),
         caption: None,
     };
-    polar::draw(&grid).save(path)
+    polar::draw(&grid).save(target)
 }
 
 fn report(sensors: &[Heard], listening: &Listening, unread: usize) -> String {

@@ -1,16 +1,15 @@
 //! `viewshed simulate`: a scene and traffic in, a recording by contract out.
 
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use serde_json::json;
 
+use super::print;
 use super::progress::bar;
-use super::{print, write_file};
+use crate::output::{OutputArgs, Target};
 use crate::twin::scene::Scene;
 use crate::twin::simulate::{Made, Simulation};
 
@@ -40,6 +39,8 @@ pub struct Args {
     /// Write as JSON what was made: frames, detections, vehicles in view, seconds it took, the scene
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: OutputArgs,
 }
 
 const HELP: &str = "\
@@ -93,10 +94,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         scene.duration_s = duration_s;
         scene.check().context("--duration")?;
     }
+    let mut outputs = args.outputs.beside(scene.files(args.fcd.as_deref())?.into_iter().chain([args.scene.clone()]));
+    let recording = outputs.file("--out", Some(&args.out))?.context("--out is missing")?;
+    let json_file = outputs.file("--json", args.json.as_deref())?;
     let simulation = Simulation::new(scene, args.fcd.as_deref())?;
     let started = Instant::now();
     let simulating = bar(&format!("simulating {}", simulation.scene.name), simulation.frames());
-    let made = write(&simulation, &args.out, &|| simulating.step())?;
+    let made = write(&simulation, &recording, &|| simulating.step())?;
     drop(simulating);
     let spent_s = started.elapsed().as_secs_f64();
     let duration_s = simulation.scene.duration_s;
@@ -111,7 +115,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         made.vehicles_in_view,
         made.most_vehicles_in_view
     ))?;
-    if let Some(file) = &args.json {
+    if let Some(file) = json_file {
         let all = json!({
             "recording": args.out.display().to_string(),
             "duration_s": duration_s,
@@ -119,27 +123,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             "made": made,
             "scene": simulation.scene,
         });
-        write_file(file, &(serde_json::to_string_pretty(&all)? + "\n"))?;
+        file.write(serde_json::to_string_pretty(&all)? + "\n")?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Writes beside the target first: a recording that fails half way leaves nothing that looks whole.
-fn write(simulation: &Simulation, target: &Path, progress: &(dyn Fn() + Sync)) -> Result<Made> {
-    let place = || format!("cannot write {}", target.display());
-    let mut unfinished = target.as_os_str().to_owned();
-    unfinished.push(".part");
-    let unfinished = PathBuf::from(unfinished);
-    let file = BufWriter::new(File::create(&unfinished).with_context(place)?);
-    let written = simulation.record(file, progress).and_then(|(file, made)| {
-        // errors of the last bytes would be lost when the buffer is dropped
-        file.into_inner().map_err(std::io::IntoInnerError::into_error).with_context(place)?;
-        std::fs::rename(&unfinished, target).with_context(place)?;
-        Ok(made)
-    });
-    if written.is_err() {
-        // what is left of it helps nobody; that it cannot be removed is no new error
-        let _ = std::fs::remove_file(&unfinished);
-    }
-    written
+fn write(simulation: &Simulation, target: &Target, progress: &(dyn Fn() + Sync)) -> Result<Made> {
+    let (file, made) = simulation.record(target.create()?, progress)?;
+    file.finish()?;
+    Ok(made)
 }

@@ -6,9 +6,10 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
 
+use super::print;
 use super::progress::bar;
-use super::{print, write_file};
 use crate::options::JudgingArgs;
+use crate::output::OutputArgs;
 use crate::pictures;
 use crate::report::site as report;
 use crate::site::sets::Rank;
@@ -66,6 +67,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
     #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
     judging: JudgingArgs,
 }
 
@@ -80,6 +83,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.judging.settings()?;
     ensure!(args.every >= 0.05 && args.every <= 3600.0, "--every {} is outside 0.05 to 3600 s", args.every);
     let scene = Scene::read(&args.scene)?;
+    let mut outputs = args.outputs.beside(scene.files(args.fcd.as_deref())?.into_iter().chain([args.scene.clone()]));
+    outputs.reads(args.judging.files());
+    let picture = outputs.file("--out", args.out.as_deref())?;
+    let json_file = outputs.file("--json", args.json.as_deref())?;
     let base = scene.radar.mount;
     let along = args.along.clone().unwrap_or(List(vec![base.x_m]));
     let lists = [&args.height, &along, &args.lateral, &args.yaw, &args.pitch].map(|l| &l.0[..]);
@@ -90,12 +97,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     drop(trying);
     let mut ranked: Vec<_> = (1..=usize::from(args.sensors)).map(|size| site.ranked(size, args.rank)).collect();
     print(&report::text(&site, &ranked, args.top))?;
-    if let Some(file) = &args.out {
-        pictures::site::draw(&site, &ranked, &title).save(file)?;
+    if let Some(file) = picture {
+        pictures::site::draw(&site, &ranked, &title).save(&file)?;
     }
-    if let Some(file) = &args.json {
+    if let Some(file) = json_file {
         ranked.iter_mut().skip(1).for_each(|sets| sets.truncate(SETS_TOLD));
-        write_file(file, &report::json(&site, &ranked, &search, args.rank, &json!(settings.evaluation))?)?;
+        file.write(report::json(&site, &ranked, &search, args.rank, &json!(settings.evaluation))?)?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -73,6 +73,20 @@ impl Plan {
     }
 }
 
+impl Plan {
+    /// Every file that is read for the reporting days.
+    ///
+    /// # Errors
+    /// Those of the scene.
+    pub fn files(&self) -> Result<Vec<PathBuf>> {
+        let path = self.folder.join(&self.scene);
+        let scene = Scene::read(&path)?;
+        let days = self.reporting.iter().map(|day| scene.files(Some(&self.folder.join(&day.fcd))));
+        let files = days.collect::<Result<Vec<_>>>()?;
+        Ok([path].into_iter().chain(files.into_iter().flatten()).collect())
+    }
+}
+
 impl Day {
     /// `day-1` of `motorway/day-1.fcd.xml.gz`.
     pub fn name(&self) -> String {

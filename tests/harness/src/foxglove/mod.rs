@@ -8,8 +8,6 @@ pub mod grid;
 pub mod input;
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -18,6 +16,7 @@ use mcap::{Compression, WriteOptions, Writer};
 
 use crate::evaluation::score::Estimator;
 use crate::geometry::pose::SensorPose;
+use crate::output::{Target, Unfinished};
 use crate::recording::mcap::{POINTS_TOPIC, TRUTH_TOPIC};
 use crate::recording::write::{TF_TOPIC, mount_message, sensor_metadata};
 use crate::recording::{ReadOptions, Recording, Sensor};
@@ -33,7 +32,7 @@ const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
 /// Files that cannot be read or written, and a field of view too large for a grid.
 pub fn write(
     source: &Path,
-    target: &Path,
+    target: &Target,
     recording: &Recording,
     options: &ReadOptions,
     estimator: &mut dyn Estimator,
@@ -57,8 +56,7 @@ pub fn write(
         input.messages.iter().zip(&frames).filter(|(_, frame)| frame.is_some()).map(|(m, _)| m.header.log_time);
     let (first, last) = (played.clone().min().unwrap_or(0), played.max().unwrap_or(u64::MAX));
 
-    let file = File::create(target).with_context(|| format!("cannot write {}", target.display()))?;
-    let mut output = Output::new(BufWriter::new(file), &input, &recording.sensor, estimator.name())?;
+    let mut output = Output::new(target.create()?, &input, &recording.sensor, estimator.name())?;
     if options.mount.is_some() {
         let seen = input.messages.iter().zip(&frames).find(|(_, frame)| frame.is_some());
         let frame_id = seen.and_then(|(m, _)| m.ros_header()).map_or_else(|| "radar".into(), |h| h.frame_id);
@@ -79,8 +77,8 @@ pub fn write(
             progress();
         }
     }
-    output.writer.finish().with_context(|| format!("cannot write {}", target.display()))?;
-    Ok(())
+    output.writer.finish().with_context(|| format!("cannot write {}", target.path().display()))?;
+    output.writer.into_inner().finish()
 }
 
 /// Which frame each message became: frames are the readable radar messages, in their order.
@@ -98,7 +96,7 @@ fn frames_of(input: &Input, recording: &Recording, radar: impl Fn(&RawMessage) -
 
 /// The file being written.
 struct Output {
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<Unfinished>,
     /// Channels of the input by its number.
     copied: BTreeMap<u16, u16>,
     grids: u16,
@@ -107,7 +105,7 @@ struct Output {
 
 impl Output {
     /// The sensor as it was used goes along, so that the copy can be replayed too.
-    fn new(sink: BufWriter<File>, input: &Input, sensor: &Sensor, estimator: &str) -> Result<Self> {
+    fn new(sink: Unfinished, input: &Input, sensor: &Sensor, estimator: &str) -> Result<Self> {
         let mut writer = WriteOptions::new().compression(Some(Compression::Zstd)).create(sink)?;
         writer.write_metadata(&sensor_metadata(sensor))?;
         let mut copied = BTreeMap::new();

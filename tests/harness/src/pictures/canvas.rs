@@ -1,11 +1,11 @@
 //! What every picture is drawn with: anti-aliased lines, polygons and discs on white, PNG out.
 
-use std::path::Path;
-
 use anyhow::{Context, Result};
 use tiny_skia::{
     Color, ColorU8, FillRule, LineCap, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform,
 };
+
+use crate::output::Target;
 
 /// A place on the picture, pixels, x to the right, y **down**.
 pub type Pixel = [f32; 2];
@@ -224,8 +224,8 @@ impl Canvas {
 
     /// # Errors
     /// A file that cannot be written, by name.
-    pub fn save(&self, path: &Path) -> Result<()> {
-        std::fs::write(path, self.png()?).with_context(|| format!("cannot write {}", path.display()))
+    pub fn save(&self, target: &Target) -> Result<()> {
+        target.write(self.png()?)
     }
 }
 

@@ -17,7 +17,7 @@ pub mod transforms;
 pub mod write;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
@@ -132,6 +132,11 @@ pub struct ReadOptions {
     pub ti_dialect: Option<viewshed::inputs::ti::Dialect>,
     /// Time between frames of a TI capture.
     pub frame_period_s: Option<f64>,
+}
+
+/// Every file that [`read`] may read for a recording.
+pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
+    [path.to_owned()].into_iter().chain(beside::files(path))
 }
 
 /// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, a capture of a TI mmWave radar or of

@@ -77,13 +77,13 @@ impl<W: Write> SampleWriter<W> {
         Ok(())
     }
 
-    /// Writes out what is buffered; without a row there is a heading at least.
-    pub fn finish(mut self) -> Result<()> {
+    /// Writes out what is buffered and gives the sink back; without a row there is a heading at least.
+    pub fn finish(mut self) -> Result<W> {
         if self.estimators.is_none() {
             let names = std::mem::take(&mut self.unlabelled);
             self.heading(names)?;
         }
-        Ok(self.csv.flush()?)
+        Ok(self.csv.into_inner().map_err(|e| e.into_error())?)
     }
 
     fn heading(&mut self, names: Vec<String>) -> Result<()> {

@@ -1,6 +1,6 @@
 //! `viewshed replay --board`: the recordings through a controller as well, every frame compared.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail, ensure};
@@ -14,8 +14,9 @@ use crate::boards::{
     can_twin,
     live_check::{self, Live},
 };
-use crate::commands::{complain, print, write_file};
+use crate::commands::{complain, print};
 use crate::options::Settings;
+use crate::output::{Folder, Target};
 #[cfg(unix)]
 use crate::recording::candump;
 use crate::{estimators, recording};
@@ -59,8 +60,8 @@ pub struct BoardArgs {
 pub fn run(
     args: &BoardArgs,
     paths: &[PathBuf],
-    out: Option<&Path>,
-    json: Option<&Path>,
+    out: &Folder,
+    json: Option<&Target>,
     settings: &Settings,
 ) -> Result<ExitCode> {
     let board = match (args.board, &args.port) {
@@ -83,8 +84,8 @@ pub fn run(
         }
     }
     print(&table(&rows))?;
-    if let Some(path) = json {
-        write_file(path, &serde_json::to_string_pretty(&rows)?)?;
+    if let Some(file) = json {
+        file.write(serde_json::to_string_pretty(&rows)?)?;
     }
     Ok(if differ { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
@@ -94,8 +95,8 @@ pub fn run(
 fn live(
     args: &BoardArgs,
     paths: &[PathBuf],
-    out: Option<&Path>,
-    json: Option<&Path>,
+    out: &Folder,
+    json: Option<&Target>,
     settings: &Settings,
 ) -> Result<ExitCode> {
     let mut all = Vec::new();
@@ -131,15 +132,15 @@ fn live(
         }
         if let Some(what) = &live.first_difference {
             let title = format!("{name}, live on {board}");
-            let folder = out.unwrap_or(Path::new("out")).join("live");
+            let folder = out.folder("live");
             let files = live.difference.as_ref().map(|d| d.draw(&folder, &title)).transpose()?.unwrap_or_default();
             let files: Vec<String> = files.iter().map(|f| format!("\n  {}", f.display())).collect();
             complain(&anyhow::anyhow!("{title}: {what}{}", files.concat()));
         }
         all.push(live);
     }
-    if let Some(path) = json {
-        write_file(path, &serde_json::to_string_pretty(&all)?)?;
+    if let Some(file) = json {
+        file.write(serde_json::to_string_pretty(&all)?)?;
     }
     let same = all.iter().all(|live| live.first_difference.is_none());
     Ok(if same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -150,12 +151,12 @@ fn live(_: &BoardArgs, _: &[PathBuf], _: Option<&Path>, _: Option<&Path>, _: &Se
     bail!("live programs can be run on Unix only")
 }
 
-fn one(run: &Run<'_>, out: Option<&Path>, differ: &mut bool) -> Result<Row> {
+fn one(run: &Run<'_>, out: &Folder, differ: &mut bool) -> Result<Row> {
     let checked = run.check()?;
     if let Some(difference) = &checked.difference {
         *differ = true;
         let title = format!("{} on {}, {} grid", run.name, run.board.name(), run.profile.name());
-        let folder = out.unwrap_or(Path::new("out")).join(run.board.name());
+        let folder = out.folder(run.board.name());
         let files = difference.draw(&folder, &title)?;
         let files: Vec<String> = files.iter().map(|f| f.display().to_string()).collect();
         complain(&anyhow::anyhow!("{title}: {}\n  {}", difference.text(), files.join("\n  ")));

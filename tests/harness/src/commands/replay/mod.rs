@@ -5,18 +5,18 @@ mod out;
 mod pictures;
 pub mod shipped;
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 
 use super::progress::bar;
-use super::{BAD_INPUT, complain, print, write_file};
+use super::{BAD_INPUT, complain, print};
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, steps};
 use crate::options::{Settings, SettingsArgs};
+use crate::output::{OutputArgs, Target};
 use crate::report::csv::SampleWriter;
 use crate::report::json::{self, Report};
 use crate::report::{ORIGIN, table};
@@ -77,6 +77,8 @@ pub struct Args {
     #[command(flatten)]
     processor: board::BoardArgs,
     #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -87,18 +89,24 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
+    outputs.reads(args.settings.files());
+    let json_file = outputs.file("--json", args.json.as_deref())?;
+    let out = outputs.folder("--out", args.out.as_deref().unwrap_or(Path::new("out")))?;
     if args.processor.board.is_some() || args.processor.port.is_some() {
-        return board::run(&args.processor, &paths, args.out.as_deref(), args.json.as_deref(), &settings);
+        return board::run(&args.processor, &paths, &out, json_file.as_ref(), &settings);
     }
     if args.mcap.is_some() && paths.len() > 1 {
         bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());
     }
-    let folders = args.out.as_deref().map(|dir| out::folders(dir, &paths)).transpose()?;
-    let mut samples = args.csv.as_deref().map(create).transpose()?.map(SampleWriter::new);
+    let mcap = outputs.file("--mcap", args.mcap.as_deref())?;
+    let csv = outputs.file("--csv", args.csv.as_deref())?;
+    let folders = args.out.as_ref().map(|_| out::folders(&out, &paths)).transpose()?;
+    let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
     let mut failed = false;
     for (k, path) in paths.iter().enumerate() {
-        let one = match replay(path, args, &settings) {
+        let one = match replay(path, args, mcap.as_ref(), &settings) {
             Ok(one) => one,
             Err(error) => {
                 complain(&error);
@@ -116,15 +124,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         reports.push(one.report(&settings));
     }
-    if let Some(csv) = samples {
-        csv.finish()?;
+    if let Some(csv) = samples.filter(|_| !reports.is_empty()) {
+        csv.finish()?.finish()?;
     }
-    if let Some(path) = &args.json {
+    if let Some(file) = json_file {
         // the number asked for decides the form, not the number that could be read
         match (&paths[..], &reports[..]) {
             ([_], []) => {}
-            ([_], [report, ..]) => write_file(path, &json::object(report)?)?,
-            (_, several) => write_file(path, &json::array(several)?)?,
+            ([_], [report, ..]) => file.write(json::object(report)?)?,
+            (_, several) => file.write(json::array(several)?)?,
         }
     }
     if !reports.is_empty() {
@@ -140,7 +148,7 @@ struct Replayed {
     mount_error: Option<Vec<Sensitivity>>,
 }
 
-fn replay(path: &Path, args: &Args, settings: &Settings) -> Result<Replayed> {
+fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) -> Result<Replayed> {
     let recording = recording::read(path, &settings.reading).map_err(|error| named(error, path))?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
@@ -148,7 +156,7 @@ fn replay(path: &Path, args: &Args, settings: &Settings) -> Result<Replayed> {
     let replay = Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step());
     drop(replaying);
 
-    if let Some(target) = &args.mcap {
+    if let Some(target) = mcap {
         write_mcap(path, target, &args.mcap_estimator, &replay, settings)?;
     }
     let wrong = |extent: Extent| {
@@ -169,14 +177,14 @@ fn named(error: anyhow::Error, path: &Path) -> anyhow::Error {
     if format!("{error:#}").contains(&*stem) { error } else { error.context(path.display().to_string()) }
 }
 
-fn write_mcap(source: &Path, target: &Path, estimator: &str, replay: &Replay, settings: &Settings) -> Result<()> {
+fn write_mcap(source: &Path, target: &Target, estimator: &str, replay: &Replay, settings: &Settings) -> Result<()> {
     let recording = &replay.recording;
     let mut all = estimators::all(recording, &settings.estimators)?;
     let names: Vec<String> = all.iter().map(|e| e.name().to_owned()).collect();
     let Some(estimator) = all.iter_mut().find(|e| e.name() == estimator) else {
         bail!("--mcap-estimator: no estimator `{estimator}`; there are {}", names.join(", "));
     };
-    let writing = bar(&format!("writing {}", target.display()), recording.frames.len() as u64);
+    let writing = bar(&format!("writing {}", target.path().display()), recording.frames.len() as u64);
     foxglove::write(source, target, recording, &settings.reading, estimator.as_mut(), &|| writing.step())
 }
 
@@ -200,10 +208,6 @@ impl Replayed {
         };
         json::report(&self.replay, self.mount_error.as_deref(), &self.examples, options)
     }
-}
-
-fn create(path: &Path) -> Result<File> {
-    File::create(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn extent(text: &str) -> Result<Extent, String> {

@@ -1,7 +1,5 @@
 //! The pictures of one replay: a frame from above, found examples, the polar grid, the trade-offs.
 
-use std::path::Path;
-
 use anyhow::Result;
 
 use crate::commands::progress::bar;
@@ -14,6 +12,7 @@ use crate::evaluation::score::{Estimator, Score};
 use crate::evaluation::summary::Row;
 use crate::geometry::solid::Solid;
 use crate::options::Settings;
+use crate::output::Folder;
 use crate::pictures::birdseye::{self, Scene, TruthBox, Window};
 use crate::pictures::closeup::Highlight;
 use crate::pictures::polar::{self, PolarGrid};
@@ -24,7 +23,7 @@ use crate::pictures::{canvas::Canvas, palette};
 const ALSO_DRAWN: [&str; 2] = ["radar-2d", "reference"];
 
 /// Draws everything into a folder.
-pub fn write(folder: &Path, replay: &Replay, shown: &str, examples: &[Example], settings: &Settings) -> Result<()> {
+pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example], settings: &Settings) -> Result<()> {
     let drawing = bar("drawing pictures", 1);
     let chosen = chosen_frame(replay, examples);
     let mut all = estimators::all(&replay.recording, &settings.estimators)?;
@@ -54,8 +53,8 @@ pub fn write(folder: &Path, replay: &Replay, shown: &str, examples: &[Example], 
     Ok(())
 }
 
-fn save(canvas: Option<Canvas>, folder: &Path, name: &str) -> Result<()> {
-    canvas.map_or(Ok(()), |c| c.save(&folder.join(format!("{name}.png"))))
+fn save(canvas: Option<Canvas>, folder: &Folder, name: &str) -> Result<()> {
+    canvas.map_or(Ok(()), |c| c.save(&folder.file(format!("{name}.png"))?))
 }
 
 /// The frame of the true invisible example, which has something to show; else the middle one.
@@ -65,7 +64,7 @@ fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
 }
 
 fn shown_frame(
-    folder: &Path,
+    folder: &Folder,
     replay: &Replay,
     examples: &[Example],
     estimator: &dyn Estimator,
