@@ -105,8 +105,8 @@ struct ReadingArgs {
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct KindArgs {
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
-    #[arg(long = "radar", value_name = "NAME", value_parser = profile)]
-    pub profile: Option<&'static Profile>,
+    #[arg(long, value_name = "NAME", value_parser = profile)]
+    pub radar: Option<&'static Profile>,
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
     pub ti_header: Option<Family>,
@@ -226,7 +226,7 @@ impl ReadingArgs {
             from_s: self.from,
             to_s: self.to,
             sensor_id: self.sensor_id,
-            profile: self.kind.profile,
+            profile: self.kind.radar,
             ti_header: self.kind.ti_header,
             ti_dialect: self.kind.ti_dialect,
             frame_period_s: self.frame_period,

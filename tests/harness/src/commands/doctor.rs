@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         file.write(serde_json::to_string_pretty(&report)? + "\n")?;
     }
     if let Some(file) = detections {
-        let KindArgs { profile, ti_header, ti_dialect } = args.kind;
+        let KindArgs { radar: profile, ti_header, ti_dialect } = args.kind;
         let options = ReadOptions { sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
         write_detections(&file, &recording::read(&args.log, &options)?)?;
     }

@@ -73,3 +73,37 @@ pub fn print(text: &str) -> Result<()> {
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+    use clap::error::ErrorKind;
+
+    use super::*;
+
+    #[test]
+    fn no_command_has_options_that_contradict_each_other() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_explains_itself() {
+        let commands: Vec<String> = Cli::command().get_subcommands().map(|c| c.get_name().to_owned()).collect();
+        assert!(commands.len() >= 8, "{commands:?}");
+        for command in &commands {
+            for help in ["-h", "--help"] {
+                let error = Cli::try_parse_from(["viewshed", command, help]).unwrap_err();
+                assert_eq!(error.kind(), ErrorKind::DisplayHelp, "{command}: {error}");
+                assert!(error.to_string().contains(&format!("Usage: viewshed {command}")), "{error}");
+            }
+        }
+    }
+
+    /// Without debug assertions in clap the two tests above could not fail: the workspace's profiles turn them on.
+    #[test]
+    #[should_panic = "Long option names must be unique"]
+    fn two_options_of_one_name_would_be_found() {
+        let option = |id: &'static str| clap::Arg::new(id).long("profile");
+        clap::Command::new("twice").args([option("grid"), option("radar")]).debug_assert();
+    }
+}

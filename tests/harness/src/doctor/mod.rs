@@ -93,7 +93,7 @@ pub fn examine(path: &Path, known: &KindArgs) -> Result<Examined> {
 fn can(log: String, bytes: &[u8], known: &KindArgs) -> Examined {
     let mut problems = Problems::default();
     let lines = lines(bytes, &mut problems);
-    let sensors = sensor::all(&lines, known.profile.unwrap_or(&ARS408));
+    let sensors = sensor::all(&lines, known.radar.unwrap_or(&ARS408));
     let native = recording::native::of_log(&lines);
     if sensors.is_empty() && !native.is_empty() {
         return Examined::Native(native::examine(log, &native, 0));

@@ -4,6 +4,7 @@ mod bad_input;
 mod can_log;
 mod foxglove;
 mod native_capture;
+mod outputs;
 mod python;
 mod radar_scan;
 mod replay;

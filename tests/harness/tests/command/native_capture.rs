@@ -64,7 +64,7 @@ fn log() -> String {
 }
 
 fn doctor(folder: &std::path::Path, name: &str) -> (i32, Value) {
-    let arguments = ["doctor", name, "--json", "d.json"];
+    let arguments = ["doctor", name, "--json", "d.json", "--force"];
     let output = Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(folder).args(arguments).output().unwrap();
     (output.status.code().unwrap(), json(&folder.join("d.json")))
 }

@@ -31,7 +31,7 @@ pub struct BoardArgs {
     /// in all and by stage, and the stack used. No rates are reported then.
     #[arg(long, value_name = "BOARD", value_enum)]
     pub board: Option<Board>,
-    /// Grid to run; both if not given
+    /// Grid of the board; both if not given
     #[arg(long, value_name = "PROFILE", value_enum)]
     profile: Option<Profile>,
     /// Run the board's live program: scans over its serial line or clusters over its CAN bus, maps back

@@ -1,0 +1,4 @@
+//! The shape of the library: folders that use one another in one direction, and a face that stays small.
+
+mod circles;
+mod public_names;
