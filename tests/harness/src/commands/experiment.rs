@@ -85,10 +85,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The recording of each reporting day. They are worth more than pictures: what exists needs `--force`.
+/// The recording of each day. They are worth more than pictures: what exists needs `--force`.
 fn kept(folder: &Path, plan: &Plan, outputs: &mut Outputs) -> Result<BTreeMap<String, Target>> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    let days = plan.reporting.iter().map(Day::name);
+    let days = plan.days().map(Day::name);
     let file = |day: String| {
         let path = folder.join(format!("{day}.mcap"));
         Ok(outputs.file("--keep", Some(&path))?.map(|target| (day, target)))

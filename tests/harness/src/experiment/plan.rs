@@ -74,14 +74,19 @@ impl Plan {
 }
 
 impl Plan {
-    /// Every file that is read for the reporting days.
+    /// The training day and the reporting days.
+    pub fn days(&self) -> impl Iterator<Item = &Day> {
+        [&self.training].into_iter().chain(&self.reporting)
+    }
+
+    /// Every file that is read for its days, beside its own.
     ///
     /// # Errors
     /// Those of the scene.
     pub fn files(&self) -> Result<Vec<PathBuf>> {
         let path = self.folder.join(&self.scene);
         let scene = Scene::read(&path)?;
-        let days = self.reporting.iter().map(|day| scene.files(Some(&self.folder.join(&day.fcd))));
+        let days = self.days().map(|day| scene.files(Some(&self.folder.join(&day.fcd))));
         let files = days.collect::<Result<Vec<_>>>()?;
         Ok([path].into_iter().chain(files.into_iter().flatten()).collect())
     }

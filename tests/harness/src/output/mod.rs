@@ -57,7 +57,7 @@ impl Outputs {
         if !is_stream(path) {
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
             if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-                bail!("{option} {}: there is no folder {}", path.display(), folder.display());
+                bail!("{option}: cannot write {}: there is no folder {}", path.display(), folder.display());
             }
             if let Some((other, _)) = self.named.iter().find(|(_, named)| is_one_file(named, path)) {
                 bail!("{option} {}: {other} writes this file too; name another", path.display());

@@ -6,15 +6,22 @@ use std::process::{Command, Output};
 use crate::scene::{Scene, folder, replay, stderr};
 
 const RECORDING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
+const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.toml");
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/ars408-made-up.log");
-const PLAN: &str = "scene = \"s.toml\"\nduration_s = 2.0\n[training]\nfcd = \"0.xml\"\nseed = 1\n\
+const PLAN: &str = "scene = \"s.toml\"\nduration_s = 2.0\n[training]\nfcd = \"u.xml\"\nseed = 1\n\
                     [[reporting]]\nfcd = \"t.xml\"\nseed = 2\n";
 const SCENE: &str = "name = \"s\"\nduration_s = 2.0\n[traffic]\nfcd = \"t.xml\"\n[radar]\nname = \"r\"\nrate_hz = 15.0\n\
                      mount = { height_m = 6.0 }\nfield_of_view = { azimuth_deg = [-60.0, 60.0], \
                      elevation_deg = [-16.0, 16.0], range_m = [3.0, 200.0] }\n";
-const TRAFFIC: &str = "<fcd-export><timestep time=\"0\"><vehicle id=\"a\" x=\"60\" y=\"0\" angle=\"90\" type=\"car\"/>\
-                       </timestep><timestep time=\"9\"><vehicle id=\"a\" x=\"90\" y=\"0\" angle=\"90\" \
-                       type=\"car\"/></timestep></fcd-export>";
+
+/// A car on its way.
+fn traffic() -> String {
+    let step = |k: u32| {
+        let (time, x) = (0.5 * f64::from(k), 60 + 10 * k);
+        format!("<timestep time=\"{time}\"><vehicle id=\"a\" x=\"{x}\" y=\"0\" angle=\"90\" type=\"car\"/></timestep>")
+    };
+    format!("<fcd-export>{}</fcd-export>", (0..8).map(step).collect::<String>())
+}
 
 fn viewshed(folder: &Path, arguments: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
@@ -27,9 +34,14 @@ fn prepared(test: &str) -> std::path::PathBuf {
     Scene::default().save(&folder, "a");
     std::fs::copy(LOG, folder.join("a.log")).unwrap();
     let key = "000102030405060708090a0b0c0d0e0f";
-    for (name, text) in
-        [("s.toml", SCENE), ("t.xml", TRAFFIC), ("p.toml", PLAN), ("key", key), ("c.toml", "[evaluation]\n")]
-    {
+    for (name, text) in [
+        ("s.toml", SCENE),
+        ("t.xml", &traffic()),
+        ("u.xml", &traffic()),
+        ("p.toml", PLAN),
+        ("key", key),
+        ("c.toml", "[evaluation]\n"),
+    ] {
         std::fs::write(folder.join(name), text).unwrap();
     }
     std::fs::write(folder.join("a.labels.csv"), "time_s,object_id,class,x_m,y_m\n").unwrap();
@@ -216,13 +228,13 @@ fn ctrl_c_leaves_nothing_half_written() {
 
     let folder = prepared("ctrl_c");
     let all = names(&folder);
-    ended(&folder, "simulate s.toml --duration 3000 --out r.mcap", Signal::INT);
+    ended(&folder, &format!("simulate {SIMULATED} --out r.mcap"), Signal::INT);
     assert_eq!(names(&folder), all);
     ended(&folder, &format!("replay {RECORDING} --csv r.csv --json r.json"), Signal::TERM);
     assert_eq!(names(&folder), all);
     // and what was there before is there still
     std::fs::write(folder.join("r.mcap"), "before").unwrap();
-    ended(&folder, "simulate s.toml --duration 3000 --out r.mcap --force", Signal::TERM);
+    ended(&folder, &format!("simulate {SIMULATED} --out r.mcap --force"), Signal::TERM);
     assert_eq!(std::fs::read(folder.join("r.mcap")).unwrap(), b"before");
     assert_eq!(names(&folder).len(), all.len() + 1);
 }

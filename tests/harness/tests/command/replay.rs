@@ -153,7 +153,7 @@ fn labelled_and_unlabelled_recordings_share_one_csv_in_any_order() {
     Scene::default().save(&folder, "with");
     Scene { labelled: false, ..Scene::default() }.save(&folder, "without");
     for order in [["with.mcap", "without.mcap"], ["without.mcap", "with.mcap"]] {
-        let output = replay(&folder, &[&order[..], &["--csv", "r.csv"]].concat());
+        let output = replay(&folder, &[&order[..], &["--csv", "r.csv", "--force"]].concat());
         assert!(output.status.success(), "{}", stderr(&output));
         let csv = std::fs::read_to_string(folder.join("r.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + 3 * COUNTED);

@@ -92,16 +92,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
     outputs.reads(args.settings.files());
     let json_file = outputs.file("--json", args.json.as_deref())?;
-    let out = outputs.folder("--out", args.out.as_deref().unwrap_or(Path::new("out")))?;
+    let out = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     if args.processor.board.is_some() || args.processor.port.is_some() {
-        return board::run(&args.processor, &paths, &out, json_file.as_ref(), &settings);
+        let pictures = out.map_or_else(|| outputs.folder("--out", Path::new("out")), Ok)?;
+        return board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings);
     }
     if args.mcap.is_some() && paths.len() > 1 {
         bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());
     }
     let mcap = outputs.file("--mcap", args.mcap.as_deref())?;
     let csv = outputs.file("--csv", args.csv.as_deref())?;
-    let folders = args.out.as_ref().map(|_| out::folders(&out, &paths)).transpose()?;
+    let folders = out.map(|out| out::folders(&out, &paths)).transpose()?;
     let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
     let mut failed = false;
