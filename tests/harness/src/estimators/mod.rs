@@ -122,6 +122,7 @@ fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCel
 }
 
 /// Why a point is no detection, as reports say it.
+pub const DROPPED: &str = "dropped when read";
 pub const NOT_FINITE: &str = "not finite";
 pub const NO_RANGE: &str = "range not measurable";
 pub const ABSURD: &str = "absurd";
@@ -130,6 +131,7 @@ pub const ABSURD: &str = "absurd";
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
     detections: Vec<Detection>,
+    dropped: u64,
     not_finite: u64,
     range: u64,
     absurd: u64,
@@ -138,7 +140,8 @@ pub(crate) struct Intake {
 impl Intake {
     pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection], FrameStatus) {
         self.detections.clear();
-        let mut refused = 0_u16;
+        let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
+        self.dropped += frame.refused;
         for d in &frame.detections {
             let measurement = Measurement {
                 range_m: d.range_m,
@@ -170,7 +173,8 @@ impl Intake {
         // those that are no detections are told apart here
         let gate = Rejection::ALL.into_iter().filter(|r| *r != Rejection::Refused);
         let gate = gate.map(|r| (r.name(), u64::from(rejections.count(r))));
-        let intake = [(NOT_FINITE, self.not_finite), (NO_RANGE, self.range), (ABSURD, self.absurd)];
+        let absurd = (ABSURD, self.absurd);
+        let intake = [(DROPPED, self.dropped), (NOT_FINITE, self.not_finite), (NO_RANGE, self.range), absurd];
         gate.chain(intake).filter(|(_, n)| *n > 0).collect()
     }
 }

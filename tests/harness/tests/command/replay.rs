@@ -218,21 +218,16 @@ fn spoilt(name: &str, change: impl Fn(&mut RadarDetection)) -> (Vec<String>, Str
 
 #[test]
 fn points_that_are_all_rejected_are_a_problem_with_a_hint_and_no_free_road() {
-    let all = 4 * FRAMES;
+    let rejected = |why: &str| format!("{0} of {0} points rejected (most: {why}", 4 * FRAMES);
     let (problems, text) = spoilt("spoilt_nan", |d| d.azimuth_rad = f32::NAN);
-    assert_eq!(
-        problems,
-        [format!("{all} of {all} points rejected, most of them as not finite: does the sensor send NaN?")]
-    );
-    assert!(text.contains(&problems[0]) && !text.contains("Problems of the input: none"), "{text}");
-    let (problems, _) = spoilt("spoilt_degrees", |d| {
+    let expected = rejected("dropped when read): does the sensor send NaN?");
+    assert!(problems.contains(&expected) && text.contains(&expected), "{problems:?}");
+    let (problems, text) = spoilt("spoilt_degrees", |d| {
         d.azimuth_rad = d.azimuth_rad.to_degrees() + 4.0;
         d.elevation_rad = d.elevation_rad.map(f32::to_degrees);
     });
-    assert_eq!(problems, [format!("{all} of {all} points rejected, most of them as absurd: angles in degrees?")]);
+    assert_eq!(problems, [rejected("absurd): angles in degrees?")]);
+    assert!(!text.contains("Problems of the input: none"), "{text}");
     let (problems, _) = spoilt("spoilt_outside", |d| d.azimuth_rad = 1.5);
-    assert!(
-        problems[0].ends_with("most of them as azimuth: angles in degrees, or a wrong field of view?"),
-        "{problems:?}"
-    );
+    assert_eq!(problems, [rejected("azimuth): angles in degrees, or a wrong field of view?")]);
 }
