@@ -115,6 +115,33 @@ mod tests {
     }
 
     #[test]
+    fn the_last_cell_counts_where_the_box_reaches_its_middle() {
+        // cells of 3 m, and a box that begins at 25 m
+        for (length_cm, last) in [(800, 10), (940, 11)] {
+            let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+            let view = FieldOfView {
+                azimuth_min_deg: -3.0,
+                azimuth_max_deg: 3.0,
+                elevation_min_deg: -30.0,
+                elevation_max_deg: 30.0,
+                range_min_m: 1.0,
+                range_max_m: 60.0,
+            };
+            let axes = Axes::<20, 4, 4>::new(&mount.levelling().unwrap(), &view, 1.0).unwrap();
+            let mut grid = SphericalGrid::<20, 4, 4>::new();
+            let (half_length_cm, half_width_cm) = (length_cm / 2, 900);
+            let (x_cm, heading) = (2500 + half_length_cm, Direction::AHEAD);
+            voxelise(
+                &Solid { x_cm, y_cm: 0, heading, half_length_cm, half_width_cm, height_cm: 200 },
+                &axes,
+                &mut grid,
+            );
+            let cells: Vec<usize> = grid.column_mut(2).unwrap().stacks().map(|(r, _)| r).collect();
+            assert_eq!(cells, (8..=last).collect::<Vec<_>>(), "ends at {} cm", 2500 + length_cm);
+        }
+    }
+
+    #[test]
     fn a_box_beside_the_sensor_fills_the_columns_its_rays_cross() {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
         let view = FieldOfView {

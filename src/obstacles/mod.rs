@@ -406,6 +406,17 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_starts_half_as_many_as_there_is_room_for() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        let seen = [-900, -300, 300, 900].map(|y| reflection(5000, y, 2000));
+        let _: Claimed<4> = all.step(&seen, Step::from_micros(0), &t, |_, _| true);
+        assert_eq!(all.iter().count(), 2);
+        let _: Claimed<4> = all.step(&seen, Step::from_micros(1), &t, |_, _| true);
+        assert_eq!(all.iter().count(), 4);
+    }
+
+    #[test]
     fn only_confirmed_movers_become_boxes() {
         let t = tracking();
         let mut all = Obstacles::<4>::new();

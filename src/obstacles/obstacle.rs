@@ -561,6 +561,16 @@ mod tests {
     }
 
     #[test]
+    fn a_newborn_stretches_to_what_is_found_before_and_behind_it() {
+        let mut o = Obstacle::new(&reflection(5000, 0, 2000), AHEAD, 2000);
+        o.reach(&reflection(4600, 0, 2000));
+        assert_eq!(o.extent, Extent { rear_cm: -400, front_cm: BIN_CM / 2 });
+        o.reach(&reflection(5300, 0, 2000));
+        o.reach(&reflection(5100, 0, 2000));
+        assert_eq!(o.extent, Extent { rear_cm: -400, front_cm: 300 });
+    }
+
+    #[test]
     fn a_drift_to_the_left_turns_the_heading_to_the_left() {
         let t = tracking();
         let mut o = Obstacle::new(&reflection(5000, 0, 2000), AHEAD, 2000);
