@@ -25,6 +25,8 @@ pub enum Problem {
         /// Largest value allowed.
         max: f32,
     },
+    /// With this mount nothing at slice height is in view.
+    NothingInView,
     /// Not above its lower neighbour.
     NotAscending {
         /// The neighbour's value.
@@ -38,6 +40,10 @@ impl core::fmt::Display for ConfigError {
         match problem {
             Problem::NotFinite => write!(f, "{parameter} is {value}, not a finite number"),
             Problem::OutOfLimits { min, max } => write!(f, "{parameter} is {value}, outside {min} to {max}"),
+            Problem::NothingInView => write!(
+                f,
+                "{parameter} is {value}: with this mount no point at slice height is in view, check height and pitch"
+            ),
             Problem::NotAscending { lower } => write!(f, "{parameter} is {value}, not above {lower}"),
         }
     }

@@ -158,7 +158,7 @@ fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     unit: &mut Unit<'_, R, A, E, W, N, G>,
 ) {
     let Outcome::Scan(scan) = outcome else { return };
-    unit.scan(scan.time, scan.detections, scan.fault, |_| {});
+    unit.scan(scan.time, scan.detections, scan.status(), |_| {});
     if scan.missing > 0 {
         unit.degrade(scan.time, Reason::IncompleteScans);
     }

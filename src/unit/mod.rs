@@ -28,7 +28,7 @@ pub mod transmitter;
 
 use crate::axes::Axes;
 use crate::detection::Detection;
-use crate::health::{Condition, Continuity};
+use crate::health::{Condition, Continuity, FrameStatus};
 use crate::polar::PolarMap;
 use crate::radar_3d::{FrameReport, Radar3d, Radar3dParameters};
 use crate::stage::Stage;
@@ -97,11 +97,12 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         &mut self,
         measured: Time,
         detections: impl IntoIterator<Item = &'d Detection, IntoIter: Clone>,
-        fault: bool,
+        status: impl Into<FrameStatus>,
         mut ended: impl FnMut(Stage),
     ) -> FrameReport {
-        let report = self.state.process_traced(self.parameters, measured, detections, fault, self.map, &mut ended);
-        self.fault = fault;
+        let status = status.into();
+        let report = self.state.process_traced(self.parameters, measured, detections, status, self.map, &mut ended);
+        self.fault = status.fault;
         if report.continuity == Continuity::ClockStepped {
             self.degrade(measured, Reason::ClockStepped);
         }
@@ -145,6 +146,7 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
             _ if self.fault => (State::Fault, Reason::RadarFault),
             (Condition::Starting, _) => (State::Starting, Reason::None),
             (Condition::Blind, _) => (State::Blind, Reason::None),
+            (Condition::Unusable, _) => (State::Blind, Reason::UnusablePoints),
             (Condition::Healthy, Some(reason)) => (State::Degraded, reason),
             (Condition::Healthy, None) => (State::Ok, Reason::None),
         };

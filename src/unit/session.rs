@@ -255,7 +255,7 @@ fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     *now = scan.time;
     let mut ticks = [0; Stage::COUNT];
     let mut last = line.ticks();
-    let report = unit.scan(scan.time, scan.detections, scan.fault, |stage| {
+    let report = unit.scan(scan.time, scan.detections, scan.status(), |stage| {
         let now = line.ticks();
         if let Some(t) = ticks.get_mut(stage as usize) {
             *t = now.wrapping_sub(last);
