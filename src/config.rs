@@ -30,6 +30,11 @@ pub enum Problem {
         /// The neighbour's value.
         lower: f32,
     },
+    /// A bit rate that no divider of a controller's clock meets.
+    NoDivider {
+        /// The clock.
+        clock_hz: u32,
+    },
 }
 
 impl core::fmt::Display for ConfigError {
@@ -39,6 +44,9 @@ impl core::fmt::Display for ConfigError {
             Problem::NotFinite => write!(f, "{parameter} is {value}, not a finite number"),
             Problem::OutOfLimits { min, max } => write!(f, "{parameter} is {value}, outside {min} to {max}"),
             Problem::NotAscending { lower } => write!(f, "{parameter} is {value}, not above {lower}"),
+            Problem::NoDivider { clock_hz } => {
+                write!(f, "{parameter} is {value}, which no divider of {clock_hz} Hz meets")
+            }
         }
     }
 }
