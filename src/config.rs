@@ -32,6 +32,11 @@ pub enum Problem {
         /// The neighbour's value.
         lower: f32,
     },
+    /// A bit rate that no divider of a controller's clock meets.
+    NoDivider {
+        /// The clock.
+        clock_hz: u32,
+    },
 }
 
 impl core::fmt::Display for ConfigError {
@@ -45,6 +50,9 @@ impl core::fmt::Display for ConfigError {
                 "{parameter} is {value}: with this mount no point at slice height is in view, check height and pitch"
             ),
             Problem::NotAscending { lower } => write!(f, "{parameter} is {value}, not above {lower}"),
+            Problem::NoDivider { clock_hz } => {
+                write!(f, "{parameter} is {value}, which no divider of {clock_hz} Hz meets")
+            }
         }
     }
 }

@@ -33,7 +33,7 @@ impl<const D: usize> TiSession<D> {
             if let Outcome::Scan(scan) = outcome {
                 unit.scan(scan.time, scan.detections, scan.status(), |_| {});
                 if scan.missing > 0 {
-                    unit.broadcast().status_mut().reason = Reason::IncompleteScans;
+                    unit.degrade(scan.time, Reason::IncompleteScans);
                 }
             }
             // a receiver that took nothing would hold up everything
