@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn the_last_cell_counts_where_the_box_reaches_its_middle() {
         // cells of 3 m, and a box that begins at 25 m
-        for (length_cm, last) in [(800, 10), (940, 11)] {
+        for (length_cm, last) in [(800, 10), (960, 11)] {
             let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
             let view = FieldOfView {
                 azimuth_min_deg: -3.0,
