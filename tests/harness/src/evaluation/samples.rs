@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::Options;
-use crate::geometry::polygon::Convex;
+use crate::geometry::polygon::{Bounds, Convex};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::geometry::sight::{box_in_sight, footprint_in_sight, shadow};
 use crate::geometry::solid::Solid;
@@ -100,12 +100,13 @@ fn frame_samples(
         });
     }
     let taken: BTreeSet<Cell> = objects.iter().flat_map(|o| o.solid.cells()).collect();
+    let bounded: Vec<(Bounds, &Convex)> = shadows.iter().flatten().map(|s| (s.bounds(), s)).collect();
     let cells = road
         .iter()
         .filter(|c| !taken.contains(c))
         .map(|&(i, j)| {
             let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5];
-            ((i, j), !shadows.iter().flatten().any(|s| s.contains(centre)))
+            ((i, j), !bounded.iter().any(|(b, s)| b.contains(centre) && s.contains(centre)))
         })
         .collect();
     FrameSamples { counted: true, objects: samples, cells }
@@ -152,6 +153,9 @@ pub fn associate(
     counts
 }
 
+/// Added to the distance beyond which a footprint is not looked at closer, for rounding, metres.
+const NOTICE_M: f64 = 0.01;
+
 /// The object a detection belongs to: nearest ungrown footprint among those whose grown footprint
 /// holds it and whose motion explains its Doppler; ties by centre.
 pub fn owner(
@@ -165,8 +169,15 @@ pub fn owner(
     let grown = !recording.sensor.frames_independent;
     let judge_doppler = grown && !recording.sensor.platform_moving;
     let line = line_of_sight(pose, p);
+    let moved = (p[0] - pose.position[0]).hypot(p[1] - pose.position[1]) * options.growth_azimuth_deg.to_radians().tan();
     let mut best: Option<(f64, f64, usize)> = None;
     for (k, object) in objects.iter().enumerate() {
+        // farther than the grown footprint reaches in any direction
+        let [length, width, _] = object.solid.size;
+        let reach = 0.5 * length.hypot(width) + std::f64::consts::SQRT_2 * options.growth_m + moved + NOTICE_M;
+        if (p[0] - object.solid.center[0]).hypot(p[1] - object.solid.center[1]) > reach {
+            continue;
+        }
         let inside = if grown {
             in_grown_footprint(&object.solid, pose, p, options)
         } else {
