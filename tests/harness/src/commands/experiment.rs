@@ -1,9 +1,9 @@
-//! `viewshed experiment`: the paper's experiment on the digital twin, the paper's table out.
+//! `viewshed experiment`: the paper's experiment on the digital twin, or crossings and queues of it; a table out.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde_json::json;
 
 use super::progress::bar;
@@ -11,29 +11,74 @@ use super::replay::shipped;
 use super::{print, write_file};
 use crate::evaluation::replay::{Replay, steps};
 use crate::experiment::plan::{Day, Plan};
+use crate::experiment::scenes::{self, Extent, Variant};
 use crate::experiment::{Experiment, total_steps};
-use crate::options::JudgingArgs;
-use crate::report::{experiment as report, json as replay_json};
+use crate::options::{JudgingArgs, Settings};
+use crate::report::{experiment as report, json as replay_json, scenes as scenes_report};
 use crate::{estimators, recording};
 
 /// Estimators that run, for the progress bar.
 const ESTIMATORS: u64 = 4;
 
-/// Repeat the paper's experiment on the digital twin and print its table beside ours
+/// Worlds of the twin there are experiments on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum World {
+    /// The paper's: a motorway from a gantry, five days
+    Motorway,
+    /// Signalised crossings with turning traffic, buses, trucks, bicycles and walkers, six scenes
+    Crossing,
+    /// Motorways with lanes that creep or stop and go beside lanes that flow, four scenes
+    Queue,
+}
+
+impl World {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Motorway => "motorway",
+            Self::Crossing => "crossing",
+            Self::Queue => "queue",
+        }
+    }
+
+    const fn plan(self) -> &'static str {
+        match self {
+            Self::Motorway => "experiment.toml",
+            Self::Crossing => "crossing/scenes.toml",
+            Self::Queue => "queue/scenes.toml",
+        }
+    }
+}
+
+/// Run an experiment on the digital twin: the paper's with its table beside ours, or crossings, or queues
 ///
-/// 60 s of a motorway of 3 + 3 lanes with dense traffic and many trucks, a radar on a gantry at 6 m looking along
-/// the direction of travel. Scene, days and seeds stand in a file that was fixed before any estimator ran on it;
-/// what is tuned is tuned on its training day or elsewhere, and only the reporting days count. Their counts are
-/// pooled, and beside every rate stands its least and greatest day.
+/// Motorway: 60 s of 3 + 3 lanes with dense traffic and many trucks, a radar on a gantry at 6 m looking along the
+/// direction of travel. Counts are pooled over the reporting days, and beside every rate stands its least and
+/// greatest day. Crossing and queue: scenes of 150 s with a mount each (corner, side, far; 4 to 8 m), the first 60 s
+/// not counted, pooled with intervals by tracks; beside it without elevation and without warm-up, and every scene.
+///
+/// Scenes, traffic, mounts and seeds stand in files that were fixed before any estimator ran on them; what is tuned
+/// is tuned on the training scenes or elsewhere.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Experiment file [default: tests/recordings/experiment.toml]
+    /// Experiment file [default: tests/recordings/experiment.toml, or scenes.toml of crossing/ or queue/ there]
     #[arg(value_name = "PLAN")]
     plan: Option<PathBuf>,
-    /// Write everything as JSON: `estimators` pooled over the reporting days, `seeds` with the same by day
+    /// Where vehicles drive
+    #[arg(long, value_enum, value_name = "NAME", default_value_t = World::Motorway)]
+    scene: World,
+    /// Run the training scenes in place of those that are reported (crossing, queue)
+    #[arg(long)]
+    train: bool,
+    /// Judge every Nth frame only, which is faster; estimators are given all frames (crossing, queue)
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    every: u16,
+    /// Leave out the runs without elevation, which is faster (crossing, queue)
+    #[arg(long)]
+    only_elevation: bool,
+    /// Write everything as JSON: pooled, and by day (`seeds`) or by scene (`variants`)
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
-    /// Keep the simulated recordings in this folder, DAY.mcap each
+    /// Keep the simulated recordings in this folder, DAY.mcap or SCENE.mcap each
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     keep: Option<PathBuf>,
     /// Print the same rows for these recordings too; may be repeated
@@ -51,40 +96,87 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.judging.settings()?;
     let path = match &args.plan {
         Some(path) => path.clone(),
-        None => shipped::file("experiment.toml")?,
+        None => shipped::file(args.scene.plan())?,
     };
-    let plan = Plan::read(&path)?;
     if let Some(folder) = &args.keep {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     }
-    let keep = |day: &Day, bytes: &[u8]| {
-        let Some(folder) = &args.keep else { return Ok(()) };
-        let file = folder.join(format!("{}.mcap", day.name()));
-        std::fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))
-    };
-    let running = bar("simulating and replaying", total_steps(&plan, ESTIMATORS)?);
-    let experiment = Experiment::run(&plan, &settings, &keep, &|| running.step())?;
-    drop(running);
-    print(&report::text(&experiment))?;
-    let options = replay_json::Options {
-        reading: &settings.reading,
-        evaluation: &settings.evaluation,
-        estimators: &settings.estimators,
-    };
-    let mut beside = Vec::new();
-    for path in &args.beside {
-        let replay = replay(path, &settings)?;
-        print(&format!("\n{}", report::beside(&replay)))?;
-        beside.push(replay_json::report(&replay, None, &[], options));
-    }
-    if let Some(file) = &args.json {
-        let plan = json!({ "file": path.display().to_string(), "content": plan });
-        write_file(file, &report::json(&experiment, &beside, &plan, options)?)?;
+    match args.scene {
+        World::Motorway => motorway(args, &path, &settings)?,
+        World::Crossing | World::Queue => several_scenes(args, &path, &settings)?,
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn replay(path: &Path, settings: &crate::options::Settings) -> Result<Replay> {
+fn motorway(args: &Args, path: &Path, settings: &Settings) -> Result<()> {
+    let asked = args.train || args.every > 1 || args.only_elevation;
+    ensure!(!asked, "--train, --every and --only-elevation go with --scene crossing or --scene queue");
+    let plan = Plan::read(path)?;
+    let running = bar("simulating and replaying", total_steps(&plan, ESTIMATORS)?);
+    let keep = |day: &Day, bytes: &[u8]| keep(args, &day.name(), bytes);
+    let experiment = Experiment::run(&plan, settings, &keep, &|| running.step())?;
+    drop(running);
+    print(&report::text(&experiment))?;
+    let beside = beside(args, settings)?;
+    if let Some(file) = &args.json {
+        let plan = json!({ "file": path.display().to_string(), "content": plan });
+        write_file(file, &report::json(&experiment, &beside, &plan, json_options(settings))?)?;
+    }
+    Ok(())
+}
+
+fn several_scenes(args: &Args, path: &Path, settings: &Settings) -> Result<()> {
+    let plan = scenes::Plan::read(path)?;
+    let set = if args.train { &plan.training } else { &plan.reporting };
+    let all = plan.scenes(set)?;
+    let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
+    let running = bar("simulating and replaying", scenes::total_steps(&all, extent, ESTIMATORS));
+    let results = scenes::run(&all, settings, extent, &|name, bytes| keep(args, name, bytes), &|| running.step())?;
+    drop(running);
+    let counted: Vec<_> =
+        Variant::ALL.iter().filter_map(|v| scenes::count(&results, *v, set.warm_up_s, settings)).collect();
+    let title = scenes_report::Title {
+        name: args.scene.name(),
+        set: if args.train { "training" } else { "reporting" },
+        warm_up_s: set.warm_up_s,
+        every: extent.every,
+    };
+    print(&scenes_report::text(&title, &plan, &counted, &settings.evaluation))?;
+    let beside = beside(args, settings)?;
+    if let Some(file) = &args.json {
+        let plan = json!({ "file": path.display().to_string(), "content": plan });
+        write_file(file, &scenes_report::json(&title, &plan, &all, &counted, &beside, json_options(settings))?)?;
+    }
+    Ok(())
+}
+
+fn keep(args: &Args, name: &str, bytes: &[u8]) -> Result<()> {
+    let Some(folder) = &args.keep else { return Ok(()) };
+    let file = folder.join(format!("{name}.mcap"));
+    std::fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))
+}
+
+/// Replays and prints the recordings that are to stand beside.
+fn beside(args: &Args, settings: &Settings) -> Result<Vec<replay_json::Report>> {
+    args.beside
+        .iter()
+        .map(|path| {
+            let replay = replay(path, settings)?;
+            print(&format!("\n{}", report::beside(&replay)))?;
+            Ok(replay_json::report(&replay, None, &[], json_options(settings)))
+        })
+        .collect()
+}
+
+fn json_options(settings: &Settings) -> replay_json::Options<'_> {
+    replay_json::Options {
+        reading: &settings.reading,
+        evaluation: &settings.evaluation,
+        estimators: &settings.estimators,
+    }
+}
+
+fn replay(path: &Path, settings: &Settings) -> Result<Replay> {
     let recording = recording::read(path, &settings.reading).with_context(|| path.display().to_string())?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let replaying = bar(&format!("replaying {}", recording.name), steps(&recording, running.len()));

@@ -143,8 +143,8 @@ fn near(solid: &Solid, from: [f64; 2], azimuth_rad: f64, half_rad: f64) -> bool 
     if distance <= radius {
         return true;
     }
-    let turn = (dy.atan2(dx) - azimuth_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
-        - std::f64::consts::PI;
+    let turn =
+        (dy.atan2(dx) - azimuth_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
     turn.abs() <= (radius / distance).asin() + half_rad
 }
 

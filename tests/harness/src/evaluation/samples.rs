@@ -47,25 +47,55 @@ pub struct FrameSamples {
 ///
 /// `progress` is told each frame done.
 pub fn collect(recording: &Recording, options: &Options, progress: &(dyn Fn() + Sync)) -> Vec<FrameSamples> {
+    collect_every(recording, options, 1, progress)
+}
+
+/// The same of every `every`-th frame alone; the others are not counted.
+pub fn collect_every(
+    recording: &Recording,
+    options: &Options,
+    every: usize,
+    progress: &(dyn Fn() + Sync),
+) -> Vec<FrameSamples> {
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let warm_up = if recording.sensor.frames_independent { 0.0 } else { options.warm_up_s };
-    let counted = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9 >= warm_up;
+    let counted =
+        |k: usize, f: &Frame| k.is_multiple_of(every) && f.time_ns.saturating_sub(start) as f64 * 1e-9 >= warm_up;
     let Some(truth) = &recording.truth else {
-        let unlabelled = |f| FrameSamples { counted: counted(f), ..FrameSamples::default() };
-        return recording.frames.iter().map(unlabelled).collect();
+        let unlabelled = |(k, f)| FrameSamples { counted: counted(k, f), ..FrameSamples::default() };
+        return recording.frames.iter().enumerate().map(unlabelled).collect();
     };
     let road = if recording.sensor.frames_independent { Vec::new() } else { road_cells(recording, options) };
     recording
         .frames
         .par_iter()
-        .map(|frame| {
+        .enumerate()
+        .map(|(k, frame)| {
             progress();
-            if !counted(frame) {
+            if !counted(k, frame) {
                 return FrameSamples::default();
             }
             frame_samples(recording, &truth.at(frame.time_ns), &frame.detections, &road, options)
         })
         .collect()
+}
+
+/// Tells anew which samples were detected, from another recording of the same truth at the same times. What is in
+/// sight does not depend on the sensor's measurements and stays.
+pub fn detect_again(recording: &Recording, samples: &mut [FrameSamples], options: &Options) {
+    let Some(truth) = &recording.truth else { return };
+    recording.frames.par_iter().zip(samples).for_each(|(frame, samples)| {
+        if samples.objects.is_empty() {
+            return;
+        }
+        let objects = truth.at(frame.time_ns);
+        let associated = associate(recording, &objects, &frame.detections, options);
+        for sample in &mut samples.objects {
+            let own = objects.iter().position(|o| o.track == sample.track);
+            sample.detections = own.map_or(0, |k| associated[k]);
+            sample.detected = sample.detections >= options.min_detections;
+        }
+    });
 }
 
 fn frame_samples(
@@ -169,7 +199,8 @@ pub fn owner(
     let grown = !recording.sensor.frames_independent;
     let judge_doppler = grown && !recording.sensor.platform_moving;
     let line = line_of_sight(pose, p);
-    let moved = (p[0] - pose.position[0]).hypot(p[1] - pose.position[1]) * options.growth_azimuth_deg.to_radians().tan();
+    let moved =
+        (p[0] - pose.position[0]).hypot(p[1] - pose.position[1]) * options.growth_azimuth_deg.to_radians().tan();
     let mut best: Option<(f64, f64, usize)> = None;
     for (k, object) in objects.iter().enumerate() {
         // farther than the grown footprint reaches in any direction

@@ -64,8 +64,7 @@ fn may_overlap(sensor: [f64; 3], a: &Solid, b: &Solid) -> bool {
         (distance > radius).then(|| (dy.atan2(dx), (radius / distance).asin()))
     };
     let (Some((to_a, half_a)), Some((to_b, half_b))) = (seen(a), seen(b)) else { return true };
-    let turn =
-        (to_a - to_b + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+    let turn = (to_a - to_b + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
     turn.abs() <= half_a + half_b + 1e-6
 }
 
