@@ -28,7 +28,7 @@ pub struct Title<'a> {
 /// Everything as text; the first of `counted` is what is reported.
 pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &EvaluationOptions) -> String {
     let Some((main, beside)) = counted.split_first() else { return String::new() };
-    let every = if title.every > 1 { format!(", every {}th frame judged", title.every) } else { String::new() };
+    let every = if title.every > 1 { format!(", one frame in {} judged", title.every) } else { String::new() };
     let summary = &main.pooled.summary;
     let mut text = format!(
         "{}, {}: {} scenes, {}; the first {} s of each not counted{every}\n\

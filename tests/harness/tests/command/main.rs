@@ -8,5 +8,6 @@ mod python;
 mod radar_scan;
 mod replay;
 mod scene;
+mod scenes;
 mod simulate;
 mod ti_capture;
