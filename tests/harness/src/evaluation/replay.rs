@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Options;
 use super::samples::{self, FrameSamples};
-use super::score::{Estimator, Score, score};
+use super::score::{Score, score};
 use super::summary::Summary;
 use crate::recording::Recording;
 
