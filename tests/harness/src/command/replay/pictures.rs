@@ -14,9 +14,9 @@ use crate::evaluation::score::Score;
 use crate::evaluation::summary::Row;
 use crate::geometry::solid::Solid;
 use crate::results::files::Folder;
-use crate::results::pictures::birdseye::{self, Scene, TruthBox, Window};
-use crate::results::pictures::closeup::Highlight;
+use crate::results::pictures::birdseye;
 use crate::results::pictures::polar::{self, PolarGrid};
+use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
 use crate::results::pictures::tradeoff::{self, Curve, Marker, MarkerKind, Span, TradeOff};
 use crate::results::pictures::{canvas::Canvas, palette};
 

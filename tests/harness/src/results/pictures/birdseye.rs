@@ -7,9 +7,9 @@ use viewshed::map::{RoadPoint, VisibilityMap};
 
 use super::axes::{BELOW_PX, LEFT_PX, Plot, RIGHT_PX};
 use super::canvas::{Area, Canvas, Colour, Pen};
-use super::closeup::Highlight;
 use super::legend::{Surround, WIDTH_PX};
-use super::palette::{INK, Outcome};
+use super::palette::INK;
+use super::scene::{Scene, Window};
 use super::text::Style;
 use super::{cells, closeup, overlay};
 use crate::evaluation::samples::Cell;
@@ -17,71 +17,10 @@ use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::{FieldOfView, RadarDetection};
 
-/// Greatest height of one plot, pixels.
-const PLOT_HEIGHT_PX: i32 = 760;
 /// From this scale on every cell is outlined.
 const CELL_GRID_PX_PER_M: f64 = 14.0;
 const NOTE_PX: i32 = 40;
 const SIGHT: Pen = Pen::new(Colour::hex(0x1B1F24), 1.2).dashed(&[2.0, 4.0]);
-
-/// A part of the road plane, metres in the road frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
-    pub x_m: [f64; 2],
-    pub y_m: [f64; 2],
-}
-
-impl Window {
-    /// The least window of whole metres around points, with a margin; at least 20 m wide and deep.
-    pub fn around(points: impl IntoIterator<Item = [f64; 2]>, margin_m: f64) -> Self {
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let [x, y] = points
-            .into_iter()
-            .fold([none, none], |[x, y], p| [[x[0].min(p[0]), x[1].max(p[0])], [y[0].min(p[1]), y[1].max(p[1])]]);
-        let side = |[lo, hi]: [f64; 2]| {
-            let [lo, hi] = if lo <= hi { [lo - margin_m, hi + margin_m] } else { [-margin_m, margin_m] };
-            let missing = (20.0 - (hi - lo)).max(0.0) / 2.0;
-            [(lo - missing).floor(), (hi + missing).ceil()]
-        };
-        Self { x_m: side(x), y_m: side(y) }
-    }
-
-    fn plot(&self, top: i32) -> Plot {
-        let (width, depth) = ((self.x_m[1] - self.x_m[0]).max(1.0), (self.y_m[1] - self.y_m[0]).max(1.0));
-        let room = WIDTH_PX - LEFT_PX - RIGHT_PX;
-        let scale = (f64::from(room) / width).min(f64::from(PLOT_HEIGHT_PX) / depth);
-        let (width_px, height_px) = ((width * scale).round() as i32, (depth * scale).round() as i32);
-        let left = LEFT_PX + (room - width_px) / 2;
-        let [x, y] = [[self.x_m[0], self.x_m[0] + width], [self.y_m[0], self.y_m[0] + depth]];
-        Plot { area: Area::new(left, top, width_px, height_px), x, y }
-    }
-}
-
-/// A ground-truth box; without an outcome it is drawn as not counted.
-#[derive(Debug, Clone, Copy)]
-pub struct TruthBox {
-    pub solid: Solid,
-    pub outcome: Option<Outcome>,
-}
-
-/// Everything on one bird's-eye picture.
-pub struct Scene<'a> {
-    pub map: &'a dyn VisibilityMap,
-    pub pose: SensorPose,
-    pub field_of_view: FieldOfView,
-    /// Height at which visibility is judged; detections without elevation are drawn where they lie at it.
-    pub slice_height_m: f64,
-    pub window: Window,
-    pub detections: &'a [RadarDetection],
-    pub boxes: Vec<TruthBox>,
-    /// Cells whose common border is drawn; may be empty.
-    pub road: &'a [Cell],
-    /// Recording, estimator, time.
-    pub title: String,
-    /// What has to be said of the data.
-    pub caption: Option<String>,
-    pub highlight: Option<Highlight>,
-}
 
 struct Layout {
     surround: Surround,

@@ -1,37 +1,15 @@
 //! One object looked at closely: a ring round it, an enlarged plot, and every box by name.
 
 use super::axes::Plot;
-use super::birdseye::{Scene, Window};
 use super::canvas::{Canvas, Pen, Pixel};
 use super::labels::Labels;
 use super::overlay;
 use super::palette::{INK, outline};
+use super::scene::{Highlight, Scene, Window};
 use super::text::Style;
-use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 
 const RING: Pen = Pen::new(INK, 2.5);
-
-/// One object looked at closely: ringed, and enlarged in a second plot below.
-#[derive(Debug, Clone)]
-pub struct Highlight {
-    pub solid: Solid,
-    /// What there is to see, above the enlarged plot.
-    pub note: String,
-    pub window: Window,
-}
-
-impl Highlight {
-    /// A window of 72 m x 26 m around the object, shifted towards the sensor by 14 m at most so
-    /// that it shows what stands before the object.
-    pub fn on(solid: Solid, pose: &SensorPose, note: impl Into<String>) -> Self {
-        let [x, y, _] = solid.center;
-        let (dx, dy) = (pose.position[0] - x, pose.position[1] - y);
-        let shift = (14.0 / dx.hypot(dy).max(1.0)).min(1.0);
-        let (x, y) = ((x + dx * shift).round(), (y + dy * shift).round());
-        Self { solid, note: note.into(), window: Window { x_m: [x - 36.0, x + 36.0], y_m: [y - 13.0, y + 13.0] } }
-    }
-}
 
 /// The ring round the object and, on the overview, the frame of the enlarged part.
 pub fn mark(canvas: &mut Canvas, plot: &Plot, highlight: &Highlight, enlarged: bool) {

@@ -5,11 +5,12 @@
 
 pub mod birdseye;
 pub mod canvas;
-pub mod closeup;
+mod closeup;
 pub mod heatmap;
 pub mod palette;
 pub mod polar;
 pub mod returns;
+pub mod scene;
 pub mod site;
 pub mod tradeoff;
 

@@ -5,7 +5,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::json::{self, Options, Report};
-use super::table::{percent, table};
+use super::percent;
+use super::table::table;
 use super::{ORIGIN, notes};
 use crate::evaluation::summary::Row;
 use crate::studies::experiment::{DayResult, Experiment, PAPER, PAPER_COVERAGE, PAPER_TRAJECTORIES, Pooled, hidden};

@@ -1,6 +1,6 @@
 //! The lines around the table: what was counted, how the intervals came about, what was rejected.
 
-use super::table::percent;
+use super::percent;
 use crate::evaluation::Options;
 use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::comparison::Comparison;

@@ -2,7 +2,7 @@
 
 use comfy_table::{Cell, CellAlignment, Table, presets};
 
-use super::notes;
+use super::{notes, percent};
 use crate::evaluation::Options;
 use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::bounds::SLICE;
@@ -24,11 +24,6 @@ pub fn text(replay: &Replay, options: &Options) -> String {
         text.push('\n');
     }
     text
-}
-
-/// A share in per cent; `n/a` where there was nothing to divide by.
-pub fn percent(rate: Option<f64>) -> String {
-    rate.map_or_else(|| "n/a".into(), |r| format!("{:.1}", 100.0 * r))
 }
 
 fn with_interval(rate: Option<f64>, interval: Option<Interval>) -> String {
