@@ -21,7 +21,7 @@ use crate::bus::loss::{Arrived, LOSSES};
 use crate::bus::report::Report;
 use crate::bus::symbols::{self, Symbols};
 use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
-use crate::evaluation::SettingsArgs;
+use crate::command::options::SettingsArgs;
 use crate::recording;
 use crate::recording::candump::{Content, Line};
 use crate::recording::serial_log::Chunk;

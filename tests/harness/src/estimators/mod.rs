@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use viewshed::detection::{Detection, Measurement, NotADetection};
 use viewshed::field_of_view::FieldOfView;
 use viewshed::gate::{Rejection, Rejections};
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::mount::Mount;
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2dConfig, Reading};

@@ -6,6 +6,7 @@ use super::Options;
 use super::samples::{self, FrameSamples};
 use super::score::{Score, score};
 use super::summary::Summary;
+use crate::estimators::Estimator;
 use crate::recording::Recording;
 
 /// Everything that replaying a recording gives; what pictures, tables and files are made of.

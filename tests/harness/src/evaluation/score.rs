@@ -1,6 +1,6 @@
 //! Runs one estimator over a recording and scores its map at every counted frame.
 
-use viewshed::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
 
 use super::Grid;
 use super::cells::{CellCounts, CellTally};
@@ -8,7 +8,7 @@ use super::counts::Counts;
 use super::samples::{Cell, FrameSamples, Sample};
 use crate::estimators::Estimator;
 use crate::geometry::solid::Solid;
-use crate::recording::{Frame, Recording};
+use crate::recording::Recording;
 
 /// One object at one frame, as an estimator sees it. `grade` is `None` where all its cells are unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

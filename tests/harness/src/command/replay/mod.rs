@@ -12,8 +12,8 @@ use anyhow::{Result, bail};
 
 use super::progress::bar;
 use super::{BAD_INPUT, complain, print};
+use crate::command::options::SettingsArgs;
 use crate::evaluation::Settings;
-use crate::evaluation::SettingsArgs;
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, steps};

@@ -5,17 +5,13 @@
 
 use viewshed::map::{RoadPoint, VisibilityMap};
 
-use super::axes::{BELOW_PX, LEFT_PX, Plot, RIGHT_PX};
-use super::canvas::{Area, Canvas, Colour, Pen};
+use super::axes::{BELOW_PX, Plot};
+use super::canvas::{Canvas, Colour, Pen};
 use super::legend::{Surround, WIDTH_PX};
 use super::palette::INK;
-use super::scene::{Scene, Window};
+use super::scene::Scene;
 use super::text::Style;
 use super::{cells, closeup, overlay};
-use crate::evaluation::samples::Cell;
-use crate::geometry::pose::SensorPose;
-use crate::geometry::solid::Solid;
-use crate::recording::{FieldOfView, RadarDetection};
 
 /// From this scale on every cell is outlined.
 const CELL_GRID_PX_PER_M: f64 = 14.0;
@@ -126,7 +122,12 @@ mod tests {
     use viewshed::map::{CellState, Visibility};
 
     use super::*;
+    use crate::geometry::pose::SensorPose;
+    use crate::geometry::solid::Solid;
+    use crate::recording::{FieldOfView, RadarDetection};
+    use crate::results::pictures::canvas::Area;
     use crate::results::pictures::palette;
+    use crate::results::pictures::scene::{Highlight, Window};
 
     struct Half(fn(RoadPoint) -> bool);
 

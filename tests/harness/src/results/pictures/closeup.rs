@@ -75,6 +75,7 @@ pub fn name_boxes(canvas: &mut Canvas, scene: &Scene, plot: &Plot) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::pose::SensorPose;
     use crate::results::pictures::canvas::Area;
 
     fn car() -> Solid {

@@ -4,7 +4,8 @@ use anyhow::Result;
 use serde_json::{Value, json};
 
 use super::ORIGIN;
-use super::table::{percent, table};
+use super::percent;
+use super::table::table;
 use crate::studies::site::sets::{Rank, Ranked};
 use crate::studies::site::{Search, Site};
 use crate::twin::scene::Mount;
