@@ -73,6 +73,8 @@
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
 //!
+//! Where a new estimator, input, bus, board or command goes, and the walk of a detection from byte to bit: [`extending`].
+//!
 //! # What was decided, and why
 //!
 //! - **The grid stands upright, whatever the mount.** Detections are turned into a levelled frame
@@ -118,6 +120,9 @@ pub mod cartesian;
 pub mod config;
 pub mod detection;
 pub mod evidence;
+#[cfg(doc)]
+#[doc = include_str!("EXTENDING.md")]
+pub mod extending {}
 pub mod field_of_view;
 pub mod gate;
 pub mod health;

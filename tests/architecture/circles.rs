@@ -1,4 +1,4 @@
-//! No folder of `src` uses, on any way, one that uses it; nor do the files within a folder.
+//! No folder of the library or the harness uses, on any way, one that uses it; nor do the files within a folder.
 //!
 //! In each folder the files and folders directly in it are compared. One uses another where code in it has a
 //! path, `crate::` or `super::`, into the other; unit tests at the end of a file do not count.
@@ -11,19 +11,32 @@ use std::path::Path;
 const KNOWN: [(&str, &[&str]); 3] =
     [("src", &["pil", "unit"]), ("src/wire/code", &["block", "expectation"]), ("src/wire/code", &["edges", "ray"])];
 
+/// The same of the harness.
+const KNOWN_IN_HARNESS: [(&str, &[&str]); 1] = [("tests/harness/src/twin/radar", &["echoes", "mirrors"])];
+
 /// A module's path below the crate.
 type Module = Vec<String>;
 
 #[test]
-fn nothing_is_used_in_a_circle() {
-    let edges = Edges::of(&sources(Path::new(env!("CARGO_MANIFEST_DIR")).join("src").as_path()));
+fn nothing_in_the_library_is_used_in_a_circle() {
+    judge("src", &KNOWN);
+}
+
+#[test]
+fn nothing_in_the_harness_is_used_in_a_circle() {
+    judge("tests/harness/src", &KNOWN_IN_HARNESS);
+}
+
+/// Fails if the folder has other circles than those that are known.
+fn judge(root: &str, known: &[(&str, &[&str])]) {
+    let edges = Edges::of(&sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(root)));
     assert!(edges.0.len() > 200, "{} uses were found: is this the right folder?", edges.0.len());
-    let circles = edges.circles();
+    let circles = edges.circles(root);
     let named: Vec<(&str, Vec<&str>)> =
         circles.iter().map(|c| (c.folder.as_str(), c.names.iter().map(String::as_str).collect())).collect();
-    let known: Vec<(&str, Vec<&str>)> = KNOWN.iter().map(|(folder, names)| (*folder, names.to_vec())).collect();
+    let known: Vec<(&str, Vec<&str>)> = known.iter().map(|(folder, names)| (*folder, names.to_vec())).collect();
     let told: Vec<&str> = circles.iter().map(|circle| circle.edges.as_str()).collect();
-    println!("{} circles\n{}", circles.len(), told.concat());
+    println!("{root}: {} circles\n{}", circles.len(), told.concat());
     for circle in &named {
         assert!(known.contains(circle), "{circle:?} use one another:\n{}", told.concat());
     }
@@ -75,13 +88,13 @@ impl Edges {
         Self(edges)
     }
 
-    fn circles(&self) -> Vec<Circle> {
+    fn circles(&self, root: &str) -> Vec<Circle> {
         let modules = self.0.iter().flat_map(|(a, b)| [a, b]);
         let folders: BTreeSet<&[String]> = modules.flat_map(|m| (0..m.len()).map(|n| &m[..n])).collect();
-        folders.into_iter().flat_map(|folder| self.circles_in(folder)).collect()
+        folders.into_iter().flat_map(|folder| self.circles_in(root, folder)).collect()
     }
 
-    fn circles_in(&self, folder: &[String]) -> Vec<Circle> {
+    fn circles_in(&self, root: &str, folder: &[String]) -> Vec<Circle> {
         let name = |m: &Module| m.strip_prefix(folder).and_then(|rest| rest.first().cloned());
         let mut uses: BTreeMap<(String, String), (&Module, &Module)> = BTreeMap::new();
         for (a, b) in &self.0 {
@@ -103,7 +116,7 @@ impl Edges {
         for &name in &names {
             groups.insert(names.iter().filter(|other| both(name, other)).map(|other| (*other).clone()).collect());
         }
-        let folder = [&["src".to_owned()][..], folder].concat().join("/");
+        let folder = [&[root.to_owned()][..], folder].concat().join("/");
         let circle = |names: BTreeSet<String>| {
             let inside = uses.iter().filter(|((a, b), _)| a != b && names.contains(a) && names.contains(b));
             let edges =
@@ -191,10 +204,10 @@ fn a_circle_is_found_and_its_edges_are_named() {
     ]
     .map(|(path, text)| (module(path), text.to_owned()))
     .into();
-    assert!(Edges::of(&sources).circles().is_empty());
+    assert!(Edges::of(&sources).circles("src").is_empty());
     let mut round = sources.clone();
     round.insert(module("d"), "use crate::a::one::One;\n".to_owned());
-    let circles = Edges::of(&round).circles();
+    let circles = Edges::of(&round).circles("src");
     assert_eq!(circles.len(), 1);
     assert_eq!(circles[0].names.iter().collect::<Vec<_>>(), ["a", "b", "c", "d"]);
     assert!(circles[0].edges.contains("src: d uses a::one") && circles[0].edges.contains("src: b::two uses d"));
@@ -202,6 +215,6 @@ fn a_circle_is_found_and_its_edges_are_named() {
     let mut within = sources;
     within.insert(module("a/six"), "use super::one::One;\n".to_owned());
     within.insert(module("a/one"), "use super::six;\n".to_owned());
-    let circles = Edges::of(&within).circles();
+    let circles = Edges::of(&within).circles("src");
     assert_eq!((circles.len(), circles[0].folder.as_str()), (1, "src/a"));
 }

@@ -5,7 +5,7 @@ mod config;
 mod frames;
 mod input;
 mod locate;
-#[path = "../../../tests/harness/src/output/one_file.rs"]
+#[path = "../../../tests/harness/src/results/files/one_file.rs"]
 mod one_file;
 mod output;
 mod run;

@@ -15,17 +15,11 @@ use viewshed::unit::session::Flow;
 use viewshed::unit::settings::Settings;
 use viewshed::unit::stored::Stored;
 use viewshed::unit::{Unit, start_bench};
-use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::message::Addresses;
 
-use super::listener::Map;
+use super::listener::{MEDIUM, Map, SENSOR};
 use super::scans::Scan;
 use crate::recording::candump::Line;
-
-/// The sensor's number on the bus, and where its messages are.
-pub const SENSOR: u8 = 0;
-pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;

@@ -11,8 +11,8 @@ use viewshed::stage::Stage;
 use super::Run;
 use super::check::{Checked, Difference};
 use super::image::Image;
-use crate::output::Folder;
-use crate::pictures::polar::{self, PolarGrid};
+use crate::results::files::Folder;
+use crate::results::pictures::polar::{self, PolarGrid};
 
 /// Median and worst of a number of instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -177,7 +177,7 @@ impl Difference {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::OutputArgs;
+    use crate::results::files::OutputArgs;
 
     #[test]
     fn the_first_cell_that_differs_is_named_and_drawn() {

@@ -10,6 +10,7 @@ use viewshed::detection::{Detection, Measurement, NotADetection};
 use viewshed::field_of_view::FieldOfView;
 use viewshed::gate::{Rejection, Rejections};
 use viewshed::health::FrameStatus;
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::mount::Mount;
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2dConfig, Reading};
@@ -18,8 +19,43 @@ use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
 
-use crate::evaluation::score::{Estimator, PolarCells};
 use crate::recording::{Frame, Recording};
+
+/// A visibility estimator as the harness drives it: one radar frame in, one map out.
+pub trait Estimator: Send {
+    fn name(&self) -> &str;
+
+    /// Forgets every frame seen, but not what was counted (called before each frame of a recording
+    /// of independent frames).
+    fn reset(&mut self);
+
+    /// Takes a radar frame and brings the map up to its time.
+    fn step(&mut self, frame: &Frame);
+
+    fn map(&self) -> &dyn VisibilityMap;
+
+    /// The map's own polar cells, where it has any.
+    fn polar(&self) -> Option<PolarCells<'_>> {
+        None
+    }
+
+    /// What was rejected or dropped since construction, by reason.
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        Vec::new()
+    }
+}
+
+/// The cells of a polar map: azimuths from right to left, ranges from near to far.
+pub struct PolarCells<'a> {
+    pub azimuths: usize,
+    pub ranges: usize,
+    /// Outer edges, radians from the boresight's heading, + left.
+    pub azimuth_rad: [f64; 2],
+    /// Length of a cell along the ground, metres.
+    pub cell_m: f64,
+    /// State of (azimuth, range).
+    pub cell: Box<dyn Fn(usize, usize) -> CellState + 'a>,
+}
 
 /// Parameters of all estimators.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,8 +5,8 @@ use viewshed::map::{CellState, RoadPoint, VisibilityMap};
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
 use viewshed::sensor::Sensor;
 
+use super::Estimator;
 use super::{Intake, MOST_DETECTIONS};
-use crate::evaluation::score::Estimator;
 use crate::recording::Frame;
 
 /// Cells along the road, and words of eight cells across: any heading of a 250 m fan fits.

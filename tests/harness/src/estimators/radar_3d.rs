@@ -7,8 +7,8 @@ use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
 
+use super::{Estimator, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};
-use crate::evaluation::score::{Estimator, PolarCells};
 use crate::recording::Frame;
 
 /// Range cells, azimuths and elevations of the reference grid.

@@ -13,12 +13,12 @@ use viewshed::sensor::Sensor;
 use viewshed::spherical::SphericalGrid;
 
 use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
+use super::{Estimator, PolarCells};
 use super::{Options, polar_cells};
-use crate::evaluation::score::{Estimator, PolarCells};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
+use crate::recording::truth::Truth;
 use crate::recording::{Frame, Recording};
-use crate::truth::Truth;
 
 /// Sub-columns a column is divided into.
 const SUB_COLUMNS: usize = 8;

@@ -26,6 +26,17 @@ pub mod units;
 
 use serde::{Deserialize, Serialize};
 
+use crate::estimators;
+use crate::recording::ReadOptions;
+
+/// Everything a replay can be told.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    pub reading: ReadOptions,
+    pub evaluation: Options,
+    pub estimators: estimators::Options,
+}
+
 /// The cells an object's visibility is judged on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]

@@ -12,7 +12,7 @@ use super::summary::Summary;
 use super::units::BLOCK_NS;
 use crate::recording::problems::Problems;
 use crate::recording::{Frame, Recording};
-use crate::truth::Truth;
+use crate::recording::truth::Truth;
 
 /// One recording's samples and scores by seconds from its first frame on.
 #[derive(Debug)]

@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use super::Options;
 use super::rejected;
 use super::samples::{self, FrameSamples};
-use super::score::{Estimator, Score, score};
+use super::score::{Score, score};
 use super::summary::Summary;
+use crate::estimators::Estimator;
 use crate::recording::Recording;
 
 /// Everything that replaying a recording gives; what pictures, tables and files are made of.

@@ -9,8 +9,8 @@ use crate::geometry::polygon::{Bounds, Convex};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::geometry::sight::{box_in_sight, footprint_in_sight, shadow};
 use crate::geometry::solid::Solid;
+use crate::recording::truth::Object;
 use crate::recording::{Frame, RadarDetection, Recording};
-use crate::truth::Object;
 
 /// A 1 m cell (i, j) = [i, i+1) x [j, j+1) metres of the road frame.
 pub type Cell = (i32, i32);
@@ -269,8 +269,8 @@ fn in_grown_footprint(solid: &Solid, pose: &SensorPose, p: [f64; 3], options: &O
 pub mod by_hand {
     use super::*;
     use crate::recording::problems::Problems;
+    use crate::recording::truth::{Label, Truth};
     use crate::recording::{FieldOfView, Sensor};
-    use crate::truth::{Label, Truth};
 
     pub const PERIOD_NS: i64 = 100_000_000;
 

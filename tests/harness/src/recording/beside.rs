@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 
 use super::{Frame, ReadOptions, Recording, labels};
-use crate::truth::Truth;
+use crate::recording::truth::Truth;
 
 /// Labels and occlusion grades beside a recording, there or not.
 pub fn files(path: &Path) -> [PathBuf; 2] {

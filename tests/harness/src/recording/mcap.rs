@@ -14,7 +14,7 @@ use super::transforms::Transforms;
 use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::truth::{Label, Truth};
+use crate::recording::truth::{Label, Truth};
 
 pub const POINTS_TOPIC: &str = "/radar/points";
 pub const TRUTH_TOPIC: &str = "/ground_truth/objects";

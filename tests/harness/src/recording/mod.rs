@@ -14,6 +14,7 @@ pub mod ros;
 pub mod serial_log;
 pub mod ti;
 pub mod transforms;
+pub mod truth;
 pub mod write;
 
 use std::collections::BTreeMap;
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 
 use crate::geometry::pose::{SensorPose, Spherical};
-use crate::truth::Truth;
+use crate::recording::truth::Truth;
 use problems::Problems;
 
 /// One low-level radar measurement, as recorded.

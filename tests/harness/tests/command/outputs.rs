@@ -191,7 +191,7 @@ fn the_commands_that_are_written_down_are_understood_and_run_twice() {
     assert!(all.len() >= 9, "{all:?}");
     for command in &all {
         let words = ["viewshed"].into_iter().chain(command.split_whitespace());
-        if let Err(error) = viewshed_harness::commands::Cli::try_parse_from(words) {
+        if let Err(error) = viewshed_harness::command::Cli::try_parse_from(words) {
             assert_eq!(error.kind(), clap::error::ErrorKind::DisplayHelp, "{command}: {error}");
         }
         let pictures = ["replay", "listen"].iter().any(|name| command.starts_with(name));

@@ -9,9 +9,9 @@ use std::process::{Command, Output};
 
 use viewshed_harness::geometry::pose::{SensorPose, direction};
 use viewshed_harness::geometry::solid::Solid;
+use viewshed_harness::recording::truth::Label;
 use viewshed_harness::recording::write::RecordingWriter;
 use viewshed_harness::recording::{FieldOfView, Frame, RadarDetection, Sensor};
-use viewshed_harness::truth::Label;
 
 /// Speed of everything, m/s along the road.
 const SPEED: f64 = 12.0;

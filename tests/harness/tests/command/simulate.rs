@@ -5,9 +5,9 @@ use std::process::{Command, Output};
 
 use viewshed_harness::evaluation::bounds::{self, BOX};
 use viewshed_harness::evaluation::{self, samples};
-use viewshed_harness::experiment::hidden;
-use viewshed_harness::experiment::plan::Plan;
 use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::studies::experiment::hidden;
+use viewshed_harness::studies::experiment::plan::Plan;
 
 use crate::scene::{folder, json, replay, stderr, stdout};
 

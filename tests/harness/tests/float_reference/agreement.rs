@@ -11,9 +11,10 @@ mod tests {
 
     use rayon::prelude::*;
     use viewshed::map::{CellState, Visibility};
+    use viewshed_harness::estimators::Estimator;
     use viewshed_harness::estimators::{self, Options};
     use viewshed_harness::evaluation::samples::{self, FrameSamples};
-    use viewshed_harness::evaluation::score::{Estimator, Score, score};
+    use viewshed_harness::evaluation::score::{Score, score};
     use viewshed_harness::evaluation::{self, Grid};
     use viewshed_harness::recording::{ReadOptions, Recording, mcap};
 

@@ -7,7 +7,7 @@ use viewshed::map::{CellState, RoadPoint, VisibilityMap};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
-use viewshed_harness::evaluation::score::{Estimator, PolarCells};
+use viewshed_harness::estimators::{Estimator, PolarCells};
 use viewshed_harness::recording::Frame;
 
 use crate::evidence::InverseSensor;

@@ -7,7 +7,7 @@ use viewshed_harness::boards::check::{self, Checked};
 use viewshed_harness::boards::scans::Scan;
 use viewshed_harness::boards::{Board, Profile, Run, firmware, host, machine, stress};
 
-use viewshed_harness::output::OutputArgs;
+use viewshed_harness::results::files::OutputArgs;
 
 use crate::shipped;
 

@@ -10,8 +10,9 @@ use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, State};
 use viewshed_harness::boards::can::CanBoard;
-use viewshed_harness::boards::can_twin::{MEDIUM, SENSOR, Sent, Step, clusters, flashed, log};
+use viewshed_harness::boards::can_twin::{Sent, Step, clusters, flashed, log};
 use viewshed_harness::boards::listener::{Listener, Telling};
+use viewshed_harness::boards::listener::{MEDIUM, SENSOR};
 use viewshed_harness::boards::{Board, Profile, firmware};
 use viewshed_harness::recording::{self, ReadOptions};
 
