@@ -5,7 +5,7 @@
 mod common;
 
 use proptest::prelude::*;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
 use viewshed::unit::session::Flow;
 use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};

@@ -4,8 +4,8 @@
 
 mod common;
 
+use viewshed::fixed::time::Time;
 use viewshed::radar_3d::Radar3d;
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;

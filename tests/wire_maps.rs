@@ -7,9 +7,9 @@ mod shadows;
 use std::collections::VecDeque;
 
 use shadows::{A, Map, Shadows, W, header};
-use viewshed::map::RoadPoint;
-use viewshed::query::{self, Answer};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::map::query::{self, Answer};
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;

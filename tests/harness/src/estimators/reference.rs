@@ -4,13 +4,13 @@
 //! in azimuth, points in range and, exactly, the span of slopes a box covers in elevation.
 
 use anyhow::Result;
-use viewshed::axes::Axes;
+use viewshed::grid::axes::Axes;
+use viewshed::grid::raycast;
+use viewshed::grid::spherical::SphericalGrid;
 use viewshed::map::VisibilityMap;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::Radar3dParameters;
-use viewshed::raycast;
 use viewshed::sensor::Sensor;
-use viewshed::spherical::SphericalGrid;
 
 use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
 use super::{Estimator, PolarCells};

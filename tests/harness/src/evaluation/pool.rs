@@ -11,8 +11,8 @@ use super::score::{Score, Verdict};
 use super::summary::Summary;
 use super::units::BLOCK_NS;
 use crate::recording::problems::Problems;
-use crate::recording::{Frame, Recording};
 use crate::recording::truth::Truth;
+use crate::recording::{Frame, Recording};
 
 /// One recording's samples and scores by seconds from its first frame on.
 #[derive(Debug)]

@@ -12,11 +12,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::estimators;
+use crate::evaluation::Settings;
 use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::score;
-use crate::evaluation::Settings;
 use crate::recording::{Recording, mcap};
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;

@@ -1,10 +1,10 @@
 //! Which detections the estimators may use; every rejection is counted by its reason.
 
-use crate::angle::Angle;
-use crate::config::{ConfigError, above, within};
-use crate::detection::Detection;
-use crate::field_of_view::Limits;
-use crate::math;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::frame::detection::Detection;
+use crate::sensor::config::{ConfigError, above, within};
+use crate::sensor::field_of_view::Limits;
 
 /// Limits on single detections.
 ///
@@ -212,7 +212,7 @@ impl Gate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field_of_view::FieldOfView;
+    use crate::sensor::field_of_view::FieldOfView;
 
     fn gate(config: GateConfig) -> Gate {
         let view = FieldOfView {

@@ -9,10 +9,10 @@
 //! An object never hides itself: the cells of an occupied run count as blocking only once the ray
 //! has left the run. What stands on the far side of the run is hidden.
 
-use crate::axes::{Axes, SliceRow};
-use crate::polar::PolarMap;
-use crate::spherical::{Column, SphericalGrid};
-use crate::stack;
+use crate::grid::axes::{Axes, SliceRow};
+use crate::grid::spherical::{Column, SphericalGrid};
+use crate::grid::stack;
+use crate::map::polar::PolarMap;
 
 /// Occupancy from which a cell belongs to an object of its own.
 const OCCUPIED: u8 = 128;
@@ -171,12 +171,13 @@ impl Pair {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field_of_view::FieldOfView;
-    use crate::map::{RoadPoint, Visibility, VisibilityMap};
-    use crate::mount::Mount;
-    use crate::solid::Solid;
-    use crate::trig::Direction;
-    use crate::voxelise::voxelise;
+    use crate::fixed::trig::Direction;
+    use crate::grid::voxelise::voxelise;
+    use crate::map::{Visibility, VisibilityMap};
+    use crate::obstacles::solid::Solid;
+    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::mount::Mount;
+    use crate::sensor::road::RoadPoint;
     use std::format;
     use std::string::String;
 

@@ -4,20 +4,25 @@
 //! detections -> gate -> reflections on the ground -> Cartesian grid -> sightlines -> map
 //! ```
 
-use crate::cartesian::{CELL_CM, CartesianConfig, CartesianGrid, CartesianParameters, OCCUPIED};
-use crate::config::{ConfigError, within};
-use crate::detection::Detection;
-use crate::field_of_view::Limits;
-use crate::gate::{Gate, GateConfig, Rejections};
-use crate::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
-use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
-use crate::math;
-use crate::mount::Levelling;
-use crate::reflection::{Noise, Reflection};
-use crate::scan::Scan;
+pub mod cartesian;
+pub mod sightlines;
+
+use crate::fixed::math;
+use crate::fixed::time::{Step, Time};
+use crate::frame::detection::Detection;
+use crate::frame::gate::{Gate, GateConfig, Rejections};
+use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
+use crate::frame::reflection::Reflection;
+use crate::frame::scan::Scan;
+use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::radar_2d::cartesian::{CELL_CM, CartesianConfig, CartesianGrid, CartesianParameters, OCCUPIED};
+use crate::radar_2d::sightlines::{Fan, Sightlines};
 use crate::sensor::Sensor;
-use crate::sightlines::{Fan, Sightlines};
-use crate::time::{Step, Time};
+use crate::sensor::config::{ConfigError, within};
+use crate::sensor::field_of_view::Limits;
+use crate::sensor::mount::Levelling;
+use crate::sensor::noise::Noise;
+use crate::sensor::road::RoadPoint;
 
 /// Everything that can be set, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,30 +3,12 @@
 //! Evaluation, queries, pictures and fusion ask through [`VisibilityMap`] and never see the grid
 //! behind it, so polar radar maps, Cartesian maps and camera maps serve alike.
 
-/// A point on the road plane, in the road frame.
-///
-/// # Units
-/// Centimetres, x along the road, y to the left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RoadPoint {
-    /// Along the road.
-    pub x_cm: i32,
-    /// To the left.
-    pub y_cm: i32,
-}
+use crate::sensor::road::RoadPoint;
 
-impl RoadPoint {
-    /// From centimetres.
-    pub const fn new(x_cm: i32, y_cm: i32) -> Self {
-        Self { x_cm, y_cm }
-    }
-
-    /// Centre of the 1 m cell (i, j) = [i, i+1) x [j, j+1) metres.
-    pub const fn cell_centre(i: i32, j: i32) -> Self {
-        Self { x_cm: i.saturating_mul(100).saturating_add(50), y_cm: j.saturating_mul(100).saturating_add(50) }
-    }
-}
+pub mod bitmap;
+pub mod polar;
+pub mod query;
+pub mod resample;
 
 /// Whether the sensor can see a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

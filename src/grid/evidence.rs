@@ -24,14 +24,15 @@
 //! Slutsky and Dobkin, "Dual inverse sensor model for radar occupancy grids", IV 2019.
 //! Elfes, "Using occupancy grids for mobile robot perception and navigation", 1989.
 
-use crate::axes::Axes;
-use crate::config::{ConfigError, within};
-use crate::math;
-use crate::polar::PolarMap;
-use crate::raycast::BLOCKED;
-use crate::reflection::{NoiseConfig, Reflection};
-use crate::spherical::{Column, SphericalGrid};
-use crate::time::Step;
+use crate::fixed::math;
+use crate::fixed::time::Step;
+use crate::frame::reflection::Reflection;
+use crate::grid::axes::Axes;
+use crate::grid::raycast::BLOCKED;
+use crate::grid::spherical::{Column, SphericalGrid};
+use crate::map::polar::PolarMap;
+use crate::sensor::config::{ConfigError, within};
+use crate::sensor::noise::NoiseConfig;
 
 /// How evidence of unmoving things comes and goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -271,8 +272,8 @@ impl InverseSensor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field_of_view::FieldOfView;
-    use crate::mount::{Levelling, Mount};
+    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::mount::{Levelling, Mount};
 
     const VIEW: FieldOfView = FieldOfView {
         azimuth_min_deg: -30.0,
@@ -354,7 +355,7 @@ mod tests {
             x_cm: i32::from(ground_cm),
             y_cm: i32::from(ground_cm) / 8,
             ground_cm,
-            sight: crate::trig::Direction::AHEAD,
+            sight: crate::fixed::trig::Direction::AHEAD,
             radial_velocity_cm_s: 0,
             across_cm: 20,
             height_cm: None,

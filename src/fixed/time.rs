@@ -78,7 +78,7 @@ impl Step {
 
     /// Way made at a speed, in the speed's unit times seconds.
     pub const fn times(self, per_second: i32) -> i32 {
-        crate::math::mul_shift(per_second, self.0, 16)
+        crate::fixed::math::mul_shift(per_second, self.0, 16)
     }
 }
 

@@ -4,8 +4,8 @@
 //! every decoder converts to the convention fixed here: azimuth + left, elevation + up, radial
 //! velocity + receding.
 
-use crate::angle::Angle;
-use crate::math;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
 
 /// A detection, in the sensor frame (x along boresight, y left, z up).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,10 +2,10 @@
 
 use heapless::Vec;
 
-use crate::detection::Detection;
-use crate::gate::{Gate, Rejection, Rejections};
-use crate::health::Points;
-use crate::reflection::Reflection;
+use crate::frame::detection::Detection;
+use crate::frame::gate::{Gate, Rejection, Rejections};
+use crate::frame::health::Points;
+use crate::frame::reflection::Reflection;
 
 /// Up to `D` reflections, the strongest of the frame, in order of arrival.
 ///
@@ -159,11 +159,11 @@ impl Strongest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::Angle;
-    use crate::field_of_view::FieldOfView;
-    use crate::gate::GateConfig;
-    use crate::mount::Mount;
-    use crate::reflection::NoiseConfig;
+    use crate::fixed::angle::Angle;
+    use crate::frame::gate::GateConfig;
+    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::mount::Mount;
+    use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec as StdVec;
 
     fn scan<const D: usize>(strengths: &[i16]) -> Scan<D> {

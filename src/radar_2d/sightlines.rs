@@ -7,11 +7,11 @@
 //! Between the two lies the grade: the share of the ray's runs that are still to come,
 //! `grade = 255 (n - k) / n` behind the k-th of n runs. A threshold at its ends is either reading.
 
-use crate::angle::Angle;
-use crate::bits::RangeBits;
-use crate::field_of_view::Limits;
-use crate::math;
-use crate::trig;
+use crate::fixed::angle::Angle;
+use crate::fixed::bits::RangeBits;
+use crate::fixed::math;
+use crate::fixed::trig;
+use crate::sensor::field_of_view::Limits;
 
 /// Grade of a place behind every run.
 const BLOCKED: u8 = 1;

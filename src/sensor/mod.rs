@@ -1,8 +1,14 @@
 //! A sensor as it is installed: what the integrator measures and reads off the data sheet.
 
-use crate::field_of_view::FieldOfView;
-use crate::mount::Mount;
-use crate::reflection::NoiseConfig;
+pub mod config;
+pub mod field_of_view;
+pub mod mount;
+pub mod noise;
+pub mod road;
+
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Mount;
+use crate::sensor::noise::NoiseConfig;
 
 /// Where a sensor stands, what it could see, and how well it measures.
 #[derive(Debug, Clone, Copy, PartialEq)]

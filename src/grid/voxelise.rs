@@ -6,10 +6,10 @@
 //! result is graded towards the edges. Within a column the box reaches from where the ray enters to
 //! where it leaves; each of its stacks is filled up to the steepest slope its top is seen under.
 
-use crate::axes::Axes;
-use crate::solid::Solid;
-use crate::spherical::SphericalGrid;
-use crate::trig;
+use crate::fixed::trig;
+use crate::grid::axes::Axes;
+use crate::grid::spherical::SphericalGrid;
+use crate::obstacles::solid::Solid;
 
 /// Half the window a column's coverage is taken over, 2^-8 columns.
 const WINDOW: i32 = 64;
@@ -64,9 +64,9 @@ fn outline<const R: usize, const A: usize, const E: usize>(solid: &Solid, axes: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field_of_view::FieldOfView;
-    use crate::mount::Mount;
-    use crate::trig::Direction;
+    use crate::fixed::trig::Direction;
+    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::mount::Mount;
     use std::vec::Vec;
 
     /// Rows (2^-8) up to which a box 25 to 35 m ahead fills the second column, by range cell; and up to which its

@@ -4,11 +4,11 @@
 //! below the sensor, x along the boresight's heading, y left, z up: a line of sight is still one
 //! constant (azimuth, slope), and the slice plane is level for every azimuth.
 
-use crate::angle::Angle;
-use crate::config::{ConfigError, within};
-use crate::map::RoadPoint;
-use crate::math;
-use crate::trig::{self, Direction};
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig::{self, Direction};
+use crate::sensor::config::{ConfigError, within};
+use crate::sensor::road::RoadPoint;
 
 /// Mounting pose in the road frame.
 ///

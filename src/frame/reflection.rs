@@ -4,73 +4,12 @@
 //! is noisy (1 degree is 2.6 m at 150 m), so the *place* is taken where range and azimuth meet a
 //! usual reflector height, and the *height* is kept beside it as measured.
 
-use crate::angle::Angle;
-use crate::config::{ConfigError, within};
-use crate::detection::Detection;
-use crate::math;
-use crate::mount::Levelling;
-use crate::trig::{self, Direction, ONE};
-
-/// How well the sensor measures; from its data sheet.
-///
-/// # Units
-/// Standard deviations in metres and degrees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct NoiseConfig {
-    /// Range.
-    pub range_m: f32,
-    /// Azimuth.
-    pub azimuth_deg: f32,
-    /// Elevation.
-    pub elevation_deg: f32,
-    /// Radial velocity, m/s.
-    pub radial_velocity_mps: f32,
-    /// Height above the road at which vehicles usually reflect (bumpers, axles, plates).
-    pub reflector_height_m: f32,
-}
-
-impl Default for NoiseConfig {
-    fn default() -> Self {
-        Self { range_m: 0.25, azimuth_deg: 0.5, elevation_deg: 1.0, radial_velocity_mps: 0.15, reflector_height_m: 0.8 }
-    }
-}
-
-/// The noise model in integers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Noise {
-    /// Range, centimetres.
-    pub range_cm: i32,
-    /// Azimuth, 2^-16 rad.
-    azimuth: i32,
-    /// Elevation, 2^-16 rad.
-    elevation: i32,
-    /// Radial velocity, cm/s.
-    pub radial_velocity_cm_s: i32,
-    reflector_height_cm: i32,
-}
-
-impl NoiseConfig {
-    /// Checks the figures and rounds them.
-    ///
-    /// # Errors
-    /// Names the parameter outside its limits.
-    pub fn noise(&self) -> Result<Noise, ConfigError> {
-        let angle = |degrees: f32| math::round_i32(degrees.to_radians() * 65536.0);
-        Ok(Noise {
-            range_cm: math::round_i32(within("noise.range_m", self.range_m, 0.01, 5.0)? * 100.0),
-            azimuth: angle(within("noise.azimuth_deg", self.azimuth_deg, 0.01, 10.0)?),
-            elevation: angle(within("noise.elevation_deg", self.elevation_deg, 0.01, 20.0)?),
-            radial_velocity_cm_s: math::round_i32(
-                within("noise.radial_velocity_mps", self.radial_velocity_mps, 0.01, 5.0)? * 100.0,
-            ),
-            reflector_height_cm: math::round_i32(
-                within("noise.reflector_height_m", self.reflector_height_m, 0.0, 3.0)? * 100.0,
-            ),
-        })
-    }
-}
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig::{self, Direction, ONE};
+use crate::frame::detection::Detection;
+use crate::sensor::mount::Levelling;
+use crate::sensor::noise::Noise;
 
 /// A reflection point on the road.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,7 +103,7 @@ fn meet_height(fall: i32, ahead: i32, up: i32) -> (i32, i32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mount::Mount;
+    use crate::sensor::mount::Mount;
 
     fn place(range_m: f32, azimuth_deg: f32, elevation_deg: Option<f32>, pitch_deg: f32) -> Reflection {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };

@@ -1,11 +1,11 @@
 //! The polar result: graded visibility and occupancy at slice height, azimuth by ground range.
 
-use crate::angle::Angle;
-use crate::axes::Axes;
-use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
-use crate::math;
-use crate::mount::Levelling;
-use crate::trig;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig;
+use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::sensor::mount::Levelling;
+use crate::sensor::road::RoadPoint;
 
 /// Grade of a cell nobody has evidence for.
 const UNKNOWN: u8 = 0;
@@ -130,18 +130,6 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
     }
 }
 
-impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
-    /// The geometry of the maps cast on these axes.
-    pub fn polar(&self, levelling: &Levelling) -> PolarGeometry {
-        PolarGeometry {
-            levelling: *levelling,
-            cell_cm: self.cell_cm,
-            azimuth_origin: self.azimuth_origin,
-            azimuth_span: self.azimuth_span,
-        }
-    }
-}
-
 impl<const R: usize, const A: usize> VisibilityMap for PolarMap<R, A> {
     /// The nearest cell's state, never a better neighbour's.
     fn at(&self, point: RoadPoint) -> CellState {
@@ -153,7 +141,7 @@ impl<const R: usize, const A: usize> VisibilityMap for PolarMap<R, A> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mount::Mount;
+    use crate::sensor::mount::Mount;
 
     /// 10 azimuths of 9 degrees from 45 degrees to the right on, 20 ranges of 2 m; a sensor at (5, -3) m.
     fn map() -> PolarMap<20, 10> {

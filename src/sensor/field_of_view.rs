@@ -1,9 +1,9 @@
 //! The static field of view: where the sensor could detect under ideal conditions.
 
-use crate::angle::Angle;
-use crate::config::{ConfigError, above, within};
-use crate::math;
-use crate::trig;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig;
+use crate::sensor::config::{ConfigError, above, within};
 
 /// Longest range a field of view may have, metres: squares of centimetres stay in 32 bits.
 pub const MAX_RANGE_M: f32 = 400.0;

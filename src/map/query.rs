@@ -1,7 +1,8 @@
 //! Questions a consumer asks a map: what of this point, this object, this area?
 
-use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
-use crate::trig::Direction;
+use crate::fixed::trig::Direction;
+use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::sensor::road::RoadPoint;
 
 /// What a map answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -116,8 +117,8 @@ impl Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::Angle;
-    use crate::trig;
+    use crate::fixed::angle::Angle;
+    use crate::fixed::trig;
     use std::vec::Vec;
 
     /// Visible for x < 10 m, free but for the cell at (5, 2); unknown for y < 0.

@@ -6,8 +6,8 @@
 //! cells of one azimuth and range lie together (a *stack*), so a box is a run of filled stacks and
 //! a ray over all elevations is a byte-wise running maximum. Empty stacks are skipped by bit rows.
 
-use crate::bits::Bits;
-use crate::stack;
+use crate::fixed::bits::Bits;
+use crate::grid::stack;
 
 /// Occupancy around one sensor: `R` ranges, `A` azimuths, `E` elevations; `W` words of 32 bits tell
 /// which of the `R` stacks of an azimuth hold something.

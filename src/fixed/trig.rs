@@ -5,8 +5,8 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
-use crate::angle::Angle;
-use crate::math;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
 
 /// A direction in the plane: cosine and sine.
 ///

@@ -11,14 +11,15 @@
 //! # References
 //! Elfes, "Using occupancy grids for mobile robot perception and navigation", Computer 22(6), 1989.
 
-use crate::bits::Bits;
-use crate::config::{ConfigError, Problem, within};
-use crate::map::RoadPoint;
-use crate::math;
-use crate::mount::Levelling;
-use crate::reflection::{Noise, Reflection};
-use crate::time::Step;
-use crate::trig::ONE;
+use crate::fixed::bits::Bits;
+use crate::fixed::math;
+use crate::fixed::time::Step;
+use crate::fixed::trig::ONE;
+use crate::frame::reflection::Reflection;
+use crate::sensor::config::{ConfigError, Problem, within};
+use crate::sensor::mount::Levelling;
+use crate::sensor::noise::Noise;
+use crate::sensor::road::RoadPoint;
 
 /// Side of a cell, centimetres.
 pub const CELL_CM: i32 = 100;

@@ -1,6 +1,7 @@
 //! Any map onto the Cartesian 1 m grid of the road: the nearest cell, never a better one.
 
-use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::sensor::road::RoadPoint;
 
 /// `NX` by `NY` cells of one metre; the first covers [x, x + 1) by [y, y + 1) metres.
 ///

@@ -8,12 +8,13 @@
 //! `(sqrt(near) + k (sqrt(far) - sqrt(near)) / E)^2`. Uniform rows would spend most of their number
 //! on sky: from 6 m, one of 2 degrees covers the road from 71 to 143 m.
 
-use crate::angle::Angle;
-use crate::config::{ConfigError, Problem, within};
-use crate::field_of_view::FieldOfView;
-use crate::math;
-use crate::mount::Levelling;
-use crate::trig::Direction;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig::Direction;
+use crate::map::polar::PolarGeometry;
+use crate::sensor::config::{ConfigError, Problem, within};
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Levelling;
 
 /// Fraction bits of a slope.
 const SLOPE_BITS: u32 = 18;
@@ -72,7 +73,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// # Errors
     /// A field of view that the slice plane never enters.
     pub fn new(levelling: &Levelling, view: &FieldOfView, slice_height_m: f32) -> Result<Self, ConfigError> {
-        const { assert!(R <= crate::bits::RangeBits::CAPACITY && R >= 2 && A >= 2 && E >= 2 && A <= 512 && E <= 64) }
+        const { assert!(R <= crate::fixed::bits::RangeBits::CAPACITY && R >= 2 && A >= 2 && E >= 2 && A <= 512 && E <= 64) }
         let limits = view.limits()?;
         within("visibility.slice_height_m", slice_height_m, 0.0, 10.0)?;
         let cell_cm = (limits.range_cm[1] + R as i32 - 1) / R as i32;
@@ -182,6 +183,16 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         }
     }
 
+    /// The geometry of the maps cast on these axes.
+    pub fn polar(&self, levelling: &Levelling) -> PolarGeometry {
+        PolarGeometry {
+            levelling: *levelling,
+            cell_cm: self.cell_cm,
+            azimuth_origin: self.azimuth_origin,
+            azimuth_span: self.azimuth_span,
+        }
+    }
+
     /// Height the slopes are taken from, centimetres.
     pub fn sensor_height_cm(&self) -> i32 {
         self.height_cm
@@ -251,7 +262,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Direction of a column's centre.
     pub fn column_direction(&self, column: usize) -> Direction {
-        crate::trig::direction(self.azimuth_of(column as i32 * 256 + 128))
+        crate::fixed::trig::direction(self.azimuth_of(column as i32 * 256 + 128))
     }
 
     /// Range cell of a ground distance.
@@ -310,7 +321,7 @@ fn part_of(slope: i32, height: i32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mount::Mount;
+    use crate::sensor::mount::Mount;
 
     fn axes(height_m: f32, pitch_deg: f32) -> Axes<200, 120, 16> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };

@@ -6,8 +6,8 @@
 //! right (not finite, in another unit, all outside the field of view), the sensor or its mount is not
 //! what it is taken for, and everything is unknown from the first such run on.
 
-use crate::config::{ConfigError, within};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, within};
 
 /// When maps end.
 ///
@@ -47,7 +47,7 @@ impl HealthConfig {
     /// Names the parameter outside its limits.
     #[allow(clippy::cast_sign_loss)] // limits are positive
     pub fn limits(&self) -> Result<HealthLimits, ConfigError> {
-        let micros = |name, v| within(name, v, 0.01, 60.0).map(|s: f32| crate::math::round_i32(s * 1e6) as u64);
+        let micros = |name, v| within(name, v, 0.01, 60.0).map(|s: f32| crate::fixed::math::round_i32(s * 1e6) as u64);
         Ok(HealthLimits {
             hold_us: micros("health.hold_s", self.hold_s)?,
             blind_after_us: micros("health.blind_after_s", self.blind_after_s)?,
@@ -78,7 +78,7 @@ pub enum Condition {
 pub struct FrameStatus {
     /// The sensor's own fault flag.
     pub fault: bool,
-    /// Points that are no detections, see [`NotADetection`](crate::detection::NotADetection): whoever
+    /// Points that are no detections, see [`NotADetection`](crate::frame::detection::NotADetection): whoever
     /// decodes a frame drops them and counts them here.
     pub refused: u16,
 }

@@ -1,8 +1,8 @@
 //! The compact visibility bitmap: three states a cell in two bits.
 
-use crate::bits::RangeBits;
+use crate::fixed::bits::RangeBits;
 use crate::map::Visibility;
-use crate::polar::PolarMap;
+use crate::map::polar::PolarMap;
 
 /// Visibility of `A` azimuths by `R` ranges.
 ///

@@ -3,7 +3,7 @@
 use core::f32::consts::TAU;
 use core::ops::{Add, Neg, Sub};
 
-use crate::math;
+use crate::fixed::math;
 
 /// An angle in [-half a turn, half a turn).
 ///

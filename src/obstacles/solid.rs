@@ -1,6 +1,6 @@
 //! Upright boxes on the road, in the levelled frame: what obstacles become for the grid.
 
-use crate::trig::Direction;
+use crate::fixed::trig::Direction;
 
 /// An upright box standing on the road.
 ///
@@ -74,8 +74,8 @@ fn scaled(d: Direction, length: i32) -> (i32, i32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::Angle;
-    use crate::trig;
+    use crate::fixed::angle::Angle;
+    use crate::fixed::trig;
 
     fn truck(x_cm: i32, y_cm: i32, heading_deg: f32) -> Solid {
         Solid {
