@@ -105,7 +105,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         axes.lay_columns(&in_view).ok_or(ConfigError {
             parameter: "field_of_view.elevation_min_deg",
             value: view.elevation_min_deg,
-            problem: Problem::OutOfLimits { min: -85.0, max: 85.0 },
+            problem: Problem::NothingInView,
         })?;
         axes.find_view(&in_view);
         axes.lay_rows(drop);
@@ -391,6 +391,7 @@ mod tests {
             range_max_m: 100.0,
         };
         let e = Axes::<100, 64, 8>::new(&mount.levelling().unwrap(), &view, 1.0).unwrap_err();
-        assert_eq!(e.parameter, "field_of_view.elevation_min_deg");
+        let said = "field_of_view.elevation_min_deg is -5: with this mount no point at slice height is in view, check height and pitch";
+        assert_eq!(std::format!("{e}"), said);
     }
 }

@@ -54,7 +54,7 @@ const TABLE: usize = 36;
 pub struct CartesianParameters {
     /// Peak times exp(-x^2 / 2) by x^2 in sixteenths.
     gaussian: [u8; TABLE],
-    /// Occupancy lost in a second.
+    /// Occupancy lost in a second, 2^-8.
     loss: i32,
     /// First cell along and across the road.
     origin: (i32, i32),
@@ -91,7 +91,7 @@ impl CartesianConfig {
         }
         Ok(CartesianParameters {
             gaussian,
-            loss: math::round_i32(255.0 / memory),
+            loss: math::round_i32(255.0 * 256.0 / memory),
             origin: (low.0 - spare_x / 2, low.1 - spare_y / 2),
         })
     }
@@ -101,6 +101,8 @@ impl CartesianConfig {
 #[derive(Debug, Clone)]
 pub struct CartesianGrid<const NX: usize, const NW: usize> {
     rows: [Row<NW>; NX],
+    /// Occupancy that is still to be taken from every cell, 2^-16.
+    owed: i32,
 }
 
 /// The cells of one metre along the road, from right to left.
@@ -138,7 +140,7 @@ impl<const NX: usize, const NW: usize> CartesianGrid<NX, NW> {
     /// Nothing occupied.
     pub const fn new() -> Self {
         const { assert!(NW <= Bits::<2>::CAPACITY) }
-        Self { rows: [const { Row { words: [0; NW], used: Bits::NONE } }; NX] }
+        Self { rows: [const { Row { words: [0; NW], used: Bits::NONE } }; NX], owed: 0 }
     }
 
     /// Forgets everything.
@@ -147,11 +149,15 @@ impl<const NX: usize, const NW: usize> CartesianGrid<NX, NW> {
             row.words = [0; NW];
             row.used = Bits::NONE;
         }
+        self.owed = 0;
     }
 
     /// Lets everything fade by a time step.
     pub fn fade(&mut self, step: Step, p: &CartesianParameters) {
-        let loss = step.times(p.loss).clamp(0, 255) as u8;
+        let lost = (i64::from(p.loss) * i64::from(step.raw())) >> 8;
+        let owed = i64::from(self.owed) + lost.clamp(0, 255 << 16);
+        self.owed = (owed & 0xFFFF) as i32;
+        let loss = (owed >> 16).min(255) as u8;
         for row in &mut self.rows {
             let mut from = 0;
             while let Some(i) = row.used.next(from) {
@@ -245,6 +251,26 @@ impl<const NW: usize> Row<NW> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn full_occupancy_fades_in_its_memory_at_any_frame_rate() {
+        for memory_s in [0.4_f32, 3.0, 60.0] {
+            for frames in [5, 15, 50] {
+                let corners = [RoadPoint::new(0, -300), RoadPoint::new(900, 300)].into_iter();
+                let config = CartesianConfig { memory_s, ..CartesianConfig::default() };
+                let p = config.parameters::<16, 2>(corners, 10.0).unwrap();
+                let mut grid = CartesianGrid::<16, 2>::new();
+                grid.rows[3].add(5, 255);
+                let mut lasted = 0;
+                while grid.rows[3].words[0] != 0 {
+                    grid.fade(Step::from_micros(1_000_000 / frames), &p);
+                    lasted += 1;
+                }
+                let error_s = lasted as f32 / frames as f32 - memory_s;
+                assert!(error_s.abs() < 0.01 * memory_s + 1.01 / frames as f32, "{memory_s} s at {frames}: {error_s}");
+            }
+        }
+    }
 
     #[test]
     fn eight_cells_fade_as_one_does() {

@@ -25,10 +25,17 @@ pub enum Problem {
         /// Largest value allowed.
         max: f32,
     },
+    /// With this mount nothing at slice height is in view.
+    NothingInView,
     /// Not above its lower neighbour.
     NotAscending {
         /// The neighbour's value.
         lower: f32,
+    },
+    /// A bit rate that no divider of a controller's clock meets.
+    NoDivider {
+        /// The clock.
+        clock_hz: u32,
     },
 }
 
@@ -38,7 +45,14 @@ impl core::fmt::Display for ConfigError {
         match problem {
             Problem::NotFinite => write!(f, "{parameter} is {value}, not a finite number"),
             Problem::OutOfLimits { min, max } => write!(f, "{parameter} is {value}, outside {min} to {max}"),
+            Problem::NothingInView => write!(
+                f,
+                "{parameter} is {value}: with this mount no point at slice height is in view, check height and pitch"
+            ),
             Problem::NotAscending { lower } => write!(f, "{parameter} is {value}, not above {lower}"),
+            Problem::NoDivider { clock_hz } => {
+                write!(f, "{parameter} is {value}, which no divider of {clock_hz} Hz meets")
+            }
         }
     }
 }

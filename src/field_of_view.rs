@@ -93,6 +93,15 @@ impl Limits {
             && within(trig::bearing(x, y), self.azimuth)
             && within(trig::bearing(ground, z), self.elevation)
     }
+
+    /// Whether a sensor-frame point, centimetres, lies between the azimuths and not above the upper limit.
+    #[allow(clippy::cast_possible_truncation)] // roots of 64-bit squares fit
+    pub fn reaches(&self, [x, y, z]: [i32; 3]) -> bool {
+        let square = |v: i32| i64::from(v) * i64::from(v);
+        let ground = (square(x) + square(y)).unsigned_abs().isqrt() as i32;
+        let azimuth = trig::bearing(x, y);
+        azimuth >= self.azimuth[0] && azimuth <= self.azimuth[1] && trig::bearing(ground, z) <= self.elevation[1]
+    }
 }
 
 #[cfg(test)]

@@ -60,12 +60,22 @@ pub enum Rejection {
     Velocity,
     /// The list was full of stronger detections.
     Overflow,
+    /// No detection at all: not finite, at no distance, or absurd. Dropped by whoever decoded it.
+    Refused,
 }
 
 impl Rejection {
     /// Every reason, in the order of `Rejections::counts`.
-    pub const ALL: [Self; 7] =
-        [Self::Range, Self::Azimuth, Self::Elevation, Self::Quality, Self::Rcs, Self::Velocity, Self::Overflow];
+    pub const ALL: [Self; 8] = [
+        Self::Range,
+        Self::Azimuth,
+        Self::Elevation,
+        Self::Quality,
+        Self::Rcs,
+        Self::Velocity,
+        Self::Overflow,
+        Self::Refused,
+    ];
 
     /// Short name for reports.
     pub const fn name(self) -> &'static str {
@@ -77,6 +87,7 @@ impl Rejection {
             Self::Rcs => "rcs",
             Self::Velocity => "velocity",
             Self::Overflow => "overflow",
+            Self::Refused => "no detection",
         }
     }
 }
@@ -94,8 +105,13 @@ impl Rejections {
 
     /// Counts one.
     pub fn add(&mut self, reason: Rejection) {
+        self.add_many(reason, 1);
+    }
+
+    /// Counts so many.
+    pub fn add_many(&mut self, reason: Rejection, count: u32) {
         if let Some(n) = self.counts.get_mut(reason as usize) {
-            *n = n.saturating_add(1);
+            *n = n.saturating_add(count);
         }
     }
 
@@ -109,6 +125,12 @@ impl Rejections {
     /// Count of one reason.
     pub fn count(&self, reason: Rejection) -> u32 {
         self.counts.get(reason as usize).copied().unwrap_or(0)
+    }
+
+    /// Of these, points outside the field of view.
+    pub fn outside(&self) -> u32 {
+        let outside = [Rejection::Range, Rejection::Azimuth, Rejection::Elevation];
+        outside.iter().fold(0, |sum: u32, reason| sum.saturating_add(self.count(*reason)))
     }
 
     /// Sum over all reasons.

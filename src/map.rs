@@ -46,7 +46,7 @@ pub enum Visibility {
 pub struct CellState {
     /// Whether the sensor can see it.
     pub visibility: Visibility,
-    /// Graded visibility, 0 (blocked) to 255 (clear); 0 where unknown.
+    /// Graded visibility, 1 (blocked) to 255 (clear); 0 where unknown.
     pub grade: u8,
     /// Occupancy at the slice height, 0 (free) to 255 (occupied); 0 where unknown.
     pub occupancy: u8,

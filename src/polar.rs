@@ -149,3 +149,60 @@ impl<const R: usize, const A: usize> VisibilityMap for PolarMap<R, A> {
         self.locate(x, y).map_or(CellState::UNKNOWN, |(a, r)| self.cell(a, r))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mount::Mount;
+
+    /// 10 azimuths of 9 degrees from 45 degrees to the right on, 20 ranges of 2 m; a sensor at (5, -3) m.
+    fn map() -> PolarMap<20, 10> {
+        let mount = Mount { x_m: 5.0, y_m: -3.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+        let levelling = mount.levelling().unwrap();
+        let geometry = PolarGeometry {
+            levelling,
+            cell_cm: 200,
+            azimuth_origin: Angle::from_degrees(-45.0),
+            azimuth_span: Angle::QUARTER.raw().unsigned_abs(),
+        };
+        PolarMap::unknown(geometry, 100, 50)
+    }
+
+    #[test]
+    fn azimuths_run_from_right_to_left_and_ranges_from_near_to_far() {
+        let m = map();
+        assert_eq!(m.locate(1000, -900), Some((0, 6)), "42 degrees to the right");
+        assert_eq!(m.locate(1000, 900), Some((9, 6)), "to the left");
+        assert_eq!(m.locate(3000, 100), Some((5, 15)));
+        assert_eq!(m.locate(1000, 1100), None, "48 degrees to the left");
+        assert_eq!(m.locate(1000, -1100), None);
+        assert_eq!(m.locate(3999, 0), Some((5, 19)));
+        assert_eq!(m.locate(4000, 0), None, "beyond the last cell");
+    }
+
+    #[test]
+    fn a_cell_is_what_its_grade_and_its_occupancy_say() {
+        let mut m = map();
+        let (grades, occupancy) = m.rows_mut(4).unwrap();
+        (grades[..5].copy_from_slice(&[0, 1, 99, 100, 255]), occupancy[..5].copy_from_slice(&[200, 49, 50, 0, 255]));
+        let cells: std::vec::Vec<CellState> = (0..5).map(|r| m.cell(4, r)).collect();
+        assert_eq!(cells[0], CellState::UNKNOWN, "whatever its occupancy");
+        use Visibility::{Invisible, Visible};
+        let expected = [(Invisible, false, 1, 49), (Invisible, true, 99, 50), (Visible, false, 100, 0)];
+        for (cell, (visibility, occupied, grade, occupancy)) in cells[1..].iter().zip(expected) {
+            assert_eq!(*cell, CellState { visibility, grade, occupancy, occupied });
+        }
+        assert!(cells[4].visible() && cells[4].occupied);
+        assert_eq!((m.cell(10, 0), m.cell(0, 20)), (CellState::UNKNOWN, CellState::UNKNOWN));
+        m.forget();
+        assert_eq!((m.cell(4, 4), m.occupancy(4)), (CellState::UNKNOWN, Some(&[0; 20])));
+    }
+
+    #[test]
+    fn a_road_point_is_looked_up_from_where_the_sensor_hangs() {
+        let mut m = map();
+        m.rows_mut(5).unwrap().0[15] = 255;
+        assert!(m.at(RoadPoint::new(3500, -200)).visible(), "30 m ahead, 1 m to the left");
+        assert!(!m.at(RoadPoint::new(3000, 100)).visible());
+    }
+}

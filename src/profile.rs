@@ -22,6 +22,10 @@ macro_rules! size {
                 crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
             }
 
+            /// Whether a unit of this size can run with settings.
+            pub const CHECK: crate::unit::stored::Check =
+                crate::unit::stored::Check::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS>();
+
             /// The estimator.
             pub type State = $state;
             /// What it works with.

@@ -9,11 +9,11 @@ use crate::config::{ConfigError, within};
 use crate::detection::Detection;
 use crate::field_of_view::Limits;
 use crate::gate::{Gate, GateConfig, Rejections};
-use crate::health::{Condition, Continuity, Health, HealthConfig, HealthLimits};
+use crate::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
 use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
 use crate::math;
 use crate::mount::Levelling;
-use crate::reflection::Noise;
+use crate::reflection::{Noise, Reflection};
 use crate::scan::Scan;
 use crate::sensor::Sensor;
 use crate::sightlines::{Fan, Sightlines};
@@ -86,6 +86,14 @@ impl Radar2dParameters {
     }
 }
 
+impl Radar2dParameters {
+    /// Whether a place lies below the field of view's upper limit: what is nearer than the view reflects as well.
+    fn reaches(&self, r: &Reflection) -> bool {
+        let place = [r.x_cm, r.y_cm, self.slice_height_cm - self.levelling.height_cm];
+        self.view.reaches(self.levelling.unlevel(place))
+    }
+}
+
 /// Which places behind an occupied one count as visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -135,17 +143,21 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         self.known = false;
     }
 
-    /// Takes a radar frame. `fault` is the sensor's own flag.
+    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the
+    /// number of points that are no detections.
     pub fn process<'a>(
         &mut self,
         p: &Radar2dParameters,
         now: Time,
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
-        fault: bool,
+        status: impl Into<FrameStatus>,
     ) -> Condition {
-        let reported = self.scan.gather(detections.into_iter(), &p.gate, |d| p.noise.place_flat(d, &p.levelling));
+        let FrameStatus { fault, refused } = status.into();
+        let place = |d: &Detection| p.noise.place_flat(d, &p.levelling);
+        let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
         self.rejections.add_all(self.scan.rejections());
-        match self.health.frame(now, reported, fault, &p.health) {
+        let points = self.scan.within_reach(points, |r| p.reaches(r));
+        match self.health.frame(now, &points, fault, &p.health) {
             Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros), &p.cartesian),
             Continuity::First => {}
             Continuity::Gap | Continuity::ClockStepped => self.grid.clear(),

@@ -18,7 +18,7 @@ use crate::stack;
 const OCCUPIED: u8 = 128;
 
 /// Grade of a cell that is known and blocked.
-const BLOCKED: u8 = 1;
+pub(crate) const BLOCKED: u8 = 1;
 
 /// Casts all rays and writes the visibility and occupancy at slice height. Cells out of view stay
 /// unknown.

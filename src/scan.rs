@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use crate::detection::Detection;
 use crate::gate::{Gate, Rejection, Rejections};
+use crate::health::Points;
 use crate::reflection::Reflection;
 
 /// Up to `D` reflections, the strongest of the frame, in order of arrival.
@@ -31,23 +32,25 @@ impl<const D: usize> Scan<D> {
     }
 
     /// Takes the detections of a frame that pass the gate, as `place` places them, in the place of the last
-    /// frame's, and counts why others do not. Returns how many there were.
+    /// frame's, and counts why others do not, the `refused` points among them. Returns where all of them were.
     pub fn gather<'a>(
         &mut self,
         detections: impl Iterator<Item = &'a Detection> + Clone,
+        refused: u16,
         gate: &Gate,
         place: impl Fn(&Detection) -> Reflection,
-    ) -> usize {
+    ) -> Points {
         self.reflections.clear();
         self.rejections = Rejections::NONE;
+        self.rejections.add_many(Rejection::Refused, refused.into());
         let room = D.min(gate.max_detections);
         let mut kept: Vec<&Detection, D, u16> = Vec::new();
         let mut strengths = Strengths([0; STEPS]);
-        let (mut reported, mut passed) = (0, 0);
+        let (mut reported, mut passed) = (0_u32, 0);
         let mut arriving = detections;
         let mut late = None;
         while let Some(d) = arriving.next() {
-            reported += 1;
+            reported = reported.saturating_add(1);
             if let Err(reason) = gate.judge(d) {
                 self.rejections.add(reason);
                 continue;
@@ -75,7 +78,19 @@ impl<const D: usize> Scan<D> {
         for d in kept {
             let _ = self.reflections.push(place(d));
         }
-        reported
+        let outside = self.rejections.outside();
+        Points { inside: reported.saturating_sub(outside), outside, refused: refused.into() }
+    }
+
+    /// The same points, where a wrong mount puts all that were kept where no map reaches: they lie outside.
+    pub fn within_reach(&self, points: Points, reach: impl Fn(&Reflection) -> bool) -> Points {
+        if self.reflections.iter().any(reach) {
+            return points;
+        }
+        let kept = u32::try_from(self.reflections.len())
+            .unwrap_or(u32::MAX)
+            .saturating_add(self.rejections.count(Rejection::Overflow));
+        Points { inside: points.inside.saturating_sub(kept), outside: points.outside.saturating_add(kept), ..points }
     }
 
     /// What was kept.
@@ -176,8 +191,9 @@ mod tests {
             .collect();
         let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
         let mut scan = Scan::new();
-        let reported = scan.gather(detections.iter(), &gate, |d| noise.place(d, &levelling));
-        assert_eq!(reported, strengths.len());
+        let points = scan.gather(detections.iter(), 7, &gate, |d| noise.place(d, &levelling));
+        assert_eq!(points, Points { inside: strengths.len() as u32, outside: 0, refused: 7 });
+        assert_eq!(scan.rejections().count(Rejection::Refused), 7);
         scan
     }
 

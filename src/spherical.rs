@@ -17,7 +17,13 @@ use crate::stack;
 #[derive(Debug, Clone)]
 pub struct SphericalGrid<const R: usize, const A: usize, const E: usize, const W: usize = 8> {
     columns: [Column<R, E, W>; A],
+    /// What is added before rounding down, 2^-32; another for every change.
+    rounding: u32,
 }
+
+/// The golden ratio's fraction, 2^-32: its multiples fill a circle more evenly than any other's, so that
+/// among any so many of them the right share lies below any bound, to one.
+const GOLDEN: u32 = 0x9E37_79B9;
 
 /// All cells of one azimuth.
 #[derive(Debug, Clone)]
@@ -39,7 +45,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize> SphericalGr
     /// Nothing occupied.
     pub const fn new() -> Self {
         const { assert!(R <= Bits::<W>::CAPACITY) }
-        Self { columns: [const { Column::EMPTY }; A] }
+        Self { columns: [const { Column::EMPTY }; A], rounding: 0 }
     }
 
     /// Forgets everything.
@@ -47,6 +53,15 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize> SphericalGr
         for c in &mut self.columns {
             c.clear();
         }
+        self.rounding = 0;
+    }
+
+    /// What is to be added before rounding down so that over the changes nothing is lost or won, 2^-32. A
+    /// cell is a byte and what it loses in a frame may be a thousandth of a step: it loses a step in one
+    /// frame of a thousand.
+    pub fn next_rounding(&mut self) -> u32 {
+        self.rounding = self.rounding.wrapping_add(GOLDEN);
+        self.rounding
     }
 
     /// All columns, from right to left.
@@ -101,13 +116,15 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
         self.used.iter().filter_map(|r| self.stacks.get(r).map(|s| (r, s)))
     }
 
-    /// Changes every stack that holds something; one left empty is skipped from then on.
+    /// Changes every stack that holds something; one left with less than 8 in every cell is emptied and
+    /// skipped from then on.
     pub fn change(&mut self, mut change: impl FnMut(usize, &mut [u8; E])) {
         let used = self.used;
         for r in used.iter() {
             let Some(s) = self.stacks.get_mut(r) else { continue };
             change(r, s);
-            if stack::is_empty(s) {
+            if stack::is_faint(s) {
+                *s = [0; E];
                 self.used.clear(r);
             }
         }
@@ -174,8 +191,11 @@ mod tests {
         g.remove_solids();
         let c = g.column_mut(0).unwrap();
         assert_eq!(c.stacks().collect::<Vec<_>>(), [(1, &[90, 0])]);
-        c.change(|_, s| s[0] = 0);
+        c.change(|_, s| s[0] = 8);
+        assert_eq!(c.stacks().count(), 1);
+        c.change(|_, s| s[0] = 7);
         assert_eq!(c.stacks().count(), 0);
+        assert_eq!(c.evidence(1), Some(&mut [0, 0]), "and nothing of it comes back");
     }
 
     #[test]

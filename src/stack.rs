@@ -1,5 +1,16 @@
 //! A stack of the grid taken four cells at a time, as controllers without vectors like it.
 
+/// Evidence below this is as good as none: 3 % of full. As a mask of what is.
+const FAINT: u32 = !0x0707_0707;
+
+/// Whether no cell of a stack holds 8 or more.
+#[inline]
+pub(crate) fn is_faint<const E: usize>(stack: &[u8; E]) -> bool {
+    let (fours, rest) = stack.as_chunks::<4>();
+    let any = fours.iter().fold(0, |any, four| any | u32::from_ne_bytes(*four));
+    any & FAINT == 0 && rest.iter().all(|cell| *cell < 8)
+}
+
 /// Whether a stack holds nothing.
 #[inline]
 pub(crate) fn is_empty<const E: usize>(stack: &[u8; E]) -> bool {
@@ -56,6 +67,16 @@ mod tests {
                     assert_eq!(level.iter().filter(|v| **v > 0).count(), usize::from(a.max(b) > 0));
                 }
             }
+        }
+    }
+
+    #[test]
+    fn eight_anywhere_is_not_faint() {
+        assert!(is_faint(&[7; 9]));
+        for at in 0..9 {
+            let mut stack = [7; 9];
+            stack[at] = 8;
+            assert!(!is_faint(&stack));
         }
     }
 

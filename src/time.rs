@@ -54,6 +54,28 @@ impl Step {
         (((memory as i64) << 16) / if whole > 0 { whole } else { 1 }) as i32
     }
 
+    /// What an exponential memory of this length (2^-16 s) keeps over the step, 2^-24: exp(-step / memory),
+    /// what is lost right to 0.2 % for steps from 20 ms and memories up to 600 s.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a share
+    pub const fn decay(self, memory: i32) -> u32 {
+        const BITS: u32 = 30;
+        const ONE: i64 = 1 << BITS;
+        const LN_2: i64 = 744_261_118;
+        // beyond 20 memories nothing is left of a byte
+        let memory = if memory > 0 { memory as i64 } else { 1 };
+        let times = ((self.0 as i64) << BITS) / memory;
+        let times = if times > 20 * ONE { 20 * ONE } else { times };
+        // 2^-halvings by shifting, the rest by the series up to the eighth power: its end is below 1e-7
+        let (halvings, rest) = (times / LN_2, times % LN_2);
+        let (mut sum, mut power) = (ONE, 8);
+        while power > 0 {
+            sum = ONE - ((sum * rest) >> BITS) / power;
+            power -= 1;
+        }
+        let shift = BITS - 24 + halvings as u32;
+        ((sum + (1 << (shift - 1))) >> shift) as u32
+    }
+
     /// Way made at a speed, in the speed's unit times seconds.
     pub const fn times(self, per_second: i32) -> i32 {
         crate::math::mul_shift(per_second, self.0, 16)
@@ -82,6 +104,21 @@ mod tests {
         assert!((fade(15) - 0.513).abs() < 0.02, "{}", fade(15));
         assert!((fade(15) - fade(30)).abs() < 0.01);
         assert_eq!(Step::from_micros(0).keep(1 << 16), 1 << 16);
+    }
+
+    #[test]
+    fn a_memory_decays_as_the_exponential_from_a_thousandth_of_it_to_all() {
+        for memory_s in [0.05, 0.4, 1.0, 5.0, 120.0, 600.0_f64] {
+            for step_us in [20_000, 66_667, 200_000, 1_000_000] {
+                let (step, memory) = (Step::from_micros(step_us), (memory_s * 65536.0).round() as i32);
+                let exact = (-(step_us as f64) * 1e-6 / memory_s).exp();
+                let lost = 1.0 - f64::from(step.decay(memory)) / f64::from(1 << 24);
+                assert!((lost / (1.0 - exact) - 1.0).abs() < 2e-3, "{memory_s} s, {step_us} us: {lost}");
+            }
+        }
+        assert_eq!(Step::from_micros(0).decay(1 << 16), 1 << 24);
+        assert_eq!(Step::from_micros(u64::MAX).decay(1), 0);
+        assert_eq!(Step::from_micros(1).decay(0), Step::from_micros(1).decay(1));
     }
 
     #[test]

@@ -487,3 +487,193 @@ impl Obstacle {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::obstacles::tracking::ObstacleConfig;
+    use crate::reflection::NoiseConfig;
+
+    const AHEAD: Direction = Direction::AHEAD;
+
+    fn tracking() -> Tracking {
+        let noise = NoiseConfig::default().noise().unwrap();
+        ObstacleConfig::default().tracking(noise, AHEAD, 22_500).unwrap()
+    }
+
+    fn reflection(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
+        Reflection {
+            x_cm,
+            y_cm,
+            ground_cm: length(x_cm, y_cm) as u16,
+            sight: Direction::of(x_cm, y_cm),
+            radial_velocity_cm_s,
+            across_cm: 40,
+            height_cm: None,
+            strength: 0,
+        }
+    }
+
+    #[test]
+    fn a_wheel_turns_the_way_its_vehicle_drives_between_standstill_and_twice_its_speed() {
+        let t = tracking();
+        for (heading, sign) in [(AHEAD, 1), (AHEAD.reversed(), -1)] {
+            let search = Obstacle::new(&reflection(5000, 0, sign * 2000), heading, 2000).search(&t);
+            let may = |speed: i16| search.is_speed_of_wheel(&reflection(5000, 0, sign * speed), &t);
+            assert!(may(0) && may(500) && may(3900), "{heading:?}");
+            assert!(!may(-500) && !may(-2000) && !may(4500), "{heading:?}");
+        }
+    }
+
+    #[test]
+    fn an_obstacle_moves_the_way_it_drives() {
+        let mut o = Obstacle::new(&reflection(5000, 300, -2000), AHEAD.reversed(), 2000);
+        o.predict(Step::from_micros(500_000), 1 << 16);
+        assert_eq!(o.anchor(), (4000, 300));
+        assert_eq!((o.age, o.travelled_cm), (1, 1000));
+        o.lateral_weight = 1000;
+        o.predict(Step::from_micros(0), 1 << 15);
+        assert_eq!(o.lateral_weight, 500);
+    }
+
+    #[test]
+    fn detections_pull_speed_and_place_towards_themselves() {
+        let t = tracking();
+        let mut o = Obstacle::new(&reflection(5000, 0, 2000), AHEAD, 2000);
+        o.predict(Step::from_micros(66_667), 1 << 16);
+        let (x, _) = o.anchor();
+        // faster than it, and to its left
+        (0..4).for_each(|_| o.absorb(&reflection(x, 60, 2100), &t));
+        o.settle(Step::from_micros(66_667), &t);
+        assert!((2050..=2100).contains(&o.velocity().0), "{:?}", o.velocity());
+        assert!((50..=60).contains(&o.anchor().1), "{:?}", o.anchor());
+        assert_eq!(o.existence, t.most_hits_a_frame << 8, "of four detections three count");
+    }
+
+    #[test]
+    fn the_surer_of_two_detections_says_where_it_is() {
+        let t = tracking();
+        let mut o = Obstacle::new(&reflection(5000, 0, 2000), AHEAD, 2000);
+        o.absorb(&Reflection { across_cm: 20, ..reflection(5000, 60, 2000) }, &t);
+        o.absorb(&Reflection { across_cm: 400, ..reflection(5000, -60, 2000) }, &t);
+        o.settle(Step::from_micros(66_667), &t);
+        assert!(o.anchor().1 > 50, "{:?}", o.anchor());
+    }
+
+    #[test]
+    fn a_newborn_stretches_to_what_is_found_before_and_behind_it() {
+        let mut o = Obstacle::new(&reflection(5000, 0, 2000), AHEAD, 2000);
+        o.reach(&reflection(4600, 0, 2000));
+        assert_eq!(o.extent, Extent { rear_cm: -400, front_cm: BIN_CM / 2 });
+        o.reach(&reflection(5300, 0, 2000));
+        o.reach(&reflection(5100, 0, 2000));
+        assert_eq!(o.extent, Extent { rear_cm: -400, front_cm: 300 });
+    }
+
+    #[test]
+    fn a_drift_to_the_left_turns_the_heading_to_the_left() {
+        let t = tracking();
+        let mut o = Obstacle::new(&reflection(5000, 0, 2000), AHEAD, 2000);
+        for _ in 0..20 {
+            o.predict(Step::from_micros(66_667), 60_000);
+            let (x, y) = o.anchor();
+            o.absorb(&reflection(x, y + 30, 2000), &t);
+            o.settle(Step::from_micros(66_667), &t);
+        }
+        assert!(o.heading.y > 50 && o.velocity().1 > 5, "{:?} {:?}", o.heading, o.velocity());
+    }
+
+    #[test]
+    fn noise_lies_across_the_line_of_sight() {
+        let t = tracking();
+        let r = Reflection { across_cm: 300, ..reflection(0, 8000, 0) };
+        // seen broadside, the noise across the line of sight lies along the road
+        assert!((sigma_along(AHEAD, &r, &t.noise) - 300).abs() < 25);
+        assert!((sigma_across(AHEAD, &r, &t.noise) - t.noise.range_cm).abs() < 5);
+        let r = Reflection { across_cm: 300, ..reflection(8000, 0, 0) };
+        assert!((sigma_across(AHEAD, &r, &t.noise) - 300).abs() < 25);
+    }
+
+    /// Two obstacles in one lane, `apart_cm` between the first's front and the second's rear end.
+    fn two(apart_cm: i32, left_cm: i32, speed: i32) -> (Obstacle, Obstacle) {
+        let mut a = Obstacle::new(&reflection(5000, 0, 0), AHEAD, 2000);
+        a.extent = Extent { rear_cm: -200, front_cm: 200 };
+        let mut b = Obstacle::new(&reflection(5000 + 400 + apart_cm, left_cm, 0), AHEAD, speed);
+        b.extent = Extent { rear_cm: -200, front_cm: 200 };
+        (a.lateral_weight, b.lateral_weight) = (MOST_WEIGHT, MOST_WEIGHT);
+        (a, b)
+    }
+
+    #[test]
+    fn parts_of_one_vehicle_are_in_line_equally_fast_and_close() {
+        let t = tracking();
+        let one = |apart, left, speed| {
+            let (a, b) = two(apart, left, speed);
+            let (forward, back) = (a.is_one_with(&b, &t), b.is_one_with(&a, &t));
+            assert_eq!(forward, back, "{apart} {left} {speed}");
+            forward
+        };
+        assert!(one(500, 50, 2000) && one(500, -50, 2100));
+        assert!(!one(500, 50, 2300), "another speed");
+        assert!(!one(500, 250, 2000) && !one(500, -250, 2000), "another lane");
+        assert!(!one(800, 0, 2000), "farther than the gap within a vehicle");
+        let (a, mut b) = two(500, 0, 2000);
+        b.heading = AHEAD.left();
+        assert!(!a.is_one_with(&b, &t), "across the road");
+        // together longer than any vehicle
+        let (mut a, b) = two(600, 0, 2000);
+        a.extent.rear_cm = -1000;
+        assert!(!a.is_one_with(&b, &t));
+    }
+
+    #[test]
+    fn only_what_lies_between_the_ends_is_enclosed() {
+        let t = tracking();
+        let (a, b) = two(-350, 0, 2000);
+        assert!(a.encloses(&b, &t), "its middle 50 cm ahead of the other's");
+        let (a, b) = two(-100, 0, 2000);
+        assert!(!a.encloses(&b, &t), "its middle 300 cm ahead");
+        let (a, b) = two(-350, 150, 2000);
+        assert!(!a.encloses(&b, &t), "beside it");
+    }
+
+    #[test]
+    fn joined_obstacles_reach_from_end_to_end_and_lie_where_the_surer_one_did() {
+        let t = tracking();
+        let (mut a, mut b) = two(500, 40, 2000);
+        for (o, x) in [(&mut a, 5000), (&mut b, 5900)] {
+            (0..20).for_each(|_| o.profile.add(-180));
+            (0..20).for_each(|_| o.profile.add(180));
+            assert_eq!(o.anchor().0, x);
+        }
+        a.lateral_weight = MOST_WEIGHT / 4;
+        (a.hits, b.hits, b.travelled_cm) = (30, 10, 700);
+        a.join(&b, &t);
+        let (rear, front) = (a.anchor().0 + a.extent.rear_cm, a.anchor().0 + a.extent.front_cm);
+        assert!((rear - 4820).abs() < 60 && (front - 6080).abs() < 60, "{rear} to {front}");
+        assert!((30..=34).contains(&a.anchor().1), "four fifths of the way: {:?}", a.anchor());
+        assert_eq!((a.hits, a.travelled_cm), (40, 700));
+    }
+
+    #[test]
+    fn what_was_hidden_of_a_vehicle_lies_behind_its_face() {
+        let t = tracking();
+        for heading in [AHEAD, AHEAD.reversed()] {
+            let solid = Obstacle::new(&reflection(5000, 0, 0), heading, 2000).solid(&t);
+            assert!(solid.x_cm - solid.half_length_cm > 4900, "{heading:?}: {solid:?}");
+        }
+    }
+
+    #[test]
+    fn what_never_moved_and_stands_is_a_fixture() {
+        let t = tracking();
+        let mut o = Obstacle::new(&reflection(5000, 0, 0), AHEAD, 20);
+        o.age = 2;
+        assert!(o.is_fixture(&t) && !o.is_mover(&t));
+        o.travelled_cm = 200;
+        assert!(!o.is_fixture(&t) && o.is_mover(&t), "a vehicle that stopped");
+        let mut o = Obstacle::new(&reflection(5000, 0, 0), AHEAD, 200);
+        o.age = 2;
+        assert!(!o.is_fixture(&t));
+    }
+}

@@ -276,4 +276,32 @@ mod tests {
         let e = e.tracking(noise, Direction::AHEAD, 20_000).unwrap_err();
         assert_eq!(e.parameter, "obstacles.gap_m");
     }
+
+    #[test]
+    fn a_course_is_where_its_doppler_says_along_the_road() {
+        let noise = NoiseConfig::default().noise().unwrap();
+        let t = ObstacleConfig::default().tracking(noise, Direction::AHEAD, 20_000).unwrap();
+        let at = |x_cm: i32, y_cm: i32, radial_velocity_cm_s| {
+            let sight = Direction::of(x_cm, y_cm);
+            t.course(&Reflection {
+                x_cm,
+                y_cm,
+                ground_cm: 5000,
+                sight,
+                radial_velocity_cm_s,
+                across_cm: 40,
+                height_cm: None,
+                strength: 0,
+            })
+        };
+        assert_eq!(at(5000, 0, 2000), Some((t.road, 2000)));
+        assert_eq!(at(5000, 0, -2000), Some((t.road.reversed(), 2000)));
+        // 60 degrees to the side half of the speed shows
+        let (heading, speed) = at(2500, 4330, -1000).unwrap();
+        assert!(heading == t.road.reversed() && (speed - 2000).abs() < 5);
+        assert_eq!(at(300, 5000, 500), None, "nearly broadside");
+        assert_eq!(at(5000, 0, 55), None, "within the noise of what stands");
+        assert_eq!(at(5000, 0, 120), None, "slower than what starts an obstacle");
+        assert_eq!(at(5000, 0, 7100), None, "no vehicle's speed");
+    }
 }

@@ -10,8 +10,8 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::unit::session::Slots;
 use crate::unit::settings::BLOCK_LEN;
+use crate::unit::stored::Slots;
 
 /// A block up to the next whole word of any flash memory, which has at most 32 bytes.
 const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
@@ -174,7 +174,7 @@ mod tests {
     }
 
     fn newest(slots: &impl Slots) -> Option<u16> {
-        Settings::newest([slots.slot(0), slots.slot(1)]).ok().map(|n| n.settings.gate.max_detections)
+        Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).ok().map(|n| n.settings.gate.max_detections)
     }
 
     fn works_on<const WORD: usize, const PAGE: usize>() {
@@ -215,7 +215,7 @@ mod tests {
         slots.write(1, &settings(101).to_block(2));
         let slots = FlashSlots::new(slots.free(), places, |slot| slot != 1);
         assert_eq!(newest(&slots), Some(100));
-        assert_eq!(Settings::newest([slots.slot(0), slots.slot(1)]).unwrap().next_slot, 1);
+        assert_eq!(Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).unwrap().next_slot, 1);
     }
 
     #[test]

@@ -31,9 +31,9 @@ impl<const D: usize> TiSession<D> {
         while !rest.is_empty() {
             let (taken, outcome) = self.radar.push(rest, now);
             if let Outcome::Scan(scan) = outcome {
-                unit.scan(scan.time, scan.detections, scan.fault, |_| {});
+                unit.scan(scan.time, scan.detections, scan.status(), |_| {});
                 if scan.missing > 0 {
-                    unit.broadcast().status_mut().reason = Reason::IncompleteScans;
+                    unit.degrade(scan.time, Reason::IncompleteScans);
                 }
             }
             // a receiver that took nothing would hold up everything

@@ -11,16 +11,14 @@ use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfigurat
 use viewshed::inputs::ars408::profile::{self, Profile};
 use viewshed::inputs::ti;
 use viewshed::mount::Mount;
-use viewshed::profile::reference::{Parameters, Sender};
+use viewshed::profile::reference::CHECK;
 use viewshed::radar_3d::VisibilityConfig;
 use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
-use viewshed::unit::header;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanId;
-use viewshed::wire::message::{Addresses, Epoch, Message};
+use viewshed::wire::message::{Addresses, Message};
 
 use crate::locate;
 use crate::one_file::is_one_file;
@@ -286,9 +284,12 @@ impl Config {
         if self.addresses().is_none() {
             add("output.base_id", "not a multiple of 32 within 11 bits, or 29 if above 0x7FF");
         }
+        // whatever the settings come from, maps are to be sent like this
+        let refused = self.medium().and_then(|medium| self.broadcast(medium).check().err());
+        problems.extend(refused.map(|e| of_library(&e)));
         let missing = [("mount", self.mount.is_none()), ("field_of_view", self.field_of_view.is_none())];
         match self.settings() {
-            Some(settings) => problems.extend(self.refused(&settings).err().map(|e| of_library(&e))),
+            Some(settings) => problems.extend(CHECK.settings(&settings).err().map(|e| of_library(&e))),
             // the integrator's messages can bring them
             None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {}
             None => {
@@ -297,15 +298,6 @@ impl Config {
             }
         }
         problems
-    }
-
-    /// What the library says of the figures.
-    fn refused(&self, settings: &Settings) -> Result<(), ConfigError> {
-        settings.check()?;
-        let parameters = Parameters::new(&settings.sensor, &settings.radar_3d())?;
-        let Ok(header) = header(settings, &parameters) else { return Ok(()) };
-        let (Some(medium), epoch) = (self.medium(), Epoch::new(0)) else { return Ok(()) };
-        Sender::new(self.broadcast(medium), header, epoch, Time::from_micros(0)).map(drop)
     }
 
     /// Whether configuration blocks may come over a line.

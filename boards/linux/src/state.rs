@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::unit::session::Slots;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
+use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::stored::Slots;
 use viewshed::wire::message::Epoch;
 
-use crate::config::Config;
 
 /// The files that are kept.
 pub const FILES: [&str; 2] = [EPOCH, SLOTS];
@@ -66,26 +65,6 @@ impl FileSlots {
         Self { path, slots }
     }
 
-    /// The settings to work with.
-    ///
-    /// # Errors
-    /// Why neither block is used.
-    pub fn newest(&self) -> Result<Settings, [BlockError; 2]> {
-        Settings::newest([&self.slots[0], &self.slots[1]]).map(|newest| newest.settings)
-    }
-
-    /// What to work with: the newest block where blocks are taken, else what the file says.
-    pub fn settings(&self, config: &Config) -> Option<Settings> {
-        if !config.has_service() {
-            return config.settings();
-        }
-        self.newest()
-            .inspect_err(|[first, second]| {
-                warn!("no configuration that holds ({first}; {second}): safe state until a block is written")
-            })
-            .ok()
-    }
-
     fn keep(&self, slot: usize) -> std::io::Result<()> {
         let Some(path) = &self.path else {
             warn!("a configuration block was written; without a state folder it is kept until the daemon ends");
@@ -119,10 +98,14 @@ impl Slots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use viewshed::config::ConfigError;
     use viewshed::field_of_view::FieldOfView;
     use viewshed::mount::Mount;
     use viewshed::reflection::NoiseConfig;
+    use viewshed::profile::reference::CHECK;
     use viewshed::sensor::Sensor;
+    use viewshed::unit::settings::BlockError;
+    use viewshed::unit::stored::Stored;
 
     fn settings(height_m: f32) -> Settings {
         Settings::of(Sensor {
@@ -146,6 +129,11 @@ mod tests {
         folder
     }
 
+    fn height(slots: &FileSlots) -> Result<f32, BlockError> {
+        let stored = Stored::read(slots, CHECK);
+        stored.place().map(|_| stored.settings().unwrap().sensor.mount.height_m)
+    }
+
     #[test]
     fn epochs_go_on_from_start_to_start() {
         let folder = folder("epochs");
@@ -164,7 +152,6 @@ mod tests {
     #[test]
     fn the_files_settings_count_until_a_block_is_written_and_a_damaged_block_is_not_used() {
         let folder = folder("slots");
-        let height = |slots: &FileSlots| slots.newest().map(|s| s.sensor.mount.height_m);
         let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
         assert_eq!(height(&slots), Ok(6.0));
         assert!(!folder.join("slots").exists());
@@ -178,12 +165,31 @@ mod tests {
         bytes[40] ^= 1;
         fs::write(folder.join("slots"), &bytes).unwrap();
         let damaged = FileSlots::open(Some(&folder), Some(&settings(8.0)));
-        assert_eq!(height(&damaged), Err([BlockError::CheckSum; 2]), "never silently another");
+        assert_eq!(height(&damaged), Err(BlockError::CheckSum), "never silently another");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_block_that_cannot_run_is_not_written_and_not_used() {
+        let folder = folder("limits");
+        // in no view: 1 m above ground from 6 m high, 4 m far
+        let mut short = settings(6.0);
+        (short.sensor.field_of_view.range_min_m, short.sensor.field_of_view.range_max_m) = (0.5, 4.0);
+        let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
+        let refused = Stored::read(&slots, CHECK).write(&short.to_block(0), &mut slots);
+        assert!(matches!(refused, Err(BlockError::Parameter(ConfigError { .. }))), "{refused:?}");
+        assert!(!folder.join("slots").exists());
+        // an older version stored it
+        slots.write(1, &short.to_block(9));
+        assert_eq!(height(&FileSlots::open(Some(&folder), None)), Ok(6.0), "the one before");
+        slots.write(0, &short.to_block(8));
+        let Err(BlockError::Parameter(e)) = height(&FileSlots::open(Some(&folder), None)) else { panic!("used") };
+        assert!(e.parameter.starts_with("field_of_view."), "{e}");
         fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
     fn without_settings_and_blocks_there_is_nothing_to_work_with() {
-        assert_eq!(FileSlots::open(None, None).newest(), Err([BlockError::Empty; 2]));
+        assert_eq!(height(&FileSlots::open(None, None)), Err(BlockError::Empty));
     }
 }

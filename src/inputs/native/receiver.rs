@@ -303,6 +303,8 @@ impl<const N: usize> Receiver<N> {
             number: u32::from(scan.number),
             detections: self.collected.detections(),
             missing,
+            // the format holds detections only, zeros fill its frames
+            refused: 0,
             fault: scan.fault,
         }))
     }

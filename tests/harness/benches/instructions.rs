@@ -13,6 +13,7 @@ use viewshed::detection::{Detection, Measurement};
 use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
+use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
@@ -24,7 +25,8 @@ use viewshed_harness::boards::stress;
 use viewshed_harness::estimators;
 use viewshed_harness::recording::mcap::read;
 
-const ESTIMATORS: [&str; 3] = ["radar-3d", "radar-3d-small", "radar-2d"];
+/// `radar-3d-blurred` is radar-3d with the largest range noise that may be set: evidence spreads widest.
+const ESTIMATORS: [&str; 4] = ["radar-3d", "radar-3d-small", "radar-3d-blurred", "radar-2d"];
 const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
 
 /// What is measured on the recording's maps only.
@@ -128,6 +130,10 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
         stress::scans(scene).into_iter().map(|s| (s.time, s.detections)).collect()
     };
     match estimator {
+        "radar-3d-blurred" => {
+            let noise = NoiseConfig { range_m: 5.0, ..sensor.noise };
+            run_3d::<200, 120, 16, 7, 64, 256>(&Sensor { noise, ..sensor }, &frames);
+        }
         "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
         "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
         "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),

@@ -69,8 +69,8 @@ impl<const D: usize> Estimator for Driver<D> {
     }
 
     fn step(&mut self, frame: &Frame) {
-        let (now, detections) = self.intake.take(frame);
-        self.state.process(&self.parameters, now, detections, false, &mut self.map);
+        let (now, detections, status) = self.intake.take(frame);
+        self.state.process(&self.parameters, now, detections, status, &mut self.map);
     }
 
     fn map(&self) -> &dyn VisibilityMap {

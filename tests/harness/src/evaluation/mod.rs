@@ -15,6 +15,7 @@ pub mod counts;
 pub mod curve;
 pub mod examples;
 pub mod mount_error;
+pub mod rejected;
 pub mod replay;
 pub mod returns;
 pub mod samples;

@@ -274,7 +274,9 @@ pub mod by_hand {
                 licence: None,
             },
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
-            frames: (0..frames).map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new() }).collect(),
+            frames: (0..frames)
+                .map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new(), refused: 0 })
+                .collect(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),
             occlusion: Default::default(),
             problems: Problems::default(),

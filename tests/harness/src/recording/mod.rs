@@ -56,6 +56,8 @@ pub struct Frame {
     /// Measurement time.
     pub time_ns: i64,
     pub detections: Vec<RadarDetection>,
+    /// Points dropped when it was read: not finite, or at no distance.
+    pub refused: u64,
 }
 
 /// Static field of view, in the sensor frame.

@@ -166,7 +166,7 @@ impl Simulation {
             }
         };
         let in_view = self.in_view(&labels);
-        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections }), labels, in_view })
+        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections, refused: 0 }), labels, in_view })
     }
 
     /// What the camera sees at one of its frames.

@@ -12,7 +12,7 @@ use viewshed_harness::recording::Frame;
 
 use crate::evidence::InverseSensor;
 use crate::gate::Scan;
-use crate::geometry::Levelled;
+use crate::geometry::{Levelled, Placed};
 use crate::grid::{Axes, Grid};
 use crate::obstacles::{Obstacles, Rules};
 use crate::raycast::{Map, cast};
@@ -65,7 +65,16 @@ impl Pipeline {
     pub fn process(&mut self, now: Time, measurements: &[Measurement]) {
         let (view, noise) = (&self.sensor.field_of_view, &self.sensor.noise);
         let scan = Scan::new(measurements, &self.config.gate, view, noise, &self.levelled);
-        let continuity = self.health.frame(now, scan.reported, false, &self.health_limits);
+        let mut points = scan.points;
+        let reached = |d: &Placed| {
+            let place = self.axes.column_place(d.bearing());
+            let column = (place >= 0.0).then(|| self.axes.view.get(place as usize)).flatten();
+            column.is_some_and(|view| d.ground() / self.axes.cell_m < view.end as f64)
+        };
+        if !scan.placed.iter().any(reached) {
+            (points.inside, points.outside) = (0, points.inside + points.outside);
+        }
+        let continuity = self.health.frame(now, &points, false, &self.health_limits);
         if continuity.resets() {
             self.obstacles.list.clear();
             self.grid.clear();

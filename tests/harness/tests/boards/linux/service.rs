@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use viewshed::unit::settings::BLOCK_LEN;
 use viewshed_harness::boards::live::Script;
 use viewshed_harness::boards::machine::Folder;
 
@@ -99,6 +100,46 @@ fn linux_only_completed_frames_feed_the_watchdog() {
     assert!(fed >= scans.len() / 3 && fed <= scans.len(), "{fed} of {}", scans.len());
     manager.listen(Duration::from_millis(400));
     assert!(manager.count("WATCHDOG=1") <= fed + 1, "and none afterwards");
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_a_stored_block_that_cannot_run_leaves_the_daemon_up_answering_and_saying_why() {
+    let (settings, scans) = shipped(1.0);
+    let mut high = settings;
+    high.visibility.slice_height_m = 15.0;
+    let mut near = settings;
+    (near.sensor.field_of_view.range_min_m, near.sensor.field_of_view.range_max_m) = (0.5, 2.0);
+    for (stored, name) in [(high, "visibility.slice_height_m"), (near, "field_of_view.")] {
+        let folder = Folder::new().unwrap();
+        std::fs::write(folder.0.join("slots"), [stored.to_block(1), [0xFF; BLOCK_LEN]].as_flattened()).unwrap();
+        let mut manager = Manager::new(&folder);
+        let ear = Ear::plug(&folder.0.join("maps"), Instant::now());
+        let mut radar = Terminal::plug(&folder.0.join("radar"));
+        let config = "state_dir = \"FOLDER\"\n[input]\nradar = \"native\"\nport = \"FOLDER/radar\"\n\
+                      [output]\nmedium = \"serial\"\nport = \"FOLDER/maps\"\n";
+        let mut daemon = start(folder, config);
+        daemon.wait_for(name);
+        manager.listen(Duration::from_millis(1500));
+        assert!(manager.count("WATCHDOG=1") >= 2, "the safe state is no reason for a restart: {:?}", manager.told);
+        let status = format!("STATUS=safe state: configuration block: {name}");
+        assert!(manager.told.iter().any(|told| told.starts_with(&status)), "{:?}", manager.told);
+        // the service's answers name it as well, and a block is taken
+        let has = |text: &[u8]| ear.bytes().windows(text.len()).any(|w| w == text);
+        assert!(has(name.as_bytes()), "refused by name");
+        let mut script = Script::default();
+        script.configure(&settings);
+        radar.send(&script.bytes);
+        daemon.wait_for_times("started", 2);
+        script.bytes.clear();
+        for scan in &scans {
+            script.scan(scan, scans[0].time);
+        }
+        radar.send(&script.bytes);
+        daemon.wait_for("radar Ok");
+        daemon.terminate();
+        assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
+    }
 }
 
 #[test]

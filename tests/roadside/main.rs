@@ -2,6 +2,8 @@
 
 #![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // tests may fail loudly
 
+mod blocks;
+#[path = "../common/mod.rs"]
 mod common;
 
 use std::collections::VecDeque;
@@ -13,8 +15,9 @@ use viewshed::unit::can_bus::CanPort;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::roadside::{Memory, Ports, Roadside, SerialPort, Start, Step, VERSION};
 use viewshed::unit::service::Request;
-use viewshed::unit::session::{Flow, Slots};
+use viewshed::unit::session::Flow;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::stored::{Check, Slots, Stored};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};
@@ -26,6 +29,8 @@ use common::gantry;
 
 const SENSOR: u8 = 0;
 const ADDRESSES: Addresses = Addresses::STANDARD;
+/// What the controllers divide.
+const CAN_CLOCK_HZ: u32 = 24_000_000;
 /// Milliseconds between the radar's scans.
 const SCAN_MS: u64 = 66;
 
@@ -33,6 +38,9 @@ const SCAN_MS: u64 = 66;
 #[derive(Default)]
 struct Bus {
     incoming: VecDeque<CanFrame>,
+    /// When they came, where that is known.
+    came: VecDeque<Time>,
+    arrived: Option<Time>,
     mailboxes: VecDeque<CanFrame>,
     /// Nobody acknowledges.
     stuck: bool,
@@ -44,7 +52,11 @@ struct Bus {
 
 impl CanPort for Bus {
     fn receive(&mut self) -> Option<CanFrame> {
+        self.arrived = self.came.pop_front();
         self.incoming.pop_front()
+    }
+    fn arrived(&self) -> Option<Time> {
+        self.arrived
     }
     fn send(&mut self, frame: &CanFrame) -> bool {
         assert!(!self.silent && !self.off, "a silent controller does not send");
@@ -122,6 +134,10 @@ struct World {
     last: Option<Step>,
     frames_done: usize,
     serial_bytes: usize,
+    replies: Vec<Vec<u8>>,
+    /// Milliseconds every scan takes to be worked up, and what is left of them.
+    work_ms: u64,
+    busy_ms: u64,
 }
 
 fn at(ms: u64) -> Time {
@@ -144,7 +160,8 @@ impl World {
         };
         let mut ports =
             Ports { radar: Bus::default(), broadcast: Bus::default(), serial: Line::default(), slots: InRam(blocks) };
-        let start = Start { sensor: SENSOR, epoch: Epoch::new(3), reset_cause: ResetCause::Watchdog };
+        let stored = Stored::read(&ports.slots, Check::of::<50, 40, 8, 2>().on_can(CAN_CLOCK_HZ));
+        let start = Start { sensor: SENSOR, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
         let unit = Unit::start(start, memory, at(0), &mut ports);
         assert!(ports.radar.silent && ports.broadcast.silent, "until the bit rate is proven");
         let far = || Far::new([SENSOR], ADDRESSES, Limits::DEFAULT);
@@ -162,6 +179,9 @@ impl World {
             last: None,
             frames_done: 0,
             serial_bytes: 0,
+            replies: Vec::new(),
+            work_ms: 0,
+            busy_ms: 0,
         }
     }
 
@@ -171,10 +191,16 @@ impl World {
 
     /// A millisecond.
     fn step(&mut self) -> Step {
-        self.ms += 1;
-        if let Some(counter) = &mut self.radar
-            && self.ms.is_multiple_of(SCAN_MS)
-        {
+        let before = self.ms;
+        self.ms += 1 + std::mem::take(&mut self.busy_ms);
+        for ms in (before + 1..=self.ms).filter(|ms| ms.is_multiple_of(SCAN_MS)) {
+            let Some(counter) = &mut self.radar else { break };
+            self.busy_ms = self.work_ms;
+            if self.ports.radar.incoming.len() > 30 {
+                self.ports.radar.lost += 13;
+                continue;
+            }
+            self.ports.radar.came.extend([at(ms); 13]);
             *counter = counter.wrapping_add(1);
             let [high, low] = counter.to_be_bytes();
             let frame = |id, bytes: &[u8]| CanFrame::classic(CanId::Standard(id), bytes).unwrap();
@@ -210,6 +236,8 @@ impl World {
             let status = Received::from_bytes(message).is_ok_and(|m| m.message == Message::Status);
             self.statuses[1].extend(status.then_some(self.ms));
             let _ = self.line.message(now, message);
+            // kinds of answers begin at 128; maps, headers and the status have message numbers below 32
+            self.replies.extend(message.get(3).filter(|kind| **kind > 128).map(|_| message.to_vec()));
         }
         step
     }
@@ -339,7 +367,9 @@ fn what_nobody_acknowledges_is_taken_back_and_never_sent_late() {
     world.ports.broadcast.stuck = true;
     world.run(400);
     assert!(world.ports.broadcast.aborted >= 3, "{}", world.ports.broadcast.aborted);
-    assert!(world.status()[1].state == State::Ok, "the other line is not held up");
+    let status = world.status()[1];
+    assert_eq!((status.state, status.reason), (State::Degraded, Reason::BusOverload), "told on the other line");
+    assert!(world.visible()[1] > 1000, "which is not held up");
     world.ports.broadcast.stuck = false;
     world.run(1000);
     assert!(world.visible()[0] > 1000);
@@ -373,7 +403,7 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
         }
         world.run(200);
         assert_eq!(over_can, world.told.contains(&Told::Written(1)), "{:?}", world.told);
-        let newest = Settings::newest([world.ports.slots.slot(0), world.ports.slots.slot(1)]);
+        let newest = Settings::newest([world.ports.slots.slot(0), world.ports.slots.slot(1)], |_| Ok(()));
         assert_eq!(newest.map(|n| n.settings), Ok(settings()));
         if over_can {
             world.ports.broadcast.incoming.extend(tool.restart());
@@ -386,4 +416,33 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
         world.run(2000);
         assert!(world.visible().iter().all(|cells| *cells > 1000));
     }
+}
+
+#[test]
+fn work_that_takes_longer_than_the_time_between_scans_is_told() {
+    for (work_ms, told) in [(60, false), (70, true)] {
+        let mut world = World::with_settings();
+        world.run(1000);
+        world.work_ms = work_ms;
+        world.run(300);
+        let overrun = world.status().iter().all(|s| (s.state, s.reason) == (State::Degraded, Reason::Overrun));
+        assert_eq!(overrun, told, "{work_ms} ms: {:?}", world.status());
+        world.work_ms = 0;
+        world.run(2500);
+        assert_eq!(world.last.unwrap().state, State::Ok);
+    }
+}
+
+#[test]
+fn a_bus_too_narrow_is_told_on_both_lines_and_ends() {
+    let mut world = World::with_settings();
+    world.run(1500);
+    world.ports.broadcast.stuck = true;
+    world.run(400);
+    world.ports.broadcast.stuck = false;
+    world.run(500);
+    let overloaded = (State::Degraded, Reason::BusOverload);
+    assert!(world.status().iter().all(|s| (s.state, s.reason) == overloaded), "{:?}", world.status());
+    world.run(2000);
+    assert!(world.status().iter().all(|s| (s.state, s.reason) == (State::Ok, Reason::None)), "{:?}", world.status());
 }
