@@ -31,7 +31,7 @@ macro_rules! size {
             /// What it works with.
             pub type Parameters = crate::radar_3d::Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>;
             /// Its map.
-            pub type Map = crate::polar::PolarMap<RANGES, AZIMUTHS>;
+            pub type Map = crate::map::polar::PolarMap<RANGES, AZIMUTHS>;
             /// Who sends it.
             pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
             /// All of them together.

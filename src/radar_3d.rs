@@ -8,25 +8,26 @@
 //!                        polar map: grade, bit, occupancy <- slice at h <- ray casting
 //! ```
 
-use crate::axes::Axes;
-use crate::config::{ConfigError, within};
-use crate::detection::Detection;
-use crate::evidence::{EvidenceConfig, InverseSensor};
-use crate::gate::{Gate, GateConfig, Rejections};
-use crate::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
-use crate::math;
-use crate::mount::Levelling;
+use crate::fixed::math;
+use crate::fixed::time::{Step, Time};
+use crate::frame::detection::Detection;
+use crate::frame::gate::{Gate, GateConfig, Rejections};
+use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
+use crate::frame::reflection::Reflection;
+use crate::frame::scan::Scan;
+use crate::grid::axes::Axes;
+use crate::grid::evidence::{EvidenceConfig, InverseSensor};
+use crate::grid::raycast;
+use crate::grid::spherical::SphericalGrid;
+use crate::grid::voxelise::voxelise;
+use crate::map::polar::PolarMap;
 use crate::obstacles::tracking::{ObstacleConfig, Tracking};
 use crate::obstacles::{Claimed, Obstacles};
-use crate::polar::PolarMap;
-use crate::raycast;
-use crate::reflection::{Noise, Reflection};
-use crate::scan::Scan;
 use crate::sensor::Sensor;
-use crate::spherical::SphericalGrid;
+use crate::sensor::config::{ConfigError, within};
+use crate::sensor::mount::Levelling;
+use crate::sensor::noise::Noise;
 use crate::stage::Stage;
-use crate::time::{Step, Time};
-use crate::voxelise::voxelise;
 
 /// Everything that can be set, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

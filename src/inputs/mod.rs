@@ -11,9 +11,9 @@ mod polar;
 pub mod signal;
 pub mod ti;
 
-use crate::detection::Detection;
-use crate::health::FrameStatus;
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
+use crate::frame::health::FrameStatus;
 
 /// The detections of one scan of a radar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,14 +13,15 @@ mod by_range;
 pub mod obstacle;
 pub mod profile;
 pub mod size;
+pub mod solid;
 pub mod tallness;
 pub mod tracking;
 
 use heapless::Vec;
 
-use crate::reflection::Reflection;
-use crate::solid::Solid;
-use crate::time::Step;
+use crate::fixed::time::Step;
+use crate::frame::reflection::Reflection;
+use crate::obstacles::solid::Solid;
 use by_range::ByRange;
 use obstacle::Obstacle;
 use tracking::Tracking;
@@ -291,8 +292,8 @@ impl<const N: usize> Obstacles<N> {
 mod tests {
     use super::tracking::ObstacleConfig;
     use super::*;
-    use crate::reflection::NoiseConfig;
-    use crate::trig::Direction;
+    use crate::fixed::trig::Direction;
+    use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec as StdVec;
 
     fn tracking() -> Tracking {

@@ -3,11 +3,12 @@
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;
 use super::tracking::Tracking;
-use crate::math::{hypot_gate, length, mul_shift, ratio, root};
-use crate::reflection::{Noise, Reflection};
-use crate::solid::Solid;
-use crate::time::Step;
-use crate::trig::Direction;
+use crate::fixed::math::{hypot_gate, length, mul_shift, ratio, root};
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
+use crate::obstacles::solid::Solid;
+use crate::sensor::noise::Noise;
 
 /// Fraction bits of positions and velocities.
 const FRACTION: u32 = 8;
@@ -492,7 +493,7 @@ impl Obstacle {
 mod tests {
     use super::*;
     use crate::obstacles::tracking::ObstacleConfig;
-    use crate::reflection::NoiseConfig;
+    use crate::sensor::noise::NoiseConfig;
 
     const AHEAD: Direction = Direction::AHEAD;
 

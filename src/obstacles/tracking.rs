@@ -2,11 +2,12 @@
 
 use super::profile::HIT;
 use super::size::{SizeConfig, Sizes};
-use crate::config::{ConfigError, above, within};
-use crate::math;
-use crate::reflection::{Noise, Reflection};
-use crate::time::Step;
-use crate::trig::Direction;
+use crate::fixed::math;
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
+use crate::sensor::config::{ConfigError, above, within};
+use crate::sensor::noise::Noise;
 
 /// How detections become moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -267,7 +268,7 @@ const FASTEST_CM_S: i32 = 7000;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reflection::NoiseConfig;
+    use crate::sensor::noise::NoiseConfig;
 
     #[test]
     fn an_impossible_parameter_is_named() {

@@ -13,9 +13,9 @@
 //!
 //! A map record is followed by its grades, then its occupancies, azimuth by azimuth.
 
-use crate::bytes::{Reader, Writer};
-use crate::health::Condition;
-use crate::polar::PolarMap;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::health::Condition;
+use crate::map::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::stage::Stage;
 

@@ -4,8 +4,8 @@
 //! On the road time is the controller's. In a test bench it comes over the radar's bus: a frame with the
 //! identifier [`TIME_ID`] and eight bytes, microseconds, big-endian, before the frames it is for.
 
+use crate::fixed::time::Time;
 use crate::inputs::ars408::{Ars408, Config, Outcome};
-use crate::time::Time;
 use crate::unit::Unit;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::CanService;

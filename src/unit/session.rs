@@ -10,10 +10,10 @@
 //! # Limits
 //! Noise and half messages cost the messages they hit, and are counted as damaged.
 
+use crate::fixed::time::Time;
 use crate::inputs::native::{Config, Outcome, Receiver};
 use crate::pil::record::FrameRecord;
 use crate::stage::Stage;
-use crate::time::Time;
 use crate::unit::Unit;
 use crate::unit::safe_state::SafeState;
 use crate::unit::service::{Reply, Request, ServiceMessage};

@@ -17,15 +17,15 @@
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 
-use crate::bytes::{Reader, Writer};
-use crate::config::ConfigError;
-use crate::field_of_view::FieldOfView;
-use crate::gate::GateConfig;
-use crate::health::HealthConfig;
-use crate::mount::Mount;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::gate::GateConfig;
+use crate::frame::health::HealthConfig;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
-use crate::reflection::NoiseConfig;
 use crate::sensor::Sensor;
+use crate::sensor::config::ConfigError;
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Mount;
+use crate::sensor::noise::NoiseConfig;
 use crate::unit::can_bus::BusConfig;
 
 /// Everything an integrator sets for one installation.

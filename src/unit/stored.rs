@@ -5,7 +5,7 @@
 //! only those that can start count. If there is none, the unit has no maps and answers its service: the
 //! safe state.
 
-use crate::config::ConfigError;
+use crate::sensor::config::ConfigError;
 use crate::unit::can_bus::BusConfig;
 use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
 

@@ -3,8 +3,8 @@
 //! The port carries nothing but the radar's frames and those carry no time a unit could use, so time is
 //! always the unit's own.
 
+use crate::fixed::time::Time;
 use crate::inputs::ti::{Config, Counters, Outcome, Ti};
-use crate::time::Time;
 use crate::unit::Unit;
 use crate::wire::status::Reason;
 

@@ -37,8 +37,8 @@ use super::secoc::{Key, Sealer};
 use super::serial;
 use super::status::{PAGES, Status};
 use super::visible_range;
-use crate::config::{ConfigError, Problem};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, Problem};
 
 /// What messages travel on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -25,10 +25,10 @@ use super::code::block::Context;
 use super::code::interval::Form;
 use super::code::ray::Known;
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
-use crate::angle::Angle;
-use crate::map::RoadPoint;
-use crate::mount::{Levelling, Mount};
-use crate::polar::PolarGeometry;
+use crate::fixed::angle::Angle;
+use crate::map::polar::PolarGeometry;
+use crate::sensor::mount::{Levelling, Mount};
+use crate::sensor::road::RoadPoint;
 
 /// Groups of a header.
 pub const GROUPS: u8 = 7;

@@ -3,16 +3,17 @@
 #![allow(dead_code)] // each test file uses a part
 #![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_3d::{FrameReport, Radar3d, Radar3dConfig, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::settings::Settings;
 use viewshed::unit::{bench_sender, build};
 use viewshed::wire::broadcast::{Broadcaster, Medium};

@@ -1,15 +1,15 @@
 //! The radar-3d estimator from detections to map, on small worlds whose answer is known.
 
 use crate::common::{FRAME_US, Rig, Vehicle, detection, gantry};
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
-use viewshed::gate::Rejection;
-use viewshed::health::{Condition, Continuity, FrameStatus};
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::fixed::trig::Direction;
+use viewshed::frame::detection::Detection;
+use viewshed::frame::gate::Rejection;
+use viewshed::frame::health::{Condition, Continuity, FrameStatus};
 use viewshed::map::Visibility;
-use viewshed::query::{self, Answer, Footprint};
+use viewshed::map::query::{self, Answer, Footprint};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
-use viewshed::trig::Direction;
 
 #[test]
 fn a_truck_in_the_left_lane_hides_the_left_lane_behind_it() {
@@ -252,7 +252,7 @@ fn queries_answer_in_the_four_words() {
     rig.drive(&[truck], 30, true);
     let x = (truck.at(rig.last()).x * 100.0) as i32;
     let place = |x_cm: i32, y_cm: i32| Footprint {
-        centre: viewshed::map::RoadPoint::new(x_cm, y_cm),
+        centre: viewshed::sensor::road::RoadPoint::new(x_cm, y_cm),
         heading: Direction::AHEAD,
         half_length_cm: 220,
         half_width_cm: 90,

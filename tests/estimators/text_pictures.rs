@@ -1,13 +1,13 @@
 //! Ray casting, the slice and resampling on lopsided pictures: a swapped sign or axis shows.
 
-use viewshed::axes::Axes;
-use viewshed::field_of_view::FieldOfView;
+use viewshed::grid::axes::Axes;
+use viewshed::grid::raycast::cast;
+use viewshed::grid::spherical::SphericalGrid;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::resample::RoadGrid;
 use viewshed::map::{CellState, Visibility, VisibilityMap};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
-use viewshed::raycast::cast;
-use viewshed::resample::RoadGrid;
-use viewshed::spherical::SphericalGrid;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
 
 const R: usize = 40;
 const A: usize = 12;

@@ -1,7 +1,7 @@
 //! A unit configured over CAN: written, read back, applied at the restart; and what may go wrong on the way.
 
 use proptest::prelude::*;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
 use viewshed::unit::session::Flow;
 use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};

@@ -1,13 +1,13 @@
 //! The loop a controller runs, here on the host: jobs in, records out.
 
-use viewshed::detection::Detection;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::pil::fingerprint::Fingerprint;
 use viewshed::pil::job::{Job, JobError, ScanBuffer, ScanHead, detection_to_bytes};
 use viewshed::pil::record::{RECORD_LEN, Record};
 use viewshed::pil::{Bench, Memory, run};
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{Broadcaster, Medium};

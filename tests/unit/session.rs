@@ -1,9 +1,9 @@
 //! A unit on serial lines that take nothing for a while.
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{Medium as Native, Sender};
 use viewshed::pil::record::FrameRecord;
 use viewshed::radar_3d::Radar3d;
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::{Line, Session};

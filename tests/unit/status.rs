@@ -1,7 +1,7 @@
 //! What a unit's status says of it, message by message, as its receivers read it.
 
+use viewshed::fixed::time::Time;
 use viewshed::radar_3d::Radar3d;
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;

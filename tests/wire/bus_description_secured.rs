@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use crate::dbc::decode;
 use crate::shadows::{A, Shadows, W, header};
 use can_dbc::Dbc;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::map_message;

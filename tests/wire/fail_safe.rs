@@ -12,7 +12,7 @@ use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
 use crate::shadows::{A, Map, R, Random, Shadows, W, header};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::block::Kind;
 use viewshed::wire::code::ray::Ray;

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use crate::shadows::{A, Map, Shadows, W, header};
-use viewshed::map::RoadPoint;
-use viewshed::query::{self, Answer};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::map::query::{self, Answer};
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;

@@ -1,7 +1,7 @@
 //! Authenticated messages: other keys, repeated and forged messages, restarts of either side.
 
 use crate::shadows::{A, Map, Random, Shadows, W, header};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::message::{Addresses, Epoch, Message, NotAuthentic, Packet, Plane, data_id};

@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::config::ConfigError;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::gate::GateConfig;
-use viewshed::health::HealthConfig;
+use viewshed::sensor::config::ConfigError;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::frame::gate::GateConfig;
+use viewshed::frame::health::HealthConfig;
 use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfiguration};
 use viewshed::inputs::ars408::profile::{self, Profile};
 use viewshed::inputs::ti;
-use viewshed::mount::Mount;
+use viewshed::sensor::mount::Mount;
 use viewshed::profile::reference::CHECK;
 use viewshed::radar_3d::VisibilityConfig;
-use viewshed::reflection::NoiseConfig;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::sensor::Sensor;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};

@@ -12,7 +12,7 @@ use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::state::RadarState;
 use viewshed::inputs::ars408::upkeep::Upkeep;
 use viewshed::profile::reference::{DETECTIONS, Unit};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper};
 use viewshed::unit::can_session::CanSession;
 use viewshed::unit::radar_clock::RadarClock;

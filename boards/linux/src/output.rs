@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use log::{error, info};
 use viewshed::pil::record::FrameRecord;
 use viewshed::profile::reference::Unit;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::session::{Flow, Line};

@@ -98,10 +98,10 @@ impl Slots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viewshed::config::ConfigError;
-    use viewshed::field_of_view::FieldOfView;
-    use viewshed::mount::Mount;
-    use viewshed::reflection::NoiseConfig;
+    use viewshed::sensor::config::ConfigError;
+    use viewshed::sensor::field_of_view::FieldOfView;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
     use viewshed::profile::reference::CHECK;
     use viewshed::sensor::Sensor;
     use viewshed::unit::settings::BlockError;

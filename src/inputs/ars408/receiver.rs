@@ -5,10 +5,10 @@ use super::message::Message;
 use super::profile::{ARS408, CountRule, General, Profile};
 use super::quality::{self, Wanted};
 use super::state::{RadarState, Version};
+use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::signal::{Signal, word};
 use crate::inputs::{RadarScan, count, usable};
-use crate::time::Time;
 use crate::wire::frame::CanFrame;
 
 /// Fields of the status message of a scan of clusters.

@@ -3,9 +3,9 @@
 use super::family::{Family, Header, ITEM_HEADER, LONGEST, MAGIC, PADDING};
 use super::learning::Learning;
 use super::points::{Dialect, Entries, LONGEST_RECORD, Layout, Record};
+use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
-use crate::time::Time;
 
 /// What is known of the radar's firmware.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -27,10 +27,10 @@ mod outbox;
 mod reset;
 mod service;
 
+use crate::fixed::time::Time;
 use crate::inputs::ars408;
-use crate::polar::PolarMap;
+use crate::map::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
-use crate::time::Time;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
 use crate::unit::can_session::CanSession;

@@ -1,11 +1,11 @@
 //! Any bytes as configuration block, service message and bench record: what is taken is within its limits
 //! and comes back as it was.
 
-use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::Mount;
 use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::service::{Reply, Request, data_id};
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::unit::stored::Check;

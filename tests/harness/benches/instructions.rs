@@ -9,13 +9,13 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
-use viewshed::detection::{Detection, Measurement};
-use viewshed::polar::PolarMap;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::Known;
 use viewshed::wire::header::Header;

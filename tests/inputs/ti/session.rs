@@ -1,12 +1,12 @@
 //! A unit behind a radar's data port.
 
-use viewshed::field_of_view::FieldOfView;
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ti::{Config, Dialect, Family};
-use viewshed::mount::Mount;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::settings::Settings;
 use viewshed::unit::ti_session::TiSession;
 use viewshed::unit::{Unit, bench_sender, build};

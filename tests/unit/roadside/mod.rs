@@ -4,9 +4,9 @@ mod blocks;
 
 use std::collections::VecDeque;
 
-use viewshed::polar::PolarMap;
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::can_bus::CanPort;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::roadside::{Memory, Ports, Roadside, SerialPort, Start, Step, VERSION};

@@ -3,11 +3,11 @@
 use std::iter::Peekable;
 use std::mem;
 
-use viewshed::detection::Detection;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::Config;
 use viewshed::pil::flash::Flash;
 use viewshed::profile::reference::{CHECK, DETECTIONS, Map as PolarMap, Parameters, Sender, State};
-use viewshed::time::Time;
 use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::can_session::{CanSession, TIME_ID};

@@ -1,11 +1,11 @@
 //! The controller's program, run here.
 
 use anyhow::{Context, Result, anyhow};
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarGeometry;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Bench, Memory, run};
-use viewshed::polar::PolarGeometry;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::settings::Settings;
 use viewshed::unit::{Unit, bench_sender, build};
 use viewshed::wire::broadcast::Medium;

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
+use viewshed::fixed::time::Time;
 use viewshed::profile::reference::{AZIMUTHS, WORDS};
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::code::ray::Ray;

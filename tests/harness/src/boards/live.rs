@@ -4,12 +4,12 @@ use std::cell::RefCell;
 use std::io::{Read, Write};
 use std::{iter, mem};
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{Medium as Native, Sender};
+use viewshed::map::polar::PolarMap;
 use viewshed::pil::flash::Flash;
 use viewshed::pil::record::FrameRecord;
-use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::{Flow, Line, Session};
 use viewshed::unit::settings::Settings;

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::time::Time;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Message, Received};

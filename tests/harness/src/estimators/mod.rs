@@ -6,18 +6,18 @@ mod reference;
 
 use anyhow::{Result, bail};
 use serde::{Deserialize, Serialize};
-use viewshed::detection::{Detection, Measurement, NotADetection};
-use viewshed::field_of_view::FieldOfView;
-use viewshed::gate::{Rejection, Rejections};
-use viewshed::health::FrameStatus;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::{Detection, Measurement, NotADetection};
+use viewshed::frame::gate::{Rejection, Rejections};
+use viewshed::frame::health::FrameStatus;
+use viewshed::map::polar::PolarMap;
 use viewshed::map::{CellState, VisibilityMap};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
 use viewshed::radar_2d::{Radar2dConfig, Reading};
 use viewshed::radar_3d::Radar3dConfig;
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::recording::{Frame, Recording};
 

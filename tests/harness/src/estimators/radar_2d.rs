@@ -1,9 +1,10 @@
 //! `radar-2d` and `radar-2d-first`: the two readings of the conventional grid.
 
 use anyhow::Result;
-use viewshed::map::{CellState, RoadPoint, VisibilityMap};
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
 use viewshed::sensor::Sensor;
+use viewshed::sensor::road::RoadPoint;
 
 use super::Estimator;
 use super::{Intake, MOST_DETECTIONS};

@@ -1,11 +1,11 @@
 //! `radar-3d` on the reference grid.
 
 use anyhow::Result;
+use viewshed::fixed::time::Time;
 use viewshed::map::VisibilityMap;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
 
 use super::{Estimator, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};

@@ -4,7 +4,7 @@
 //! them ([`bounds`] are scores too), and [`summary`] makes rates ([`counts`], [`cells`]), intervals
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
 //! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
-//! and [`examples`] picks what is worth a picture.
+//! [`pool`] joins several, and [`examples`] picks what is worth a picture.
 
 pub mod bootstrap;
 pub mod bounds;
@@ -15,6 +15,7 @@ pub mod counts;
 pub mod curve;
 pub mod examples;
 pub mod mount_error;
+pub mod pool;
 pub mod rejected;
 pub mod replay;
 pub mod returns;

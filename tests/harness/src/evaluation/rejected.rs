@@ -1,6 +1,6 @@
 //! Points that were rejected, so many that the input and not the road is the reason.
 
-use viewshed::gate::Rejection;
+use viewshed::frame::gate::Rejection;
 
 use super::score::Score;
 use crate::estimators::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE};

@@ -1,6 +1,7 @@
 //! Runs one estimator over a recording and scores its map at every counted frame.
 
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
+use viewshed::map::{Visibility, VisibilityMap};
+use viewshed::sensor::road::RoadPoint;
 
 use super::Grid;
 use super::cells::{CellCounts, CellTally};

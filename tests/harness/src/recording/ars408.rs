@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile;
 use viewshed::inputs::ars408::{Ars408, Config, Counters, Outcome};
-use viewshed::time::Time;
 
 use super::candump::Line;
 use super::capture::{self, Kind};

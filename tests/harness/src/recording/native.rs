@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::native::{Config, Counters, Outcome, Receiver, VERSION, data_id, id};
-use viewshed::time::Time;
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::serial::Unstuffer;
 

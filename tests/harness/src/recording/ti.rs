@@ -1,9 +1,9 @@
 //! Recordings from raw captures of a TI mmWave radar's data port.
 
 use anyhow::{Context, Result, bail};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ti::{Config, Counters, Dialect, Family, Flaw, Outcome, Ti};
-use viewshed::time::Time;
 
 use super::capture::{self, Kind};
 use super::problems::Problems;

@@ -9,5 +9,6 @@ mod python;
 mod radar_scan;
 mod replay;
 mod scene;
+mod scenes;
 mod simulate;
 mod ti_capture;

@@ -3,10 +3,10 @@
 use std::process::Command;
 
 use serde_json::{Value, json};
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::native::{Medium, Sender, id};
-use viewshed::time::Time;
 use viewshed_harness::recording::candump::{Content, Line};
 use viewshed_harness::recording::{ReadOptions, read};
 

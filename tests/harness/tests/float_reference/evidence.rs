@@ -1,7 +1,7 @@
 //! The inverse sensor model: what a detection, and the lack of one, say of a cell.
 
-use viewshed::evidence::EvidenceConfig;
-use viewshed::reflection::NoiseConfig;
+use viewshed::grid::evidence::EvidenceConfig;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::Placed;
 use crate::grid::{Axes, Grid};
@@ -123,12 +123,12 @@ mod tests {
     use super::*;
     use crate::geometry::{Levelled, place};
     use crate::scene::{self, AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, mounts, raise, within};
-    use viewshed::detection::Measurement;
-    use viewshed::evidence::InverseSensor as IntegerSensor;
-    use viewshed::mount::{Levelling, Mount};
-    use viewshed::polar::PolarMap;
-    use viewshed::reflection::Noise;
-    use viewshed::time::Step;
+    use viewshed::fixed::time::Step;
+    use viewshed::frame::detection::Measurement;
+    use viewshed::grid::evidence::InverseSensor as IntegerSensor;
+    use viewshed::map::polar::PolarMap;
+    use viewshed::sensor::mount::{Levelling, Mount};
+    use viewshed::sensor::noise::Noise;
 
     /// One mount's model and grid, in integers and in real numbers.
     struct Both {

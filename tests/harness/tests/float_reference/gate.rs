@@ -1,10 +1,10 @@
 //! Which measurements are used: the limits on single ones, and the strongest of the rest.
 
-use viewshed::detection::{MAX_RANGE_M, Measurement};
-use viewshed::field_of_view::FieldOfView;
-use viewshed::gate::{GateConfig, Rejection};
-use viewshed::health::Points;
-use viewshed::reflection::NoiseConfig;
+use viewshed::frame::detection::{MAX_RANGE_M, Measurement};
+use viewshed::frame::gate::{GateConfig, Rejection};
+use viewshed::frame::health::Points;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Levelled, Placed, place};
 
@@ -101,7 +101,7 @@ impl Scan {
 mod tests {
     use super::*;
     use crate::scene::{Random, VIEW, mounts, within};
-    use viewshed::detection::Detection;
+    use viewshed::frame::detection::Detection;
 
     #[test]
     fn the_same_detections_pass_for_the_same_reasons() {
@@ -135,7 +135,7 @@ mod tests {
             let levelling = mount.levelling().unwrap();
             let measurements: Vec<Measurement> = (0..400).map(|_| random.measurement()).collect();
             let exact = Scan::new(&measurements, &config, &VIEW, &noise, &Levelled::new(&mount));
-            let mut scan = viewshed::scan::Scan::<256>::new();
+            let mut scan = viewshed::frame::scan::Scan::<256>::new();
             let detections: Vec<Detection> = measurements.iter().map(|m| Detection::new(m).unwrap()).collect();
             let points = scan.gather(detections.iter(), 0, &gate, |d| noises.place(d, &levelling));
             assert_eq!(points, exact.points);

@@ -1,12 +1,13 @@
 //! All stages in order, from measurements to a polar map; an estimator for the evaluation.
 
-use viewshed::detection::Measurement;
-use viewshed::gate::Rejection;
-use viewshed::health::{Condition, Continuity, Health, HealthLimits};
-use viewshed::map::{CellState, RoadPoint, VisibilityMap};
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Measurement;
+use viewshed::frame::gate::Rejection;
+use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::road::RoadPoint;
 use viewshed_harness::estimators::{Estimator, PolarCells};
 use viewshed_harness::recording::Frame;
 

@@ -4,7 +4,8 @@ use anyhow::{Result, ensure};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde::Serialize;
-use viewshed::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use viewshed::map::{CellState, Visibility, VisibilityMap};
+use viewshed::sensor::road::RoadPoint;
 
 use crate::geometry::pose::Spherical;
 use crate::recording::Recording;

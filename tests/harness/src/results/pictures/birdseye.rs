@@ -3,7 +3,8 @@
 //! The road runs to the right (x), its left side is up (y), both axes at the same scale. The
 //! ground is what the map answers at the centre of every 1 m cell.
 
-use viewshed::map::{RoadPoint, VisibilityMap};
+use viewshed::map::VisibilityMap;
+use viewshed::sensor::road::RoadPoint;
 
 use super::axes::{BELOW_PX, Plot};
 use super::canvas::{Canvas, Colour, Pen};

@@ -81,7 +81,7 @@ pub(super) struct Rates {
 
 /// What the intervals were drawn from.
 #[derive(Serialize)]
-struct Resampling {
+pub(super) struct Resampling {
     objects_over: &'static str,
     object_units: usize,
     cells_over: &'static str,
@@ -147,7 +147,7 @@ pub fn array(reports: &[Report]) -> Result<String> {
     Ok(serde_json::to_string_pretty(reports)? + "\n")
 }
 
-fn estimator(row: &Row) -> Estimator {
+pub(super) fn estimator(row: &Row) -> Estimator {
     Estimator {
         name: row.name.clone(),
         rates: rates(&row.counts),
@@ -186,7 +186,7 @@ fn breakdown(groups: &Breakdown) -> Value {
     })
 }
 
-fn resampling(summary: &Summary) -> Resampling {
+pub(super) fn resampling(summary: &Summary) -> Resampling {
     Resampling {
         objects_over: summary.drawn,
         object_units: summary.drawn_units,

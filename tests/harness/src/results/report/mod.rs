@@ -4,6 +4,7 @@ pub mod csv;
 pub mod experiment;
 pub mod json;
 pub mod notes;
+pub mod scenes;
 pub mod site;
 pub mod table;
 

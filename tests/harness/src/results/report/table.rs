@@ -31,7 +31,7 @@ fn with_interval(rate: Option<f64>, interval: Option<Interval>) -> String {
     percent(rate) + &spread.unwrap_or_default()
 }
 
-fn signed(points: Option<f64>, interval: Option<Interval>) -> String {
+pub(super) fn signed(points: Option<f64>, interval: Option<Interval>) -> String {
     let spread = interval.map(|Interval(low, high)| format!("\n{low:+.1}…{high:+.1}"));
     points.map_or_else(|| "n/a".into(), |p| format!("{p:+.1}")) + &spread.unwrap_or_default()
 }

@@ -2,8 +2,10 @@
 //!
 //! A [`plan`] names the scene and the days; each day is simulated as a recording, read back like any other
 //! and replayed. Counts are pooled over the reporting days, and every rate is kept by day for its spread.
+//! [`scenes`] are crossings and queues, which have a mount each.
 
 pub mod plan;
+pub mod scenes;
 
 use std::io::Cursor;
 

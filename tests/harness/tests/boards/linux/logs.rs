@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::process::Command;
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::Config;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::profile::reference::{DETECTIONS, Parameters, Sender, State, Unit};
-use viewshed::time::Time;
 use viewshed::unit::build;
 use viewshed::unit::can_session::CanSession;
 use viewshed::unit::settings::Settings;

@@ -1,9 +1,9 @@
 //! Parameters of tracking in metres and seconds.
 
+use viewshed::fixed::trig::Direction;
 use viewshed::obstacles::size::SizeConfig;
 use viewshed::obstacles::tracking::ObstacleConfig;
-use viewshed::reflection::NoiseConfig;
-use viewshed::trig::Direction;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Ground, Placed, along};
 
