@@ -1,0 +1,110 @@
+//! The fault classes.
+
+/// What a bus, a sender or a receiver does to maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    Lossless,
+    /// Frames are lost: 1, 5, 20 %.
+    Loss1,
+    Loss5,
+    Loss20,
+    /// Every frame is up to 100 ms late.
+    Reordered,
+    /// Every frame is up to 50 ms late.
+    Jitter,
+    /// 1 % of the frames are up to 3 s late.
+    Late1,
+    /// 20 % of the frames come again, up to 3 s late.
+    Repeated20,
+    /// 5 % are up to 3 s late, 5 % come again up to 3 s late.
+    LateAndRepeated,
+    /// The receiver starts while 1 to 2.5 s of backlog drain.
+    DrainAtStart,
+    /// A gateway stands still for 2.6 to 3 s, then drains.
+    DrainAfterStall,
+    /// The cable is pulled and put back.
+    Cuts,
+    SenderRestarts,
+    ReceiverRestarts,
+    /// A second sender with the same number.
+    TwoSenders,
+    /// 2 % of the frames have a bit turned over, some are cut off.
+    Flips,
+    /// Intact frames of another epoch, one by one.
+    Strays,
+    /// The receiver's clock jumps, some of the times in a silence.
+    ClockJumps,
+    /// Mailboxes, a scan's frames at once, sent lowest identifier first.
+    Mailboxes,
+    /// 16 mailboxes that are kept full.
+    MailboxesFull,
+    /// For some seconds everything comes again, by a second path slower by 2.6 to 4.9 s.
+    Echo,
+    /// From some moment on everything is 0.15 to 4.9 s late, and stays so.
+    DelayStays,
+}
+
+use Class::{
+    ClockJumps, Cuts, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, Jitter, Late1, LateAndRepeated, Lossless,
+    Loss1, Loss5, Loss20, Mailboxes, MailboxesFull, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays,
+    TwoSenders,
+};
+
+impl Class {
+    pub const ALL: [Self; 22] = [
+        Lossless,
+        Loss1,
+        Loss5,
+        Loss20,
+        Reordered,
+        Jitter,
+        Late1,
+        Repeated20,
+        LateAndRepeated,
+        DrainAtStart,
+        DrainAfterStall,
+        Cuts,
+        SenderRestarts,
+        ReceiverRestarts,
+        TwoSenders,
+        Flips,
+        Strays,
+        ClockJumps,
+        Mailboxes,
+        MailboxesFull,
+        Echo,
+        DelayStays,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Lossless => "lossless",
+            Loss1 => "loss-1",
+            Loss5 => "loss-5",
+            Loss20 => "loss-20",
+            Reordered => "reordered",
+            Jitter => "jitter",
+            Late1 => "late-1",
+            Repeated20 => "repeated-20",
+            LateAndRepeated => "late-and-repeated",
+            DrainAtStart => "drain-at-start",
+            DrainAfterStall => "drain-after-stall",
+            Cuts => "cuts",
+            SenderRestarts => "sender-restarts",
+            ReceiverRestarts => "receiver-restarts",
+            TwoSenders => "two-senders",
+            Flips => "flips",
+            Strays => "strays",
+            ClockJumps => "clock-jumps",
+            Mailboxes => "mailboxes",
+            MailboxesFull => "mailboxes-full",
+            Echo => "echo",
+            DelayStays => "delay-stays",
+        }
+    }
+
+    /// Whether the fail-safe sentence holds: not where a delay stays for so long that it becomes the new zero.
+    pub fn strict(self) -> bool {
+        self != DelayStays
+    }
+}

@@ -1,0 +1,110 @@
+//! The library's receiver as a program, the table of figures, and the logs.
+
+use std::io::{BufRead, BufWriter, Write};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use rayon::prelude::*;
+use viewshed_conformance::class::Class;
+use viewshed_conformance::input::{Bus, Input};
+use viewshed_conformance::library::Library;
+use viewshed_conformance::measure::{self, Figures};
+use viewshed_conformance::program::Program;
+use viewshed_conformance::world::{Looks, World};
+
+/// Receivers of visibility maps against the faults of buses.
+#[derive(Debug, Parser)]
+#[command(version)]
+enum Cli {
+    /// The library's receiver: lines of tests/conformance/README.md in and out
+    Receive,
+    /// Print, for each fault and bus, how often a receiver was wrong and how much arrived
+    Table(TableArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct TableArgs {
+    /// Runs of 30 s for each fault and bus
+    #[arg(long, default_value_t = 3)]
+    runs: u64,
+    /// The first run's seed
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only faults whose name begins so
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Another receiver than the library's: a program and its arguments
+    #[arg(long)]
+    receiver: Option<String>,
+    /// Name every run in which something was wrongly visible
+    #[arg(long)]
+    wrong: bool,
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse() {
+        Cli::Receive => receive(),
+        Cli::Table(args) => table(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn receive() -> Result<()> {
+    let mut library = Library::default();
+    let mut out = BufWriter::new(std::io::stdout().lock());
+    for line in std::io::stdin().lock().lines() {
+        let input: Input = line?.parse().map_err(anyhow::Error::msg)?;
+        if let Some(answer) = library.take(&input) {
+            writeln!(out, "{answer}")?;
+        }
+    }
+    Ok(out.flush()?)
+}
+
+const LENGTH_US: u64 = 30_000_000;
+
+fn table(args: &TableArgs) -> Result<()> {
+    let maps = viewshed_conformance::maps()?;
+    let program = args.receiver.as_deref().map(Program::new);
+    println!("| fault | bus | looks | wrong looks | wrong cells | arrived % | least of a run % | told again s |");
+    println!("|---|---|---|---|---|---|---|---|");
+    for class in Class::ALL.into_iter().filter(|class| class.name().starts_with(&args.only)) {
+        for bus in Bus::ALL {
+            let run = |seed: u64| -> Result<Figures> {
+                let world = World::new(&maps, bus, class, seed, LENGTH_US, Looks::Often)?;
+                let Some(program) = &program else {
+                    let (figures, first, _) = measure::library(&maps, &world);
+                    if let Some((us, cells)) = first.filter(|_| args.wrong) {
+                        let at = us as f64 / 1e6;
+                        eprintln!("{} {} seed {seed}: first at {at:.3} s, {cells} cells", class.name(), bus.name());
+                    }
+                    return Ok(figures);
+                };
+                let answers = program.answers(world.text(true))?;
+                measure::answered(&maps, &world, answers.lines()).map_err(anyhow::Error::msg)
+            };
+            let runs: Vec<Figures> = (args.seed..args.seed + args.runs).into_par_iter().map(run).collect::<Result<_>>()?;
+            let all = runs.iter().fold(Figures::default(), |all, one| all.and(*one));
+            let least = runs.iter().map(Figures::arrived).fold(1.0, f64::min);
+            println!(
+                "| {} | {} | {} | {} | {} | {:.1} | {:.1} | {} |",
+                class.name(),
+                bus.name(),
+                all.looks,
+                all.wrong_looks,
+                all.wrong_cells,
+                100.0 * all.arrived(),
+                100.0 * least,
+                if all.again_us > 0 { format!("{:.2}", all.again_us as f64 / 1e6) } else { "–".into() },
+            );
+        }
+    }
+    Ok(())
+}
