@@ -40,18 +40,26 @@ pub enum Class {
     MailboxesFull,
     /// For some seconds everything comes again, by a second path slower by 2.6 to 4.9 s.
     Echo,
+    /// For up to 5 s everything is 0.15 to 4.9 s late.
+    DelayPasses,
     /// From some moment on everything is 0.15 to 4.9 s late, and stays so.
     DelayStays,
+    /// Messages of other sensors, of later versions, of installations, of other planes; visible ranges.
+    Others,
+    /// Headers that contradict, do not check, or are of another wire version.
+    HeaderFaults,
+    /// Made-up maps: noise, limits that change, azimuths without known cells.
+    MadeUpMaps,
 }
 
 use Class::{
-    ClockJumps, Cuts, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, Jitter, Late1, LateAndRepeated, Lossless,
-    Loss1, Loss5, Loss20, Mailboxes, MailboxesFull, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays,
+    ClockJumps, Cuts, DelayPasses, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, HeaderFaults, Jitter, Late1,
+    LateAndRepeated, Lossless, Loss1, Loss5, Loss20, MadeUpMaps, Mailboxes, MailboxesFull, Others, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays,
     TwoSenders,
 };
 
 impl Class {
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 26] = [
         Lossless,
         Loss1,
         Loss5,
@@ -73,7 +81,11 @@ impl Class {
         Mailboxes,
         MailboxesFull,
         Echo,
+        DelayPasses,
         DelayStays,
+        Others,
+        HeaderFaults,
+        MadeUpMaps,
     ];
 
     pub fn name(self) -> &'static str {
@@ -99,12 +111,11 @@ impl Class {
             Mailboxes => "mailboxes",
             MailboxesFull => "mailboxes-full",
             Echo => "echo",
+            DelayPasses => "delay-passes",
             DelayStays => "delay-stays",
+            Others => "others",
+            HeaderFaults => "header-faults",
+            MadeUpMaps => "made-up-maps",
         }
-    }
-
-    /// Whether the fail-safe sentence holds: not where a delay stays for so long that it becomes the new zero.
-    pub fn strict(self) -> bool {
-        self != DelayStays
     }
 }

@@ -3,6 +3,7 @@
 pub mod class;
 pub mod input;
 pub mod library;
+mod made_up;
 pub mod measure;
 pub mod program;
 mod random;

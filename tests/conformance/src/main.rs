@@ -4,7 +4,7 @@ use std::io::{BufRead, BufWriter, Write};
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::Parser;
 use rayon::prelude::*;
 use viewshed_conformance::class::Class;
 use viewshed_conformance::input::{Bus, Input};

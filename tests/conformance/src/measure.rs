@@ -58,6 +58,7 @@ pub struct Measure<'a> {
 
 impl<'a> Measure<'a> {
     pub fn new(maps: &'a Maps, world: &'a World) -> Self {
+        let maps = world.made_up.as_ref().unwrap_or(maps);
         Self { maps, world, figures: Figures::default(), waiting: world.drained.clone(), first_wrong: None }
     }
 
@@ -80,7 +81,7 @@ impl<'a> Measure<'a> {
             .sum::<u64>()
         });
         let wrong = wrong.min().unwrap_or(0);
-        if wrong > 0 {
+        if wrong > 0 && at < self.world.strict_to {
             self.figures.wrong_looks += 1;
             self.figures.wrong_cells += wrong;
             self.first_wrong.get_or_insert((at - START, wrong));

@@ -55,6 +55,8 @@ pub struct Plan {
     pub first_map: usize,
     /// `None`: first in, first out.
     pub mailboxes: Option<Mailboxes>,
+    /// Whether visible ranges are sent, too.
+    pub visible_range: bool,
 }
 
 /// The maps of an epoch: when each was measured, and which it is.
@@ -88,6 +90,7 @@ pub fn send(maps: &Maps, bus: Bus, plan: &Plan) -> Result<(Vec<Sent>, Life)> {
     if plan.mailboxes.is_some() {
         config.gap_us = 0;
     }
+    config.visible_range_ms = plan.visible_range.then_some(500);
     let begin = Time::from_micros(plan.from + plan.ahead);
     let mut broadcaster =
         Broadcaster::new(config, maps.header, plan.epoch, begin).map_err(|error| anyhow!("the sender: {error}"))?;

@@ -2,14 +2,16 @@
 
 use std::fmt::Write as _;
 
-use anyhow::Result;
-use viewshed::wire::message::{Epoch, Message, Packet, Part, Plane};
+use anyhow::{Result, bail};
+use viewshed::wire::header::Header;
+use viewshed::wire::message::Epoch;
 use viewshed_harness::bus::traffic::Maps;
 
 use crate::class::Class;
 use crate::input::{Bus, Input};
+use crate::made_up::{self, Maker};
 use crate::random::Random;
-use crate::sender::{Life, Mailboxes, Plan, SCAN_US, SENSOR, Sent, on_bus, send};
+use crate::sender::{Life, Mailboxes, Plan, SCAN_US, SENSOR, Sent, send};
 
 /// Microseconds in a millisecond.
 const MS: u64 = 1000;
@@ -33,13 +35,16 @@ pub enum Looks {
 }
 
 /// A run.
-#[derive(Debug, Clone)]
 pub struct World {
+    /// What the maps are of, where they are not the recording's.
+    pub made_up: Option<Maps>,
     pub lives: Vec<Life>,
     /// True time, and what the receiver is fed then.
     pub inputs: Vec<(u64, Input)>,
     /// From these moments on a map is to be told again: a queue is drained and a header has come since.
     pub drained: Vec<u64>,
+    /// After this moment a delay has stayed for so long that it is taken for none.
+    pub strict_to: u64,
 }
 
 /// The receiver's clock.
@@ -61,9 +66,11 @@ impl Clock {
 struct Faults {
     random: Random,
     bus: Bus,
-    /// Of the first sender.
-    epoch: Epoch,
+    /// What the first sender does, and of what its maps are.
+    sender: Plan,
+    header: Header,
     end: u64,
+    strict_to: u64,
     drained: Vec<u64>,
     jumps: Vec<(u64, i64)>,
     starts: Vec<u64>,
@@ -79,18 +86,30 @@ impl World {
         let end = START + length_us;
         let (mut sent, mut lives) = (Vec::new(), Vec::new());
         let plans = plans(class, &mut random, end);
-        let epoch = plans.first().map_or(Epoch::new(0), |plan| plan.epoch);
+        let made_up = (class == Class::MadeUpMaps).then(|| made_up::maps(maps, &mut random));
+        let maps = made_up.as_ref().unwrap_or(maps);
         for plan in &plans {
             let (more, life) = send(maps, bus, plan)?;
             sent.extend(more);
             lives.push(life);
         }
         sent.sort_by_key(|one| one.at);
-        let mut faults = Faults { random, bus, epoch, end, drained: Vec::new(), jumps: Vec::new(), starts: vec![START] };
+        let [sender, ..] = plans[..] else { bail!("nobody sends") };
+        let mut faults = Faults {
+            random,
+            bus,
+            sender,
+            header: maps.header,
+            end,
+            strict_to: u64::MAX,
+            drained: Vec::new(),
+            jumps: Vec::new(),
+            starts: vec![START],
+        };
         let mut sent = faults.apply(class, sent);
         // those of one moment stay in the order they were sent in
         sent.sort_by_key(|one| one.at);
-        let Faults { mut random, drained, jumps, starts, .. } = faults;
+        let Faults { mut random, drained, jumps, starts, strict_to, .. } = faults;
         let clock = Clock { ahead: random.between(100 * S, 200 * S), rate: 999_800 + 200 * random.below(3), jumps };
         let mut inputs: Vec<(u64, u8, Input)> =
             starts.into_iter().map(|at| (at, 0, Input::Start { bus, sensor: SENSOR })).collect();
@@ -103,7 +122,8 @@ impl World {
             at += if looks == Looks::Log { 100 * MS } else { random.between(20 * MS, 50 * MS) };
         }
         inputs.sort_by_key(|(at, order, _)| (*at, *order));
-        Ok(Self { lives, inputs: inputs.into_iter().map(|(at, _, input)| (at, input)).collect(), drained })
+        let inputs = inputs.into_iter().map(|(at, _, input)| (at, input)).collect();
+        Ok(Self { made_up, lives, inputs, drained, strict_to })
     }
 
     /// The lines that are fed to a receiver.
@@ -154,6 +174,7 @@ fn plans(class: Class, random: &mut Random, end: u64) -> Vec<Plan> {
         ahead: random.below(100 * S),
         first_map: random.below(400) as usize,
         mailboxes,
+        visible_range: class == Class::Others,
     };
     let mut all = Vec::new();
     if class == Class::SenderRestarts {
@@ -183,7 +204,8 @@ impl Faults {
             | Class::SenderRestarts
             | Class::TwoSenders
             | Class::Mailboxes
-            | Class::MailboxesFull => sent,
+            | Class::MailboxesFull
+            | Class::MadeUpMaps => sent,
             Class::Loss1 => self.lose(sent, 10),
             Class::Loss5 => self.lose(sent, 50),
             Class::Loss20 => self.lose(sent, 200),
@@ -230,12 +252,22 @@ impl Faults {
                 sent
             }
             Class::Flips => self.flip(sent),
-            Class::Strays => self.stray(sent),
+            Class::Strays => self.add(sent, 450 * MS, 3 * S, Maker::stray),
+            Class::Others => self.add(sent, 20 * MS, 120 * MS, Maker::other),
+            Class::HeaderFaults => self.add(sent, 500 * MS, 7 * S, Maker::header),
             Class::ClockJumps => self.jump(sent),
             Class::Echo => self.echo(sent),
+            Class::DelayPasses => {
+                let from = START + self.random.between(3 * S, 4 * S);
+                let to = from + self.random.between(500 * MS, 5 * S);
+                let by = self.random.between(150 * MS, 4900 * MS);
+                let late = |one: Sent| Sent { at: if (from..to).contains(&one.at) { one.at + by } else { one.at }, ..one };
+                sent.into_iter().map(late).collect()
+            }
             Class::DelayStays => {
                 let from = START + self.random.between(3 * S, 4 * S);
                 let by = self.random.between(150 * MS, 4900 * MS);
+                self.strict_to = from + by + 5120 * MS;
                 let late = |one: Sent| Sent { at: if one.at < from { one.at } else { one.at + by }, ..one };
                 sent.into_iter().map(late).collect()
             }
@@ -299,27 +331,19 @@ impl Faults {
         sent
     }
 
-    fn stray(&mut self, mut sent: Vec<Sent>) -> Vec<Sent> {
-        let packing = self.bus.medium().packing(false);
-        let mut at = START + self.random.between(S, 2 * S);
+    /// Messages that are made up, one after another with these times between them.
+    fn add(
+        &mut self,
+        mut sent: Vec<Sent>,
+        least_us: u64,
+        most_us: u64,
+        make: fn(&Maker, u64, &mut Random) -> Option<Sent>,
+    ) -> Vec<Sent> {
+        let maker = Maker { bus: self.bus, sender: self.sender, header: self.header };
+        let mut at = START + self.random.below(2 * S);
         while at < self.end {
-            let mut own = [0; 6].map(|_| self.random.below(256) as u8);
-            let message = match self.random.below(4) {
-                0 => Message::Status,
-                1 => Message::Header,
-                2 => Message::VisibleRange,
-                _ => Message::Map(Plane::Visibility, Part::Refresh),
-            };
-            if message == Message::Status {
-                own[0] &= 0x51;
-            }
-            let epoch = Epoch::new(self.epoch.number() + 1 + self.random.below(15) as u8);
-            let packet = Packet::new(packing, SENSOR, message, epoch, &own);
-            let filled = (self.bus == Bus::CanFd).then_some(12);
-            if let Some(stray) = on_bus(self.bus, &packet.protect(self.random.below(15) as u8, filled)) {
-                sent.push(Sent { at, clock: false, ..stray });
-            }
-            at += self.random.between(450 * MS, 3 * S);
+            sent.extend(make(&maker, at, &mut self.random));
+            at += self.random.between(least_us, most_us);
         }
         sent
     }
