@@ -4,6 +4,7 @@ pub mod class;
 pub mod input;
 pub mod library;
 mod made_up;
+pub mod logs;
 pub mod measure;
 pub mod program;
 mod random;

@@ -1,6 +1,7 @@
 //! The library's receiver as a program, the table of figures, and the logs.
 
 use std::io::{BufRead, BufWriter, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -9,6 +10,7 @@ use rayon::prelude::*;
 use viewshed_conformance::class::Class;
 use viewshed_conformance::input::{Bus, Input};
 use viewshed_conformance::library::Library;
+use viewshed_conformance::logs::{self, Log};
 use viewshed_conformance::measure::{self, Figures};
 use viewshed_conformance::program::Program;
 use viewshed_conformance::world::{Looks, World};
@@ -21,6 +23,8 @@ enum Cli {
     Receive,
     /// Print, for each fault and bus, how often a receiver was wrong and how much arrived
     Table(TableArgs),
+    /// Write the logs of tests/conformance/logs anew, answered by the library's receiver
+    Logs,
 }
 
 #[derive(Debug, clap::Args)]
@@ -46,6 +50,7 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse() {
         Cli::Receive => receive(),
         Cli::Table(args) => table(&args),
+        Cli::Logs => logs(),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -66,6 +71,12 @@ fn receive() -> Result<()> {
         }
     }
     Ok(out.flush()?)
+}
+
+fn logs() -> Result<()> {
+    let maps = viewshed_conformance::maps()?;
+    let all: Vec<_> = logs::names().collect();
+    all.into_par_iter().try_for_each(|(bus, class)| Log::new(&maps, bus, class)?.write(Path::new(logs::FOLDER)))
 }
 
 const LENGTH_US: u64 = 30_000_000;
