@@ -8,6 +8,7 @@ pub mod logs;
 pub mod measure;
 pub mod program;
 mod random;
+pub mod receivers;
 pub mod sender;
 pub mod world;
 

@@ -41,7 +41,7 @@ struct TableArgs {
     /// Another receiver than the library's: a program and its arguments
     #[arg(long)]
     receiver: Option<String>,
-    /// Name every run in which something was wrongly visible
+    /// Name every run in which something was wrongly visible, or told otherwise than by the library
     #[arg(long)]
     wrong: bool,
 }
@@ -84,33 +84,41 @@ const LENGTH_US: u64 = 30_000_000;
 fn table(args: &TableArgs) -> Result<()> {
     let maps = viewshed_conformance::maps()?;
     let program = args.receiver.as_deref().map(Program::new);
-    println!("| fault | bus | looks | wrong looks | wrong cells | arrived % | least of a run % | told again s |");
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("| fault | bus | looks | wrong looks | wrong cells | otherwise than the library | arrived % | least of a run % | told again s |");
+    println!("|---|---|---|---|---|---|---|---|---|");
     for class in Class::ALL.into_iter().filter(|class| class.name().starts_with(&args.only)) {
         for bus in Bus::ALL {
             let run = |seed: u64| -> Result<Figures> {
                 let world = World::new(&maps, bus, class, seed, LENGTH_US, Looks::Often)?;
+                let world = if program.is_some() { world.asking_for_cells() } else { world };
+                let (figures, first, ours) = measure::library(&maps, &world);
                 let Some(program) = &program else {
-                    let (figures, first, _) = measure::library(&maps, &world);
                     if let Some((us, cells)) = first.filter(|_| args.wrong) {
                         let at = us as f64 / 1e6;
                         eprintln!("{} {} seed {seed}: first at {at:.3} s, {cells} cells", class.name(), bus.name());
                     }
                     return Ok(figures);
                 };
-                let answers = program.answers(world.text(true))?;
-                measure::answered(&maps, &world, answers.lines()).map_err(anyhow::Error::msg)
+                let answers = program.answers(world.text())?;
+                let differing = ours.iter().zip(answers.lines()).enumerate().filter(|(_, (ours, theirs))| ours != theirs);
+                let differ = differing.clone().count() as u64;
+                if let Some((look, _)) = differing.clone().next().filter(|_| args.wrong) {
+                    eprintln!("{} {} seed {seed}: {differ} looks differ, first {look}", class.name(), bus.name());
+                }
+                let figures = measure::answered(&maps, &world, answers.lines()).map_err(anyhow::Error::msg)?;
+                Ok(Figures { differ, ..figures })
             };
             let runs: Vec<Figures> = (args.seed..args.seed + args.runs).into_par_iter().map(run).collect::<Result<_>>()?;
             let all = runs.iter().fold(Figures::default(), |all, one| all.and(*one));
             let least = runs.iter().map(Figures::arrived).fold(1.0, f64::min);
             println!(
-                "| {} | {} | {} | {} | {} | {:.1} | {:.1} | {} |",
+                "| {} | {} | {} | {} | {} | {} | {:.1} | {:.1} | {} |",
                 class.name(),
                 bus.name(),
                 all.looks,
                 all.wrong_looks,
                 all.wrong_cells,
+                all.differ,
                 100.0 * all.arrived(),
                 100.0 * least,
                 if all.again_us > 0 { format!("{:.2}", all.again_us as f64 / 1e6) } else { "–".into() },

@@ -22,6 +22,8 @@ pub struct Figures {
     /// Visible cells of the newest map, and those of them that were told.
     pub newest: u64,
     pub told: u64,
+    /// Looks at which another receiver answered otherwise than the library's.
+    pub differ: u64,
     /// The longest it took until a map was told again after a queue had drained and a header had come.
     pub again_us: u64,
 }
@@ -40,6 +42,7 @@ impl Figures {
             wrong_cells: self.wrong_cells + other.wrong_cells,
             newest: self.newest + other.newest,
             told: self.told + other.told,
+            differ: self.differ + other.differ,
             again_us: self.again_us.max(other.again_us),
         }
     }
@@ -122,7 +125,7 @@ pub fn library(maps: &Maps, world: &World) -> (Figures, Option<(u64, u64)>, Vec<
     let (mut library, mut measure) = (Library::default(), Measure::new(maps, world));
     let mut answers = Vec::new();
     for (at, input) in &world.inputs {
-        if let Input::Look { time } = input {
+        if let Input::Look { time } | Input::Cells { time } = input {
             measure.look(*at, &library.visible(*time));
         }
         answers.extend(library.take(input));
@@ -138,7 +141,7 @@ pub fn library(maps: &Maps, world: &World) -> (Figures, Option<(u64, u64)>, Vec<
 pub fn answered<'a>(maps: &Maps, world: &World, answers: impl Iterator<Item = &'a str>) -> Result<Figures, String> {
     let mut measure = Measure::new(maps, world);
     let mut looks = world.inputs.iter().filter_map(|(at, input)| match input {
-        Input::Look { time } => Some((*at, *time)),
+        Input::Look { time } | Input::Cells { time } => Some((*at, *time)),
         _ => None,
     });
     for answer in answers {

@@ -1,6 +1,7 @@
 //! A receiver that is a program: fed on standard input, answering on standard output.
 
 use std::io::Write;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
@@ -13,6 +14,11 @@ impl Program {
     /// From a command line whose words are separated by spaces.
     pub fn new(words: &str) -> Self {
         Self(words.split_whitespace().map(str::to_owned).collect())
+    }
+
+    /// From a program and its arguments.
+    pub fn of(words: impl IntoIterator<Item = PathBuf>) -> Self {
+        Self(words.into_iter().map(|word| word.to_string_lossy().into_owned()).collect())
     }
 
     /// Feeds lines; what was answered.

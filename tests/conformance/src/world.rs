@@ -131,15 +131,28 @@ impl World {
         self.inputs.iter().map(|(_, input)| input)
     }
 
-    /// The same as text, with every look asking for cells where that is wanted.
-    pub fn text(&self, cells: bool) -> String {
+    /// The same as text.
+    pub fn text(&self) -> String {
         self.lines().fold(String::new(), |mut text, input| {
-            let _ = match input {
-                Input::Look { time } if cells => writeln!(text, "{}", Input::Cells { time: *time }),
-                input => writeln!(text, "{input}"),
-            };
+            let _ = writeln!(text, "{input}");
             text
         })
+    }
+
+    /// The same with every look asking for cells.
+    #[must_use]
+    pub fn asking_for_cells(mut self) -> Self {
+        for (_, input) in &mut self.inputs {
+            if let Input::Look { time } = *input {
+                *input = Input::Cells { time };
+            }
+        }
+        self
+    }
+
+    /// Only the beginning.
+    pub fn shorten(&mut self, length_us: u64) {
+        self.inputs.retain(|(at, _)| *at < START + length_us);
     }
 }
 
