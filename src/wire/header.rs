@@ -167,7 +167,12 @@ impl Header {
 
     /// What the code of its maps needs of it.
     pub fn context(&self, form: Form) -> Context {
-        Context { form, usual: self.usual, azimuths: usize::from(self.azimuths) }
+        Context {
+            form,
+            usual: self.usual,
+            azimuths: usize::from(self.azimuths),
+            ranges: usize::from(self.ranges),
+        }
     }
 
     /// Groups 1 to 6.
@@ -329,7 +334,8 @@ impl Collector {
         if bytes.len() < usize::from(GROUPS) * GROUP {
             return match flags >> 4 & 7 {
                 0 => Ok(Brought::Clock(Clock::parse(synchronised, first))),
-                GROUPS.. => Err(NotAHeader::Range),
+                // of a later version, which says so itself if that matters
+                GROUPS.. => Ok(Brought::Group),
                 group => self.take_group(usize::from(group) - 1, first),
             };
         }

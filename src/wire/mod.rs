@@ -1,4 +1,4 @@
-//! Radar frames in and visibility out, over CAN, CAN FD and serial lines.
+//! Visibility maps out and in again, over CAN, CAN FD and serial lines.
 //!
 #![doc = include_str!("SPECIFICATION.md")]
 

@@ -15,6 +15,9 @@ pub const TICK_US: u32 = 20_000;
 /// Time after which numbers come again, microseconds.
 pub const PERIOD_US: u32 = 5_120_000;
 
+/// Time after which the header's clock comes again, microseconds: 2^40 ms.
+pub const CLOCK_US: u64 = (1 << 40) * 1000;
+
 /// Number of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -24,7 +27,8 @@ impl ScanNumber {
     /// Of a scan measured at this time of the sender's clock.
     #[allow(clippy::cast_possible_truncation)] // modulo 256
     pub const fn at(measured: Time) -> Self {
-        Self((measured.micros() / TICK_US as u64) as u8)
+        // the clock comes again after 2^40 ms, as it does in the header
+        Self((measured.micros() % CLOCK_US / TICK_US as u64) as u8)
     }
 
     /// From the byte in a message.

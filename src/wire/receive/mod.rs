@@ -49,6 +49,8 @@ pub use secured::SecuredReceiver;
 pub use sensor::{Accepted, Condition, Counters, Refused, SensorReceiver};
 pub use session::{ENOUGH, Limits};
 
+use core::cell::Cell;
+
 use super::frame::CanFrame;
 use super::message::{Addresses, NotAMessage, Received};
 use crate::time::Time;
@@ -60,12 +62,14 @@ pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usi
     limits: Limits,
     sensors: [(u8, SensorReceiver<A, W, P>); N],
     foreign: u32,
+    /// The latest time handed in.
+    latest: Cell<Time>,
 }
 
 impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N, A, W, P> {
     /// Of these sensors, and no others.
     pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits) -> Self {
-        Self { addresses, limits, sensors: sensors.map(|number| (number, SensorReceiver::NEW)), foreign: 0 }
+        Self { addresses, limits, sensors: sensors.map(|number| (number, SensorReceiver::NEW)), foreign: 0, latest: Cell::new(Time::from_micros(0)) }
     }
 
     /// Takes a CAN or CAN FD frame.
@@ -101,6 +105,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         received: Result<Received<'_>, NotAMessage>,
         sensor: Option<u8>,
     ) -> Result<Accepted, Refused> {
+        self.watch(now);
         let limits = self.limits;
         let found = self.sensors.iter_mut().find(|(number, _)| Some(*number) == sensor);
         let Some((_, sensor)) = found.filter(|_| received != Err(NotAMessage::Foreign)) else {
@@ -110,6 +115,14 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         match received {
             Ok(received) => sensor.take(now, &received, &limits),
             Err(error) => Err(sensor.refuse(Refused::NotAMessage(error))),
+        }
+    }
+
+    /// Follows the receiver's clock, at frames and at looks. Where it steps back, nothing is told before each
+    /// sensor's next session: no age is known any more.
+    fn watch(&self, now: Time) {
+        if now < self.latest.replace(now) {
+            self.sensors.iter().for_each(|(_, sensor)| sensor.step_back());
         }
     }
 
@@ -132,11 +145,13 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
 
     /// A sensor's map as it is now; everything is unknown where it cannot be trusted.
     pub fn map(&self, number: u8, now: Time) -> ReceivedMap<'_, A, W, P> {
+        self.watch(now);
         ReceivedMap::new(self.sensor(number), now, self.limits)
     }
 
     /// All sensors' maps as they are now.
     pub fn together(&self, now: Time) -> Together<'_, N, A, W, P> {
+        self.watch(now);
         Together::new(self.sensors.each_ref().map(|(_, sensor)| ReceivedMap::new(Some(sensor), now, self.limits)))
     }
 }
