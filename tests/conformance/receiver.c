@@ -20,8 +20,16 @@ static int state_of(const sensor_t *s, uint64_t now, int a, int c) {
     return told(s, now, a) && c >= s->now[a].near && c < s->now[a].end ? 1 + s->now[a].bit[c] : 0;
 }
 
+/* Bytes of hexadecimal digits; how many, at most `most`. */
+static int bytes_in(const char *digits, uint8_t *bytes, int most) {
+    int n = 0;
+    for (unsigned byte; n < most && sscanf(digits + 2 * n, "%2x", &byte) == 1; n++) bytes[n] = (uint8_t)byte;
+    return n;
+}
+
 /* Answers `look`; with `cells` cell by cell. */
 static void answer(const sensor_t *s, uint64_t now, bool cells) {
+    watch(now);
     static char rows[AZIMUTHS * (CELLS + 1) + 1];
     int count[3] = {0, 0, 0}, azimuths = trusted(s, now) ? s->azimuths : 0, n = 0;
     uint32_t sum = 0xFFFFFFFF;
@@ -55,9 +63,9 @@ int main(void) {
         if (sscanf(line, "start %15s %d", bus, &sensor) == 2 && sensor >= 0 && sensor < SENSORS) {
             start();
         } else if (sscanf(line, "frame %llu %x %2048s", &now, &id, data) == 3) {
-            frame(now, id, bytes, bytes_of(data, bytes, 64), !strcmp(bus, "canfd"));
+            frame(now, id, bytes, bytes_in(data, bytes, 64), !strcmp(bus, "canfd"));
         } else if (sscanf(line, "bytes %llu %2048s", &now, data) == 2) {
-            int n = bytes_of(data, bytes, 1024);
+            int n = bytes_in(data, bytes, 1024);
             for (int i = 0; i < n; i++) serial_byte(now, bytes[i]);
         } else if (sscanf(line, "look %llu", &now) == 1) {
             answer(&sensors[sensor], now, false);

@@ -45,7 +45,7 @@ impl Log {
         let seconds = if class == Class::DrainAfterStall { 14 } else { 11 };
         let world = World::new(maps, bus, class, 0, seconds * 1_000_000, Looks::Log)?;
         let name = format!("{}-{}", bus.name(), class.name());
-        Ok(Self { name, fed: world.text(), answers: library::answers(world.lines()) })
+        Ok(Self { name, fed: world.text(seconds * 1_000_000), answers: library::answers(world.lines()) })
     }
 
     /// Reads the log of a name.

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufWriter, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Parser;
 use rayon::prelude::*;
 use viewshed_conformance::class::Class;
@@ -23,8 +23,20 @@ enum Cli {
     Receive,
     /// Print, for each fault and bus, how often a receiver was wrong and how much arrived
     Table(TableArgs),
+    /// Print what a receiver is fed in a run of the table
+    Lines(LinesArgs),
     /// Write the logs of tests/conformance/logs anew, answered by the library's receiver
     Logs,
+}
+
+#[derive(Debug, clap::Args)]
+struct LinesArgs {
+    /// The fault, as the table names it
+    fault: String,
+    /// can, canfd or serial
+    bus: String,
+    /// The run's seed
+    seed: u64,
 }
 
 #[derive(Debug, clap::Args)]
@@ -51,6 +63,7 @@ fn main() -> ExitCode {
         Cli::Receive => receive(),
         Cli::Table(args) => table(&args),
         Cli::Logs => logs(),
+        Cli::Lines(args) => lines(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -71,6 +84,18 @@ fn receive() -> Result<()> {
         }
     }
     Ok(out.flush()?)
+}
+
+fn lines(args: &LinesArgs) -> Result<()> {
+    let found = logs::names().find(|(bus, class)| (bus.name(), class.name()) == (&*args.bus, &*args.fault));
+    let Some((bus, class)) = found else {
+        let names: Vec<&str> = Class::ALL.iter().map(|class| class.name()).collect();
+        bail!("no fault {} on {}; faults are {}; buses can, canfd, serial", args.fault, args.bus, names.join(", "));
+    };
+    let world = World::new(&viewshed_conformance::maps()?, bus, class, args.seed, LENGTH_US, Looks::Often)?;
+    // a reader that has seen enough is no error
+    let _ = std::io::stdout().lock().write_all(world.text(LENGTH_US).as_bytes());
+    Ok(())
 }
 
 fn logs() -> Result<()> {
@@ -99,7 +124,7 @@ fn table(args: &TableArgs) -> Result<()> {
                     }
                     return Ok(figures);
                 };
-                let answers = program.answers(world.text())?;
+                let answers = program.answers(world.text(LENGTH_US))?;
                 let differing = ours.iter().zip(answers.lines()).enumerate().filter(|(_, (ours, theirs))| ours != theirs);
                 let differ = differing.clone().count() as u64;
                 if let Some((look, _)) = differing.clone().next().filter(|_| args.wrong) {

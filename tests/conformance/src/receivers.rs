@@ -30,9 +30,19 @@ pub fn c(folder: &Path) -> Result<Option<Program>> {
     Ok(Some(Program::of([target])))
 }
 
+/// The Python receiver.
+fn script() -> PathBuf {
+    Path::new(HERE).join("receiver.py")
+}
+
+/// Whether there is a Python receiver.
+pub fn python_there() -> bool {
+    script().exists()
+}
+
 /// The Python receiver; `None` without python3.
 pub fn python() -> Option<Program> {
     let found = Command::new("python3").args(["-c", "import zlib"]).output();
     let there = found.is_ok_and(|output| output.status.success());
-    there.then(|| Program::of([PathBuf::from("python3"), Path::new(HERE).join("receiver.py")]))
+    there.then(|| Program::of([PathBuf::from("python3"), script()]))
 }

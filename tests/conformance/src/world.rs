@@ -131,9 +131,10 @@ impl World {
         self.inputs.iter().map(|(_, input)| input)
     }
 
-    /// The same as text.
-    pub fn text(&self) -> String {
-        self.lines().fold(String::new(), |mut text, input| {
+    /// The lines of the first so many microseconds as text.
+    pub fn text(&self, length_us: u64) -> String {
+        let lines = self.inputs.iter().take_while(|(at, _)| *at < START + length_us).map(|(_, input)| input);
+        lines.fold(String::new(), |mut text, input| {
             let _ = writeln!(text, "{input}");
             text
         })
@@ -148,11 +149,6 @@ impl World {
             }
         }
         self
-    }
-
-    /// Only the beginning.
-    pub fn shorten(&mut self, length_us: u64) {
-        self.inputs.retain(|(at, _)| *at < START + length_us);
     }
 }
 
