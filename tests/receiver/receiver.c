@@ -486,11 +486,12 @@ static void start_sensor(sensor_t *s) {
     s->conflict = s->other_version = NEVER;
 }
 
-/* Before every frame and every look: a clock that steps back ends all sessions. */
-static void watch(uint64_t now) {
+/* Before every frame and every look, the time to count with: one that steps back ends all sessions. */
+static uint64_t watch(uint64_t now) {
+    if (now <= latest && latest - now <= 20000) return latest;
     if (now < latest)
         for (int i = 0; i < SENSORS; i++) start_sensor(&sensors[i]);
-    latest = now;
+    return latest = now;
 }
 
 /* ---- messages ---- */
@@ -658,7 +659,7 @@ static void long_message(uint64_t now, const uint8_t *data, int n) {
 
 /* Checks a frame and takes it. */
 static void frame(uint64_t now, unsigned id, const uint8_t *data, int n, bool fd) {
-    watch(now);
+    now = watch(now);
     if (id < 0x400 || id >= 0x500) return;
     int sensor = (int)(id - 0x400) / 32, number = (int)id % 32;
     if (fd) {
@@ -690,7 +691,7 @@ static void serial_byte(uint64_t now, uint8_t byte) {
         if (block < 255 && at < length) data[n++] = 0;
     }
     length = 0;
-    watch(now);
+    now = watch(now);
     long_message(now, data, n);
 }
 
@@ -712,7 +713,7 @@ static int bytes_of(const char *digits, uint8_t *bytes, int most) {
 }
 
 static void print_maps(uint64_t now) {
-    watch(now);
+    now = watch(now);
     for (int i = 0; i < SENSORS; i++) {
         const sensor_t *s = &sensors[i];
         if (!trusted(s, now)) continue;

@@ -55,6 +55,10 @@ use super::frame::CanFrame;
 use super::message::{Addresses, NotAMessage, Received};
 use crate::time::Time;
 
+/// Frames and looks may be handed in out of order by so much, microseconds: a time stamp was taken before the
+/// look that is handed in after it.
+const BACK_US: u64 = 20_000;
+
 /// Receives the maps of `N` sensors: at most `A` azimuths of `32 W` ranges, the first `P` planes.
 #[derive(Debug, Clone)]
 pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usize = 1> {
@@ -105,7 +109,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         received: Result<Received<'_>, NotAMessage>,
         sensor: Option<u8>,
     ) -> Result<Accepted, Refused> {
-        self.watch(now);
+        let now = self.watch(now);
         let limits = self.limits;
         let found = self.sensors.iter_mut().find(|(number, _)| Some(*number) == sensor);
         let Some((_, sensor)) = found.filter(|_| received != Err(NotAMessage::Foreign)) else {
@@ -118,12 +122,18 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         }
     }
 
-    /// Follows the receiver's clock, at frames and at looks. Where it steps back, nothing is told before each
-    /// sensor's next session: no age is known any more.
-    fn watch(&self, now: Time) {
-        if now < self.latest.replace(now) {
-            self.sensors.iter().for_each(|(_, sensor)| sensor.step_back());
+    /// Follows the receiver's clock, at frames and at looks; the time to count with. A little before the latest
+    /// counts as the latest. Where it steps back, nothing is told before each sensor's next session: no age is
+    /// known any more.
+    fn watch(&self, now: Time) -> Time {
+        let latest = self.latest.get();
+        match latest.since(now) {
+            Some(back) if back <= BACK_US => return latest,
+            Some(_) => self.sensors.iter().for_each(|(_, sensor)| sensor.step_back()),
+            None => {}
         }
+        self.latest.set(now);
+        now
     }
 
     /// Counts what is refused before it is looked at.
@@ -145,13 +155,13 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
 
     /// A sensor's map as it is now; everything is unknown where it cannot be trusted.
     pub fn map(&self, number: u8, now: Time) -> ReceivedMap<'_, A, W, P> {
-        self.watch(now);
+        let now = self.watch(now);
         ReceivedMap::new(self.sensor(number), now, self.limits)
     }
 
     /// All sensors' maps as they are now.
     pub fn together(&self, now: Time) -> Together<'_, N, A, W, P> {
-        self.watch(now);
+        let now = self.watch(now);
         Together::new(self.sensors.each_ref().map(|(_, sensor)| ReceivedMap::new(Some(sensor), now, self.limits)))
     }
 }

@@ -63,7 +63,7 @@ impl<K: Key + Clone, const N: usize, const A: usize, const W: usize, const P: us
         received: Result<Received<'_>, NotAMessage>,
         sensor: Option<u8>,
     ) -> Result<Accepted, Refused> {
-        self.receiver.watch(now);
+        let now = self.receiver.watch(now);
         let Ok(message) = received else { return self.receiver.received(now, received, sensor) };
         let opener = self.openers.iter_mut().find(|(number, _)| *number == message.sensor);
         match opener.map(|(_, opener)| opener.open(&message)) {
