@@ -1,5 +1,7 @@
 //! The fault classes.
 
+use crate::input::Bus;
+
 /// What a bus, a sender or a receiver does to maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
@@ -54,8 +56,8 @@ pub enum Class {
 
 use Class::{
     ClockJumps, Cuts, DelayPasses, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, HeaderFaults, Jitter, Late1,
-    LateAndRepeated, Lossless, Loss1, Loss5, Loss20, MadeUpMaps, Mailboxes, MailboxesFull, Others, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays,
-    TwoSenders,
+    LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, Others, ReceiverRestarts,
+    Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
 };
 
 impl Class {
@@ -116,6 +118,29 @@ impl Class {
             Others => "others",
             HeaderFaults => "header-faults",
             MadeUpMaps => "made-up-maps",
+        }
+    }
+
+    /// Share of the newest map's visible cells that is told over 30 s from the start, in percent: at least this
+    /// in the mean of many runs.
+    pub fn least(self, bus: Bus) -> f64 {
+        let [can, canfd, serial] = match self {
+            _ => [0.0; 3],
+        };
+        match bus {
+            Bus::Can => can,
+            Bus::CanFd => canfd,
+            Bus::Serial => serial,
+        }
+    }
+
+    /// How far below the mean of three runs may lie, points: where faults come by chance and last for seconds.
+    pub fn spread(self) -> f64 {
+        match self {
+            Cuts | HeaderFaults => 20.0,
+            ClockJumps | TwoSenders | DelayPasses | DelayStays => 12.0,
+            DrainAtStart | DrainAfterStall | SenderRestarts | ReceiverRestarts | Reordered | Loss20 | MadeUpMaps => 6.0,
+            _ => 1.0,
         }
     }
 }

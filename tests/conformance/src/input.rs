@@ -126,7 +126,9 @@ mod tests {
         {
             assert_eq!(line.parse::<Input>().unwrap().to_string(), line);
         }
-        for line in ["start can 8", "start lin 0", "frame 1 800 00", "frame 1 400 0", "look", "look -1", "", "bytes 1 0G"] {
+        for line in
+            ["start can 8", "start lin 0", "frame 1 800 00", "frame 1 400 0", "look", "look -1", "", "bytes 1 0G"]
+        {
             assert!(line.parse::<Input>().unwrap_err().contains(line), "{line}");
         }
     }

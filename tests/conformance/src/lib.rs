@@ -3,8 +3,8 @@
 pub mod class;
 pub mod input;
 pub mod library;
-mod made_up;
 pub mod logs;
+mod made_up;
 pub mod measure;
 pub mod program;
 mod random;

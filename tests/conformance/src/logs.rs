@@ -57,7 +57,9 @@ impl Log {
             let path = path(Path::new(FOLDER), name, kind);
             let file = std::fs::File::open(&path).with_context(|| format!("cannot read {}", path.display()))?;
             let mut text = String::new();
-            GzDecoder::new(file).read_to_string(&mut text).with_context(|| format!("cannot read {}", path.display()))?;
+            GzDecoder::new(file)
+                .read_to_string(&mut text)
+                .with_context(|| format!("cannot read {}", path.display()))?;
             Ok(text)
         };
         Ok(Self { name: name.to_owned(), fed: read("in")?, answers: read("out")? })
@@ -93,5 +95,9 @@ pub fn difference(name: &str, expected: &str, got: &str) -> Option<String> {
     let first = differing.clone().next()?;
     let say = |lines: &[&str]| lines.get(first).copied().unwrap_or("nothing").to_owned();
     let count = differing.count();
-    Some(format!("{name}: {count} of {most} answers differ; the first is expected `{}`, is `{}`", say(&expected), say(&got)))
+    Some(format!(
+        "{name}: {count} of {most} answers differ; the first is expected `{}`, is `{}`",
+        say(&expected),
+        say(&got)
+    ))
 }

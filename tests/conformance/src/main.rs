@@ -109,7 +109,9 @@ const LENGTH_US: u64 = 30_000_000;
 fn table(args: &TableArgs) -> Result<()> {
     let maps = viewshed_conformance::maps()?;
     let program = args.receiver.as_deref().map(Program::new);
-    println!("| fault | bus | looks | wrong looks | wrong cells | otherwise than the library | arrived % | least of a run % | told again s |");
+    println!(
+        "| fault | bus | looks | wrong looks | wrong cells | otherwise than the library | arrived % | least of a run % | told again s |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|");
     for class in Class::ALL.into_iter().filter(|class| class.name().starts_with(&args.only)) {
         for bus in Bus::ALL {
@@ -125,7 +127,8 @@ fn table(args: &TableArgs) -> Result<()> {
                     return Ok(figures);
                 };
                 let answers = program.answers(world.text(LENGTH_US))?;
-                let differing = ours.iter().zip(answers.lines()).enumerate().filter(|(_, (ours, theirs))| ours != theirs);
+                let differing =
+                    ours.iter().zip(answers.lines()).enumerate().filter(|(_, (ours, theirs))| ours != theirs);
                 let differ = differing.clone().count() as u64;
                 if let Some((look, _)) = differing.clone().next().filter(|_| args.wrong) {
                     eprintln!("{} {} seed {seed}: {differ} looks differ, first {look}", class.name(), bus.name());
@@ -133,7 +136,8 @@ fn table(args: &TableArgs) -> Result<()> {
                 let figures = measure::answered(&maps, &world, answers.lines()).map_err(anyhow::Error::msg)?;
                 Ok(Figures { differ, ..figures })
             };
-            let runs: Vec<Figures> = (args.seed..args.seed + args.runs).into_par_iter().map(run).collect::<Result<_>>()?;
+            let runs: Vec<Figures> =
+                (args.seed..args.seed + args.runs).into_par_iter().map(run).collect::<Result<_>>()?;
             let all = runs.iter().fold(Figures::default(), |all, one| all.and(*one));
             let least = runs.iter().map(Figures::arrived).fold(1.0, f64::min);
             println!(

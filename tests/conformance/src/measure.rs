@@ -71,7 +71,8 @@ impl<'a> Measure<'a> {
         self.figures.looks += 1;
         let wrong = self.world.lives.iter().map(|life| {
             let end = life.scans.partition_point(|(measured, _)| *measured <= at);
-            let lately = || life.scans[..end].iter().rev().take_while(|(measured, _)| measured + AGE_AND_DELAY_US >= at);
+            let lately =
+                || life.scans[..end].iter().rev().take_while(|(measured, _)| measured + AGE_AND_DELAY_US >= at);
             let rows = told.iter().enumerate();
             rows.map(|(azimuth, told)| {
                 let mut left = *told;

@@ -270,7 +270,8 @@ impl Faults {
                 let from = START + self.random.between(3 * S, 4 * S);
                 let to = from + self.random.between(500 * MS, 5 * S);
                 let by = self.random.between(150 * MS, 4900 * MS);
-                let late = |one: Sent| Sent { at: if (from..to).contains(&one.at) { one.at + by } else { one.at }, ..one };
+                let late =
+                    |one: Sent| Sent { at: if (from..to).contains(&one.at) { one.at + by } else { one.at }, ..one };
                 sent.into_iter().map(late).collect()
             }
             Class::DelayStays => {
@@ -330,7 +331,8 @@ impl Faults {
             if self.random.chance(3) {
                 let keep = self.random.below(one.data.len() as u64) as usize;
                 // CAN FD has no length between these
-                let keep = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64].into_iter().rev().find(|n| *n <= keep);
+                let keep =
+                    [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64].into_iter().rev().find(|n| *n <= keep);
                 one.data.truncate(keep.unwrap_or(0));
             } else if self.random.chance(20) && !one.data.is_empty() {
                 let bit = self.random.below(8 * one.data.len() as u64) as usize;
