@@ -52,7 +52,7 @@ typedef struct {
     /* session */
     int epoch; /* -1: none */
     uint64_t heard, map_heard, conflict, other_version;
-    bool doubt;
+    bool doubt; uint64_t refused_since;
     struct { bool there, confirmed; uint64_t at, us, begun; } clock;
     struct { bool there; uint64_t begun, at, sunk; uint32_t lag; int count; } measure;
     struct { enum { UNMARKED, HEARD, LEFT } mark; uint64_t ms; } epochs[16];
@@ -347,8 +347,8 @@ static bool beyond(uint32_t clock, uint32_t lag) {
 /* Rule 1: whether a frame is of the session; scan is -1 where it has none. */
 static bool enter(sensor_t *s, uint64_t now, int epoch, int scan) {
     uint64_t since_ms = now / 1000 - s->epochs[epoch].ms;
+    if (epoch == s->epoch && now - s->heard <= PERIOD) { s->heard = now; return true; }
     if (s->epoch >= 0 && now - s->heard <= PERIOD / 2) {
-        if (epoch == s->epoch) { s->heard = now; return true; }
         if (s->epochs[epoch].mark == LEFT && since_ms > PERIOD / 1000) s->epochs[epoch].mark = UNMARKED;
         bool left = s->epochs[epoch].mark == LEFT;
         if (left && since_ms <= (A_US + D_US) / 1000) return false;
@@ -381,7 +381,7 @@ static void begin(sensor_t *s, uint64_t now, int epoch) {
     s->epochs[epoch].mark = UNMARKED;
     s->epoch = epoch;
     s->heard = s->map_heard = now;
-    s->conflict = s->other_version = NEVER;
+    s->conflict = s->other_version = s->refused_since = NEVER;
     s->clock.there = s->measure.there = s->doubt = s->complete = false;
     s->groups = 0;
     forget_maps(s);
@@ -420,24 +420,29 @@ static bool measure_anew(sensor_t *s, uint64_t now, uint32_t lag) {
     forget_maps(s);
     s->measure.there = true;
     s->measure.begun = s->measure.at = s->map_heard = now;
+    s->refused_since = NEVER;
     s->measure.lag = lag;
     s->measure.sunk = 0;
     s->measure.count = 1;
     return true;
 }
 
+/* A frame with this lag is not in time; nothing else for a period: the clocks are not what they were. */
+static bool refuse(sensor_t *s, uint64_t now, uint32_t lag) {
+    s->doubt = true;
+    if (s->refused_since == NEVER) s->refused_since = now;
+    if (now - s->refused_since < PERIOD) return false;
+    s->clock.there = false;
+    return measure_anew(s, now, lag);
+}
+
 /* Rules 2 and 3: whether a frame with a scan number is in time. */
 static bool hear(sensor_t *s, uint64_t now, int scan) {
     uint32_t lag = lag_of(now, scan);
-    uint64_t pause = now - s->map_heard;
-    if (pause > PERIOD) {
-        s->clock.there = false;
-        return measure_anew(s, now, lag);
-    }
-    if (s->clock.there && beyond(clock_lag(s, now), lag)) { s->doubt = true; return false; }
+    if (s->clock.there && beyond(clock_lag(s, now), lag)) return refuse(s, now, lag);
     if (!s->measure.there) return measure_anew(s, now, lag);
     uint32_t late = behind(lag, least(s, now));
-    if (late > D_US && late <= PERIOD / 2) { s->doubt = true; return false; }
+    if (late > D_US && late <= PERIOD / 2) return refuse(s, now, lag);
     if (late > PERIOD / 2) {
         uint64_t allowed = (now - s->measure.at) >> 10;
         s->measure.sunk = (s->measure.sunk > allowed ? s->measure.sunk - allowed : 0) + PERIOD - late;
@@ -446,8 +451,9 @@ static bool hear(sensor_t *s, uint64_t now, int scan) {
         s->measure.lag = lag;
     }
     if (s->measure.count < 255) s->measure.count++;
+    if (now - s->map_heard > 1000000) forget_maps(s);
     s->map_heard = now;
-    if (pause > 1000000) forget_maps(s);
+    s->refused_since = NEVER;
     return true;
 }
 
@@ -504,8 +510,8 @@ static bool header_holds(uint8_t group[7][5]) {
 }
 
 static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
-    if (n < 6) return;
-    if ((own[0] & 15) != 1) { s->other_version = now; return; }
+    if (n > 0 && (own[0] & 15) != 1) s->other_version = now;
+    if (n < 6 || (own[0] & 15) != 1) return;
     int first = own[0] >> 4 & 7;
     uint8_t all[7][5];
     if (n >= 36) {
@@ -597,7 +603,7 @@ static void classic_word(sensor_t *s, int scan, int start, int index, int delta,
 
 static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint8_t *own, int n, bool is_long, int most) {
     /* from anybody, of no epoch */
-    if (number == 4 || number == 5 || number == 24 || number == 25) return;
+    if (number == 4 || number == 5 || number >= 24) return;
     bool dated = number == 2 || number >= 6, whole = n >= 3;
     if (!enter(s, now, epoch, dated && whole ? own[0] : -1)) return;
     if (number == 1) header(s, now, own, n);
@@ -682,6 +688,7 @@ static void serial_byte(uint64_t now, uint8_t byte) {
         if (length < 256) stuffed[length++] = byte;
         return;
     }
+    if (length == 0) return;
     uint8_t data[256];
     int n = 0, at = 0;
     while (at < length && length < 256) {

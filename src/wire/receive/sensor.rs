@@ -244,10 +244,10 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             return Err(Refused::Sealed);
         }
         // those of integrators and installations come from anybody and know nothing of the sender's epoch
-        if let Message::Other(4..26) = message.message {
+        if let Message::Other(_) = message.message {
             return Ok(Accepted::Other(message.message));
         }
-        let dated = matches!(message.message, Message::Map(..) | Message::VisibleRange | Message::Other(_));
+        let dated = matches!(message.message, Message::Map(..) | Message::VisibleRange);
         let whole = message.own.first().filter(|_| message.own.len() >= LEAST_DATED);
         let scan = whole.filter(|_| dated).map(|byte| ScanNumber::from_byte(*byte));
         match self.session.enter(now, message.epoch, scan, limits) {

@@ -28,7 +28,7 @@ use crate::wire::scan_number::{CLOCK_US, PERIOD_US, ScanNumber, TICK_US};
 /// Map frames a measure must be of before it is trusted.
 pub const ENOUGH: u8 = 8;
 
-/// Silence that ends a session, microseconds: half a period of the scan numbers.
+/// Silence of a session's epoch after which another may begin one, microseconds.
 const SILENCE_US: u64 = PERIOD_US as u64 / 2;
 
 /// A conflict, and another wire version, last this long after their last sign, microseconds.
@@ -45,6 +45,9 @@ const CREEP: u32 = 11;
 
 /// The smallest lag may sink by 2^-10 of the time passed: what it crept up and what clocks drift.
 const LEAK: u32 = 10;
+
+/// What did not happen yet.
+const NEVER: Time = Time::from_micros(u64::MAX);
 
 /// Age and delay a receiver works with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -210,13 +213,14 @@ pub(super) struct Session {
     measure: Option<Measure>,
     /// Last map frame in time; before the first the session's beginning.
     map_heard: Time,
-    /// Whether a map frame of this session was refused.
+    /// Whether a map frame of this session was refused, and since when only such are heard.
     doubt: bool,
+    refused_since: Time,
     epochs: Epochs,
     /// The epoch left last and its smallest lag then.
     previous: Option<(Epoch, u32)>,
-    conflict: Option<Time>,
-    other_version: Option<Time>,
+    conflict: Time,
+    other_version: Time,
 }
 
 impl Session {
@@ -228,10 +232,11 @@ impl Session {
         measure: None,
         map_heard: Time::from_micros(0),
         doubt: false,
+        refused_since: NEVER,
         epochs: Epochs::NONE,
         previous: None,
-        conflict: None,
-        other_version: None,
+        conflict: NEVER,
+        other_version: NEVER,
     };
 
     pub fn epoch(&self) -> Option<Epoch> {
@@ -249,18 +254,20 @@ impl Session {
             *self = Self::NONE;
         }
         let sum_ms = limits.sum_us() / 1000;
-        if self.epoch.is_some() && now.since(self.heard).is_some_and(|silence| silence <= SILENCE_US) {
-            if self.epoch == Some(epoch) {
-                self.heard = now;
-                return Entry::Taken;
-            }
+        let silence = self.epoch.and_then(|_| now.since(self.heard)).unwrap_or(u64::MAX);
+        if self.epoch == Some(epoch) && silence <= u64::from(PERIOD_US) {
+            // clock and measure hold, so that what was under way meanwhile is known to be late
+            self.heard = now;
+            return Entry::Taken;
+        }
+        if silence <= SILENCE_US {
             let left = self.epochs.since_left(epoch, now);
             if left.is_some_and(|since| u64::from(since) <= sum_ms) {
                 return Entry::OldEpoch;
             }
             if left.is_some() || self.conflicting(now) {
                 if self.speaks_now(now, epoch, scan, limits) {
-                    self.conflict = Some(now);
+                    self.conflict = now;
                     return Entry::Conflict;
                 }
                 return Entry::OldEpoch;
@@ -289,19 +296,20 @@ impl Session {
         }
         self.epochs.mark(epoch, Mark::None, now);
         (self.epoch, self.heard, self.map_heard) = (Some(epoch), now, now);
-        (self.clock, self.measure, self.doubt) = (None, None, false);
-        (self.conflict, self.other_version) = (None, None);
+        (self.clock, self.measure) = (None, None);
+        (self.doubt, self.refused_since) = (false, NEVER);
+        (self.conflict, self.other_version) = (NEVER, NEVER);
         Entry::New
     }
 
     /// Says something of the same epoch that cannot be true of one sender.
     pub fn contradiction(&mut self, now: Time) {
-        self.conflict = Some(now);
+        self.conflict = now;
     }
 
     /// Speaks a wire version that is not known here.
     pub fn other_version(&mut self, now: Time) {
-        self.other_version = Some(now);
+        self.other_version = now;
     }
 
     pub fn conflicting(&self, now: Time) -> bool {
@@ -340,21 +348,13 @@ impl Session {
     /// The scan number of a map frame.
     pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Hearing {
         let lag = scan.lag(now);
-        let pause = now.since(self.map_heard).unwrap_or(0);
-        if pause > u64::from(PERIOD_US) {
-            // for a whole period nothing was in time: the clocks are not what they were
-            self.clock = None;
-            return self.measure_anew(now, lag);
-        }
         if self.clock.is_some_and(|clock| is_beyond(clock.lag(now), lag, limits)) {
-            self.doubt = true;
-            return Hearing::Beyond;
+            return self.refuse(now, lag, Hearing::Beyond);
         }
         let Some(mut measure) = self.measure else { return self.measure_anew(now, lag) };
         let behind = difference(lag, measure.least(now));
         if behind > limits.max_delay_us && behind <= PERIOD_US / 2 {
-            self.doubt = true;
-            return Hearing::Late;
+            return self.refuse(now, lag, Hearing::Late);
         }
         if behind > PERIOD_US / 2 {
             let allowed = now.since(measure.at).unwrap_or(0) >> LEAK;
@@ -366,14 +366,28 @@ impl Session {
         }
         measure.count = measure.count.saturating_add(1);
         self.measure = Some(measure);
-        self.map_heard = now;
+        let pause = now.since(self.map_heard).unwrap_or(0);
+        (self.map_heard, self.refused_since) = (now, NEVER);
         if pause > GAP_US { Hearing::Anew } else { Hearing::InTime }
     }
 
     fn measure_anew(&mut self, now: Time, lag: u32) -> Hearing {
         self.measure = Some(Measure { begun: now, at: now, lag, sunk: 0, count: 1 });
-        self.map_heard = now;
+        (self.map_heard, self.refused_since) = (now, NEVER);
         Hearing::Anew
+    }
+
+    fn refuse(&mut self, now: Time, lag: u32, hearing: Hearing) -> Hearing {
+        self.doubt = true;
+        if self.refused_since == NEVER {
+            self.refused_since = now;
+        }
+        if now.since(self.refused_since).is_none_or(|refused| refused < u64::from(PERIOD_US)) {
+            return hearing;
+        }
+        // nothing in time for a whole period: the clocks are not what they were
+        self.clock = None;
+        self.measure_anew(now, lag)
     }
 
     /// How old a scan is, at most by the fastest frame's delay more.
@@ -412,8 +426,8 @@ impl Session {
 }
 
 /// Whether a sign still counts.
-fn lasts(sign: Option<Time>, now: Time) -> bool {
-    sign.is_some_and(|sign| now.since(sign).is_some_and(|since| since < SIGN_US))
+fn lasts(sign: Time, now: Time) -> bool {
+    now.since(sign).is_some_and(|since| since < SIGN_US)
 }
 
 /// How much a lag is more than another, modulo the period.
@@ -640,10 +654,27 @@ mod tests {
     }
 
     #[test]
-    fn silence_ends_a_session() {
+    fn silence_lets_another_epoch_begin_and_ends_a_session_after_a_period() {
         let mut s = trusting();
-        assert_eq!(s.enter(ms(3100), Epoch::new(3), None, &LIMITS), Entry::First);
-        assert_eq!(s.enter(ms(3110), Epoch::new(3), None, &LIMITS), Entry::New);
+        let mut enter = |at: u64, epoch| s.enter(ms(at), Epoch::new(epoch), None, &LIMITS);
+        assert_eq!(enter(5100, 3), Entry::Taken);
+        assert_eq!((enter(10_300, 3), enter(10_310, 3)), (Entry::First, Entry::New));
+        assert_eq!((enter(12_900, 4), enter(12_910, 3)), (Entry::First, Entry::Taken));
+        assert_eq!((enter(15_500, 4), enter(15_510, 4)), (Entry::First, Entry::New));
+    }
+
+    #[test]
+    fn what_waited_while_the_bus_stood_still_is_late() {
+        for delay in [150, 2600, 4900] {
+            let mut s = trusting();
+            assert_eq!(s.enter(ms(480), Epoch::new(3), None, &LIMITS), Entry::Taken);
+            let first = 500 + delay;
+            assert_eq!(s.enter(ms(first), Epoch::new(3), None, &LIMITS), Entry::Taken);
+            for k in 10..112 {
+                let hearing = s.hear(ms(50 * k + delay), scan(50 * k), &LIMITS);
+                assert!(matches!(hearing, Hearing::Late | Hearing::Beyond), "{k}");
+            }
+        }
     }
 
     #[test]
@@ -652,9 +683,9 @@ mod tests {
         for k in 10..112 {
             assert_eq!(s.hear(ms(50 * k), scan(50 * k - 200), &LIMITS), Hearing::Late, "{k}");
         }
-        // the last one in time was heard at 480 ms
-        assert_eq!(s.hear(ms(5600), scan(5400), &LIMITS), Hearing::Late);
-        assert_eq!(s.hear(ms(5601), scan(5401), &LIMITS), Hearing::Anew);
+        // the first late one was heard at 500 ms
+        assert_eq!(s.hear(ms(5619), scan(5419), &LIMITS), Hearing::Late);
+        assert_eq!(s.hear(ms(5620), scan(5420), &LIMITS), Hearing::Anew);
         assert!(s.clock.is_none());
     }
 
