@@ -121,7 +121,7 @@ def lowest(bits):
 
 
 @lru_cache(maxsize=4096)
-def told(ray, ranges):
+def states_of(ray, ranges):
     """How many cells are visible and not visible, and the states of all cells: 0 unknown, 1 not visible, 2 visible."""
     near, end, bits = ray
     known = max(end - near, 0)
@@ -375,7 +375,7 @@ def read_distance(numbers, bit):
 
 
 class Receiver:
-    """Hears a bus and answers for one sensor."""
+    """Hears a bus and answers for one sensor: rule 0, and which messages are the sensor's."""
 
     def __init__(self, bus, sensor):
         self.bus, self.number = bus, sensor
@@ -406,10 +406,13 @@ class Receiver:
         if message:
             self.sensor.message(t, *message, self.bus != "can")
 
-    def bytes(self, t, data):
+    def serial(self, t, data):
+        """A piece of the stream; the time of a message is that of its zero byte."""
         *ended, rest = data.split(b"\0")
         for piece in ended:
             stuffed, self.stuffed = self.stuffed + piece, bytearray()
+            if not stuffed:
+                continue
             now = self.time(t)
             data = cobs(stuffed)
             if len(data) >= 6 and data[4] == self.number:
@@ -419,12 +422,13 @@ class Receiver:
         self.stuffed += rest
 
     def look(self, t):
-        """Rays told, azimuth 0 first, None for each that is not, and the ranges; None if nothing is told."""
-        t = self.time(t)
-        return self.sensor.look(t)
+        """What `states_of` says of each azimuth, azimuth 0 first; None if nothing is told."""
+        return self.sensor.look(self.time(t))
 
 
 class Sensor:
+    """What is known of a sensor: rules 1 to 5."""
+
     def __init__(self):
         self.session = None             # its epoch
         self.came = {}                  # epoch: when its last frame came to rule 1 c
@@ -436,6 +440,7 @@ class Sensor:
         self.session, self.last_frame = epoch, t
         self.conflict = self.other_version = None       # last sign of it
         self.in_doubt = False
+        self.misfit = None              # noted time, rule 3 a
         self.groups = [None] * 7
         self.header = None
         self.has_clock = self.has_measure = False
@@ -451,9 +456,9 @@ class Sensor:
     # Rule 1
 
     def message(self, t, number, epoch, own, long):
-        if number in (4, 5, 24, 25):
+        if number in (4, 5) or number >= 24:
             return
-        dated = (number == 2 or 6 <= number <= 23 or number >= 26) and len(own) >= 3
+        dated = (number == 2 or number >= 6) and len(own) >= 3
         if not self.in_session(t, epoch, own[0] if dated else None):
             return
         if number == 1:
@@ -464,13 +469,14 @@ class Sensor:
 
     def in_session(self, t, epoch, scan):
         """True if the frame is one of the session. `scan` of a dated message, or None."""
-        if self.session is not None and t - self.last_frame <= 2_560_000:
-            if epoch == self.session:                                                                    # a
-                self.last_frame = t
-                return True
-            since = t // 1000 - self.left[epoch] // 1000 if epoch in self.left else P                    # b
-            left = since <= 5120
-            if since <= (A + D) // 1000:
+        silent = P + 1 if self.session is None else t - self.last_frame
+        if epoch == self.session and silent <= P:                                                        # a
+            self.last_frame = t
+            return True
+        if silent <= 2_560_000:                                                                          # b
+            since = t // 1000 - self.left[epoch] // 1000 if epoch in self.left else None
+            left = since is not None and since <= 5120
+            if left and since <= (A + D) // 1000:
                 return False
             if left or self.signed(self.conflict, t):
                 if scan is not None and self.speaks_now(t, epoch, scan, left):
@@ -547,7 +553,7 @@ class Sensor:
                 self.confirmed = True
             if faster:
                 self.clock_at, self.clock_us = t, c
-        if self.has_measure and self.beyond_clock(t, self.smallest_lag(t)):                              # c
+        if self.has_measure and D < (self.clock_lag(t) - self.smallest_lag(t)) % P <= P // 2:            # c
             self.has_measure = False
             self.empty_maps()
 
@@ -560,9 +566,6 @@ class Sensor:
         """L(t)"""
         return (t - self.senders_clock(t)) % P
 
-    def beyond_clock(self, t, of):
-        return D < (self.clock_lag(t) - of) % P <= P // 2
-
     # Rule 3
 
     def smallest_lag(self, t):
@@ -572,19 +575,26 @@ class Sensor:
     def in_time(self, t, scan):
         """True if a dated message is accepted."""
         of = lag(t, scan)
-        if t - self.last_in_time > P:                                                                    # a
-            self.has_clock = False
-            return self.measure_anew(t, of)
-        if self.has_clock and self.beyond_clock(t, of):                                                  # b
+        x = (self.clock_lag(t) - of) % P if self.has_clock else 0                                        # b
+        ahead = D < x <= 1_500_000
+        refused = 1_500_000 < x <= P // 2
+        late = (of - self.smallest_lag(t)) % P if self.has_measure else 0
+        if D < late <= P // 2:                                                                           # d
+            refused = True
+        if not refused and not ahead:                                                                    # a
+            self.misfit = None
+        elif self.misfit is None:
+            self.misfit = t
+        elif t - self.misfit >= P:
+            self.has_clock, self.misfit = False, None
+            if refused:
+                return self.measure_anew(t, of)
+        if refused:
             self.in_doubt = True
             return False
         if not self.has_measure:                                                                         # c
             return self.measure_anew(t, of)
-        late = (of - self.smallest_lag(t)) % P                                                           # d
-        if D < late <= P // 2:
-            self.in_doubt = True
-            return False
-        if late > P // 2:
+        if late > P // 2:                                                                                # d
             self.sunk = max(0, self.sunk - (t - self.at >> 10)) + P - late
             if self.sunk > D:
                 return self.measure_anew(t, of)
@@ -732,7 +742,7 @@ class Sensor:
             return None
         rays = [held[1] if held and (lag(t, held[0]) - smallest) % P + 25_000 <= A else NO_CELLS
                 for held in self.rays[:self.header.azimuths]]
-        return [told(ray, self.header.ranges) for ray in rays]
+        return [states_of(ray, self.header.ranges) for ray in rays]
 
 
 def lag(t, scan):
@@ -775,7 +785,7 @@ def main():
         elif what == "frame":
             receiver.frame(int(fields[0]), int(fields[1], 16), data_of(fields[2]))
         elif what == "bytes":
-            receiver.bytes(int(fields[0]), data_of(fields[1]))
+            receiver.serial(int(fields[0]), data_of(fields[1]))
         elif what == "look":
             print(answer(fields[0], receiver.look(int(fields[0]))))
         elif what == "cells":

@@ -51,15 +51,13 @@ impl Maker {
             0 => self.message(at, SENSOR + 1, random.below(32) as u8, any, &own, random),
             // configuration and the installation's own, of any epoch
             1 | 2 => {
-                let number = [4, 5, 24, 25][random.below(4) as usize];
+                let number = [4, 5, 24 + random.below(8) as u8][random.below(3) as usize];
                 self.message(at, SENSOR, number, any, &own, random)
             }
             // planes that are not asked for
             3 => {
                 own[0] = ScanNumber::at(Time::from_micros(at + self.sender.ahead - 20_000)).byte();
-                let number = 12 + random.below(18) as u8;
-                let number = if number < 24 { number } else { number + 2 };
-                self.message(at, SENSOR, number, self.sender.epoch, &own, random)
+                self.message(at, SENSOR, 12 + random.below(12) as u8, self.sender.epoch, &own, random)
             }
             // a status page, a state and a reason of a later version
             4 => {
