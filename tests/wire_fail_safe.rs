@@ -31,8 +31,9 @@ const SENSOR: u8 = 2;
 const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
 const DELAY_US: u64 = 100_000;
-/// Frames are displaced by less than the period of the scan numbers, less D.
-const MOST_DISPLACED_US: u64 = 4_900_000;
+/// Frames are displaced by so much; in every fifth world by almost the period of the scan numbers, less D, which
+/// is as safe, but tells little.
+const MOST_DISPLACED_US: [u64; 5] = [3_500_000, 3_500_000, 2_450_000, 3_500_000, 4_900_000];
 /// A bus or gateway stands still for at most as long.
 const MOST_STANDSTILL_US: u64 = 3_000_000;
 
@@ -122,8 +123,8 @@ impl World {
         self.sent += 1;
         let r = &mut self.random;
         if us < self.queue_us {
-            // a classic frame a millisecond, a long one every twelve
-            self.queue_us += if frame.fd { 12_000 } else { 1000 };
+            // the queue shortens by more than D in A + D: the premise
+            self.queue_us += if frame.fd { 3000 } else { 1000 };
             self.drained += 1;
             if !r.chance(self.loss) {
                 let (id, data) = (frame.id.raw(), frame.data().to_vec());
@@ -132,7 +133,8 @@ impl World {
             return;
         }
         let in_time = (us + r.below(8000)).min(us.max(measured + DELAY_US));
-        let late = |r: &mut Random| us + r.below(MOST_DISPLACED_US);
+        let most_us = MOST_DISPLACED_US[(self.seed / 2 % 5) as usize];
+        let late = |r: &mut Random| us + r.below(most_us);
         let mut data = frame.data().to_vec();
         if r.chance(0.01) {
             data.truncate(r.below(data.len() as u64) as usize);
@@ -217,7 +219,12 @@ impl World {
             };
             let sent = &sent.0[azimuth];
             told_azimuths += 1;
-            assert!(us - measured <= AGE_AND_DELAY_US, "azimuth {azimuth} is {} us old in world {}", us - measured, self.seed);
+            assert!(
+                us - measured <= AGE_AND_DELAY_US,
+                "azimuth {azimuth} is {} us old in world {}",
+                us - measured,
+                self.seed
+            );
             assert_eq!(told.bits().and(sent.bits()), *told.bits(), "visible what was not");
             if let Some((e, newest)) = self.newest[azimuth] {
                 assert!(e != epoch || newest <= measured, "azimuth {azimuth} went back by {} us", newest - measured);
@@ -250,7 +257,8 @@ impl World {
     }
 
     fn restarts(&mut self, us: u64) {
-        if self.random.chance(0.003) {
+        // not before the last one is empty for a while, or its delay would stay
+        if us > self.queue_us + AGE_AND_DELAY_US && self.random.chance(0.003) {
             self.queue_us = us + self.random.below(MOST_STANDSTILL_US);
             if self.random.chance(0.3) {
                 // a receiver that starts while it drains

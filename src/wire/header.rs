@@ -167,12 +167,7 @@ impl Header {
 
     /// What the code of its maps needs of it.
     pub fn context(&self, form: Form) -> Context {
-        Context {
-            form,
-            usual: self.usual,
-            azimuths: usize::from(self.azimuths),
-            ranges: usize::from(self.ranges),
-        }
+        Context { form, usual: self.usual, azimuths: usize::from(self.azimuths), ranges: usize::from(self.ranges) }
     }
 
     /// Groups 1 to 6.

@@ -84,6 +84,15 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_those_of_the_headers_clock() {
+        // a set clock is beyond 2^40 ms, which is no multiple of the period
+        for ms in [1_790_000_000_000_u64, (1 << 40) + 30, 1 << 40, (1 << 40) - 1] {
+            let header_ms = ms % (1 << 40);
+            assert_eq!(u64::from(ScanNumber::at(Time::from_micros(ms * 1000)).byte()), header_ms / 20 % 256, "{ms}");
+        }
+    }
+
+    #[test]
     fn the_lag_counts_from_the_beginning_of_the_tick() {
         let number = ScanNumber::from_byte(255);
         assert_eq!(number.lag(Time::from_micros(5_100_000)), 0);

@@ -52,7 +52,7 @@ typedef struct {
     /* session */
     int epoch; /* -1: none */
     uint64_t heard, map_heard, conflict, other_version;
-    bool doubt; uint64_t refused_since;
+    bool doubt; uint64_t misfit_since;
     struct { bool there, confirmed; uint64_t at, us, begun; } clock;
     struct { bool there; uint64_t begun, at, sunk; uint32_t lag; int count; } measure;
     struct { enum { UNMARKED, HEARD, LEFT } mark; uint64_t ms; } epochs[16];
@@ -339,9 +339,10 @@ static uint64_t sender_clock(const sensor_t *s, uint64_t now) {
 
 static uint32_t clock_lag(const sensor_t *s, uint64_t now) { return behind(now % PERIOD, sender_clock(s, now) % PERIOD); }
 
-static bool beyond(uint32_t clock, uint32_t lag) {
+/* By how much a lag is smaller than the sender's clock allows; 0 if it is not. */
+static uint32_t ahead_of(uint32_t clock, uint32_t lag) {
     uint32_t by = behind(clock, lag);
-    return by > D_US && by <= PERIOD / 2;
+    return by > D_US && by <= PERIOD / 2 ? by : 0;
 }
 
 /* Rule 1: whether a frame is of the session; scan is -1 where it has none. */
@@ -381,7 +382,7 @@ static void begin(sensor_t *s, uint64_t now, int epoch) {
     s->epochs[epoch].mark = UNMARKED;
     s->epoch = epoch;
     s->heard = s->map_heard = now;
-    s->conflict = s->other_version = s->refused_since = NEVER;
+    s->conflict = s->other_version = s->misfit_since = NEVER;
     s->clock.there = s->measure.there = s->doubt = s->complete = false;
     s->groups = 0;
     forget_maps(s);
@@ -410,51 +411,61 @@ static void hear_clock(sensor_t *s, uint64_t now, const uint8_t *group) {
         s->clock.at = now;
         s->clock.us = us;
     }
-    if (s->measure.there && beyond(clock_lag(s, now), least(s, now))) {
+    if (s->measure.there && ahead_of(clock_lag(s, now), least(s, now)) > 0) {
         s->measure.there = false;
         forget_maps(s);
     }
 }
 
-static bool measure_anew(sensor_t *s, uint64_t now, uint32_t lag) {
-    forget_maps(s);
-    s->measure.there = true;
-    s->measure.begun = s->measure.at = s->map_heard = now;
-    s->refused_since = NEVER;
-    s->measure.lag = lag;
-    s->measure.sunk = 0;
-    s->measure.count = 1;
+/* Whether nothing fitted measure and clock for a period: the clocks are not what they were. */
+static bool misfits(sensor_t *s, uint64_t now) {
+    if (s->misfit_since == NEVER) s->misfit_since = now;
+    if (now - s->misfit_since < PERIOD) return false;
+    s->clock.there = false;
+    s->misfit_since = NEVER;
     return true;
 }
 
-/* A frame with this lag is not in time; nothing else for a period: the clocks are not what they were. */
+static bool in_time(sensor_t *s, uint64_t now, uint32_t ahead) {
+    s->map_heard = now;
+    if (ahead) misfits(s, now);
+    else s->misfit_since = NEVER;
+    return true;
+}
+
+static bool measure_anew(sensor_t *s, uint64_t now, uint32_t lag, uint32_t ahead) {
+    forget_maps(s);
+    s->measure.there = true;
+    s->measure.begun = s->measure.at = now;
+    s->measure.lag = lag;
+    s->measure.sunk = 0;
+    s->measure.count = 1;
+    return in_time(s, now, ahead);
+}
+
 static bool refuse(sensor_t *s, uint64_t now, uint32_t lag) {
+    if (misfits(s, now)) return measure_anew(s, now, lag, 0);
     s->doubt = true;
-    if (s->refused_since == NEVER) s->refused_since = now;
-    if (now - s->refused_since < PERIOD) return false;
-    s->clock.there = false;
-    return measure_anew(s, now, lag);
+    return false;
 }
 
 /* Rules 2 and 3: whether a frame with a scan number is in time. */
 static bool hear(sensor_t *s, uint64_t now, int scan) {
-    uint32_t lag = lag_of(now, scan);
-    if (s->clock.there && beyond(clock_lag(s, now), lag)) return refuse(s, now, lag);
-    if (!s->measure.there) return measure_anew(s, now, lag);
+    uint32_t lag = lag_of(now, scan), ahead = s->clock.there ? ahead_of(clock_lag(s, now), lag) : 0;
+    if (ahead > 1500000) return refuse(s, now, lag);
+    if (!s->measure.there) return measure_anew(s, now, lag, ahead);
     uint32_t late = behind(lag, least(s, now));
     if (late > D_US && late <= PERIOD / 2) return refuse(s, now, lag);
     if (late > PERIOD / 2) {
         uint64_t allowed = (now - s->measure.at) >> 10;
         s->measure.sunk = (s->measure.sunk > allowed ? s->measure.sunk - allowed : 0) + PERIOD - late;
-        if (s->measure.sunk > D_US) return measure_anew(s, now, lag);
+        if (s->measure.sunk > D_US) return measure_anew(s, now, lag, ahead);
         s->measure.at = now;
         s->measure.lag = lag;
     }
     if (s->measure.count < 255) s->measure.count++;
     if (now - s->map_heard > 1000000) forget_maps(s);
-    s->map_heard = now;
-    s->refused_since = NEVER;
-    return true;
+    return in_time(s, now, ahead);
 }
 
 /* Rule 4, the dropping. */

@@ -104,7 +104,8 @@ pub fn decode<const W: usize>(
         }
     };
     let mut progress = Progress::behind(kind, before, neighbour, neighbour_was);
-    let (ending, (azimuth, before, state)) = go(&mut decoder, &mut progress, (from..context.azimuths, context.ranges), reader);
+    let (ending, (azimuth, before, state)) =
+        go(&mut decoder, &mut progress, (from..context.azimuths, context.ranges), reader);
     *place = Place::of(azimuth, before, state);
     ending
 }
@@ -199,7 +200,11 @@ fn decode_ray<const W: usize>(
 fn limits<const W: usize>(near: usize, end: usize, ranges: usize) -> Result<Known, NotARay> {
     let known = Known::new(near, end);
     let none = near == Known::NONE.near() && end == Known::NONE.end();
-    if (known.is_empty() && !none) || end > ranges.min(Bits::<W>::CAPACITY) { Err(NotARay::Malformed) } else { Ok(known) }
+    if (known.is_empty() && !none) || end > ranges.min(Bits::<W>::CAPACITY) {
+        Err(NotARay::Malformed)
+    } else {
+        Ok(known)
+    }
 }
 
 /// Reads edges up to the end of a ray with these known cells.

@@ -88,7 +88,13 @@ pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usi
 impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N, A, W, P> {
     /// Of these sensors, and no others.
     pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits) -> Self {
-        Self { addresses, limits, sensors: sensors.map(|number| (number, SensorReceiver::NEW)), foreign: 0, latest: Cell::new(Time::from_micros(0)) }
+        Self {
+            addresses,
+            limits,
+            sensors: sensors.map(|number| (number, SensorReceiver::NEW)),
+            foreign: 0,
+            latest: Cell::new(Time::from_micros(0)),
+        }
     }
 
     /// Takes a CAN or CAN FD frame.

@@ -8,7 +8,8 @@
 //!
 //! *Sender's clock* (rule 2). The header carries the full clock. The headers heard so far bound it from
 //! below: what the fastest of them said, and the time passed since, less 2^-11 for drift. A map frame of a
-//! scan after that by more than `D` is of another period of the scan numbers, and is refused.
+//! scan after that by more than 1.5 s is of another period of the scan numbers, and is refused; one by more
+//! than `D` shows that the headers were late, and nothing is told before the next one.
 //!
 //! *Measure* (rule 3). A frame's scan number is the sender's clock at the measurement. The receiver's
 //! clock less that is the delay plus an unknown constant; the smallest seen stands for no delay. What lags
@@ -36,6 +37,10 @@ const SIGN_US: u64 = 1_000_000;
 
 /// What the smallest lag may be off by: a tick's rounding, and its creeping up over ten seconds.
 const MARGIN_US: u32 = TICK_US + 5000;
+
+/// A map frame further ahead of the sender's clock was late by more than half a period, microseconds; one nearer
+/// shows that the clock is late: three headers were lost.
+const MOST_AHEAD_US: u32 = 1_500_000;
 
 /// Without a map frame in time for longer than this, what is held is dropped, microseconds.
 const GAP_US: u64 = 1_000_000;
@@ -213,9 +218,10 @@ pub(super) struct Session {
     measure: Option<Measure>,
     /// Last map frame in time; before the first the session's beginning.
     map_heard: Time,
-    /// Whether a map frame of this session was refused, and since when only such are heard.
+    /// Whether a map frame of this session was refused.
     doubt: bool,
-    refused_since: Time,
+    /// Since when all map frames fit measure or clock not.
+    misfit_since: Time,
     epochs: Epochs,
     /// The epoch left last and its smallest lag then.
     previous: Option<(Epoch, u32)>,
@@ -232,7 +238,7 @@ impl Session {
         measure: None,
         map_heard: Time::from_micros(0),
         doubt: false,
-        refused_since: NEVER,
+        misfit_since: NEVER,
         epochs: Epochs::NONE,
         previous: None,
         conflict: NEVER,
@@ -297,7 +303,7 @@ impl Session {
         self.epochs.mark(epoch, Mark::None, now);
         (self.epoch, self.heard, self.map_heard) = (Some(epoch), now, now);
         (self.clock, self.measure) = (None, None);
-        (self.doubt, self.refused_since) = (false, NEVER);
+        (self.doubt, self.misfit_since) = (false, NEVER);
         (self.conflict, self.other_version) = (NEVER, NEVER);
         Entry::New
     }
@@ -337,7 +343,7 @@ impl Session {
         }
         self.clock = Some(known);
         // the fastest frame was of a scan that the sender's clock had not reached
-        let beyond = |measure: &Measure| is_beyond(known.lag(now), measure.least(now), limits);
+        let beyond = |measure: &Measure| ahead_of(known.lag(now), measure.least(now), limits) > 0;
         let void = self.measure.as_ref().is_some_and(beyond);
         if void {
             self.measure = None;
@@ -348,10 +354,11 @@ impl Session {
     /// The scan number of a map frame.
     pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Hearing {
         let lag = scan.lag(now);
-        if self.clock.is_some_and(|clock| is_beyond(clock.lag(now), lag, limits)) {
+        let ahead = self.clock.map_or(0, |clock| ahead_of(clock.lag(now), lag, limits));
+        if ahead > MOST_AHEAD_US {
             return self.refuse(now, lag, Hearing::Beyond);
         }
-        let Some(mut measure) = self.measure else { return self.measure_anew(now, lag) };
+        let Some(mut measure) = self.measure else { return self.measure_anew(now, lag, ahead) };
         let behind = difference(lag, measure.least(now));
         if behind > limits.max_delay_us && behind <= PERIOD_US / 2 {
             return self.refuse(now, lag, Hearing::Late);
@@ -360,34 +367,51 @@ impl Session {
             let allowed = now.since(measure.at).unwrap_or(0) >> LEAK;
             let sunk = u64::from(measure.sunk).saturating_sub(allowed) + u64::from(PERIOD_US - behind);
             if sunk > u64::from(limits.max_delay_us) {
-                return self.measure_anew(now, lag);
+                return self.measure_anew(now, lag, ahead);
             }
             (measure.at, measure.lag, measure.sunk) = (now, lag, modulo(sunk));
         }
         measure.count = measure.count.saturating_add(1);
         self.measure = Some(measure);
         let pause = now.since(self.map_heard).unwrap_or(0);
-        (self.map_heard, self.refused_since) = (now, NEVER);
+        self.in_time(now, ahead);
         if pause > GAP_US { Hearing::Anew } else { Hearing::InTime }
     }
 
-    fn measure_anew(&mut self, now: Time, lag: u32) -> Hearing {
+    fn measure_anew(&mut self, now: Time, lag: u32, ahead: u32) -> Hearing {
         self.measure = Some(Measure { begun: now, at: now, lag, sunk: 0, count: 1 });
-        (self.map_heard, self.refused_since) = (now, NEVER);
+        self.in_time(now, ahead);
         Hearing::Anew
     }
 
+    fn in_time(&mut self, now: Time, ahead: u32) {
+        self.map_heard = now;
+        if ahead == 0 {
+            self.misfit_since = NEVER;
+        } else {
+            self.misfits(now);
+        }
+    }
+
+    /// Notes that a frame fits measure or clock not; whether none did for a period.
+    fn misfits(&mut self, now: Time) -> bool {
+        if self.misfit_since == NEVER {
+            self.misfit_since = now;
+        }
+        let over = now.since(self.misfit_since).is_some_and(|since| since >= u64::from(PERIOD_US));
+        if over {
+            // the clocks are not what they were
+            (self.clock, self.misfit_since) = (None, NEVER);
+        }
+        over
+    }
+
     fn refuse(&mut self, now: Time, lag: u32, hearing: Hearing) -> Hearing {
+        if self.misfits(now) {
+            return self.measure_anew(now, lag, 0);
+        }
         self.doubt = true;
-        if self.refused_since == NEVER {
-            self.refused_since = now;
-        }
-        if now.since(self.refused_since).is_none_or(|refused| refused < u64::from(PERIOD_US)) {
-            return hearing;
-        }
-        // nothing in time for a whole period: the clocks are not what they were
-        self.clock = None;
-        self.measure_anew(now, lag)
+        hearing
     }
 
     /// How old a scan is, at most by the fastest frame's delay more.
@@ -435,10 +459,10 @@ fn difference(lag: u32, least: u32) -> u32 {
     modulo(u64::from(lag) + u64::from(PERIOD_US) - u64::from(least))
 }
 
-/// Whether a lag is smaller than the sender's clock allows.
-fn is_beyond(clock: u32, lag: u32, limits: &Limits) -> bool {
-    let beyond = difference(clock, lag);
-    beyond > limits.max_delay_us && beyond <= PERIOD_US / 2
+/// By how much a lag is smaller than the sender's clock allows; 0 if it is not.
+fn ahead_of(clock: u32, lag: u32, limits: &Limits) -> u32 {
+    let ahead = difference(clock, lag);
+    if ahead > limits.max_delay_us && ahead <= PERIOD_US / 2 { ahead } else { 0 }
 }
 
 #[allow(clippy::cast_possible_truncation)] // modulo
@@ -672,7 +696,10 @@ mod tests {
             assert_eq!(s.enter(ms(first), Epoch::new(3), None, &LIMITS), Entry::Taken);
             for k in 10..112 {
                 let hearing = s.hear(ms(50 * k + delay), scan(50 * k), &LIMITS);
-                assert!(matches!(hearing, Hearing::Late | Hearing::Beyond), "{k}");
+                // 4.9 s late looks like 0.2 s fast
+                assert!(delay > 3600 || matches!(hearing, Hearing::Late | Hearing::Beyond), "{k}");
+                s.hear_clock(ms(50 * k + delay), &clock(50 * k + 10), &LIMITS);
+                assert!(!s.trusted(ms(50 * k + delay), &LIMITS), "{k}");
             }
         }
     }
