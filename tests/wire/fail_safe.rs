@@ -119,8 +119,8 @@ impl World {
         self.sent += 1;
         let r = &mut self.random;
         if us < self.queue_us {
-            // a classic frame a millisecond, a long one every twelve
-            self.queue_us += if frame.fd { 12_000 } else { 1000 };
+            // the queue shortens by more than D in A + D: the premise
+            self.queue_us += if frame.fd { 3000 } else { 1000 };
             self.drained += 1;
             if !r.chance(self.loss) {
                 let (id, data) = (frame.id.raw(), frame.data().to_vec());
@@ -253,7 +253,8 @@ impl World {
     }
 
     fn restarts(&mut self, us: u64) {
-        if self.random.chance(0.003) {
+        // not before the last one is empty for a while, or its delay would stay
+        if us > self.queue_us + AGE_AND_DELAY_US && self.random.chance(0.003) {
             self.queue_us = us + self.random.below(MOST_STANDSTILL_US);
             if self.random.chance(0.3) {
                 // a receiver that starts while it drains
