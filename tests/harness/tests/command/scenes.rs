@@ -133,7 +133,7 @@ fn a_plan_of_scenes_that_cannot_be_run_says_why() {
         ("late.toml --scene crossing", "warm_up_s 6 leaves nothing of `train-1`, which has 6 s"),
         ("none.toml --scene queue", "[training] has no scenes"),
         ("gone.toml --scene crossing", "gone-2.toml"),
-        ("typing.toml --scene crossing", "line 3"),
+        ("typing.toml --scene crossing", "unknown field `scnes`"),
         ("--train", "go with --scene crossing or --scene queue"),
         ("--scene roundabout", "possible values: motorway, crossing, queue"),
         ("plan.toml --scene crossing --every 0", "0 is not in 1..=1000"),
