@@ -223,8 +223,13 @@ impl Faults {
             Class::Late1 => self.delay(sent, 10, 3 * S),
             Class::Repeated20 => self.repeat(sent, 200),
             Class::LateAndRepeated => {
-                let sent = self.delay(sent, 50, 3 * S);
-                self.repeat(sent, 50)
+                // not one of the other: 5.12 s together would be no delay at all
+                let again = sent.len();
+                let mut sent = self.repeat(sent, 50);
+                let again = sent.split_off(again);
+                let mut sent = self.delay(sent, 50, 3 * S);
+                sent.extend(again);
+                sent
             }
             Class::DrainAtStart => {
                 let backlog = self.random.between(S, 5 * S / 2);
