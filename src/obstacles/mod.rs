@@ -10,6 +10,7 @@
 //! if that is unconfirmed, and is dropped and counted otherwise.
 
 mod by_range;
+pub mod motion;
 pub mod obstacle;
 pub mod profile;
 pub mod size;
@@ -270,13 +271,17 @@ impl<const N: usize> Obstacles<N> {
             let places = [o.extent.front_cm, o.extent.middle_cm(), o.extent.rear_cm];
             let loss = if o.existence < t.confirmed {
                 t.tentative_loss
-            } else if places.iter().any(|&along| {
-                let (x, y) = o.global(along, 0);
-                in_view(x, y)
-            }) {
-                t.visible_loss
             } else {
-                t.hidden_loss
+                let seen = places.iter().any(|&along| {
+                    let (x, y) = o.global(along, 0);
+                    in_view(x, y)
+                });
+                match (o.is_standing(t), seen) {
+                    (false, true) => t.visible_loss,
+                    (false, false) => t.hidden_loss,
+                    (true, true) => t.standing_visible_loss,
+                    (true, false) => t.standing_hidden_loss,
+                }
             };
             o.existence -= step.times(loss);
         }

@@ -1,5 +1,6 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
+use super::motion::{FreeMotion, Seen};
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;
 use super::tracking::Tracking;
@@ -38,15 +39,28 @@ pub struct Obstacle {
     /// Way made so far, centimetres, saturating.
     travelled_cm: u16,
     tallness: Tallness,
+    /// Its motion where the road's direction is not assumed.
+    free: FreeMotion,
+    /// Frames in a row in which motion along its heading did not explain where it is.
+    unexplained: u8,
+    /// Whether it goes its own way: speed and heading from `free`.
+    roaming: bool,
     /// What this frame's detections add up to.
     gathered: Gathered,
 }
+
+/// Variance of the place of a newborn, cm^2: somewhere on a car.
+const NEWBORN_PLACE: i32 = 150 * 150;
+/// Variance of its speed across the line of sight, (cm/s)^2: as fast as traffic crosses.
+const NEWBORN_SPEED: i32 = 1000 * 1000;
+/// The same of what was slow and has a heading.
+const SLOW_SPEED: i32 = 150 * 150;
 
 /// Greatest weight of a lateral estimate: [`ratio`]'s limit.
 const MOST_WEIGHT: i32 = 1 << 26;
 
 /// Sums over the detections of one frame.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Gathered {
     count: i32,
     /// Speed error along the heading: sum of projection x error (2^-10 cm/s), and of projection
@@ -54,6 +68,26 @@ struct Gathered {
     speed: (i32, i32),
     /// Lateral place: sum of weight x offset, and of weights.
     lateral: (i32, i32),
+    /// Place: sums of the offsets ahead of the anchor and to its left, cm.
+    offset: (i32, i32),
+    /// Sum of the radial speed errors, 2^-4 cm/s.
+    radial: i32,
+    /// Line of sight to the last.
+    sight: Direction,
+    /// Noise of the last across it, cm.
+    across_cm: i32,
+}
+
+impl Gathered {
+    const NONE: Self = Self {
+        count: 0,
+        speed: (0, 0),
+        lateral: (0, 0),
+        offset: (0, 0),
+        radial: 0,
+        sight: Direction::AHEAD,
+        across_cm: 0,
+    };
 }
 
 /// Weight of a lateral measurement with a standard deviation in centimetres: the inverse variance,
@@ -194,9 +228,14 @@ impl Obstacle {
     pub fn new(seed: &Reflection, heading: Direction, speed_cm_s: i32) -> Self {
         let fine = |v: i32| v << FRACTION;
         let part = |c: i16| ((speed_cm_s << 4) * i32::from(c)) >> (14 + 4 - FRACTION);
+        let (position, velocity) =
+            ((fine(seed.x_cm), fine(seed.y_cm)), (part(heading.x), part(heading.y)));
         Self {
-            position: (fine(seed.x_cm), fine(seed.y_cm)),
-            velocity: (part(heading.x), part(heading.y)),
+            position,
+            velocity,
+            free: FreeMotion::new(position, NEWBORN_PLACE, velocity, NEWBORN_SPEED),
+            unexplained: 0,
+            roaming: false,
             heading,
             profile: Profile::EMPTY,
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
@@ -206,7 +245,7 @@ impl Obstacle {
             age: 0,
             travelled_cm: 0,
             tallness: Tallness::default(),
-            gathered: Gathered::default(),
+            gathered: Gathered::NONE,
         }
     }
 
@@ -246,8 +285,9 @@ impl Obstacle {
         self.position.1 += dy;
         let way = u16::try_from(hypot_gate(dx, dy) >> FRACTION).unwrap_or(u16::MAX);
         self.travelled_cm = self.travelled_cm.saturating_add(way);
+        self.free.predict(step);
         self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
-        self.gathered = Gathered::default();
+        self.gathered = Gathered::NONE;
         self.age = self.age.saturating_add(1);
     }
 
@@ -259,6 +299,11 @@ impl Obstacle {
     /// Whether it stands still without ever having moved.
     pub fn is_fixture(&self, t: &Tracking) -> bool {
         !self.is_mover(t) && self.age >= 2 && hypot_gate(self.velocity.0, self.velocity.1) < t.fixture_speed
+    }
+
+    /// Whether it has come to a stop.
+    pub fn is_standing(&self, t: &Tracking) -> bool {
+        self.is_mover(t) && self.speed() < t.standing_speed
     }
 
     /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
@@ -303,6 +348,11 @@ impl Obstacle {
         g.speed.1 += (projection * projection) >> 14;
         g.lateral.0 = g.lateral.0.saturating_add(w * left);
         g.lateral.1 = g.lateral.1.saturating_add(w);
+        g.offset.0 += along;
+        g.offset.1 += left;
+        g.radial += error;
+        g.sight = r.sight;
+        g.across_cm = i32::from(r.across_cm);
         self.profile.add(along);
         if let Some((height, sigma)) = r.height_cm {
             self.tallness.add(i32::from(height), i32::from(sigma));
@@ -334,19 +384,88 @@ impl Obstacle {
         if g.count == 0 {
             return;
         }
-        let inertia = if self.age < t.young { t.young_inertia } else { t.inertia };
-        self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
+        self.follow(t);
         let weight = self.lateral_weight.saturating_add(g.lateral.1).clamp(1, MOST_WEIGHT);
         let offset = ratio::<FRACTION>(g.lateral.0, weight);
-        self.move_left(offset);
-        self.lateral_weight = weight;
-        if self.age >= t.young {
-            self.turn(offset, step, t);
+        if self.roaming && self.speed() > t.turning_speed {
+            self.velocity = self.free.velocity;
+            self.heading = Direction::of(self.velocity.0, self.velocity.1);
+            self.move_left(offset);
+        } else {
+            let inertia = if self.age < t.young { t.young_inertia } else { t.inertia };
+            self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
+            self.move_left(offset);
+            if self.age >= t.young {
+                self.turn(offset, step, t);
+            }
         }
+        self.lateral_weight = weight;
+        self.question(t);
         self.update_extent(t);
         self.hits = self.hits.saturating_add(g.count as u16);
         let gained = g.count.min(t.most_hits_a_frame) << 8;
         self.existence = (self.existence + gained).min(t.existence_max);
+    }
+
+    /// Speed, 2^-8 cm/s.
+    fn speed(&self) -> i32 {
+        hypot_gate(self.velocity.0, self.velocity.1)
+    }
+
+    /// Lets the free motion follow this frame's detections.
+    fn follow(&mut self, t: &Tracking) {
+        let g = self.gathered;
+        let (along, left) = ((g.offset.0 << FRACTION) / g.count, (g.offset.1 << FRACTION) / g.count);
+        let (hx, hy) = (i32::from(self.heading.x), i32::from(self.heading.y));
+        let centre = (
+            self.position.0 + mul_shift(along, hx, 14) - mul_shift(left, hy, 14),
+            self.position.1 + mul_shift(along, hy, 14) + mul_shift(left, hx, 14),
+        );
+        // a vehicle reflects anywhere along the side it shows
+        let shown = (self.extent.length_cm().max(t.sizes.min_length_cm) * self.heading.sine(g.sight).abs()) >> 14;
+        let seen = Seen {
+            count: g.count,
+            centre,
+            variance: ((shown * shown / 12 + 50 * 50 + g.across_cm * g.across_cm) / g.count).max(400),
+            sight: g.sight,
+            radial: ((g.radial / g.count) << 4) + g.sight.along(self.velocity.0, self.velocity.1),
+        };
+        self.free.update(&seen);
+    }
+
+    /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way.
+    fn question(&mut self, t: &Tracking) {
+        if self.roaming {
+            if self.speed() <= t.turning_speed {
+                self.free = FreeMotion::new(self.position, NEWBORN_PLACE, self.velocity, SLOW_SPEED);
+            }
+            return;
+        }
+        let (dx, dy) =
+            ((self.free.velocity.0 - self.velocity.0) >> FRACTION, (self.free.velocity.1 - self.velocity.1) >> FRACTION);
+        let off = length(dx, dy);
+        let sure = off * off > t.roam_sigmas * t.roam_sigmas * self.free.speed_variance();
+        let aside = self.heading.across(dx, dy).abs();
+        let way_off = aside > t.roam_speed_cm_s && aside > mul_shift(self.speed(), t.roam_share, 16 + FRACTION);
+        if way_off && sure {
+            self.unexplained += 1;
+        } else {
+            self.unexplained = 0;
+        }
+        if self.unexplained >= t.roam_frames {
+            self.roam();
+        }
+    }
+
+    /// Goes on from the free motion.
+    fn roam(&mut self) {
+        self.roaming = true;
+        self.position = self.free.place;
+        self.velocity = self.free.velocity;
+        self.heading = Direction::of(self.velocity.0, self.velocity.1);
+        self.profile = Profile::EMPTY;
+        self.extent = Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 };
+        self.lateral_weight = 0;
     }
 
     /// Adds to the speed along the heading, 2^-8 cm/s.

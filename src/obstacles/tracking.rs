@@ -55,6 +55,8 @@ pub struct ObstacleConfig {
     pub visible_loss_per_s: f32,
     /// Loss of evidence while unseen in a shadow, detections per second.
     pub hidden_loss_per_s: f32,
+    #[doc(hidden)]
+    pub x: [f32; 16],
     /// Widths and heights by length.
     pub sizes: SizeConfig,
 }
@@ -83,6 +85,7 @@ impl Default for ObstacleConfig {
             tentative_loss_per_s: 10.0,
             visible_loss_per_s: 9.0,
             hidden_loss_per_s: 2.0,
+            x: [3.0, 2.0, 3.0, 0.7, 9.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             sizes: SizeConfig::default(),
         }
     }
@@ -152,6 +155,18 @@ pub struct Tracking {
     pub turning_speed: i32,
     /// Bins the outline's middle may leave the anchor.
     pub recentre_bins: i32,
+    /// Standard deviations by which a free motion must differ from the one along the heading, the least
+    /// difference, and frames in a row.
+    pub roam_sigmas: i32,
+    pub roam_speed_cm_s: i32,
+    pub roam_frames: u8,
+    /// Of the speed, 2^-16.
+    pub roam_share: i32,
+    /// 2^-8 cm/s
+    pub standing_speed: i32,
+    /// 2^-8 detections per second
+    pub standing_visible_loss: i32,
+    pub standing_hidden_loss: i32,
     pub sizes: Sizes,
     pub noise: Noise,
     /// The road's axis in the levelled frame.
@@ -219,6 +234,13 @@ impl ObstacleConfig {
             fixture_speed: math::round_i32(self.min_speed_mps * 100.0) << 7,
             turning_speed: 200 << 8,
             recentre_bins: 6,
+            roam_sigmas: math::round_i32(self.x[0]),
+            roam_speed_cm_s: math::round_i32(self.x[1] * 100.0),
+            roam_share: math::round_i32(self.x[6] * 65536.0),
+            roam_frames: math::round_i32(self.x[2]) as u8,
+            standing_speed: math::round_i32(self.x[3] * 25_600.0),
+            standing_visible_loss: math::round_i32(self.x[4] * 256.0),
+            standing_hidden_loss: math::round_i32(self.x[5] * 256.0),
             sizes: self.sizes.sizes()?,
             noise,
             road,
