@@ -99,7 +99,7 @@ impl<const N: usize> Obstacles<N> {
     ) -> Claimed<D> {
         let kept = t.kept_over(step);
         for o in &mut self.list {
-            o.predict(step, kept.lateral);
+            o.predict(step, kept.lateral, t);
         }
         let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
         let mut claimed = self.associate(reflections, &by_range, kept.outline, t);
@@ -162,7 +162,7 @@ impl<const N: usize> Obstacles<N> {
         for (i, (r, ((_, body), _))) in reflections.iter().zip(&best).enumerate() {
             let Some(o) = self.list.get_mut(usize::from(*body)) else { continue };
             if !o.seen() {
-                o.fade_outline(outline_kept);
+                o.fade_outline(outline_kept, t);
             }
             o.absorb(r, t);
             claimed.insert(i);

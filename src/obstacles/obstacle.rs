@@ -30,6 +30,8 @@ pub struct Obstacle {
     pub extent: Extent,
     /// Weight of the lateral estimate; [`weight`] of each detection, fading.
     lateral_weight: i32,
+    /// Variance of where across it the detections lie, noise taken off, cm^2.
+    spread: i32,
     /// Evidence that it is there, 2^-8 detections.
     pub existence: i32,
     /// Detections so far, saturating.
@@ -56,6 +58,11 @@ const NEWBORN_SPEED: i32 = 1000 * 1000;
 /// The same of what was slow and has a heading.
 const SLOW_SPEED: i32 = 150 * 150;
 
+/// Variance across a vehicle that reflects on both its sides, cm^2.
+const EVEN_SPREAD: i32 = 85 * 85;
+/// Detections over which the spread is taken.
+const SPREAD_MEMORY: i32 = 40;
+
 /// Greatest weight of a lateral estimate: [`ratio`]'s limit.
 const MOST_WEIGHT: i32 = 1 << 26;
 
@@ -70,6 +77,8 @@ struct Gathered {
     lateral: (i32, i32),
     /// Place: sums of the offsets ahead of the anchor and to its left, cm.
     offset: (i32, i32),
+    /// Sum of the squared offsets to the left, cm^2.
+    squares: i32,
     /// Sum of the radial speed errors, 2^-4 cm/s.
     radial: i32,
     /// Line of sight to the last.
@@ -84,6 +93,7 @@ impl Gathered {
         speed: (0, 0),
         lateral: (0, 0),
         offset: (0, 0),
+        squares: 0,
         radial: 0,
         sight: Direction::AHEAD,
         across_cm: 0,
@@ -240,6 +250,7 @@ impl Obstacle {
             profile: Profile::EMPTY,
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
             lateral_weight: 0,
+            spread: EVEN_SPREAD,
             existence: 0,
             hits: 0,
             age: 0,
@@ -279,14 +290,14 @@ impl Obstacle {
 
     /// Moves it on by a time step, which leaves a part (2^-16) of its lateral weight, and forgets the last
     /// frame's sums.
-    pub fn predict(&mut self, step: Step, lateral_kept: i32) {
+    pub fn predict(&mut self, step: Step, lateral_kept: i32, t: &Tracking) {
         let (dx, dy) = (step.times(self.velocity.0), step.times(self.velocity.1));
         self.position.0 += dx;
         self.position.1 += dy;
         let way = u16::try_from(hypot_gate(dx, dy) >> FRACTION).unwrap_or(u16::MAX);
         self.travelled_cm = self.travelled_cm.saturating_add(way);
         self.free.predict(step);
-        self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
+        self.lateral_weight = mul_shift(self.lateral_weight, self.kept_by_way(lateral_kept, t), 16);
         self.gathered = Gathered::NONE;
         self.age = self.age.saturating_add(1);
     }
@@ -350,6 +361,7 @@ impl Obstacle {
         g.lateral.1 = g.lateral.1.saturating_add(w);
         g.offset.0 += along;
         g.offset.1 += left;
+        g.squares = g.squares.saturating_add(left * left);
         g.radial += error;
         g.sight = r.sight;
         g.across_cm = i32::from(r.across_cm);
@@ -373,8 +385,14 @@ impl Obstacle {
     }
 
     /// Keeps a part (2^-16) of the outline; to be called before this frame's detections are absorbed.
-    pub fn fade_outline(&mut self, kept: i32) {
-        self.profile.fade(kept);
+    pub fn fade_outline(&mut self, kept: i32, t: &Tracking) {
+        self.profile.fade(self.kept_by_way(kept, t));
+    }
+
+    /// What a memory keeps (2^-16) by the way made rather than by time: what stands stays what it is.
+    fn kept_by_way(&self, kept: i32, t: &Tracking) -> i32 {
+        let speed = (self.speed() >> FRACTION).min(t.memory_speed_cm_s);
+        (1 << 16) - ((1 << 16) - kept) * speed / t.memory_speed_cm_s.max(1)
     }
 
     /// Brings motion, place and outline up to date with what was absorbed.
@@ -400,6 +418,9 @@ impl Obstacle {
             }
         }
         self.lateral_weight = weight;
+        let noise = (g.across_cm * self.heading.cosine(g.sight)) >> 14;
+        let spread = (g.squares / g.count - noise * noise).clamp(0, 4 * EVEN_SPREAD);
+        self.spread += (spread - self.spread) * g.count / (g.count + SPREAD_MEMORY);
         self.question(t);
         self.update_extent(t);
         self.hits = self.hits.saturating_add(g.count as u16);
@@ -495,7 +516,12 @@ impl Obstacle {
 
     /// Reads the outline and keeps the anchor near its middle.
     fn update_extent(&mut self, t: &Tracking) {
-        let Some(extent) = self.profile.extent(t.outline_min_hits, t.outline_share) else { return };
+        let Some(mut extent) = self.profile.extent(t.outline_min_hits, t.outline_share) else { return };
+        let g = self.gathered;
+        let smear = (g.across_cm * self.heading.sine(g.sight).abs()) >> 14;
+        let shrink = ((smear * t.shrink) >> 4).min(extent.length_cm() / 4);
+        extent.front_cm -= shrink;
+        extent.rear_cm += shrink;
         self.extent = extent;
         let bins = extent.middle_cm() / BIN_CM;
         if bins.abs() >= t.recentre_bins {
@@ -541,6 +567,9 @@ impl Obstacle {
             return false;
         }
         let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
+        if (self.is_standing(t) || other.is_standing(t)) && self.is_mover(t) && other.is_mover(t) && t.nojoin {
+            return false;
+        }
         let coupled = i32::from(self.travelled_cm.min(other.travelled_cm)) >= t.coupled_way_cm
             && hypot_gate(dvx, dvy) <= t.coupled_speed
             && left.abs() <= t.merge_lateral_cm;
@@ -591,18 +620,28 @@ impl Obstacle {
 
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
     pub fn solid(&self, t: &Tracking) -> Solid {
-        let size = t.sizes.of(self.extent.length_cm());
+        let tall = self.tallness.floor_cm();
+        let least = if t.tall_length { match tall { ..260 => 0, 260..310 => 600, 310..360 => 750, _ => 900 } } else { 0 };
+        let size = t.sizes.of(self.extent.length_cm().max(least));
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let hidden = (size.length_cm - self.extent.length_cm()).max(0) / 2;
-        let receding = self.heading.along(x, y) >= 0;
-        let (x, y) = self.global(self.extent.middle_cm() + if receding { hidden } else { -hidden }, 0);
+        let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
+        // the side the radar sees is where the detections are, the other one behind it
+        let (side, end) = (size.length_cm * left.abs(), size.width_cm * ahead.abs());
+        let shown = (side / ((side + end) / 512).max(1)).min(256);
+        let unseen = (size.width_cm / 2 - root((self.spread + self.spread / 8).unsigned_abs()) as i32).max(0);
+        let aside = (((unseen * shown) >> 8) * t.aside) >> 8;
+        let (x, y) = self.global(
+            self.extent.middle_cm() + if ahead >= 0 { hidden } else { -hidden },
+            if left >= 0 { aside } else { -aside },
+        );
         Solid {
             x_cm: x,
             y_cm: y,
             heading: self.heading,
             half_length_cm: size.length_cm / 2,
             half_width_cm: size.width_cm / 2,
-            height_cm: size.height_cm.max(self.tallness.floor_cm()),
+            height_cm: size.height_cm.max(tall),
         }
     }
 }

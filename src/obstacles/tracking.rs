@@ -85,7 +85,7 @@ impl Default for ObstacleConfig {
             tentative_loss_per_s: 10.0,
             visible_loss_per_s: 9.0,
             hidden_loss_per_s: 2.0,
-            x: [3.0, 2.0, 3.0, 0.7, 9.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            x: [3.0, 2.0, 3.0, 0.7, 9.0, 2.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             sizes: SizeConfig::default(),
         }
     }
@@ -160,6 +160,12 @@ pub struct Tracking {
     pub roam_sigmas: i32,
     pub roam_speed_cm_s: i32,
     pub roam_frames: u8,
+    pub aside: i32,
+    pub tall_length: bool,
+    pub memory_speed_cm_s: i32,
+    /// 2^-4
+    pub shrink: i32,
+    pub nojoin: bool,
     /// Of the speed, 2^-16.
     pub roam_share: i32,
     /// 2^-8 cm/s
@@ -237,6 +243,11 @@ impl ObstacleConfig {
             roam_sigmas: math::round_i32(self.x[0]),
             roam_speed_cm_s: math::round_i32(self.x[1] * 100.0),
             roam_share: math::round_i32(self.x[6] * 65536.0),
+            shrink: math::round_i32(self.x[7] * 16.0),
+            nojoin: self.x[8] > 0.0,
+            memory_speed_cm_s: math::round_i32(self.x[9] * 100.0),
+            aside: math::round_i32(self.x[10] * 256.0),
+            tall_length: self.x[11] > 0.0,
             roam_frames: math::round_i32(self.x[2]) as u8,
             standing_speed: math::round_i32(self.x[3] * 25_600.0),
             standing_visible_loss: math::round_i32(self.x[4] * 256.0),
