@@ -16,7 +16,8 @@ use crate::gate::{Gate, GateConfig, Rejections};
 use crate::health::{Condition, Continuity, Health, HealthConfig, HealthLimits};
 use crate::math;
 use crate::mount::Levelling;
-use crate::obstacles::tracking::{ObstacleConfig, Tracking};
+use crate::obstacles::config::ObstacleConfig;
+use crate::obstacles::tracking::Tracking;
 use crate::obstacles::{Claimed, Obstacles};
 use crate::polar::PolarMap;
 use crate::raycast;
@@ -148,7 +149,7 @@ pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usiz
 }
 
 /// The reference grid: 200 m in 1 m cells, 1 degree, 16 elevations.
-pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 64, 256>;
+pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 96, 256>;
 
 /// For controllers with 128 kB: 2 m cells.
 pub type SmallProfile = Radar3d<100, 64, 8, 4, 28, 176>;

@@ -1,7 +1,7 @@
 //! The box of an obstacle that the radar has seen one end of.
 
+use viewshed::obstacles::config::ObstacleConfig;
 use viewshed::obstacles::obstacle::Obstacle;
-use viewshed::obstacles::tracking::ObstacleConfig;
 use viewshed::reflection::{NoiseConfig, Reflection};
 use viewshed::trig::Direction;
 
