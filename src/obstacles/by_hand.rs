@@ -31,7 +31,7 @@ pub fn reflection([x, y]: [f64; 2], [vx, vy]: [f64; 2]) -> Reflection {
     }
 }
 
-/// An upright box that moves, metres and m/s; it reflects at its corners and half way along its sides.
+/// An upright box that moves, metres and m/s; it reflects every 2.5 m along its sides.
 #[derive(Clone, Copy)]
 pub struct Vehicle {
     pub at: [f64; 2],
@@ -43,7 +43,9 @@ pub struct Vehicle {
 impl Vehicle {
     pub fn reflections(&self) -> Vec<Reflection> {
         let [hx, hy] = self.heading;
-        let points = [-0.5, 0.0, 0.5].into_iter().flat_map(|a| [-0.5, 0.5].map(|b| (a, b)));
+        let stretches = (self.size[0] / 2.5).ceil();
+        let along = (0..=stretches as u32).map(|k| f64::from(k) / stretches - 0.5);
+        let points = along.flat_map(|a| [-0.5, 0.5].map(|b| (a, b)));
         points
             .map(|(a, b)| {
                 let (ahead, left) = (a * self.size[0], b * self.size[1]);

@@ -78,6 +78,8 @@ pub struct ObstacleConfig {
     pub own_way_mps: f32,
     /// Least share of the speed for that.
     pub own_way_share: f32,
+    /// Share of the way to the place seen that the outline of what goes its own way is moved in a frame.
+    pub own_way_follow: f32,
     /// Standard deviations a speed must have to tell the heading of what goes its own way.
     pub heading_sigmas: f32,
     /// Speed below which a mover has come to a stop, m/s.
@@ -126,6 +128,7 @@ impl Default for ObstacleConfig {
             own_way_sigmas: 3.0,
             own_way_mps: 2.0,
             own_way_share: 0.25,
+            own_way_follow: 0.05,
             heading_sigmas: 4.0,
             standing_speed_mps: 0.7,
             standing_visible_loss_per_s: 3.0,
@@ -194,6 +197,9 @@ impl ObstacleConfig {
             own_way_sigmas: sigmas("obstacles.own_way_sigmas", self.own_way_sigmas)?,
             own_way_cm_s: cm("obstacles.own_way_mps", self.own_way_mps, 0.0, 50.0)?,
             own_way_share: math::round_i32(within("obstacles.own_way_share", self.own_way_share, 0.0, 2.0)? * 65536.0),
+            own_way_follow: math::round_i32(
+                within("obstacles.own_way_follow", self.own_way_follow, 0.0, 1.0)? * 65536.0,
+            ),
             heading_sigmas: sigmas("obstacles.heading_sigmas", self.heading_sigmas)?,
             standing_speed: fine("obstacles.standing_speed_mps", self.standing_speed_mps, 0.0, 5.0)?,
             standing_visible_loss: hits("obstacles.standing_visible_loss_per_s", self.standing_visible_loss_per_s)?,

@@ -348,7 +348,7 @@ mod tests {
     fn a_lorry_that_stands_for_an_hour_stays_the_same_box() {
         let mut list = Obstacles::<16>::new();
         let mut lorry = [car([30.0, 5.0], [1.0, 0.0], 6.0)];
-        lorry[0].size = [12.0, 2.5];
+        lorry[0].size = [9.0, 2.0];
         follow(&mut list, &mut lorry, 3.0, true);
         change_speed(&mut list, &mut lorry, 0.0);
         follow(&mut list, &mut lorry, 3.0, true);
@@ -378,7 +378,8 @@ mod tests {
         let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
         follow(&mut list, &mut cars, 5.0, true);
         assert!(boxes(&list).is_empty());
-        change_speed(&mut list, &mut cars, 6.0);
+        change_speed(&mut list, &mut cars, 2.0);
+        follow(&mut list, &mut cars, 3.0, true);
         assert_eq!(boxes(&list).len(), 6);
     }
 }

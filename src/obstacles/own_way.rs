@@ -43,6 +43,13 @@ impl Obstacle {
             sight: g.sight,
             radial: own + ((g.radial / g.count.max(1)) << 4),
         });
+        if self.free_heading {
+            let (dx, dy) = (self.free.place.0 - self.position.0, self.free.place.1 - self.position.1);
+            let ahead = self.heading.along(dx, dy) - (self.extent.middle_cm() << FRACTION);
+            let by = mul_shift(ahead, t.own_way_follow, 16);
+            self.position.0 += mul_shift(by, hx, 14);
+            self.position.1 += mul_shift(by, hy, 14);
+        }
     }
 
     /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way.

@@ -63,6 +63,8 @@ pub struct Tracking {
     pub own_way_sigmas: i32,
     pub own_way_cm_s: i32,
     /// 2^-16
+    pub own_way_follow: i32,
+    /// 2^-16
     pub own_way_share: i32,
     /// 2^-4
     pub heading_sigmas: i32,

@@ -77,6 +77,10 @@ impl Obstacle {
         let variance = (shown.powi(2) / 12.0 + ON_VEHICLE_SIGMA.powi(2) + g.sigma_across.powi(2)) / g.count;
         let radial = along(g.sight, self.velocity) + g.radial / g.count;
         self.free.update(g.count, centre, variance.max(LEAST_SIGMA.powi(2)), g.sight, radial);
+        if self.free_heading {
+            let off = along(self.heading, difference(self.free.place, self.anchor)) - self.extent.middle();
+            self.anchor = moved(self.anchor, self.heading, off * rules.own_way_follow);
+        }
     }
 
     /// Leaves the heading it has where motion along that does not explain what is seen.
