@@ -6,15 +6,15 @@
 //! argument. The same input gives the same bits on every machine.
 //!
 //! ```
-//! use viewshed::detection::{Detection, Measurement};
-//! use viewshed::field_of_view::FieldOfView;
-//! use viewshed::map::RoadPoint;
-//! use viewshed::mount::Mount;
-//! use viewshed::query::{self, Answer};
+//! use viewshed::frame::detection::{Detection, Measurement};
+//! use viewshed::sensor::field_of_view::FieldOfView;
+//! use viewshed::sensor::road::RoadPoint;
+//! use viewshed::sensor::mount::Mount;
+//! use viewshed::map::query::{self, Answer};
 //! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters, SmallProfile};
-//! use viewshed::reflection::NoiseConfig;
+//! use viewshed::sensor::noise::NoiseConfig;
 //! use viewshed::sensor::Sensor;
-//! use viewshed::time::Time;
+//! use viewshed::fixed::time::Time;
 //!
 //! // a gantry, 6 m up, looking 4 degrees down
 //! let sensor = Sensor {
@@ -51,7 +51,7 @@
 //! assert_eq!(query::point(&map, ahead), Answer::VisibleFree);
 //! let behind_the_sensor = RoadPoint { x_cm: -2_000, y_cm: 0 };
 //! assert_eq!(query::point(&map, behind_the_sensor), Answer::Unknown);
-//! # Ok::<(), viewshed::config::ConfigError>(())
+//! # Ok::<(), viewshed::sensor::config::ConfigError>(())
 //! ```
 //!
 //! # What is where
@@ -72,6 +72,8 @@
 //! | a whole unit: sessions on its lines, stored settings, buses looked after, the loop of a board | [`mod@unit`] |
 //! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
+//!
+//! Where a new estimator, input, bus, board or command goes, and the walk of a detection from byte to bit: [`extending`].
 //!
 //! # What was decided, and why
 //!
@@ -109,41 +111,20 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod angle;
-pub mod axes;
-pub mod bitmap;
-pub mod bits;
-mod bytes;
-pub mod cartesian;
-pub mod config;
-pub mod detection;
-pub mod evidence;
-pub mod field_of_view;
-pub mod gate;
-pub mod health;
+#[cfg(doc)]
+#[doc = include_str!("EXTENDING.md")]
+pub mod extending {}
+pub mod fixed;
+pub mod frame;
+pub mod grid;
 pub mod inputs;
 pub mod map;
-mod math;
-pub mod mount;
 pub mod obstacles;
 pub mod pil;
-pub mod polar;
 pub mod profile;
-pub mod query;
 pub mod radar_2d;
 pub mod radar_3d;
-pub mod raycast;
-pub mod reflection;
-pub mod resample;
-pub mod scan;
 pub mod sensor;
-pub mod sightlines;
-pub mod solid;
-pub mod spherical;
-mod stack;
 pub mod stage;
-pub mod time;
-pub mod trig;
 pub mod unit;
-pub mod voxelise;
 pub mod wire;

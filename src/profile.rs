@@ -22,12 +22,16 @@ macro_rules! size {
                 crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
             }
 
+            /// Whether a unit of this size can run with settings.
+            pub const CHECK: crate::unit::stored::Check =
+                crate::unit::stored::Check::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS>();
+
             /// The estimator.
             pub type State = $state;
             /// What it works with.
             pub type Parameters = crate::radar_3d::Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>;
             /// Its map.
-            pub type Map = crate::polar::PolarMap<RANGES, AZIMUTHS>;
+            pub type Map = crate::map::polar::PolarMap<RANGES, AZIMUTHS>;
             /// Who sends it.
             pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
             /// All of them together.

@@ -5,15 +5,16 @@
 mod common;
 
 use proptest::prelude::*;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
-use viewshed::unit::session::{Flow, Slots};
+use viewshed::unit::session::Flow;
 use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
+use viewshed::unit::stored::{Check, Slots, Stored};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 use viewshed::wire::receive::{Accepted, Limits, Receiver};
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, State, Status};
 
 use common::gantry;
 
@@ -47,9 +48,13 @@ fn settings(height_m: f32) -> Settings {
     Settings::of(gantry(height_m, 0.0))
 }
 
+fn stored(slots: &InRam) -> Stored {
+    Stored::read(slots, Check::of::<50, 40, 8, 2>())
+}
+
 fn start(medium: Medium, slots: &InRam) -> CanService {
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, medium) };
-    CanService::start(config, Epoch::new(1), at(0), slots)
+    CanService::start(config, Epoch::new(1), at(0), stored(slots))
 }
 
 fn send(frames: impl Iterator<Item = CanFrame>, unit: &mut CanService, slots: &mut InRam) {
@@ -122,14 +127,14 @@ fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_stat
     slots.0[0][40] ^= 1;
     for medium in [CLASSIC, FD] {
         let mut unit = start(medium, &slots);
-        assert_eq!((unit.settings(), unit.refusal()), (None, Some(&BlockError::CheckSum)));
+        assert_eq!((unit.settings(), unit.refusal()), (None, Some(BlockError::CheckSum)));
         let told = told(&mut unit, &slots, medium);
         assert!(matches!(told[..], [Told::Started(None), Told::Refused(r)] if r.reason == 4), "{told:?}");
         // the status says it to everybody, at least twice a second
         let mut receiver = Receiver::<1, 120, 7>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
         let mut last = 0;
         for ms in 0..3000 {
-            let Some(frame) = unit.next_status(at(ms)) else { continue };
+            let Some(frame) = unit.next_status(at(ms), Status::starting(0)) else { continue };
             assert_eq!(receiver.frame(at(ms), &frame), Ok(Accepted::Status));
             assert!(ms - last <= 500);
             last = ms;
@@ -184,10 +189,10 @@ fn a_lost_part_is_asked_for_and_a_repeated_completion_writes_once() {
 fn receivers_of_maps_and_other_sensors_units_leave_these_messages_alone() {
     let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, CLASSIC));
     let block = settings(6.0).to_block(1);
-    let mut other = CanService::start(CanServiceConfig::new(3, CLASSIC), Epoch::new(1), at(0), &slots);
+    let mut other = CanService::start(CanServiceConfig::new(3, CLASSIC), Epoch::new(1), at(0), stored(&slots));
     let mut receiver = Receiver::<1, 120, 7>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
     let mut unit = start(CLASSIC, &slots);
-    let status = unit.next_status(at(0)).unwrap();
+    let status = unit.next_status(at(0), Status::starting(0)).unwrap();
     assert_eq!(receiver.frame(at(0), &status), Ok(Accepted::Status));
     for frame in tool.write(&block) {
         assert_eq!(other.take(&frame, &mut slots), None);
@@ -210,7 +215,7 @@ fn answers_keep_their_distance_and_identifiers_are_where_the_installation_has_th
     let addresses = Addresses::new(CanId::Extended(0x0A00_0000)).unwrap();
     let medium = Medium::Can(addresses);
     let config = CanServiceConfig::new(SENSOR, medium);
-    let mut unit = CanService::start(config, Epoch::new(1), at(0), &slots);
+    let mut unit = CanService::start(config, Epoch::new(1), at(0), stored(&slots));
     let mut tool = Tool::new(SENSOR, medium);
     unit.take(&tool.read().unwrap(), &mut slots.clone());
     let mut sent = Vec::new();

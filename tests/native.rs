@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use proptest::prelude::*;
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::native::{
     Config, MOST_BYTES, Medium, Message, Outcome, Receiver, Refusal, Sender, SerialReceiver, id,
 };
-use viewshed::time::Time;
 use viewshed::wire::e2e::{E2eError, Profile};
 use viewshed::wire::frame::{CanFrame, CanId};
 

@@ -1,9 +1,10 @@
 //! The box of an obstacle that the radar has seen one end of.
 
+use viewshed::fixed::trig::Direction;
+use viewshed::frame::reflection::Reflection;
 use viewshed::obstacles::config::ObstacleConfig;
 use viewshed::obstacles::obstacle::Obstacle;
-use viewshed::reflection::{NoiseConfig, Reflection};
-use viewshed::trig::Direction;
+use viewshed::sensor::noise::NoiseConfig;
 
 #[test]
 fn what_was_not_seen_of_a_vehicle_lies_behind_the_face_that_was() {

@@ -4,22 +4,21 @@
 
 mod common;
 
-use viewshed::detection::Detection;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::pil::fingerprint::Fingerprint;
 use viewshed::pil::job::{Job, JobError, ScanBuffer, ScanHead, detection_to_bytes};
 use viewshed::pil::record::{RECORD_LEN, Record};
 use viewshed::pil::{Bench, Memory, run};
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
-use viewshed::unit::{Unit, bench_sender};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
-use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::MOST_STUFFED;
 use viewshed::wire::status::State;
 
-use common::{Vehicle, gantry};
+use common::{Vehicle, gantry, small_unit};
 
 type Small = Radar3d<50, 40, 8, 2, 16, 64>;
 
@@ -60,8 +59,8 @@ fn sensor() -> Sensor {
     gantry(6.0, 0.0)
 }
 
-fn sender(settings: &Settings, parameters: &Radar3dParameters<50, 40, 8>) -> Broadcaster<40, 2> {
-    bench_sender(settings, parameters, Medium::Serial, Epoch::new(0), Time::from_micros(0)).unwrap()
+fn unit(settings: &Settings) -> (Radar3dParameters<50, 40, 8>, Broadcaster<40, 2>) {
+    small_unit(settings, Medium::Serial, 0, Time::from_micros(0))
 }
 
 fn scans() -> Vec<Vec<Detection>> {
@@ -83,9 +82,8 @@ fn job(dump: Option<u32>, scans: &[Vec<Detection>]) -> Vec<u8> {
 fn answer(job: Vec<u8>) -> (Result<(), JobError>, Vec<u8>) {
     let mut streams = Streams { job, answer: Vec::new(), ticks: 0 };
     let outcome = Job::read(&mut streams).and_then(|job| {
-        let parameters = Radar3dParameters::new(&job.settings.sensor, &job.settings.radar_3d()).unwrap();
+        let (parameters, mut sender) = unit(&job.settings);
         let (mut state, mut map, mut scan) = (Box::new(Small::new()), parameters.map(), ScanBuffer::<64>::new());
-        let mut sender = sender(&job.settings, &parameters);
         let unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
         let memory = Memory { unit, scan: &mut scan };
         run(&mut streams, &job, memory)
@@ -105,9 +103,8 @@ fn every_frame_is_answered_with_the_fingerprint_of_its_map() {
     let records = records(&bytes);
     assert_eq!(records.len(), scans.len() + 2);
     let settings = Settings::of(sensor());
-    let parameters = Radar3dParameters::new(&sensor(), &settings.radar_3d()).unwrap();
+    let (parameters, mut sender) = unit(&settings);
     let (mut state, mut map) = (Box::new(Small::new()), parameters.map());
-    let mut sender = sender(&settings, &parameters);
     let mut line = [0; MOST_STUFFED];
     let (mut seen, mut messages) = (std::collections::BTreeSet::new(), 0);
     for (k, scan) in scans.iter().enumerate() {

@@ -5,11 +5,12 @@
 mod common;
 
 use common::{FRAME_US, detection, gantry};
-use viewshed::detection::Detection;
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
+use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::road::RoadPoint;
 
 /// Posts seen for three frames, then the road from above: rows from left (top) to right, 4 m each; x
 /// ahead to the right, 4 m a character.

@@ -5,14 +5,15 @@
 mod common;
 
 use common::{FRAME_US, Rig, Vehicle, detection, gantry};
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
-use viewshed::gate::Rejection;
-use viewshed::health::{Condition, Continuity};
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::fixed::trig::Direction;
+use viewshed::frame::detection::Detection;
+use viewshed::frame::gate::Rejection;
+use viewshed::frame::health::{Condition, Continuity, FrameStatus};
 use viewshed::map::Visibility;
-use viewshed::query::{self, Answer, Footprint};
-use viewshed::time::Time;
-use viewshed::trig::Direction;
+use viewshed::map::query::{self, Answer, Footprint};
+use viewshed::sensor::Sensor;
 
 #[test]
 fn a_truck_in_the_left_lane_hides_the_left_lane_behind_it() {
@@ -149,6 +150,70 @@ fn before_the_first_frame_after_the_hold_time_and_when_blind_all_is_unknown() {
     assert_eq!(rig.visibility(60.0, 10.0), Visibility::Unknown);
 }
 
+/// Conditions over one and a half seconds of frames, 15 a second, and whether anything is on the last map.
+fn conditions(rig: &mut Rig, status: FrameStatus, detections: &[Detection]) -> (Vec<Condition>, bool) {
+    let told = (0..23)
+        .map(|_| {
+            let now = rig.now();
+            rig.frames += 1;
+            rig.state.process(&rig.parameters, now, detections, status, &mut rig.map).condition
+        })
+        .collect();
+    (told, (20..200).any(|x| rig.visibility(f64::from(x), 0.0) != Visibility::Unknown))
+}
+
+#[test]
+fn rejected_is_not_empty() {
+    let row = |sensor: &Sensor| -> Vec<Detection> {
+        (30..190).filter_map(|x| detection(sensor, [f64::from(x), 4.0, 0.6], [-20.0, 0.0], true)).collect()
+    };
+    let right = gantry(6.0, 0.0);
+    // nothing but NaN; degrees taken for radians, of which the few within 3 degrees of the axis are none that
+    // the gate takes; a mount that looks 30 degrees farther down, so that the map ends at 20 m
+    let degrees: Vec<Detection> = row(&right)
+        .iter()
+        .filter(|d| d.azimuth.radians().to_degrees().abs() < 3.14)
+        .map(|d| Detection { azimuth: Angle::from_radians(d.azimuth.radians().to_degrees()), ..*d })
+        .collect();
+    let refused = (row(&right).len() - degrees.len()) as u16;
+    assert!(refused > 0 && !degrees.is_empty());
+    let mut down = right;
+    down.mount.pitch_deg = 33.0;
+    let cases = [
+        ("NaN", right, 160, Vec::new()),
+        ("mostly NaN", right, 161, row(&right)),
+        ("degrees", right, 160 - degrees.len() as u16, degrees),
+        ("outside", right, 0, row(&right).iter().map(|d| Detection { range_cm: d.range_cm + 18_000, ..*d }).collect()),
+        ("mount", down, 0, row(&right)),
+    ];
+    for (what, sensor, refused, detections) in cases {
+        let mut rig = Rig::new(sensor);
+        let (told, known) = conditions(&mut rig, FrameStatus { fault: false, refused }, &detections);
+        assert_eq!(told.first(), Some(&Condition::Healthy), "{what}");
+        assert_eq!(told.last(), Some(&Condition::Unusable), "{what}: unknown within 1.5 s");
+        assert!(!known, "{what}");
+    }
+}
+
+#[test]
+fn weak_clutter_few_detections_and_what_stands_at_the_sensors_feet_stay_visible() {
+    let sensor = gantry(6.0, 0.0);
+    let at = |x: f64, y: f64, z: f64| detection(&sensor, [x, y, z], [0.0; 2], true).unwrap();
+    let weak = |d: Detection| Detection { snr_half_db: Some(2), ..d };
+    let cases = [
+        ("an empty road", vec![]),
+        ("weak clutter", vec![weak(at(60.0, 9.0, 0.3)), weak(at(90.0, -8.0, 0.3))]),
+        ("weak clutter, some of it outside", vec![weak(at(60.0, 9.0, 0.3)), weak(at(60.0, 150.0, 0.3))]),
+        ("one detection", vec![at(70.0, 2.0, 0.5)]),
+        ("three, two of them outside", vec![at(70.0, 2.0, 0.5), at(20.0, 60.0, 0.5), at(230.0, 0.0, 0.5)]),
+        ("the roof of a lorry under the gantry", vec![at(9.0, 1.0, 4.0)]),
+    ];
+    for (what, detections) in cases {
+        let (told, known) = conditions(&mut Rig::new(sensor), FrameStatus::default(), &detections);
+        assert!(known && told.iter().all(|c| *c == Condition::Healthy), "{what}: {told:?}");
+    }
+}
+
 #[test]
 fn a_gap_or_a_step_back_of_the_clock_forgets_the_obstacles() {
     let truck = Vehicle::truck(110.0, 0.0, -20.0);
@@ -191,7 +256,7 @@ fn queries_answer_in_the_four_words() {
     rig.drive(&[truck], 30, true);
     let x = (truck.at(rig.last()).x * 100.0) as i32;
     let place = |x_cm: i32, y_cm: i32| Footprint {
-        centre: viewshed::map::RoadPoint::new(x_cm, y_cm),
+        centre: viewshed::sensor::road::RoadPoint::new(x_cm, y_cm),
         heading: Direction::AHEAD,
         half_length_cm: 220,
         half_width_cm: 90,

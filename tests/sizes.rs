@@ -5,7 +5,7 @@ use std::mem::size_of;
 use viewshed::inputs::ars408::Ars408;
 use viewshed::inputs::native::{Receiver, SerialReceiver};
 use viewshed::inputs::ti::Ti;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
 use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
 use viewshed::wire::broadcast::Broadcaster;

@@ -2,14 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::indexing_slicing)] // a scene that cannot be set up fails its test
 
-use viewshed::axes::Axes;
-use viewshed::field_of_view::FieldOfView;
+use viewshed::grid::axes::Axes;
+use viewshed::grid::raycast::cast;
+use viewshed::grid::spherical::SphericalGrid;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::resample::RoadGrid;
 use viewshed::map::{CellState, Visibility, VisibilityMap};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
-use viewshed::raycast::cast;
-use viewshed::resample::RoadGrid;
-use viewshed::spherical::SphericalGrid;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
 
 const R: usize = 40;
 const A: usize = 12;

@@ -4,15 +4,15 @@
 
 mod common;
 
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::radar_3d::Radar3d;
+use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
-use viewshed::unit::{Unit, bench_sender};
-use viewshed::wire::broadcast::{Broadcaster, Medium};
-use viewshed::wire::message::{Addresses, Epoch, Message, Received};
+use viewshed::wire::broadcast::Medium;
+use viewshed::wire::message::{Addresses, Message, Received};
 use viewshed::wire::status::{Reason, State, Status};
 
-use common::{Vehicle, gantry};
+use common::{Vehicle, gantry, small_unit};
 
 /// Milliseconds between scans.
 const PERIOD: u64 = 60;
@@ -24,12 +24,10 @@ type Told = Vec<(State, Reason, u64, usize)>;
 /// are missing.
 fn run(until: u64, scan: impl Fn(u64) -> Option<(bool, bool)>, time: impl Fn(u64) -> u64) -> Told {
     let settings = Settings::of(gantry(6.0, 0.0));
-    let parameters = Radar3dParameters::<50, 40, 8>::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let medium = Medium::Can(Addresses::STANDARD);
+    let (parameters, mut sender) = small_unit(&settings, medium, 1, Time::from_micros(1000 * time(0)));
     let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
     let mut map = parameters.map();
-    let medium = Medium::Can(Addresses::STANDARD);
-    let mut sender: Broadcaster<40, 2> =
-        bench_sender(&settings, &parameters, medium, Epoch::new(1), Time::from_micros(1000 * time(0))).unwrap();
     let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
     let car = Vehicle::car(40.0, 2.0, 0.0);
     let mut told = Told::new();

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use shadows::{A, Map, Random, Shadows, W, header};
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet};

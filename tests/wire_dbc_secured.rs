@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 use can_dbc::Dbc;
 use dbc::decode;
 use shadows::{A, Shadows, W, header};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::map_message;

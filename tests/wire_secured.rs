@@ -5,7 +5,7 @@
 mod shadows;
 
 use shadows::{A, Map, Random, Shadows, W, header};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::message::{Addresses, Epoch, Message, NotAuthentic, Packet, Plane, data_id};

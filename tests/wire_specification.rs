@@ -2,9 +2,9 @@
 
 #![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
 
-use viewshed::angle::Angle;
-use viewshed::bits::Bits;
-use viewshed::map::RoadPoint;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::bits::Bits;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::code::block::{Block, Kind, Rays};
 use viewshed::wire::code::model::MODEL;
 use viewshed::wire::code::ray::{Known, Ray};
@@ -175,7 +175,7 @@ fn the_example_reads_as_the_pictures() {
 /// What a sender with a key says first, on CAN FD.
 #[cfg(feature = "secoc")]
 fn secured() -> Vec<viewshed::wire::frame::CanFrame> {
-    use viewshed::time::Time;
+    use viewshed::fixed::time::Time;
     use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
     let start = Time::from_micros(1000 * 0x0102_0304);
     let medium = Medium::CanFd(Addresses::STANDARD);

@@ -3,8 +3,8 @@
 use super::obstacle::Obstacle;
 use super::size::Size;
 use super::tracking::Tracking;
-use crate::math::root;
-use crate::solid::Solid;
+use crate::fixed::math::root;
+use crate::obstacles::solid::Solid;
 
 /// Variance across a car that reflects on both its sides alike, cm^2.
 pub(super) const EVEN_SPREAD: i32 = 85 * 85;
@@ -50,9 +50,13 @@ impl Obstacle {
 #[cfg(test)]
 mod tests {
     use super::super::Obstacles;
-    use super::super::by_hand::{PERIOD_S, reflection, rules};
-    use crate::time::Step;
+    use super::super::by_hand::{PERIOD_S, reflection, rules, seen_at};
+    use super::super::obstacle::Obstacle;
+    use crate::fixed::time::Step;
+    use crate::fixed::trig::Direction;
     use std::vec::Vec;
+
+    const AHEAD: Direction = Direction::AHEAD;
 
     /// Follows reflections in a row along a lorry 13 m long, and gives the middle of its box aside, metres.
     fn middle_of(rows_m: &[f64], x_m: f64) -> f64 {
@@ -84,5 +88,14 @@ mod tests {
         assert!((both - 10.0).abs() < 0.5, "{both} m");
         let behind = middle_of(&[2.0], 90.0);
         assert!((behind - 2.0).abs() < 0.3, "{behind} m");
+    }
+
+    #[test]
+    fn what_was_hidden_of_a_vehicle_lies_behind_its_face() {
+        let t = rules();
+        for heading in [AHEAD, AHEAD.reversed()] {
+            let solid = Obstacle::new(&seen_at(5000, 0, 0), heading, 2000).solid(&t);
+            assert!(solid.x_cm - solid.half_length_cm > 4900, "{heading:?}: {solid:?}");
+        }
     }
 }

@@ -5,14 +5,29 @@ use std::vec::Vec;
 use super::Obstacles;
 use super::config::ObstacleConfig;
 use super::tracking::Tracking;
-use crate::math::length;
-use crate::reflection::{NoiseConfig, Reflection};
-use crate::time::Step;
-use crate::trig::Direction;
+use crate::fixed::math::length;
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
+use crate::sensor::noise::NoiseConfig;
 
 /// Default rules for a road straight ahead, followed to 225 m.
 pub fn rules() -> Tracking {
     ObstacleConfig::default().tracking(NoiseConfig::default().noise().unwrap(), Direction::AHEAD, 22_500).unwrap()
+}
+
+/// A reflection at a place, with a radial velocity.
+pub fn seen_at(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
+    Reflection {
+        x_cm,
+        y_cm,
+        ground_cm: length(x_cm, y_cm) as u16,
+        sight: Direction::of(x_cm, y_cm),
+        radial_velocity_cm_s,
+        across_cm: 40,
+        height_cm: None,
+        strength: 0,
+    }
 }
 
 /// A reflection of something that moves, metres and m/s.

@@ -3,10 +3,10 @@
 use super::profile::HIT;
 use super::size::SizeConfig;
 use super::tracking::Tracking;
-use crate::config::{ConfigError, above, within};
-use crate::math;
-use crate::reflection::Noise;
-use crate::trig::Direction;
+use crate::fixed::math;
+use crate::fixed::trig::Direction;
+use crate::sensor::config::{ConfigError, above, within};
+use crate::sensor::noise::Noise;
 
 /// How detections become moving obstacles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -215,7 +215,7 @@ impl ObstacleConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reflection::NoiseConfig;
+    use crate::sensor::noise::NoiseConfig;
 
     #[test]
     fn an_impossible_parameter_is_named() {

@@ -1,8 +1,9 @@
 //! What the detections of one frame add up to, for one obstacle.
 
-use crate::math::hypot_gate;
-use crate::reflection::{Noise, Reflection};
-use crate::trig::Direction;
+use crate::fixed::math::hypot_gate;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
+use crate::sensor::noise::Noise;
 
 /// Variance of where on a vehicle a reflection lies, half a metre squared, cm^2.
 const ON_VEHICLE_VARIANCE: i32 = 50 * 50;
@@ -101,5 +102,24 @@ pub(super) fn sigma_across(heading: Direction, r: &Reflection, noise: &Noise) ->
 /// Standard deviation of a lateral place of this weight, centimetres.
 #[allow(clippy::cast_possible_wrap)] // at most 1000
 pub(super) fn sigma_of_weight(weight: i32) -> i32 {
-    crate::math::root(UNIT_WEIGHT.unsigned_abs() / weight.max(1).unsigned_abs()).min(1000) as i32
+    crate::fixed::math::root(UNIT_WEIGHT.unsigned_abs() / weight.max(1).unsigned_abs()).min(1000) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::by_hand::{rules, seen_at};
+    use super::*;
+
+    const AHEAD: Direction = Direction::AHEAD;
+
+    #[test]
+    fn noise_lies_across_the_line_of_sight() {
+        let t = rules();
+        let r = Reflection { across_cm: 300, ..seen_at(0, 8000, 0) };
+        // seen broadside, the noise across the line of sight lies along the road
+        assert!((sigma_along(AHEAD, &r, &t.noise) - 300).abs() < 25);
+        assert!((sigma_across(AHEAD, &r, &t.noise) - t.noise.range_cm).abs() < 5);
+        let r = Reflection { across_cm: 300, ..seen_at(8000, 0, 0) };
+        assert!((sigma_across(AHEAD, &r, &t.noise) - 300).abs() < 25);
+    }
 }

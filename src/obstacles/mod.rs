@@ -22,14 +22,17 @@ mod own_way;
 pub mod profile;
 mod search;
 pub mod size;
+pub mod solid;
+#[cfg(test)]
+mod stops;
 pub mod tallness;
 pub mod tracking;
 
 use heapless::Vec;
 
-use crate::reflection::Reflection;
-use crate::solid::Solid;
-use crate::time::Step;
+use crate::fixed::time::Step;
+use crate::frame::reflection::Reflection;
+use crate::obstacles::solid::Solid;
 use by_range::ByRange;
 use obstacle::Obstacle;
 use tracking::Tracking;
@@ -44,7 +47,7 @@ pub struct Obstacles<const N: usize> {
     dropped: u32,
 }
 
-/// Which detections found an obstacle: one bit each, in the scan's order.
+/// Which detections found an obstacle: a flag each, in the scan's order.
 #[derive(Debug, Clone, Copy)]
 pub struct Claimed<const D: usize>([bool; D]);
 
@@ -302,84 +305,139 @@ impl<const N: usize> Obstacles<N> {
 
 #[cfg(test)]
 mod tests {
-    use super::by_hand::{car, change_speed, follow, reflection, rules};
+    use super::by_hand::rules as tracking;
     use super::*;
-    use std::vec::Vec;
+    use crate::fixed::trig::Direction;
+    use std::vec::Vec as StdVec;
 
-    fn boxes<const N: usize>(list: &Obstacles<N>) -> Vec<Solid> {
-        list.solids(&rules()).collect()
-    }
-
-    /// A car that came along the road and has stopped 50 m ahead.
-    fn stopped() -> (Obstacles<16>, Solid) {
-        let mut list = Obstacles::new();
-        let mut cars = [car([30.0, 3.0], [1.0, 0.0], 10.0)];
-        follow(&mut list, &mut cars, 2.0, true);
-        change_speed(&mut list, &mut cars, 0.0);
-        follow(&mut list, &mut cars, 2.0, true);
-        let found = boxes(&list);
-        assert_eq!(found.len(), 1, "{found:?}");
-        assert!((f64::from(found[0].x_cm) / 100.0 - cars[0].at[0]).abs() < 1.5, "{found:?}");
-        (list, found[0])
-    }
-
-    #[test]
-    fn what_has_stopped_keeps_its_box_through_a_red_light_in_a_shadow() {
-        let (mut list, found) = stopped();
-        follow(&mut list, &mut [], 30.0, false);
-        let after = boxes(&list);
-        assert_eq!(after.len(), 1);
-        assert!((after[0].x_cm - found.x_cm).abs() < 50 && after[0].height_cm == found.height_cm, "{after:?}");
-        // seen free, it is given up
-        follow(&mut list, &mut [], 6.0, true);
-        assert!(boxes(&list).is_empty());
-    }
-
-    #[test]
-    fn what_was_moving_is_given_up_in_a_shadow() {
-        let mut list = Obstacles::<16>::new();
-        follow(&mut list, &mut [car([30.0, 3.0], [1.0, 0.0], 10.0)], 2.0, true);
-        assert_eq!(boxes(&list).len(), 1);
-        follow(&mut list, &mut [], 8.0, false);
-        assert!(boxes(&list).is_empty());
-    }
-
-    #[test]
-    fn a_lorry_that_stands_for_an_hour_stays_the_same_box() {
-        let mut list = Obstacles::<16>::new();
-        let mut lorry = [car([30.0, 5.0], [1.0, 0.0], 6.0)];
-        lorry[0].size = [9.0, 2.0];
-        follow(&mut list, &mut lorry, 3.0, true);
-        change_speed(&mut list, &mut lorry, 0.0);
-        follow(&mut list, &mut lorry, 3.0, true);
-        let before = boxes(&list);
-        follow(&mut list, &mut lorry, 3600.0, true);
-        let after = boxes(&list);
-        assert_eq!((before.len(), after.len()), (1, 1));
-        assert!((after[0].x_cm - before[0].x_cm).abs() < 100 && (after[0].y_cm - before[0].y_cm).abs() < 50);
-        assert!((after[0].half_length_cm - before[0].half_length_cm).abs() < 50, "{before:?} {after:?}");
-    }
-
-    #[test]
-    fn a_crowd_of_standing_detections_makes_no_obstacle() {
-        let crowd: Vec<Reflection> =
-            (0..256).map(|i| reflection([10.0 + f64::from(i % 16) * 8.0, f64::from(i / 16) - 8.0], [0.0; 2])).collect();
-        let mut list = Obstacles::<16>::new();
-        for _ in 0..100 {
-            let claimed = list.step::<256>(&crowd, Step::from_micros(66_972), &rules(), |_, _| true);
-            assert!((0..256).all(|i| !claimed.contains(i)));
+    fn reflection(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
+        Reflection {
+            x_cm,
+            y_cm,
+            ground_cm: x_cm as u16,
+            sight: Direction::AHEAD,
+            radial_velocity_cm_s,
+            across_cm: 40,
+            height_cm: None,
+            strength: 0,
         }
-        assert_eq!((list.iter().count(), list.dropped()), (0, 0));
+    }
+
+    /// One obstacle with so much evidence; what it loses in a tenth of a second without a detection.
+    fn lost(existence: i32, in_view: impl Fn(i32, i32) -> bool) -> i32 {
+        let mut all = Obstacles::<4>::new();
+        let mut o = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, 2000);
+        (o.existence, o.extent) = (existence, profile::Extent { rear_cm: -200, front_cm: 200 });
+        let _ = all.list.push(o);
+        let _: Claimed<4> = all.step(&[], Step::from_micros(100_000), &tracking(), in_view);
+        existence - all.iter().next().map_or(0, |o| o.existence)
     }
 
     #[test]
-    fn a_jam_the_unit_started_in_is_followed_once_it_moves() {
-        let mut list = Obstacles::<16>::new();
-        let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
-        follow(&mut list, &mut cars, 5.0, true);
-        assert!(boxes(&list).is_empty());
-        change_speed(&mut list, &mut cars, 2.0);
-        follow(&mut list, &mut cars, 3.0, true);
-        assert_eq!(boxes(&list).len(), 6);
+    fn what_is_unseen_is_doubted_quickly_in_view_and_slowly_in_a_shadow() {
+        let t = tracking();
+        let tenth = |per_s: i32| Step::from_micros(100_000).times(per_s);
+        let confirmed = t.confirmed + 1000;
+        assert_eq!(lost(confirmed, |_, _| false), tenth(t.hidden_loss));
+        assert_eq!(lost(confirmed, |_, _| true), tenth(t.visible_loss));
+        // it is at 52 m by then; one end in view is enough
+        assert_eq!(lost(confirmed, |x, _| x > 5350), tenth(t.visible_loss));
+        assert_eq!(lost(confirmed, |x, _| x < 5050), tenth(t.visible_loss));
+        assert_eq!(lost(confirmed, |x, _| x > 5450), tenth(t.hidden_loss));
+        assert_eq!(lost(t.confirmed - 1, |_, _| true), tenth(t.tentative_loss));
+        assert!(t.hidden_loss < t.visible_loss && t.visible_loss < t.tentative_loss);
+    }
+
+    #[test]
+    fn a_full_list_gives_up_its_weakest_for_what_has_more_evidence() {
+        let t = tracking();
+        let mut all = Obstacles::<2>::new();
+        let of = |existence| {
+            let mut o = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, 2000);
+            o.existence = existence;
+            o
+        };
+        [300, 500].map(of).into_iter().for_each(|o| all.admit(o, &t));
+        let evidence = |all: &Obstacles<2>| all.iter().map(|o| o.existence).collect::<StdVec<_>>();
+        all.admit(of(400), &t);
+        assert_eq!((evidence(&all), all.dropped()), ([400, 500].to_vec(), 0));
+        all.admit(of(350), &t);
+        assert_eq!((evidence(&all), all.dropped()), ([400, 500].to_vec(), 1));
+        [900, 1000].map(of).into_iter().for_each(|o| all.admit(o, &t));
+        all.admit(of(5000), &t);
+        assert_eq!((evidence(&all), all.dropped()), ([900, 1000].to_vec(), 2), "the confirmed stay");
+    }
+
+    #[test]
+    fn the_part_with_more_detections_takes_the_other() {
+        let t = tracking();
+        let mut all = Obstacles::<2>::new();
+        for (x, hits) in [(5000, 5), (5500, 50)] {
+            let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
+            (o.existence, o.hits) = (1000, hits);
+            let _ = all.list.push(o);
+        }
+        all.join_parts(&t);
+        let left: StdVec<(i32, u16)> = all.iter().map(|o| (o.existence, o.hits)).collect();
+        assert_eq!(left, [(0, 5), (2000, 55)]);
+    }
+
+    #[test]
+    fn a_detection_goes_to_the_obstacle_it_fits_best() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        // together longer than any vehicle
+        for (x, front_cm) in [(6200, 1250), (5000, 25)] {
+            let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
+            (o.existence, o.extent) = (t.confirmed, profile::Extent { rear_cm: -25, front_cm });
+            let _ = all.list.push(o);
+        }
+        let claimed: Claimed<4> = all.step(&[reflection(5450, 0, 2000)], Step::from_micros(0), &t, |_, _| false);
+        assert!(claimed.contains(0) && !claimed.contains(1));
+        assert_eq!(all.iter().map(|o| o.hits).collect::<StdVec<_>>(), [0, 1], "7 m from one, 4 m from the other");
+    }
+
+    #[test]
+    fn boxes_are_of_the_confirmed_and_what_has_no_evidence_left_or_is_behind_the_sensor_goes() {
+        let t = tracking();
+        let after = |x, existence| {
+            let mut all = Obstacles::<4>::new();
+            let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
+            (o.existence, o.age) = (existence, 5);
+            let _ = all.list.push(o);
+            let _: Claimed<4> = all.step(&[], Step::from_micros(200_000), &t, |_, _| false);
+            (all.iter().count(), all.solids(&t).count())
+        };
+        assert_eq!(after(5000, t.confirmed + 1000), (1, 1));
+        assert_eq!(after(5000, t.confirmed - 1), (1, 0));
+        assert_eq!(after(5000, 1), (0, 0));
+        assert_eq!(after(BEHIND_CM - 500, t.confirmed + 1000), (0, 0));
+        assert_eq!(after(t.limit_cm, t.confirmed + 1000), (0, 0));
+    }
+
+    #[test]
+    fn a_frame_starts_half_as_many_as_there_is_room_for() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        let seen = [-900, -300, 300, 900].map(|y| reflection(5000, y, 2000));
+        let _: Claimed<4> = all.step(&seen, Step::from_micros(0), &t, |_, _| true);
+        assert_eq!(all.iter().count(), 2);
+        let _: Claimed<4> = all.step(&seen, Step::from_micros(1), &t, |_, _| true);
+        assert_eq!(all.iter().count(), 4);
+    }
+
+    #[test]
+    fn only_confirmed_movers_become_boxes() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        let mut frames = 0;
+        while all.solids(&t).next().is_none() {
+            assert!(frames < 20, "never");
+            let seen = [reflection(5000 + 133 * frames, 0, 2000), reflection(5200 + 133 * frames, 0, 2000)];
+            let _: Claimed<4> = all.step(&seen, Step::from_micros(66_667), &t, |_, _| true);
+            frames += 1;
+        }
+        // after 2 m of way, which takes it two frames behind the first
+        assert_eq!(frames, 3);
     }
 }

@@ -7,9 +7,9 @@
 //! states, place and speed across the line of sight, whose measurement is the centre of a frame's
 //! detections. It is right wherever a thing goes, and slow: 2 m/s after half a second.
 
-use crate::math::{mul_shift, ratio};
-use crate::time::Step;
-use crate::trig::Direction;
+use crate::fixed::math::{mul_shift, ratio};
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
 
 /// Largest correction of a speed in one frame, and largest speed along an axis, 2^-8 cm/s: 20 and 70 m/s.
 const MOST_PUSH: i32 = 2000 << 8;

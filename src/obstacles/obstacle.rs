@@ -7,10 +7,10 @@ use super::profile::{BIN_CM, Extent, Profile};
 use super::search::speed_error;
 use super::tallness::Tallness;
 use super::tracking::{INERTIA, MOST_HITS_A_FRAME, RECENTRE_BINS, Tracking, YOUNG_FRAMES, YOUNG_INERTIA};
-use crate::math::{hypot_gate, mul_shift, ratio};
-use crate::reflection::Reflection;
-use crate::time::Step;
-use crate::trig::Direction;
+use crate::fixed::math::{hypot_gate, mul_shift, ratio};
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
 
 /// Fraction bits of positions and velocities.
 pub(super) const FRACTION: u32 = 8;
@@ -60,7 +60,7 @@ const NEWBORN_SPEED: i32 = 1000 * 1000;
 /// Detections over which the spread to the sides is taken.
 const SPREAD_MEMORY: i32 = 40;
 /// Greatest weight of a lateral estimate: [`ratio`]'s limit.
-const MOST_WEIGHT: i32 = 1 << 26;
+pub(super) const MOST_WEIGHT: i32 = 1 << 26;
 /// Fastest drift to one side that turns a heading, 2^-8 cm/s: a metre a second.
 const FASTEST_DRIFT: i32 = 100 << FRACTION;
 
@@ -273,5 +273,85 @@ impl Obstacle {
         self.position.0 += mul_shift(by << FRACTION, i32::from(self.heading.x), 14);
         self.position.1 += mul_shift(by << FRACTION, i32::from(self.heading.y), 14);
         self.extent = Extent { rear_cm: self.extent.rear_cm - by, front_cm: self.extent.front_cm - by };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::by_hand::{rules, seen_at};
+    use super::*;
+
+    const AHEAD: Direction = Direction::AHEAD;
+
+    #[test]
+    fn an_obstacle_moves_the_way_it_drives() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 300, -2000), AHEAD.reversed(), 2000);
+        o.predict(Step::from_micros(500_000), 1 << 16, &t);
+        assert_eq!(o.anchor(), (4000, 300));
+        assert_eq!((o.age, o.travelled_cm), (1, 1000));
+        o.lateral_weight = 1000;
+        o.predict(Step::from_micros(0), 1 << 15, &t);
+        assert_eq!(o.lateral_weight, 500);
+    }
+
+    #[test]
+    fn detections_pull_speed_and_place_towards_themselves() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        o.predict(Step::from_micros(66_667), 1 << 16, &t);
+        let (x, _) = o.anchor();
+        // faster than it, and to its left
+        (0..4).for_each(|_| o.absorb(&seen_at(x, 60, 2100), &t));
+        o.settle(Step::from_micros(66_667), &t);
+        assert!((2050..=2100).contains(&o.velocity().0), "{:?}", o.velocity());
+        assert!((50..=60).contains(&o.anchor().1), "{:?}", o.anchor());
+        assert_eq!(o.existence, MOST_HITS_A_FRAME << 8, "of four detections three count");
+    }
+
+    #[test]
+    fn the_surer_of_two_detections_says_where_it_is() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        o.absorb(&Reflection { across_cm: 20, ..seen_at(5000, 60, 2000) }, &t);
+        o.absorb(&Reflection { across_cm: 400, ..seen_at(5000, -60, 2000) }, &t);
+        o.settle(Step::from_micros(66_667), &t);
+        assert!(o.anchor().1 > 50, "{:?}", o.anchor());
+    }
+
+    #[test]
+    fn a_newborn_stretches_to_what_is_found_before_and_behind_it() {
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        o.reach(&seen_at(4600, 0, 2000));
+        assert_eq!(o.extent, Extent { rear_cm: -400, front_cm: BIN_CM / 2 });
+        o.reach(&seen_at(5300, 0, 2000));
+        o.reach(&seen_at(5100, 0, 2000));
+        assert_eq!(o.extent, Extent { rear_cm: -400, front_cm: 300 });
+    }
+
+    #[test]
+    fn a_drift_to_the_left_turns_the_heading_to_the_left() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        for _ in 0..20 {
+            o.predict(Step::from_micros(66_667), 60_000, &t);
+            let (x, y) = o.anchor();
+            o.absorb(&seen_at(x, y + 30, 2000), &t);
+            o.settle(Step::from_micros(66_667), &t);
+        }
+        assert!(o.heading.y > 50 && o.velocity().1 > 5, "{:?} {:?}", o.heading, o.velocity());
+    }
+
+    #[test]
+    fn what_never_moved_and_stands_is_a_fixture() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 0), AHEAD, 20);
+        o.age = 2;
+        assert!(o.is_fixture(&t) && !o.is_mover(&t));
+        o.travelled_cm = 200;
+        assert!(!o.is_fixture(&t) && o.is_mover(&t), "a vehicle that stopped");
+        let mut o = Obstacle::new(&seen_at(5000, 0, 0), AHEAD, 200);
+        o.age = 2;
+        assert!(!o.is_fixture(&t));
     }
 }

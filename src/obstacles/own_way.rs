@@ -8,8 +8,8 @@ use super::motion::{FreeMotion, Seen};
 use super::obstacle::{FRACTION, NEWBORN_PLACE, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tracking::Tracking;
-use crate::math::{length, mul_shift};
-use crate::trig::Direction;
+use crate::fixed::math::{length, mul_shift};
+use crate::fixed::trig::Direction;
 
 /// Frames in a row in which motion along the heading must fail.
 const OWN_WAY_FRAMES: u8 = 2;
@@ -98,7 +98,7 @@ mod tests {
         let mut cars = [car(at, heading, speed)];
         follow(&mut list, &mut cars, seconds, true);
         let t = rules();
-        let of = |s: crate::solid::Solid| {
+        let of = |s: crate::obstacles::solid::Solid| {
             let degrees = f64::from(s.heading.y).atan2(f64::from(s.heading.x)).to_degrees();
             [degrees, f64::from(s.x_cm) / 100.0, f64::from(s.y_cm) / 100.0]
         };

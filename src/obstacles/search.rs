@@ -4,9 +4,9 @@ use super::gathered::{sigma_across, sigma_along};
 use super::obstacle::Obstacle;
 use super::profile::Extent;
 use super::tracking::Tracking;
-use crate::math::length;
-use crate::reflection::Reflection;
-use crate::trig::Direction;
+use crate::fixed::math::length;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
 
 /// How far noise carries a detection beyond its obstacle, centimetres.
 const NOISE_REACH_CM: i32 = 600;
@@ -147,6 +147,25 @@ impl Obstacle {
             reach_cm,
             corner: (anchor.0 - reach_cm, anchor.1 - reach_cm),
             side_cm: 2 * reach_cm.unsigned_abs(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::by_hand::{rules, seen_at};
+    use super::*;
+
+    const AHEAD: Direction = Direction::AHEAD;
+
+    #[test]
+    fn a_wheel_turns_the_way_its_vehicle_drives_between_standstill_and_twice_its_speed() {
+        let t = rules();
+        for (heading, sign) in [(AHEAD, 1), (AHEAD.reversed(), -1)] {
+            let search = Obstacle::new(&seen_at(5000, 0, sign * 2000), heading, 2000).search(&t);
+            let may = |speed: i16| search.is_speed_of_wheel(&seen_at(5000, 0, sign * speed), &t);
+            assert!(may(0) && may(500) && may(3900), "{heading:?}");
+            assert!(!may(-500) && !may(-2000) && !may(4500), "{heading:?}");
         }
     }
 }

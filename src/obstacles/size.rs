@@ -5,8 +5,8 @@
 //! delivery vans are about 6 m long and 2.6 m high, and goods vehicles fill what the law allows
 //! (2.55 m wide and 4.00 m high in the European Union, directive 96/53/EC).
 
-use crate::config::{ConfigError, above, within};
-use crate::math;
+use crate::fixed::math;
+use crate::sensor::config::{ConfigError, above, within};
 
 /// One point of the size table.
 ///

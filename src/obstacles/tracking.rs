@@ -1,9 +1,10 @@
 //! Parameters of obstacle tracking, checked and in integers.
 
 use super::size::Sizes;
-use crate::reflection::{Noise, Reflection};
-use crate::time::Step;
-use crate::trig::Direction;
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
+use crate::sensor::noise::Noise;
 
 /// [`ObstacleConfig`](super::config::ObstacleConfig) in integers; lengths in centimetres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,3 +132,36 @@ const LEAST_PROJECTION: i32 = (15 << 14) / 100;
 
 /// Speeds above this are no vehicle's.
 const FASTEST_CM_S: i32 = 7000;
+
+#[cfg(test)]
+mod tests {
+    use super::super::by_hand::rules;
+    use super::*;
+
+    #[test]
+    fn a_course_is_where_its_doppler_says_along_the_road() {
+        let t = rules();
+        let at = |x_cm: i32, y_cm: i32, radial_velocity_cm_s| {
+            let sight = Direction::of(x_cm, y_cm);
+            t.course(&Reflection {
+                x_cm,
+                y_cm,
+                ground_cm: 5000,
+                sight,
+                radial_velocity_cm_s,
+                across_cm: 40,
+                height_cm: None,
+                strength: 0,
+            })
+        };
+        assert_eq!(at(5000, 0, 2000), Some((t.road, 2000)));
+        assert_eq!(at(5000, 0, -2000), Some((t.road.reversed(), 2000)));
+        // 60 degrees to the side half of the speed shows
+        let (heading, speed) = at(2500, 4330, -1000).unwrap();
+        assert!(heading == t.road.reversed() && (speed - 2000).abs() < 5);
+        assert_eq!(at(300, 5000, 500), None, "nearly broadside");
+        assert_eq!(at(5000, 0, 55), None, "within the noise of what stands");
+        assert_eq!(at(5000, 0, 120), None, "slower than what starts an obstacle");
+        assert_eq!(at(5000, 0, 7100), None, "no vehicle's speed");
+    }
+}

@@ -8,8 +8,8 @@
 //! What goes first: freshness value, status, header, map, visible range. Between two frames lies the minimum gap.
 //!
 //! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are told
-//! against it. The header's groups and the pages of the status go round all the time, so who joins late
-//! has everything within a second.
+//! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
+//! round all the time, so who joins late has everything within a second.
 //!
 //! *What is dropped.* A new map ends the one before: what of that was not handed out is dropped, and
 //! the new one begins at the azimuth where the old one broke off, so that on a bus too narrow every
@@ -37,8 +37,8 @@ use super::secoc::{Key, Sealer};
 use super::serial;
 use super::status::{PAGES, Status};
 use super::visible_range;
-use crate::config::{ConfigError, Problem};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, Problem};
 
 /// What messages travel on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,7 +107,11 @@ impl BroadcastConfig {
         }
     }
 
-    fn check(&self) -> Result<(), ConfigError> {
+    /// Checks it.
+    ///
+    /// # Errors
+    /// Names the first parameter outside its limits.
+    pub fn check(&self) -> Result<(), ConfigError> {
         let most_sensor = match self.medium {
             Medium::Can(addresses) | Medium::CanFd(addresses) => addresses.most_sensor(),
             Medium::Serial => u8::MAX,
@@ -200,6 +204,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     epoch: Epoch,
     synchronised: bool,
     status: Status,
+    /// Whether something was dropped for want of time since that was last asked.
+    overloaded: bool,
     layers: [Layer<A, W>; P],
     scan: Option<Scan>,
     /// The scan before, and when it was measured.
@@ -217,6 +223,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     freshness_due: Every,
     page: u8,
     group: u8,
+    /// Messages of the header still to be sent at an epoch's start.
+    groups_first: u8,
     range_from: usize,
     counters: [u8; 32],
 }
@@ -235,6 +243,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             epoch,
             synchronised: false,
             status: Status::starting(header.fingerprint),
+            overloaded: false,
             layers: [const { Layer::new() }; P],
             scan: None,
             last: None,
@@ -249,6 +258,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             freshness_due: Every::new(now, u64::from(config.header_ms) * 1000),
             page: 0,
             group: 0,
+            groups_first: 0,
             range_from: 0,
             counters: [0; 32],
         };
@@ -265,28 +275,47 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.begin(header, now)
     }
 
-    fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+    /// Whether maps of this header are sent by a sender of this size.
+    ///
+    /// # Errors
+    /// Names what there is too much of.
+    pub fn fits(header: &Header) -> Result<(), ConfigError> {
         let most = |cells: usize| u32::try_from(cells).unwrap_or(u32::MAX);
         within("header.azimuths", u32::from(header.azimuths), 1, most(A.min(super::header::MOST_AZIMUTHS)))?;
-        within("header.ranges", u32::from(header.ranges), 1, most((32 * W).min(256)))?;
+        within("header.ranges", u32::from(header.ranges), 1, most((32 * W).min(256)))
+    }
+
+    fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+        Self::fits(&header)?;
         self.header = Header { planes: planes(P), ..header };
         self.status.fingerprint = header.fingerprint;
+        self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / u64::from(self.header_messages()));
         self.quiet(now);
-        let long = !self.packing().is_classic();
-        let groups = if long { 1 } else { u64::from(GROUPS) };
-        self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / groups);
         let messages = usize::from(header.azimuths).div_ceil(self.packing().most_own() - 2) as u64;
         let period = |ms: u16| Every::new(now, u64::from(ms) * 1000 / messages.max(1));
         self.range_due = self.config.visible_range_ms.map(period);
         Ok(())
     }
 
+    /// Messages that the whole header takes.
+    fn header_messages(&self) -> u8 {
+        if self.packing().is_classic() { GROUPS } else { 1 }
+    }
+
+    fn quiet_us(&self) -> u64 {
+        (u64::from(self.config.max_age_ms) + u64::from(self.config.max_delay_ms)) * 1000
+    }
+
+    /// A new epoch begins: no map for a while, but the whole header.
     fn quiet(&mut self, now: Time) {
+        // this is no want of time
+        let overloaded = self.overloaded;
+        (self.group, self.groups_first) = (0, self.header_messages());
         self.drop_scan();
+        self.overloaded = overloaded;
         self.layers.iter_mut().for_each(Layer::forget);
         (self.last, self.refreshed, self.from) = (None, None, 0);
-        let quiet_us = (u64::from(self.config.max_age_ms) + u64::from(self.config.max_delay_ms)) * 1000;
-        self.quiet_until = Time::from_micros(now.micros() + quiet_us);
+        self.quiet_until = Time::from_micros(now.micros() + self.quiet_us());
     }
 
     fn packing(&self) -> Packing {
@@ -296,6 +325,17 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     /// What is told of the sender. Uptime, versions, fingerprint and dropped azimuths are filled in.
     pub fn status_mut(&mut self) -> &mut Status {
         &mut self.status
+    }
+
+    /// Counts messages of maps that were handed out and did not leave.
+    pub fn count_dropped(&mut self, messages: u16) {
+        self.status.dropped = self.status.dropped.saturating_add(messages);
+        self.overloaded |= messages > 0;
+    }
+
+    /// Whether something of a map was dropped since the last call because there was no time to send it.
+    pub fn take_overload(&mut self) -> bool {
+        core::mem::take(&mut self.overloaded)
     }
 
     /// Whether the clock is set by a time service.
@@ -335,6 +375,11 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             return Err(NotSent::TooSoon);
         }
         let wait = self.quiet_until.since(measured).unwrap_or(0);
+        if wait > self.quiet_us() {
+            // the clock stepped back since the epoch began
+            self.epoch = self.epoch.next();
+            self.quiet(measured);
+        }
         if wait > 0 {
             return Err(NotSent::Quiet);
         }
@@ -361,7 +406,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     fn drop_scan(&mut self) {
         let Some(scan) = self.scan.take() else { return };
         let pending: u32 = self.layers.iter().map(Layer::pending).sum();
-        self.status.dropped = self.status.dropped.saturating_add(u16::try_from(pending).unwrap_or(u16::MAX));
+        self.count_dropped(u16::try_from(pending).unwrap_or(u16::MAX));
         if let Some(running) = scan.running {
             self.from = match running.next {
                 Next::Block { start, .. } => start,
@@ -456,10 +501,14 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     fn header_packet(&mut self, now: Time) -> Option<Packet> {
-        if !self.header_due.due(now) {
+        if self.groups_first > 0 {
+            self.groups_first -= 1;
+            self.header_due.next = Time::from_micros(now.micros() + self.header_due.period_us);
+        } else if self.header_due.due(now) {
+            self.header_due.done(now);
+        } else {
             return None;
         }
-        self.header_due.done(now);
         let clock = Clock { time_ms: now.micros() / 1000, synchronised: self.synchronised };
         if !self.packing().is_classic() {
             return Some(self.packet(Message::Header, &self.header.emit(&clock)));

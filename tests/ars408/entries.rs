@@ -1,7 +1,7 @@
 //! Single entries: bytes to units, signs and scales.
 
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
+use viewshed::fixed::angle::Angle;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::profile::SR75;
 use viewshed::inputs::ars408::quality::Wanted;
 use viewshed::inputs::ars408::{Ars408, Config, Outcome};

@@ -7,8 +7,8 @@ mod entries;
 mod random;
 mod scans;
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::{Ars408, Config, Outcome};
-use viewshed::time::Time;
 use viewshed::wire::frame::{CanFrame, CanId};
 
 /// A frame as `candump` writes it, `701#0755F1CD6C200294`.

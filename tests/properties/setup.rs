@@ -1,12 +1,12 @@
 //! Every parameter with its limits, and random setups within them.
 
 use proptest::prelude::*;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::Mount;
 use viewshed::radar_2d::Radar2dConfig;
 use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 
 /// A sensor and both estimators' configurations.
 #[derive(Debug, Clone, Copy)]

@@ -8,9 +8,9 @@ mod points;
 mod random;
 mod session;
 
-use viewshed::detection::Detection;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ti::{Config, Dialect, Family, Flaw, Outcome, Ti};
-use viewshed::time::Time;
 
 /// What came out, in short.
 #[derive(Debug, Clone, PartialEq)]

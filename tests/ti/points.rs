@@ -1,6 +1,6 @@
 //! Every kind of point: bytes to units, axes and signs.
 
-use viewshed::detection::Detection;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ti::{AngleUnit, Config, Dialect, Entries, Family, Flaw, PolarPoints, Ti};
 
 use crate::frames::{Frame, floats, shorts};
@@ -19,7 +19,7 @@ fn usual(frame: &Frame) -> Vec<Detection> {
     detections(Dialect::USUAL, frame)
 }
 
-fn degrees(angle: viewshed::angle::Angle) -> f32 {
+fn degrees(angle: viewshed::fixed::angle::Angle) -> f32 {
     angle.radians().to_degrees()
 }
 

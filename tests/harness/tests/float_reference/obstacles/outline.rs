@@ -157,9 +157,9 @@ pub fn least_length(sizes: &SizeConfig, height: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::scene::{Random, raise, within};
+    use viewshed::fixed::time::Step;
     use viewshed::obstacles::profile::{HIT, Profile as IntegerProfile};
     use viewshed::obstacles::tallness::Tallness as IntegerTallness;
-    use viewshed::time::Step;
 
     /// A frame of reflections somewhere along a vehicle, centimetres.
     fn hits(length: f64, random: &mut Random) -> Vec<i32> {

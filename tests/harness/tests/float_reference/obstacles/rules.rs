@@ -5,7 +5,7 @@ use viewshed::obstacles::size::SizeConfig;
 use viewshed::obstacles::tracking::{
     INERTIA, MERGE_PARALLEL, MOST_HITS_A_FRAME, RECENTRE_BINS, YOUNG_FRAMES, YOUNG_INERTIA,
 };
-use viewshed::reflection::NoiseConfig;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Ground, Placed, along};
 

@@ -2,13 +2,14 @@
 
 #[cfg(test)]
 mod tests {
-    use viewshed::detection::Measurement;
-    use viewshed::mount::Mount;
+    use viewshed::fixed::time::Step;
+    use viewshed::frame::detection::Measurement;
+    use viewshed::frame::reflection::Reflection;
     use viewshed::obstacles::Obstacles as IntegerObstacles;
     use viewshed::obstacles::config::ObstacleConfig;
     use viewshed::obstacles::obstacle::Obstacle as IntegerObstacle;
-    use viewshed::reflection::{NoiseConfig, Reflection};
-    use viewshed::time::Step;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
 
     use super::super::{Obstacle, Obstacles, Rules};
     use crate::geometry::{Ground, Levelled, Placed, across, along, difference, left, moved, place};
@@ -51,7 +52,7 @@ mod tests {
     struct Both {
         levelled: Levelled,
         noise: NoiseConfig,
-        levelling: viewshed::mount::Levelling,
+        levelling: viewshed::sensor::mount::Levelling,
         tracking: viewshed::obstacles::tracking::Tracking,
         rules: Rules,
         integer: IntegerObstacles<16>,

@@ -1,0 +1,29 @@
+//! The page for the next developer names files that exist.
+
+use std::path::Path;
+
+/// Named and not there yet. To be made fewer.
+const COMING: [&str; 7] = [
+    "src/frame/gate.rs",
+    "src/frame/health.rs",
+    "src/frame/reflection.rs",
+    "src/frame/scan.rs",
+    "src/grid/evidence.rs",
+    "src/grid/raycast.rs",
+    "src/grid/voxelise.rs",
+];
+
+#[test]
+fn every_file_that_is_named_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = std::fs::read_to_string(root.join("src/EXTENDING.md")).unwrap();
+    let quoted = page.split('`').skip(1).step_by(2);
+    let is_place = |text: &&str| ["src/", "tests/", "boards/"].iter().any(|top| text.starts_with(top));
+    let named: Vec<&str> = quoted.filter(is_place).filter(|text| !text.contains("NAME")).collect();
+    assert!(named.len() > 30, "{named:?}");
+    for place in named {
+        let (exists, coming) = (root.join(place).exists(), COMING.contains(&place));
+        assert!(exists || coming, "{place} is no file: correct src/EXTENDING.md");
+        assert!(!(exists && coming), "{place} exists: take it out of the list");
+    }
+}
