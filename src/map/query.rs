@@ -1,7 +1,10 @@
 //! Questions a consumer asks a map: what of this point, this object, this area?
 
-use crate::fixed::trig::Direction;
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig::{self, Direction};
 use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
 /// What a map answers.
@@ -81,6 +84,24 @@ pub fn area(map: &impl VisibilityMap, footprint: &Footprint) -> Answer {
 }
 
 impl Footprint {
+    /// Of an object at a place, with its heading from the road's x axis (degrees, + left) and its length and
+    /// width in metres, rounded up to 2 cm.
+    ///
+    /// # Errors
+    /// A heading that is not finite or beyond a turn, a length or width outside 0.02 to [`MAX_SIDE_M`].
+    pub fn new(centre: RoadPoint, heading_deg: f32, length_m: f32, width_m: f32) -> Result<Self, ConfigError> {
+        let heading = within("footprint.heading_deg", heading_deg, -360.0, 360.0)?;
+        let half = |name, m| {
+            within(name, m, 0.02, MAX_SIDE_M as f32).map(|m| math::round_i32(m * 50.0 + 0.49).clamp(1, MAX_SIDE_M * 50))
+        };
+        Ok(Self {
+            centre,
+            heading: trig::direction(Angle::from_degrees(heading)),
+            half_length_cm: half("footprint.length_m", length_m)?,
+            half_width_cm: half("footprint.width_m", width_m)?,
+        })
+    }
+
     /// Visits the centres of the 1 m cells that share area with the footprint; false, and no visit,
     /// if it is larger than [`MAX_SIDE_M`] or turned inside out.
     fn each_cell(&self, mut visit: impl FnMut(RoadPoint)) -> bool {
@@ -117,8 +138,6 @@ impl Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixed::angle::Angle;
-    use crate::fixed::trig;
     use std::vec::Vec;
 
     /// Visible for x < 10 m, free but for the cell at (5, 2); unknown for y < 0.
@@ -177,6 +196,18 @@ mod tests {
         let diagonal = Footprint { heading, centre: RoadPoint::new(0, 0), ..footprint(0, 0, 4, 2) };
         assert!(diagonal.each_cell(|c| turned.push((c.x_cm.div_euclid(100), c.y_cm.div_euclid(100)))));
         assert!(turned.contains(&(1, 1)) && !turned.contains(&(1, -2)), "{turned:?}");
+    }
+
+    #[test]
+    fn footprints_are_named_in_metres_and_refused_by_name() {
+        let (centre, left) = (RoadPoint::new(0, 0), Direction { x: 0, y: 1 << 14 });
+        let truck = Footprint::new(centre, 90.0, 16.5, 2.55).unwrap();
+        assert_eq!(truck, Footprint { centre, heading: left, half_length_cm: 825, half_width_cm: 128 });
+        let refused = |heading, length, width| Footprint::new(centre, heading, length, width).unwrap_err().parameter;
+        assert_eq!(refused(0.0, 100.1, 2.0), "footprint.length_m");
+        assert_eq!(refused(0.0, 4.0, 0.0), "footprint.width_m");
+        assert_eq!(refused(f32::NAN, 4.0, 2.0), "footprint.heading_deg");
+        assert!(Footprint::new(centre, 0.0, 100.0, 100.0).unwrap().each_cell(|_| ()), "the largest is looked at");
     }
 
     #[test]

@@ -68,25 +68,32 @@ pub struct Unit<'a, const R: usize, const A: usize, const E: usize, const W: usi
     trouble: Option<(Time, Reason)>,
 }
 
-/// What a unit is made of by its settings: its parameters, where they stay, and the header of its maps. A start
-/// and the check of a block that came are this same function, so that none is accepted that cannot start.
+/// What a unit is made of by its settings: its parameters, and the header of its maps. A start and the check of a
+/// block that came are this same function, so that none is accepted that cannot start.
+#[inline(never)] // what it takes of the stack is free again afterwards
+fn make<const R: usize, const A: usize, const E: usize>(
+    settings: &Settings,
+) -> Result<(Radar3dParameters<R, A, E>, Header), ConfigError> {
+    settings.radar_bus.check("radar_bus")?;
+    settings.broadcast_bus.check("broadcast_bus")?;
+    let parameters = Radar3dParameters::new(&settings.sensor, &settings.radar_3d())?;
+    let header = header(settings, &parameters)?;
+    Ok((parameters, header))
+}
+
+/// Makes a unit's parameters, where they stay, and the header of its maps.
 ///
 /// # Errors
 /// Names the first parameter that cannot be worked with; there are no parameters then.
-#[inline(never)] // what it takes of the stack is free again before the first scan
+#[inline(never)] // as above
 pub fn build<const R: usize, const A: usize, const E: usize>(
     settings: &Settings,
     parameters: &mut Option<Radar3dParameters<R, A, E>>,
 ) -> Result<Header, ConfigError> {
     *parameters = None;
-    settings.radar_bus.check("radar_bus")?;
-    settings.broadcast_bus.check("broadcast_bus")?;
-    let built = parameters.insert(Radar3dParameters::new(&settings.sensor, &settings.radar_3d())?);
-    let header = header(settings, built);
-    if header.is_err() {
-        *parameters = None;
-    }
-    header
+    let (made, header) = make(settings)?;
+    *parameters = Some(made);
+    Ok(header)
 }
 
 /// Whether a unit of this grid, and a sender of this size, can be made by these settings.
@@ -97,8 +104,7 @@ pub fn build<const R: usize, const A: usize, const E: usize>(
 pub fn check<const R: usize, const A: usize, const E: usize, const W: usize>(
     settings: &Settings,
 ) -> Result<(), ConfigError> {
-    let header = build::<R, A, E>(settings, &mut None)?;
-    Broadcaster::<A, W>::fits(&header)
+    make::<R, A, E>(settings).and_then(|(_, header)| Broadcaster::<A, W>::fits(&header))
 }
 
 fn header<const R: usize, const A: usize, const E: usize>(

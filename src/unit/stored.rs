@@ -82,7 +82,7 @@ impl Stored {
     }
 
     /// Both buses as the block in use describes them: the radar's, the broadcast's. By default without one.
-    pub fn buses(&self) -> [BusConfig; 2] {
+    pub fn buses(self) -> [BusConfig; 2] {
         self.settings().map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus])
     }
 

@@ -444,8 +444,9 @@ static bool measure_anew(sensor_t *s, uint64_t now, uint32_t lag, uint32_t ahead
 }
 
 static bool refuse(sensor_t *s, uint64_t now, uint32_t lag) {
+    if (misfits(s, now)) return measure_anew(s, now, lag, 0);
     s->doubt = true;
-    return misfits(s, now) && measure_anew(s, now, lag, 0);
+    return false;
 }
 
 /* Rules 2 and 3: whether a frame with a scan number is in time. */

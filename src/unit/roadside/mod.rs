@@ -153,7 +153,7 @@ pub struct Roadside<
     const N: usize,
     const G: usize,
 > {
-    start: Start,
+    reset_cause: ResetCause,
     service: Service,
     can_service: CanService,
     maps: Option<Maps<'u, R, A, E, W, N, G>>,
@@ -186,7 +186,7 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         let [radar, broadcast] = start.stored.buses();
         let maps = start.stored.settings().and_then(|settings| maps(&start, settings, memory, now));
         Self {
-            start,
+            reset_cause: start.reset_cause,
             service,
             can_service,
             maps,
@@ -269,7 +269,7 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         let bus_off = self.bus_off();
         let off = [&self.radar_bus, &self.broadcast_bus].iter().any(|k| matches!(k.state(), BusState::Off(_)));
         let radar_lost = self.radar.lost().saturating_add(self.lost);
-        let start = self.start;
+        let reset_cause = self.reset_cause;
         let Some(maps) = &mut self.maps else { return };
         if off {
             maps.unit.degrade(now, Reason::BusOff);
@@ -278,7 +278,7 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
             maps.unit.degrade(now, Reason::BusOverload);
         }
         let status = maps.unit.broadcast().status_mut();
-        status.reset_cause = start.reset_cause;
+        status.reset_cause = reset_cause;
         status.firmware = VERSION;
         status.bus_off = bus_off;
         status.radar_lost = u16::try_from(radar_lost).unwrap_or(u16::MAX);
@@ -330,7 +330,7 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
 
     /// What both lines are told of the controller in the safe state.
     fn told(&self) -> Status {
-        let reset_cause = self.start.reset_cause;
+        let reset_cause = self.reset_cause;
         Status { reset_cause, firmware: VERSION, bus_off: self.bus_off(), ..Status::starting(0) }
     }
 

@@ -407,8 +407,11 @@ impl Session {
     }
 
     fn refuse(&mut self, now: Time, lag: u32, hearing: Hearing) -> Hearing {
+        if self.misfits(now) {
+            return self.measure_anew(now, lag, 0);
+        }
         self.doubt = true;
-        if self.misfits(now) { self.measure_anew(now, lag, 0) } else { hearing }
+        hearing
     }
 
     /// How old a scan is, at most by the fastest frame's delay more.

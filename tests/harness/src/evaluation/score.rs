@@ -132,6 +132,8 @@ fn points(solid: &Solid) -> impl Iterator<Item = RoadPoint> {
 
 #[cfg(test)]
 mod tests {
+    use viewshed::map::CellState;
+
     use super::*;
 
     /// x < 0 unknown, x < 10 m visible, beyond invisible with a grade falling with x.
