@@ -21,7 +21,8 @@ use crate::grid::raycast;
 use crate::grid::spherical::SphericalGrid;
 use crate::grid::voxelise::voxelise;
 use crate::map::polar::PolarMap;
-use crate::obstacles::tracking::{ObstacleConfig, Tracking};
+use crate::obstacles::config::ObstacleConfig;
+use crate::obstacles::tracking::Tracking;
 use crate::obstacles::{Claimed, Obstacles};
 use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, within};
@@ -156,7 +157,7 @@ pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usiz
 }
 
 /// The reference grid: 200 m in 1 m cells, 1 degree, 16 elevations.
-pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 64, 256>;
+pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 96, 256>;
 
 /// For controllers with 128 kB: 2 m cells.
 pub type SmallProfile = Radar3d<100, 64, 8, 4, 28, 176>;

@@ -9,11 +9,22 @@
 //! At most `N` obstacles. When the list is full, a new one replaces the one with the least evidence
 //! if that is unconfirmed, and is dropped and counted otherwise.
 
+mod body;
+#[cfg(test)]
+mod by_hand;
 mod by_range;
+pub mod config;
+mod gathered;
+mod joining;
+pub mod motion;
 pub mod obstacle;
+mod own_way;
 pub mod profile;
+mod search;
 pub mod size;
 pub mod solid;
+#[cfg(test)]
+mod stops;
 pub mod tallness;
 pub mod tracking;
 
@@ -99,7 +110,7 @@ impl<const N: usize> Obstacles<N> {
     ) -> Claimed<D> {
         let kept = t.kept_over(step);
         for o in &mut self.list {
-            o.predict(step, kept.lateral);
+            o.predict(step, kept.lateral, t);
         }
         let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
         let mut claimed = self.associate(reflections, &by_range, kept.outline, t);
@@ -271,13 +282,17 @@ impl<const N: usize> Obstacles<N> {
             let places = [o.extent.front_cm, o.extent.middle_cm(), o.extent.rear_cm];
             let loss = if o.existence < t.confirmed {
                 t.tentative_loss
-            } else if places.iter().any(|&along| {
-                let (x, y) = o.global(along, 0);
-                in_view(x, y)
-            }) {
-                t.visible_loss
             } else {
-                t.hidden_loss
+                let seen = places.iter().any(|&along| {
+                    let (x, y) = o.global(along, 0);
+                    in_view(x, y)
+                });
+                match (o.is_standing(t), seen) {
+                    (false, true) => t.visible_loss,
+                    (false, false) => t.hidden_loss,
+                    (true, true) => t.standing_visible_loss,
+                    (true, false) => t.standing_hidden_loss,
+                }
             };
             o.existence -= step.times(loss);
         }
@@ -290,16 +305,10 @@ impl<const N: usize> Obstacles<N> {
 
 #[cfg(test)]
 mod tests {
-    use super::tracking::ObstacleConfig;
+    use super::by_hand::rules as tracking;
     use super::*;
     use crate::fixed::trig::Direction;
-    use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec as StdVec;
-
-    fn tracking() -> Tracking {
-        let noise = NoiseConfig::default().noise().unwrap();
-        ObstacleConfig::default().tracking(noise, Direction::AHEAD, 22_500).unwrap()
-    }
 
     fn reflection(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
         Reflection {

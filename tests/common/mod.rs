@@ -23,7 +23,7 @@ pub const R: usize = 200;
 pub const A: usize = 120;
 pub const E: usize = 16;
 
-pub type State = Radar3d<R, A, E, 7, 64, 256>;
+pub type State = Radar3d<R, A, E, 7, 96, 256>;
 pub type Parameters = Radar3dParameters<R, A, E>;
 pub type Map = PolarMap<R, A>;
 

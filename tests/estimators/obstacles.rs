@@ -2,8 +2,8 @@
 
 use viewshed::fixed::trig::Direction;
 use viewshed::frame::reflection::Reflection;
+use viewshed::obstacles::config::ObstacleConfig;
 use viewshed::obstacles::obstacle::Obstacle;
-use viewshed::obstacles::tracking::ObstacleConfig;
 use viewshed::sensor::noise::NoiseConfig;
 
 #[test]

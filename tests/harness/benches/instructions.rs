@@ -132,9 +132,9 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
     match estimator {
         "radar-3d-blurred" => {
             let noise = NoiseConfig { range_m: 5.0, ..sensor.noise };
-            run_3d::<200, 120, 16, 7, 64, 256>(&Sensor { noise, ..sensor }, &frames);
+            run_3d::<200, 120, 16, 7, 96, 256>(&Sensor { noise, ..sensor }, &frames);
         }
-        "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
+        "radar-3d" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &frames),
         "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
         "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),
         "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
@@ -183,7 +183,7 @@ fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: us
 fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) {
     let parameters =
         Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 64, 256>::new());
+    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
     let mut map = Box::new(parameters.map());
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     let view = parameters.axes().view(60);

@@ -18,7 +18,7 @@ pub const ELEVATIONS: usize = 16;
 
 struct Driver<const D: usize> {
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
-    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 7, 64, D>>,
+    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 7, 96, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
     intake: Intake,
 }

@@ -21,7 +21,7 @@ use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
 use crate::voxelise::voxelise;
 
 /// Obstacles followed at most.
-const OBSTACLES: usize = 64;
+const OBSTACLES: usize = 96;
 /// How far behind the field of view's range obstacles are followed, metres.
 const BEYOND_M: f64 = 25.0;
 

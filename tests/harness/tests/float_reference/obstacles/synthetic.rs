@@ -6,8 +6,8 @@ mod tests {
     use viewshed::frame::detection::Measurement;
     use viewshed::frame::reflection::Reflection;
     use viewshed::obstacles::Obstacles as IntegerObstacles;
+    use viewshed::obstacles::config::ObstacleConfig;
     use viewshed::obstacles::obstacle::Obstacle as IntegerObstacle;
-    use viewshed::obstacles::tracking::ObstacleConfig;
     use viewshed::sensor::mount::Mount;
     use viewshed::sensor::noise::NoiseConfig;
 
@@ -242,7 +242,7 @@ mod tests {
             let mut exact = Obstacle::new(&place(&seed, &both.noise, &both.levelled), both.rules.road, 25.0);
             let step = Step::from_micros(PERIOD_US);
             for _ in 0..15 {
-                integer.predict(step, both.tracking.kept_over(step).lateral);
+                integer.predict(step, both.tracking.kept_over(step).lateral, &both.tracking);
                 exact.predict(PERIOD_US as f64 * 1e-6, &both.rules);
             }
             let off = difference(metres(integer.anchor()), exact.anchor);
