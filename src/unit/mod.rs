@@ -278,14 +278,22 @@ pub fn start_bench<const R: usize, const A: usize, const E: usize, const W: usiz
 ) {
     (*parameters, *sender) = (None, None);
     let Some(Ok(header)) = settings.map(|settings| build(settings, parameters)) else { return };
+    start_bench_sender(sender, header, medium, epoch, now);
+}
+
+#[inline(never)]
+fn start_bench_sender<const A: usize, const W: usize>(
+    sender: &mut Option<Broadcaster<A, W>>,
+    header: Header,
+    medium: Medium,
+    epoch: Epoch,
+    now: Time,
+) {
     *sender = bench_sender(header, medium, epoch, now);
 }
 
-/// The sender of a unit in a test bench: every message at the moment it is due.
-///
-/// # Errors
-/// None for a map that cannot be sent.
-#[inline(never)]
+/// The sender of a unit in a test bench: every message at the moment it is due. `None` for a map that cannot be
+/// sent.
 pub fn bench_sender<const A: usize, const W: usize>(
     header: Header,
     medium: Medium,

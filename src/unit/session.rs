@@ -165,6 +165,7 @@ impl<const D: usize> Session<D> {
         }
     }
 
+    #[inline(never)] // its buffer is not on the stack while a scan is worked up
     fn flush<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
         &mut self,
         unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
@@ -188,6 +189,7 @@ impl<const D: usize> Session<D> {
     }
 
     /// In the safe state only the status is sent.
+    #[inline(never)] // as above
     fn say_safe(&mut self, line: &mut impl Line) {
         let mut stuffed = [0; MOST_STUFFED];
         let length = self.safe.next_line(self.now, Status::starting(0), &mut stuffed);
