@@ -12,7 +12,7 @@ use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
-use viewshed::wire::receive::{Accepted, Limits, Receiver};
+use viewshed::wire::receive::{Accepted, Limits, Receiver, Refused};
 use viewshed::wire::status::{Reason, State};
 
 use common::gantry;
@@ -130,9 +130,11 @@ fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_stat
         let mut last = 0;
         for ms in 0..3000 {
             let Some(frame) = unit.next_status(at(ms)) else { continue };
-            assert_eq!(receiver.frame(at(ms), &frame), Ok(Accepted::Status));
+            // a session begins with the second
+            let expected = if last == 0 { Err(Refused::FirstOfEpoch) } else { Ok(Accepted::Status) };
+            assert_eq!(receiver.frame(at(ms), &frame), expected, "{ms} ms");
             assert!(ms - last <= 500);
-            last = ms;
+            last = ms.max(1);
         }
         let status = receiver.sensor(SENSOR).and_then(|s| s.status()).unwrap();
         assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
@@ -188,6 +190,7 @@ fn receivers_of_maps_and_other_sensors_units_leave_these_messages_alone() {
     let mut receiver = Receiver::<1, 120, 7>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
     let mut unit = start(CLASSIC, &slots);
     let status = unit.next_status(at(0)).unwrap();
+    assert_eq!(receiver.frame(at(0), &status), Err(Refused::FirstOfEpoch));
     assert_eq!(receiver.frame(at(0), &status), Ok(Accepted::Status));
     for frame in tool.write(&block) {
         assert_eq!(other.take(&frame, &mut slots), None);

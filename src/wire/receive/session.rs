@@ -8,8 +8,9 @@
 //!
 //! *Sender's clock* (rule 2). The header carries the full clock. The headers heard so far bound it from
 //! below: what the fastest of them said, and the time passed since, less 2^-11 for drift. A map frame of a
-//! scan after that by more than 1.5 s is of another period of the scan numbers, and is refused; one by more
-//! than `D` shows that the headers were late, and nothing is told before the next one.
+//! scan after that by more than `D` is of another period of the scan numbers, and is refused. But where none was in
+//! time for `D`, one that is ahead by at most 1.5 s shows that the headers were late, and nothing is told before
+//! the next one.
 //!
 //! *Measure* (rule 3). A frame's scan number is the sender's clock at the measurement. The receiver's
 //! clock less that is the delay plus an unknown constant; the smallest seen stands for no delay. What lags
@@ -39,7 +40,7 @@ const SIGN_US: u64 = 1_000_000;
 const MARGIN_US: u32 = TICK_US + 5000;
 
 /// A map frame further ahead of the sender's clock was late by more than half a period, microseconds; one nearer
-/// shows that the clock is late: three headers were lost.
+/// shows that the clock is late, by three headers at most, where none was in time.
 const MOST_AHEAD_US: u32 = 1_500_000;
 
 /// Without a map frame in time for longer than this, what is held is dropped, microseconds.
@@ -355,7 +356,9 @@ impl Session {
     pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Hearing {
         let lag = scan.lag(now);
         let ahead = self.clock.map_or(0, |clock| ahead_of(clock.lag(now), lag, limits));
-        if ahead > MOST_AHEAD_US {
+        let pause = now.since(self.map_heard).unwrap_or(0);
+        // among frames in time it is one of another period
+        if ahead > MOST_AHEAD_US || (ahead > 0 && pause <= u64::from(limits.max_delay_us)) {
             return self.refuse(now, lag, Hearing::Beyond);
         }
         let Some(mut measure) = self.measure else { return self.measure_anew(now, lag, ahead) };
@@ -373,7 +376,6 @@ impl Session {
         }
         measure.count = measure.count.saturating_add(1);
         self.measure = Some(measure);
-        let pause = now.since(self.map_heard).unwrap_or(0);
         self.in_time(now, ahead);
         if pause > GAP_US { Hearing::Anew } else { Hearing::InTime }
     }
@@ -385,9 +387,8 @@ impl Session {
     }
 
     fn in_time(&mut self, now: Time, ahead: u32) {
-        self.map_heard = now;
         if ahead == 0 {
-            self.misfit_since = NEVER;
+            (self.map_heard, self.misfit_since) = (now, NEVER);
         } else {
             self.misfits(now);
         }
@@ -576,6 +577,18 @@ mod tests {
         assert!(s.hear_clock(ms(2730), &clock(2725), &LIMITS));
         assert_eq!(s.hear(ms(2740), scan(2720), &LIMITS), Hearing::Anew);
         assert_eq!(s.hear(ms(2740), scan(40), &LIMITS), Hearing::Beyond);
+    }
+
+    #[test]
+    fn frames_ahead_of_the_clock_are_heard_where_none_is_in_time() {
+        let mut s = trusting();
+        // 4.5 s late, which looks like 0.6 s fast
+        let echo = |now: u64| scan(now + 5120 - 4500);
+        assert_eq!(s.hear(ms(500), echo(500), &LIMITS), Hearing::Beyond);
+        assert_eq!(s.hear(ms(530), scan(500), &LIMITS), Hearing::InTime);
+        assert_eq!(s.hear(ms(630), echo(630), &LIMITS), Hearing::Beyond);
+        assert_eq!(s.hear(ms(631), echo(631), &LIMITS), Hearing::Anew, "none in time for more than D");
+        assert!(!s.trusted(ms(631), &LIMITS), "until a header says who is right");
     }
 
     #[test]
