@@ -3,7 +3,7 @@
 use super::assembly::{Assembly, Begun, Place};
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Limits, Session};
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
 use crate::wire::code::ray::Ray;
 use crate::wire::code::reading::{self, Ending, Reader};

@@ -22,7 +22,7 @@
 
 use core::cell::Cell;
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::header::Clock;
 use crate::wire::message::Epoch;
 use crate::wire::scan_number::{CLOCK_US, PERIOD_US, ScanNumber, TICK_US};
