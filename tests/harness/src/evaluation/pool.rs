@@ -44,12 +44,12 @@ impl Seconds {
                 continue;
             }
             let at = usize::try_from(frame.time_ns.saturating_sub(start) / BLOCK_NS).unwrap_or(0);
-            let empty = Second {
-                verdicts: vec![Vec::new(); scores.len()],
-                cells: vec![CellTally::default(); scores.len()],
-                ..Second::default()
-            };
             if seconds.len() <= at {
+                let empty = Second {
+                    verdicts: vec![Vec::new(); scores.len()],
+                    cells: vec![CellTally::default(); scores.len()],
+                    ..Second::default()
+                };
                 seconds.resize(at + 1, empty);
             }
             let second = &mut seconds[at];
