@@ -576,9 +576,8 @@ class Sensor:
         """True if a dated message is accepted."""
         of = lag(t, scan)
         x = (self.clock_lag(t) - of) % P if self.has_clock else 0                                        # b
-        heard = t - self.last_in_time <= D
-        ahead = D < x <= 1_500_000 and not heard
-        refused = 1_500_000 < x <= P // 2 or D < x <= 1_500_000 and heard
+        ahead = D < x <= 1_500_000
+        refused = 1_500_000 < x <= P // 2
         late = (of - self.smallest_lag(t)) % P if self.has_measure else 0
         if D < late <= P // 2:                                                                           # d
             refused = True
@@ -594,25 +593,22 @@ class Sensor:
             self.in_doubt = True
             return False
         if not self.has_measure:                                                                         # c
-            return self.measure_anew(t, of, ahead)
+            return self.measure_anew(t, of)
         if late > P // 2:                                                                                # d
             self.sunk = max(0, self.sunk - (t - self.at >> 10)) + P - late
             if self.sunk > D:
-                return self.measure_anew(t, of, ahead)
+                return self.measure_anew(t, of)
             self.at, self.lag = t, of
         self.count += 1
         if t - self.last_in_time > 1_000_000:
             self.empty_maps()
-        if not ahead:
-            self.last_in_time = t
+        self.last_in_time = t
         return True
 
-    def measure_anew(self, t, of, ahead=False):                                                          # e
+    def measure_anew(self, t, of):                                                                       # e
         self.empty_maps()
         self.has_measure = True
-        self.begun = self.at = t
-        if not ahead:
-            self.last_in_time = t
+        self.begun = self.at = self.last_in_time = t
         self.lag, self.sunk, self.count = of, 0, 1
         return True
 
