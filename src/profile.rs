@@ -22,12 +22,16 @@ macro_rules! size {
                 crate::pil::record::Opening::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>(ticks_per_256)
             }
 
+            /// Whether a unit of this size can run with settings.
+            pub const CHECK: crate::unit::stored::Check =
+                crate::unit::stored::Check::of::<RANGES, AZIMUTHS, ELEVATIONS, WORDS>();
+
             /// The estimator.
             pub type State = $state;
             /// What it works with.
             pub type Parameters = crate::radar_3d::Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>;
             /// Its map.
-            pub type Map = crate::polar::PolarMap<RANGES, AZIMUTHS>;
+            pub type Map = crate::map::polar::PolarMap<RANGES, AZIMUTHS>;
             /// Who sends it.
             pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
             /// All of them together.
@@ -41,7 +45,7 @@ macro_rules! size {
 
 size!(
     /// 200 x 120 x 16 cells: parts with 512 kB.
-    reference, crate::radar_3d::ReferenceProfile, 200, 120, 16, 64, 256
+    reference, crate::radar_3d::ReferenceProfile, 200, 120, 16, 96, 256
 );
 size!(
     /// 100 x 64 x 8 cells: parts with 128 kB.

@@ -11,8 +11,9 @@ mod polar;
 pub mod signal;
 pub mod ti;
 
-use crate::detection::Detection;
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
+use crate::frame::health::FrameStatus;
 
 /// The detections of one scan of a radar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,8 +29,17 @@ pub struct RadarScan<'a> {
     pub detections: &'a [Detection],
     /// Announced and not arrived; the most it can be, where that is not known exactly.
     pub missing: u16,
+    /// Points that arrived and are no detections: not finite, at no distance, or absurd.
+    pub refused: u16,
     /// Whether the radar says that something is wrong with it.
     pub fault: bool,
+}
+
+impl RadarScan<'_> {
+    /// What the estimators are told besides the detections.
+    pub fn status(&self) -> FrameStatus {
+        FrameStatus { fault: self.fault, refused: self.refused }
+    }
 }
 
 /// Whether enough of a scan arrived to be used: a scan of which most is missing would be taken for

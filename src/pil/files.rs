@@ -7,8 +7,8 @@ use core::ffi::CStr;
 use super::Bench;
 use super::flash::{FLASH_LEN, Flash};
 use super::record::Record;
-use crate::unit::session::Slots;
 use crate::unit::settings::BLOCK_LEN;
+use crate::unit::stored::Slots;
 use crate::wire::message::Epoch;
 
 const JOB: &CStr = c"job.bin";

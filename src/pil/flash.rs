@@ -1,7 +1,7 @@
 //! What a unit keeps over a loss of power, for boards and hosts of a test bench that have no flash.
 
-use crate::unit::session::Slots;
 use crate::unit::settings::BLOCK_LEN;
+use crate::unit::stored::Slots;
 use crate::wire::message::Epoch;
 
 /// Bytes of it: two slots, starts.

@@ -13,9 +13,9 @@
 //!
 //! A map record is followed by its grades, then its occupancies, azimuth by azimuth.
 
-use crate::bytes::{Reader, Writer};
-use crate::health::Condition;
-use crate::polar::PolarMap;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::health::Condition;
+use crate::map::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::stage::Stage;
 
@@ -141,8 +141,8 @@ impl Record {
                 bytes: [r.u32()?, r.u32()?, r.u32()?],
             }),
             b'F' => {
-                let conditions = [Condition::Starting, Condition::Healthy, Condition::Blind, Condition::Stale];
-                let condition = conditions.into_iter().find(|c| *c as u8 == detail)?;
+                use Condition::{Blind, Healthy, Stale, Starting, Unusable};
+                let condition = [Starting, Healthy, Blind, Stale, Unusable].into_iter().find(|c| *c as u8 == detail)?;
                 let (frame, fingerprint) = (r.u32()?, r.u64()?);
                 let mut ticks = [0; Stage::COUNT];
                 for t in &mut ticks {
@@ -165,7 +165,7 @@ mod tests {
     fn records_read_back() {
         let frame = FrameRecord {
             frame: 70_000,
-            condition: Condition::Blind,
+            condition: Condition::Unusable,
             used: 256,
             fingerprint: 0x0123_4567_89AB_CDEF,
             ticks: [1, 2, 3, 4, 5, 6, 7, u32::MAX],

@@ -3,7 +3,7 @@
 use super::fingerprint::Fingerprint;
 use super::job::{Job, JobError, ScanBuffer};
 use super::record::{Closing, FrameRecord, Opening, Record};
-use crate::polar::PolarMap;
+use crate::map::polar::PolarMap;
 use crate::stage::Stage;
 use crate::unit::Unit;
 use crate::wire::serial::MOST_STUFFED;

@@ -1,7 +1,7 @@
 //! A classic CAN bus: bit timing, what a board's controller offers, and how it is kept on the bus.
 
-use crate::config::{ConfigError, within};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, Problem, within};
 use crate::wire::frame::CanFrame;
 
 /// A bus as the integrator knows it.
@@ -48,12 +48,21 @@ impl BusConfig {
     /// Names the parameter outside its limits.
     #[allow(clippy::cast_precision_loss)] // bit rates are small
     pub fn check(&self, bus: &'static str) -> Result<(), ConfigError> {
-        let [rate, point] = match bus {
-            "radar_bus" => ["radar_bus.bit_rate", "radar_bus.sample_point_permille"],
-            _ => ["broadcast_bus.bit_rate", "broadcast_bus.sample_point_permille"],
-        };
+        let [rate, point] = names(bus);
         within(rate, self.bit_rate as f32, 10_000.0, 1_000_000.0)?;
         within(point, f32::from(self.sample_point_permille), 500.0, 900.0).map(|_| ())
+    }
+
+    /// Checks that a controller clocked at `clock_hz` has a divider for the bit rate.
+    ///
+    /// # Errors
+    /// Names the bit rate.
+    #[allow(clippy::cast_precision_loss)] // bit rates are small
+    pub fn check_clock(&self, bus: &'static str, clock_hz: u32) -> Result<(), ConfigError> {
+        let [parameter, _] = names(bus);
+        let problem = Problem::NoDivider { clock_hz };
+        let refused = ConfigError { parameter, value: self.bit_rate as f32, problem };
+        self.timing(clock_hz).map(|_| ()).ok_or(refused)
     }
 
     /// Register values for a controller clocked at `clock_hz`: the finest quantum that meets the bit
@@ -71,6 +80,14 @@ impl BusConfig {
             segment_2: segment_2 as u8,
             jump_width: segment_2.min(4) as u8,
         })
+    }
+}
+
+/// Parameters of a bus.
+fn names(bus: &'static str) -> [&'static str; 2] {
+    match bus {
+        "radar_bus" => ["radar_bus.bit_rate", "radar_bus.sample_point_permille"],
+        _ => ["broadcast_bus.bit_rate", "broadcast_bus.sample_point_permille"],
     }
 }
 
@@ -218,6 +235,13 @@ mod tests {
     fn a_rate_no_divider_meets_is_refused() {
         assert_eq!(BusConfig { bit_rate: 333_333, ..BusConfig::default() }.timing(8_000_000), None);
         assert_eq!(BusConfig { bit_rate: 0, ..BusConfig::default() }.timing(8_000_000), None);
+        let odd = BusConfig { bit_rate: 333_333, ..BusConfig::default() };
+        let refused = odd.check_clock("broadcast_bus", 8_000_000).unwrap_err();
+        assert_eq!(
+            std::string::ToString::to_string(&refused),
+            "broadcast_bus.bit_rate is 333333, which no divider of 8000000 Hz meets"
+        );
+        assert_eq!(odd.check_clock("radar_bus", 333_333 * 8), Ok(()));
         let wrong = BusConfig { bit_rate: 2_000_000, ..BusConfig::default() };
         assert_eq!(wrong.check("radar_bus").unwrap_err().parameter, "radar_bus.bit_rate");
     }

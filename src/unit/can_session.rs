@@ -4,14 +4,15 @@
 //! On the road time is the controller's. In a test bench it comes over the radar's bus: a frame with the
 //! identifier [`TIME_ID`] and eight bytes, microseconds, big-endian, before the frames it is for.
 
+use crate::fixed::time::Time;
 use crate::inputs::ars408::{Ars408, Config, Outcome};
-use crate::time::Time;
 use crate::unit::Unit;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::CanService;
-use crate::unit::session::{Flow, Slots};
+use crate::unit::session::Flow;
+use crate::unit::stored::Slots;
 use crate::wire::frame::{CanFrame, CanId};
-use crate::wire::status::Reason;
+use crate::wire::status::{Reason, Status};
 
 /// Identifier of the time in a test bench.
 pub const TIME_ID: CanId = CanId::Standard(0x0F0);
@@ -113,7 +114,7 @@ impl<const D: usize> CanSession<D> {
         let answer = service.next_frame(now, slots);
         answer.or_else(|| match unit {
             Some(unit) => unit.next_frame(now),
-            None => service.next_status(now),
+            None => service.next_status(now, Status::starting(0)),
         })
     }
 
@@ -158,7 +159,7 @@ fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     unit: &mut Unit<'_, R, A, E, W, N, G>,
 ) {
     let Outcome::Scan(scan) = outcome else { return };
-    unit.scan(scan.time, scan.detections, scan.fault, |_| {});
+    unit.scan(scan.time, scan.detections, scan.status(), |_| {});
     if scan.missing > 0 {
         unit.degrade(scan.time, Reason::IncompleteScans);
     }

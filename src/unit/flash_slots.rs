@@ -10,8 +10,8 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::unit::session::Slots;
 use crate::unit::settings::BLOCK_LEN;
+use crate::unit::stored::Slots;
 
 /// A block up to the next whole word of any flash memory, which has at most 32 bytes.
 const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
@@ -150,7 +150,7 @@ mod tests {
 
     fn settings(max_detections: u16) -> Settings {
         let sensor = crate::sensor::Sensor {
-            mount: crate::mount::Mount {
+            mount: crate::sensor::mount::Mount {
                 x_m: 0.0,
                 y_m: 0.0,
                 height_m: 6.0,
@@ -158,7 +158,7 @@ mod tests {
                 pitch_deg: 4.0,
                 roll_deg: 0.0,
             },
-            field_of_view: crate::field_of_view::FieldOfView {
+            field_of_view: crate::sensor::field_of_view::FieldOfView {
                 azimuth_min_deg: -60.0,
                 azimuth_max_deg: 60.0,
                 elevation_min_deg: -16.0,
@@ -166,7 +166,7 @@ mod tests {
                 range_min_m: 3.0,
                 range_max_m: 200.0,
             },
-            noise: crate::reflection::NoiseConfig::default(),
+            noise: crate::sensor::noise::NoiseConfig::default(),
         };
         let mut settings = Settings::of(sensor);
         settings.gate.max_detections = max_detections;
@@ -174,7 +174,7 @@ mod tests {
     }
 
     fn newest(slots: &impl Slots) -> Option<u16> {
-        Settings::newest([slots.slot(0), slots.slot(1)]).ok().map(|n| n.settings.gate.max_detections)
+        Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).ok().map(|n| n.settings.gate.max_detections)
     }
 
     fn works_on<const WORD: usize, const PAGE: usize>() {
@@ -215,7 +215,7 @@ mod tests {
         slots.write(1, &settings(101).to_block(2));
         let slots = FlashSlots::new(slots.free(), places, |slot| slot != 1);
         assert_eq!(newest(&slots), Some(100));
-        assert_eq!(Settings::newest([slots.slot(0), slots.slot(1)]).unwrap().next_slot, 1);
+        assert_eq!(Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).unwrap().next_slot, 1);
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! | around it | modules |
 //! |---|---|
 //! | sessions: what comes over a line becomes scans and requests | [`session`], [`can_session`], [`ti_session`], [`radar_clock`] |
-//! | settings: the checked block, asked for and written over serial lines and CAN, kept in flash | [`settings`], [`service`], [`can_service`], [`flash_slots`] |
+//! | settings: the checked block, asked for and written over serial lines and CAN, kept in flash | [`settings`], [`stored`], [`service`], [`can_service`], [`flash_slots`], [`safe_state`] |
 //! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
 //! | a unit on hardware of its own: the loop, and what its lamp shows | [`roadside`], [`status_output`] |
 
@@ -19,25 +19,28 @@ pub mod flash_slots;
 pub mod frame_queue;
 pub mod radar_clock;
 pub mod roadside;
+pub mod safe_state;
 pub mod service;
 pub mod session;
 pub mod settings;
 pub mod status_output;
+pub mod stored;
 pub mod ti_session;
 pub mod transmitter;
 
-use crate::axes::Axes;
-use crate::detection::Detection;
-use crate::health::{Condition, Continuity};
-use crate::polar::PolarMap;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
+use crate::frame::health::{Condition, Continuity, FrameStatus};
+use crate::grid::axes::Axes;
+use crate::map::polar::PolarMap;
 use crate::radar_3d::{FrameReport, Radar3d, Radar3dParameters};
+use crate::sensor::config::{ConfigError, Problem};
 use crate::stage::Stage;
-use crate::time::Time;
 use crate::unit::settings::Settings;
 use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use crate::wire::code::ray::Known;
 use crate::wire::frame::CanFrame;
-use crate::wire::header::{Header, NotAHeader, fingerprint};
+use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
 use crate::wire::message::Epoch;
 use crate::wire::status::{Reason, State};
 
@@ -56,25 +59,68 @@ pub struct Unit<'a, const R: usize, const A: usize, const E: usize, const W: usi
     broadcast: &'a mut Broadcaster<A, W>,
     /// The last map that was offered to the sender.
     offered: Option<Time>,
+    /// The last scan, and the time from the one before to it.
+    scanned: Option<Time>,
+    period_us: Option<u64>,
     /// Whether the radar says that it has a fault.
     fault: bool,
     /// What went wrong last, and when.
     trouble: Option<(Time, Reason)>,
 }
 
-/// The header of a unit's maps.
+/// What a unit is made of by its settings: its parameters, and the header of its maps. A start and the check of a
+/// block that came are this same function, so that none is accepted that cannot start.
+#[inline(never)] // what it takes of the stack is free again afterwards
+fn make<const R: usize, const A: usize, const E: usize>(
+    settings: &Settings,
+) -> Result<(Radar3dParameters<R, A, E>, Header), ConfigError> {
+    settings.radar_bus.check("radar_bus")?;
+    settings.broadcast_bus.check("broadcast_bus")?;
+    let parameters = Radar3dParameters::new(&settings.sensor, &settings.radar_3d())?;
+    let header = header(settings, &parameters)?;
+    Ok((parameters, header))
+}
+
+/// Makes a unit's parameters, where they stay, and the header of its maps.
 ///
 /// # Errors
-/// A map that cannot be sent.
-pub fn header<const R: usize, const A: usize, const E: usize>(
+/// Names the first parameter that cannot be worked with; there are no parameters then.
+#[inline(never)] // as above
+pub fn build<const R: usize, const A: usize, const E: usize>(
+    settings: &Settings,
+    parameters: &mut Option<Radar3dParameters<R, A, E>>,
+) -> Result<Header, ConfigError> {
+    *parameters = None;
+    let (made, header) = make(settings)?;
+    *parameters = Some(made);
+    Ok(header)
+}
+
+/// Whether a unit of this grid, and a sender of this size, can be made by these settings.
+///
+/// # Errors
+/// Names the first parameter that cannot be worked with.
+#[inline(never)]
+pub fn check<const R: usize, const A: usize, const E: usize, const W: usize>(
+    settings: &Settings,
+) -> Result<(), ConfigError> {
+    make::<R, A, E>(settings).and_then(|(_, header)| Broadcaster::<A, W>::fits(&header))
+}
+
+fn header<const R: usize, const A: usize, const E: usize>(
     settings: &Settings,
     parameters: &Radar3dParameters<R, A, E>,
-) -> Result<Header, NotAHeader> {
+) -> Result<Header, ConfigError> {
     let axes: &Axes<R, A, E> = parameters.axes();
     let view = axes.view(A / 2);
     let geometry = axes.polar(parameters.levelling());
     let usual = Known::new(view.start, view.end);
-    Header::new::<R, A>(&settings.sensor.mount, &geometry, usual, 1, fingerprint(&settings.to_block(0)))
+    let header = Header::new::<R, A>(&settings.sensor.mount, &geometry, usual, 1, fingerprint(&settings.to_block(0)));
+    // the mount was checked with the parameters, so it is the grid
+    #[allow(clippy::cast_precision_loss)]
+    let most = Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 };
+    #[allow(clippy::cast_precision_loss)]
+    header.map_err(|_| ConfigError { parameter: "header.azimuths", value: A as f32, problem: most })
 }
 
 impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
@@ -89,7 +135,17 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
     ) -> Self {
         parameters.prepare(map);
         state.reset();
-        Self { parameters, state, map, broadcast, offered: None, fault: false, trouble: None }
+        Self {
+            parameters,
+            state,
+            map,
+            broadcast,
+            offered: None,
+            scanned: None,
+            period_us: None,
+            fault: false,
+            trouble: None,
+        }
     }
 
     /// Takes a scan measured at this time and offers its map to the sender.
@@ -97,11 +153,13 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         &mut self,
         measured: Time,
         detections: impl IntoIterator<Item = &'d Detection, IntoIter: Clone>,
-        fault: bool,
+        status: impl Into<FrameStatus>,
         mut ended: impl FnMut(Stage),
     ) -> FrameReport {
-        let report = self.state.process_traced(self.parameters, measured, detections, fault, self.map, &mut ended);
-        self.fault = fault;
+        let status = status.into();
+        let report = self.state.process_traced(self.parameters, measured, detections, status, self.map, &mut ended);
+        self.fault = status.fault;
+        self.period_us = self.scanned.replace(measured).and_then(|last| measured.since(last));
         if report.continuity == Continuity::ClockStepped {
             self.degrade(measured, Reason::ClockStepped);
         }
@@ -128,8 +186,13 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         let _ = self.broadcast.scan(measured, &*self.map);
     }
 
-    /// Maps go on, but something went wrong just now: told in the status for a second.
+    /// Maps go on, but something went wrong just now: told in the status for a second. A bus too narrow is told
+    /// only where nothing else went wrong, which may be why.
     pub fn degrade(&mut self, now: Time, reason: Reason) {
+        let known = self.trouble.is_some_and(|(since, other)| other != reason && recent(since, now));
+        if known && reason == Reason::BusOverload {
+            return;
+        }
         self.trouble = Some((now, reason));
         let status = self.broadcast.status_mut();
         if status.state == State::Ok {
@@ -137,14 +200,26 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         }
     }
 
+    /// A scan took so long to be worked up, microseconds, by the clock of `now`: told if it is longer than the
+    /// time from scan to scan.
+    pub fn took(&mut self, now: Time, took_us: u64) {
+        if self.period_us.is_some_and(|period| took_us > period) {
+            self.degrade(now, Reason::Overrun);
+        }
+    }
+
     fn tell(&mut self, condition: Condition, now: Time) {
-        let recent = |(since, reason)| now.since(since).is_some_and(|us| us < DEGRADED_US).then_some(reason);
+        if self.broadcast.take_overload() {
+            self.degrade(now, Reason::BusOverload);
+        }
+        let trouble = self.trouble.filter(|(since, _)| recent(*since, now)).map(|(_, reason)| reason);
         let status = self.broadcast.status_mut();
-        (status.state, status.reason) = match (condition, self.trouble.and_then(recent)) {
+        (status.state, status.reason) = match (condition, trouble) {
             (Condition::Stale, _) => (State::Blind, Reason::RadarSilent),
             _ if self.fault => (State::Fault, Reason::RadarFault),
             (Condition::Starting, _) => (State::Starting, Reason::None),
             (Condition::Blind, _) => (State::Blind, Reason::None),
+            (Condition::Unusable, _) => (State::Blind, Reason::UnusablePoints),
             (Condition::Healthy, Some(reason)) => (State::Degraded, reason),
             (Condition::Healthy, None) => (State::Ok, Reason::None),
         };
@@ -183,23 +258,15 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
     }
 }
 
-/// The sender of a unit in a test bench: every message at the moment it is due.
-///
-/// # Errors
-/// A map that cannot be sent.
-pub fn bench_sender<const R: usize, const A: usize, const E: usize, const W: usize>(
-    settings: &Settings,
-    parameters: &Radar3dParameters<R, A, E>,
-    medium: Medium,
-    epoch: Epoch,
-    now: Time,
-) -> Option<Broadcaster<A, W>> {
-    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
-    Broadcaster::new(config, header(settings, parameters).ok()?, epoch, now).ok()
+/// Whether something happened within the time it is told for, before or after `now`: scans are of another clock
+/// than the loop around them.
+fn recent(since: Time, now: Time) -> bool {
+    now.since(since).or_else(|| since.since(now)).is_some_and(|us| us < DEGRADED_US)
 }
 
-/// Puts parameters and sender of a unit in a test bench where they stay, or `None` without settings that can
-/// be worked with. Apart, so that what this takes of the stack is free again before the first scan.
+/// Puts parameters and sender of a unit in a test bench where they stay: every message is sent at the moment it
+/// is due. `None` without settings, and without ones that can be worked with. Apart, so that what this takes of
+/// the stack is free again before the first scan.
 #[inline(never)]
 pub fn start_bench<const R: usize, const A: usize, const E: usize, const W: usize>(
     parameters: &mut Option<Radar3dParameters<R, A, E>>,
@@ -209,19 +276,30 @@ pub fn start_bench<const R: usize, const A: usize, const E: usize, const W: usiz
     epoch: Epoch,
     now: Time,
 ) {
-    *parameters = settings.and_then(|s| Radar3dParameters::new(&s.sensor, &s.radar_3d()).ok());
-    start_bench_sender(parameters.as_ref(), sender, settings, medium, epoch, now);
+    (*parameters, *sender) = (None, None);
+    let Some(Ok(header)) = settings.map(|settings| build(settings, parameters)) else { return };
+    start_bench_sender(sender, header, medium, epoch, now);
 }
 
 #[inline(never)]
-fn start_bench_sender<const R: usize, const A: usize, const E: usize, const W: usize>(
-    parameters: Option<&Radar3dParameters<R, A, E>>,
+fn start_bench_sender<const A: usize, const W: usize>(
     sender: &mut Option<Broadcaster<A, W>>,
-    settings: Option<&Settings>,
+    header: Header,
     medium: Medium,
     epoch: Epoch,
     now: Time,
 ) {
-    let found = settings.zip(parameters);
-    *sender = found.and_then(|(settings, parameters)| bench_sender(settings, parameters, medium, epoch, now));
+    *sender = bench_sender(header, medium, epoch, now);
+}
+
+/// The sender of a unit in a test bench: every message at the moment it is due. `None` for a map that cannot be
+/// sent.
+pub fn bench_sender<const A: usize, const W: usize>(
+    header: Header,
+    medium: Medium,
+    epoch: Epoch,
+    now: Time,
+) -> Option<Broadcaster<A, W>> {
+    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
+    Broadcaster::new(config, header, epoch, now).ok()
 }

@@ -5,12 +5,13 @@
 //! unit has to know what the radar's clock shows *now*. A stamp `s` that arrives at `t` is `t - s` late;
 //! the smallest lag seen is taken for the difference of the clocks, so that no stamp is ever ahead of
 //! the radar's clock as read here. The lag kept grows by 2^-11 (490 ppm) of the time that passes, more
-//! than any two quartzes differ, and a lag larger by a second or more is a clock that stepped back.
+//! than any two quartzes differ. A stamp before the last one is a clock that stepped back, however little,
+//! and a lag larger by a second or more one that was set: both begin anew.
 //!
 //! # Limits
 //! Times below 2^63 µs. Before the first stamp the unit's own clock is shown.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 
 /// A lag this much larger, microseconds, is another clock.
 const STEP_US: i64 = 1_000_000;
@@ -18,25 +19,27 @@ const STEP_US: i64 = 1_000_000;
 /// Keeps the difference between a radar's clock and the unit's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RadarClock {
-    /// The lag, and when it was last looked at; microseconds.
+    /// The lag, microseconds, and when it was last looked at.
     kept: Option<(i64, Time)>,
+    /// The last stamp.
+    stamp: Time,
 }
 
 impl RadarClock {
     /// Before the first stamp.
-    pub const NEW: Self = Self { kept: None };
+    pub const NEW: Self = Self { kept: None, stamp: Time::from_micros(0) };
 
     /// A scan with this stamp arrived.
     pub fn stamp(&mut self, stamp: Time, arrived: Time) {
         let lag = signed(arrived).saturating_sub(signed(stamp));
         let lag = match self.kept {
-            Some((kept, last)) if lag < kept.saturating_add(STEP_US) => {
+            Some((kept, last)) if stamp >= self.stamp && lag < kept.saturating_add(STEP_US) => {
                 let passed = arrived.since(last).and_then(|us| i64::try_from(us).ok()).unwrap_or(0);
                 lag.min(kept.saturating_add(passed >> 11))
             }
             _ => lag,
         };
-        self.kept = Some((lag, arrived));
+        (self.kept, self.stamp) = (Some((lag, arrived)), stamp);
     }
 
     /// What the radar's clock shows.
@@ -82,6 +85,17 @@ mod tests {
         assert_eq!(clock.now(at(5_000)), at(1_040), "held up for three seconds");
         clock.stamp(at(4_100), at(5_066));
         assert_eq!(clock.now(at(5_066)), at(4_100), "and free again");
+    }
+
+    #[test]
+    fn a_clock_that_steps_back_by_any_amount_is_followed_at_once() {
+        for step_ms in [67, 100, 300, 499, 500, 700, 999, 1000, 5000] {
+            let mut clock = RadarClock::NEW;
+            (0..20).for_each(|k| clock.stamp(at(9000 + 66 * k), at(100 + 66 * k)));
+            let (stamp, arrived) = (at(9000 + 66 * 20 - step_ms), at(100 + 66 * 20));
+            clock.stamp(stamp, arrived);
+            assert_eq!(clock.now(arrived), stamp, "{step_ms} ms back: a map measured now is new");
+        }
     }
 
     #[test]

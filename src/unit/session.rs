@@ -10,24 +10,19 @@
 //! # Limits
 //! Noise and half messages cost the messages they hit, and are counted as damaged.
 
+use crate::fixed::time::Time;
 use crate::inputs::native::{Config, Outcome, Receiver};
 use crate::pil::record::FrameRecord;
 use crate::stage::Stage;
-use crate::time::Time;
 use crate::unit::Unit;
+use crate::unit::safe_state::SafeState;
 use crate::unit::service::{Reply, Request, ServiceMessage};
-use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
-use crate::wire::message::{Epoch, Message, Packet, Packing};
+use crate::unit::settings::Settings;
+use crate::unit::stored::{Slots, Stored};
+use crate::wire::broadcast::Medium;
+use crate::wire::message::{Epoch, Packing};
 use crate::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
-use crate::wire::status::{Reason, State, Status};
-
-/// Where configuration blocks are kept.
-pub trait Slots {
-    /// The bytes of a slot, 0 or 1.
-    fn slot(&self, slot: usize) -> &[u8];
-    /// Writes a slot.
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]);
-}
+use crate::wire::status::{Reason, Status};
 
 /// The outgoing line and the measurements of a test bench.
 pub trait Line {
@@ -50,8 +45,6 @@ pub enum Flow {
 
 /// Most messages sent in one go.
 const MOST_MESSAGES: usize = 400;
-/// Time between two status messages in the safe state, microseconds.
-const SAFE_STATUS_US: u64 = 400_000;
 
 /// What lies between the lines and the unit. `D` detections a scan.
 #[derive(Debug)]
@@ -59,45 +52,42 @@ pub struct Session<const D: usize> {
     sensor: u8,
     unstuffer: Unstuffer,
     radar: Receiver<D>,
-    /// The block in use, or why there is none.
-    settings: Result<Newest, BlockError>,
+    stored: Stored,
+    safe: SafeState,
     now: Time,
     /// Messages the line did not take.
     refused: u16,
     service_counter: u8,
     frames: u32,
-    safe_status: Option<Time>,
-    safe_counter: u8,
 }
 
 impl<const D: usize> Session<D> {
-    /// Starts with the newest block that holds.
+    /// Starts with a block, or without.
     #[inline(never)] // what it takes of the stack is free again afterwards
-    pub fn start(sensor: u8, slots: &impl Slots, line: &mut impl Line) -> Self {
-        let settings = Settings::newest([slots.slot(0), slots.slot(1)]).map_err(worst);
+    pub fn start(sensor: u8, epoch: Epoch, stored: Stored, line: &mut impl Line) -> Self {
+        let now = Time::from_micros(0);
         let mut session = Self {
             sensor,
             unstuffer: Unstuffer::new(),
             radar: Receiver::new(Config::sensor(sensor)),
-            settings,
-            now: Time::from_micros(0),
+            stored,
+            safe: SafeState::new(sensor, Medium::Serial, epoch, now),
+            now,
             refused: 0,
             service_counter: 0,
             frames: 0,
-            safe_status: None,
-            safe_counter: 0,
         };
-        let slot = settings.ok().and_then(|n| u8::try_from(n.slot).ok());
-        session.reply(&Reply::Started(slot), line);
-        if let Err(reason) = settings {
-            session.reply(&Reply::Refused(&reason), line);
+        let place = stored.place();
+        session.reply(&Reply::Started(place.ok().map(|(slot, _)| slot)), line);
+        if let Err(reason) = &place {
+            session.reply(&Reply::Refused(reason), line);
         }
         session
     }
 
     /// What to work with; none in the safe state.
     pub fn settings(&self) -> Option<&Settings> {
-        self.settings.as_ref().ok().map(|n| &n.settings)
+        self.stored.settings()
     }
 
     /// The time by what came in.
@@ -122,7 +112,7 @@ impl<const D: usize> Session<D> {
                 match request {
                     Request::Restart => return Flow::Restart,
                     Request::Write(block) => {
-                        let outcome = write(block, slots);
+                        let outcome = self.stored.write(block, slots);
                         let reply = match &outcome {
                             Ok(sequence) => Reply::Written(*sequence),
                             Err(reason) => Reply::Refused(reason),
@@ -130,7 +120,7 @@ impl<const D: usize> Session<D> {
                         send(&reply, self.sensor, &mut self.service_counter, &mut self.refused, line);
                     }
                     Request::Read => {
-                        let used = self.settings.as_ref().ok().map_or(&[][..], |n| slots.slot(n.slot));
+                        let used = self.stored.block(slots);
                         send(&Reply::Block(used), self.sensor, &mut self.service_counter, &mut self.refused, line);
                     }
                     Request::Time(now) => self.wait(now, unit, line),
@@ -175,6 +165,7 @@ impl<const D: usize> Session<D> {
         }
     }
 
+    #[inline(never)] // its buffer is not on the stack while a scan is worked up
     fn flush<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
         &mut self,
         unit: &mut Option<Unit<'_, R, A, E, W, N, G>>,
@@ -188,7 +179,7 @@ impl<const D: usize> Session<D> {
         let status = unit.broadcast().status_mut();
         status.e2e_errors = u16::try_from(damaged).unwrap_or(u16::MAX);
         status.radar_lost = u16::try_from(lost).unwrap_or(u16::MAX);
-        status.dropped = status.dropped.saturating_add(refused);
+        unit.broadcast().count_dropped(refused);
         for _ in 0..MOST_MESSAGES {
             let Some(message) = unit.next_line(self.now, &mut stuffed).and_then(|n| stuffed.get(..n)) else { break };
             if !line.send(message) {
@@ -198,40 +189,18 @@ impl<const D: usize> Session<D> {
     }
 
     /// In the safe state only the status is sent.
+    #[inline(never)] // as above
     fn say_safe(&mut self, line: &mut impl Line) {
-        let due = self.safe_status.is_none_or(|last| self.now.since(last).is_none_or(|us| us >= SAFE_STATUS_US));
-        if !due {
-            return;
-        }
-        self.safe_status = Some(self.now);
-        let status = Status { state: State::Fault, reason: Reason::Configuration, ..Status::starting(0) };
-        let packet = Packet::new(Packing::Long, self.sensor, Message::Status, Epoch::new(0), &status.emit());
-        let packet = packet.protect(self.safe_counter, None);
-        self.safe_counter = Packing::Long.profile().next(self.safe_counter);
         let mut stuffed = [0; MOST_STUFFED];
-        if let Some(bytes) = stuff(packet.bytes(), &mut stuffed).and_then(|n| stuffed.get(..n)) {
-            let _ = line.send(bytes);
+        let length = self.safe.next_line(self.now, Status::starting(0), &mut stuffed);
+        if let Some(message) = length.and_then(|n| stuffed.get(..n)) {
+            let _ = line.send(message);
         }
     }
 
     fn reply(&mut self, reply: &Reply<'_>, line: &mut impl Line) {
         send(reply, self.sensor, &mut self.service_counter, &mut self.refused, line);
     }
-}
-
-/// Of two refusals the one that says more: an empty slot says least.
-pub(crate) fn worst([first, second]: [BlockError; 2]) -> BlockError {
-    if first == BlockError::Empty { second } else { first }
-}
-
-/// Checks a block and writes it into the slot not in use; its sequence.
-pub(crate) fn write(block: &[u8], slots: &mut impl Slots) -> Result<u32, BlockError> {
-    let (_, settings) = Settings::from_block(block)?;
-    let newest = Settings::newest([slots.slot(0), slots.slot(1)]);
-    let (slot, sequence) = newest.map_or((0, 1), |n| (n.next_slot, n.next_sequence));
-    slots.write(slot, &settings.to_block(sequence));
-    // what was written counts, not what was meant
-    Settings::from_block(slots.slot(slot)).map(|(sequence, _)| sequence)
 }
 
 fn send(reply: &Reply<'_>, sensor: u8, counter: &mut u8, refused: &mut u16, line: &mut impl Line) {
@@ -255,7 +224,7 @@ fn scan<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     *now = scan.time;
     let mut ticks = [0; Stage::COUNT];
     let mut last = line.ticks();
-    let report = unit.scan(scan.time, scan.detections, scan.fault, |stage| {
+    let report = unit.scan(scan.time, scan.detections, scan.status(), |stage| {
         let now = line.ticks();
         if let Some(t) = ticks.get_mut(stage as usize) {
             *t = now.wrapping_sub(last);

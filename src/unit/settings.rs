@@ -17,15 +17,15 @@
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 
-use crate::bytes::{Reader, Writer};
-use crate::config::{ConfigError, within};
-use crate::field_of_view::FieldOfView;
-use crate::gate::GateConfig;
-use crate::health::HealthConfig;
-use crate::mount::Mount;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::gate::GateConfig;
+use crate::frame::health::HealthConfig;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
-use crate::reflection::NoiseConfig;
 use crate::sensor::Sensor;
+use crate::sensor::config::ConfigError;
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Mount;
+use crate::sensor::noise::NoiseConfig;
 use crate::unit::can_bus::BusConfig;
 
 /// Everything an integrator sets for one installation.
@@ -150,10 +150,11 @@ impl Settings {
         block
     }
 
-    /// Reads a block with its sequence; bytes after it do not matter.
+    /// Reads a block with its sequence; bytes after it do not matter. Its parameters may be anything: whether
+    /// a unit can run with them is [`Check`](crate::unit::stored::Check)'s to say.
     ///
     /// # Errors
-    /// The first thing that does not hold; every parameter is within its limits otherwise.
+    /// The first thing that does not hold.
     pub fn from_block(bytes: &[u8]) -> Result<(u32, Self), BlockError> {
         let mut header = Reader(bytes);
         match header.take::<4>() {
@@ -173,23 +174,29 @@ impl Settings {
         }
         let sequence = header.u32().ok_or(BlockError::Short)?;
         let settings = Self::read(&mut header).ok_or(BlockError::Short)?;
-        settings.check().map_err(BlockError::Parameter)?;
         Ok((sequence, settings))
     }
 
-    /// The newer of two slots that holds: its number and settings, and the sequence to write into
-    /// the other one next.
+    /// The newer of two slots that holds and is accepted: its number and settings, and the sequence to write
+    /// into the other one next.
     ///
     /// # Errors
     /// Why each was refused.
-    pub fn newest(slots: [&[u8]; 2]) -> Result<Newest, [BlockError; 2]> {
+    pub fn newest(
+        slots: [&[u8]; 2],
+        accept: impl Fn(&Self) -> Result<(), ConfigError>,
+    ) -> Result<Newest, [BlockError; 2]> {
+        let read = |bytes| {
+            let (sequence, settings) = Self::from_block(bytes)?;
+            accept(&settings).map_err(BlockError::Parameter).map(|()| (sequence, settings))
+        };
         let found = |slot, (sequence, settings): (u32, Self)| Newest {
             slot,
             settings,
             next_slot: 1 - slot,
             next_sequence: sequence.wrapping_add(1),
         };
-        match slots.map(Self::from_block) {
+        match slots.map(read) {
             [Err(first), Err(second)] => Err([first, second]),
             [Ok(first), Err(_)] => Ok(found(0, first)),
             [Err(_), Ok(second)] => Ok(found(1, second)),
@@ -199,23 +206,6 @@ impl Settings {
                 Ok(if second_is_newer { found(1, second) } else { found(0, first) })
             }
         }
-    }
-
-    /// Every parameter within its limits.
-    ///
-    /// # Errors
-    /// Names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        self.sensor.mount.levelling()?;
-        let view = self.sensor.field_of_view.limits()?;
-        self.sensor.noise.noise()?;
-        self.gate.gate(&view)?;
-        self.health.limits()?;
-        within("visibility.slice_height_m", self.visibility.slice_height_m, 0.0, 20.0)?;
-        within("visibility.visible_from", self.visibility.visible_from, 0.01, 1.0)?;
-        within("visibility.occupied_from", self.visibility.occupied_from, 0.01, 1.0)?;
-        self.radar_bus.check("radar_bus")?;
-        self.broadcast_bus.check("broadcast_bus")
     }
 
     fn numbers(&self) -> [f32; NUMBERS] {
@@ -365,13 +355,13 @@ mod tests {
         let mut other = block;
         other[4] = 9;
         assert_eq!(Settings::from_block(&other), Err(BlockError::Layout(9)));
-        let mut high = settings();
-        high.sensor.mount.height_m = 50.0;
-        let Err(BlockError::Parameter(e)) = Settings::from_block(&high.to_block(1)) else { panic!("accepted") };
+        let high = |s: &Settings| s.sensor.mount.levelling().map(|_| ());
+        let mut too_high = settings();
+        too_high.sensor.mount.height_m = 50.0;
+        let refused = Settings::newest([&too_high.to_block(2), &settings().to_block(1)], high).map(|n| n.slot);
+        assert_eq!(refused, Ok(1), "the newer one is not accepted");
+        let Err([BlockError::Parameter(e), _]) = Settings::newest([&too_high.to_block(2), &[]], high) else { panic!() };
         assert_eq!((e.parameter, e.value), ("mount.height_m", 50.0));
-        let mut odd = settings();
-        odd.radar_bus.sample_point_permille = 1000;
-        assert!(matches!(Settings::from_block(&odd.to_block(1)), Err(BlockError::Parameter(_))));
     }
 
     #[test]
@@ -379,14 +369,15 @@ mod tests {
         let (mut old, mut new) = (settings(), settings());
         old.gate.max_detections = 100;
         new.gate.max_detections = 200;
-        let pick = |slots: [&[u8]; 2]| Settings::newest(slots).map(|n| (n.slot, n.settings.gate.max_detections));
+        let pick =
+            |slots: [&[u8]; 2]| Settings::newest(slots, |_| Ok(())).map(|n| (n.slot, n.settings.gate.max_detections));
         let (a, b) = (old.to_block(u32::MAX), new.to_block(0));
         assert_eq!(pick([&a, &b]), Ok((1, 200)), "the sequence wraps");
         assert_eq!(pick([&b, &a]), Ok((0, 200)));
         let torn = &b[..50];
         assert_eq!(pick([&a, torn]), Ok((0, 100)), "power failed while writing");
         assert_eq!(pick([torn, &[0; 4]]), Err([BlockError::Short, BlockError::Empty]));
-        let n = Settings::newest([&a, &b]).unwrap();
+        let n = Settings::newest([&a, &b], |_| Ok(())).unwrap();
         assert_eq!((n.next_slot, n.next_sequence), (0, 1));
     }
 }

@@ -3,8 +3,8 @@
 //! The port carries nothing but the radar's frames and those carry no time a unit could use, so time is
 //! always the unit's own.
 
+use crate::fixed::time::Time;
 use crate::inputs::ti::{Config, Counters, Outcome, Ti};
-use crate::time::Time;
 use crate::unit::Unit;
 use crate::wire::status::Reason;
 
@@ -31,9 +31,9 @@ impl<const D: usize> TiSession<D> {
         while !rest.is_empty() {
             let (taken, outcome) = self.radar.push(rest, now);
             if let Outcome::Scan(scan) = outcome {
-                unit.scan(scan.time, scan.detections, scan.fault, |_| {});
+                unit.scan(scan.time, scan.detections, scan.status(), |_| {});
                 if scan.missing > 0 {
-                    unit.broadcast().status_mut().reason = Reason::IncompleteScans;
+                    unit.degrade(scan.time, Reason::IncompleteScans);
                 }
             }
             // a receiver that took nothing would hold up everything

@@ -37,8 +37,8 @@ use super::secoc::{Key, Sealer};
 use super::serial;
 use super::status::{PAGES, Status};
 use super::visible_range;
-use crate::config::{ConfigError, Problem};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, Problem};
 
 /// What messages travel on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,7 +107,11 @@ impl BroadcastConfig {
         }
     }
 
-    fn check(&self) -> Result<(), ConfigError> {
+    /// Checks it.
+    ///
+    /// # Errors
+    /// Names the first parameter outside its limits.
+    pub fn check(&self) -> Result<(), ConfigError> {
         let most_sensor = match self.medium {
             Medium::Can(addresses) | Medium::CanFd(addresses) => addresses.most_sensor(),
             Medium::Serial => u8::MAX,
@@ -200,6 +204,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     epoch: Epoch,
     synchronised: bool,
     status: Status,
+    /// Whether something was dropped for want of time since that was last asked.
+    overloaded: bool,
     layers: [Layer<A, W>; P],
     scan: Option<Scan>,
     /// The scan before, and when it was measured.
@@ -237,6 +243,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             epoch,
             synchronised: false,
             status: Status::starting(header.fingerprint),
+            overloaded: false,
             layers: [const { Layer::new() }; P],
             scan: None,
             last: None,
@@ -268,10 +275,18 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.begin(header, now)
     }
 
-    fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+    /// Whether maps of this header are sent by a sender of this size.
+    ///
+    /// # Errors
+    /// Names what there is too much of.
+    pub fn fits(header: &Header) -> Result<(), ConfigError> {
         let most = |cells: usize| u32::try_from(cells).unwrap_or(u32::MAX);
         within("header.azimuths", u32::from(header.azimuths), 1, most(A.min(super::header::MOST_AZIMUTHS)))?;
-        within("header.ranges", u32::from(header.ranges), 1, most((32 * W).min(256)))?;
+        within("header.ranges", u32::from(header.ranges), 1, most((32 * W).min(256)))
+    }
+
+    fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+        Self::fits(&header)?;
         self.header = Header { planes: planes(P), ..header };
         self.status.fingerprint = header.fingerprint;
         self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / u64::from(self.header_messages()));
@@ -293,8 +308,11 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     /// A new epoch begins: no map for a while, but the whole header.
     fn quiet(&mut self, now: Time) {
+        // this is no want of time
+        let overloaded = self.overloaded;
         (self.group, self.groups_first) = (0, self.header_messages());
         self.drop_scan();
+        self.overloaded = overloaded;
         self.layers.iter_mut().for_each(Layer::forget);
         (self.last, self.refreshed, self.from) = (None, None, 0);
         self.quiet_until = Time::from_micros(now.micros() + self.quiet_us());
@@ -307,6 +325,17 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     /// What is told of the sender. Uptime, versions, fingerprint and dropped azimuths are filled in.
     pub fn status_mut(&mut self) -> &mut Status {
         &mut self.status
+    }
+
+    /// Counts messages of maps that were handed out and did not leave.
+    pub fn count_dropped(&mut self, messages: u16) {
+        self.status.dropped = self.status.dropped.saturating_add(messages);
+        self.overloaded |= messages > 0;
+    }
+
+    /// Whether something of a map was dropped since the last call because there was no time to send it.
+    pub fn take_overload(&mut self) -> bool {
+        core::mem::take(&mut self.overloaded)
     }
 
     /// Whether the clock is set by a time service.
@@ -377,7 +406,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     fn drop_scan(&mut self) {
         let Some(scan) = self.scan.take() else { return };
         let pending: u32 = self.layers.iter().map(Layer::pending).sum();
-        self.status.dropped = self.status.dropped.saturating_add(u16::try_from(pending).unwrap_or(u16::MAX));
+        self.count_dropped(u16::try_from(pending).unwrap_or(u16::MAX));
         if let Some(running) = scan.running {
             self.from = match running.next {
                 Next::Block { start, .. } => start,

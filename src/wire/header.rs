@@ -19,16 +19,16 @@
 //! 128 azimuths (their start takes seven bits of a classic frame), 256 range cells, positions within
 //! 83 km of the road's origin.
 
-use crc::Crc;
+use crc::{Crc, NoTable};
 
 use super::code::block::Context;
 use super::code::interval::Form;
 use super::code::ray::Known;
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
-use crate::angle::Angle;
-use crate::map::RoadPoint;
-use crate::mount::{Levelling, Mount};
-use crate::polar::PolarGeometry;
+use crate::fixed::angle::Angle;
+use crate::map::polar::PolarGeometry;
+use crate::sensor::mount::{Levelling, Mount};
+use crate::sensor::road::RoadPoint;
 
 /// Groups of a header.
 pub const GROUPS: u8 = 7;
@@ -44,9 +44,12 @@ pub const MOST_AZIMUTHS: usize = 128;
 
 static CRC_8: Crc<u8> = Crc::<u8>::new(&crc::CRC_8_GSM_A);
 
+/// Bit by bit: run at starts only, where a table would take a kilobyte of stack or flash.
+static CRC_32: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&crc::CRC_32_ISO_HDLC);
+
 /// A fingerprint of a configuration's bytes: CRC-32, to see that two are the same.
 pub fn fingerprint(bytes: &[u8]) -> u32 {
-    Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
+    CRC_32.checksum(bytes)
 }
 
 /// The sender's clock.

@@ -7,7 +7,7 @@
 //! # Limits
 //! At most 50 scans a second. Numbers come again after 5.12 s.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 
 /// Length of a tick, microseconds.
 pub const TICK_US: u32 = 20_000;

@@ -65,6 +65,8 @@ pub enum Reason {
     BusOff,
     /// The time of a frame was exceeded.
     Overrun,
+    /// Points keep coming, but none that can be used: not finite, or all outside the field of view.
+    UnusablePoints,
     /// A number given by the integrator, or by a later version.
     Other(u8),
 }
@@ -83,6 +85,7 @@ impl Reason {
             Self::BusOverload => 7,
             Self::BusOff => 8,
             Self::Overrun => 9,
+            Self::UnusablePoints => 10,
             Self::Other(number) => number,
         }
     }
@@ -100,6 +103,7 @@ impl Reason {
             7 => Self::BusOverload,
             8 => Self::BusOff,
             9 => Self::Overrun,
+            10 => Self::UnusablePoints,
             other => Self::Other(other),
         }
     }

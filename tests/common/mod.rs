@@ -3,22 +3,27 @@
 #![allow(dead_code)] // each test file uses a part
 #![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_3d::{FrameReport, Radar3d, Radar3dConfig, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
+use viewshed::sensor::road::RoadPoint;
+use viewshed::unit::settings::Settings;
+use viewshed::unit::{bench_sender, build};
+use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::wire::message::Epoch;
 
 pub const R: usize = 200;
 pub const A: usize = 120;
 pub const E: usize = 16;
 
-pub type State = Radar3d<R, A, E, 7, 64, 256>;
+pub type State = Radar3d<R, A, E, 7, 96, 256>;
 pub type Parameters = Radar3dParameters<R, A, E>;
 pub type Map = PolarMap<R, A>;
 
@@ -38,6 +43,18 @@ pub fn gantry(height_m: f32, yaw_deg: f32) -> Sensor {
         },
         noise: NoiseConfig::default(),
     }
+}
+
+/// Parameters and sender of a unit of 50 x 40 x 8 cells in a test bench.
+pub fn small_unit(
+    settings: &Settings,
+    medium: Medium,
+    epoch: u8,
+    now: Time,
+) -> (Radar3dParameters<50, 40, 8>, Broadcaster<40, 2>) {
+    let mut parameters = None;
+    let header = build(settings, &mut parameters).unwrap();
+    (parameters.unwrap(), bench_sender(header, medium, Epoch::new(epoch), now).unwrap())
 }
 
 /// An upright box that moves along the road, metres and m/s.

@@ -12,14 +12,16 @@ use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::state::RadarState;
 use viewshed::inputs::ars408::upkeep::Upkeep;
 use viewshed::profile::reference::{DETECTIONS, Unit};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper};
 use viewshed::unit::can_session::CanSession;
 use viewshed::unit::radar_clock::RadarClock;
 use viewshed::unit::session::{Flow, Session};
-use viewshed::unit::settings::Settings;
+use viewshed::unit::stored::Stored;
 use viewshed::unit::ti_session::TiSession;
 use viewshed::wire::frame::CanFrame;
+use viewshed::wire::message::Epoch;
+use viewshed::wire::status::Reason;
 
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
@@ -55,8 +57,8 @@ pub enum Step {
 
 /// A radar.
 pub trait Input {
-    /// A start: what to work with, `None` in the safe state.
-    fn start(&mut self, config: &Config, slots: &mut FileSlots, output: &mut Output) -> Option<Settings>;
+    /// A start, with a block or without, where the radar's line takes messages.
+    fn start(&mut self, _epoch: Epoch, _stored: Stored, _output: &mut Output) {}
     /// For waiting until something comes.
     fn fd(&self) -> Option<BorrowedFd<'_>>;
     /// Takes what came up to now, and what follows from time alone.
@@ -145,10 +147,6 @@ impl Bus {
 }
 
 impl Input for Bus {
-    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
-        slots.settings(config)
-    }
-
     fn fd(&self) -> Option<BorrowedFd<'_>> {
         self.interface.fd()
     }
@@ -171,6 +169,9 @@ impl Input for Bus {
         self.look_after(None, now);
         self.last = now;
         self.session.idle(now, unit);
+        if self.upkeep.as_ref().is_some_and(|upkeep| upkeep.disagrees(now)) {
+            unit.degrade(now, Reason::RadarConfiguration);
+        }
         Step::Now(now)
     }
 }
@@ -228,10 +229,6 @@ impl Log {
 }
 
 impl Input for Log {
-    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
-        slots.settings(config)
-    }
-
     fn fd(&self) -> Option<BorrowedFd<'_>> {
         None
     }
@@ -264,10 +261,6 @@ struct TiPort {
 }
 
 impl Input for TiPort {
-    fn start(&mut self, config: &Config, slots: &mut FileSlots, _: &mut Output) -> Option<Settings> {
-        slots.settings(config)
-    }
-
     fn fd(&self) -> Option<BorrowedFd<'_>> {
         self.port.fd()
     }
@@ -304,11 +297,10 @@ struct NativePort {
 }
 
 impl Input for NativePort {
-    fn start(&mut self, config: &Config, slots: &mut FileSlots, output: &mut Output) -> Option<Settings> {
+    fn start(&mut self, epoch: Epoch, stored: Stored, output: &mut Output) {
         self.port.keep_open();
         let mut lines = Lines { output, own: Some(&mut self.port) };
-        self.session = Some(Session::start(self.sensor, slots, &mut lines));
-        slots.settings(config)
+        self.session = Some(Session::start(self.sensor, epoch, stored, &mut lines));
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {

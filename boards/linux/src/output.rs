@@ -8,17 +8,20 @@ use anyhow::{Context, Result};
 use log::{error, info};
 use viewshed::pil::record::FrameRecord;
 use viewshed::profile::reference::Unit;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::session::{Flow, Line};
+use viewshed::unit::stored::Stored;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::MOST_STUFFED;
+use viewshed::wire::status::{Reason, Status};
 
 use crate::can::Interface;
 use crate::config::{ClockSource, Config};
 use crate::frames;
+use crate::run::version;
 use crate::serial::Serial;
 use crate::state::FileSlots;
 
@@ -74,12 +77,12 @@ impl Output {
     }
 
     /// A start: from here on the integrator's messages are answered, where that is wanted.
-    pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, slots: &FileSlots) {
+    pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, stored: Stored) {
         // nothing of the epoch before
         self.held = None;
         let medium = config.medium().filter(|_| config.output.service);
         let service = medium.map(|medium| CanServiceConfig::new(config.output.sensor, medium));
-        self.service = service.map(|service| CanService::start(service, epoch, now, slots));
+        self.service = service.map(|service| CanService::start(service, epoch, now, stored));
     }
 
     /// Opens what is to be open and takes what the bus says; whether the integrator wants a restart.
@@ -112,7 +115,8 @@ impl Output {
     /// Answers the integrator; in the safe state, says that it is one.
     pub fn answer(&mut self, now: Time, safe: bool, slots: &FileSlots) {
         let Some(service) = &mut self.service else { return };
-        let status = if safe { service.next_status(now) } else { None };
+        let told = Status { firmware: version(), ..Status::starting(0) };
+        let status = if safe { service.next_status(now, told) } else { None };
         let answer = service.next_frame(now, slots);
         for frame in status.iter().chain(&answer) {
             let sent = self.put(now, frame);
@@ -132,7 +136,7 @@ impl Output {
             let mut lines = Lines { output: self, own };
             while let Some(message) = unit.next_line(now, &mut line).and_then(|n| line.get(..n)) {
                 if !lines.send(message) {
-                    dropped(unit);
+                    unit.broadcast().count_dropped(1);
                 }
             }
             return;
@@ -145,7 +149,7 @@ impl Output {
                 return;
             } else {
                 self.refused += 1;
-                dropped(unit);
+                unit.broadcast().count_dropped(1);
             }
         }
         while let Some(frame) = unit.next_frame(now) {
@@ -156,7 +160,10 @@ impl Output {
             self.sent += 1;
         }
         if let Sink::Can(interface, _) = &self.sink {
-            unit.broadcast().status_mut().bus_off = interface.bus_offs;
+            let status = unit.broadcast().status_mut();
+            if std::mem::replace(&mut status.bus_off, interface.bus_offs) != interface.bus_offs {
+                unit.degrade(now, Reason::BusOff);
+            }
         }
     }
 
@@ -186,11 +193,6 @@ impl Output {
             _ => Ok(()),
         }
     }
-}
-
-fn dropped(unit: &mut Unit<'_>) {
-    let status = unit.broadcast().status_mut();
-    status.dropped = status.dropped.saturating_add(1);
 }
 
 /// A serial session's way out: the maps' line, or back on the radar's where maps go over CAN.

@@ -6,11 +6,13 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use viewshed::polar::PolarMap;
-use viewshed::profile::reference::{Map, Parameters, Sender, State, Unit};
-use viewshed::time::Time;
-use viewshed::unit::header;
+use viewshed::map::polar::PolarMap;
+use viewshed::profile::reference::{CHECK, Map, Parameters, Sender, State, Unit};
+use viewshed::fixed::time::Time;
+use viewshed::unit::build;
 use viewshed::unit::session::Flow;
+use viewshed::unit::settings::BlockError;
+use viewshed::unit::stored::Stored;
 use viewshed::wire::status::{Reason, State as Told};
 
 use crate::config::{ClockSource, Config};
@@ -37,7 +39,8 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let _ = folder.map(std::fs::create_dir_all);
     let settings = config.settings();
     let mut slots = FileSlots::open(folder, settings.as_ref());
-    if config.has_service() && settings.is_some() && slots.newest().ok() != settings {
+    let stored = Stored::read(&slots, CHECK);
+    if config.has_service() && settings.is_some() && stored.settings().is_some_and(|s| Some(*s) != settings) {
         warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
     }
     let mut input = input::open(config)?;
@@ -51,14 +54,19 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         let epoch = next_epoch(folder, last_epoch);
         last_epoch = Some(epoch);
         output.keep_up(clock.now(), &mut slots);
-        let settings = input.start(config, &mut slots, &mut output);
-        let parameters = settings.map(|s| Parameters::new(&s.sensor, &s.radar_3d())).transpose();
-        let parameters = parameters.map_err(|e| anyhow!("{e}"))?;
-        let mut sender = None;
-        if let Some((settings, parameters)) = settings.as_ref().zip(parameters.as_ref()) {
+        let stored = Stored::read(&slots, CHECK);
+        input.start(epoch, stored, &mut output);
+        // where blocks are taken the newest that can run, else what the file says
+        let settings = if config.has_service() { stored.settings().copied() } else { config.settings() };
+        let refused = stored.place().err().filter(|_| settings.is_none());
+        if let Some(reason) = &refused {
+            warn!("{reason}: safe state until a block is written");
+        }
+        let (mut parameters, mut sender) = (None::<Parameters>, None);
+        if let Some(settings) = &settings {
             let medium = config.medium().context("output.base_id is no identifier")?;
-            let header =
-                header(settings, parameters).map_err(|e| anyhow!("maps of this sensor cannot be sent: {e:?}"))?;
+            // what does not build was refused above
+            let header = build(settings, &mut parameters).map_err(|e| anyhow!("{e}"))?;
             let now = input.now(clock.now());
             let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
@@ -67,10 +75,10 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         if let Some(unit) = &mut unit {
             unit.broadcast().status_mut().firmware = version();
         }
-        output.start(config, epoch, input.now(clock.now()), &slots);
+        output.start(config, epoch, input.now(clock.now()), stored);
         info!("started, epoch {}", epoch.number());
         systemd.ready();
-        let mut watch = Watch::default();
+        let mut watch = Watch { refused, ..Watch::default() };
         let last = loop {
             if stop.load(Ordering::Relaxed) {
                 info!("stopping");
@@ -81,9 +89,13 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             if output.keep_up(now, &mut slots) == Flow::Restart {
                 break Step::Restart;
             }
+            let (began, offered) = (Instant::now(), unit.as_ref().and_then(Unit::offered));
             let step = input.step(now, &mut Work { unit: &mut unit, slots: &mut slots, output: &mut output });
             let Step::Now(now) = step else { break step };
             if let Some(unit) = &mut unit {
+                if unit.offered() != offered && config.input.clock == ClockSource::System {
+                    unit.took(now, began.elapsed().as_micros() as u64);
+                }
                 output.send(now, unit, input.line());
             }
             output.answer(now, unit.is_none(), &slots);
@@ -164,7 +176,7 @@ impl Clock {
 }
 
 /// Version of the daemon, for the status.
-fn version() -> [u8; 3] {
+pub fn version() -> [u8; 3] {
     let mut parts = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse().unwrap_or(0));
     std::array::from_fn(|_| parts.next().unwrap_or(0))
 }
@@ -177,6 +189,8 @@ struct Watch {
     /// Messages of the safe state.
     said: u64,
     told: Option<(Told, Reason)>,
+    /// Why there is no unit.
+    refused: Option<BlockError>,
 }
 
 impl Watch {
@@ -205,7 +219,10 @@ impl Watch {
     }
 
     fn text(&self, output: &Output) -> String {
-        let state = self.told.map_or("Starting".to_owned(), |(state, _)| format!("{state:?}"));
-        format!("radar {state}; {} maps, {} messages sent, {} refused", self.maps, output.sent, output.refused)
+        let state = match (&self.refused, self.told) {
+            (Some(reason), _) => format!("safe state: {reason}"),
+            (None, told) => format!("radar {:?}", told.map_or(Told::Starting, |(state, _)| state)),
+        };
+        format!("{state}; {} maps, {} messages sent, {} refused", self.maps, output.sent, output.refused)
     }
 }

@@ -7,17 +7,21 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::unit::session::Slots;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
+use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::stored::Slots;
 use viewshed::wire::message::Epoch;
 
-use crate::config::Config;
+
+/// The files that are kept.
+pub const FILES: [&str; 2] = [EPOCH, SLOTS];
+const EPOCH: &str = "epoch";
+const SLOTS: &str = "slots";
 
 /// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
 /// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
 pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
     let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
-    let path = folder.map(|folder| folder.join("epoch"));
+    let path = folder.map(|folder| folder.join(EPOCH));
     let kept = || fs::read_to_string(path.as_ref()?).ok()?.trim().parse().ok().map(Epoch::new);
     let next = last.or_else(kept).map_or(Epoch::new(chance), Epoch::next);
     match path.as_ref().map(|path| replace(path, next.number().to_string().as_bytes())) {
@@ -48,7 +52,7 @@ pub struct FileSlots {
 impl FileSlots {
     /// Reads the slots. Where none was written, the first holds these settings.
     pub fn open(folder: Option<&Path>, settings: Option<&Settings>) -> Self {
-        let path = folder.map(|folder| folder.join("slots"));
+        let path = folder.map(|folder| folder.join(SLOTS));
         let mut slots = [[0xFF; BLOCK_LEN]; 2];
         let kept = path.as_ref().and_then(|path| fs::read(path).ok()).unwrap_or_default();
         for (slot, bytes) in slots.iter_mut().zip(kept.chunks(BLOCK_LEN)) {
@@ -59,26 +63,6 @@ impl FileSlots {
             slots[0] = settings.to_block(1);
         }
         Self { path, slots }
-    }
-
-    /// The settings to work with.
-    ///
-    /// # Errors
-    /// Why neither block is used.
-    pub fn newest(&self) -> Result<Settings, [BlockError; 2]> {
-        Settings::newest([&self.slots[0], &self.slots[1]]).map(|newest| newest.settings)
-    }
-
-    /// What to work with: the newest block where blocks are taken, else what the file says.
-    pub fn settings(&self, config: &Config) -> Option<Settings> {
-        if !config.has_service() {
-            return config.settings();
-        }
-        self.newest()
-            .inspect_err(|[first, second]| {
-                warn!("no configuration that holds ({first}; {second}): safe state until a block is written")
-            })
-            .ok()
     }
 
     fn keep(&self, slot: usize) -> std::io::Result<()> {
@@ -114,10 +98,14 @@ impl Slots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viewshed::field_of_view::FieldOfView;
-    use viewshed::mount::Mount;
-    use viewshed::reflection::NoiseConfig;
+    use viewshed::sensor::config::ConfigError;
+    use viewshed::sensor::field_of_view::FieldOfView;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
+    use viewshed::profile::reference::CHECK;
     use viewshed::sensor::Sensor;
+    use viewshed::unit::settings::BlockError;
+    use viewshed::unit::stored::Stored;
 
     fn settings(height_m: f32) -> Settings {
         Settings::of(Sensor {
@@ -141,6 +129,11 @@ mod tests {
         folder
     }
 
+    fn height(slots: &FileSlots) -> Result<f32, BlockError> {
+        let stored = Stored::read(slots, CHECK);
+        stored.place().map(|_| stored.settings().unwrap().sensor.mount.height_m)
+    }
+
     #[test]
     fn epochs_go_on_from_start_to_start() {
         let folder = folder("epochs");
@@ -159,7 +152,6 @@ mod tests {
     #[test]
     fn the_files_settings_count_until_a_block_is_written_and_a_damaged_block_is_not_used() {
         let folder = folder("slots");
-        let height = |slots: &FileSlots| slots.newest().map(|s| s.sensor.mount.height_m);
         let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
         assert_eq!(height(&slots), Ok(6.0));
         assert!(!folder.join("slots").exists());
@@ -173,12 +165,31 @@ mod tests {
         bytes[40] ^= 1;
         fs::write(folder.join("slots"), &bytes).unwrap();
         let damaged = FileSlots::open(Some(&folder), Some(&settings(8.0)));
-        assert_eq!(height(&damaged), Err([BlockError::CheckSum; 2]), "never silently another");
+        assert_eq!(height(&damaged), Err(BlockError::CheckSum), "never silently another");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_block_that_cannot_run_is_not_written_and_not_used() {
+        let folder = folder("limits");
+        // in no view: 1 m above ground from 6 m high, 4 m far
+        let mut short = settings(6.0);
+        (short.sensor.field_of_view.range_min_m, short.sensor.field_of_view.range_max_m) = (0.5, 4.0);
+        let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
+        let refused = Stored::read(&slots, CHECK).write(&short.to_block(0), &mut slots);
+        assert!(matches!(refused, Err(BlockError::Parameter(ConfigError { .. }))), "{refused:?}");
+        assert!(!folder.join("slots").exists());
+        // an older version stored it
+        slots.write(1, &short.to_block(9));
+        assert_eq!(height(&FileSlots::open(Some(&folder), None)), Ok(6.0), "the one before");
+        slots.write(0, &short.to_block(8));
+        let Err(BlockError::Parameter(e)) = height(&FileSlots::open(Some(&folder), None)) else { panic!("used") };
+        assert!(e.parameter.starts_with("field_of_view."), "{e}");
         fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]
     fn without_settings_and_blocks_there_is_nothing_to_work_with() {
-        assert_eq!(FileSlots::open(None, None).newest(), Err([BlockError::Empty; 2]));
+        assert_eq!(height(&FileSlots::open(None, None)), Err(BlockError::Empty));
     }
 }

@@ -39,11 +39,12 @@ use stm32::can::{Queue, Receiver, open, queue};
 use stm32::dma::SEND;
 use stm32::serial::{Line, Out, send};
 use stm32::{crash, now};
-use viewshed::profile::reference::{Map, Parameters, Roadside, Sender, State};
+use viewshed::profile::reference::{CHECK, Map, Parameters, Roadside, Sender, State};
 use viewshed::unit::flash_slots::FlashSlots;
-use viewshed::unit::roadside::{Memory, Ports, ResetFlags, Start, buses};
+use viewshed::unit::roadside::{Memory, Ports, ResetFlags, Start};
 use viewshed::unit::session::Flow;
 use viewshed::unit::status_output::StatusOutput;
+use viewshed::unit::stored::Stored;
 use viewshed::wire::message::Epoch;
 
 /// The radar's number on its bus and in the broadcast.
@@ -156,7 +157,8 @@ async fn main(_spawner: Spawner) {
 
     let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS, |slot| last.readable(slot));
     crash::read_done();
-    let [radar_timing, broadcast_timing] = buses(&slots).map(|bus| bus.timing(CAN_CLOCK_HZ));
+    let stored = Stored::read(&slots, CHECK.on_can(CAN_CLOCK_HZ));
+    let [radar_timing, broadcast_timing] = stored.buses().map(|bus| bus.timing(CAN_CLOCK_HZ));
     let can = can::CanConfigurator::new(p.FDCAN1, p.PD0, p.PD1, Irqs);
     let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);
     let can = can::CanConfigurator::new(p.FDCAN2, p.PB5, p.PB6, Irqs);
@@ -183,7 +185,7 @@ async fn main(_spawner: Spawner) {
         serial: SERIAL.init(None),
     };
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
-    let start = Start { sensor: SENSOR, epoch, reset_cause: flags.into() };
+    let start = Start { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
     let mut ports = Ports { radar, broadcast, serial, slots };
     let mut unit = Roadside::start(start, memory, now(), &mut ports);
     let mut light = StatusOutput::new(Output::new(p.PB0, Level::Low, Speed::Low));

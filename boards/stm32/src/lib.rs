@@ -8,7 +8,7 @@ pub mod crash;
 pub mod dma;
 pub mod serial;
 
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 
 /// The hardware timer's time, in which the loop, the receive queues and the events count.
 pub fn now() -> Time {

@@ -3,7 +3,7 @@
 use super::configuration::RadarConfiguration;
 use super::motion::standing;
 use super::state::RadarState;
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::frame::CanFrame;
 
 /// Speed and yaw rate are sent this often.
@@ -22,6 +22,8 @@ pub struct Upkeep {
     sensor: u8,
     settings: RadarConfiguration,
     holds: Option<bool>,
+    /// When the settings were sent first.
+    asked: Option<Time>,
     motion_at: Option<Time>,
     settings_at: Option<Time>,
     /// The yaw rate is still to follow the speed.
@@ -31,7 +33,7 @@ pub struct Upkeep {
 impl Upkeep {
     /// For the sensor of an id; the settings are not to change that id.
     pub const fn new(sensor: u8, settings: RadarConfiguration) -> Self {
-        Self { sensor, settings, holds: None, motion_at: None, settings_at: None, yaw_rate_due: false }
+        Self { sensor, settings, holds: None, asked: None, motion_at: None, settings_at: None, yaw_rate_due: false }
     }
 
     /// Takes note of what the sensor says of itself.
@@ -42,6 +44,13 @@ impl Upkeep {
     /// Whether the sensor has read the settings back; until then its scans may be of another kind.
     pub fn holds(&self) -> bool {
         self.holds == Some(true)
+    }
+
+    /// Whether the sensor is known not to be as it is to be: it reads back other settings, or none for as long as
+    /// they are given to hold.
+    pub fn disagrees(&self, now: Time) -> bool {
+        let waited = self.asked.and_then(|asked| now.since(asked)).is_some_and(|us| us >= SETTINGS_PERIOD_US);
+        self.holds.map_or(waited, |holds| !holds)
     }
 
     /// The next frame to be sent, if one is due; to be called until there is none.
@@ -55,6 +64,7 @@ impl Upkeep {
         }
         if !self.holds() && due(self.settings_at, now, SETTINGS_PERIOD_US) {
             self.settings_at = Some(now);
+            self.asked.get_or_insert(now);
             let frame = self.settings.frame(self.sensor);
             self.settings.store = None;
             return frame;
@@ -94,16 +104,18 @@ mod tests {
         assert_eq!(sent(&mut upkeep, 0), ["220#7800000010240000", "320#0000", "321#8000"]);
         assert_eq!(sent(&mut upkeep, 49), [""; 0]);
         assert_eq!(sent(&mut upkeep, 50), ["320#0000", "321#8000"]);
-        assert!(!upkeep.holds());
+        assert!(!upkeep.holds() && !upkeep.disagrees(Time::from_micros(1_999_999)));
+        assert!(upkeep.disagrees(Time::from_micros(2_000_000)), "no answer is none");
         // nothing was read back
         assert_eq!(sent(&mut upkeep, 2000), ["220#7800000010240000", "320#0000", "321#8000"]);
         upkeep.state(&RadarState::read(&HOLDS).unwrap());
-        assert!(upkeep.holds());
+        assert!(upkeep.holds() && !upkeep.disagrees(Time::from_micros(5_000_000)));
         assert_eq!(sent(&mut upkeep, 5000), ["320#0000", "321#8000"]);
         // it started over and sends objects again
         let mut objects = HOLDS;
         objects[5] = 0x14;
         upkeep.state(&RadarState::read(&objects).unwrap());
+        assert!(upkeep.disagrees(Time::from_micros(5_001_000)));
         assert_eq!(sent(&mut upkeep, 5001), ["220#7800000010240000"]);
     }
 

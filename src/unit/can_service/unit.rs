@@ -1,16 +1,15 @@
 //! The unit's end: takes a block, keeps it, tells what it runs with, and what it says without one.
 
 use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
-use crate::time::Time;
-use crate::unit::session::{Flow, Slots, worst, write};
-use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
+use crate::fixed::time::Time;
+use crate::unit::safe_state::SafeState;
+use crate::unit::session::Flow;
+use crate::unit::settings::{BLOCK_LEN, BlockError, Settings};
+use crate::unit::stored::{Slots, Stored};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
-use crate::wire::message::{Epoch, Message, Packet};
-use crate::wire::status::{PAGES, Reason, State, Status};
-
-/// Time between two status messages in the safe state, microseconds.
-const SAFE_STATUS_US: u64 = 250_000;
+use crate::wire::message::Epoch;
+use crate::wire::status::Status;
 
 /// Where and how a unit answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,13 +36,14 @@ impl CanServiceConfig {
 /// A block is sent in parts, written, and read by the next start:
 /// ```
 /// # use viewshed::unit::can_service::{Answers, CanService, CanServiceConfig, Told, Tool};
-/// # use viewshed::field_of_view::FieldOfView;
-/// # use viewshed::mount::Mount;
-/// # use viewshed::reflection::NoiseConfig;
+/// # use viewshed::sensor::field_of_view::FieldOfView;
+/// # use viewshed::sensor::mount::Mount;
+/// # use viewshed::sensor::noise::NoiseConfig;
 /// # use viewshed::sensor::Sensor;
-/// # use viewshed::unit::session::{Flow, Slots};
+/// # use viewshed::unit::session::Flow;
+/// # use viewshed::unit::stored::{Check, Slots, Stored};
 /// # use viewshed::unit::settings::{BLOCK_LEN, Settings};
-/// # use viewshed::time::Time;
+/// # use viewshed::fixed::time::Time;
 /// # use viewshed::wire::broadcast::Medium;
 /// # use viewshed::wire::message::{Addresses, Epoch};
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);
@@ -64,7 +64,9 @@ impl CanServiceConfig {
 /// let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(3, medium) };
 /// let (mut slots, now) = (InRam([[0xFF; BLOCK_LEN]; 2]), Time::from_micros(0));
 ///
-/// let mut unit = CanService::start(config, Epoch::new(1), now, &slots);
+/// let check = Check::of::<50, 40, 8, 2>();
+///
+/// let mut unit = CanService::start(config, Epoch::new(1), now, Stored::read(&slots, check));
 /// assert!(unit.settings().is_none());
 /// let (mut tool, mut answers) = (Tool::new(3, medium), Answers::new(3, medium));
 /// for frame in tool.write(&settings.to_block(0)) {
@@ -75,55 +77,46 @@ impl CanServiceConfig {
 /// let restart = tool.restart().unwrap();
 /// assert_eq!(unit.take(&restart, &mut slots), Some(Flow::Restart));
 ///
-/// let unit = CanService::start(config, Epoch::new(2), now, &slots);
+/// let unit = CanService::start(config, Epoch::new(2), now, Stored::read(&slots, check));
 /// assert_eq!(unit.settings(), Some(&settings));
 /// ```
 #[derive(Debug, Clone)]
 pub struct CanService {
     config: CanServiceConfig,
     epoch: Epoch,
-    /// The block in use, or why there is none.
-    settings: Result<Newest, BlockError>,
+    stored: Stored,
+    safe: SafeState,
     incoming: Incoming,
     outgoing: Outgoing,
     counter: u8,
     /// When the next answer may be sent.
     next: Time,
-    started: Time,
-    /// The last status of the safe state, its counter and the next page.
-    status: Option<Time>,
-    status_counter: u8,
-    page: u8,
 }
 
 impl CanService {
-    /// Starts with the newest block that holds.
-    pub fn start(config: CanServiceConfig, epoch: Epoch, now: Time, slots: &impl Slots) -> Self {
-        let settings = Settings::newest([slots.slot(0), slots.slot(1)]).map_err(worst);
-        let refused = settings.err().map(|error| Refused { what: What::Block(error), next: 0 });
+    /// Starts with a block, or without.
+    pub fn start(config: CanServiceConfig, epoch: Epoch, now: Time, stored: Stored) -> Self {
+        let refused = stored.place().err().map(|error| Refused { what: What::Block(error), next: 0 });
         Self {
             config,
             epoch,
-            settings,
+            stored,
+            safe: SafeState::new(config.sensor, config.medium, epoch, now),
             incoming: Incoming::NONE,
             outgoing: Outgoing { started: true, refused, written: None, part: None },
             counter: 0,
             next: now,
-            started: now,
-            status: None,
-            status_counter: 0,
-            page: 0,
         }
     }
 
     /// What to work with; none in the safe state.
     pub fn settings(&self) -> Option<&Settings> {
-        self.settings.as_ref().ok().map(|newest| &newest.settings)
+        self.stored.settings()
     }
 
     /// Why there is no block to work with.
-    pub fn refusal(&self) -> Option<&BlockError> {
-        self.settings.as_ref().err()
+    pub fn refusal(&self) -> Option<BlockError> {
+        self.stored.place().err()
     }
 
     /// Takes a frame of the bus; `None` if it is none of the integrator's.
@@ -132,11 +125,11 @@ impl CanService {
         match Request::read(own)? {
             Request::Begin { length } => self.incoming.begin(length),
             Request::Part { number, bytes } => self.incoming.part(number, bytes),
-            Request::Complete { last } => match self.incoming.complete(last, slots) {
+            Request::Complete { last } => match self.incoming.complete(last, &self.stored, slots) {
                 Ok(sequence) => self.outgoing.written = Some(sequence),
                 Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
             },
-            Request::Read => match self.settings {
+            Request::Read => match self.stored.place() {
                 Ok(_) => self.outgoing.part = Some(0),
                 Err(error) => self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 }),
             },
@@ -152,33 +145,16 @@ impl CanService {
         if self.next.since(now).is_some_and(|wait| wait > 0 && wait <= gap_us) {
             return None;
         }
-        let answer = self.outgoing.next(&self.settings, slots)?;
+        let answer = self.outgoing.next(&self.stored, slots)?;
         self.next = Time::from_micros(now.micros().saturating_add(gap_us));
         let CanServiceConfig { sensor, medium, .. } = self.config;
         frame(&medium, sensor, ANSWER, self.epoch, &mut self.counter, answer.own())
     }
 
-    /// The next status of a unit in its safe state, where nothing else of it is sent.
-    pub fn next_status(&mut self, now: Time) -> Option<CanFrame> {
-        let (Medium::Can(addresses) | Medium::CanFd(addresses)) = self.config.medium else { return None };
-        if self.status.and_then(|last| now.since(last)).is_some_and(|us| us < SAFE_STATUS_US) {
-            return None;
-        }
-        self.status = Some(now);
-        let uptime_s = u32::try_from(now.since(self.started).unwrap_or(0) / 1_000_000).unwrap_or(u32::MAX);
-        let status = Status { state: State::Fault, reason: Reason::Configuration, uptime_s, ..Status::starting(0) };
-        let packing = self.config.medium.packing(false);
-        let of = |own: &[u8]| Packet::new(packing, self.config.sensor, Message::Status, self.epoch, own);
-        let (packet, filled) = if packing.is_classic() {
-            (of(&status.emit_page(self.page)), None)
-        } else {
-            let packet = of(&status.emit());
-            (packet, crate::wire::frame::fd_length(packet.bytes().len()))
-        };
-        self.page = (self.page + 1) % PAGES;
-        let protected = packet.protect(self.status_counter, filled);
-        self.status_counter = packing.profile().next(self.status_counter);
-        protected.frame(&addresses)
+    /// The next status of a unit in its safe state, where nothing else of it is sent; versions and counters as
+    /// in `told`.
+    pub fn next_status(&mut self, now: Time, told: Status) -> Option<CanFrame> {
+        self.safe.next_frame(now, told)
     }
 }
 
@@ -211,7 +187,7 @@ impl Incoming {
     }
 
     /// Checks the block and writes it; its sequence.
-    fn complete(&mut self, last: [u8; 4], slots: &mut impl Slots) -> Result<u32, What> {
+    fn complete(&mut self, last: [u8; 4], stored: &Stored, slots: &mut impl Slots) -> Result<u32, What> {
         let Some(length) = self.length else {
             // the answer may have been lost
             let again = self.written.filter(|(sum, _)| *sum == last);
@@ -226,7 +202,7 @@ impl Incoming {
         if block.last_chunk::<4>().is_some_and(|end| *end != last) {
             return Err(What::Block(BlockError::CheckSum));
         }
-        let sequence = write(block, slots).map_err(What::Block)?;
+        let sequence = stored.write(block, slots).map_err(What::Block)?;
         self.written = Some((last, sequence));
         Ok(sequence)
     }
@@ -258,11 +234,10 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    fn next(&mut self, settings: &Result<Newest, BlockError>, slots: &impl Slots) -> Option<Answer> {
+    fn next(&mut self, stored: &Stored, slots: &impl Slots) -> Option<Answer> {
         if core::mem::take(&mut self.started) {
-            let newest = settings.as_ref().ok();
-            let slot = newest.and_then(|n| u8::try_from(n.slot).ok()).unwrap_or(u8::MAX);
-            return Some(Answer::Started { slot, sequence: newest.map_or(0, |n| n.next_sequence.wrapping_sub(1)) });
+            let (slot, sequence) = stored.place().unwrap_or((u8::MAX, 0));
+            return Some(Answer::Started { slot, sequence });
         }
         if let Some(sequence) = self.written.take() {
             return Some(Answer::Written { sequence });
@@ -274,8 +249,7 @@ impl Outgoing {
             return Some(answer);
         }
         let number = self.part.take()?;
-        let slot = slots.slot(settings.as_ref().ok()?.slot);
-        let bytes = *slot.get(4 * usize::from(number)..)?.first_chunk::<4>()?;
+        let bytes = *stored.block(slots).get(4 * usize::from(number)..)?.first_chunk::<4>()?;
         self.part = (usize::from(number) + 1 < PARTS).then_some(number + 1);
         Some(Answer::Part { number, bytes })
     }

@@ -25,19 +25,20 @@
 
 mod outbox;
 mod reset;
-mod safe;
 mod service;
 
+use crate::fixed::time::Time;
 use crate::inputs::ars408;
-use crate::polar::PolarMap;
+use crate::map::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
-use crate::time::Time;
-use crate::unit::can_bus::{BusConfig, BusKeeper, BusState, CanPort};
+use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
 use crate::unit::can_session::CanSession;
-use crate::unit::session::{Flow, Slots};
+use crate::unit::safe_state::SafeState;
+use crate::unit::session::Flow;
 use crate::unit::settings::Settings;
-use crate::unit::{Unit, header};
+use crate::unit::stored::{Slots, Stored};
+use crate::unit::{Unit, build};
 use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use crate::wire::message::{Addresses, Epoch};
 use crate::wire::serial::MOST_STUFFED;
@@ -45,7 +46,6 @@ use crate::wire::status::{Reason, ResetCause, State, Status};
 
 use outbox::Outbox;
 pub use reset::ResetFlags;
-use safe::SafeState;
 use service::Service;
 
 /// Frames of a bus taken in a step.
@@ -86,6 +86,8 @@ pub struct Start {
     pub sensor: u8,
     /// One that was not used lately.
     pub epoch: Epoch,
+    /// The block to run with, or why there is none.
+    pub stored: Stored,
     /// Why the controller started.
     pub reset_cause: ResetCause,
 }
@@ -132,13 +134,6 @@ pub struct Step {
     pub state: State,
 }
 
-/// Both buses as the newest block that holds describes them: the radar's, the broadcast's. By default where
-/// there is none.
-pub fn buses(slots: &impl Slots) -> [BusConfig; 2] {
-    Settings::newest([slots.slot(0), slots.slot(1)])
-        .map_or_else(|_| Default::default(), |n| [n.settings.radar_bus, n.settings.broadcast_bus])
-}
-
 /// A unit and its second sender.
 #[derive(Debug)]
 struct Maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize> {
@@ -158,7 +153,7 @@ pub struct Roadside<
     const N: usize,
     const G: usize,
 > {
-    start: Start,
+    reset_cause: ResetCause,
     service: Service,
     can_service: CanService,
     maps: Option<Maps<'u, R, A, E, W, N, G>>,
@@ -169,6 +164,8 @@ pub struct Roadside<
     outbox: Outbox,
     /// The last scan or look at the map's age.
     looked: Time,
+    /// When the last step began, if a scan was worked up in it.
+    scanned: Option<Time>,
     /// Frames of the radar lost between its bus and the loop.
     lost: u32,
 }
@@ -176,29 +173,30 @@ pub struct Roadside<
 impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>
     Roadside<'u, T, R, A, E, W, N, G>
 {
-    /// Starts with the newest block that holds, and puts both controllers on their buses.
+    /// Starts, and puts both controllers on their buses.
     pub fn start<Rp: CanPort, Bp: CanPort, L: SerialPort, S: Slots>(
         start: Start,
         memory: Memory<'u, R, A, E, W, N, G>,
         now: Time,
         ports: &mut Ports<Rp, Bp, L, S>,
     ) -> Self {
-        let service = Service::start(start.sensor, &ports.slots, &mut ports.serial);
+        let service = Service::start(start.sensor, start.stored, &mut ports.serial);
         let asked = CanServiceConfig::new(start.sensor, Medium::Can(Addresses::STANDARD));
-        let can_service = CanService::start(asked, start.epoch, now, &ports.slots);
-        let [radar, broadcast] = buses(&ports.slots);
-        let maps = service.settings().and_then(|settings| maps(&start, settings, memory, now));
+        let can_service = CanService::start(asked, start.epoch, now, start.stored);
+        let [radar, broadcast] = start.stored.buses();
+        let maps = start.stored.settings().and_then(|settings| maps(&start, settings, memory, now));
         Self {
-            start,
+            reset_cause: start.reset_cause,
             service,
             can_service,
             maps,
-            safe: SafeState::new(now),
+            safe: SafeState::new(start.sensor, Medium::Serial, start.epoch, now),
             radar: CanSession::new(ars408::Config::sensor(start.sensor)),
             radar_bus: BusKeeper::start(&radar, &mut ports.radar),
             broadcast_bus: BusKeeper::start(&broadcast, &mut ports.broadcast),
             outbox: Outbox::new(),
             looked: now,
+            scanned: None,
             lost: 0,
         }
     }
@@ -232,6 +230,9 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
 
     /// Takes the radar's frames; whether a scan, or a time without one, was worked up.
     fn receive(&mut self, now: Time, port: &mut impl CanPort) -> bool {
+        if let (Some(began), Some(maps)) = (self.scanned.take(), &mut self.maps) {
+            maps.unit.took(now, now.since(began).unwrap_or(0));
+        }
         let before = self.radar.scans();
         self.lost = self.lost.saturating_add(port.take_lost());
         for _ in 0..MOST_FRAMES {
@@ -253,30 +254,34 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
             return false;
         }
         self.looked = now;
+        self.scanned = scanned.then_some(now);
         if let Some(maps) = &mut self.maps {
             if !scanned {
                 self.radar.idle(now, &mut maps.unit);
             }
-            self.tell();
+            self.tell(now);
         }
         true
     }
 
     /// Offers the map to the second sender and completes the status of both.
-    fn tell(&mut self) {
+    fn tell(&mut self, now: Time) {
         let bus_off = self.bus_off();
         let off = [&self.radar_bus, &self.broadcast_bus].iter().any(|k| matches!(k.state(), BusState::Off(_)));
         let radar_lost = self.radar.lost().saturating_add(self.lost);
-        let start = self.start;
+        let reset_cause = self.reset_cause;
         let Some(maps) = &mut self.maps else { return };
+        if off {
+            maps.unit.degrade(now, Reason::BusOff);
+        }
+        if maps.serial.take_overload() {
+            maps.unit.degrade(now, Reason::BusOverload);
+        }
         let status = maps.unit.broadcast().status_mut();
-        status.reset_cause = start.reset_cause;
+        status.reset_cause = reset_cause;
         status.firmware = VERSION;
         status.bus_off = bus_off;
         status.radar_lost = u16::try_from(radar_lost).unwrap_or(u16::MAX);
-        if off && status.state == State::Ok {
-            (status.state, status.reason) = (State::Degraded, Reason::BusOff);
-        }
         let told = *status;
         let second = maps.serial.status_mut();
         *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..told };
@@ -297,15 +302,15 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         if !self.outbox.flush(now, &mut self.broadcast_bus, port) {
             return;
         }
+        let told = self.told();
         let answer = self.can_service.next_frame(now, &ports.slots);
         let (frame, deadline) = match &mut self.maps {
             Some(maps) => {
                 let sender = maps.unit.broadcast();
-                let status = sender.status_mut();
-                status.dropped = status.dropped.saturating_add(late);
+                sender.count_dropped(late);
                 (answer.or_else(|| sender.next_frame(now)), sender.deadline())
             }
-            None => (answer.or_else(|| self.can_service.next_status(now)), None),
+            None => (answer.or_else(|| self.can_service.next_status(now, told)), None),
         };
         if let Some(frame) = frame {
             self.outbox.send(frame, deadline, now, &mut self.broadcast_bus, port);
@@ -314,16 +319,19 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
 
     /// Tells the serial line that there are no settings.
     fn say_safe(&mut self, now: Time, line: &mut impl SerialPort) -> State {
-        let status = Status {
-            state: State::Fault,
-            reason: Reason::Configuration,
-            reset_cause: self.start.reset_cause,
-            firmware: VERSION,
-            bus_off: self.bus_off(),
-            ..Status::starting(0)
-        };
-        self.safe.poll(self.start.sensor, self.start.epoch, status, now, line);
-        status.state
+        let told = self.told();
+        let mut stuffed = [0; MOST_STUFFED];
+        let length = self.safe.next_line(now, told, &mut stuffed);
+        if let Some(message) = length.and_then(|n| stuffed.get(..n)) {
+            let _ = line.send(message);
+        }
+        State::Fault
+    }
+
+    /// What both lines are told of the controller in the safe state.
+    fn told(&self) -> Status {
+        let reset_cause = self.reset_cause;
+        Status { reset_cause, firmware: VERSION, bus_off: self.bus_off(), ..Status::starting(0) }
     }
 
     fn bus_off(&self) -> u16 {
@@ -340,9 +348,8 @@ fn maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, cons
     memory: Memory<'u, R, A, E, W, N, G>,
     now: Time,
 ) -> Option<Maps<'u, R, A, E, W, N, G>> {
-    *memory.parameters = Radar3dParameters::new(&settings.sensor, &settings.radar_3d()).ok();
+    let header = build(settings, memory.parameters).ok()?;
     let parameters = memory.parameters.as_ref()?;
-    let header = header(settings, parameters).ok()?;
     let sender = |medium| {
         let config = BroadcastConfig { stale_ms: STALE_MS, ..BroadcastConfig::new(start.sensor, medium) };
         Broadcaster::new(config, header, start.epoch, now).ok()
@@ -363,8 +370,7 @@ fn talk<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     for _ in 0..MOST_MESSAGES {
         let Some(message) = maps.serial.next_line(now, &mut stuffed).and_then(|n| stuffed.get(..n)) else { return };
         if !port.send(message) {
-            let status = maps.serial.status_mut();
-            status.dropped = status.dropped.saturating_add(1);
+            maps.serial.count_dropped(1);
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::SerialPort;
 use crate::unit::service::{Reply, Request};
-use crate::unit::session::{Flow, Slots, worst, write};
-use crate::unit::settings::{BlockError, Newest, Settings};
+use crate::unit::session::Flow;
+use crate::unit::stored::{Slots, Stored};
 use crate::wire::message::Packing;
 use crate::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 
@@ -16,26 +16,19 @@ pub struct Service {
     sensor: u8,
     unstuffer: Unstuffer,
     counter: u8,
-    /// The block in use, or why there is none.
-    settings: Result<Newest, BlockError>,
+    stored: Stored,
 }
 
 impl Service {
     /// Says what the unit starts with.
-    pub fn start(sensor: u8, slots: &impl Slots, line: &mut impl SerialPort) -> Self {
-        let settings = Settings::newest([slots.slot(0), slots.slot(1)]).map_err(worst);
-        let mut service = Self { sensor, unstuffer: Unstuffer::new(), counter: 0, settings };
-        let slot = settings.ok().and_then(|n| u8::try_from(n.slot).ok());
-        service.reply(&Reply::Started(slot), line);
-        if let Err(reason) = settings {
-            service.reply(&Reply::Refused(&reason), line);
+    pub fn start(sensor: u8, stored: Stored, line: &mut impl SerialPort) -> Self {
+        let mut service = Self { sensor, unstuffer: Unstuffer::new(), counter: 0, stored };
+        let place = stored.place();
+        service.reply(&Reply::Started(place.ok().map(|(slot, _)| slot)), line);
+        if let Err(reason) = &place {
+            service.reply(&Reply::Refused(reason), line);
         }
         service
-    }
-
-    /// What to work with.
-    pub fn settings(&self) -> Option<&Settings> {
-        self.settings.as_ref().ok().map(|n| &n.settings)
     }
 
     /// Takes what came and answers it. The time is the controller's own here, nobody sets it.
@@ -51,7 +44,7 @@ impl Service {
                 Request::Restart => return Flow::Restart,
                 Request::Time(_) => {}
                 Request::Write(block) => {
-                    let outcome = write(block, slots);
+                    let outcome = self.stored.write(block, slots);
                     let reply = match &outcome {
                         Ok(sequence) => Reply::Written(*sequence),
                         Err(reason) => Reply::Refused(reason),
@@ -59,7 +52,7 @@ impl Service {
                     send(&reply, self.sensor, &mut self.counter, line);
                 }
                 Request::Read => {
-                    let used = self.settings.as_ref().ok().map_or(&[][..], |n| slots.slot(n.slot));
+                    let used = self.stored.block(slots);
                     send(&Reply::Block(used), self.sensor, &mut self.counter, line);
                 }
             }

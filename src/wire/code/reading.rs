@@ -6,7 +6,7 @@ use super::expectation::{Before, EdgeTables, Last, Progress, distance_table, fir
 use super::interval::{Decoder, Form, OutOfWords};
 use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH};
 use super::ray::{Known, Ray};
-use crate::bits::Bits;
+use crate::fixed::bits::Bits;
 use core::ops::Range;
 
 /// Why a block's decoding ended.

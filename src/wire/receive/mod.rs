@@ -68,7 +68,7 @@ use core::cell::Cell;
 
 use super::frame::CanFrame;
 use super::message::{Addresses, NotAMessage, Received};
-use crate::time::Time;
+use crate::fixed::time::Time;
 
 /// Frames and looks may be handed in out of order by so much, microseconds: a time stamp was taken before the
 /// look that is handed in after it.
@@ -91,7 +91,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         Self {
             addresses,
             limits,
-            sensors: sensors.map(|number| (number, SensorReceiver::NEW)),
+            sensors: sensors.map(|number| (number, SensorReceiver::new())),
             foreign: 0,
             latest: Cell::new(Time::from_micros(0)),
         }

@@ -10,7 +10,7 @@
 //! until the sender's next freshness message.
 
 use super::{Accepted, Limits, Receiver, Refused};
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::{Addresses, NotAMessage, Received};
 use crate::wire::secoc::{Key, Opener};

@@ -3,7 +3,7 @@
 use super::assembly::{Assembly, Begun, Place};
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Limits, Session};
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
 use crate::wire::code::ray::Ray;
 use crate::wire::code::reading::{self, Ending, Reader};
@@ -131,29 +131,31 @@ pub struct SensorReceiver<const A: usize, const W: usize, const P: usize> {
 
 impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     /// Nothing heard yet.
-    pub const NEW: Self = Self {
-        session: Session::NONE,
-        collector: Collector::NEW,
-        fits: true,
-        clock: None,
-        status: None,
-        planes: [const { Sectors::new() }; P],
-        assemblies: [Assembly::NEW; P],
-        purged: None,
-        sequences: [Counter::NEW; 32],
-        counters: Counters {
-            accepted: 0,
-            protection: 0,
-            not_authentic: 0,
-            lost: 0,
-            repeated: 0,
-            out_of_sequence: 0,
-            late: 0,
-            epoch: 0,
-            early: 0,
-            malformed: 0,
-        },
-    };
+    pub(super) const fn new() -> Self {
+        Self {
+            session: Session::none(),
+            collector: Collector::NEW,
+            fits: true,
+            clock: None,
+            status: None,
+            planes: [const { Sectors::new() }; P],
+            assemblies: [Assembly::NEW; P],
+            purged: None,
+            sequences: [Counter::NEW; 32],
+            counters: Counters {
+                accepted: 0,
+                protection: 0,
+                not_authentic: 0,
+                lost: 0,
+                repeated: 0,
+                out_of_sequence: 0,
+                late: 0,
+                epoch: 0,
+                early: 0,
+                malformed: 0,
+            },
+        }
+    }
 
     /// Its status, as far as it is heard.
     pub fn status(&self) -> Option<&Status> {

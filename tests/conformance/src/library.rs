@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use flate2::Crc;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::message::{Addresses, Plane};
 use viewshed::wire::receive::{Limits, Receiver};

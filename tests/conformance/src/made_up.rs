@@ -1,7 +1,7 @@
 //! Messages and maps that no sender of this recording sends.
 
-use viewshed::bits::Bits;
-use viewshed::time::Time;
+use viewshed::fixed::bits::Bits;
+use viewshed::fixed::time::Time;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Clock, Header};
 use viewshed::wire::message::{Epoch, Message, Packet};

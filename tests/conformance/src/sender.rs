@@ -1,7 +1,7 @@
 //! Senders: a recording's maps, one after another, and what of them is on the bus when.
 
 use anyhow::{Result, anyhow};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanId;
 use viewshed::wire::message::{Epoch, Message, Packet};

@@ -1,13 +1,14 @@
 //! Any bytes as configuration block, service message and bench record: what is taken is within its limits
 //! and comes back as it was.
 
-use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::Mount;
 use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::service::{Reply, Request, data_id};
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::stored::Check;
 use viewshed::wire::e2e::Profile;
 
 fn crc32(bytes: &[u8]) -> u32 {
@@ -44,15 +45,15 @@ fn block(content: &[u8]) -> [u8; BLOCK_LEN] {
 pub fn run(bytes: &[u8]) {
     let _ = Settings::from_block(bytes);
     let whole = block(bytes);
-    let slots = Settings::newest([bytes, &whole]);
-    match Settings::from_block(&whole) {
+    let check = Check::of::<50, 40, 8, 2>();
+    let slots = Settings::newest([bytes, &whole], |settings| check.settings(settings));
+    match slots.map(|newest| (newest.next_sequence - 1, newest.settings)).map_err(|[_, reason]| reason) {
         Ok((sequence, settings)) => {
-            assert!(sequence == 3 && settings.check().is_ok());
+            assert_eq!(sequence, 3);
             assert!(settings.sensor.mount.levelling().is_ok() && settings.sensor.field_of_view.limits().is_ok());
             // flags are written as 0 or 1
             let again = settings.to_block(sequence);
             assert_eq!(Settings::from_block(&again), Ok((sequence, settings)));
-            assert_eq!(slots.map(|newest| newest.settings), Ok(settings));
         }
         Err(reason) => {
             assert!((1..=5).contains(&reason.code()));

@@ -1,6 +1,6 @@
 //! Any words as a block: the end comes, rays keep within their limits, and what is read can be resumed.
 
-use viewshed::bits::Bits;
+use viewshed::fixed::bits::Bits;
 use viewshed::wire::code::block::{Context, Kind};
 use viewshed::wire::code::interval::Form;
 use viewshed::wire::code::ray::{Known, Ray};

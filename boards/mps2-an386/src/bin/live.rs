@@ -3,7 +3,7 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use mps2_an386::profile::{DETECTIONS, Map, Parameters, Sender, State, opening};
+use mps2_an386::profile::{CHECK, DETECTIONS, Map, Parameters, Sender, State, opening};
 use mps2_an386::stack;
 use mps2_an386::timer::{TICKS_PER_256, Timer};
 use mps2_an386::uart::{PATIENCE, Uart};
@@ -11,9 +11,11 @@ use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::pil::flash::Flash;
 use viewshed::pil::record::{Closing, FrameRecord, Record};
 use viewshed::unit::session::{Flow, Line, Session};
+use viewshed::unit::stored::Stored;
 use viewshed::unit::transmitter::Transmitter;
 use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
+use viewshed::wire::message::Epoch;
 
 const SENSOR: u8 = 0;
 
@@ -49,6 +51,12 @@ impl Line for Lines {
     }
 }
 
+/// Apart, so that what this takes of the stack is free again.
+#[inline(never)]
+fn session(epoch: Epoch, flash: &Flash, lines: &mut Lines) -> Session<DETECTIONS> {
+    Session::start(SENSOR, epoch, Stored::read(flash, CHECK), lines)
+}
+
 #[entry]
 fn main() -> ! {
     let radar = Uart::start(0);
@@ -65,7 +73,7 @@ fn main() -> ! {
         let epoch = flash.start();
         starts += 1;
         lines.record(&Record::Opening(opening(TICKS_PER_256)));
-        let mut session = Session::<DETECTIONS>::start(SENSOR, &flash, &mut lines);
+        let mut session = session(epoch, &flash, &mut lines);
         let settings = session.settings();
         let mut parameters: Option<Parameters> = None;
         start_bench(&mut parameters, sender, settings, Medium::Serial, epoch, session.now());

@@ -7,7 +7,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::pil::files::Files;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Memory, run};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Epoch;

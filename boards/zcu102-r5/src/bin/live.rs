@@ -7,16 +7,16 @@ use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::inputs::ars408::Config;
 use viewshed::pil::files::{FlashFile, answer};
 use viewshed::pil::record::{Closing, Record};
-use viewshed::unit::can_bus::{BusConfig, BusKeeper};
+use viewshed::unit::can_bus::BusKeeper;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::can_session::CanSession;
-use viewshed::unit::session::{Flow, Slots};
-use viewshed::unit::settings::Settings;
+use viewshed::unit::session::Flow;
+use viewshed::unit::stored::Stored;
 use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Addresses;
 use zcu102_r5::can::Can;
-use zcu102_r5::profile::{DETECTIONS, Map, Parameters, Sender, State};
+use zcu102_r5::profile::{CHECK, DETECTIONS, Map, Parameters, Sender, State};
 use zcu102_r5::semihost::HostFile;
 use zcu102_r5::stack;
 
@@ -44,18 +44,17 @@ extern "C" fn main() -> ! {
     loop {
         let epoch = flash.start();
         starts += 1;
-        let settings = Settings::newest([flash.slot(0), flash.slot(1)]).ok().map(|newest| newest.settings);
-        // a bit rate that no divider meets must not make the unit unreachable
-        let bus = settings.map(|s| s.radar_bus).filter(|bus| bus.timing(CAN_CLOCK_HZ).is_some()).unwrap_or_default();
+        let stored = Stored::read(&flash, CHECK.on_can(CAN_CLOCK_HZ));
+        let [bus, _] = stored.buses();
         let Some(timing) = bus.timing(CAN_CLOCK_HZ) else { exit(1) };
         let mut can = Can::new(timing);
         let mut keeper = BusKeeper::start(&bus, &mut can);
         while !told {
             told = session.bench_clock(&mut keeper, &mut can);
         }
-        let mut service = CanService::start(config, epoch, session.now(), &flash);
+        let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start_bench(&mut parameters, sender, settings.as_ref(), MEDIUM, epoch, session.now());
+        start_bench(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         while session.bench_turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}

@@ -3,28 +3,23 @@
 use std::iter::Peekable;
 use std::mem;
 
-use viewshed::detection::Detection;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::Config;
 use viewshed::pil::flash::Flash;
-use viewshed::profile::reference::{DETECTIONS, Map as PolarMap, Parameters, Sender, State};
-use viewshed::time::Time;
-use viewshed::unit::can_bus::{BusConfig, BusKeeper, CanPort};
+use viewshed::profile::reference::{CHECK, DETECTIONS, Map as PolarMap, Parameters, Sender, State};
+use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::can_session::{CanSession, TIME_ID};
-use viewshed::unit::session::{Flow, Slots};
+use viewshed::unit::session::Flow;
 use viewshed::unit::settings::Settings;
+use viewshed::unit::stored::Stored;
 use viewshed::unit::{Unit, start_bench};
-use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::message::Addresses;
 
-use super::listener::Map;
+use super::listener::{MEDIUM, Map, SENSOR};
 use super::scans::Scan;
 use crate::recording::candump::Line;
-
-/// The sensor's number on the bus, and where its messages are.
-pub const SENSOR: u8 = 0;
-pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;
@@ -106,15 +101,15 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut told = false;
     'start: loop {
         let epoch = flash.start();
-        let settings = Settings::newest([flash.slot(0), flash.slot(1)]).ok().map(|newest| newest.settings);
-        let bus = settings.map_or(BusConfig::default(), |s| s.radar_bus);
+        let stored = Stored::read(flash, CHECK);
+        let [bus, _] = stored.buses();
         let mut keeper = BusKeeper::start(&bus, &mut port);
         while !told && port.frames.peek().is_some() {
             told = session.bench_clock(&mut keeper, &mut port);
         }
-        let mut service = CanService::start(config, epoch, session.now(), flash);
+        let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start_bench(&mut parameters, &mut sender, settings.as_ref(), MEDIUM, epoch, session.now());
+        start_bench(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
         let mut last = None;

@@ -1,13 +1,13 @@
 //! The controller's program, run here.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarGeometry;
 use viewshed::pil::job::{Job, ScanBuffer};
 use viewshed::pil::{Bench, Memory, run};
-use viewshed::polar::PolarGeometry;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::settings::Settings;
-use viewshed::unit::{Unit, bench_sender};
+use viewshed::unit::{Unit, bench_sender, build};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Epoch;
 
@@ -30,7 +30,7 @@ pub fn answer(
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     let mut memory = InMemory { job: job(settings, scans, dump), read: 0, answer: Vec::new() };
     let geometry = match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 64, 256>(&mut memory)?,
+        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(&mut memory)?,
         Profile::Small => work::<100, 64, 8, 4, 28, 176>(&mut memory)?,
     };
     Ok((memory.answer, geometry))
@@ -40,10 +40,12 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     bench: &mut InMemory,
 ) -> Result<PolarGeometry> {
     let job = Job::read(bench).map_err(|e| anyhow::anyhow!("{e:?}"))?;
-    let parameters = Radar3dParameters::<R, A, E>::new(&job.settings.sensor, &job.settings.radar_3d())?;
+    let mut parameters = None::<Radar3dParameters<R, A, E>>;
+    let header = build(&job.settings, &mut parameters)?;
+    let parameters = parameters.context("built")?;
     let (mut state, mut map) = (Box::new(Radar3d::<R, A, E, W, N, D>::new()), Box::new(parameters.map()));
-    let sender = bench_sender(&job.settings, &parameters, Medium::Serial, Epoch::new(0), Time::from_micros(0));
-    let mut sender = Box::new(sender.context("maps of this sensor cannot be sent")?);
+    let sender = bench_sender(header, Medium::Serial, Epoch::new(0), Time::from_micros(0));
+    let mut sender = Box::new(sender.ok_or_else(|| anyhow!("maps of this sensor cannot be sent"))?);
     let geometry = *map.geometry();
     let unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
     let mut scan = Box::new(ScanBuffer::<MOST_DETECTIONS>::new());

@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
+use viewshed::fixed::time::Time;
 use viewshed::profile::reference::{AZIMUTHS, WORDS};
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::code::ray::Ray;
@@ -13,7 +13,9 @@ use viewshed::wire::message::{Addresses, Epoch, Plane};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::scan_number::ScanNumber;
 
-use super::can_twin::{MEDIUM, SENSOR};
+/// The sensor's number on the bus, and where its messages are.
+pub const SENSOR: u8 = 0;
+pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;

@@ -4,15 +4,16 @@ use std::cell::RefCell;
 use std::io::{Read, Write};
 use std::{iter, mem};
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{Medium as Native, Sender};
+use viewshed::map::polar::PolarMap;
 use viewshed::pil::flash::Flash;
 use viewshed::pil::record::FrameRecord;
-use viewshed::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::{Flow, Line, Session};
 use viewshed::unit::settings::Settings;
+use viewshed::unit::stored::{Check, Stored};
 use viewshed::unit::{Unit, start_bench};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
@@ -71,7 +72,7 @@ type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
 
 fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
     match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 64, 256>(bytes, send, after),
+        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(bytes, send, after),
         Profile::Small => work::<100, 64, 8, 4, 28, 176>(bytes, send, after),
     }
 }
@@ -88,7 +89,8 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     'start: loop {
         let epoch = flash.start();
-        let mut session = Session::<D>::start(SENSOR, &flash, &mut line);
+        let stored = Stored::read(&flash, Check::of::<R, A, E, W>());
+        let mut session = Session::<D>::start(SENSOR, epoch, stored, &mut line);
         let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
         start_bench(&mut parameters, &mut sender, session.settings(), Medium::Serial, epoch, session.now());
         let sender = (*sender).as_mut();

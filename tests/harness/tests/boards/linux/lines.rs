@@ -3,8 +3,8 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::time::Time;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::message::{Addresses, Message, Received};
@@ -89,7 +89,7 @@ fn linux_in_a_test_bench_every_message_of_five_seconds_is_the_same() {
     daemon.terminate();
     let folder = std::fs::read(daemon.folder.0.join("slots")).unwrap();
     assert_eq!(
-        Settings::newest([&folder[..folder.len() / 2], &folder[folder.len() / 2..]]).unwrap().settings,
+        Settings::newest([&folder[..folder.len() / 2], &folder[folder.len() / 2..]], |_| Ok(())).unwrap().settings,
         settings
     );
 }

@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::process::Command;
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::Config;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::profile::reference::{DETECTIONS, Parameters, Sender, State, Unit};
-use viewshed::time::Time;
+use viewshed::unit::build;
 use viewshed::unit::can_session::CanSession;
-use viewshed::unit::header;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
@@ -28,13 +28,14 @@ type Sent = Vec<(u64, CanFrame)>;
 
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second behind the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
-    let parameters = Parameters::new(&settings.sensor, &settings.radar_3d()).unwrap();
+    let mut parameters: Option<Parameters> = None;
+    let header = build(settings, &mut parameters).unwrap();
+    let parameters = parameters.unwrap();
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
     let (first, last) = (log.first().unwrap().0, log.last().unwrap().0);
     let at = Time::from_micros;
     let config = BroadcastConfig::new(0, medium);
-    let header = header(settings, &parameters).unwrap();
     let mut sender = Box::new(Sender::new(config, header, EPOCH, at(first)).unwrap());
     let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
     unit.broadcast().status_mut().firmware = [0, 1, 0];

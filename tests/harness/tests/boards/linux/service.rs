@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use viewshed::unit::settings::BLOCK_LEN;
 use viewshed_harness::boards::live::Script;
 use viewshed_harness::boards::machine::Folder;
 
@@ -103,6 +104,46 @@ fn linux_only_completed_frames_feed_the_watchdog() {
 
 #[test]
 #[ignore = "needs the daemon"]
+fn linux_a_stored_block_that_cannot_run_leaves_the_daemon_up_answering_and_saying_why() {
+    let (settings, scans) = shipped(1.0);
+    let mut high = settings;
+    high.visibility.slice_height_m = 15.0;
+    let mut near = settings;
+    (near.sensor.field_of_view.range_min_m, near.sensor.field_of_view.range_max_m) = (0.5, 2.0);
+    for (stored, name) in [(high, "visibility.slice_height_m"), (near, "field_of_view.")] {
+        let folder = Folder::new().unwrap();
+        std::fs::write(folder.0.join("slots"), [stored.to_block(1), [0xFF; BLOCK_LEN]].as_flattened()).unwrap();
+        let mut manager = Manager::new(&folder);
+        let ear = Ear::plug(&folder.0.join("maps"), Instant::now());
+        let mut radar = Terminal::plug(&folder.0.join("radar"));
+        let config = "state_dir = \"FOLDER\"\n[input]\nradar = \"native\"\nport = \"FOLDER/radar\"\n\
+                      [output]\nmedium = \"serial\"\nport = \"FOLDER/maps\"\n";
+        let mut daemon = start(folder, config);
+        daemon.wait_for(name);
+        manager.listen(Duration::from_millis(1500));
+        assert!(manager.count("WATCHDOG=1") >= 2, "the safe state is no reason for a restart: {:?}", manager.told);
+        let status = format!("STATUS=safe state: configuration block: {name}");
+        assert!(manager.told.iter().any(|told| told.starts_with(&status)), "{:?}", manager.told);
+        // the service's answers name it as well, and a block is taken
+        let has = |text: &[u8]| ear.bytes().windows(text.len()).any(|w| w == text);
+        assert!(has(name.as_bytes()), "refused by name");
+        let mut script = Script::default();
+        script.configure(&settings);
+        radar.send(&script.bytes);
+        daemon.wait_for_times("started", 2);
+        script.bytes.clear();
+        for scan in &scans {
+            script.scan(scan, scans[0].time);
+        }
+        radar.send(&script.bytes);
+        daemon.wait_for("radar Ok");
+        daemon.terminate();
+        assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
+    }
+}
+
+#[test]
+#[ignore = "needs the daemon"]
 fn linux_a_missing_bus_is_waited_for_and_sigterm_ends_it() {
     let (settings, _) = shipped(0.1);
     let config = format!(
@@ -163,6 +204,16 @@ fn linux_mistakes_are_told_with_file_line_and_key() {
     let output = Command::new(program()).arg("--config").arg(&missing).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("none.toml: cannot be read: No such file"));
+    // at start as well as by --check, before anything is written
+    let log = folder.0.join("in.log");
+    std::fs::write(&log, "(1.0) can0 123#00\n").unwrap();
+    let text = sample.replace("interface = \"can0\"", &format!("candump = {log:?}"));
+    let text = text.replace("interface = \"can1\"", &format!("candump = {log:?}"));
+    let (code, said) = check(&text);
+    assert!(code == Some(2) && said.contains("output.candump: ") && said.contains("would destroy"), "{said}");
+    let output = Command::new(program()).arg("--config").arg(&path).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(&log).unwrap(), "(1.0) can0 123#00\n");
     // a log that is not there is no device to wait for
     std::fs::write(&path, sample.replace("interface = \"can0\"", "candump = \"none.log\"")).unwrap();
     let output = Command::new(program()).arg("--config").arg(&path).output().unwrap();

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::time::Time;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::message::{Addresses, Received};

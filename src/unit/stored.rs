@@ -1,0 +1,111 @@
+//! The stored block a unit runs with, and whether it could run with one that came.
+//!
+//! Both are decided by the same function, which builds what the settings are for: a block that is answered
+//! "written" starts, and one that cannot start is refused with its parameter's name. Of the blocks stored
+//! only those that can start count. If there is none, the unit has no maps and answers its service: the
+//! safe state.
+
+use crate::sensor::config::ConfigError;
+use crate::unit::can_bus::BusConfig;
+use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
+
+/// Where configuration blocks are kept.
+pub trait Slots {
+    /// The bytes of a slot, 0 or 1.
+    fn slot(&self, slot: usize) -> &[u8];
+    /// Writes a slot.
+    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]);
+}
+
+/// Whether a unit can be built with settings: with its grid, its senders and its controller's clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Check {
+    build: fn(&Settings) -> Result<(), ConfigError>,
+    /// Clock of the CAN controllers this program sets the bit rate of.
+    can_clock_hz: Option<u32>,
+}
+
+impl Check {
+    /// For a unit of `R` ranges (up to `32 W`), `A` azimuths and `E` elevations.
+    pub const fn of<const R: usize, const A: usize, const E: usize, const W: usize>() -> Self {
+        Self { build: super::check::<R, A, E, W>, can_clock_hz: None }
+    }
+
+    /// And for CAN controllers of this clock, whose dividers have to meet the bit rates.
+    pub const fn on_can(self, clock_hz: u32) -> Self {
+        Self { can_clock_hz: Some(clock_hz), ..self }
+    }
+
+    /// Tries it. Takes as long and as much of the stack as a start.
+    ///
+    /// # Errors
+    /// Names the parameter that stands against it.
+    pub fn settings(&self, settings: &Settings) -> Result<(), ConfigError> {
+        if let Some(clock_hz) = self.can_clock_hz {
+            settings.radar_bus.check_clock("radar_bus", clock_hz)?;
+            settings.broadcast_bus.check_clock("broadcast_bus", clock_hz)?;
+        }
+        (self.build)(settings)
+    }
+}
+
+/// The block a unit runs with, or why there is none.
+#[derive(Debug, Clone, Copy)]
+pub struct Stored {
+    found: Result<Newest, BlockError>,
+    check: Check,
+}
+
+impl Stored {
+    /// The newest block that the unit can run with.
+    pub fn read(slots: &impl Slots, check: Check) -> Self {
+        Self { found: newest(slots, check).map_err(worst), check }
+    }
+
+    /// What to work with; none in the safe state.
+    pub fn settings(&self) -> Option<&Settings> {
+        self.found.as_ref().ok().map(|newest| &newest.settings)
+    }
+
+    /// The slot and the sequence of the block in use.
+    ///
+    /// # Errors
+    /// Why there is none.
+    #[allow(clippy::cast_possible_truncation)] // 0 or 1
+    pub fn place(&self) -> Result<(u8, u32), BlockError> {
+        self.found.map(|newest| (newest.slot as u8, newest.next_sequence.wrapping_sub(1)))
+    }
+
+    /// The block in use, as it is stored; empty without one.
+    pub fn block<'s>(&self, slots: &'s impl Slots) -> &'s [u8] {
+        self.found.as_ref().map_or(&[], |newest| slots.slot(newest.slot))
+    }
+
+    /// Both buses as the block in use describes them: the radar's, the broadcast's. By default without one.
+    pub fn buses(self) -> [BusConfig; 2] {
+        self.settings().map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus])
+    }
+
+    /// Checks a block that came and writes it into the slot not in use; its sequence. It counts from the
+    /// next start on.
+    ///
+    /// # Errors
+    /// Why the unit could not start with it; nothing is written then.
+    pub fn write(&self, block: &[u8], slots: &mut impl Slots) -> Result<u32, BlockError> {
+        let (_, settings) = Settings::from_block(block)?;
+        self.check.settings(&settings).map_err(BlockError::Parameter)?;
+        let (slot, sequence) = newest(slots, self.check).map_or((0, 1), |n| (n.next_slot, n.next_sequence));
+        slots.write(slot, &settings.to_block(sequence));
+        // what was written counts, not what was meant
+        Settings::from_block(slots.slot(slot)).map(|(sequence, _)| sequence)
+    }
+}
+
+fn newest(slots: &impl Slots, check: Check) -> Result<Newest, [BlockError; 2]> {
+    Settings::newest([slots.slot(0), slots.slot(1)], |settings| check.settings(settings))
+}
+
+/// Of two refusals the one that says more: an empty slot says least.
+fn worst([first, second]: [BlockError; 2]) -> BlockError {
+    if first == BlockError::Empty { second } else { first }
+}
