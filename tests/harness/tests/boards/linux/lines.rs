@@ -50,7 +50,7 @@ fn content(message: &[u8]) -> (Vec<u8>, Option<Status>) {
     }
 }
 
-/// What maps tell, epoch left out.
+/// Contents of maps, epoch left out.
 fn maps(messages: &[Vec<u8>]) -> Vec<(u8, Vec<u8>)> {
     let is_map = |m: &&Vec<u8>| Received::from_bytes(m).is_ok_and(|r| matches!(r.message, Message::Map(..)));
     messages.iter().filter(is_map).map(|m| (m[3], m[6..].to_vec())).collect()

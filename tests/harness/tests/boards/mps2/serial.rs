@@ -93,7 +93,7 @@ fn records(board: &Running) -> Vec<Record> {
 fn enough_stack(profile: Profile, board: &Running) {
     let closing =
         records(board).into_iter().rev().find_map(|r| if let Record::Closing(c) = r { Some(c) } else { None });
-    let [used, there] = closing.expect("told at the end of every start").stack;
+    let [used, there] = closing.expect("reported at the end of every start").stack;
     println!("live, {}: {used} of {there} bytes of stack", profile.name());
     assert!(used > 500 && used + 2048 <= there, "{used} of {there}");
 }
@@ -103,7 +103,7 @@ fn enough_stack(profile: Profile, board: &Running) {
 fn every_byte_of_five_seconds_is_the_same() {
     let (settings, scans) = shipped(5.0);
     let mut script = script(&settings, &scans);
-    // ends a start and tells what it took
+    // ends a start and reports what it took
     script.request(&Request::Restart);
     let board = same(Profile::Reference, &script);
     let frames = records(&board).into_iter().filter(|r| matches!(r, Record::Frame(f) if f.used > 0)).count();
