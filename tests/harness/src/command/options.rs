@@ -105,7 +105,7 @@ pub struct KindArgs {
     /// What a TI mmWave capture does not say of its firmware, between commas [default: none of it]
     ///
     /// degrees       angles of spherical points (type 1000) are in degrees, not radians
-    /// raised        points behind 52 bytes have an elevation
+    /// raised        points after 52 bytes have an elevation
     /// no-elevation  the antenna measures none
     /// targets       take the tracked targets in place of the points
     /// doppler=M/S   velocity of a Doppler step, without which SDK 1 and 2 have none

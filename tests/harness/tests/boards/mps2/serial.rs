@@ -242,7 +242,7 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
         board.line.deaf = deaf.contains(&k);
         board.line.send(&script.bytes[from..to]).unwrap();
         from = to;
-        // the frame is done when its trace is there, behind those of two starts
+        // the frame is done when its trace is there, after those of two starts
         let done = |line: &SerialBoard| line.trace.len() / RECORD_LEN > k + 3;
         let started = Instant::now();
         while !done(&board.line) && started.elapsed() < Duration::from_secs(120) {
