@@ -11,10 +11,11 @@
 //! use viewshed::map::RoadPoint;
 //! use viewshed::mount::Mount;
 //! use viewshed::query::{self, Answer};
-//! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters, SmallProfile};
+//! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
 //! use viewshed::reflection::NoiseConfig;
 //! use viewshed::sensor::Sensor;
 //! use viewshed::time::Time;
+//! use viewshed::unit::profile::small;
 //!
 //! // a gantry, 6 m up, looking 4 degrees down
 //! let sensor = Sensor {
@@ -31,7 +32,7 @@
 //! };
 //! let parameters = Radar3dParameters::new(&sensor, &Radar3dConfig::default())?;
 //! // on a controller: a static
-//! let mut radar = Box::new(SmallProfile::new());
+//! let mut radar = Box::new(small::State::new());
 //! let mut map = parameters.map();
 //!
 //! // one parked truck's reflection, again and again
@@ -69,8 +70,9 @@
 //! | results: the map interface, queries, the 1 m grid, the bitmap | [`map`], [`query`], [`resample`], [`bitmap`] |
 //! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
 //! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
+//! | what a unit asks of an estimator, and a decoder that feeds one | [`estimator`], [`inputs::Feed`] |
 //! | a whole unit: sessions on its lines, stored settings, buses looked after, the loop of a board | [`mod@unit`] |
-//! | the same input on a controller and on a PC, compared | [`pil`], [`stage`], [`profile`] |
+//! | the same input on a controller and on a PC, compared | [`mod@bench`] |
 //! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
 //!
 //! # What was decided, and why
@@ -111,12 +113,14 @@ extern crate std;
 
 pub mod angle;
 pub mod axes;
+pub mod bench;
 pub mod bitmap;
 pub mod bits;
 mod bytes;
 pub mod cartesian;
 pub mod config;
 pub mod detection;
+pub mod estimator;
 pub mod evidence;
 pub mod field_of_view;
 pub mod gate;
@@ -126,9 +130,7 @@ pub mod map;
 mod math;
 pub mod mount;
 pub mod obstacles;
-pub mod pil;
 pub mod polar;
-pub mod profile;
 pub mod query;
 pub mod radar_2d;
 pub mod radar_3d;
@@ -141,7 +143,6 @@ pub mod sightlines;
 pub mod solid;
 pub mod spherical;
 mod stack;
-pub mod stage;
 pub mod time;
 pub mod trig;
 pub mod unit;

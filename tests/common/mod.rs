@@ -4,6 +4,7 @@
 #![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
 use viewshed::angle::Angle;
+use viewshed::bench::start;
 use viewshed::detection::Detection;
 use viewshed::field_of_view::FieldOfView;
 use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
@@ -14,7 +15,6 @@ use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
 use viewshed::time::Time;
 use viewshed::unit::settings::Settings;
-use viewshed::unit::{bench_sender, build};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 
@@ -44,16 +44,20 @@ pub fn gantry(height_m: f32, yaw_deg: f32) -> Sensor {
     }
 }
 
-/// Parameters and sender of a unit of 50 x 40 x 8 cells in a test bench.
+/// A unit of 50 x 40 x 8 cells.
+pub type SmallState = Radar3d<50, 40, 8, 2, 16, 64>;
+pub type SmallSender = Broadcaster<40, 2>;
+
+/// Its parameters and its sender in a test bench.
 pub fn small_unit(
     settings: &Settings,
     medium: Medium,
     epoch: u8,
     now: Time,
-) -> (Radar3dParameters<50, 40, 8>, Broadcaster<40, 2>) {
-    let mut parameters = None;
-    let header = build(settings, &mut parameters).unwrap();
-    (parameters.unwrap(), bench_sender(header, medium, Epoch::new(epoch), now).unwrap())
+) -> (Radar3dParameters<50, 40, 8>, SmallSender) {
+    let (mut parameters, mut sender) = (None, None);
+    start::<SmallState, _>(&mut parameters, &mut sender, Some(settings), medium, Epoch::new(epoch), now);
+    (parameters.unwrap(), sender.unwrap())
 }
 
 /// An upright box that moves along the road, metres and m/s.

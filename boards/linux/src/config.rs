@@ -11,10 +11,10 @@ use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfigurat
 use viewshed::inputs::ars408::profile::{self, Profile};
 use viewshed::inputs::ti;
 use viewshed::mount::Mount;
-use viewshed::profile::reference::CHECK;
 use viewshed::radar_3d::VisibilityConfig;
 use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::unit::profile::reference::CHECK;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanId;

@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::unit::stored::Slots;
+use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots};
 use viewshed::wire::message::Epoch;
-
 
 /// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
 /// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
@@ -97,10 +95,10 @@ mod tests {
     use viewshed::field_of_view::FieldOfView;
     use viewshed::mount::Mount;
     use viewshed::reflection::NoiseConfig;
-    use viewshed::profile::reference::CHECK;
     use viewshed::sensor::Sensor;
+    use viewshed::unit::profile::reference::CHECK;
     use viewshed::unit::settings::BlockError;
-    use viewshed::unit::stored::Stored;
+    use viewshed::unit::settings::Stored;
 
     fn settings(height_m: f32) -> Settings {
         Settings::of(Sensor {

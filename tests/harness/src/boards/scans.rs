@@ -1,7 +1,7 @@
 //! A recording as scans for a controller.
 
+use viewshed::bench::job::{Job, ScanHead, detection_to_bytes};
 use viewshed::detection::Detection;
-use viewshed::pil::job::{Job, ScanHead, detection_to_bytes};
 use viewshed::time::Time;
 use viewshed::unit::settings::Settings;
 

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use viewshed::bench::record::{RECORD_LEN, Record};
 use viewshed::map::Visibility;
-use viewshed::pil::record::{RECORD_LEN, Record};
 use viewshed::time::Time;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};

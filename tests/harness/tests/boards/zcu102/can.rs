@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use viewshed::pil::flash::Flash;
+use viewshed::bench::flash::Flash;
 use viewshed::time::Time;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::settings::Settings;

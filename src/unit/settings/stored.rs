@@ -5,9 +5,11 @@
 //! only those that can start count. If there is none, the unit has no maps and answers its service: the
 //! safe state.
 
+use super::{BLOCK_LEN, BlockError, Newest, Settings};
 use crate::config::ConfigError;
+use crate::unit::build::{InUnit, check};
 use crate::unit::can_bus::BusConfig;
-use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
+use crate::unit::sender::Sender;
 
 /// Where configuration blocks are kept.
 pub trait Slots {
@@ -26,9 +28,9 @@ pub struct Check {
 }
 
 impl Check {
-    /// For a unit of `R` ranges (up to `32 W`), `A` azimuths and `E` elevations.
-    pub const fn of<const R: usize, const A: usize, const E: usize, const W: usize>() -> Self {
-        Self { build: super::check::<R, A, E, W>, can_clock_hz: None }
+    /// For a unit of this estimator and sender.
+    pub const fn of<E: InUnit, S: Sender<E::Map>>() -> Self {
+        Self { build: check::<E, S>, can_clock_hz: None }
     }
 
     /// And for CAN controllers of this clock, whose dividers have to meet the bit rates.
