@@ -3,9 +3,9 @@
 //! Parameters, state and map lie apart, each in the memory its owner has for it: parameters are made once,
 //! state and map are large and stay where they are.
 
-use crate::config::ConfigError;
-use crate::health::{Condition, Continuity};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::frame::health::{Condition, Continuity, FrameStatus};
+use crate::sensor::config::ConfigError;
 
 /// What a frame did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,14 +42,14 @@ pub trait Estimator {
     /// Forgets everything but the counters, the map included: what comes next does not follow.
     fn forget(&mut self, map: &mut Self::Map);
 
-    /// Takes a frame measured at this time and brings the map up to it. `fault` is the sensor's own flag;
-    /// `ended` is called as each stage ends, in their order.
+    /// Takes a frame measured at this time and brings the map up to it. `status` is what the sensor says of
+    /// itself; `ended` is called as each stage ends, in their order.
     fn process(
         &mut self,
         parameters: &Self::Parameters,
         measured: Time,
         input: &Self::Input,
-        fault: bool,
+        status: FrameStatus,
         map: &mut Self::Map,
         ended: &mut impl FnMut(),
     ) -> Progress;

@@ -6,15 +6,15 @@
 //! argument. The same input gives the same bits on every machine.
 //!
 //! ```
-//! use viewshed::detection::{Detection, Measurement};
-//! use viewshed::field_of_view::FieldOfView;
-//! use viewshed::map::RoadPoint;
-//! use viewshed::mount::Mount;
-//! use viewshed::query::{self, Answer};
+//! use viewshed::frame::detection::{Detection, Measurement};
+//! use viewshed::sensor::field_of_view::FieldOfView;
+//! use viewshed::sensor::road::RoadPoint;
+//! use viewshed::sensor::mount::Mount;
+//! use viewshed::map::query::{self, Answer, Footprint};
 //! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
-//! use viewshed::reflection::NoiseConfig;
+//! use viewshed::sensor::noise::NoiseConfig;
 //! use viewshed::sensor::Sensor;
-//! use viewshed::time::Time;
+//! use viewshed::fixed::time::Time;
 //! use viewshed::unit::profile::small;
 //!
 //! // a gantry, 6 m up, looking 4 degrees down
@@ -48,32 +48,51 @@
 //! for frame in 0..20 {
 //!     radar.process(&parameters, Time::from_micros(frame * 66_667), [&detection], false, &mut map);
 //! }
-//! let ahead = RoadPoint { x_cm: 2_000, y_cm: 0 };
+//! let ahead = RoadPoint::from_metres(20.0, 0.0)?;
 //! assert_eq!(query::point(&map, ahead), Answer::VisibleFree);
-//! let behind_the_sensor = RoadPoint { x_cm: -2_000, y_cm: 0 };
+//! let behind_the_sensor = RoadPoint::from_metres(-20.0, 0.0)?;
 //! assert_eq!(query::point(&map, behind_the_sensor), Answer::Unknown);
-//! # Ok::<(), viewshed::config::ConfigError>(())
+//! // is there room for a car in the next lane? (heading and size in degrees and metres)
+//! let car = Footprint::new(RoadPoint::from_metres(30.0, 3.5)?, 0.0, 4.6, 1.8)?;
+//! assert_eq!(query::area(&map, &car), Answer::VisibleFree);
+//! # Ok::<(), viewshed::sensor::config::ConfigError>(())
 //! ```
 //!
 //! # What is where
 //!
-//! | stage | modules |
+//! One folder a stage, in the order of the data; what is listed below uses only what is listed above it.
+//!
+//! | folder | what comes in, and what goes out |
 //! |---|---|
-//! | a sensor and its configuration, in SI units, checked once | [`sensor`], [`mount`], [`field_of_view`], [`config`] |
-//! | detections in, gated and counted, placed on the road | [`detection`], [`gate`], [`reflection`], [`scan`] |
-//! | what moves: place, length, width, height | [`obstacles`], [`solid`] |
-//! | the grid: range x azimuth x slope, evidence with decay | [`axes`], [`spherical`], [`voxelise`], [`evidence`] |
-//! | lines of sight, and the slice at 1 m | [`raycast`], [`polar`] |
-//! | what a silent sensor means | [`health`] |
-//! | the flat baseline | [`cartesian`], [`sightlines`] |
-//! | whole estimators | [`radar_3d`], [`radar_2d`] |
-//! | results: the map interface, queries, the 1 m grid, the bitmap | [`map`], [`query`], [`resample`], [`bitmap`] |
-//! | radar frames in: ARS408 family, TI mmWave, the native format | [`inputs`] |
-//! | maps out over CAN, CAN FD and serial lines, and their receiver | [`wire`] |
-//! | what a unit asks of an estimator, and a decoder that feeds one | [`estimator`], [`inputs::Feed`] |
-//! | a whole unit: sessions on its lines, stored settings, buses looked after, the loop of a board | [`mod@unit`] |
-//! | the same input on a controller and on a PC, compared | [`mod@bench`] |
-//! | integers: angles, time, tables, rows of bits | [`angle`], [`time`], [`trig`], [`bits`] |
+//! | [`fixed`] | integers with their scale: [angles](fixed::angle), [time](fixed::time), [directions](fixed::trig), [rows of bits](fixed::bits) |
+//! | [`sensor`] | a sensor as it is installed, in SI units, checked once: [mount](sensor::mount), [field of view](sensor::field_of_view), [noise](sensor::noise) |
+//! | [`frame`] | one radar frame: [detections](frame::detection) in, [gated](frame::gate) and counted, [placed on the road](frame::reflection); what a silent or [blind](frame::health) sensor means |
+//! | [`obstacles`] | what moves is followed: place, length, width, height; [solid](obstacles::solid) boxes out |
+//! | [`map`] | what a map answers: the [interface](map::VisibilityMap), the [polar map](map::polar), [queries](map::query), the [1 m grid](map::resample), the [bitmap](map::bitmap) |
+//! | [`grid`] | range x azimuth x slope: boxes and [evidence](grid::evidence) in, [lines of sight](grid::raycast) and a polar map out |
+//! | [`estimator`] | what a unit asks of an estimator, whatever its sensor and its map |
+//! | [`radar_3d`] | the estimator: all stages above, in order |
+//! | [`radar_2d`] | the flat baseline, as an estimator of its own |
+//! | [`wire`] | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
+//! | [`inputs`] | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
+//! | [`mod@unit`] | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
+//! | [`mod@bench`] | the same scans on a controller and on a PC, compared, stage by stage |
+//!
+//! # Words
+//!
+//! | word | what it means here |
+//! |---|---|
+//! | detection | one measurement of the radar: range, azimuth, perhaps elevation, radial velocity, strength |
+//! | reflection | a detection placed on the road, in the levelled frame under the sensor |
+//! | obstacle | what is followed over many frames because its reflections move together: a vehicle |
+//! | solid | the upright box that an obstacle becomes for the grid |
+//! | evidence | occupancy of the grid's cells from reflections that no obstacle explains; fades by the second |
+//! | slope | height over ground range; a row of the grid is a range of slopes, so a line of sight is a row |
+//! | slice | the plane, 1 m above the road, on which visibility is judged |
+//! | grade | how visible a cell is: 1 hidden to 255 clear; 0 is unknown |
+//! | scan | the detections of one radar frame, as an input gives them out |
+//! | refresh | a message that describes azimuths by itself; a *delta* describes them against a refresh |
+//! | epoch | four bits that change whenever what a receiver holds of a sender is no longer true |
 //!
 //! # What was decided, and why
 //!
@@ -111,40 +130,19 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod angle;
-pub mod axes;
 pub mod bench;
-pub mod bitmap;
-pub mod bits;
-mod bytes;
-pub mod cartesian;
-pub mod config;
-pub mod detection;
+#[cfg(doc)]
+#[doc = include_str!("EXTENDING.md")]
+pub mod extending {}
 pub mod estimator;
-pub mod evidence;
-pub mod field_of_view;
-pub mod gate;
-pub mod health;
+pub mod fixed;
+pub mod frame;
+pub mod grid;
 pub mod inputs;
 pub mod map;
-mod math;
-pub mod mount;
 pub mod obstacles;
-pub mod polar;
-pub mod query;
 pub mod radar_2d;
 pub mod radar_3d;
-pub mod raycast;
-pub mod reflection;
-pub mod resample;
-pub mod scan;
 pub mod sensor;
-pub mod sightlines;
-pub mod solid;
-pub mod spherical;
-mod stack;
-pub mod time;
-pub mod trig;
 pub mod unit;
-pub mod voxelise;
 pub mod wire;

@@ -8,25 +8,27 @@
 //!                        polar map: grade, bit, occupancy <- slice at h <- ray casting
 //! ```
 
-use crate::axes::Axes;
-use crate::config::{ConfigError, within};
-use crate::detection::Detection;
 use crate::estimator::{Estimator, Progress};
-use crate::evidence::{EvidenceConfig, InverseSensor};
-use crate::gate::{Gate, GateConfig, Rejections};
-use crate::health::{Condition, Continuity, Health, HealthConfig, HealthLimits};
-use crate::math;
-use crate::mount::Levelling;
-use crate::obstacles::tracking::{ObstacleConfig, Tracking};
+use crate::fixed::math;
+use crate::fixed::time::{Step, Time};
+use crate::frame::detection::Detection;
+use crate::frame::gate::{Gate, GateConfig, Rejections};
+use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
+use crate::frame::reflection::Reflection;
+use crate::frame::scan::Scan;
+use crate::grid::axes::Axes;
+use crate::grid::evidence::{EvidenceConfig, InverseSensor};
+use crate::grid::raycast;
+use crate::grid::spherical::SphericalGrid;
+use crate::grid::voxelise::voxelise;
+use crate::map::polar::PolarMap;
+use crate::obstacles::config::ObstacleConfig;
+use crate::obstacles::tracking::Tracking;
 use crate::obstacles::{Claimed, Obstacles};
-use crate::polar::PolarMap;
-use crate::raycast;
-use crate::reflection::Noise;
-use crate::scan::Scan;
 use crate::sensor::Sensor;
-use crate::spherical::SphericalGrid;
-use crate::time::{Step, Time};
-use crate::voxelise::voxelise;
+use crate::sensor::config::{ConfigError, within};
+use crate::sensor::mount::Levelling;
+use crate::sensor::noise::Noise;
 
 /// Everything that can be set, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -112,6 +114,13 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
     /// Makes a map one for these parameters, where it lies: controllers have no stack for a second.
     pub fn prepare(&self, map: &mut PolarMap<R, A>) {
         map.prepare(self.axes.polar(&self.levelling), self.visible_from, self.occupied_from);
+    }
+
+    /// Whether a place is on the map, or nearer than what is in view on it. What stands at the sensor's feet
+    /// reflects below the field of view; what lies behind its far edge was never measured.
+    fn reaches(&self, r: &Reflection) -> bool {
+        let end = self.axes.column(r.bearing()).map_or(0, |a| self.axes.view(a).end);
+        self.axes.range_cell(i32::from(r.ground_cm)).is_some_and(|cell| cell < end)
     }
 
     /// The grid's axes.
@@ -206,16 +215,17 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         self.health = Health::NEW;
     }
 
-    /// Takes a radar frame and brings the map up to its time. `fault` is the sensor's own flag.
+    /// Takes a radar frame and brings the map up to its time. `status` is the sensor's own fault flag, and
+    /// where there can be any with it the number of points that are no detections.
     pub fn process<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
         now: Time,
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
-        fault: bool,
+        status: impl Into<FrameStatus>,
         map: &mut PolarMap<R, A>,
     ) -> FrameReport {
-        self.process_traced(p, now, detections, fault, map, &mut || {})
+        self.process_traced(p, now, detections, status, map, &mut || {})
     }
 
     /// [`process`](Self::process) that calls `ended` as each of its seven stages ends.
@@ -225,12 +235,15 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         p: &Radar3dParameters<R, A, E>,
         now: Time,
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
-        fault: bool,
+        status: impl Into<FrameStatus>,
         map: &mut PolarMap<R, A>,
         ended: &mut impl FnMut(),
     ) -> FrameReport {
-        let reported = self.scan.gather(detections.into_iter(), &p.gate, |d| p.noise.place(d, &p.levelling));
-        let continuity = self.health.frame(now, reported, fault, &p.health);
+        let FrameStatus { fault, refused } = status.into();
+        let place = |d: &Detection| p.noise.place(d, &p.levelling);
+        let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
+        let points = self.scan.within_reach(points, |r| p.reaches(r));
+        let continuity = self.health.frame(now, &points, fault, &p.health);
         if continuity.resets() {
             self.obstacles.clear();
             self.grid.clear();
@@ -349,11 +362,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         parameters: &Self::Parameters,
         measured: Time,
         input: &[Detection],
-        fault: bool,
+        status: FrameStatus,
         map: &mut Self::Map,
         ended: &mut impl FnMut(),
     ) -> Progress {
-        let report = self.process_traced(parameters, measured, input, fault, map, ended);
+        let report = self.process_traced(parameters, measured, input, status, map, ended);
         Progress { continuity: report.continuity, condition: report.condition, used: report.used }
     }
 

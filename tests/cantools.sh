@@ -17,7 +17,7 @@ viewshed=${CARGO_TARGET_DIR:-target}/release/viewshed
 csv=$(mktemp)
 trap 'rm -f "$csv"' EXIT
 compare() {
-    "$viewshed" doctor "$1" --sensor-id "$2" --detections "$csv" >/dev/null || [ $? = 1 ]
+    "$viewshed" doctor "$1" --sensor-id "$2" --detections "$csv" --force >/dev/null || [ $? = 1 ]
     "$python" tests/ars408_with_cantools.py check "$1" "$csv" "$2"
 }
 if [ $# -gt 0 ]; then

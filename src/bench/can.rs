@@ -5,8 +5,8 @@
 //! [`TIME_ID`] and eight bytes, microseconds, big-endian, before the frames it is for.
 
 use crate::estimator::Estimator;
+use crate::fixed::time::Time;
 use crate::inputs::Feed;
-use crate::time::Time;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::CanService;
 use crate::unit::settings::Slots;

@@ -1,6 +1,6 @@
 //! A number that differs when any cell of a map does.
 
-use crate::polar::PolarMap;
+use crate::map::polar::PolarMap;
 
 /// FNV-1a in 64 bits, fed with words of four bytes.
 ///
@@ -64,9 +64,9 @@ impl Fingerprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axes::Axes;
-    use crate::field_of_view::FieldOfView;
-    use crate::mount::Mount;
+    use crate::grid::axes::Axes;
+    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::mount::Mount;
 
     fn map(visible_from: u8) -> PolarMap<50, 3> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };

@@ -22,10 +22,10 @@
 use heapless::Vec;
 
 use super::Bench;
-use crate::angle::Angle;
-use crate::bytes::{Reader, Writer};
-use crate::detection::Detection;
-use crate::time::Time;
+use crate::fixed::angle::Angle;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
 use crate::unit::settings::{BLOCK_LEN, BlockError, Settings};
 
 /// Bytes before the scans.

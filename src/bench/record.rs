@@ -14,9 +14,9 @@
 //! A map record is followed by its grades, then its occupancies, azimuth by azimuth.
 
 use super::stage::Stage;
-use crate::bytes::{Reader, Writer};
 use crate::estimator::Estimator;
-use crate::health::Condition;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::health::Condition;
 use crate::unit::Event;
 
 /// Bytes of a record.
@@ -168,8 +168,8 @@ impl Record {
                 bytes: [r.u32()?, r.u32()?, r.u32()?],
             }),
             b'F' => {
-                let conditions = [Condition::Starting, Condition::Healthy, Condition::Blind, Condition::Stale];
-                let condition = conditions.into_iter().find(|c| *c as u8 == detail)?;
+                use Condition::{Blind, Healthy, Stale, Starting, Unusable};
+                let condition = [Starting, Healthy, Blind, Stale, Unusable].into_iter().find(|c| *c as u8 == detail)?;
                 let (frame, fingerprint) = (r.u32()?, r.u64()?);
                 let mut ticks = [0; Stage::COUNT];
                 for t in &mut ticks {
@@ -192,7 +192,7 @@ mod tests {
     fn records_read_back() {
         let frame = FrameRecord {
             frame: 70_000,
-            condition: Condition::Blind,
+            condition: Condition::Unusable,
             used: 256,
             fingerprint: 0x0123_4567_89AB_CDEF,
             ticks: [1, 2, 3, 4, 5, 6, 7, u32::MAX],

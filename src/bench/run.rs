@@ -4,10 +4,10 @@ use super::fingerprint::Fingerprint;
 use super::job::{Job, JobError, ScanBuffer};
 use super::record::{Closing, Opening, Record, Tracer};
 use super::stage::Stage;
-use crate::detection::Detection;
 use crate::estimator::Estimator;
+use crate::frame::detection::Detection;
 use crate::inputs::Frame;
-use crate::polar::PolarMap;
+use crate::map::polar::PolarMap;
 use crate::unit::{Sender, Unit};
 use crate::wire::serial::MOST_STUFFED;
 
@@ -57,7 +57,8 @@ where
             unit.reset();
         }
         let mut done = None;
-        let frame = Frame { measured: head.time, input: scan.detections(), incomplete: false, fault: head.fault };
+        let frame =
+            Frame { measured: head.time, input: scan.detections(), incomplete: false, status: head.fault.into() };
         unit.frame(&frame, &mut |event| done = tracer.event(event, bench.ticks()));
         let mut fingerprint = Fingerprint::of_map(unit.map());
         let mut sending = 0_u32;

@@ -1,6 +1,6 @@
 //! A unit in a test bench: its sender sends every message at the moment it is due.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::unit::settings::Settings;
 use crate::unit::{InUnit, Sender, build};
 use crate::wire::broadcast::{BroadcastConfig, Medium};

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use crate::detection::Detection;
+use crate::frame::detection::Detection;
 
 /// Up to `N` detections, the strongest of those offered.
 #[derive(Debug, Clone)]
@@ -81,7 +81,7 @@ impl<const N: usize> Collected<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::Angle;
+    use crate::fixed::angle::Angle;
     use std::vec::Vec as StdVec;
 
     fn detection(snr: i16) -> Detection {

@@ -11,8 +11,9 @@ mod polar;
 pub mod signal;
 pub mod ti;
 
-use crate::detection::Detection;
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
+use crate::frame::health::FrameStatus;
 use crate::wire::frame::CanFrame;
 
 /// The detections of one scan of a radar.
@@ -29,14 +30,21 @@ pub struct RadarScan<'a> {
     pub detections: &'a [Detection],
     /// Announced and not arrived; the most it can be, where that is not known exactly.
     pub missing: u16,
+    /// Points that arrived and are no detections: not finite, at no distance, or absurd.
+    pub refused: u16,
     /// Whether the radar says that something is wrong with it.
     pub fault: bool,
 }
 
 impl RadarScan<'_> {
+    /// What the estimators are told besides the detections.
+    pub fn status(&self) -> FrameStatus {
+        FrameStatus { fault: self.fault, refused: self.refused }
+    }
+
     /// As a frame for an estimator.
-    pub const fn frame(&self) -> Frame<'_, [Detection]> {
-        Frame { measured: self.time, input: self.detections, incomplete: self.missing > 0, fault: self.fault }
+    pub fn frame(&self) -> Frame<'_, [Detection]> {
+        Frame { measured: self.time, input: self.detections, incomplete: self.missing > 0, status: self.status() }
     }
 }
 
@@ -49,8 +57,8 @@ pub struct Frame<'a, I: ?Sized> {
     pub input: &'a I,
     /// Something of it was announced and did not arrive.
     pub incomplete: bool,
-    /// Whether the sensor says that something is wrong with it.
-    pub fault: bool,
+    /// What the sensor says of itself, and what was refused.
+    pub status: FrameStatus,
 }
 
 /// A decoder that feeds an estimator: pieces of a sensor's line in, frames out.

@@ -1,7 +1,7 @@
 //! Cartesian coordinates of a radar, in centimetres, to range, azimuth and elevation.
 
-use crate::angle::Angle;
-use crate::trig;
+use crate::fixed::angle::Angle;
+use crate::fixed::trig;
 
 /// Range, azimuth and elevation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! A frame's reflections in bins of range, so that an obstacle looks only at those around it.
 
-use crate::reflection::Reflection;
+use crate::frame::reflection::Reflection;
 
 /// Bins of range.
 const BINS: usize = 128;
@@ -67,7 +67,7 @@ impl<const D: usize> ByRange<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trig::Direction;
+    use crate::fixed::trig::Direction;
     use std::vec::Vec;
 
     #[test]

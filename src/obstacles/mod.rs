@@ -9,18 +9,30 @@
 //! At most `N` obstacles. When the list is full, a new one replaces the one with the least evidence
 //! if that is unconfirmed, and is dropped and counted otherwise.
 
+mod body;
+#[cfg(test)]
+mod by_hand;
 mod by_range;
+pub mod config;
+mod gathered;
+mod joining;
+pub mod motion;
 pub mod obstacle;
+mod own_way;
 pub mod profile;
+mod search;
 pub mod size;
+pub mod solid;
+#[cfg(test)]
+mod stops;
 pub mod tallness;
 pub mod tracking;
 
 use heapless::Vec;
 
-use crate::reflection::Reflection;
-use crate::solid::Solid;
-use crate::time::Step;
+use crate::fixed::time::Step;
+use crate::frame::reflection::Reflection;
+use crate::obstacles::solid::Solid;
 use by_range::ByRange;
 use obstacle::Obstacle;
 use tracking::Tracking;
@@ -35,7 +47,7 @@ pub struct Obstacles<const N: usize> {
     dropped: u32,
 }
 
-/// Which detections found an obstacle: one bit each, in the scan's order.
+/// Which detections found an obstacle: a flag each, in the scan's order.
 #[derive(Debug, Clone, Copy)]
 pub struct Claimed<const D: usize>([bool; D]);
 
@@ -98,7 +110,7 @@ impl<const N: usize> Obstacles<N> {
     ) -> Claimed<D> {
         let kept = t.kept_over(step);
         for o in &mut self.list {
-            o.predict(step, kept.lateral);
+            o.predict(step, kept.lateral, t);
         }
         let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
         let mut claimed = self.associate(reflections, &by_range, kept.outline, t);
@@ -270,13 +282,17 @@ impl<const N: usize> Obstacles<N> {
             let places = [o.extent.front_cm, o.extent.middle_cm(), o.extent.rear_cm];
             let loss = if o.existence < t.confirmed {
                 t.tentative_loss
-            } else if places.iter().any(|&along| {
-                let (x, y) = o.global(along, 0);
-                in_view(x, y)
-            }) {
-                t.visible_loss
             } else {
-                t.hidden_loss
+                let seen = places.iter().any(|&along| {
+                    let (x, y) = o.global(along, 0);
+                    in_view(x, y)
+                });
+                match (o.is_standing(t), seen) {
+                    (false, true) => t.visible_loss,
+                    (false, false) => t.hidden_loss,
+                    (true, true) => t.standing_visible_loss,
+                    (true, false) => t.standing_hidden_loss,
+                }
             };
             o.existence -= step.times(loss);
         }
@@ -284,5 +300,144 @@ impl<const N: usize> Obstacles<N> {
             let (x, y) = o.anchor();
             o.existence > 0 && !o.is_fixture(t) && x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::by_hand::rules as tracking;
+    use super::*;
+    use crate::fixed::trig::Direction;
+    use std::vec::Vec as StdVec;
+
+    fn reflection(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
+        Reflection {
+            x_cm,
+            y_cm,
+            ground_cm: x_cm as u16,
+            sight: Direction::AHEAD,
+            radial_velocity_cm_s,
+            across_cm: 40,
+            height_cm: None,
+            strength: 0,
+        }
+    }
+
+    /// One obstacle with so much evidence; what it loses in a tenth of a second without a detection.
+    fn lost(existence: i32, in_view: impl Fn(i32, i32) -> bool) -> i32 {
+        let mut all = Obstacles::<4>::new();
+        let mut o = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, 2000);
+        (o.existence, o.extent) = (existence, profile::Extent { rear_cm: -200, front_cm: 200 });
+        let _ = all.list.push(o);
+        let _: Claimed<4> = all.step(&[], Step::from_micros(100_000), &tracking(), in_view);
+        existence - all.iter().next().map_or(0, |o| o.existence)
+    }
+
+    #[test]
+    fn what_is_unseen_is_doubted_quickly_in_view_and_slowly_in_a_shadow() {
+        let t = tracking();
+        let tenth = |per_s: i32| Step::from_micros(100_000).times(per_s);
+        let confirmed = t.confirmed + 1000;
+        assert_eq!(lost(confirmed, |_, _| false), tenth(t.hidden_loss));
+        assert_eq!(lost(confirmed, |_, _| true), tenth(t.visible_loss));
+        // it is at 52 m by then; one end in view is enough
+        assert_eq!(lost(confirmed, |x, _| x > 5350), tenth(t.visible_loss));
+        assert_eq!(lost(confirmed, |x, _| x < 5050), tenth(t.visible_loss));
+        assert_eq!(lost(confirmed, |x, _| x > 5450), tenth(t.hidden_loss));
+        assert_eq!(lost(t.confirmed - 1, |_, _| true), tenth(t.tentative_loss));
+        assert!(t.hidden_loss < t.visible_loss && t.visible_loss < t.tentative_loss);
+    }
+
+    #[test]
+    fn a_full_list_gives_up_its_weakest_for_what_has_more_evidence() {
+        let t = tracking();
+        let mut all = Obstacles::<2>::new();
+        let of = |existence| {
+            let mut o = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, 2000);
+            o.existence = existence;
+            o
+        };
+        [300, 500].map(of).into_iter().for_each(|o| all.admit(o, &t));
+        let evidence = |all: &Obstacles<2>| all.iter().map(|o| o.existence).collect::<StdVec<_>>();
+        all.admit(of(400), &t);
+        assert_eq!((evidence(&all), all.dropped()), ([400, 500].to_vec(), 0));
+        all.admit(of(350), &t);
+        assert_eq!((evidence(&all), all.dropped()), ([400, 500].to_vec(), 1));
+        [900, 1000].map(of).into_iter().for_each(|o| all.admit(o, &t));
+        all.admit(of(5000), &t);
+        assert_eq!((evidence(&all), all.dropped()), ([900, 1000].to_vec(), 2), "the confirmed stay");
+    }
+
+    #[test]
+    fn the_part_with_more_detections_takes_the_other() {
+        let t = tracking();
+        let mut all = Obstacles::<2>::new();
+        for (x, hits) in [(5000, 5), (5500, 50)] {
+            let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
+            (o.existence, o.hits) = (1000, hits);
+            let _ = all.list.push(o);
+        }
+        all.join_parts(&t);
+        let left: StdVec<(i32, u16)> = all.iter().map(|o| (o.existence, o.hits)).collect();
+        assert_eq!(left, [(0, 5), (2000, 55)]);
+    }
+
+    #[test]
+    fn a_detection_goes_to_the_obstacle_it_fits_best() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        // together longer than any vehicle
+        for (x, front_cm) in [(6200, 1250), (5000, 25)] {
+            let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
+            (o.existence, o.extent) = (t.confirmed, profile::Extent { rear_cm: -25, front_cm });
+            let _ = all.list.push(o);
+        }
+        let claimed: Claimed<4> = all.step(&[reflection(5450, 0, 2000)], Step::from_micros(0), &t, |_, _| false);
+        assert!(claimed.contains(0) && !claimed.contains(1));
+        assert_eq!(all.iter().map(|o| o.hits).collect::<StdVec<_>>(), [0, 1], "7 m from one, 4 m from the other");
+    }
+
+    #[test]
+    fn boxes_are_of_the_confirmed_and_what_has_no_evidence_left_or_is_behind_the_sensor_goes() {
+        let t = tracking();
+        let after = |x, existence| {
+            let mut all = Obstacles::<4>::new();
+            let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
+            (o.existence, o.age) = (existence, 5);
+            let _ = all.list.push(o);
+            let _: Claimed<4> = all.step(&[], Step::from_micros(200_000), &t, |_, _| false);
+            (all.iter().count(), all.solids(&t).count())
+        };
+        assert_eq!(after(5000, t.confirmed + 1000), (1, 1));
+        assert_eq!(after(5000, t.confirmed - 1), (1, 0));
+        assert_eq!(after(5000, 1), (0, 0));
+        assert_eq!(after(BEHIND_CM - 500, t.confirmed + 1000), (0, 0));
+        assert_eq!(after(t.limit_cm, t.confirmed + 1000), (0, 0));
+    }
+
+    #[test]
+    fn a_frame_starts_half_as_many_as_there_is_room_for() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        let seen = [-900, -300, 300, 900].map(|y| reflection(5000, y, 2000));
+        let _: Claimed<4> = all.step(&seen, Step::from_micros(0), &t, |_, _| true);
+        assert_eq!(all.iter().count(), 2);
+        let _: Claimed<4> = all.step(&seen, Step::from_micros(1), &t, |_, _| true);
+        assert_eq!(all.iter().count(), 4);
+    }
+
+    #[test]
+    fn only_confirmed_movers_become_boxes() {
+        let t = tracking();
+        let mut all = Obstacles::<4>::new();
+        let mut frames = 0;
+        while all.solids(&t).next().is_none() {
+            assert!(frames < 20, "never");
+            let seen = [reflection(5000 + 133 * frames, 0, 2000), reflection(5200 + 133 * frames, 0, 2000)];
+            let _: Claimed<4> = all.step(&seen, Step::from_micros(66_667), &t, |_, _| true);
+            frames += 1;
+        }
+        // after 2 m of way, which takes it two frames behind the first
+        assert_eq!(frames, 3);
     }
 }

@@ -5,8 +5,8 @@
 //! delivery vans are about 6 m long and 2.6 m high, and goods vehicles fill what the law allows
 //! (2.55 m wide and 4.00 m high in the European Union, directive 96/53/EC).
 
-use crate::config::{ConfigError, above, within};
-use crate::math;
+use crate::fixed::math;
+use crate::sensor::config::{ConfigError, above, within};
 
 /// One point of the size table.
 ///
@@ -104,6 +104,18 @@ impl Sizes {
         }
         Size { length_cm: length_cm.max(self.min_length_cm), ..size }
     }
+
+    /// Shortest length whose usual height reaches this one, centimetres; 0 for what is lower than all.
+    pub fn least_length_cm(&self, height_cm: i32) -> i32 {
+        let Some(first) = self.points.first().filter(|p| p.height_cm < height_cm) else { return 0 };
+        let mut length = first.length_cm;
+        for pair in self.points.windows(2) {
+            let [a, b] = pair else { continue };
+            let rise = (height_cm - a.height_cm).clamp(0, (b.height_cm - a.height_cm).max(0));
+            length += (b.length_cm - a.length_cm) * rise / (b.height_cm - a.height_cm).max(1);
+        }
+        length
+    }
 }
 
 #[cfg(test)]
@@ -118,6 +130,14 @@ mod tests {
         assert_eq!(sizes.of(600).height_cm, 260);
         assert_eq!(sizes.of(1650), Size { length_cm: 1650, width_cm: 255, height_cm: 400 });
         assert_eq!(sizes.of(560).height_cm, 205, "half way from car to van");
+    }
+
+    #[test]
+    fn what_is_proven_high_is_long() {
+        let sizes = SizeConfig::default().sizes().unwrap();
+        assert_eq!([0, 150, 260, 400, 900].map(|h| sizes.least_length_cm(h)), [0, 0, 600, 1200, 1200]);
+        let length = sizes.least_length_cm(310);
+        assert!((sizes.of(length).height_cm - 310).abs() <= 1, "the inverse of the table, {length} cm");
     }
 
     #[test]

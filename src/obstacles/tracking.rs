@@ -1,94 +1,12 @@
 //! Parameters of obstacle tracking, checked and in integers.
 
-use super::profile::HIT;
-use super::size::{SizeConfig, Sizes};
-use crate::config::{ConfigError, above, within};
-use crate::math;
-use crate::reflection::{Noise, Reflection};
-use crate::time::Step;
-use crate::trig::Direction;
+use super::size::Sizes;
+use crate::fixed::time::Step;
+use crate::fixed::trig::Direction;
+use crate::frame::reflection::Reflection;
+use crate::sensor::noise::Noise;
 
-/// How detections become moving obstacles.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
-pub struct ObstacleConfig {
-    /// Slowest radial motion, projected on the road, that starts an obstacle, m/s.
-    pub min_speed_mps: f32,
-    /// Largest difference between measured and explained radial velocity, m/s.
-    pub doppler_gate_mps: f32,
-    /// Longest stretch without reflections within one vehicle, metres.
-    pub gap_m: f32,
-    /// Shortest headway between vehicles, seconds: what is farther apart is two vehicles.
-    pub headway_s: f32,
-    /// Shortest headway that vehicles keep for long, seconds: what follows closer is coupled.
-    pub coupled_headway_s: f32,
-    /// Way both must have come for that, metres.
-    pub coupled_way_m: f32,
-    /// Largest difference in speed of what is coupled, m/s.
-    pub coupled_speed_mps: f32,
-    /// Shortest gap between vehicles standing in a queue, metres.
-    pub standstill_m: f32,
-    /// How far beside the outline a detection may lie before noise is allowed for, metres.
-    pub lateral_gate_m: f32,
-    /// Standard deviations of noise allowed for.
-    pub gate_sigmas: f32,
-    /// Longest vehicle, metres.
-    pub max_length_m: f32,
-    /// How long the outline remembers, seconds.
-    pub outline_memory_s: f32,
-    /// Detections that make an end of the outline.
-    pub outline_min_hits: f32,
-    /// Share of all detections that makes an end of the outline.
-    pub outline_share: f32,
-    /// How long the lateral place remembers, seconds.
-    pub lateral_memory_s: f32,
-    /// Share of a lateral innovation that goes into the lateral speed.
-    pub drift_gain: f32,
-    /// Detections that confirm an obstacle.
-    pub confirm_hits: f32,
-    /// Detections' worth of evidence an obstacle can hold.
-    pub max_evidence: f32,
-    /// Loss of evidence while unconfirmed and unseen, detections per second.
-    pub tentative_loss_per_s: f32,
-    /// Loss of evidence while unseen in plain view, detections per second.
-    pub visible_loss_per_s: f32,
-    /// Loss of evidence while unseen in a shadow, detections per second.
-    pub hidden_loss_per_s: f32,
-    /// Widths and heights by length.
-    pub sizes: SizeConfig,
-}
-
-impl Default for ObstacleConfig {
-    fn default() -> Self {
-        Self {
-            min_speed_mps: 1.5,
-            doppler_gate_mps: 1.2,
-            gap_m: 7.0,
-            headway_s: 0.4,
-            coupled_headway_s: 0.6,
-            coupled_way_m: 12.0,
-            coupled_speed_mps: 0.5,
-            standstill_m: 1.0,
-            lateral_gate_m: 1.0,
-            gate_sigmas: 2.0,
-            max_length_m: 19.0,
-            outline_memory_s: 2.0,
-            outline_min_hits: 2.5,
-            outline_share: 0.06,
-            lateral_memory_s: 1.0,
-            drift_gain: 0.01,
-            confirm_hits: 3.0,
-            max_evidence: 12.0,
-            tentative_loss_per_s: 10.0,
-            visible_loss_per_s: 9.0,
-            hidden_loss_per_s: 2.0,
-            sizes: SizeConfig::default(),
-        }
-    }
-}
-
-/// [`ObstacleConfig`] in integers; lengths in centimetres.
+/// [`ObstacleConfig`](super::config::ObstacleConfig) in integers; lengths in centimetres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the fields are the configuration's, in the units below
 pub struct Tracking {
@@ -129,29 +47,34 @@ pub struct Tracking {
     /// 2^-8 detections per second
     pub hidden_loss: i32,
     pub merge_lateral_cm: i32,
-    /// Least distance between the middles of two vehicles side by side.
     pub abreast_cm: i32,
     /// 2^-8 cm/s
     pub merge_speed: i32,
-    /// Least cosine between headings, 2^-14.
-    pub merge_parallel: i32,
-    /// Half the width detections of one vehicle spread over.
     pub half_width_cm: i32,
-    /// Frames an obstacle is young: its motion follows its detections quickly.
-    pub young: u16,
-    /// Detections' worth of trust in the speed so far, 2^-14; while young and later.
-    pub young_inertia: i32,
-    pub inertia: i32,
-    /// Detections of one frame that count as evidence.
-    pub most_hits_a_frame: i32,
-    /// Way after which an obstacle is a mover, and stays one when it stops.
     pub mover_cm: i32,
     /// Speed below which one that never moved is a fixture, 2^-8 cm/s.
     pub fixture_speed: i32,
-    /// Speed above which motion tells the heading, 2^-8 cm/s.
+    /// 2^-8 cm/s
     pub turning_speed: i32,
-    /// Bins the outline's middle may leave the anchor.
-    pub recentre_bins: i32,
+    /// 2^-4
+    pub outline_sigmas: i32,
+    /// (cm/s)^2 per second
+    pub turning_noise: i32,
+    /// 2^-4
+    pub own_way_sigmas: i32,
+    pub own_way_cm_s: i32,
+    /// 2^-16
+    pub own_way_follow: i32,
+    /// 2^-16
+    pub own_way_share: i32,
+    /// 2^-4
+    pub heading_sigmas: i32,
+    /// 2^-8 cm/s
+    pub standing_speed: i32,
+    /// 2^-8 detections per second
+    pub standing_visible_loss: i32,
+    /// 2^-8 detections per second
+    pub standing_hidden_loss: i32,
     pub sizes: Sizes,
     pub noise: Noise,
     /// The road's axis in the levelled frame.
@@ -160,72 +83,18 @@ pub struct Tracking {
     pub limit_cm: i32,
 }
 
-impl ObstacleConfig {
-    /// Checks the parameters and rounds them. `road` is the road's axis in the levelled frame, and
-    /// obstacles are followed as far as `limit_cm`.
-    ///
-    /// # Errors
-    /// Names the parameter outside its limits.
-    pub fn tracking(&self, noise: Noise, road: Direction, limit_cm: i32) -> Result<Tracking, ConfigError> {
-        let cm = |name, v, min, max| within(name, v, min, max).map(|m| math::round_i32(m * 100.0));
-        let seconds = |name, v| within(name, v, 0.05, 60.0).map(|s| math::round_i32(s * 65536.0));
-        let hits = |name, v| within(name, v, 0.0, 1000.0).map(|h| math::round_i32(h * 256.0));
-        let gap_cm = cm("obstacles.gap_m", self.gap_m, 0.5, 20.0)?;
-        let max_length_cm = cm("obstacles.max_length_m", self.max_length_m, 2.0, 22.0)?;
-        let confirmed = hits("obstacles.confirm_hits", self.confirm_hits)?;
-        let existence_max = hits("obstacles.max_evidence", self.max_evidence)?;
-        if existence_max < confirmed {
-            // nothing would ever be confirmed
-            above("obstacles.max_evidence", self.max_evidence, self.confirm_hits)?;
-        }
-        Ok(Tracking {
-            min_speed_cm_s: cm("obstacles.min_speed_mps", self.min_speed_mps, 0.3, 20.0)?,
-            doppler_gate: cm("obstacles.doppler_gate_mps", self.doppler_gate_mps, 0.1, 10.0)? << 4,
-            gap_cm,
-            lateral_gate_cm: cm("obstacles.lateral_gate_m", self.lateral_gate_m, 0.0, 5.0)?,
-            sigmas: math::round_i32(within("obstacles.gate_sigmas", self.gate_sigmas, 0.0, 8.0)? * 16.0),
-            max_length_cm,
-            headway: math::round_i32(within("obstacles.headway_s", self.headway_s, 0.0, 5.0)? * 65536.0),
-            coupled_headway: math::round_i32(
-                within("obstacles.coupled_headway_s", self.coupled_headway_s, 0.0, 5.0)? * 65536.0,
-            ),
-            coupled_way_cm: cm("obstacles.coupled_way_m", self.coupled_way_m, 0.0, 100.0)?,
-            coupled_speed: math::round_i32(
-                within("obstacles.coupled_speed_mps", self.coupled_speed_mps, 0.0, 5.0)? * 25_600.0,
-            ),
-            standstill_cm: cm("obstacles.standstill_m", self.standstill_m, 0.0, 10.0)?,
-            outline_memory: seconds("obstacles.outline_memory_s", self.outline_memory_s)?,
-            outline_min_hits: math::round_i32(
-                within("obstacles.outline_min_hits", self.outline_min_hits, 0.1, 50.0)? * HIT as f32,
-            ),
-            outline_share: math::round_i32(within("obstacles.outline_share", self.outline_share, 0.0, 0.4)? * 256.0),
-            lateral_memory: seconds("obstacles.lateral_memory_s", self.lateral_memory_s)?,
-            drift_gain: math::round_i32(within("obstacles.drift_gain", self.drift_gain, 0.0, 0.5)? * 65536.0),
-            confirmed,
-            existence_max,
-            tentative_loss: hits("obstacles.tentative_loss_per_s", self.tentative_loss_per_s)?,
-            visible_loss: hits("obstacles.visible_loss_per_s", self.visible_loss_per_s)?,
-            hidden_loss: hits("obstacles.hidden_loss_per_s", self.hidden_loss_per_s)?,
-            merge_lateral_cm: 100,
-            abreast_cm: 180,
-            merge_speed: 200 << 8,
-            merge_parallel: 15_500, // 19 degrees
-            half_width_cm: 80,
-            young: 5,
-            young_inertia: 1 << 13,
-            inertia: 4 << 14,
-            most_hits_a_frame: 3,
-            mover_cm: 200,
-            fixture_speed: math::round_i32(self.min_speed_mps * 100.0) << 7,
-            turning_speed: 200 << 8,
-            recentre_bins: 6,
-            sizes: self.sizes.sizes()?,
-            noise,
-            road,
-            limit_cm,
-        })
-    }
-}
+/// Frames an obstacle is young: its motion follows its detections quickly.
+pub const YOUNG_FRAMES: u16 = 5;
+/// Detections' worth of trust in the speed so far while young, and later, 2^-14.
+pub const YOUNG_INERTIA: i32 = 1 << 13;
+/// See [`YOUNG_INERTIA`].
+pub const INERTIA: i32 = 4 << 14;
+/// Detections of one frame that count as evidence: more are of one reflection.
+pub const MOST_HITS_A_FRAME: i32 = 3;
+/// Least cosine between the headings of parts of one vehicle, 2^-14: 19 degrees.
+pub const MERGE_PARALLEL: i32 = 15_500;
+/// Bins the outline's middle may leave the anchor before that is moved: 3 m of the histogram's 24.
+pub const RECENTRE_BINS: i32 = 6;
 
 impl Tracking {
     /// What a time step leaves of every obstacle's memories.
@@ -266,14 +135,33 @@ const FASTEST_CM_S: i32 = 7000;
 
 #[cfg(test)]
 mod tests {
+    use super::super::by_hand::rules;
     use super::*;
-    use crate::reflection::NoiseConfig;
 
     #[test]
-    fn an_impossible_parameter_is_named() {
-        let e = ObstacleConfig { gap_m: -1.0, ..ObstacleConfig::default() };
-        let noise = NoiseConfig::default().noise().unwrap();
-        let e = e.tracking(noise, Direction::AHEAD, 20_000).unwrap_err();
-        assert_eq!(e.parameter, "obstacles.gap_m");
+    fn a_course_is_where_its_doppler_says_along_the_road() {
+        let t = rules();
+        let at = |x_cm: i32, y_cm: i32, radial_velocity_cm_s| {
+            let sight = Direction::of(x_cm, y_cm);
+            t.course(&Reflection {
+                x_cm,
+                y_cm,
+                ground_cm: 5000,
+                sight,
+                radial_velocity_cm_s,
+                across_cm: 40,
+                height_cm: None,
+                strength: 0,
+            })
+        };
+        assert_eq!(at(5000, 0, 2000), Some((t.road, 2000)));
+        assert_eq!(at(5000, 0, -2000), Some((t.road.reversed(), 2000)));
+        // 60 degrees to the side half of the speed shows
+        let (heading, speed) = at(2500, 4330, -1000).unwrap();
+        assert!(heading == t.road.reversed() && (speed - 2000).abs() < 5);
+        assert_eq!(at(300, 5000, 500), None, "nearly broadside");
+        assert_eq!(at(5000, 0, 55), None, "within the noise of what stands");
+        assert_eq!(at(5000, 0, 120), None, "slower than what starts an obstacle");
+        assert_eq!(at(5000, 0, 7100), None, "no vehicle's speed");
     }
 }

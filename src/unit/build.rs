@@ -1,10 +1,10 @@
 //! What settings make of a unit: the same for a start and for the check of a block that came.
 
-use crate::config::{ConfigError, Problem};
 use crate::estimator::Estimator;
 use crate::radar_3d::Radar3d;
+use crate::sensor::config::{ConfigError, Problem};
 use crate::unit::sender::Sender;
-use crate::unit::settings::Settings;
+use crate::unit::settings::{Check, Settings};
 use crate::wire::code::ray::Known;
 use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
 
@@ -44,12 +44,16 @@ pub fn build<E: InUnit>(settings: &Settings, parameters: &mut Option<E::Paramete
 }
 
 /// Whether a unit with this sender can be made by these settings.
-///
-/// # Errors
-/// Names the first parameter that cannot be worked with.
 #[inline(never)]
-pub fn check<E: InUnit, S: Sender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
+fn check<E: InUnit, S: Sender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
     make::<E>(settings).and_then(|(_, header)| S::fits(&header))
+}
+
+impl Check {
+    /// For a unit of this estimator and sender.
+    pub const fn of<E: InUnit, S: Sender<E::Map>>() -> Self {
+        Self::by(check::<E, S>)
+    }
 }
 
 impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> InUnit

@@ -1,7 +1,7 @@
 //! A classic CAN bus: bit timing, what a board's controller offers, and how it is kept on the bus.
 
-use crate::config::{ConfigError, Problem, within};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, Problem, within};
 use crate::wire::frame::CanFrame;
 
 /// A bus as the integrator knows it.

@@ -6,7 +6,7 @@
 
 use heapless::Deque;
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::frame::{CanFrame, CanId};
 
 /// A classic frame in as few bytes as it needs.

@@ -35,9 +35,9 @@ pub use build::{InUnit, build};
 pub use sender::Sender;
 
 use crate::estimator::{Estimator, Progress};
-use crate::health::{Condition, Continuity};
+use crate::fixed::time::Time;
+use crate::frame::health::{Condition, Continuity};
 use crate::inputs::{Feed, Frame};
-use crate::time::Time;
 use crate::wire::frame::CanFrame;
 use crate::wire::status::{Reason, State};
 
@@ -123,11 +123,11 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
 
     /// Takes a frame and offers its map to the sender.
     pub fn frame(&mut self, frame: &Frame<'_, E::Input>, event: &mut impl FnMut(Event)) -> Progress {
-        let Frame { measured, input, incomplete, fault } = *frame;
+        let Frame { measured, input, incomplete, status } = *frame;
         event(Event::Began);
         let ended = &mut || event(Event::Ended);
-        let progress = self.state.process(self.parameters, measured, input, fault, self.map, ended);
-        self.fault = fault;
+        let progress = self.state.process(self.parameters, measured, input, status, self.map, ended);
+        self.fault = status.fault;
         self.frames = self.frames.wrapping_add(1);
         self.period_us = self.measured.replace(measured).and_then(|last| measured.since(last));
         if progress.continuity == Continuity::ClockStepped {
@@ -192,6 +192,7 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
             _ if self.fault => (State::Fault, Reason::RadarFault),
             (Condition::Starting, _) => (State::Starting, Reason::None),
             (Condition::Blind, _) => (State::Blind, Reason::None),
+            (Condition::Unusable, _) => (State::Blind, Reason::UnusablePoints),
             (Condition::Healthy, Some(reason)) => (State::Degraded, reason),
             (Condition::Healthy, None) => (State::Ok, Reason::None),
         };
@@ -248,7 +249,8 @@ fn recent(since: Time, now: Time) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::ConfigError;
+    use crate::frame::health::FrameStatus;
+    use crate::sensor::config::ConfigError;
     use crate::wire::broadcast::BroadcastConfig;
     use crate::wire::header::Header;
     use crate::wire::message::Epoch;
@@ -288,7 +290,7 @@ mod tests {
             rows: &usize,
             measured: Time,
             input: &[Outline],
-            _: bool,
+            _: FrameStatus,
             map: &mut Squares,
             ended: &mut impl FnMut(),
         ) -> Progress {
@@ -296,7 +298,8 @@ mod tests {
                 squares.fill(!input.iter().any(|[from, to]| (*from..*to).contains(&row)));
             }
             ended();
-            let continuity = if self.last.replace(measured).is_none() { Continuity::First } else { Continuity::Follows(1) };
+            let continuity =
+                if self.last.replace(measured).is_none() { Continuity::First } else { Continuity::Follows(1) };
             Progress { continuity, condition: Condition::Healthy, used: 1 }
         }
 
@@ -352,7 +355,7 @@ mod tests {
         fn take(&mut self, piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Outline]>)) {
             let [from, to] = *piece else { return self.0 += 1 };
             let input = &[[usize::from(from), usize::from(to)]][..];
-            each(&Frame { measured: now, input, incomplete: from > to, fault: false });
+            each(&Frame { measured: now, input, incomplete: from > to, status: false.into() });
         }
         fn wait(&mut self, _: Time, _: &mut impl FnMut(&Frame<'_, [Outline]>)) {}
         fn lost(&self) -> u32 {
@@ -362,7 +365,8 @@ mod tests {
 
     #[test]
     fn an_estimator_with_another_input_and_map_is_a_unit_as_well() {
-        let (mut camera, mut map, mut kept, mut feed) = (Camera::default(), [[true; 4]; 4], Kept::default(), Pictures(0));
+        let (mut camera, mut map, mut kept, mut feed) =
+            (Camera::default(), [[true; 4]; 4], Kept::default(), Pictures(0));
         let at = |ms: u64| Time::from_micros(ms * 1000);
         let mut unit = Unit::new(&3, &mut camera, &mut map, &mut kept);
         assert_eq!(*unit.map(), [[false; 4]; 4], "nothing is known");

@@ -41,7 +41,7 @@ macro_rules! size {
 
 size!(
     /// 200 x 120 x 16 cells: parts with 512 kB.
-    reference, 200, 120, 16, 64, 256
+    reference, 200, 120, 16, 96, 256
 );
 size!(
     /// 100 x 64 x 8 cells: parts with 128 kB.

@@ -11,7 +11,7 @@
 //! # Limits
 //! Times below 2^63 µs. Before the first stamp the unit's own clock is shown.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 
 /// A lag this much larger, microseconds, is another clock.
 const STEP_US: i64 = 1_000_000;

@@ -1,6 +1,6 @@
 //! What a unit says without a block it can run with: a status, and nothing else.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet};

@@ -1,7 +1,7 @@
 //! Who sends a unit's maps, whatever their kind and size.
 
-use crate::config::ConfigError;
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::ConfigError;
 use crate::wire::broadcast::{BroadcastConfig, Broadcaster};
 use crate::wire::frame::CanFrame;
 use crate::wire::header::Header;

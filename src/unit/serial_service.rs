@@ -1,6 +1,6 @@
 //! The unit's end of a serial line: the integrator's requests answered, and what is said without settings.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::unit::safe_state::SafeState;
 use crate::unit::service::{Reply, Request};
 use crate::unit::settings::{Slots, Stored};

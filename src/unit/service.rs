@@ -26,9 +26,9 @@
 //! | 131 | the unit starts | slot, 1 byte; 255 without a block |
 //! | 132 | a block was refused, the unit stays in its safe state if it has no other | reason, 1 byte; of a parameter: its value as `f32`, 4 bytes, and its name |
 
-use crate::bytes::Reader;
-use crate::config::ConfigError;
-use crate::time::Time;
+use crate::fixed::bytes::Reader;
+use crate::fixed::time::Time;
+use crate::sensor::config::ConfigError;
 use crate::unit::settings::{BLOCK_LEN, BlockError};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
@@ -172,7 +172,7 @@ impl Reply<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Problem;
+    use crate::sensor::config::Problem;
 
     #[test]
     fn requests_read_back_and_belong_to_one_sensor() {

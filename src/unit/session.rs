@@ -10,11 +10,11 @@
 //! # Limits
 //! Noise and half messages cost the messages they hit, and are counted as damaged.
 
-use crate::detection::Detection;
 use crate::estimator::Estimator;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
 use crate::inputs::Feed;
 use crate::inputs::native::{Config, Receiver};
-use crate::time::Time;
 use crate::unit::serial_service::{Asked, Line, SerialService};
 use crate::unit::settings::{Settings, Slots, Stored};
 use crate::unit::{Event, Flow, Sender, Unit};

@@ -13,7 +13,7 @@
 
 use embedded_hal::digital::OutputPin;
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::status::State;
 
 /// Half a period of blinking, microseconds.

@@ -8,8 +8,8 @@
 //! What goes first: freshness value, status, header, map, visible range. Between two frames lies the minimum gap.
 //!
 //! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are told
-//! against it. The header's groups and the pages of the status go round all the time, so who joins late
-//! has everything within a second.
+//! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
+//! round all the time, so who joins late has everything within a second.
 //!
 //! *What is dropped.* A new map ends the one before: what of that was not handed out is dropped, and
 //! the new one begins at the azimuth where the old one broke off, so that on a bus too narrow every
@@ -37,8 +37,8 @@ use super::secoc::{Key, Sealer};
 use super::serial;
 use super::status::{PAGES, Status};
 use super::visible_range;
-use crate::config::{ConfigError, Problem};
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, Problem};
 
 /// What messages travel on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -223,6 +223,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     freshness_due: Every,
     page: u8,
     group: u8,
+    /// Messages of the header still to be sent at an epoch's start.
+    groups_first: u8,
     range_from: usize,
     counters: [u8; 32],
 }
@@ -256,6 +258,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             freshness_due: Every::new(now, u64::from(config.header_ms) * 1000),
             page: 0,
             group: 0,
+            groups_first: 0,
             range_from: 0,
             counters: [0; 32],
         };
@@ -286,25 +289,33 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         Self::fits(&header)?;
         self.header = Header { planes: planes(P), ..header };
         self.status.fingerprint = header.fingerprint;
+        self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / u64::from(self.header_messages()));
         self.quiet(now);
-        let long = !self.packing().is_classic();
-        let groups = if long { 1 } else { u64::from(GROUPS) };
-        self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / groups);
         let messages = usize::from(header.azimuths).div_ceil(self.packing().most_own() - 2) as u64;
         let period = |ms: u16| Every::new(now, u64::from(ms) * 1000 / messages.max(1));
         self.range_due = self.config.visible_range_ms.map(period);
         Ok(())
     }
 
+    /// Messages that the whole header takes.
+    fn header_messages(&self) -> u8 {
+        if self.packing().is_classic() { GROUPS } else { 1 }
+    }
+
+    fn quiet_us(&self) -> u64 {
+        (u64::from(self.config.max_age_ms) + u64::from(self.config.max_delay_ms)) * 1000
+    }
+
+    /// A new epoch begins: no map for a while, but the whole header.
     fn quiet(&mut self, now: Time) {
         // this is no want of time
         let overloaded = self.overloaded;
+        (self.group, self.groups_first) = (0, self.header_messages());
         self.drop_scan();
         self.overloaded = overloaded;
         self.layers.iter_mut().for_each(Layer::forget);
         (self.last, self.refreshed, self.from) = (None, None, 0);
-        let quiet_us = (u64::from(self.config.max_age_ms) + u64::from(self.config.max_delay_ms)) * 1000;
-        self.quiet_until = Time::from_micros(now.micros() + quiet_us);
+        self.quiet_until = Time::from_micros(now.micros() + self.quiet_us());
     }
 
     fn packing(&self) -> Packing {
@@ -364,6 +375,11 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             return Err(NotSent::TooSoon);
         }
         let wait = self.quiet_until.since(measured).unwrap_or(0);
+        if wait > self.quiet_us() {
+            // the clock stepped back since the epoch began
+            self.epoch = self.epoch.next();
+            self.quiet(measured);
+        }
         if wait > 0 {
             return Err(NotSent::Quiet);
         }
@@ -485,10 +501,14 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     fn header_packet(&mut self, now: Time) -> Option<Packet> {
-        if !self.header_due.due(now) {
+        if self.groups_first > 0 {
+            self.groups_first -= 1;
+            self.header_due.next = Time::from_micros(now.micros() + self.header_due.period_us);
+        } else if self.header_due.due(now) {
+            self.header_due.done(now);
+        } else {
             return None;
         }
-        self.header_due.done(now);
         let clock = Clock { time_ms: now.micros() / 1000, synchronised: self.synchronised };
         if !self.packing().is_classic() {
             return Some(self.packet(Message::Header, &self.header.emit(&clock)));

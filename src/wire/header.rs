@@ -25,10 +25,10 @@ use super::code::block::Context;
 use super::code::interval::Form;
 use super::code::ray::Known;
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
-use crate::angle::Angle;
-use crate::map::RoadPoint;
-use crate::mount::{Levelling, Mount};
-use crate::polar::PolarGeometry;
+use crate::fixed::angle::Angle;
+use crate::map::polar::PolarGeometry;
+use crate::sensor::mount::{Levelling, Mount};
+use crate::sensor::road::RoadPoint;
 
 /// Groups of a header.
 pub const GROUPS: u8 = 7;
@@ -170,7 +170,7 @@ impl Header {
 
     /// What the code of its maps needs of it.
     pub fn context(&self, form: Form) -> Context {
-        Context { form, usual: self.usual, azimuths: usize::from(self.azimuths) }
+        Context { form, usual: self.usual, azimuths: usize::from(self.azimuths), ranges: usize::from(self.ranges) }
     }
 
     /// Groups 1 to 6.
@@ -332,7 +332,8 @@ impl Collector {
         if bytes.len() < usize::from(GROUPS) * GROUP {
             return match flags >> 4 & 7 {
                 0 => Ok(Brought::Clock(Clock::parse(synchronised, first))),
-                GROUPS.. => Err(NotAHeader::Range),
+                // of a later version, which says so itself if that matters
+                GROUPS.. => Ok(Brought::Group),
                 group => self.take_group(usize::from(group) - 1, first),
             };
         }

@@ -8,7 +8,7 @@
 use super::code::block::{Block, Context, Kind, Rays};
 use super::code::ray::Ray;
 use super::scan_number::ScanNumber;
-use crate::bits::Bits;
+use crate::fixed::bits::Bits;
 
 /// Azimuths, a bit each.
 pub(super) type Azimuths = Bits<4>;

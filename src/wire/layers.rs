@@ -2,9 +2,9 @@
 
 use super::code::ray::{Known, Ray};
 use super::message::Plane;
-use crate::bitmap::VisibilityBitmap;
-use crate::bits::Bits;
-use crate::polar::PolarMap;
+use crate::fixed::bits::Bits;
+use crate::map::bitmap::VisibilityBitmap;
+use crate::map::polar::PolarMap;
 
 /// A map of one or more planes.
 pub trait Layers<const W: usize> {
@@ -106,10 +106,11 @@ fn reached(cells: [u8; 8], threshold: u8) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angle::Angle;
-    use crate::map::{RoadPoint, Visibility};
-    use crate::mount::Levelling;
-    use crate::polar::PolarGeometry;
+    use crate::fixed::angle::Angle;
+    use crate::map::Visibility;
+    use crate::map::polar::PolarGeometry;
+    use crate::sensor::mount::Levelling;
+    use crate::sensor::road::RoadPoint;
 
     fn map() -> PolarMap<40, 2> {
         let geometry = PolarGeometry {

@@ -16,7 +16,7 @@ use super::code::interval::MOST_WORDS;
 use super::code::ray::{Known, Ray};
 use super::message::{CLASSIC_BYTES, LONG_BYTES};
 use super::scan_number::ScanNumber;
-use crate::bits::Bits;
+use crate::fixed::bits::Bits;
 
 /// Cells of a classic plain message.
 pub const SEGMENT: usize = 29;

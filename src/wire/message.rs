@@ -124,8 +124,8 @@ pub enum Message {
     Freshness,
     /// A part of a map.
     Map(Plane, Part),
-    /// A number that is nothing of a map: 24 and 25 are the configuration's
-    /// ([`can_service`](crate::unit::can_service)), 26 to 31 the installation's own.
+    /// Another number: 4 and 5 are the installation's own, 24 and 25 the configuration's
+    /// ([`can_service`](crate::unit::can_service)), 26 to 31 a fourth plane's.
     Other(u8),
 }
 
@@ -498,8 +498,8 @@ impl<'a> Received<'a> {
         };
         let counter = Profile::P05.check(bytes, data_id(*sensor, message)).map_err(NotAMessage::Protection)?;
         let sealed = epoch & SECURED != 0;
-        if sealed && epoch & RESERVED != 0 {
-            // no sender says so, and its authenticator would not cover it
+        if epoch & RESERVED != 0 {
+            // no sender says so
             return Err(NotAMessage::Mislabelled { number: *number, sensor: *sensor });
         }
         let packing = if sealed { Packing::Secured } else { Packing::Long };

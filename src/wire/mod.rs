@@ -1,4 +1,4 @@
-//! Radar frames in and visibility out, over CAN, CAN FD and serial lines.
+//! Maps out of a sensor's unit and into its receivers, over CAN, CAN FD and serial lines.
 //!
 #![doc = include_str!("SPECIFICATION.md")]
 

@@ -7,13 +7,16 @@
 //! # Limits
 //! At most 50 scans a second. Numbers come again after 5.12 s.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 
 /// Length of a tick, microseconds.
 pub const TICK_US: u32 = 20_000;
 
 /// Time after which numbers come again, microseconds.
 pub const PERIOD_US: u32 = 5_120_000;
+
+/// Time after which the header's clock comes again, microseconds: 2^40 ms.
+pub const CLOCK_US: u64 = (1 << 40) * 1000;
 
 /// Number of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -24,7 +27,8 @@ impl ScanNumber {
     /// Of a scan measured at this time of the sender's clock.
     #[allow(clippy::cast_possible_truncation)] // modulo 256
     pub const fn at(measured: Time) -> Self {
-        Self((measured.micros() / TICK_US as u64) as u8)
+        // the clock comes again after 2^40 ms, as it does in the header
+        Self((measured.micros() % CLOCK_US / TICK_US as u64) as u8)
     }
 
     /// From the byte in a message.
@@ -77,6 +81,15 @@ mod tests {
         assert!(at(5200).newer_than(at(5000)) && !at(5000).newer_than(at(5200)) && !at(40).newer_than(at(41)));
         assert!(at(2540).newer_than(at(0)) && !at(2560).newer_than(at(0)));
         assert_eq!((at(5200).ticks_after(at(5000)), at(60).before(5).byte()), (10, 254));
+    }
+
+    #[test]
+    fn numbers_are_those_of_the_headers_clock() {
+        // a set clock is beyond 2^40 ms, which is no multiple of the period
+        for ms in [1_790_000_000_000_u64, (1 << 40) + 30, 1 << 40, (1 << 40) - 1] {
+            let header_ms = ms % (1 << 40);
+            assert_eq!(u64::from(ScanNumber::at(Time::from_micros(ms * 1000)).byte()), header_ms / 20 % 256, "{ms}");
+        }
     }
 
     #[test]

@@ -65,6 +65,8 @@ pub enum Reason {
     BusOff,
     /// The time of a frame was exceeded.
     Overrun,
+    /// Points keep coming, but none that can be used: not finite, or all outside the field of view.
+    UnusablePoints,
     /// A number given by the integrator, or by a later version.
     Other(u8),
 }
@@ -83,6 +85,7 @@ impl Reason {
             Self::BusOverload => 7,
             Self::BusOff => 8,
             Self::Overrun => 9,
+            Self::UnusablePoints => 10,
             Self::Other(number) => number,
         }
     }
@@ -100,6 +103,7 @@ impl Reason {
             7 => Self::BusOverload,
             8 => Self::BusOff,
             9 => Self::Overrun,
+            10 => Self::UnusablePoints,
             other => Self::Other(other),
         }
     }
@@ -192,11 +196,6 @@ pub struct Status {
 pub enum NotAStatus {
     /// Bytes are missing.
     TooShort,
-    /// A page that does not exist.
-    Page {
-        /// Its number.
-        page: u8,
-    },
     /// A state that does not exist.
     State {
         /// Its number.
@@ -235,7 +234,7 @@ impl Status {
         }
     }
 
-    fn take_page(&mut self, page: u8, bytes: [u8; 4]) -> Result<(), NotAStatus> {
+    fn take_page(&mut self, page: u8, bytes: [u8; 4]) {
         let [a, b, c, d] = bytes;
         let pair = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
         match page {
@@ -245,9 +244,9 @@ impl Status {
             3 => (self.radar_lost, self.dropped) = pair,
             4 => (self.e2e_errors, self.bus_off) = pair,
             5 => self.reset_cause = ResetCause::from_number(a),
-            page => return Err(NotAStatus::Page { page }),
+            // of a later version
+            _ => {}
         }
-        Ok(())
     }
 
     /// Own bytes of the classic message that carries a page, 0 to 5.
@@ -265,10 +264,10 @@ impl Status {
         bytes
     }
 
-    /// Takes a message's own bytes: one page, or all of them.
+    /// Takes a message's own bytes: one page, or all of them. Of a page that is not known only state and reason.
     ///
     /// # Errors
-    /// Bytes missing, a page or a state that does not exist.
+    /// Bytes missing, or a state that does not exist.
     pub fn take(&mut self, own: &[u8]) -> Result<(), NotAStatus> {
         let [first, reason, pages @ ..] = own else { return Err(NotAStatus::TooShort) };
         let state = match first & 0x0F {
@@ -283,9 +282,9 @@ impl Status {
         let mut new = Self { state, reason: Reason::from_number(*reason), ..*self };
         match chunks {
             [] => return Err(NotAStatus::TooShort),
-            [page] => new.take_page(first >> 4, *page)?,
+            [page] => new.take_page(first >> 4, *page),
             pages if pages.len() >= usize::from(PAGES) => {
-                (0..PAGES).zip(pages).try_for_each(|(number, page)| new.take_page(number, *page))?;
+                (0..PAGES).zip(pages).for_each(|(number, page)| new.take_page(number, *page));
             }
             _ => return Err(NotAStatus::TooShort),
         }
@@ -335,10 +334,16 @@ mod tests {
     }
 
     #[test]
+    fn of_a_page_of_a_later_version_state_and_reason_count() {
+        let mut got = STATUS;
+        assert_eq!(got.take(&[0x63, 12, 1, 2, 3, 4]), Ok(()));
+        assert_eq!(got, Status { state: State::Degraded, reason: Reason::Other(12), ..STATUS });
+    }
+
+    #[test]
     fn what_is_no_status_changes_nothing() {
         let mut got = STATUS;
         assert_eq!(got.take(&[0x05, 0, 0, 0, 0, 0]), Err(NotAStatus::State { state: 5 }));
-        assert_eq!(got.take(&[0x60, 0, 0, 0, 0, 0]), Err(NotAStatus::Page { page: 6 }));
         assert_eq!(got.take(&[0x00, 0, 1]), Err(NotAStatus::TooShort));
         assert_eq!(got.take(&[0x00, 0, 1, 2, 3, 4, 5, 6, 7, 8]), Err(NotAStatus::TooShort));
         assert_eq!(got, STATUS);

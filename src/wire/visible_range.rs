@@ -73,7 +73,7 @@ impl<'a> Ranges<'a> {
 mod tests {
     use super::super::code::ray::Known;
     use super::*;
-    use crate::bits::Bits;
+    use crate::fixed::bits::Bits;
 
     #[test]
     fn the_range_ends_at_the_first_blocked_cell_and_is_rounded_down() {

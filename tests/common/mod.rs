@@ -3,17 +3,18 @@
 #![allow(dead_code)] // each test file uses a part
 #![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
-use viewshed::angle::Angle;
 use viewshed::bench::start;
-use viewshed::detection::Detection;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_3d::{FrameReport, Radar3d, Radar3dConfig, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
@@ -22,7 +23,7 @@ pub const R: usize = 200;
 pub const A: usize = 120;
 pub const E: usize = 16;
 
-pub type State = Radar3d<R, A, E, 7, 64, 256>;
+pub type State = Radar3d<R, A, E, 7, 96, 256>;
 pub type Parameters = Radar3dParameters<R, A, E>;
 pub type Map = PolarMap<R, A>;
 

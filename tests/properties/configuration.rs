@@ -1,9 +1,9 @@
 //! A bad configuration is an error that names the parameter.
 
 use proptest::prelude::*;
-use viewshed::config::{ConfigError, Problem};
 use viewshed::radar_2d::Radar2dParameters;
 use viewshed::radar_3d::Radar3dParameters;
+use viewshed::sensor::config::{ConfigError, Problem};
 
 use crate::cases;
 use crate::setup::{OF_BOTH, OF_RADAR_2D, OF_RADAR_3D, OF_SENSOR, Parameter, Setup, all, setups};

@@ -1,10 +1,10 @@
 //! Measurements and placing: any number is refused or rounded, and everything is placed.
 
 use proptest::prelude::*;
-use viewshed::detection::{Detection, Measurement};
-use viewshed::map::RoadPoint;
-use viewshed::reflection::Reflection;
-use viewshed::trig::{self, Direction};
+use viewshed::fixed::trig::{self, Direction};
+use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::frame::reflection::Reflection;
+use viewshed::sensor::road::RoadPoint;
 
 use crate::cases;
 use crate::setup::setups;
@@ -50,7 +50,7 @@ proptest! {
 
     #[test]
     fn any_vector_has_a_bearing_and_components(x in -131_071..131_072, y in -131_071..131_072, angle in any::<i16>(), far in any::<i32>()) {
-        let d: Direction = trig::direction(viewshed::angle::Angle::from_raw(angle));
+        let d: Direction = trig::direction(viewshed::fixed::angle::Angle::from_raw(angle));
         let (cos, sin) = (f64::from(d.x) / 16384.0, f64::from(d.y) / 16384.0);
         let (x, y) = (f64::from(x), f64::from(y));
         prop_assert!((f64::from(d.along(x as i32, y as i32)) - (x * cos + y * sin)).abs() <= 1.0);

@@ -1,13 +1,14 @@
 //! What is made of a map: bits, coarser bits, the road's grid, answers to questions.
 
 use proptest::prelude::*;
-use viewshed::angle::Angle;
-use viewshed::bitmap::VisibilityBitmap;
-use viewshed::map::{CellState, RoadPoint, Visibility, VisibilityMap};
-use viewshed::polar::PolarMap;
-use viewshed::query::{self, Answer, Footprint};
-use viewshed::resample::RoadGrid;
-use viewshed::trig;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::trig;
+use viewshed::map::bitmap::VisibilityBitmap;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::query::{self, Answer, Footprint};
+use viewshed::map::resample::RoadGrid;
+use viewshed::map::{CellState, Visibility, VisibilityMap};
+use viewshed::sensor::road::RoadPoint;
 
 use crate::cases;
 use crate::setup::setups;
@@ -98,7 +99,7 @@ proptest! {
         thresholds in (2..=255_u8, 2..=255_u8),
     ) {
         let levelling = crate::setup::Setup::default().sensor.mount.levelling().unwrap();
-        let geometry = viewshed::polar::PolarGeometry { levelling, cell_cm: 100, azimuth_origin: Angle::from_degrees(-60.0), azimuth_span: 21_845 };
+        let geometry = viewshed::map::polar::PolarGeometry { levelling, cell_cm: 100, azimuth_origin: Angle::from_degrees(-60.0), azimuth_span: 21_845 };
         let mut map = PolarMap::<R, A>::unknown(geometry, thresholds.0, thresholds.1);
         for (a, row) in grades.chunks(R).enumerate() {
             let (grades, occupancy) = map.rows_mut(a).unwrap();
@@ -133,7 +134,7 @@ proptest! {
     #[test]
     fn a_cell_of_a_polar_map_is_found_at_its_centre(setup in setups(), a in 0..A, r in 1..R) {
         let levelling = setup.sensor.mount.levelling().unwrap();
-        let axes = viewshed::axes::Axes::<R, A, 4>::new(&levelling, &setup.sensor.field_of_view, 1.0);
+        let axes = viewshed::grid::axes::Axes::<R, A, 4>::new(&levelling, &setup.sensor.field_of_view, 1.0);
         let Ok(axes) = axes else { return Ok(()) };
         let geometry = axes.polar(&levelling);
         let map = PolarMap::<R, A>::unknown(geometry, 128, 128);

@@ -1,11 +1,12 @@
 //! radar-2d: whatever comes in, the map says no more than it may.
 
 use proptest::prelude::*;
-use viewshed::health::Condition;
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
+use viewshed::fixed::time::Time;
+use viewshed::frame::health::Condition;
+use viewshed::map::{Visibility, VisibilityMap};
+use viewshed::radar_2d::sightlines::{Fan, Sightlines};
 use viewshed::radar_2d::{Radar2d, Radar2dParameters, Reading};
-use viewshed::sightlines::{Fan, Sightlines};
-use viewshed::time::Time;
+use viewshed::sensor::road::RoadPoint;
 
 use crate::cases;
 use crate::setup::{Setup, setups};

@@ -1,11 +1,12 @@
 //! radar-3d: whatever comes in, the map says no more than it may.
 
 use proptest::prelude::*;
-use viewshed::health::Condition;
-use viewshed::map::{RoadPoint, Visibility, VisibilityMap};
-use viewshed::polar::PolarMap;
+use viewshed::fixed::time::Time;
+use viewshed::frame::health::Condition;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_3d::{FrameReport, Radar3d, Radar3dParameters};
-use viewshed::time::Time;
+use viewshed::sensor::road::RoadPoint;
 
 use crate::cases;
 use crate::setup::{Setup, setups};

@@ -1,12 +1,12 @@
 //! Every parameter with its limits, and random setups within them.
 
 use proptest::prelude::*;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::Mount;
 use viewshed::radar_2d::Radar2dConfig;
 use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 
 /// A sensor and both estimators' configurations.
 #[derive(Debug, Clone, Copy)]
@@ -109,6 +109,22 @@ pub const OF_RADAR_3D: &[Parameter] = parameters! {
     "obstacles.tentative_loss_per_s" 0.0 1000.0 radar_3d.obstacles.tentative_loss_per_s;
     "obstacles.visible_loss_per_s" 0.0 1000.0 radar_3d.obstacles.visible_loss_per_s;
     "obstacles.hidden_loss_per_s" 0.0 1000.0 radar_3d.obstacles.hidden_loss_per_s;
+    "obstacles.merge_lateral_m" 0.0 5.0 radar_3d.obstacles.merge_lateral_m;
+    "obstacles.abreast_m" 0.5 5.0 radar_3d.obstacles.abreast_m;
+    "obstacles.merge_speed_mps" 0.0 20.0 radar_3d.obstacles.merge_speed_mps;
+    "obstacles.half_width_m" 0.1 3.0 radar_3d.obstacles.half_width_m;
+    "obstacles.mover_way_m" 0.0 50.0 radar_3d.obstacles.mover_way_m;
+    "obstacles.turning_speed_mps" 0.5 20.0 radar_3d.obstacles.turning_speed_mps;
+    "obstacles.outline_sigmas" 0.0 8.0 radar_3d.obstacles.outline_sigmas;
+    "obstacles.turning_noise_mps" 0.1 10.0 radar_3d.obstacles.turning_noise_mps;
+    "obstacles.own_way_sigmas" 0.0 8.0 radar_3d.obstacles.own_way_sigmas;
+    "obstacles.own_way_mps" 0.0 50.0 radar_3d.obstacles.own_way_mps;
+    "obstacles.own_way_follow" 0.0 1.0 radar_3d.obstacles.own_way_follow;
+    "obstacles.own_way_share" 0.0 2.0 radar_3d.obstacles.own_way_share;
+    "obstacles.heading_sigmas" 0.0 8.0 radar_3d.obstacles.heading_sigmas;
+    "obstacles.standing_speed_mps" 0.0 5.0 radar_3d.obstacles.standing_speed_mps;
+    "obstacles.standing_visible_loss_per_s" 0.0 1000.0 radar_3d.obstacles.standing_visible_loss_per_s;
+    "obstacles.standing_hidden_loss_per_s" 0.0 1000.0 radar_3d.obstacles.standing_hidden_loss_per_s;
     "sizes.min_length_m" 0.3 20.0 radar_3d.obstacles.sizes.min_length_m;
     "evidence.gain" 0.0 1.0 radar_3d.evidence.gain;
     "evidence.clearing" 0.0 1.0 radar_3d.evidence.clearing;

@@ -1,17 +1,17 @@
 //! Single stages: what a stage promises for any input within the others' promises.
 
 use proptest::prelude::*;
-use viewshed::angle::Angle;
-use viewshed::axes::Axes;
-use viewshed::evidence::EvidenceConfig;
-use viewshed::polar::PolarMap;
-use viewshed::raycast::cast;
-use viewshed::reflection::Reflection;
-use viewshed::solid::Solid;
-use viewshed::spherical::SphericalGrid;
-use viewshed::time::Step;
-use viewshed::trig;
-use viewshed::voxelise::voxelise;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Step;
+use viewshed::fixed::trig;
+use viewshed::frame::reflection::Reflection;
+use viewshed::grid::axes::Axes;
+use viewshed::grid::evidence::EvidenceConfig;
+use viewshed::grid::raycast::cast;
+use viewshed::grid::spherical::SphericalGrid;
+use viewshed::grid::voxelise::voxelise;
+use viewshed::map::polar::PolarMap;
+use viewshed::obstacles::solid::Solid;
 
 use crate::cases;
 use crate::setup::{Setup, setups};

@@ -1,9 +1,9 @@
 //! Random frames: detections of any value, and things that move so that they are followed.
 
 use proptest::prelude::*;
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
-use viewshed::time::Time;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 
 use crate::setup::Setup;
 

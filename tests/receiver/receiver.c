@@ -23,10 +23,12 @@
 #define SENSORS 8
 #define AZIMUTHS 128
 #define CELLS 256
-#define SLOTS 4
+#define WAITING 36     /* words that wait for others of their blocks */
 #define PERIOD 5120000 /* us, of the scan numbers */
+#define CLOCK (UINT64_C(1099511627776) * 1000) /* us, of the header's clock */
 #define A_US 300000
 #define D_US 100000
+#define MARGIN_US 25000
 #define NEVER UINT64_MAX
 
 /* An azimuth: known cells near to end - 1, and a bit for each. */
@@ -44,31 +46,25 @@ static void trim(ray_t *r) {
         if (c < r->near || c >= r->end) r->bit[c] = 0;
 }
 
-/* Known cells from limits as they are told. */
-static bool known(ray_t *r, int near, int end) {
-    if (near < end && end <= CELLS) { r->near = near; r->end = end; return true; }
-    r->near = 1; r->end = 0;
-    return near == 1 && end == 0;
-}
-
-typedef struct { bool there; int scan, start, delta, have; uint64_t word[4]; unsigned touched; } slot_t;
+typedef struct { int scan, start, index, delta; uint64_t word; } waiting_t;
 
 typedef struct {
     /* session */
     int epoch; /* -1: none */
-    uint64_t heard, begun, crept, map_heard, late_since, conflict;
-    uint32_t least;
-    int count;
-    uint64_t left[16];
-    int previous; uint32_t previous_least;
+    uint64_t heard, map_heard, conflict, other_version;
+    bool doubt; uint64_t misfit_since;
+    struct { bool there, confirmed; uint64_t at, us, begun; } clock;
+    struct { bool there; uint64_t begun, at, sunk; uint32_t lag; int count; } measure;
+    struct { enum { UNMARKED, HEARD, LEFT } mark; uint64_t ms; } epochs[16];
+    int previous; uint32_t previous_least; /* -1: none */
     /* header */
-    uint8_t group[7][5]; int groups; bool complete, usable;
+    uint8_t group[7][5]; int groups; bool complete;
     int azimuths, ranges, usual_near, usual_end;
     /* maps */
     bool there[AZIMUTHS], refreshed[AZIMUTHS];
     int now_scan[AZIMUTHS], was_scan[AZIMUTHS];
     ray_t now[AZIMUTHS], was[AZIMUTHS];
-    slot_t slot[SLOTS]; unsigned touches;
+    waiting_t waiting[WAITING]; int words;
     /* authentication */
     bool fresh; uint64_t freshness;
 } sensor_t;
@@ -76,6 +72,7 @@ typedef struct {
 static sensor_t sensors[SENSORS];
 static uint8_t key[16];
 static bool keyed;
+static uint64_t latest; /* time handed in */
 
 /* ---- check sums ---- */
 
@@ -138,6 +135,13 @@ static int room(const number_t *n) {
 }
 
 /* ---- rays ---- */
+
+/* Known cells from limits as they are sent; false if no sender sends them. */
+static bool known(const sensor_t *s, ray_t *r, int near, int end) {
+    r->near = near;
+    r->end = end;
+    return (near < end && end <= s->ranges) || (near == 1 && end == 0);
+}
 
 /* The first edge at or behind a cell; -1 for none. */
 static int edge_from(const ray_t *r, int from) {
@@ -240,14 +244,14 @@ static void take(sensor_t *s, int azimuth, int scan, const ray_t *ray, bool refr
     }
 }
 
-/* Reads what is there of a block. */
-static void block(sensor_t *s, int delta, int scan, int start, const uint64_t *word, int words, int bits, int most) {
+/* Reads what is there of a block; whether nothing can follow: it is complete, or malformed. */
+static bool block(sensor_t *s, int delta, int scan, int start, const uint64_t *word, int words, int bits, int most) {
     static const int classes[7] = {8, 12, 16, 20, 26, 34, 48};
     number_t n = {word, words, bits, most, 1, word[0], UINT64_C(1) << bits, false};
     int base = 0;
     if (delta) {
         int age = plain(&n, 4);
-        if (age < 0) return;
+        if (age < 0) return false;
         base = (scan - age - 1) & 255;
     }
     bool first = true, as_expected = true, unchanged = true;
@@ -255,13 +259,14 @@ static void block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
     for (int a = start; a < s->azimuths; a++) {
         if (!first) {
             int r = room(&n), k = 0;
-            if (r < 4) return;
+            if (r < 4) return true;
             while (k < 7 && r >= classes[k]) k++;
-            if (symbol(&n, STOP[k], 2) != 0) return;
+            int stop = symbol(&n, STOP[k], 2);
+            if (stop != 0) return stop == 1;
         }
         const ray_t *was = &NOTHING;
         if (delta) {
-            if (!s->refreshed[a] || s->was_scan[a] != base) return;
+            if (!s->refreshed[a] || s->was_scan[a] != base) return false;
             was = &s->was[a];
             expected = *was;
             if (!first) {
@@ -271,7 +276,8 @@ static void block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
             }
         } else if (first) {
             expected = NOTHING;
-            known(&expected, s->usual_near, s->usual_end);
+            expected.near = s->usual_near;
+            expected.end = s->usual_end;
             memset(expected.bit, 1, CELLS);
             trim(&expected);
         } else {
@@ -279,7 +285,7 @@ static void block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
         }
         int row = delta ? (first ? 3 : 4 + (unchanged ? 0 : 2) + (as_expected ? 0 : 1)) : (first ? 0 : as_expected ? 1 : 2);
         int told = symbol(&n, RAY[row][edge_from(&expected, 0) >= 0], 3);
-        if (told < 0) return;
+        if (told < 0) return false;
         if (told == 0) {
             ray = expected;
         } else {
@@ -287,12 +293,12 @@ static void block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
             ray.near = expected.near;
             ray.end = expected.end;
             if (told == 2) {
-                if (delta) return;
+                if (delta) return true;
                 int near = limit(&n, expected.near);
                 int end = n.out || near < 0 ? -1 : limit(&n, expected.end);
-                if (near < 0 || end < 0 || !known(&ray, near, end)) return;
+                if (near < 0 || end < 0 || !known(s, &ray, near, end)) return !n.out;
             }
-            if (ray.near < ray.end && !edges(&n, delta, &expected, &ray)) return;
+            if (ray.near < ray.end && !edges(&n, delta, &expected, &ray)) return !n.out;
         }
         as_expected = same(&ray, &expected);
         unchanged = delta && same(&ray, was);
@@ -302,144 +308,257 @@ static void block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
         /* `was` may point into what is replaced here, so it is not used any more */
         take(s, a, scan, &ray, !delta);
     }
+    return true;
 }
 
-/* ---- session: rules 1 to 3 ---- */
+/* ---- session: rules 1 to 5 ---- */
 
 static void forget_maps(sensor_t *s) {
     memset(s->there, 0, sizeof s->there);
     memset(s->refreshed, 0, sizeof s->refreshed);
-    memset(s->slot, 0, sizeof s->slot);
+    s->words = 0;
 }
 
-static void begin_measure(sensor_t *s) { s->begun = s->late_since = NEVER; s->count = 0; }
+static void begin(sensor_t *s, uint64_t now, int epoch);
+
+static bool lasts(uint64_t sign, uint64_t now) { return sign != NEVER && now - sign < 1000000; }
+
+static uint32_t behind(uint64_t lag, uint64_t least) { return (uint32_t)((lag + PERIOD - least) % PERIOD); }
+
+static uint32_t lag_of(uint64_t now, int scan) { return behind(now % PERIOD, (uint64_t)scan * 20000); }
+
+static uint32_t least(const sensor_t *s, uint64_t now) {
+    return (uint32_t)((s->measure.lag + ((now - s->measure.at) >> 11)) % PERIOD);
+}
+
+/* The sender's clock as the headers bound it, and the lag of a scan measured by it now. */
+static uint64_t sender_clock(const sensor_t *s, uint64_t now) {
+    uint64_t passed = now - s->clock.at;
+    return (s->clock.us + passed - (passed >> 11)) % CLOCK;
+}
+
+static uint32_t clock_lag(const sensor_t *s, uint64_t now) { return behind(now % PERIOD, sender_clock(s, now) % PERIOD); }
+
+/* By how much a lag is smaller than the sender's clock allows; 0 if it is not. */
+static uint32_t ahead_of(uint32_t clock, uint32_t lag) {
+    uint32_t by = behind(clock, lag);
+    return by > D_US && by <= PERIOD / 2 ? by : 0;
+}
+
+/* Rule 1: whether a frame is of the session; scan is -1 where it has none. */
+static bool enter(sensor_t *s, uint64_t now, int epoch, int scan) {
+    uint64_t since_ms = now / 1000 - s->epochs[epoch].ms;
+    if (epoch == s->epoch && now - s->heard <= PERIOD) { s->heard = now; return true; }
+    if (s->epoch >= 0 && now - s->heard <= PERIOD / 2) {
+        if (s->epochs[epoch].mark == LEFT && since_ms > PERIOD / 1000) s->epochs[epoch].mark = UNMARKED;
+        bool left = s->epochs[epoch].mark == LEFT;
+        if (left && since_ms <= (A_US + D_US) / 1000) return false;
+        if (left || lasts(s->conflict, now)) {
+            bool speaks = false;
+            if (scan >= 0 && s->previous == epoch) {
+                uint32_t late = behind(lag_of(now, scan), s->previous_least);
+                speaks = late <= D_US || late > PERIOD / 2;
+            } else if (scan >= 0) {
+                speaks = !left;
+            }
+            if (speaks) s->conflict = now;
+            return false;
+        }
+    }
+    bool again = s->epochs[epoch].mark == HEARD && since_ms <= (A_US + D_US) / 1000;
+    s->epochs[epoch].mark = HEARD;
+    s->epochs[epoch].ms = now / 1000;
+    if (again) begin(s, now, epoch);
+    return again;
+}
 
 static void begin(sensor_t *s, uint64_t now, int epoch) {
     if (s->epoch >= 0 && s->epoch != epoch) {
-        s->left[s->epoch] = now;
-        s->previous = s->begun != NEVER ? s->epoch : -1;
-        s->previous_least = s->least;
+        s->epochs[s->epoch].mark = LEFT;
+        s->epochs[s->epoch].ms = now / 1000;
+        s->previous = s->measure.there ? s->epoch : -1;
+        s->previous_least = least(s, now);
     }
-    s->left[epoch] = NEVER;
+    s->epochs[epoch].mark = UNMARKED;
     s->epoch = epoch;
-    s->heard = now;
-    s->conflict = NEVER;
+    s->heard = s->map_heard = now;
+    s->conflict = s->other_version = s->misfit_since = NEVER;
+    s->clock.there = s->measure.there = s->doubt = s->complete = false;
     s->groups = 0;
-    s->complete = false;
-    s->usable = true;
-    begin_measure(s);
     forget_maps(s);
 }
 
-static bool conflicting(const sensor_t *s, uint64_t now) { return s->conflict != NEVER && now - s->conflict < 1000000; }
-
-static uint32_t lag_of(uint64_t now, int scan) {
-    return (uint32_t)((now % PERIOD + PERIOD - (uint64_t)scan * 20000) % PERIOD);
-}
-
-static uint32_t behind(uint32_t lag, uint32_t least) { return (lag + PERIOD - least) % PERIOD; }
-
-/* Whether a frame is of the session; scan is -1 where it has none. */
-static bool enter(sensor_t *s, uint64_t now, int epoch, int scan) {
-    if (s->epoch < 0 || now < s->heard || now - s->heard > PERIOD / 2) { begin(s, now, epoch); return true; }
-    if (epoch == s->epoch) { s->heard = now; return true; }
-    uint64_t since = s->left[epoch] == NEVER ? NEVER : (now / 1000 - s->left[epoch] / 1000) * 1000;
-    if (since != NEVER && since > PERIOD) s->left[epoch] = NEVER;
-    if (since <= A_US + D_US) return false;
-    if (conflicting(s, now) || since <= PERIOD) {
-        bool speaks = false;
-        if (scan >= 0 && s->previous == epoch) {
-            uint32_t late = behind(lag_of(now, scan), s->previous_least);
-            speaks = late <= D_US || late > PERIOD / 2;
-        } else if (scan >= 0) {
-            speaks = s->left[epoch] == NEVER;
-        }
-        if (speaks) s->conflict = now;
-        return false;
+/* Rule 2: the clock of a header. */
+static void hear_clock(sensor_t *s, uint64_t now, const uint8_t *group) {
+    uint64_t us = 0;
+    for (int i = 0; i < 5; i++) us = us << 8 | group[i];
+    us *= 1000;
+    if (!s->clock.there) {
+        s->clock.there = true;
+        s->clock.confirmed = false;
+        s->clock.at = s->clock.begun = now;
+        s->clock.us = us;
     }
-    begin(s, now, epoch);
-    return true;
-}
-
-static bool begin_with(sensor_t *s, uint64_t now, uint32_t lag) {
-    begin_measure(s);
-    s->begun = s->crept = s->map_heard = now;
-    s->least = lag;
-    s->count = 1;
-    return true;
-}
-
-/* Rule 2: whether a map frame is in time. */
-static bool hear(sensor_t *s, uint64_t now, int scan) {
-    uint32_t lag = lag_of(now, scan);
-    if (s->begun == NEVER) return begin_with(s, now, lag);
-    uint64_t steps = (now - s->crept) >> 11;
-    s->least = (uint32_t)((s->least + steps) % PERIOD);
-    s->crept += steps << 11;
-    uint32_t late = behind(lag, s->least);
-    if (late > D_US && late <= PERIOD / 2) {
-        if (s->late_since == NEVER) s->late_since = now;
-        if (now - s->late_since < PERIOD) return false;
+    uint64_t ahead = (us + CLOCK - sender_clock(s, now)) % CLOCK;
+    bool faster = ahead < CLOCK / 2;
+    if (faster && ahead > D_US) {
+        s->clock.begun = now;
+        s->clock.confirmed = false;
+    } else if ((faster || CLOCK - ahead <= D_US) && now - s->clock.begun >= A_US + D_US) {
+        s->clock.confirmed = true;
+    }
+    if (faster) {
+        s->clock.at = now;
+        s->clock.us = us;
+    }
+    if (s->measure.there && ahead_of(clock_lag(s, now), least(s, now)) > 0) {
+        s->measure.there = false;
         forget_maps(s);
-        return begin_with(s, now, lag);
     }
-    if (late > PERIOD / 2) {
-        if (PERIOD - late > D_US) { forget_maps(s); return begin_with(s, now, lag); }
-        s->least = lag;
-        s->crept = now;
-    }
-    s->late_since = NEVER;
-    s->map_heard = now;
-    if (s->count < 255) s->count++;
+}
+
+/* Whether nothing fitted measure and clock for a period: the clocks are not what they were. */
+static bool misfits(sensor_t *s, uint64_t now) {
+    if (s->misfit_since == NEVER) s->misfit_since = now;
+    if (now - s->misfit_since < PERIOD) return false;
+    s->clock.there = false;
+    s->misfit_since = NEVER;
     return true;
 }
 
-/* Rule 5, the dropping. */
+static bool in_time(sensor_t *s, uint64_t now, uint32_t ahead) {
+    if (ahead) { misfits(s, now); return true; }
+    s->map_heard = now;
+    s->misfit_since = NEVER;
+    return true;
+}
+
+static bool measure_anew(sensor_t *s, uint64_t now, uint32_t lag, uint32_t ahead) {
+    forget_maps(s);
+    s->measure.there = true;
+    s->measure.begun = s->measure.at = now;
+    s->measure.lag = lag;
+    s->measure.sunk = 0;
+    s->measure.count = 1;
+    return in_time(s, now, ahead);
+}
+
+static bool refuse(sensor_t *s, uint64_t now, uint32_t lag) {
+    if (misfits(s, now)) return measure_anew(s, now, lag, 0);
+    s->doubt = true;
+    return false;
+}
+
+/* Rules 2 and 3: whether a frame with a scan number is in time. */
+static bool hear(sensor_t *s, uint64_t now, int scan) {
+    uint32_t lag = lag_of(now, scan), ahead = s->clock.there ? ahead_of(clock_lag(s, now), lag) : 0;
+    if (ahead > 1500000 || (ahead && now - s->map_heard <= D_US)) return refuse(s, now, lag);
+    if (!s->measure.there) return measure_anew(s, now, lag, ahead);
+    uint32_t late = behind(lag, least(s, now));
+    if (late > D_US && late <= PERIOD / 2) return refuse(s, now, lag);
+    if (late > PERIOD / 2) {
+        uint64_t allowed = (now - s->measure.at) >> 10;
+        s->measure.sunk = (s->measure.sunk > allowed ? s->measure.sunk - allowed : 0) + PERIOD - late;
+        if (s->measure.sunk > D_US) return measure_anew(s, now, lag, ahead);
+        s->measure.at = now;
+        s->measure.lag = lag;
+    }
+    if (s->measure.count < 255) s->measure.count++;
+    if (now - s->map_heard > 1000000) forget_maps(s);
+    return in_time(s, now, ahead);
+}
+
+/* Rule 4, the dropping. */
 static void purge(sensor_t *s, uint64_t now) {
     for (int a = 0; a < AZIMUTHS; a++) {
-        if (s->there[a] && behind(lag_of(now, s->now_scan[a]), s->least) > 1000000) s->there[a] = s->refreshed[a] = false;
-        if (s->refreshed[a] && behind(lag_of(now, s->was_scan[a]), s->least) > 1000000) s->refreshed[a] = false;
+        if (s->there[a] && behind(lag_of(now, s->now_scan[a]), least(s, now)) > 1000000) s->there[a] = s->refreshed[a] = false;
+        if (s->refreshed[a] && behind(lag_of(now, s->was_scan[a]), least(s, now)) > 1000000) s->refreshed[a] = false;
     }
-    for (int i = 0; i < SLOTS; i++)
-        if (s->slot[i].there && behind(lag_of(now, s->slot[i].scan), s->least) > 1000000) s->slot[i].there = false;
+    int kept = 0;
+    for (int i = 0; i < s->words; i++)
+        if (behind(lag_of(now, s->waiting[i].scan), least(s, now)) <= 1000000) s->waiting[kept++] = s->waiting[i];
+    s->words = kept;
 }
 
+/* Rule 5. */
 static bool trusted(const sensor_t *s, uint64_t now) {
-    return s->epoch >= 0 && s->complete && s->usable && s->begun != NEVER && now - s->begun >= A_US + D_US &&
-           now - s->map_heard <= A_US && s->count >= 8 && !conflicting(s, now);
+    return s->epoch >= 0 && s->complete && s->measure.there && s->clock.there && now - s->measure.begun >= A_US + D_US &&
+           s->measure.count >= 8 && now - s->map_heard <= A_US && (s->clock.confirmed || !s->doubt) &&
+           behind((uint64_t)least(s, now) + D_US, clock_lag(s, now)) <= 2 * D_US + MARGIN_US &&
+           !lasts(s->conflict, now) && !lasts(s->other_version, now);
 }
 
 static bool told(const sensor_t *s, uint64_t now, int a) {
-    return s->there[a] && behind(lag_of(now, s->now_scan[a]), s->least) + 25000 <= A_US;
+    return s->there[a] && behind(lag_of(now, s->now_scan[a]), least(s, now)) + MARGIN_US <= A_US;
+}
+
+/* Nothing heard. */
+static void start_sensor(sensor_t *s) {
+    bool fresh = s->fresh;
+    uint64_t freshness = s->freshness;
+    memset(s, 0, sizeof *s);
+    s->fresh = fresh;
+    s->freshness = freshness;
+    s->epoch = s->previous = -1;
+    s->conflict = s->other_version = NEVER;
+}
+
+/* Before every frame and every look, the time to count with: one that steps back ends all sessions. */
+static uint64_t watch(uint64_t now) {
+    if (now <= latest && latest - now <= 20000) return latest;
+    if (now < latest)
+        for (int i = 0; i < SENSORS; i++) start_sensor(&sensors[i]);
+    return latest = now;
 }
 
 /* ---- messages ---- */
 
+static bool header_holds(uint8_t group[7][5]) {
+    int ranges = group[5][2] + 1, near = group[5][3], last = group[5][4];
+    bool cells = near <= last ? last < ranges : near == 1 && last == 0;
+        return crc8(0, group[1], 29) == group[6][4] && group[4][4] < AZIMUTHS && cells && (group[4][2] || group[4][3]) &&
+           (group[5][0] || group[5][1]);
+}
+
 static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
-    if (n < 6) return;
-    if ((own[0] & 15) != 1) { s->usable = false; return; }
-    int first = own[0] >> 4 & 7, count = n >= 36 ? 7 : 1;
+    if (n > 0 && (own[0] & 15) != 1) s->other_version = now;
+    if (n < 6 || (own[0] & 15) != 1) return;
+    int first = own[0] >> 4 & 7;
     uint8_t all[7][5];
-    for (int g = 0; g < count; g++) memcpy(all[count == 7 ? g : first], own + 1 + 5 * g, 5);
-    for (int g = 1; g < 7; g++) {
-        if (count == 1 && g != first) continue;
-        if (s->groups >> g & 1 && memcmp(s->group[g], all[g], 5)) { s->conflict = now; return; }
-        memcpy(s->group[g], all[g], 5);
-        s->groups |= 1 << g;
+    if (n >= 36) {
+        memcpy(all, own + 1, 35);
+        if (!header_holds(all)) return;
+        for (int g = 1; g < 7; g++)
+            if (s->groups >> g & 1 && memcmp(s->group[g], all[g], 5)) { s->conflict = now; return; }
+        memcpy(s->group, all, 35);
+        s->groups = 0x7E;
+        hear_clock(s, now, all[0]);
+    } else if (first == 0) {
+        hear_clock(s, now, own + 1);
+        return;
+    } else if (first < 7) {
+        if (s->groups >> first & 1 && memcmp(s->group[first], own + 1, 5)) { s->conflict = now; return; }
+        memcpy(s->group[first], own + 1, 5);
+        s->groups |= 1 << first;
     }
     if (s->groups != 0x7E || s->complete) return;
-    uint8_t check = crc8(0, s->group[1], 29);
+    if (!header_holds(s->group)) { s->groups = 0; return; }
     const uint8_t *g4 = s->group[4], *g5 = s->group[5];
-    if (check != s->group[6][4]) { s->groups = 0; return; }
     s->azimuths = g4[4] + 1;
     s->ranges = g5[2] + 1;
     s->usual_near = g5[3];
     s->usual_end = g5[3] == 1 && g5[4] == 0 ? 0 : g5[4] + 1;
-    if (s->azimuths > AZIMUTHS) { s->groups = 0; return; }
     s->complete = true;
 }
 
 static void plain_cells(sensor_t *s, int scan, int a, const uint8_t *own, int n, uint64_t word, bool is_long) {
+    ray_t new = NOTHING;
+    int segment = is_long ? 15 : (int)(word >> 29);
+    int near = is_long ? own[2] : (int)(word >> 21 & 255), last = is_long ? own[3] : (int)(word >> 13 & 255);
+    if (is_long && n < 4) return;
+    if (segment == 15 && !known(s, &new, near, near == 1 && last == 0 ? 0 : last + 1)) return;
+    if (segment > 8 && segment < 15) return;
+    if (is_long && new.end > 8 * (n - 4)) return;
     if (!s->there[a] || newer(scan, s->now_scan[a])) {
         s->now[a] = NOTHING;
         s->now_scan[a] = scan;
@@ -448,60 +567,61 @@ static void plain_cells(sensor_t *s, int scan, int a, const uint8_t *own, int n,
     }
     if (s->now_scan[a] != scan) return;
     ray_t *r = &s->now[a];
+    if (segment == 15 && (r->near != new.near || r->end != new.end)) s->refreshed[a] = false;
     if (is_long) {
-        ray_t whole = NOTHING;
-        if (n < 4 || !known(&whole, own[2], own[2] == 1 && own[3] == 0 ? 0 : own[3] + 1) || whole.end > 8 * (n - 4)) return;
-        for (int c = 0; c < whole.end; c++) whole.bit[c] = own[4 + c / 8] >> (7 - c % 8) & 1;
-        trim(&whole);
-        *r = whole;
-        return;
-    }
-    int segment = (int)(word >> 29);
-    if (segment == 15) {
-        int near = word >> 21 & 255, last = word >> 13 & 255;
-        known(r, near, near == 1 && last == 0 ? 0 : last + 1);
-    } else if (segment < 9) {
+        for (int c = 0; c < new.end; c++) new.bit[c] = own[4 + c / 8] >> (7 - c % 8) & 1;
+        *r = new;
+    } else if (segment == 15) {
+        r->near = new.near;
+        r->end = new.end;
+    } else {
         for (int i = 0; i < 29 && 29 * segment + i < CELLS; i++)
             if (word >> (28 - i) & 1) r->bit[29 * segment + i] = 1;
     }
     trim(r);
 }
 
+/* A word of a block: it waits, and if it joins those that are there from the first on, they are read. */
 static void classic_word(sensor_t *s, int scan, int start, int index, int delta, uint64_t word) {
-    int at = -1, oldest = 0;
-    for (int i = 0; i < SLOTS; i++) {
-        if (s->slot[i].there && s->slot[i].scan == scan && s->slot[i].start == start) at = i;
-        if (!s->slot[i].there ? s->slot[oldest].there : s->slot[oldest].there && s->slot[i].touched < s->slot[oldest].touched)
-            oldest = i;
+    bool again = false;
+    int kept = 0;
+    for (int i = 0; i < s->words; i++) {
+        const waiting_t *w = &s->waiting[i];
+        bool same_word = w->scan == scan && w->start == start && w->index == index;
+        again |= same_word;
+        if (!same_word) s->waiting[kept++] = *w;
     }
-    if (at < 0) {
-        at = oldest;
-        s->slot[at] = (slot_t){.there = true, .scan = scan, .start = start};
+    s->words = kept;
+    if (s->words == WAITING) memmove(s->waiting, s->waiting + 1, sizeof *s->waiting * (size_t)--s->words);
+    s->waiting[s->words++] = (waiting_t){scan, start, index, delta, word};
+    if (again) return;
+    uint64_t words[4] = {0};
+    int have = 0, count = 0;
+    for (int i = 0; i < s->words; i++) {
+        const waiting_t *w = &s->waiting[i];
+        if (w->scan != scan || w->start != start) continue;
+        words[w->index] = w->word;
+        have |= 1 << w->index;
+        if (w->index == 0) delta = w->delta;
     }
-    slot_t *slot = &s->slot[at];
-    slot->touched = ++s->touches;
-    slot->word[index] = word;
-    int words = 0, before = 0;
-    while (before < 4 && slot->have >> before & 1) before++;
-    slot->have |= 1 << index;
-    while (words < 4 && slot->have >> words & 1) words++;
-    if (index == 0) slot->delta = delta;
-    if (words > before) block(s, slot->delta, scan, start, slot->word, words, 33, 4);
+    while (have >> count & 1) count++;
+    if (count <= index || !block(s, delta, scan, start, words, count, 33, 4)) return;
+    kept = 0;
+    for (int i = 0; i < s->words; i++)
+        if (s->waiting[i].scan != scan || s->waiting[i].start != start) s->waiting[kept++] = s->waiting[i];
+    s->words = kept;
 }
 
 static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint8_t *own, int n, bool is_long, int most) {
-    bool map = number >= 6 && number < 24;
     /* from anybody, of no epoch */
-    if (number >= 24) return;
-    if (!enter(s, now, epoch, (map || number == 2) && n > 0 ? own[0] : -1)) return;
+    if (number == 4 || number == 5 || number >= 24) return;
+    bool dated = number == 2 || number >= 6, whole = n >= 3;
+    if (!enter(s, now, epoch, dated && whole ? own[0] : -1)) return;
     if (number == 1) header(s, now, own, n);
-    if (number == 2 && n > 2) { if (hear(s, now, own[0])) purge(s, now); }
-    if (!map || n < (is_long ? 2 : 6)) return;
-    int scan = own[0], start = is_long ? own[1] : own[1] >> 1;
-    if (!hear(s, now, scan)) return;
+    if (!dated || !whole || !hear(s, now, own[0])) return;
     purge(s, now);
-    int part = (number - 6) % 6;
-    if (!s->complete || !s->usable || start >= s->azimuths || number >= 12) return;
+    int scan = own[0], start = is_long ? own[1] : own[1] >> 1, part = number - 6;
+    if (number < 6 || number >= 12 || !s->complete || start >= s->azimuths) return;
     uint64_t word[14] = {0};
     int words = 1;
     if (is_long) {
@@ -543,7 +663,7 @@ static bool authentic(sensor_t *s, unsigned data_id, const uint8_t *data, int n)
 
 /* Checks a long message and takes it. */
 static void long_message(uint64_t now, const uint8_t *data, int n) {
-    if (n < 6 || n > 64 || data[3] >= 32 || data[4] >= SENSORS) return;
+    if (n < 6 || n > 64 || data[3] >= 32 || data[4] >= SENSORS || data[5] & 0x70) return;
     int number = data[3];
     sensor_t *s = &sensors[data[4]];
     unsigned data_id = 0x8000u + 32u * data[4] + (unsigned)number;
@@ -556,6 +676,7 @@ static void long_message(uint64_t now, const uint8_t *data, int n) {
 
 /* Checks a frame and takes it. */
 static void frame(uint64_t now, unsigned id, const uint8_t *data, int n, bool fd) {
+    now = watch(now);
     if (id < 0x400 || id >= 0x500) return;
     int sensor = (int)(id - 0x400) / 32, number = (int)id % 32;
     if (fd) {
@@ -570,13 +691,15 @@ static void frame(uint64_t now, unsigned id, const uint8_t *data, int n, bool fd
 }
 
 /* A byte of a serial line: at the end of a message takes the stuffing out of it. */
+static uint8_t stuffed[256];
+static int length;
+
 static void serial_byte(uint64_t now, uint8_t byte) {
-    static uint8_t stuffed[256];
-    static int length;
     if (byte != 0) {
         if (length < 256) stuffed[length++] = byte;
         return;
     }
+    if (length == 0) return;
     uint8_t data[256];
     int n = 0, at = 0;
     while (at < length && length < 256) {
@@ -586,8 +709,19 @@ static void serial_byte(uint64_t now, uint8_t byte) {
         if (block < 255 && at < length) data[n++] = 0;
     }
     length = 0;
+    now = watch(now);
     long_message(now, data, n);
 }
+
+/* Forgets everything. */
+static void start(void) {
+    memset(sensors, 0, sizeof sensors);
+    for (int i = 0; i < SENSORS; i++) start_sensor(&sensors[i]);
+    length = 0;
+    latest = 0;
+}
+
+#ifndef RECEIVER_WITHOUT_MAIN
 
 /* Bytes of hexadecimal digits; how many, at most `most`. */
 static int bytes_of(const char *digits, uint8_t *bytes, int most) {
@@ -597,6 +731,7 @@ static int bytes_of(const char *digits, uint8_t *bytes, int most) {
 }
 
 static void print_maps(uint64_t now) {
+    now = watch(now);
     for (int i = 0; i < SENSORS; i++) {
         const sensor_t *s = &sensors[i];
         if (!trusted(s, now)) continue;
@@ -628,12 +763,7 @@ int main(int argc, char **argv) {
         fprintf(stderr, "usage: receiver LOG [KEY]\n");
         return 2;
     }
-    for (int i = 0; i < SENSORS; i++) {
-        sensors[i].epoch = sensors[i].previous = -1;
-        sensors[i].conflict = NEVER;
-        for (int e = 0; e < 16; e++) sensors[i].left[e] = NEVER;
-        begin_measure(&sensors[i]);
-    }
+    start();
     char line[1024], text[900];
     uint64_t next = NEVER;
     while (fgets(line, sizeof line, log)) {
@@ -658,3 +788,4 @@ int main(int argc, char **argv) {
     fclose(log);
     return 0;
 }
+#endif

@@ -3,9 +3,9 @@
 #![allow(dead_code)] // each test file uses a part
 #![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used)]
 
-use viewshed::angle::Angle;
-use viewshed::bits::Bits;
-use viewshed::map::RoadPoint;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::bits::Bits;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Header, WireMount};
 use viewshed::wire::layers::Layers;

@@ -12,7 +12,7 @@ macro_rules! batch {
         use $crate::viewshed::bench::files::Files;
         use $crate::viewshed::bench::job::{Job, ScanBuffer};
         use $crate::viewshed::bench::{run, start};
-        use $crate::viewshed::time::Time;
+        use $crate::viewshed::fixed::time::Time;
         use $crate::viewshed::unit::Unit;
         use $crate::viewshed::wire::broadcast::Medium;
         use $crate::viewshed::wire::message::Epoch;

@@ -3,17 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::config::ConfigError;
-use viewshed::field_of_view::FieldOfView;
-use viewshed::gate::GateConfig;
-use viewshed::health::HealthConfig;
+use viewshed::frame::gate::GateConfig;
+use viewshed::frame::health::HealthConfig;
 use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfiguration};
 use viewshed::inputs::ars408::profile::{self, Profile};
 use viewshed::inputs::ti;
-use viewshed::mount::Mount;
 use viewshed::radar_3d::VisibilityConfig;
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::config::ConfigError;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::profile::reference::CHECK;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
@@ -21,6 +21,8 @@ use viewshed::wire::frame::CanId;
 use viewshed::wire::message::{Addresses, Message};
 
 use crate::locate;
+use crate::one_file::is_one_file;
+use crate::state;
 
 /// The whole file.
 #[derive(Debug, Clone, Deserialize)]
@@ -166,20 +168,39 @@ const USUAL_BAUD: u32 = 921_600;
 type Problem = (String, String);
 
 impl Config {
-    /// Reads and checks a file.
+    /// Reads and checks a file. Where it names no folder for what is kept, `state_dir` is that.
     ///
     /// # Errors
     /// One line for each problem: file, line, key, what is wrong.
-    pub fn read(path: &Path) -> Result<Self, Vec<String>> {
+    pub fn read(path: &Path, state_dir: Option<PathBuf>) -> Result<Self, Vec<String>> {
         let shown = path.display();
         let text = std::fs::read_to_string(path).map_err(|e| vec![format!("{shown}: cannot be read: {e}")])?;
-        Self::parse(&text).map_err(|problems| {
+        let with_lines = |problems: Vec<(Option<usize>, String)>| -> Vec<String> {
             let line = |(line, what): (Option<usize>, String)| match line {
                 Some(line) => format!("{shown}:{line}: {what}"),
                 None => format!("{shown}: {what}"),
             };
             problems.into_iter().map(line).collect()
-        })
+        };
+        let mut config = Self::parse(&text).map_err(with_lines)?;
+        config.state_dir = config.state_dir.or(state_dir);
+        match config.destroyed(path) {
+            None => Ok(config),
+            Some(what) => {
+                let key = "output.candump";
+                Err(with_lines(vec![(locate::line_of(&text, key), format!("{key}: {what}"))]))
+            }
+        }
+    }
+
+    /// What the log of the broadcast would destroy, be it through links: a file that is read, or is kept.
+    fn destroyed(&self, own: &Path) -> Option<String> {
+        let log = self.output.candump.as_ref()?;
+        let kept = self.state_dir.iter().flat_map(|folder| state::FILES.map(|name| ("state_dir", folder.join(name))));
+        let read = self.input.candump.iter().map(|path| ("input.candump", path.clone()));
+        let mut files = read.chain(kept).chain([("the configuration", own.to_owned())]);
+        let (what, path) = files.find(|(_, path)| is_one_file(path, log))?;
+        Some(format!("{} would destroy {} ({what}); name another file", log.display(), path.display()))
     }
 
     /// Reads and checks a text; problems come with their lines.
@@ -428,4 +449,49 @@ fn of_library(e: &ConfigError) -> Problem {
     let text = e.to_string();
     let what = text.strip_prefix(e.parameter).unwrap_or(&text).trim().to_owned();
     (key, what)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_log_that_is_an_input_is_refused_whatever_its_name() {
+        let folder = std::env::temp_dir().join(format!("viewshedd-destroyed-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let at = |name: &str| folder.join(name);
+        let config = |log: &str| {
+            let text = format!(
+                "[input]\nradar = \"ars408\"\ncandump = {:?}\n[output]\nmedium = \"can\"\ncandump = {:?}\n\
+                 [mount]\nx_m = 0.0\ny_m = 0.0\nheight_m = 6.0\nyaw_deg = 0.0\npitch_deg = 4.0\nroll_deg = 0.0\n\
+                 [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
+                 elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n",
+                at("in.log"),
+                at(log)
+            );
+            fs::write(at("c.toml"), text).unwrap();
+            Config::read(&at("c.toml"), Some(folder.clone())).map(|_| ()).map_err(|lines| lines.join("\n"))
+        };
+        // before there is a log to be read too
+        assert!(config("in.log").is_err());
+        fs::write(at("in.log"), "(1.0) can0 123#00\n").unwrap();
+        fs::hard_link(at("in.log"), at("hard.log")).unwrap();
+        std::os::unix::fs::symlink("in.log", at("soft.log")).unwrap();
+        for (log, read) in [
+            ("in.log", "input.candump"),
+            ("hard.log", "input.candump"),
+            ("soft.log", "input.candump"),
+            ("c.toml", "the configuration"),
+            ("slots", "state_dir"),
+            ("epoch", "state_dir"),
+        ] {
+            let error = config(log).unwrap_err();
+            assert!(error.contains("c.toml:6: output.candump: ") && error.contains(read), "{log}: {error}");
+        }
+        assert_eq!(config("out.log"), Ok(()));
+        fs::remove_dir_all(folder).unwrap();
+    }
 }

@@ -3,7 +3,7 @@
 use socketcan::dump::CanDumpRecord;
 use socketcan::id::FdFlags;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, EmbeddedFrame, ExtendedId, Id, StandardId};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::frame::{CanFrame, CanId};
 
 /// The library's frame; `None` for remote and error frames.

@@ -5,6 +5,8 @@ mod config;
 mod frames;
 mod input;
 mod locate;
+#[path = "../../../tests/harness/src/results/files/one_file.rs"]
+mod one_file;
 mod output;
 mod run;
 mod serial;
@@ -20,7 +22,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Parser;
 use log::{Level, LevelFilter, error};
 
-use crate::config::Config;
+use crate::sensor::config::Config;
 
 /// Computes where a roadside radar can see, and broadcasts it
 ///
@@ -57,14 +59,13 @@ Exit codes: 0 stopped, or the log is over; 1 failed while running; 2 the configu
 fn main() -> ExitCode {
     let args = Args::parse();
     log_to_stderr(args.verbose);
-    let config = match Config::read(&args.config) {
+    let config = match Config::read(&args.config, state_dir()) {
         Ok(config) => config,
         Err(problems) => {
             problems.iter().for_each(|problem| error!("{problem}"));
             return ExitCode::from(2);
         }
     };
-    let config = Config { state_dir: config.state_dir.clone().or_else(state_dir), ..config };
     if args.check {
         println!("{}", config.summary(&args.config));
         return ExitCode::SUCCESS;
@@ -106,4 +107,17 @@ fn log_to_stderr(verbose: bool) {
         if journal { writeln!(out, "<{number}>{}", record.args()) } else { writeln!(out, "{word}{}", record.args()) }
     };
     env_logger::Builder::new().filter_level(level).format(format).init();
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn options_do_not_contradict_each_other() {
+        // panics where clap was built with debug assertions, as Cargo.toml says
+        Args::command().debug_assert();
+    }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use log::{error, info};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::Flow;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
@@ -19,7 +19,7 @@ use viewshed::wire::serial::MOST_STUFFED;
 use viewshed::wire::status::{Reason, Status};
 
 use crate::can::Interface;
-use crate::config::{ClockSource, Config};
+use crate::sensor::config::{ClockSource, Config};
 use crate::frames;
 use crate::run::version;
 use crate::serial::Serial;

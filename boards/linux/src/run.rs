@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use viewshed::polar::PolarMap;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarMap;
 use viewshed::unit::Flow;
 use viewshed::unit::build;
 use viewshed::unit::profile::reference::{CHECK, Map, Parameters, Sender, State, Unit};
 use viewshed::unit::settings::{BlockError, Stored};
 use viewshed::wire::status::{Reason, State as Told};
 
-use crate::config::{ClockSource, Config};
+use crate::sensor::config::{ClockSource, Config};
 use crate::input::{self, Input, Step, Work};
 use crate::output::Output;
 use crate::state::{FileSlots, next_epoch};
@@ -70,7 +70,8 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
         }
-        let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut *state, &mut *map, &mut **s));
+        let mut unit =
+            parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut *state, &mut *map, &mut **s));
         if let Some(unit) = &mut unit {
             unit.broadcast().status_mut().firmware = version();
         }

@@ -10,11 +10,16 @@ use log::{error, warn};
 use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots};
 use viewshed::wire::message::Epoch;
 
+/// The files that are kept.
+pub const FILES: [&str; 2] = [EPOCH, SLOTS];
+const EPOCH: &str = "epoch";
+const SLOTS: &str = "slots";
+
 /// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
 /// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
 pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
     let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
-    let path = folder.map(|folder| folder.join("epoch"));
+    let path = folder.map(|folder| folder.join(EPOCH));
     let kept = || fs::read_to_string(path.as_ref()?).ok()?.trim().parse().ok().map(Epoch::new);
     let next = last.or_else(kept).map_or(Epoch::new(chance), Epoch::next);
     match path.as_ref().map(|path| replace(path, next.number().to_string().as_bytes())) {
@@ -45,7 +50,7 @@ pub struct FileSlots {
 impl FileSlots {
     /// Reads the slots. Where none was written, the first holds these settings.
     pub fn open(folder: Option<&Path>, settings: Option<&Settings>) -> Self {
-        let path = folder.map(|folder| folder.join("slots"));
+        let path = folder.map(|folder| folder.join(SLOTS));
         let mut slots = [[0xFF; BLOCK_LEN]; 2];
         let kept = path.as_ref().and_then(|path| fs::read(path).ok()).unwrap_or_default();
         for (slot, bytes) in slots.iter_mut().zip(kept.chunks(BLOCK_LEN)) {
@@ -91,11 +96,11 @@ impl Slots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viewshed::config::ConfigError;
-    use viewshed::field_of_view::FieldOfView;
-    use viewshed::mount::Mount;
-    use viewshed::reflection::NoiseConfig;
     use viewshed::sensor::Sensor;
+    use viewshed::sensor::config::ConfigError;
+    use viewshed::sensor::field_of_view::FieldOfView;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
     use viewshed::unit::profile::reference::CHECK;
     use viewshed::unit::settings::BlockError;
     use viewshed::unit::settings::Stored;

@@ -9,7 +9,7 @@ use socketcan::dump::Reader;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;

@@ -1,6 +1,6 @@
 //! What differs between the original and its clones, as a table.
 
-use crate::detection::Detection;
+use crate::frame::detection::Detection;
 use crate::inputs::polar::spherical;
 use crate::inputs::signal::{Quantity, Signal};
 

@@ -5,10 +5,10 @@ use super::message::Message;
 use super::profile::{ARS408, CountRule, General, Profile};
 use super::quality::{self, Wanted};
 use super::state::{RadarState, Version};
+use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::signal::{Signal, word};
 use crate::inputs::{RadarScan, count, usable};
-use crate::time::Time;
 use crate::wire::frame::CanFrame;
 
 /// Fields of the status message of a scan of clusters.
@@ -168,6 +168,8 @@ struct Scan {
     latest: Time,
     announced: u16,
     arrived: u16,
+    /// Of these, entries at no distance.
+    refused: u16,
     qualified: u16,
     entries: Numbers,
     qualities: Numbers,
@@ -308,6 +310,7 @@ impl<const N: usize> Ars408<N> {
             latest: now,
             announced,
             arrived: 0,
+            refused: 0,
             qualified: 0,
             entries: Numbers::default(),
             qualities: Numbers::default(),
@@ -358,7 +361,10 @@ impl<const N: usize> Ars408<N> {
         }
         scan.arrived += 1;
         match detection.map(|d| self.collected.add(number, d)) {
-            None => count(&mut self.counters.no_range),
+            None => {
+                scan.refused += 1;
+                count(&mut self.counters.no_range);
+            }
             Some(Added::Full) => count(&mut self.counters.overflow),
             Some(Added::Kept) => {}
         }
@@ -440,6 +446,7 @@ impl<const N: usize> Ars408<N> {
             number: u32::from(scan.number),
             detections: self.collected.detections(),
             missing,
+            refused: scan.refused,
             fault: self.fault,
         })
     }

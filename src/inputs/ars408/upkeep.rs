@@ -3,7 +3,7 @@
 use super::configuration::RadarConfiguration;
 use super::motion::standing;
 use super::state::RadarState;
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::frame::CanFrame;
 
 /// Speed and yaw rate are sent this often.

@@ -1,8 +1,8 @@
 //! One message: header and records as bytes.
 
-use crate::angle::Angle;
-use crate::detection::Detection;
-use crate::time::Time;
+use crate::fixed::angle::Angle;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
 use crate::wire::e2e::{E2eError, Profile};
 use crate::wire::frame::{self, CanFrame, CanId};
 use crate::wire::serial;

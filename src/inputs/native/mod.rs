@@ -35,10 +35,10 @@
 //!
 //! # Example
 //! ```
-//! use viewshed::angle::Angle;
-//! use viewshed::detection::Detection;
+//! use viewshed::fixed::angle::Angle;
+//! use viewshed::frame::detection::Detection;
 //! use viewshed::inputs::native::{Config, Medium, Outcome, Receiver, Sender};
-//! use viewshed::time::Time;
+//! use viewshed::fixed::time::Time;
 //!
 //! let car = Detection {
 //!     range_cm: 5000,

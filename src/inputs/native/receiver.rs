@@ -1,9 +1,9 @@
 //! Messages in, scans out.
 
 use super::message::{self, Header, MOST_BYTES, Medium, NoMessage};
+use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
-use crate::time::Time;
 use crate::wire::e2e::{Counter, E2eError, Profile, Sequence};
 use crate::wire::frame::CanFrame;
 use crate::wire::frame::CanId;
@@ -303,6 +303,8 @@ impl<const N: usize> Receiver<N> {
             number: u32::from(scan.number),
             detections: self.collected.detections(),
             missing,
+            // the format holds detections only, zeros fill its frames
+            refused: 0,
             fault: scan.fault,
         }))
     }

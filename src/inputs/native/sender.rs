@@ -3,8 +3,8 @@
 use core::slice::Chunks;
 
 use super::message::{Header, Medium, Message};
-use crate::detection::Detection;
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
 use crate::wire::e2e::Profile;
 
 /// Numbers the scans and messages of one sensor.

@@ -1,7 +1,7 @@
 //! Records to detections: units, axes and signs.
 
-use crate::detection::{Detection, Measurement, NotADetection};
-use crate::math;
+use crate::fixed::math;
+use crate::frame::detection::{Detection, Measurement, NotADetection};
 
 /// Unit of the angles of spherical points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use super::family::{Family, Header, ITEM_HEADER, LONGEST, MAGIC, PADDING};
 use super::learning::Learning;
 use super::points::{Dialect, Entries, LONGEST_RECORD, Layout, Record};
+use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
-use crate::time::Time;
 
 /// What is known of the radar's firmware.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,6 +105,8 @@ pub struct Ti<const N: usize> {
     filled: usize,
     started: Time,
     points: u16,
+    /// Of these, points with values that are none.
+    refused: u16,
     ratios: u16,
     collected: Collected<N>,
     last: Option<(u32, u32)>,
@@ -155,6 +157,7 @@ impl<const N: usize> Ti<N> {
             filled: 0,
             started: Time::from_micros(0),
             points: 0,
+            refused: 0,
             ratios: 0,
             collected: Collected::new(),
             last: None,
@@ -253,7 +256,7 @@ impl<const N: usize> Ti<N> {
         self.stage = Stage::Header;
         self.end = self.family.map_or(0, Family::header);
         self.started = now;
-        (self.points, self.ratios) = (0, 0);
+        (self.points, self.refused, self.ratios) = (0, 0, 0);
         self.collected.clear();
         event
     }
@@ -361,7 +364,10 @@ impl<const N: usize> Ti<N> {
             Record::Head(behind) => self.layout = behind,
             Record::Point(point) => {
                 match point.map(|point| self.collected.add(self.points, point)) {
-                    Err(_) => count(&mut self.counters.no_point),
+                    Err(_) => {
+                        count(&mut self.counters.no_point);
+                        self.refused = self.refused.saturating_add(1);
+                    }
                     Ok(Added::Full) => count(&mut self.counters.overflow),
                     Ok(Added::Kept) => {}
                 }
@@ -395,6 +401,7 @@ impl<const N: usize> Ti<N> {
             number: header.number,
             detections: self.collected.detections(),
             missing: announced.saturating_sub(self.points),
+            refused: self.refused,
             fault: false,
         })
     }

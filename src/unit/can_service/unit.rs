@@ -1,7 +1,7 @@
 //! The unit's end: takes a block, keeps it, tells what it runs with, and what it says without one.
 
 use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::unit::Flow;
 use crate::unit::safe_state::SafeState;
 use crate::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
@@ -35,14 +35,14 @@ impl CanServiceConfig {
 /// A block is sent in parts, written, and read by the next start:
 /// ```
 /// # use viewshed::unit::can_service::{Answers, CanService, CanServiceConfig, Told, Tool};
-/// # use viewshed::field_of_view::FieldOfView;
-/// # use viewshed::mount::Mount;
-/// # use viewshed::reflection::NoiseConfig;
+/// # use viewshed::sensor::field_of_view::FieldOfView;
+/// # use viewshed::sensor::mount::Mount;
+/// # use viewshed::sensor::noise::NoiseConfig;
 /// # use viewshed::sensor::Sensor;
 /// # use viewshed::unit::Flow;
 /// # use viewshed::unit::profile::small;
 /// # use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots, Stored};
-/// # use viewshed::time::Time;
+/// # use viewshed::fixed::time::Time;
 /// # use viewshed::wire::broadcast::Medium;
 /// # use viewshed::wire::message::{Addresses, Epoch};
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);

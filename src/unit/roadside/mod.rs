@@ -26,8 +26,8 @@
 mod outbox;
 mod reset;
 
+use crate::fixed::time::Time;
 use crate::inputs::Feed;
-use crate::time::Time;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
 use crate::unit::serial_service::{Asked, Line, SerialService};

@@ -1,6 +1,6 @@
 //! Frames on their way through a controller's mailboxes, and until when each may leave.
 
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::unit::can_bus::{BusKeeper, CanPort};
 use crate::wire::frame::CanFrame;
 

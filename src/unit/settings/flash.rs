@@ -149,7 +149,7 @@ mod tests {
 
     fn settings(max_detections: u16) -> Settings {
         let sensor = crate::sensor::Sensor {
-            mount: crate::mount::Mount {
+            mount: crate::sensor::mount::Mount {
                 x_m: 0.0,
                 y_m: 0.0,
                 height_m: 6.0,
@@ -157,7 +157,7 @@ mod tests {
                 pitch_deg: 4.0,
                 roll_deg: 0.0,
             },
-            field_of_view: crate::field_of_view::FieldOfView {
+            field_of_view: crate::sensor::field_of_view::FieldOfView {
                 azimuth_min_deg: -60.0,
                 azimuth_max_deg: 60.0,
                 elevation_min_deg: -16.0,
@@ -165,7 +165,7 @@ mod tests {
                 range_min_m: 3.0,
                 range_max_m: 200.0,
             },
-            noise: crate::reflection::NoiseConfig::default(),
+            noise: crate::sensor::noise::NoiseConfig::default(),
         };
         let mut settings = Settings::of(sensor);
         settings.gate.max_detections = max_detections;

@@ -23,15 +23,15 @@ mod stored;
 pub use flash::FlashSlots;
 pub use stored::{Check, Slots, Stored};
 
-use crate::bytes::{Reader, Writer};
-use crate::config::ConfigError;
-use crate::field_of_view::FieldOfView;
-use crate::gate::GateConfig;
-use crate::health::HealthConfig;
-use crate::mount::Mount;
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::gate::GateConfig;
+use crate::frame::health::HealthConfig;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
-use crate::reflection::NoiseConfig;
 use crate::sensor::Sensor;
+use crate::sensor::config::ConfigError;
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Mount;
+use crate::sensor::noise::NoiseConfig;
 use crate::unit::can_bus::BusConfig;
 use crate::wire::header::fingerprint;
 

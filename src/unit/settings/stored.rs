@@ -6,10 +6,8 @@
 //! safe state.
 
 use super::{BLOCK_LEN, BlockError, Newest, Settings};
-use crate::config::ConfigError;
-use crate::unit::build::{InUnit, check};
+use crate::sensor::config::ConfigError;
 use crate::unit::can_bus::BusConfig;
-use crate::unit::sender::Sender;
 
 /// Where configuration blocks are kept.
 pub trait Slots {
@@ -28,9 +26,9 @@ pub struct Check {
 }
 
 impl Check {
-    /// For a unit of this estimator and sender.
-    pub const fn of<E: InUnit, S: Sender<E::Map>>() -> Self {
-        Self { build: check::<E, S>, can_clock_hz: None }
+    /// By this function; [`Check::of`] is the one for an estimator and a sender.
+    pub const fn by(build: fn(&Settings) -> Result<(), ConfigError>) -> Self {
+        Self { build, can_clock_hz: None }
     }
 
     /// And for CAN controllers of this clock, whose dividers have to meet the bit rates.

@@ -45,6 +45,8 @@ pub struct Context {
     pub usual: Known,
     /// The header's number of azimuths.
     pub azimuths: usize,
+    /// The header's number of range cells.
+    pub ranges: usize,
 }
 
 /// The rays a block is made of or built on.

@@ -1,8 +1,8 @@
 //! One azimuth of a map as it travels: which cells are known, and a bit for each of them.
 
 use super::edges::Edges;
-use crate::bitmap::Row;
-use crate::bits::Bits;
+use crate::fixed::bits::Bits;
+use crate::map::bitmap::Row;
 
 /// The cells of an azimuth there is evidence for: `near..=last`, or none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -6,7 +6,7 @@ use super::expectation::{Before, EdgeTables, Last, Progress, distance_table, fir
 use super::interval::{Decoder, Form, OutOfWords};
 use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH};
 use super::ray::{Known, Ray};
-use crate::bits::Bits;
+use crate::fixed::bits::Bits;
 use core::ops::Range;
 
 /// Why a block's decoding ended.
@@ -104,7 +104,8 @@ pub fn decode<const W: usize>(
         }
     };
     let mut progress = Progress::behind(kind, before, neighbour, neighbour_was);
-    let (ending, (azimuth, before, state)) = go(&mut decoder, &mut progress, from..context.azimuths, reader);
+    let (ending, (azimuth, before, state)) =
+        go(&mut decoder, &mut progress, (from..context.azimuths, context.ranges), reader);
     *place = Place::of(azimuth, before, state);
     ending
 }
@@ -116,7 +117,7 @@ type At = (usize, Before, (usize, u64, u64));
 fn go<const W: usize>(
     decoder: &mut Decoder<'_>,
     progress: &mut Progress<W>,
-    azimuths: Range<usize>,
+    (azimuths, ranges): (Range<usize>, usize),
     reader: &mut impl Reader<W>,
 ) -> (Ending, At) {
     let mut at = (azimuths.start, progress.before, decoder.state());
@@ -137,7 +138,7 @@ fn go<const W: usize>(
             },
         };
         let mut ray = progress.expect(&refreshed);
-        match decode_ray(decoder, progress, &mut ray) {
+        match decode_ray(decoder, progress, ranges, &mut ray) {
             Ok(as_expected) => {
                 reader.take(azimuth, &ray);
                 progress.advance(&ray, &refreshed, as_expected);
@@ -174,6 +175,7 @@ impl From<OutOfWords> for NotARay {
 fn decode_ray<const W: usize>(
     decoder: &mut Decoder<'_>,
     progress: &mut Progress<W>,
+    ranges: usize,
     ray: &mut Ray<W>,
 ) -> Result<bool, NotARay> {
     let known = match decoder.symbol(progress.table())? {
@@ -182,7 +184,7 @@ fn decode_ray<const W: usize>(
         KNOWN if progress.kind == Kind::Refresh => {
             let near = decode_limit(decoder, ray.known.near())?;
             let end = decode_limit(decoder, ray.known.end())?;
-            limits::<W>(near, end)?
+            limits::<W>(near, end, ranges)?
         }
         _ => return Err(NotARay::Malformed),
     };
@@ -195,10 +197,14 @@ fn decode_ray<const W: usize>(
 }
 
 /// Known cells as told: nothing, or within the row.
-fn limits<const W: usize>(near: usize, end: usize) -> Result<Known, NotARay> {
+fn limits<const W: usize>(near: usize, end: usize, ranges: usize) -> Result<Known, NotARay> {
     let known = Known::new(near, end);
     let none = near == Known::NONE.near() && end == Known::NONE.end();
-    if (known.is_empty() && !none) || end > Bits::<W>::CAPACITY { Err(NotARay::Malformed) } else { Ok(known) }
+    if (known.is_empty() && !none) || end > ranges.min(Bits::<W>::CAPACITY) {
+        Err(NotARay::Malformed)
+    } else {
+        Ok(known)
+    }
 }
 
 /// Reads edges up to the end of a ray with these known cells.
@@ -321,7 +327,7 @@ mod tests {
     const USUAL: Known = Known::new(3, 60);
 
     fn context(form: Form, azimuths: usize) -> Context {
-        Context { form, usual: USUAL, azimuths }
+        Context { form, usual: USUAL, azimuths, ranges: 64 }
     }
 
     /// Reads into closures.
@@ -397,7 +403,7 @@ mod tests {
     /// All blocks of a map, decoded again.
     fn through(map: &Map, form: Form, kind: Kind) -> (Vec<Ray<2>>, usize) {
         let count = map.now.len();
-        let context = Context { form, usual: USUAL, azimuths: count };
+        let context = Context { form, usual: USUAL, azimuths: count, ranges: 64 };
         let mut got = vec![Ray::UNKNOWN; count];
         let (mut at, mut words) = (0, 0);
         while at < count {

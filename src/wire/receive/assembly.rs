@@ -1,40 +1,70 @@
 //! The words of blocks, frame by frame, in any order.
+//!
+//! # Model
+//! Words of blocks that are not complete wait in one row, the one that came last at the end. A word that
+//! comes again moves there. The row is full: its first word makes room. With [`ROOM`] words all first
+//! words of a refresh may come before the second ones, or frames be displaced by 50 ms.
+//!
+//! # Limits
+//! Eight bytes a word.
 
-use crate::wire::code::block::Kind;
 use crate::wire::code::reading;
-use crate::wire::message::Plane;
 use crate::wire::scan_number::ScanNumber;
 
-/// Blocks under way at a time; the one that waited longest makes room.
-const SLOTS: usize = 4;
+/// Words that wait for others of their blocks.
+pub const ROOM: usize = 36;
 
 /// Words of a block on classic CAN.
 const WORDS: usize = 4;
 
-/// Which block a word belongs to.
+/// Bits of a word.
+const WORD_BITS: u32 = 33;
+
+/// Which block of a plane a word belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Place {
-    pub plane: Plane,
     pub scan: ScanNumber,
     pub start: u8,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Slot {
-    place: Place,
-    /// Whether it is a delta; told by the first word.
-    delta: bool,
-    /// Which words are there, a bit each; none: the slot is free.
-    there: u8,
-    words: [u64; WORDS],
-    /// Where reading goes on.
-    reading: reading::Place,
+/// A word with its place: bit 51 the block's kind, if it is the first word; 43 to 50 scan, 35 to 42 first azimuth, 33 and 34
+/// which word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Waiting(u64);
+
+impl Waiting {
+    fn new(place: Place, index: usize, delta: bool, word: u64) -> Self {
+        let key = u64::from(place.scan.byte()) << 10 | u64::from(place.start) << 2 | (index as u64 & 3);
+        Self(u64::from(delta) << 51 | key << WORD_BITS | word & ((1 << WORD_BITS) - 1))
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // 18 bits
+    fn key(self) -> u32 {
+        (self.0 >> WORD_BITS) as u32 & 0x3_FFFF
+    }
+
+    fn is_of(self, place: Place) -> bool {
+        self.key() >> 2 == Self::new(place, 0, false, 0).key() >> 2
+    }
+
+    fn index(self) -> usize {
+        self.key() as usize & 3
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // a byte
+    fn scan(self) -> ScanNumber {
+        ScanNumber::from_byte((self.key() >> 10) as u8)
+    }
 }
 
-/// Blocks under way, the one touched last first.
-#[derive(Debug, Clone, Copy)]
+/// The words of a plane that wait.
+#[derive(Debug, Clone)]
 pub(super) struct Assembly {
-    slots: [Slot; SLOTS],
+    /// The first `count` of them, in the order they came in.
+    words: [Waiting; ROOM],
+    count: u8,
+    /// Where reading goes on, if nothing else was taken since.
+    read: Option<(Place, reading::Place)>,
 }
 
 /// The words of a block that are there from the first on.
@@ -55,57 +85,81 @@ impl Begun {
 }
 
 impl Assembly {
-    pub const NEW: Self = Self {
-        slots: [Slot {
-            place: Place { plane: Plane::Visibility, scan: ScanNumber::from_byte(0), start: 0 },
-            delta: false,
-            there: 0,
-            words: [0; WORDS],
-            reading: reading::Place::START,
-        }; SLOTS],
-    };
+    pub const NEW: Self = Self { words: [Waiting(0); ROOM], count: 0, read: None };
 
-    /// Notes how far the block touched last was read.
-    pub fn read_up_to(&mut self, place: reading::Place) {
-        if let Some(slot) = self.slots.first_mut() {
-            slot.reading = place;
+    fn waiting(&self) -> &[Waiting] {
+        self.words.get(..usize::from(self.count)).unwrap_or(&[])
+    }
+
+    /// Keeps those that are to be kept, in their order.
+    fn retain(&mut self, keep: impl Fn(Waiting) -> bool) {
+        let mut kept = 0;
+        for from in 0..usize::from(self.count) {
+            let Some(word) = self.words.get(from).copied().filter(|word| keep(*word)) else { continue };
+            if let Some(to) = self.words.get_mut(usize::from(kept)) {
+                *to = word;
+            }
+            kept += 1;
+        }
+        self.count = kept;
+    }
+
+    /// A block was read up to here; if it was read to its end, its words are not needed any more.
+    pub fn read_up_to(&mut self, block: Place, reading: reading::Place, ended: bool) {
+        self.read = Some((block, reading)).filter(|_| !ended);
+        if ended {
+            self.retain(|word| !word.is_of(block));
         }
     }
 
+    /// Something else was taken: what is to be read is read from its first word.
+    pub fn interrupt(&mut self) {
+        self.read = None;
+    }
+
     pub fn forget(&mut self) {
-        *self = Self::NEW;
+        (self.count, self.read) = (0, None);
     }
 
     /// Drops what is too old, before its number comes again.
     pub fn purge(&mut self, too_old: impl Fn(ScanNumber) -> bool) {
-        self.slots.iter_mut().filter(|slot| too_old(slot.place.scan)).for_each(|slot| slot.there = 0);
+        if self.waiting().iter().any(|word| too_old(word.scan())) {
+            self.retain(|word| !too_old(word.scan()));
+        }
     }
 
-    /// Takes a word; what can be read now that could not before. `kind` comes with the first word.
-    pub fn take(&mut self, place: Place, index: usize, kind: Option<Kind>, word: u64) -> Option<Begun> {
-        let found = self.slots.iter().position(|slot| slot.there != 0 && slot.place == place);
-        let free = || self.slots.iter().position(|slot| slot.there == 0).unwrap_or(SLOTS - 1);
-        let at = found.unwrap_or_else(free);
-        // the one touched last comes first, so the last one waited longest
-        let touched = *self.slots.get(at)?;
-        for i in (0..at).rev() {
-            let slot = *self.slots.get(i)?;
-            *self.slots.get_mut(i + 1)? = slot;
+    /// Takes a word; what can be read now that could not before. Whether the block is a delta comes with the
+    /// first word.
+    pub fn take(&mut self, place: Place, index: usize, delta: bool, word: u64) -> Option<Begun> {
+        let new = Waiting::new(place, index, delta, word);
+        let again = self.waiting().iter().any(|waiting| waiting.key() == new.key());
+        if again {
+            self.retain(|waiting| waiting.key() != new.key());
+        } else if usize::from(self.count) == ROOM {
+            self.words.copy_within(1.., 0);
+            self.count -= 1;
         }
-        let slot = self.slots.first_mut()?;
-        *slot = touched;
-        if found.is_none() {
-            *slot = Slot { place, delta: false, there: 0, words: [0; WORDS], reading: reading::Place::START };
+        *self.words.get_mut(usize::from(self.count))? = new;
+        self.count += 1;
+        if again {
+            return None;
         }
-        let before = slot.there.trailing_ones();
-        *slot.words.get_mut(index)? = word;
-        slot.there |= 1 << index;
-        if let Some(kind) = kind {
-            slot.delta = kind != Kind::Refresh;
+        let mut begun = Begun { delta: false, reading: reading::Place::START, words: [0; WORDS], count: 0 };
+        let mut there = 0_u8;
+        for waiting in self.waiting().iter().filter(|waiting| waiting.is_of(place)) {
+            there |= 1 << waiting.index();
+            *begun.words.get_mut(waiting.index())? = waiting.0 & ((1 << WORD_BITS) - 1);
+            begun.delta |= waiting.0 >> 51 & 1 == 1;
         }
-        let count = slot.there.trailing_ones();
-        let begun = Begun { delta: slot.delta, reading: slot.reading, words: slot.words, count: count as usize };
-        (count > before).then_some(begun)
+        begun.count = there.trailing_ones() as usize;
+        if let Some((block, reading)) = self.read
+            && block == place
+        {
+            begun.reading = reading;
+        }
+        self.read = None;
+        // only then the new one is among them
+        (begun.count > index).then_some(begun)
     }
 }
 
@@ -114,35 +168,48 @@ mod tests {
     use super::*;
 
     fn place(start: u8) -> Place {
-        Place { plane: Plane::Visibility, scan: ScanNumber::from_byte(9), start }
+        Place { scan: ScanNumber::from_byte(9), start }
     }
 
     #[test]
     fn words_come_in_any_order() {
         let mut a = Assembly::NEW;
-        assert!(a.take(place(3), 2, None, 30).is_none());
-        assert!(a.take(place(3), 1, None, 20).is_none());
-        let begun = a.take(place(3), 0, Some(Kind::Delta { ticks: 1 }), 10).unwrap();
+        assert!(a.take(place(3), 2, false, 30).is_none());
+        assert!(a.take(place(3), 1, false, 20).is_none());
+        let begun = a.take(place(3), 0, true, 10).unwrap();
         assert_eq!((begun.words(), begun.delta), (&[10, 20, 30][..], true));
-        assert_eq!(a.take(place(3), 3, None, 40).unwrap().words(), [10, 20, 30, 40]);
-        assert!(a.take(place(3), 1, None, 20).is_none(), "nothing new");
+        assert_eq!(a.take(place(3), 3, false, 0x1_FFFF_FFFF).unwrap().words(), [10, 20, 30, 0x1_FFFF_FFFF]);
+        assert!(a.take(place(3), 1, false, 20).is_none(), "nothing new");
     }
 
     #[test]
-    fn the_block_that_waited_longest_makes_room() {
+    fn all_first_words_of_a_map_may_come_before_the_second_ones() {
         let mut a = Assembly::NEW;
-        (0..4).for_each(|start| assert!(a.take(place(start), 1, None, u64::from(start)).is_none()));
-        a.take(place(0), 2, None, 7);
-        a.take(place(4), 0, Some(Kind::Refresh), 1);
-        assert_eq!(a.take(place(0), 0, Some(Kind::Refresh), 5).unwrap().words(), [5, 0, 7]);
-        assert_eq!(a.take(place(1), 0, Some(Kind::Refresh), 5).unwrap().words(), [5], "its second word is gone");
+        for start in 0..35 {
+            assert_eq!(a.take(place(start), 0, true, u64::from(start)).unwrap().words(), [u64::from(start)]);
+        }
+        for start in 0..35 {
+            assert_eq!(a.take(place(start), 1, false, 7).unwrap().words(), [u64::from(start), 7]);
+            a.read_up_to(place(start), reading::Place::START, true);
+        }
+        assert!(a.waiting().is_empty());
+    }
+
+    #[test]
+    fn a_word_that_comes_again_waits_from_then_on() {
+        let mut a = Assembly::NEW;
+        (0..36).for_each(|start| assert!(a.take(place(start), 1, false, 1).is_none()));
+        assert!(a.take(place(0), 1, false, 1).is_none());
+        assert!(a.take(place(50), 1, false, 1).is_none());
+        assert_eq!(a.take(place(0), 0, false, 2).unwrap().words(), [2, 1]);
+        assert_eq!(a.take(place(1), 0, false, 2).unwrap().words(), [2], "it made room");
     }
 
     #[test]
     fn what_is_too_old_is_forgotten() {
         let mut a = Assembly::NEW;
-        a.take(place(0), 1, None, 1);
+        a.take(place(0), 1, false, 1);
         a.purge(|scan| scan == ScanNumber::from_byte(9));
-        assert_eq!(a.take(place(0), 0, Some(Kind::Refresh), 5).unwrap().words(), [5]);
+        assert_eq!(a.take(place(0), 0, false, 5).unwrap().words(), [5]);
     }
 }

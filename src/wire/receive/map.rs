@@ -2,9 +2,10 @@
 
 use super::sensor::SensorReceiver;
 use super::session::Limits;
-use crate::map::{CellState, RoadPoint, Visibility, VisibilityMap};
-use crate::polar::PolarGeometry;
-use crate::time::Time;
+use crate::fixed::time::Time;
+use crate::map::polar::PolarGeometry;
+use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::sensor::road::RoadPoint;
 use crate::wire::code::ray::Ray;
 use crate::wire::header::Header;
 use crate::wire::message::Plane;

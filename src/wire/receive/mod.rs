@@ -5,32 +5,47 @@
 //! and reception that the integrator guarantees ([`Limits::max_delay_us`]). *When the receiver answers
 //! visible, the sender's map of the same sensor, epoch and geometry, measured at most `A + D` ago, had
 //! that cell visible, and no accepted frame of a newer scan says otherwise.* It holds under any loss,
-//! truncation and interleaving, and under repetition and reordering displaced by less than half the
-//! period of the scan numbers. Why:
+//! truncation and interleaving, and under repetition and reordering displaced by less than the
+//! period of the scan numbers less `D`. Why:
 //!
 //! - *The cell was visible in the scan the sector is marked with.* A refresh decodes alone. A delta
 //!   decodes only against the refresh of exactly the scan it names, azimuth by azimuth. Words are joined
 //!   only within one plane, scan and start, where a sender tells one block; words missing end the
 //!   decoding before the first ray that needs them.
-//! - *The scan is the one its number says.* Numbers come again after 5.12 s. Every map frame passes the
-//!   check of its lag, so what is accepted was measured at most `2 D` before it came; sectors,
-//!   refreshes and words are dropped long before 5.12 s; silence of half a period ends the session.
+//! - *The scan is the one its number says.* Numbers come again after 5.12 s. What is accepted was
+//!   measured at most `2 D` before it came: the measure refuses what is later by less than half a
+//!   period, the sender's clock in the header what is later by more. Sectors, refreshes and words are
+//!   dropped long before 5.12 s: a second after their scan while frames come, all of them after a second
+//!   without any.
 //! - *The scan was measured at most `A + D` ago.* A sector is told while its number is at most `A` (less
 //!   25 ms for a tick and for drifting clocks) behind the clocks' difference as the fastest frame of
-//!   the session showed it. That frame took at most `D`: a session tells nothing before it is `A + D` old and has
-//!   heard 8 map frames, so that not all of them were late ones, and when a frame turns out faster by
-//!   more than `D` the session begins anew.
+//!   the measure showed it. So it is enough that this frame took at most `D`. Suppose all frames of a measure
+//!   took longer. Either they are the sender's only ones: a delay that all frames have no receiver sees, and
+//!   the integrator guarantees that there is none. Or a queue drains, and each frame is faster than the one
+//!   before: a measure is trusted when it is `A + D` old, and begins anew when its smallest lag has sunk by
+//!   more than `D`, less 1 in 1024 of the time, which is what it crept up and what clocks drift. So nothing
+//!   is told out of a queue that shortens by more than `D` in `A + D`. Or faster frames were refused, because
+//!   the sender's clock had not come so far: then the header it is known by was late, too. A session that
+//!   refused any frame waits for a second header that agrees `A + D` later; headers come every 0.5 s, so the
+//!   first that was in time lies between, and after it the maps' fastest frame would be more than `D` behind
+//!   the sender's clock, which is not trusted either.
+//! - *The receiver's clock goes forward.* Where a frame or a look comes with a time that is more than a tick
+//!   before the latest, no age is known: every session is over.
 //! - *Sensor, epoch and geometry are the same.* The sensor is in the identifier or in the message, and in
-//!   the protection's data ID. A frame of a new epoch empties the maps, the old epoch is refused for
-//!   `A + D`, and a header's groups are checked together. Senders are quiet for `A + D` after a change.
-//!   Two epochs that alternate, and groups that contradict those of the same epoch, are two senders
+//!   the protection's data ID. The second frame of a new epoch within `A + D` empties the maps, the old epoch
+//!   is refused for `A + D`, and a header's groups are checked together. Senders are quiet for `A + D` after a
+//!   change. Two epochs that alternate, and groups that contradict those of the same epoch, are two senders
 //!   with one number: a conflict is reported and everything is unknown.
 //! - *No newer frame says otherwise.* A sector takes what is newer by its number, whatever order frames
 //!   come in. Frames that cannot be decoded say nothing; what they would have said stays unsaid until the
 //!   sector has aged.
 //!
 //! Corruption passes at the check sum's residual rate. What the integrator owes: `D`, and a sender whose
-//! mailboxes are aborted after its deadline.
+//! mailboxes are aborted after its deadline. Delays within `D` of a multiple of 5.12 s no receiver sees.
+//!
+//! # Order
+//! Words of a block may come in any order, between those of other blocks: 36 of them wait for the others, which is
+//! every first word of a map before any second one.
 //!
 //! # Limits
 //! For 120 azimuths by 200 ranges below 8 kB a sensor, ages included.
@@ -49,9 +64,15 @@ pub use secured::SecuredReceiver;
 pub use sensor::{Accepted, Condition, Counters, Refused, SensorReceiver};
 pub use session::{ENOUGH, Limits};
 
+use core::cell::Cell;
+
 use super::frame::CanFrame;
 use super::message::{Addresses, NotAMessage, Received};
-use crate::time::Time;
+use crate::fixed::time::Time;
+
+/// Frames and looks may be handed in out of order by so much, microseconds: a time stamp was taken before the
+/// look that is handed in after it.
+const BACK_US: u64 = 20_000;
 
 /// Receives the maps of `N` sensors: at most `A` azimuths of `32 W` ranges, the first `P` planes.
 #[derive(Debug, Clone)]
@@ -60,12 +81,20 @@ pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usi
     limits: Limits,
     sensors: [(u8, SensorReceiver<A, W, P>); N],
     foreign: u32,
+    /// The latest time handed in.
+    latest: Cell<Time>,
 }
 
 impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N, A, W, P> {
     /// Of these sensors, and no others.
     pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits) -> Self {
-        Self { addresses, limits, sensors: sensors.map(|number| (number, SensorReceiver::NEW)), foreign: 0 }
+        Self {
+            addresses,
+            limits,
+            sensors: sensors.map(|number| (number, SensorReceiver::NEW)),
+            foreign: 0,
+            latest: Cell::new(Time::from_micros(0)),
+        }
     }
 
     /// Takes a CAN or CAN FD frame.
@@ -101,6 +130,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         received: Result<Received<'_>, NotAMessage>,
         sensor: Option<u8>,
     ) -> Result<Accepted, Refused> {
+        let now = self.watch(now);
         let limits = self.limits;
         let found = self.sensors.iter_mut().find(|(number, _)| Some(*number) == sensor);
         let Some((_, sensor)) = found.filter(|_| received != Err(NotAMessage::Foreign)) else {
@@ -111,6 +141,20 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
             Ok(received) => sensor.take(now, &received, &limits),
             Err(error) => Err(sensor.refuse(Refused::NotAMessage(error))),
         }
+    }
+
+    /// Follows the receiver's clock, at frames and at looks; the time to count with. A little before the latest
+    /// counts as the latest. Where it steps back, nothing is told before each sensor's next session: no age is
+    /// known any more.
+    fn watch(&self, now: Time) -> Time {
+        let latest = self.latest.get();
+        match latest.since(now) {
+            Some(back) if back <= BACK_US => return latest,
+            Some(_) => self.sensors.iter().for_each(|(_, sensor)| sensor.step_back()),
+            None => {}
+        }
+        self.latest.set(now);
+        now
     }
 
     /// Counts what is refused before it is looked at.
@@ -132,11 +176,13 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
 
     /// A sensor's map as it is now; everything is unknown where it cannot be trusted.
     pub fn map(&self, number: u8, now: Time) -> ReceivedMap<'_, A, W, P> {
+        let now = self.watch(now);
         ReceivedMap::new(self.sensor(number), now, self.limits)
     }
 
     /// All sensors' maps as they are now.
     pub fn together(&self, now: Time) -> Together<'_, N, A, W, P> {
+        let now = self.watch(now);
         Together::new(self.sensors.each_ref().map(|(_, sensor)| ReceivedMap::new(Some(sensor), now, self.limits)))
     }
 }

@@ -1,6 +1,6 @@
 //! One plane of a map as received: the newest of every azimuth, and the refresh deltas build on.
 
-use crate::bits::Bits;
+use crate::fixed::bits::Bits;
 use crate::wire::code::ray::{Known, Ray};
 use crate::wire::layer::Azimuths;
 use crate::wire::map_message::Plain;

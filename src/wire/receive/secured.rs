@@ -10,7 +10,7 @@
 //! until the sender's next freshness message.
 
 use super::{Accepted, Limits, Receiver, Refused};
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::{Addresses, NotAMessage, Received};
 use crate::wire::secoc::{Key, Opener};
@@ -63,6 +63,7 @@ impl<K: Key + Clone, const N: usize, const A: usize, const W: usize, const P: us
         received: Result<Received<'_>, NotAMessage>,
         sensor: Option<u8>,
     ) -> Result<Accepted, Refused> {
+        let now = self.receiver.watch(now);
         let Ok(message) = received else { return self.receiver.received(now, received, sensor) };
         let opener = self.openers.iter_mut().find(|(number, _)| *number == message.sensor);
         match opener.map(|(_, opener)| opener.open(&message)) {

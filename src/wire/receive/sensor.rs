@@ -3,13 +3,13 @@
 use super::assembly::{Assembly, Begun, Place};
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Limits, Session};
-use crate::time::Time;
+use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
 use crate::wire::code::ray::Ray;
 use crate::wire::code::reading::{self, Ending, Reader};
 use crate::wire::e2e::{Counter, Sequence};
 use crate::wire::header::{Brought, Clock, Collector, Header, NotAHeader};
-use crate::wire::map_message;
+use crate::wire::map_message::{self, Plain};
 use crate::wire::message::{Epoch, Message, NotAMessage, NotAuthentic, Part, Plane, Received};
 use crate::wire::scan_number::ScanNumber;
 use crate::wire::status::Status;
@@ -42,12 +42,16 @@ pub enum Refused {
     Sealed,
     /// Not of the sender that has the key, or not new.
     NotAuthentic(NotAuthentic),
+    /// The first of an epoch: a session begins with the second.
+    FirstOfEpoch,
     /// Of an epoch that is over.
     OldEpoch,
     /// Two senders use this sensor's number.
     Conflict,
     /// Later than the greatest delay.
     Late,
+    /// Of a scan the sender's clock had not reached: later than half a period of the scan numbers.
+    BeyondClock,
     /// The header is not complete yet.
     NoHeader,
     /// No header that can be used; an unknown wire version, say.
@@ -76,9 +80,9 @@ pub struct Counters {
     pub repeated: u32,
     /// Came out of sequence, by more than the counter can tell.
     pub out_of_sequence: u32,
-    /// Refused as late.
+    /// Refused as late, by the measure or by the sender's clock.
     pub late: u32,
-    /// Refused for their epoch, or in a conflict.
+    /// Refused for their epoch, or in a conflict, or the first of an epoch.
     pub epoch: u32,
     /// Refused for want of a header or a refresh.
     pub early: u32,
@@ -90,7 +94,7 @@ pub struct Counters {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Condition {
-    /// Not heard, or not long enough, or not lately.
+    /// Not heard, or not long enough, or not lately, or too late.
     Waiting,
     /// Heard, but its header is not complete.
     NoHeader,
@@ -102,6 +106,9 @@ pub enum Condition {
     Ok,
 }
 
+/// Own bytes a message with a scan number has at least.
+const LEAST_DATED: usize = 3;
+
 /// Steps of a counter that still count as some lost.
 const MOST_STEP: u8 = 7;
 
@@ -110,12 +117,12 @@ const MOST_STEP: u8 = 7;
 pub struct SensorReceiver<const A: usize, const W: usize, const P: usize> {
     session: Session,
     collector: Collector,
-    /// Whether its header can be used.
-    usable: bool,
+    /// Whether its header fits this receiver's storage.
+    fits: bool,
     clock: Option<Clock>,
     status: Option<Status>,
     planes: [Sectors<A, W>; P],
-    assembly: Assembly,
+    assemblies: [Assembly; P],
     /// The scan at which old numbers were dropped last.
     purged: Option<ScanNumber>,
     sequences: [Counter; 32],
@@ -127,11 +134,11 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     pub const NEW: Self = Self {
         session: Session::NONE,
         collector: Collector::NEW,
-        usable: true,
+        fits: true,
         clock: None,
         status: None,
         planes: [const { Sectors::new() }; P],
-        assembly: Assembly::NEW,
+        assemblies: [Assembly::NEW; P],
         purged: None,
         sequences: [Counter::NEW; 32],
         counters: Counters {
@@ -155,12 +162,17 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
 
     /// What its maps are of, once complete.
     pub fn header(&self) -> Option<&Header> {
-        self.collector.header().filter(|_| self.usable)
+        self.collector.header().filter(|_| self.fits)
     }
 
     /// Its clock as it said last.
     pub fn clock(&self) -> Option<&Clock> {
         self.clock.as_ref()
+    }
+
+    /// The receiver's clock stepped back: nothing is told before a new session.
+    pub(super) fn step_back(&self) {
+        self.session.step_back();
     }
 
     /// Its epoch.
@@ -177,7 +189,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     pub fn condition(&self, now: Time, limits: &Limits) -> Condition {
         match () {
             () if self.session.conflicting(now) => Condition::Conflict,
-            () if !self.usable => Condition::Unusable,
+            () if !self.fits || self.session.speaks_otherwise(now) => Condition::Unusable,
             () if self.session.epoch().is_none() => Condition::Waiting,
             () if self.collector.header().is_none() => Condition::NoHeader,
             () if self.session.trusted(now, limits) => Condition::Ok,
@@ -207,8 +219,8 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         let count = match why {
             Refused::NotAMessage(_) => &mut c.protection,
             Refused::Sealed | Refused::NotAuthentic(_) => &mut c.not_authentic,
-            Refused::OldEpoch | Refused::Conflict => &mut c.epoch,
-            Refused::Late => &mut c.late,
+            Refused::FirstOfEpoch | Refused::OldEpoch | Refused::Conflict => &mut c.epoch,
+            Refused::Late | Refused::BeyondClock => &mut c.late,
             Refused::NoHeader | Refused::NoRefresh => &mut c.early,
             Refused::NotAHeader(_) | Refused::TooLarge | Refused::Malformed => &mut c.malformed,
         };
@@ -232,18 +244,23 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             return Err(Refused::Sealed);
         }
         // those of integrators and installations come from anybody and know nothing of the sender's epoch
-        if let Message::Other(24..) = message.message {
+        if let Message::Other(_) = message.message {
             return Ok(Accepted::Other(message.message));
         }
         let dated = matches!(message.message, Message::Map(..) | Message::VisibleRange);
-        let scan = message.own.first().filter(|_| dated).map(|byte| ScanNumber::from_byte(*byte));
+        let whole = message.own.first().filter(|_| message.own.len() >= LEAST_DATED);
+        let scan = whole.filter(|_| dated).map(|byte| ScanNumber::from_byte(*byte));
         match self.session.enter(now, message.epoch, scan, limits) {
             Entry::Taken => {}
             Entry::New => self.forget_all(),
+            Entry::First => return Err(Refused::FirstOfEpoch),
             Entry::OldEpoch => return Err(Refused::OldEpoch),
             Entry::Conflict => return Err(Refused::Conflict),
         }
         self.follow(message);
+        if dated {
+            self.hear(now, scan.ok_or(Refused::Malformed)?, limits)?;
+        }
         match message.message {
             Message::Status => {
                 let mut status = self.status.unwrap_or_default();
@@ -251,11 +268,10 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
                 self.status = Some(status);
                 Ok(Accepted::Status)
             }
-            Message::Header => self.take_header(now, message.own),
-            Message::Map(plane, part) => self.take_map(now, message, plane, part, limits),
+            Message::Header => self.take_header(now, message.own, limits),
+            Message::Map(plane, part) => self.take_map(message, plane, part),
             Message::VisibleRange => {
-                let ranges = Ranges::parse(message.own).ok_or(Refused::Malformed)?;
-                self.hear(now, ranges.scan, limits)?;
+                Ranges::parse(message.own).ok_or(Refused::Malformed)?;
                 Ok(Accepted::Other(message.message))
             }
             other => Ok(Accepted::Other(other)),
@@ -264,13 +280,13 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
 
     fn forget_all(&mut self) {
         self.forget_maps();
-        (self.collector, self.usable, self.clock, self.status) = (Collector::NEW, true, None, None);
+        (self.collector, self.fits, self.clock, self.status) = (Collector::NEW, true, None, None);
         self.sequences = [Counter::NEW; 32];
     }
 
     fn forget_maps(&mut self) {
         self.planes.iter_mut().for_each(Sectors::forget);
-        self.assembly.forget();
+        self.assemblies.iter_mut().for_each(Assembly::forget);
         self.purged = None;
     }
 
@@ -286,71 +302,74 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         }
     }
 
-    fn take_header(&mut self, now: Time, own: &[u8]) -> Result<Accepted, Refused> {
+    fn take_header(&mut self, now: Time, own: &[u8], limits: &Limits) -> Result<Accepted, Refused> {
         match self.collector.take(own) {
             Ok(Brought::Contradiction) => {
                 self.session.contradiction(now);
                 return Err(Refused::Conflict);
             }
-            Ok(Brought::Clock(clock)) => self.clock = Some(clock),
+            Ok(Brought::Clock(clock)) => {
+                self.clock = Some(clock);
+                if self.session.hear_clock(now, &clock, limits) {
+                    self.forget_maps();
+                }
+            }
             Ok(Brought::Group | Brought::Complete) => {}
             Err(error) => {
-                self.usable &= !matches!(error, NotAHeader::Version { .. });
+                if let NotAHeader::Version { .. } = error {
+                    self.session.other_version(now);
+                }
                 return Err(Refused::NotAHeader(error));
             }
         }
         let fits = |header: &Header| usize::from(header.azimuths) <= A && usize::from(header.ranges) <= 32 * W;
         if self.collector.header().is_some_and(|header| !fits(header)) {
-            self.usable = false;
+            self.fits = false;
             return Err(Refused::TooLarge);
         }
         Ok(Accepted::Header)
     }
 
-    fn take_map(
-        &mut self,
-        now: Time,
-        message: &Received<'_>,
-        plane: Plane,
-        part: Part,
-        limits: &Limits,
-    ) -> Result<Accepted, Refused> {
+    fn take_map(&mut self, message: &Received<'_>, plane: Plane, part: Part) -> Result<Accepted, Refused> {
         let long = !message.packing.is_classic();
         let map = map_message::parse(message.own, long).ok_or(Refused::Malformed)?;
-        // the lag is looked at before there is a header, so that a session settles meanwhile
-        self.hear(now, map.scan, limits)?;
-        let header = self.collector.header().filter(|_| self.usable).ok_or(Refused::NoHeader)?;
+        let header = self.collector.header().filter(|_| self.fits).ok_or(Refused::NoHeader)?;
         let accepted = Accepted::Map { scan: map.scan };
         if map.start >= usize::from(header.azimuths) {
             return Err(Refused::Malformed);
         }
-        let Some(sectors) = self.planes.get_mut(plane.index()) else { return Ok(Accepted::Other(message.message)) };
+        let stored = (self.planes.get_mut(plane.index()), self.assemblies.get_mut(plane.index()));
+        let (Some(sectors), Some(assembly)) = stored else { return Ok(Accepted::Other(message.message)) };
         let context = header.context(message.packing.form());
-        let (words, delta): (&[u64], bool);
-        let mut place = reading::Place::START;
-        let begun: Begun;
-        match part {
+        let index = match part {
             Part::Plain => {
+                assembly.interrupt();
                 let plain = map.plain(message.own, long).ok_or(Refused::Malformed)?;
+                if let Plain::Whole(Ray { known, .. }) | Plain::Limits(known) = plain
+                    && known.end() > context.ranges
+                {
+                    return Err(Refused::Malformed);
+                }
                 sectors.take_plain(map.start, map.scan, &plain);
                 return Ok(accepted);
             }
-            Part::Refresh | Part::Delta if long => (words, delta) = (map.words(), part == Part::Delta),
-            Part::Refresh | Part::Delta | Part::More(_) => {
-                let (index, kind) = match part {
-                    Part::More(word) => (word.index(), None),
-                    Part::Delta => (0, Some(Kind::Delta { ticks: 1 })),
-                    _ => (0, Some(Kind::Refresh)),
-                };
-                let start = u8::try_from(map.start).map_err(|_| Refused::Malformed)?;
-                let block = Place { plane, scan: map.scan, start };
-                let word = *map.words().first().ok_or(Refused::Malformed)?;
-                match self.assembly.take(block, index, kind, word) {
-                    Some(more) => begun = more,
-                    None => return Ok(accepted),
-                }
-                (words, delta, place) = (begun.words(), begun.delta, begun.reading);
+            Part::Refresh | Part::Delta => 0,
+            Part::More(_) if long => return Err(Refused::Malformed),
+            Part::More(word) => word.index(),
+        };
+        let block = Place { scan: map.scan, start: u8::try_from(map.start).map_err(|_| Refused::Malformed)? };
+        let (words, delta): (&[u64], bool);
+        let mut place = reading::Place::START;
+        let begun: Begun;
+        if long {
+            (words, delta) = (map.words(), part == Part::Delta);
+        } else {
+            let word = *map.words().first().ok_or(Refused::Malformed)?;
+            match assembly.take(block, index, part == Part::Delta, word) {
+                Some(more) => begun = more,
+                None => return Ok(accepted),
             }
+            (words, delta, place) = (begun.words(), begun.delta, begun.reading);
         }
         let kind = match (delta, reading::age(words, context.form)) {
             (false, _) => Kind::Refresh,
@@ -359,8 +378,10 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         };
         let mut reader = Reading { sectors, kind, scan: map.scan };
         let ending = reading::decode(words, &context, kind, map.start, &mut place, &mut reader);
-        if !long {
-            self.assembly.read_up_to(place);
+        if long {
+            assembly.interrupt();
+        } else {
+            assembly.read_up_to(block, place, matches!(ending, Ending::Complete | Ending::Malformed));
         }
         match ending {
             Ending::Complete | Ending::OutOfWords => Ok(accepted),
@@ -375,6 +396,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             Hearing::InTime => {}
             Hearing::Anew => self.forget_maps(),
             Hearing::Late => return Err(Refused::Late),
+            Hearing::Beyond => return Err(Refused::BeyondClock),
         }
         self.purge(now, scan, limits);
         Ok(())
@@ -390,7 +412,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         let most_us = 400_000 + 2 * limits.max_delay_us.max(limits.max_age_us);
         let too_old = self.session.older_than(now, most_us);
         self.planes.iter_mut().for_each(|sectors| sectors.purge(&too_old));
-        self.assembly.purge(&too_old);
+        self.assemblies.iter_mut().for_each(|assembly| assembly.purge(&too_old));
     }
 }
 

@@ -1,33 +1,59 @@
-//! Whom a receiver listens to, and how late what it hears is.
+//! Whom a receiver listens to, and how late what it hears is: the rules by their numbers.
 //!
 //! # Model
-//! *Lag.* A frame's scan number is the sender's clock at the measurement. The receiver's clock less that
-//! is the delay plus an unknown constant; the smallest seen stands for no delay. What lags more than `D`
-//! behind it is refused. A frame faster by more than `D` shows that the smallest was a late one: the
-//! session begins anew. The smallest creeps up by 2^-11, so that clocks may drift apart.
+//! *Session* (rule 1). An epoch has a session from its second intact frame within `A + D` on; one stray
+//! frame changes nothing. The epoch before is refused for `A + D`, its late frames for a period of the
+//! scan numbers. Should it speak again after `A + D`, in time by its own measure, then two senders use
+//! one number: a conflict, until only one of them is heard for a second.
 //!
-//! *Trust.* A session tells nothing before it is `A + D` old and has heard [`ENOUGH`] frames: one of
-//! them was in time.
+//! *Sender's clock* (rule 2). The header carries the full clock. The headers heard so far bound it from
+//! below: what the fastest of them said, and the time passed since, less 2^-11 for drift. A map frame of a
+//! scan after that by more than `D` is of another period of the scan numbers, and is refused. But where none was in
+//! time for `D`, one that is ahead by at most 1.5 s shows that the headers were late, and nothing is told before
+//! the next one.
 //!
-//! *Epochs.* A new epoch begins a new session, and the old one is refused for `A + D`, its late frames
-//! for a period of the scan numbers. Should it speak again after `A + D`, in time by its own measure, then
-//! two senders use one number: a conflict, until only one of them is heard for a second.
+//! *Measure* (rule 3). A frame's scan number is the sender's clock at the measurement. The receiver's
+//! clock less that is the delay plus an unknown constant; the smallest seen stands for no delay. What lags
+//! more than `D` behind it is refused. A smallest that sinks by more than `D`, at once or little by
+//! little, was a late one: the measure begins anew. It creeps up by 2^-11, so that clocks may drift.
+//!
+//! *Trust* (rule 5). Nothing is told before the measure is `A + D` old and of [`ENOUGH`] frames, nor
+//! while it does not fit the sender's clock.
 
-use crate::time::Time;
+use core::cell::Cell;
+
+use crate::fixed::time::Time;
+use crate::wire::header::Clock;
 use crate::wire::message::Epoch;
-use crate::wire::scan_number::{PERIOD_US, ScanNumber, TICK_US};
+use crate::wire::scan_number::{CLOCK_US, PERIOD_US, ScanNumber, TICK_US};
 
-/// Map frames a session must have heard before it is trusted.
+/// Map frames a measure must be of before it is trusted.
 pub const ENOUGH: u8 = 8;
 
-/// Silence that ends a session, microseconds: half a period of the scan numbers.
+/// Silence of a session's epoch after which another may begin one, microseconds.
 const SILENCE_US: u64 = PERIOD_US as u64 / 2;
 
-/// A conflict lasts this long after its last sign, microseconds.
-const CONFLICT_US: u64 = 1_000_000;
+/// A conflict, and another wire version, last this long after their last sign, microseconds.
+const SIGN_US: u64 = 1_000_000;
 
 /// What the smallest lag may be off by: a tick's rounding, and its creeping up over ten seconds.
 const MARGIN_US: u32 = TICK_US + 5000;
+
+/// A map frame further ahead of the sender's clock was late by more than half a period, microseconds; one nearer
+/// shows that the clock is late, by three headers at most, where none was in time.
+const MOST_AHEAD_US: u32 = 1_500_000;
+
+/// Without a map frame in time for longer than this, what is held is dropped, microseconds.
+const GAP_US: u64 = 1_000_000;
+
+/// The smallest lag, and the bound of the sender's clock, give way by 2^-11 of the time passed.
+const CREEP: u32 = 11;
+
+/// The smallest lag may sink by 2^-10 of the time passed: what it crept up and what clocks drift.
+const LEAK: u32 = 10;
+
+/// What did not happen yet.
+const NEVER: Time = Time::from_micros(u64::MAX);
 
 /// Age and delay a receiver works with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +81,8 @@ pub(super) enum Entry {
     Taken,
     /// A new session: everything before is void.
     New,
+    /// The first of an epoch that has no session yet.
+    First,
     /// Of an epoch that is over.
     OldEpoch,
     /// Of a second sender.
@@ -66,74 +94,193 @@ pub(super) enum Entry {
 pub(super) enum Hearing {
     /// In time.
     InTime,
-    /// In time, but what came before was not: maps before are void.
+    /// In time, but maps before are void.
     Anew,
     /// Too late.
     Late,
+    /// Of a scan that the sender's clock had not reached.
+    Beyond,
+}
+
+/// The sender's clock, as the fastest header had it.
+#[derive(Debug, Clone, Copy)]
+struct SenderClock {
+    /// When that came, and what it said: microseconds, modulo [`CLOCK_US`].
+    at: Time,
+    us: u64,
+    /// The first one, or the first after one faster by more than `D`.
+    begun: Time,
+    /// Whether a header `A + D` later agreed.
+    confirmed: bool,
+}
+
+impl SenderClock {
+    /// What it has reached by now, at least.
+    fn now_us(&self, now: Time) -> u64 {
+        let passed = now.since(self.at).unwrap_or(0);
+        (self.us + passed - (passed >> CREEP)) % CLOCK_US
+    }
+
+    /// The lag that a scan measured now would have.
+    fn lag(&self, now: Time) -> u32 {
+        difference(modulo(now.micros()), modulo(self.now_us(now)))
+    }
+}
+
+/// The smallest lag.
+#[derive(Debug, Clone, Copy)]
+struct Measure {
+    begun: Time,
+    /// The fastest frame: when it came, and its lag.
+    at: Time,
+    lag: u32,
+    /// By how much the smallest sank since the measure began, less what is allowed.
+    sunk: u32,
+    /// Map frames in time.
+    count: u8,
+}
+
+impl Measure {
+    fn least(&self, now: Time) -> u32 {
+        modulo(u64::from(self.lag) + (now.since(self.at).unwrap_or(0) >> CREEP))
+    }
+}
+
+/// What is remembered of an epoch without a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mark {
+    None,
+    /// A frame of it was heard.
+    Heard,
+    /// It had a session.
+    Left,
+}
+
+/// Whole milliseconds at which each epoch was heard or left.
+#[derive(Debug, Clone, Copy)]
+struct Epochs {
+    at_ms: [u32; 16],
+    heard: u16,
+    left: u16,
+}
+
+impl Epochs {
+    const NONE: Self = Self { at_ms: [0; 16], heard: 0, left: 0 };
+
+    fn mark(&mut self, epoch: Epoch, mark: Mark, now: Time) {
+        let bit = 1 << epoch.number();
+        (self.heard, self.left) = (self.heard & !bit, self.left & !bit);
+        match mark {
+            Mark::None => return,
+            Mark::Heard => self.heard |= bit,
+            Mark::Left => self.left |= bit,
+        }
+        if let Some(at) = self.at_ms.get_mut(usize::from(epoch.number())) {
+            *at = milliseconds(now);
+        }
+    }
+
+    fn since_ms(&self, epoch: Epoch, now: Time) -> u32 {
+        let at = self.at_ms.get(usize::from(epoch.number())).copied().unwrap_or(0);
+        milliseconds(now).wrapping_sub(at)
+    }
+
+    fn is_left(&self, epoch: Epoch) -> bool {
+        self.left >> epoch.number() & 1 == 1
+    }
+
+    /// Milliseconds since an epoch was left, if that is not a period ago.
+    fn since_left(&mut self, epoch: Epoch, now: Time) -> Option<u32> {
+        let since = Some(self.since_ms(epoch, now)).filter(|_| self.is_left(epoch))?;
+        if since > PERIOD_US / 1000 {
+            self.mark(epoch, Mark::None, now);
+            return None;
+        }
+        Some(since)
+    }
+
+    /// Notes a frame; whether the one before it came within this time.
+    fn again(&mut self, epoch: Epoch, now: Time, within_ms: u64) -> bool {
+        let again = self.heard >> epoch.number() & 1 == 1 && u64::from(self.since_ms(epoch, now)) <= within_ms;
+        self.mark(epoch, Mark::Heard, now);
+        again
+    }
 }
 
 /// Who is listened to.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Session {
     epoch: Option<Epoch>,
     /// The last frame of this epoch.
     heard: Time,
-    /// First map frame, smallest lag and when it last crept up.
-    begun: Option<(Time, u32, Time)>,
-    /// Last map frame in time.
+    /// The receiver's clock stepped back: nothing holds any more.
+    void: Cell<bool>,
+    clock: Option<SenderClock>,
+    measure: Option<Measure>,
+    /// Last map frame in time; before the first the session's beginning.
     map_heard: Time,
-    /// Map frames in time.
-    count: u8,
-    /// Since when there are only late ones.
-    late_since: Option<Time>,
-    /// When each epoch was left, milliseconds, and which are remembered.
-    left_ms: [u32; 16],
-    left: u16,
-    /// The epoch left last and its smallest lag.
+    /// Whether a map frame of this session was refused.
+    doubt: bool,
+    /// Since when all map frames fit measure or clock not.
+    misfit_since: Time,
+    epochs: Epochs,
+    /// The epoch left last and its smallest lag then.
     previous: Option<(Epoch, u32)>,
-    conflict: Option<Time>,
+    conflict: Time,
+    other_version: Time,
 }
 
 impl Session {
     pub const NONE: Self = Self {
         epoch: None,
         heard: Time::from_micros(0),
-        begun: None,
+        void: Cell::new(false),
+        clock: None,
+        measure: None,
         map_heard: Time::from_micros(0),
-        count: 0,
-        late_since: None,
-        left_ms: [0; 16],
-        left: 0,
+        doubt: false,
+        misfit_since: NEVER,
+        epochs: Epochs::NONE,
         previous: None,
-        conflict: None,
+        conflict: NEVER,
+        other_version: NEVER,
     };
 
     pub fn epoch(&self) -> Option<Epoch> {
-        self.epoch
+        self.epoch.filter(|_| !self.void.get())
+    }
+
+    /// The receiver's clock stepped back.
+    pub fn step_back(&self) {
+        self.void.set(true);
     }
 
     /// A checked frame of any kind, with its scan number if it has one.
     pub fn enter(&mut self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &Limits) -> Entry {
-        let Some(current) = self.epoch else { return self.begin(now, epoch) };
-        if now.since(self.heard).is_none_or(|silence| silence > SILENCE_US) {
-            return self.begin(now, epoch);
+        if self.void.get() {
+            *self = Self::NONE;
         }
-        if epoch == current {
+        let sum_ms = limits.sum_us() / 1000;
+        let silence = self.epoch.and_then(|_| now.since(self.heard)).unwrap_or(u64::MAX);
+        if self.epoch == Some(epoch) && silence <= u64::from(PERIOD_US) {
+            // clock and measure hold, so that what was under way meanwhile is known to be late
             self.heard = now;
             return Entry::Taken;
         }
-        let left = self.since_left(now, epoch);
-        if left.is_some_and(|since| since <= limits.sum_us()) {
-            return Entry::OldEpoch;
-        }
-        if self.conflicting(now) || left.is_some_and(|since| since <= u64::from(PERIOD_US)) {
-            if self.speaks_now(now, epoch, scan, limits) {
-                self.conflict = Some(now);
-                return Entry::Conflict;
+        if silence <= SILENCE_US {
+            let left = self.epochs.since_left(epoch, now);
+            if left.is_some_and(|since| u64::from(since) <= sum_ms) {
+                return Entry::OldEpoch;
             }
-            return Entry::OldEpoch;
+            if left.is_some() || self.conflicting(now) {
+                if self.speaks_now(now, epoch, scan, limits) {
+                    self.conflict = now;
+                    return Entry::Conflict;
+                }
+                return Entry::OldEpoch;
+            }
         }
-        self.begin(now, epoch)
+        if self.epochs.again(epoch, now, sum_ms) { self.begin(now, epoch) } else { Entry::First }
     }
 
     /// Whether a frame of another epoch is of a sender that speaks now: not one that is late by the
@@ -141,94 +288,136 @@ impl Session {
     fn speaks_now(&self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &Limits) -> bool {
         match (self.previous.filter(|(previous, _)| *previous == epoch), scan) {
             (Some((_, least)), Some(scan)) => {
-                let behind = behind(scan.lag(now), least);
+                let behind = difference(scan.lag(now), least);
                 behind <= limits.max_delay_us || behind > PERIOD_US / 2
             }
-            (None, Some(_)) => self.left >> epoch.number() & 1 == 0,
+            (None, Some(_)) => !self.epochs.is_left(epoch),
             (_, None) => false,
         }
     }
 
     fn begin(&mut self, now: Time, epoch: Epoch) -> Entry {
         if let Some(old) = self.epoch.filter(|old| *old != epoch) {
-            if let Some(left) = self.left_ms.get_mut(usize::from(old.number())) {
-                *left = milliseconds(now);
-            }
-            self.left |= 1 << old.number();
-            self.previous = self.begun.map(|(_, least, _)| (old, least));
+            self.epochs.mark(old, Mark::Left, now);
+            self.previous = self.measure.map(|measure| (old, measure.least(now)));
         }
-        self.left &= !(1 << epoch.number());
-        (self.epoch, self.heard, self.conflict) = (Some(epoch), now, None);
-        self.restart();
+        self.epochs.mark(epoch, Mark::None, now);
+        (self.epoch, self.heard, self.map_heard) = (Some(epoch), now, now);
+        (self.clock, self.measure) = (None, None);
+        (self.doubt, self.misfit_since) = (false, NEVER);
+        (self.conflict, self.other_version) = (NEVER, NEVER);
         Entry::New
-    }
-
-    fn restart(&mut self) {
-        (self.begun, self.count, self.late_since) = (None, 0, None);
-    }
-
-    /// Microseconds since an epoch was left, if it is remembered.
-    fn since_left(&mut self, now: Time, epoch: Epoch) -> Option<u64> {
-        if self.left >> epoch.number() & 1 == 0 {
-            return None;
-        }
-        let left = self.left_ms.get(usize::from(epoch.number()))?;
-        let since = u64::from(milliseconds(now).wrapping_sub(*left)) * 1000;
-        if since > u64::from(PERIOD_US) {
-            self.left &= !(1 << epoch.number());
-        }
-        Some(since)
     }
 
     /// Says something of the same epoch that cannot be true of one sender.
     pub fn contradiction(&mut self, now: Time) {
-        self.conflict = Some(now);
+        self.conflict = now;
+    }
+
+    /// Speaks a wire version that is not known here.
+    pub fn other_version(&mut self, now: Time) {
+        self.other_version = now;
     }
 
     pub fn conflicting(&self, now: Time) -> bool {
-        self.conflict.is_some_and(|sign| now.since(sign).is_some_and(|since| since < CONFLICT_US))
+        lasts(self.conflict, now)
+    }
+
+    pub fn speaks_otherwise(&self, now: Time) -> bool {
+        lasts(self.other_version, now)
+    }
+
+    /// The clock of a header; whether maps before are void.
+    pub fn hear_clock(&mut self, now: Time, clock: &Clock, limits: &Limits) -> bool {
+        let us = clock.time_ms * 1000 % CLOCK_US;
+        let delay_us = u64::from(limits.max_delay_us);
+        let mut known = self.clock.unwrap_or(SenderClock { at: now, us, begun: now, confirmed: false });
+        let ahead = (us + CLOCK_US - known.now_us(now)) % CLOCK_US;
+        let faster = ahead < CLOCK_US / 2;
+        if faster && ahead > delay_us {
+            (known.begun, known.confirmed) = (now, false);
+        } else if faster || CLOCK_US - ahead <= delay_us {
+            known.confirmed |= now.since(known.begun).is_some_and(|since| since >= limits.sum_us());
+        }
+        if faster {
+            (known.at, known.us) = (now, us);
+        }
+        self.clock = Some(known);
+        // the fastest frame was of a scan that the sender's clock had not reached
+        let beyond = |measure: &Measure| ahead_of(known.lag(now), measure.least(now), limits) > 0;
+        let void = self.measure.as_ref().is_some_and(beyond);
+        if void {
+            self.measure = None;
+        }
+        void
     }
 
     /// The scan number of a map frame.
     pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Hearing {
         let lag = scan.lag(now);
-        let Some((begun, mut least, crept)) = self.begun else { return self.hear_first(now, lag, Hearing::InTime) };
-        // clocks drift apart
-        let steps = now.since(crept).unwrap_or(0) >> 11;
-        least = modulo(u64::from(least) + steps);
-        let crept = Time::from_micros(crept.micros() + (steps << 11));
-        self.begun = Some((begun, least, crept));
-        let behind = behind(lag, least);
+        let ahead = self.clock.map_or(0, |clock| ahead_of(clock.lag(now), lag, limits));
+        let pause = now.since(self.map_heard).unwrap_or(0);
+        // among frames in time it is one of another period
+        if ahead > MOST_AHEAD_US || (ahead > 0 && pause <= u64::from(limits.max_delay_us)) {
+            return self.refuse(now, lag, Hearing::Beyond);
+        }
+        let Some(mut measure) = self.measure else { return self.measure_anew(now, lag, ahead) };
+        let behind = difference(lag, measure.least(now));
         if behind > limits.max_delay_us && behind <= PERIOD_US / 2 {
-            let since = *self.late_since.get_or_insert(now);
-            if now.since(since).is_some_and(|late| late < u64::from(PERIOD_US)) {
-                return Hearing::Late;
-            }
-            // nothing but late frames for a whole period: the clocks are not what they were
-            return self.hear_first(now, lag, Hearing::Anew);
+            return self.refuse(now, lag, Hearing::Late);
         }
         if behind > PERIOD_US / 2 {
-            if PERIOD_US - behind > limits.max_delay_us {
-                return self.hear_first(now, lag, Hearing::Anew);
+            let allowed = now.since(measure.at).unwrap_or(0) >> LEAK;
+            let sunk = u64::from(measure.sunk).saturating_sub(allowed) + u64::from(PERIOD_US - behind);
+            if sunk > u64::from(limits.max_delay_us) {
+                return self.measure_anew(now, lag, ahead);
             }
-            self.begun = Some((begun, lag, now));
+            (measure.at, measure.lag, measure.sunk) = (now, lag, modulo(sunk));
         }
-        self.late_since = None;
-        self.map_heard = now;
-        self.count = self.count.saturating_add(1);
-        Hearing::InTime
+        measure.count = measure.count.saturating_add(1);
+        self.measure = Some(measure);
+        self.in_time(now, ahead);
+        if pause > GAP_US { Hearing::Anew } else { Hearing::InTime }
     }
 
-    fn hear_first(&mut self, now: Time, lag: u32, hearing: Hearing) -> Hearing {
-        self.restart();
-        self.begun = Some((now, lag, now));
-        (self.map_heard, self.count) = (now, 1);
+    fn measure_anew(&mut self, now: Time, lag: u32, ahead: u32) -> Hearing {
+        self.measure = Some(Measure { begun: now, at: now, lag, sunk: 0, count: 1 });
+        self.in_time(now, ahead);
+        Hearing::Anew
+    }
+
+    fn in_time(&mut self, now: Time, ahead: u32) {
+        if ahead == 0 {
+            (self.map_heard, self.misfit_since) = (now, NEVER);
+        } else {
+            self.misfits(now);
+        }
+    }
+
+    /// Notes that a frame fits measure or clock not; whether none did for a period.
+    fn misfits(&mut self, now: Time) -> bool {
+        if self.misfit_since == NEVER {
+            self.misfit_since = now;
+        }
+        let over = now.since(self.misfit_since).is_some_and(|since| since >= u64::from(PERIOD_US));
+        if over {
+            // the clocks are not what they were
+            (self.clock, self.misfit_since) = (None, NEVER);
+        }
+        over
+    }
+
+    fn refuse(&mut self, now: Time, lag: u32, hearing: Hearing) -> Hearing {
+        if self.misfits(now) {
+            return self.measure_anew(now, lag, 0);
+        }
+        self.doubt = true;
         hearing
     }
 
     /// How old a scan is, at most by the fastest frame's delay more.
     pub fn age_us(&self, now: Time, scan: ScanNumber) -> u32 {
-        self.begun.map_or(PERIOD_US, |(_, least, _)| behind(scan.lag(now), least))
+        self.measure.map_or(PERIOD_US, |measure| difference(scan.lag(now), measure.least(now)))
     }
 
     /// Whether scans are older than this at one time.
@@ -238,16 +427,21 @@ impl Session {
         let age_us = self.age_us(now, ScanNumber::from_byte(0));
         let ticks = (age_us / TICK_US) as u8;
         let most_ticks = (most_us.saturating_sub(age_us % TICK_US) / TICK_US).min(255) as u8;
-        let any = self.begun.is_none();
+        let any = self.measure.is_none();
         move |scan| any || ScanNumber::from_byte(ticks).ticks_after(scan) > most_ticks
     }
 
     /// Whether anything may be told now.
     pub fn trusted(&self, now: Time, limits: &Limits) -> bool {
-        let settled = self.begun.is_some_and(|(begun, ..)| now.since(begun).is_some_and(|t| t >= limits.sum_us()));
+        let (Some(measure), Some(clock), false) = (self.measure, self.clock, self.void.get()) else { return false };
+        let settled = now.since(measure.begun).is_some_and(|t| t >= limits.sum_us()) && measure.count >= ENOUGH;
         // later than this every map has aged, and before it no number comes again
         let current = now.since(self.map_heard).is_some_and(|t| t <= u64::from(limits.max_age_us));
-        settled && current && self.count >= ENOUGH && !self.conflicting(now)
+        // by the header's clock the fastest map frame was in time
+        let over = difference(measure.least(now) + limits.max_delay_us, clock.lag(now));
+        let fits = over <= 2 * limits.max_delay_us + MARGIN_US;
+        let sure = clock.confirmed || !self.doubt;
+        settled && current && fits && sure && !self.conflicting(now) && !self.speaks_otherwise(now)
     }
 
     /// Whether a scan may be told now, given that the session is trusted.
@@ -256,9 +450,20 @@ impl Session {
     }
 }
 
+/// Whether a sign still counts.
+fn lasts(sign: Time, now: Time) -> bool {
+    now.since(sign).is_some_and(|since| since < SIGN_US)
+}
+
 /// How much a lag is more than another, modulo the period.
-fn behind(lag: u32, least: u32) -> u32 {
-    if lag < least { lag + PERIOD_US - least } else { lag - least }
+fn difference(lag: u32, least: u32) -> u32 {
+    modulo(u64::from(lag) + u64::from(PERIOD_US) - u64::from(least))
+}
+
+/// By how much a lag is smaller than the sender's clock allows; 0 if it is not.
+fn ahead_of(clock: u32, lag: u32, limits: &Limits) -> u32 {
+    let ahead = difference(clock, lag);
+    if ahead > limits.max_delay_us && ahead <= PERIOD_US / 2 { ahead } else { 0 }
 }
 
 #[allow(clippy::cast_possible_truncation)] // modulo
@@ -286,24 +491,39 @@ mod tests {
         ScanNumber::at(ms(measured_ms + 1234))
     }
 
-    fn trusting() -> Session {
+    fn clock(sent_ms: u64) -> Clock {
+        Clock { time_ms: sent_ms + 1234, synchronised: false }
+    }
+
+    /// Two frames of an epoch: a session.
+    fn begun(at: u64, epoch: u8) -> Session {
         let mut s = Session::NONE;
-        assert_eq!(s.enter(ms(0), Epoch::new(3), None, &LIMITS), Entry::New);
+        assert_eq!(s.enter(ms(at), Epoch::new(epoch), None, &LIMITS), Entry::First);
+        assert_eq!(s.enter(ms(at), Epoch::new(epoch), None, &LIMITS), Entry::New);
+        s
+    }
+
+    /// A session whose frames take 30 ms.
+    fn trusting() -> Session {
+        let mut s = begun(0, 3);
+        assert!(!s.hear_clock(ms(20), &clock(10), &LIMITS));
         for k in 0..10 {
-            assert_eq!(s.hear(ms(50 * k + 30), scan(50 * k), &LIMITS), Hearing::InTime);
+            let hearing = s.hear(ms(50 * k + 30), scan(50 * k), &LIMITS);
+            assert_eq!(hearing, if k == 0 { Hearing::Anew } else { Hearing::InTime });
         }
         assert!(s.trusted(ms(480), &LIMITS));
         s
     }
 
     #[test]
-    fn a_session_is_trusted_after_age_and_delay_and_enough_frames() {
-        let mut s = Session::NONE;
-        s.enter(ms(0), Epoch::new(3), None, &LIMITS);
+    fn a_measure_is_trusted_after_age_and_delay_and_enough_frames_and_a_clock() {
+        let mut s = begun(0, 3);
         for k in 0..8 {
             assert!(!s.trusted(ms(50 * k + 5), &LIMITS));
             s.hear(ms(50 * k + 5), scan(50 * k), &LIMITS);
         }
+        assert!(!s.trusted(ms(405), &LIMITS), "no clock yet");
+        s.hear_clock(ms(360), &clock(350), &LIMITS);
         assert!(!s.trusted(ms(404), &LIMITS) && s.trusted(ms(405), &LIMITS));
         assert!(!s.trusted(ms(656), &LIMITS), "300 ms after the last frame");
     }
@@ -315,8 +535,87 @@ mod tests {
         assert_eq!(s.hear(ms(600), scan(500), &LIMITS), Hearing::InTime);
         assert_eq!(s.hear(ms(600), scan(590), &LIMITS), Hearing::InTime, "20 ms faster");
         assert_eq!(s.hear(ms(600), scan(480), &LIMITS), Hearing::Late, "by the new measure");
+        assert!(!s.hear_clock(ms(600), &clock(2010), &LIMITS));
         assert_eq!(s.hear(ms(600), scan(2000), &LIMITS), Hearing::Anew, "all before were late");
         assert!(!s.trusted(ms(600), &LIMITS));
+    }
+
+    #[test]
+    fn a_queue_that_drains_begins_the_measure_anew_again_and_again() {
+        let mut s = begun(0, 3);
+        let mut delay = 2000;
+        for now in (2100..).step_by(5) {
+            // a header in every hundred
+            if now % 500 == 0 {
+                s.hear_clock(ms(now), &clock(now - delay), &LIMITS);
+            }
+            s.hear(ms(now), scan(now - delay), &LIMITS);
+            assert!(!s.trusted(ms(now), &LIMITS) || delay <= 100, "{delay} ms late at {now}");
+            // twice as fast as it grew
+            delay = if delay > 13 { delay - 8 } else { 5 };
+            if now == 2095 + 5 * 250 + 700 {
+                break;
+            }
+        }
+        assert!(delay == 5 && s.trusted(ms(4050), &LIMITS));
+    }
+
+    #[test]
+    fn a_frame_from_after_the_senders_clock_changes_nothing() {
+        let mut s = trusting();
+        // 2.7 s late, which looks like 2.4 s fast
+        assert_eq!(s.hear(ms(600), scan(600 + 5120 - 2700), &LIMITS), Hearing::Beyond);
+        assert!(!s.trusted(ms(600), &LIMITS), "a single header may have been as late");
+        s.hear_clock(ms(430), &clock(410), &LIMITS);
+        assert!(s.trusted(ms(600), &LIMITS), "two are not");
+        assert_eq!(s.hear(ms(600), scan(580), &LIMITS), Hearing::InTime);
+        // the real header shows that everything before was of the echo
+        let mut s = begun(0, 3);
+        s.hear_clock(ms(2710), &clock(10), &LIMITS);
+        s.hear(ms(2720), scan(20), &LIMITS);
+        assert_eq!(s.hear(ms(2725), scan(2720), &LIMITS), Hearing::Late);
+        assert!(s.hear_clock(ms(2730), &clock(2725), &LIMITS));
+        assert_eq!(s.hear(ms(2740), scan(2720), &LIMITS), Hearing::Anew);
+        assert_eq!(s.hear(ms(2740), scan(40), &LIMITS), Hearing::Beyond);
+    }
+
+    #[test]
+    fn frames_ahead_of_the_clock_are_heard_where_none_is_in_time() {
+        let mut s = trusting();
+        // 4.5 s late, which looks like 0.6 s fast
+        let echo = |now: u64| scan(now + 5120 - 4500);
+        assert_eq!(s.hear(ms(500), echo(500), &LIMITS), Hearing::Beyond);
+        assert_eq!(s.hear(ms(530), scan(500), &LIMITS), Hearing::InTime);
+        assert_eq!(s.hear(ms(630), echo(630), &LIMITS), Hearing::Beyond);
+        assert_eq!(s.hear(ms(631), echo(631), &LIMITS), Hearing::Anew, "none in time for more than D");
+        assert!(!s.trusted(ms(631), &LIMITS), "until a header says who is right");
+    }
+
+    #[test]
+    fn maps_that_are_later_than_the_header_are_not_told() {
+        let mut s = begun(0, 3);
+        s.hear_clock(ms(20), &clock(10), &LIMITS);
+        (0..20).for_each(|k| _ = s.hear(ms(50 * k + 230), scan(50 * k), &LIMITS));
+        assert!(!s.trusted(ms(1180), &LIMITS), "all of them took 230 ms");
+    }
+
+    #[test]
+    fn a_clock_that_steps_back_ends_the_session() {
+        let mut s = trusting();
+        s.step_back();
+        assert!(!s.trusted(ms(480), &LIMITS) && s.epoch().is_none());
+        assert_eq!(s.enter(ms(300), Epoch::new(3), None, &LIMITS), Entry::First);
+        assert_eq!(s.enter(ms(301), Epoch::new(3), None, &LIMITS), Entry::New);
+    }
+
+    #[test]
+    fn one_stray_frame_changes_nothing() {
+        let mut s = trusting();
+        assert_eq!(s.enter(ms(480), Epoch::new(9), Some(scan(400)), &LIMITS), Entry::First);
+        assert_eq!(s.enter(ms(480), Epoch::new(8), None, &LIMITS), Entry::First);
+        assert!(s.trusted(ms(480), &LIMITS));
+        assert_eq!(s.enter(ms(881), Epoch::new(9), None, &LIMITS), Entry::First, "too long after the other");
+        assert_eq!(s.enter(ms(1281), Epoch::new(9), None, &LIMITS), Entry::New);
     }
 
     #[test]
@@ -341,11 +640,19 @@ mod tests {
 
     #[test]
     fn clocks_may_drift_apart_by_400_parts_in_a_million() {
-        let mut s = trusting();
-        for k in 10..200_000_u64 {
-            let measured = 50 * k;
-            let received = Time::from_micros((measured + 30) * 1000 + measured * 1000 / 2500);
-            assert_eq!(s.hear(received, scan(measured), &LIMITS), Hearing::InTime, "{k}");
+        for ahead in [0, 800] {
+            let mut s = trusting();
+            for k in 10..200_000_u64 {
+                let measured = 50 * k;
+                // from 400 slow to 400 fast, in parts of a million
+                let drifted = (measured + 30) * 1000 + measured * (1_000_000 + 400 - ahead) / 1000 - measured * 1000;
+                let received = Time::from_micros(drifted);
+                assert_eq!(s.hear(received, scan(measured), &LIMITS), Hearing::InTime, "{k}");
+                if k % 10 == 0 {
+                    s.hear_clock(received, &clock(measured + 20), &LIMITS);
+                }
+                assert!(s.trusted(received, &LIMITS), "{k}");
+            }
         }
     }
 
@@ -353,7 +660,7 @@ mod tests {
     fn the_old_epoch_is_refused_and_then_a_conflict() {
         let mut s = trusting();
         let mut enter = |at: u64, epoch, scan| s.enter(ms(at), Epoch::new(epoch), scan, &LIMITS);
-        assert_eq!(enter(500, 4, None), Entry::New);
+        assert_eq!((enter(500, 4, None), enter(500, 4, None)), (Entry::First, Entry::New));
         assert_eq!(enter(900, 3, Some(scan(870))), Entry::OldEpoch);
         assert_eq!(enter(901, 3, Some(scan(450))), Entry::OldEpoch, "a late one");
         assert_eq!(enter(901, 3, None), Entry::OldEpoch, "of no known time");
@@ -362,10 +669,11 @@ mod tests {
         assert_eq!(enter(1000, 9, Some(scan(0))), Entry::Conflict, "a third one either");
         assert!(s.conflicting(ms(1999)) && !s.conflicting(ms(2001)));
         let mut enter = |at: u64, epoch| s.enter(ms(at), Epoch::new(epoch), None, &LIMITS);
-        assert_eq!(enter(2002, 9), Entry::New, "a restart");
+        assert_eq!((enter(2002, 9), enter(2003, 9)), (Entry::First, Entry::New), "a restart");
         // the old number may come again when it is forgotten
         (0..6).for_each(|k| assert_eq!(enter(2100 + 1000 * k, 9), Entry::Taken));
-        assert_eq!(enter(7200, 4), Entry::New);
+        assert_eq!(enter(7120, 4), Entry::OldEpoch);
+        assert_eq!((enter(7200, 4), enter(7201, 4)), (Entry::First, Entry::New));
     }
 
     #[test]
@@ -373,28 +681,59 @@ mod tests {
         let mut s = Session::NONE;
         for k in 0..600 {
             let epoch = Epoch::new(1 + u8::try_from(k & 1).unwrap());
-            if s.enter(ms(33 * k), epoch, Some(scan(33 * k)), &LIMITS) != Entry::Conflict {
+            if matches!(s.enter(ms(33 * k), epoch, Some(scan(33 * k)), &LIMITS), Entry::Taken | Entry::New) {
+                s.hear_clock(ms(33 * k), &clock(33 * k), &LIMITS);
                 s.hear(ms(33 * k), scan(33 * k), &LIMITS);
             }
-            assert_eq!(s.conflicting(ms(33 * k)), k >= 14, "{k}");
+            assert_eq!(s.conflicting(ms(33 * k)), k >= 16, "{k}");
             assert!(!s.trusted(ms(33 * k), &LIMITS));
         }
     }
 
     #[test]
-    fn silence_ends_a_session() {
+    fn silence_lets_another_epoch_begin_and_ends_a_session_after_a_period() {
         let mut s = trusting();
-        assert_eq!(s.enter(ms(3100), Epoch::new(3), None, &LIMITS), Entry::New);
-        assert_eq!(s.enter(ms(3000), Epoch::new(3), None, &LIMITS), Entry::New, "so does a clock stepping back");
+        let mut enter = |at: u64, epoch| s.enter(ms(at), Epoch::new(epoch), None, &LIMITS);
+        assert_eq!(enter(5100, 3), Entry::Taken);
+        assert_eq!((enter(10_300, 3), enter(10_310, 3)), (Entry::First, Entry::New));
+        assert_eq!((enter(12_900, 4), enter(12_910, 3)), (Entry::First, Entry::Taken));
+        assert_eq!((enter(15_500, 4), enter(15_510, 4)), (Entry::First, Entry::New));
     }
 
     #[test]
-    fn nothing_but_late_frames_is_a_clock_that_stepped() {
-        let mut s = trusting();
-        for k in 10..113 {
-            let hearing = s.hear(ms(50 * k), scan(50 * k - 200), &LIMITS);
-            assert_eq!(hearing, if k < 113 { Hearing::Late } else { Hearing::Anew }, "{k}");
+    fn what_waited_while_the_bus_stood_still_is_late() {
+        for delay in [150, 2600, 4900] {
+            let mut s = trusting();
+            assert_eq!(s.enter(ms(480), Epoch::new(3), None, &LIMITS), Entry::Taken);
+            let first = 500 + delay;
+            assert_eq!(s.enter(ms(first), Epoch::new(3), None, &LIMITS), Entry::Taken);
+            for k in 10..112 {
+                let hearing = s.hear(ms(50 * k + delay), scan(50 * k), &LIMITS);
+                // 4.9 s late looks like 0.2 s fast
+                assert!(delay > 3600 || matches!(hearing, Hearing::Late | Hearing::Beyond), "{k}");
+                s.hear_clock(ms(50 * k + delay), &clock(50 * k + 10), &LIMITS);
+                assert!(!s.trusted(ms(50 * k + delay), &LIMITS), "{k}");
+            }
         }
-        assert_eq!(s.hear(ms(5700), scan(5500), &LIMITS), Hearing::Anew);
+    }
+
+    #[test]
+    fn without_a_frame_in_time_for_a_period_the_clocks_are_not_what_they_were() {
+        let mut s = trusting();
+        for k in 10..112 {
+            assert_eq!(s.hear(ms(50 * k), scan(50 * k - 200), &LIMITS), Hearing::Late, "{k}");
+        }
+        // the first late one was heard at 500 ms
+        assert_eq!(s.hear(ms(5619), scan(5419), &LIMITS), Hearing::Late);
+        assert_eq!(s.hear(ms(5620), scan(5420), &LIMITS), Hearing::Anew);
+        assert!(s.clock.is_none());
+    }
+
+    #[test]
+    fn a_pause_of_a_second_empties_the_maps_and_keeps_the_measure() {
+        let mut s = trusting();
+        assert_eq!(s.hear(ms(1481), scan(1451), &LIMITS), Hearing::Anew);
+        assert_eq!(s.hear(ms(1481), scan(1341), &LIMITS), Hearing::Late);
+        assert!(s.hear_clock(ms(1482), &clock(1480), &LIMITS) || s.trusted(ms(1482), &LIMITS));
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! Twelve bytes make a frame: which message, its length, milliseconds since the last, data.
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile::PROFILES;
 use viewshed::inputs::ars408::{Ars408, Config, Outcome};
-use viewshed::time::Time;
 use viewshed::wire::frame::{CanFrame, CanId};
 
 /// One input.

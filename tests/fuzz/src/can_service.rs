@@ -1,7 +1,7 @@
 //! Any requests and answers of an integrator on CAN, six own bytes each, with check sums that hold.
 
 use viewshed::bench::flash::Flash;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, REQUEST};
 use viewshed::unit::profile::small;
 use viewshed::unit::settings::{BlockError, Settings, Slots, Stored};

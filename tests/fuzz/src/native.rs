@@ -1,9 +1,9 @@
 //! The native format: any bytes on a serial line, and scans that come back as they were sent.
 
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::native::{Config, Medium, Outcome, Receiver, Sender, SerialReceiver, id};
-use viewshed::time::Time;
 use viewshed::wire::e2e::Profile;
 
 /// A detection of ten bytes, by a layout of this file's own.

@@ -2,10 +2,10 @@
 //! and comes back as it was.
 
 use viewshed::bench::record::{RECORD_LEN, Record};
-use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::Mount;
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::profile::small;
 use viewshed::unit::service::{Reply, Request, data_id};
 use viewshed::unit::settings::{BLOCK_LEN, Settings};

@@ -3,8 +3,8 @@
 //! The first byte says which header is set, and how bytes are chunked. A byte 0xB5 stands for the
 //! magic word, 0xB6 for a header that announces a frame of the length and items behind it.
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ti::{AngleUnit, Config, Dialect, Entries, Family, Outcome, PolarPoints, Ti};
-use viewshed::time::Time;
 
 const MAGIC: [u8; 8] = [2, 1, 4, 3, 6, 5, 8, 7];
 

@@ -1,12 +1,13 @@
 //! Any words as a block: the end comes, rays keep within their limits, and what is read can be resumed.
 
-use viewshed::bits::Bits;
+use viewshed::fixed::bits::Bits;
 use viewshed::wire::code::block::{Context, Kind};
 use viewshed::wire::code::interval::Form;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::code::reading::{Ending, Place, Reader, decode};
 
 const AZIMUTHS: usize = 128;
+const RANGES: usize = 224;
 
 struct Rays {
     was: Ray<7>,
@@ -18,7 +19,7 @@ impl Reader<7> for Rays {
         (azimuth % 50 != 49).then_some(self.was)
     }
     fn take(&mut self, azimuth: usize, ray: &Ray<7>) {
-        assert!(azimuth < AZIMUTHS && ray.known.end() <= 224);
+        assert!(azimuth < AZIMUTHS && ray.known.end() <= RANGES);
         assert_eq!(Ray::new(ray.known, *ray.bits()), *ray, "bits outside");
         self.taken[azimuth] = Some(*ray);
     }
@@ -41,8 +42,8 @@ pub fn run(bytes: &[u8]) {
         })
         .collect();
     let usual = Known::new(usize::from(*near), usize::from(*last) + 1);
-    let usual = if usual.end() > 224 { Known::NONE } else { usual };
-    let context = Context { form, usual, azimuths: AZIMUTHS };
+    let usual = if usual.end() > RANGES { Known::NONE } else { usual };
+    let context = Context { form, usual, azimuths: AZIMUTHS, ranges: RANGES };
     let was = Ray::new(usual, Bits::from_words([u32::from(*pattern) * 0x0101_0101; 7]));
     let start = usize::from(*start) % AZIMUTHS;
     let rays = || Rays { was, taken: vec![None; AZIMUTHS] };

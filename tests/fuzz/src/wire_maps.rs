@@ -1,9 +1,9 @@
 //! Any maps, one after another, from a sender to a receiver: what was sent whole comes back.
 
-use viewshed::angle::Angle;
-use viewshed::bits::Bits;
-use viewshed::map::RoadPoint;
-use viewshed::time::Time;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::bits::Bits;
+use viewshed::fixed::time::Time;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Header, WireMount};

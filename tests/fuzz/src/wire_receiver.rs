@@ -1,7 +1,8 @@
 //! Any frames whose check sums are right, from any senders at any time: nothing is told that was not said.
 
-use viewshed::map::{RoadPoint, VisibilityMap};
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::map::VisibilityMap;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Message, Packing, Plane, data_id};
 use viewshed::wire::receive::{Limits, Receiver};

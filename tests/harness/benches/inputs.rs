@@ -4,11 +4,11 @@
 use std::hint::black_box;
 use std::process::{Command, ExitCode};
 
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::{ars408, native, ti};
-use viewshed::time::Time;
 use viewshed::wire::frame::CanFrame;
 
 const INPUTS: [&str; 5] = ["ars408", "native-can-fd", "native-serial", "native-sender", "ti"];

@@ -9,12 +9,13 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
-use viewshed::detection::{Detection, Measurement};
-use viewshed::polar::PolarMap;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::Known;
 use viewshed::wire::header::Header;
@@ -24,7 +25,8 @@ use viewshed_harness::boards::stress;
 use viewshed_harness::estimators;
 use viewshed_harness::recording::mcap::read;
 
-const ESTIMATORS: [&str; 3] = ["radar-3d", "radar-3d-small", "radar-2d"];
+/// `radar-3d-blurred` is radar-3d with the largest range noise that may be set: evidence spreads widest.
+const ESTIMATORS: [&str; 4] = ["radar-3d", "radar-3d-small", "radar-3d-blurred", "radar-2d"];
 const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
 
 /// What is measured on the recording's maps only.
@@ -128,7 +130,11 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
         stress::scans(scene).into_iter().map(|s| (s.time, s.detections)).collect()
     };
     match estimator {
-        "radar-3d" => run_3d::<200, 120, 16, 7, 64, 256>(&sensor, &frames),
+        "radar-3d-blurred" => {
+            let noise = NoiseConfig { range_m: 5.0, ..sensor.noise };
+            run_3d::<200, 120, 16, 7, 96, 256>(&Sensor { noise, ..sensor }, &frames);
+        }
+        "radar-3d" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &frames),
         "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
         "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),
         "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
@@ -177,7 +183,7 @@ fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: us
 fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) {
     let parameters =
         Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 64, 256>::new());
+    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
     let mut map = Box::new(parameters.map());
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     let view = parameters.axes().view(60);

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use viewshed_harness::commands::Cli;
+use viewshed_harness::command::Cli;
 
 fn main() -> ExitCode {
     Cli::parse().run()

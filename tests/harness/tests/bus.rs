@@ -23,7 +23,7 @@ fn sent(name: &str, more: &[&str]) -> (Value, PathBuf) {
     let (report, log) = (scratch(&format!("{name}.json")), scratch(&format!("{name}.log")));
     let to = if cfg!(debug_assertions) { "8" } else { "30" };
     let paths = [report.to_str().expect("UTF-8"), log.to_str().expect("UTF-8")];
-    let arguments = [&["bus", recording, "--to", to, "--json", paths[0], "--log", paths[1]], more].concat();
+    let arguments = [&["bus", recording, "--to", to, "--json", paths[0], "--log", paths[1], "--force"], more].concat();
     let output = viewshed(&arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     (json(&report), log)
@@ -82,6 +82,7 @@ fn listens(log: &Path, scans: u64) {
         log.to_str().expect("UTF-8"),
         "--json",
         heard.to_str().expect("UTF-8"),
+        "--force",
         "--out",
         pictures.to_str().expect("UTF-8"),
     ];
@@ -119,7 +120,7 @@ const KEY: &str = "000102030405060708090a0b0c0d0e0f";
 fn heard(log: &Path, more: &[&str]) -> Result<Value, String> {
     let heard = log.with_extension("heard.json");
     let paths = [log, &heard].map(|path| path.to_str().expect("UTF-8"));
-    let output = viewshed(&[&["listen", paths[0], "--json", paths[1]], more].concat());
+    let output = viewshed(&[&["listen", paths[0], "--json", paths[1], "--force"], more].concat());
     if output.status.success() { Ok(json(&heard)) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
 }
 

@@ -6,9 +6,9 @@ use std::mem;
 use viewshed::bench::can::{CanBench, TIME_ID};
 use viewshed::bench::flash::Flash;
 use viewshed::bench::start;
-use viewshed::detection::Detection;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::Config;
-use viewshed::time::Time;
 use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::profile::reference::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
@@ -16,15 +16,10 @@ use viewshed::unit::settings::{Settings, Stored};
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::message::Addresses;
 
-use super::listener::Map;
+use super::listener::{MEDIUM, Map, SENSOR};
 use super::scans::Scan;
 use crate::recording::candump::Line;
-
-/// The sensor's number on the bus, and where its messages are.
-pub const SENSOR: u8 = 0;
-pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail, ensure};
 use viewshed::bench::record::{Closing, FrameRecord, Opening, RECORD_LEN, Record};
 use viewshed::bench::stage::Stage;
-use viewshed::polar::PolarGeometry;
+use viewshed::map::polar::PolarGeometry;
 
 use super::image::Image;
 
@@ -162,7 +162,7 @@ fn dumped(answer: &[u8], wanted: usize) -> Option<(usize, Vec<[u8; 2]>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viewshed::health::Condition;
+    use viewshed::frame::health::Condition;
 
     fn answer(fingerprints: &[u64], reason: u8) -> Vec<u8> {
         let opening = Opening { shape: [2, 1, 1, 4], ticks_per_256: 512, bytes: [0; 3] };

@@ -3,9 +3,9 @@
 use anyhow::{Context, Result};
 use viewshed::bench::job::{Job, ScanBuffer};
 use viewshed::bench::{Bench, run, start};
-use viewshed::polar::PolarGeometry;
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarGeometry;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::{Check, Settings};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
@@ -30,7 +30,7 @@ pub fn answer(
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     let mut memory = InMemory { job: job(settings, scans, dump), read: 0, answer: Vec::new() };
     let geometry = match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 64, 256>(&mut memory)?,
+        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(&mut memory)?,
         Profile::Small => work::<100, 64, 8, 4, 28, 176>(&mut memory)?,
     };
     Ok((memory.answer, geometry))

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 
 use viewshed::estimator::Estimator;
-use viewshed::polar::PolarMap;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarMap;
 use viewshed::unit::Unit;
 use viewshed::unit::profile::reference::{AZIMUTHS, WORDS};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
@@ -15,7 +15,9 @@ use viewshed::wire::message::{Addresses, Epoch, Plane};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::scan_number::ScanNumber;
 
-use super::can_twin::{MEDIUM, SENSOR};
+/// The sensor's number on the bus, and where its messages are.
+pub const SENSOR: u8 = 0;
+pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;

@@ -6,10 +6,10 @@ use std::{iter, mem};
 
 use viewshed::bench::flash::Flash;
 use viewshed::bench::start;
+use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{Medium as Native, Sender};
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::time::Time;
 use viewshed::unit::serial_service::Line;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::Session;
@@ -72,7 +72,7 @@ type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
 
 fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
     match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 64, 256>(bytes, send, after),
+        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(bytes, send, after),
         Profile::Small => work::<100, 64, 8, 4, 28, 176>(bytes, send, after),
     }
 }

@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::time::Time;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Message, Received};
@@ -15,8 +15,9 @@ use viewshed::wire::receive::{Limits, ReceivedMap, Receiver};
 use viewshed::wire::serial::Unstuffer;
 
 use super::can::CanBoard;
-use super::can_twin::{self, SENSOR, Step, flashed};
+use super::can_twin::{self, Step, flashed};
 use super::check::{self, Difference};
+use super::listener::SENSOR;
 use super::live::{self, Script};
 use super::machine::{Emulator, Folder, Lines};
 use super::report::Cost;

@@ -1,8 +1,8 @@
 //! A run on a controller as text, JSON and, where a frame differs, pictures.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use comfy_table::{Cell, CellAlignment, Table, presets};
 use serde::Serialize;
 use viewshed::bench::stage::Stage;
@@ -11,7 +11,8 @@ use viewshed::map::{CellState, Visibility};
 use super::Run;
 use super::check::{Checked, Difference};
 use super::image::Image;
-use crate::pictures::polar::{self, PolarGrid};
+use crate::results::files::Folder;
+use crate::results::pictures::polar::{self, PolarGrid};
 
 /// Median and worst of a number of instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -148,8 +149,7 @@ impl Difference {
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn draw(&self, folder: &Path, title: &str) -> Result<Vec<PathBuf>> {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    pub fn draw(&self, folder: &Folder, title: &str) -> Result<Vec<PathBuf>> {
         let host = |k: usize| self.state(self.host[k]);
         let board = |k: usize| self.state(self.board[k]);
         let only = |k: usize| if self.host[k] == self.board[k] { CellState::UNKNOWN } else { board(k) };
@@ -166,9 +166,9 @@ impl Difference {
                 title: format!("{title}, frame {}: {name}", self.frame),
                 caption: Some(self.text()),
             };
-            let path = folder.join(format!("frame-{:05}-{name}.png", self.frame));
-            polar::draw(&grid).save(&path)?;
-            files.push(path);
+            let file = folder.file(format!("frame-{:05}-{name}.png", self.frame))?;
+            polar::draw(&grid).save(&file)?;
+            files.push(file.path().to_owned());
         }
         Ok(files)
     }
@@ -177,6 +177,7 @@ impl Difference {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::files::OutputArgs;
 
     #[test]
     fn the_first_cell_that_differs_is_named_and_drawn() {
@@ -196,7 +197,7 @@ mod tests {
             "frame 5: 1 cells differ, first azimuth 1 range 3: grade and occupancy 255 0 here, 1 3 there"
         );
         let folder = std::env::temp_dir().join(format!("viewshed-difference-{}", std::process::id()));
-        let files = d.draw(&folder, "scene").unwrap();
+        let files = d.draw(&OutputArgs::default().beside([]).folder("--out", &folder).unwrap(), "scene").unwrap();
         assert_eq!(files.len(), 3);
         let bytes = |k: usize| std::fs::read(&files[k]).unwrap();
         assert!(bytes(0) != bytes(1) && bytes(1) != bytes(2));

@@ -1,8 +1,8 @@
 //! A recording as scans for a controller.
 
 use viewshed::bench::job::{Job, ScanHead, detection_to_bytes};
-use viewshed::detection::Detection;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::unit::settings::Settings;
 
 use crate::estimators::Intake;
@@ -22,7 +22,8 @@ pub fn of(recording: &Recording) -> Vec<Scan> {
     let mut intake = Intake::default();
     let reset = recording.sensor.frames_independent;
     let scan = |frame| {
-        let (time, detections) = intake.take(frame);
+        // the format they are sent in holds detections only
+        let (time, detections, _) = intake.take(frame);
         Scan { time, reset, detections: detections.to_vec() }
     };
     recording.frames.iter().map(scan).collect()

@@ -1,8 +1,8 @@
 //! Scans nobody should send, to know what a frame costs at most.
 
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
-use viewshed::time::Time;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 
 use super::scans::Scan;
 

@@ -1,6 +1,6 @@
 //! A receiver with or without a key.
 
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Addresses;
 use viewshed::wire::receive::{Accepted, Limits, Receiver, Refused, SecuredReceiver};

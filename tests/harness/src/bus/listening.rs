@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use viewshed::fixed::time::Time;
 use viewshed::map::{CellState, Visibility};
-use viewshed::time::Time;
 use viewshed::wire::message::{Addresses, Plane};
 use viewshed::wire::receive::{Condition, Limits, ReceivedMap};
 use viewshed::wire::serial::Unstuffer;
@@ -181,7 +181,7 @@ impl Listening {
     pub fn heard(&self, number: u8, maps: Vec<Moment>) -> Option<Heard> {
         let sensor = self.ears.receiver().sensor(number)?;
         let header = sensor.header().map(|h| {
-            let degrees = |angle: viewshed::angle::Angle| f64::from(angle.radians()).to_degrees();
+            let degrees = |angle: viewshed::fixed::angle::Angle| f64::from(angle.radians()).to_degrees();
             let right = degrees(h.azimuth_origin);
             Mounted {
                 x_m: f64::from(h.mount.origin.x_cm) / 100.0,

@@ -41,21 +41,25 @@ impl Load {
     }
 }
 
-/// The load of every window of a second that begins with a frame and ends before the last one.
+/// Between the beginnings of two windows, microseconds.
+const STEP_US: u64 = 1000;
+
+/// The load of windows of a second, one every millisecond up to the last frame: windows that begin with
+/// frames would count dense seconds more often.
 fn windows(sent: &[(u64, f64)]) -> Vec<f64> {
-    let Some(last) = sent.last() else { return Vec::new() };
-    let (mut end, mut busy) = (0, 0.0);
+    let (Some((first, _)), Some((last, _))) = (sent.first(), sent.last()) else { return Vec::new() };
+    let (mut from, mut to, mut busy) = (0, 0, 0.0);
     let mut windows = Vec::new();
-    for (at, duration) in sent {
-        while let Some((_, more)) = sent.get(end).filter(|(t, _)| *t < at + 1_000_000) {
+    for begin in (*first..=(*last).saturating_sub(1_000_000).max(*first)).step_by(STEP_US as usize) {
+        while let Some((_, more)) = sent.get(to).filter(|(at, _)| *at < begin + 1_000_000) {
             busy += more;
-            end += 1;
+            to += 1;
         }
-        if at + 1_000_000 > last.0 && !windows.is_empty() {
-            break;
+        while let Some((_, less)) = sent.get(from).filter(|(at, _)| *at < begin) {
+            busy -= less;
+            from += 1;
         }
         windows.push(busy);
-        busy -= duration;
     }
     windows
 }
@@ -74,5 +78,16 @@ mod tests {
         assert!((windows[0] - 0.1).abs() < 1e-9);
         let worst = windows.iter().copied().fold(0.0, f64::max);
         assert!((worst - 0.3).abs() < 1e-9, "{worst}");
+    }
+
+    #[test]
+    fn a_dense_second_counts_as_often_as_any_other() {
+        // nine seconds of a frame every 100 ms, one second of a hundred
+        let mut sent: Vec<(u64, f64)> = (0..100).map(|k| (k * 100_000, 0.001)).collect();
+        sent.extend((0..900).map(|k| (5_000_000 + k * 1000, 0.001)));
+        sent.sort_by_key(|s| s.0);
+        let mut windows = windows(&sent);
+        windows.sort_by(f64::total_cmp);
+        assert!((windows[windows.len() / 2] - 0.01).abs() < 1e-9, "the median is of the quiet seconds");
     }
 }

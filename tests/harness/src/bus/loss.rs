@@ -3,7 +3,7 @@
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Plane};
 use viewshed::wire::receive::Limits;

@@ -78,7 +78,7 @@ impl Symbols {
 
     /// Counts the symbols of one scan; returns the words it took.
     pub fn count<const W: usize>(&mut self, scan: &Scan<'_, W>, form: Form, kind: Kind, usual: Known) -> usize {
-        let context = Context { form, usual, azimuths: scan.now.len() };
+        let context = Context { form, usual, azimuths: scan.now.len(), ranges: 32 * W };
         let all = tables(&BELOW);
         let (mut at, mut words) = (0, 0);
         while at < scan.now.len() {

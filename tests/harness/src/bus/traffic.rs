@@ -1,8 +1,8 @@
 //! Everything a sender puts on a bus while a recording runs.
 
 use anyhow::{Result, anyhow};
-use viewshed::polar::PolarMap;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarMap;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;

@@ -207,7 +207,7 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
         found.add(
             Severity::Warning,
             format!("{name}: {:.0} % of its entries lie beyond 260 m or behind it", 100.0 * sensor.implausible),
-            "a clone with other scales? Try --profile SR75, here and in `viewshed replay`, and compare distances",
+            "a clone with other scales? Try --radar SR75, here and in `viewshed replay`, and compare distances",
         );
     }
 }

@@ -13,12 +13,11 @@ use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use viewshed::inputs::ars408::profile::ARS408;
 
-use crate::options::KindArgs;
-use crate::recording;
 use crate::recording::ars408::lines;
 use crate::recording::candump;
 use crate::recording::problems::{Problem, Problems};
 use crate::recording::ti::is_capture;
+use crate::recording::{self, ReadOptions};
 use can::Identifier;
 use findings::Finding;
 use sensor::Sensor;
@@ -70,7 +69,7 @@ impl Examined {
 ///
 /// # Errors
 /// A file that cannot be read or is no such log.
-pub fn examine(path: &Path, known: &KindArgs) -> Result<Examined> {
+pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if candump::is_log(&bytes) {
@@ -90,7 +89,7 @@ pub fn examine(path: &Path, known: &KindArgs) -> Result<Examined> {
     );
 }
 
-fn can(log: String, bytes: &[u8], known: &KindArgs) -> Examined {
+fn can(log: String, bytes: &[u8], known: &ReadOptions) -> Examined {
     let mut problems = Problems::default();
     let lines = lines(bytes, &mut problems);
     let sensors = sensor::all(&lines, known.profile.unwrap_or(&ARS408));

@@ -6,7 +6,7 @@ use serde::Serialize;
 use viewshed::inputs::ti::{Config, Dialect, Entries, Family, Outcome, Ti};
 
 use super::findings::{Finding, Severity};
-use crate::options::KindArgs;
+use crate::recording::ReadOptions;
 use crate::recording::ti::{MAGIC, feed, flaw, flaws, learn};
 
 /// What is said of a capture.
@@ -32,7 +32,7 @@ pub struct Report {
 }
 
 /// Judges a capture, by the header and the dialect that are known or else by what can be learnt.
-pub fn examine(log: String, bytes: &[u8], known: &KindArgs) -> Report {
+pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
     let family = known.ti_header.or_else(|| learn(bytes));
     let dialect = known.ti_dialect.unwrap_or(Dialect::USUAL);
     let mut report = Report {

@@ -6,19 +6,56 @@ mod reference;
 
 use anyhow::{Result, bail};
 use serde::{Deserialize, Serialize};
-use viewshed::detection::{Detection, Measurement, NotADetection};
-use viewshed::field_of_view::FieldOfView;
-use viewshed::gate::{Rejection, Rejections};
-use viewshed::mount::Mount;
-use viewshed::polar::PolarMap;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::{Detection, Measurement, NotADetection};
+use viewshed::frame::gate::{Rejection, Rejections};
+use viewshed::frame::health::FrameStatus;
+use viewshed::map::polar::PolarMap;
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_2d::{Radar2dConfig, Reading};
 use viewshed::radar_3d::Radar3dConfig;
-use viewshed::reflection::NoiseConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 
-use crate::evaluation::score::{Estimator, PolarCells};
 use crate::recording::{Frame, Recording};
+
+/// A visibility estimator as the harness drives it: one radar frame in, one map out.
+pub trait Estimator: Send {
+    fn name(&self) -> &str;
+
+    /// Forgets every frame seen, but not what was counted (called before each frame of a recording
+    /// of independent frames).
+    fn reset(&mut self);
+
+    /// Takes a radar frame and brings the map up to its time.
+    fn step(&mut self, frame: &Frame);
+
+    fn map(&self) -> &dyn VisibilityMap;
+
+    /// The map's own polar cells, where it has any.
+    fn polar(&self) -> Option<PolarCells<'_>> {
+        None
+    }
+
+    /// What was rejected or dropped since construction, by reason.
+    fn counters(&self) -> Vec<(&'static str, u64)> {
+        Vec::new()
+    }
+}
+
+/// The cells of a polar map: azimuths from right to left, ranges from near to far.
+pub struct PolarCells<'a> {
+    pub azimuths: usize,
+    pub ranges: usize,
+    /// Outer edges, radians from the boresight's heading, + left.
+    pub azimuth_rad: [f64; 2],
+    /// Length of a cell along the ground, metres.
+    pub cell_m: f64,
+    /// State of (azimuth, range).
+    pub cell: Box<dyn Fn(usize, usize) -> CellState + 'a>,
+}
 
 /// Parameters of all estimators.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -120,18 +157,27 @@ fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCel
     }
 }
 
+/// Why a point is no detection, as reports say it.
+pub const DROPPED: &str = "dropped when read";
+pub const NOT_FINITE: &str = "not finite";
+pub const NO_RANGE: &str = "range not measurable";
+pub const ABSURD: &str = "absurd";
+
 /// Turns recorded frames into the library's input and counts what cannot be.
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
     detections: Vec<Detection>,
+    dropped: u64,
     not_finite: u64,
     range: u64,
     absurd: u64,
 }
 
 impl Intake {
-    pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection]) {
+    pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection], FrameStatus) {
         self.detections.clear();
+        let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
+        self.dropped += frame.refused;
         for d in &frame.detections {
             let measurement = Measurement {
                 range_m: d.range_m,
@@ -141,20 +187,30 @@ impl Intake {
                 rcs_dbsm: d.rcs_dbsm,
                 snr_db: d.snr_db,
             };
-            match Detection::new(&measurement) {
-                Ok(d) => self.detections.push(d),
-                Err(NotADetection::NotFinite) => self.not_finite += 1,
-                Err(NotADetection::Range) => self.range += 1,
-                Err(NotADetection::Absurd) => self.absurd += 1,
+            let why = match Detection::new(&measurement) {
+                Ok(d) => {
+                    self.detections.push(d);
+                    continue;
+                }
+                Err(why) => why,
+            };
+            refused = refused.saturating_add(1);
+            match why {
+                NotADetection::NotFinite => self.not_finite += 1,
+                NotADetection::Range => self.range += 1,
+                NotADetection::Absurd => self.absurd += 1,
             }
         }
         let micros = u64::try_from(frame.time_ns / 1000).unwrap_or(0);
-        (Time::from_micros(micros), &self.detections)
+        (Time::from_micros(micros), &self.detections, FrameStatus { fault: false, refused })
     }
 
     fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {
-        let gate = Rejection::ALL.map(|r| (r.name(), u64::from(rejections.count(r))));
-        let intake = [("not finite", self.not_finite), ("range not measurable", self.range), ("absurd", self.absurd)];
-        gate.into_iter().chain(intake).filter(|(_, n)| *n > 0).collect()
+        // those that are no detections are told apart here
+        let gate = Rejection::ALL.into_iter().filter(|r| *r != Rejection::Refused);
+        let gate = gate.map(|r| (r.name(), u64::from(rejections.count(r))));
+        let absurd = (ABSURD, self.absurd);
+        let intake = [(DROPPED, self.dropped), (NOT_FINITE, self.not_finite), (NO_RANGE, self.range), absurd];
+        gate.chain(intake).filter(|(_, n)| *n > 0).collect()
     }
 }

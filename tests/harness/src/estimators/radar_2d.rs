@@ -1,12 +1,13 @@
 //! `radar-2d` and `radar-2d-first`: the two readings of the conventional grid.
 
 use anyhow::Result;
-use viewshed::map::{CellState, RoadPoint, VisibilityMap};
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
 use viewshed::sensor::Sensor;
+use viewshed::sensor::road::RoadPoint;
 
+use super::Estimator;
 use super::{Intake, MOST_DETECTIONS};
-use crate::evaluation::score::Estimator;
 use crate::recording::Frame;
 
 /// Cells along the road, and words of eight cells across: any heading of a 250 m fan fits.
@@ -56,8 +57,8 @@ impl<const D: usize> Estimator for Driver<D> {
     }
 
     fn step(&mut self, frame: &Frame) {
-        let (now, detections) = self.intake.take(frame);
-        self.state.process(&self.parameters, now, detections, false);
+        let (now, detections, status) = self.intake.take(frame);
+        self.state.process(&self.parameters, now, detections, status);
     }
 
     fn map(&self) -> &dyn VisibilityMap {

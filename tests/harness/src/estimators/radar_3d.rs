@@ -1,14 +1,14 @@
 //! `radar-3d` on the reference grid.
 
 use anyhow::Result;
+use viewshed::fixed::time::Time;
 use viewshed::map::VisibilityMap;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
 
+use super::{Estimator, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};
-use crate::evaluation::score::{Estimator, PolarCells};
 use crate::recording::Frame;
 
 /// Range cells, azimuths and elevations of the reference grid.
@@ -18,7 +18,7 @@ pub const ELEVATIONS: usize = 16;
 
 struct Driver<const D: usize> {
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
-    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 7, 64, D>>,
+    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 7, 96, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
     intake: Intake,
 }
@@ -69,8 +69,8 @@ impl<const D: usize> Estimator for Driver<D> {
     }
 
     fn step(&mut self, frame: &Frame) {
-        let (now, detections) = self.intake.take(frame);
-        self.state.process(&self.parameters, now, detections, false, &mut self.map);
+        let (now, detections, status) = self.intake.take(frame);
+        self.state.process(&self.parameters, now, detections, status, &mut self.map);
     }
 
     fn map(&self) -> &dyn VisibilityMap {

@@ -4,21 +4,21 @@
 //! in azimuth, points in range and, exactly, the span of slopes a box covers in elevation.
 
 use anyhow::Result;
-use viewshed::axes::Axes;
+use viewshed::grid::axes::Axes;
+use viewshed::grid::raycast;
+use viewshed::grid::spherical::SphericalGrid;
 use viewshed::map::VisibilityMap;
-use viewshed::polar::PolarMap;
+use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::Radar3dParameters;
-use viewshed::raycast;
 use viewshed::sensor::Sensor;
-use viewshed::spherical::SphericalGrid;
 
 use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
+use super::{Estimator, PolarCells};
 use super::{Options, polar_cells};
-use crate::evaluation::score::{Estimator, PolarCells};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
+use crate::recording::truth::Truth;
 use crate::recording::{Frame, Recording};
-use crate::truth::Truth;
 
 /// Sub-columns a column is divided into.
 const SUB_COLUMNS: usize = 8;
@@ -92,15 +92,18 @@ fn fill(
     let cell_m = f64::from(axes.cell_cm) / 100.0;
     // slopes a point at this ground distance is seen under, from the box's bottom to its top
     let slope = |z: f64, ground: f64| (z - f64::from(axes.sensor_height_cm()) / 100.0) / ground;
+    let span = f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU;
+    let towards = |place: f64| yaw + f64::from(axes.azimuth_origin.radians()) + span * place / AZIMUTHS as f64;
     for a in 0..AZIMUTHS {
+        if !near(solid, [sensor[0], sensor[1]], towards(a as f64 + 0.5), span / AZIMUTHS as f64) {
+            continue;
+        }
         let Some(column) = grid.column_mut(a) else { continue };
         let mut shares = [[0.0; ELEVATIONS]; RANGES];
         let mut any = false;
         for sub in 0..SUB_COLUMNS {
             let place = a as f64 + 0.5 + WINDOW * ((sub as f64 + 0.5) / SUB_COLUMNS as f64 - 0.5);
-            let span = f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU;
-            let azimuth = yaw + f64::from(axes.azimuth_origin.radians()) + span * place / AZIMUTHS as f64;
-            let Some((enter, leave)) = crossing(solid, [sensor[0], sensor[1]], azimuth) else { continue };
+            let Some((enter, leave)) = crossing(solid, [sensor[0], sensor[1]], towards(place)) else { continue };
             any = true;
             let (first, last) = ((enter / cell_m) as usize, (leave / cell_m) as usize);
             for (r, rows) in shares.iter_mut().enumerate().take(last + 1).skip(first) {
@@ -131,6 +134,18 @@ fn spanned(bottom: f64, top: f64, near: f64, far: f64, slope: &impl Fn(f64, f64)
     let low = slope(bottom, near).min(slope(bottom, far));
     let high = slope(top, near).max(slope(top, far));
     (low, high)
+}
+
+/// Whether a ray within `half_rad` of a direction can meet the circle around a footprint.
+fn near(solid: &Solid, from: [f64; 2], azimuth_rad: f64, half_rad: f64) -> bool {
+    let (dx, dy) = (solid.center[0] - from[0], solid.center[1] - from[1]);
+    let (distance, radius) = (dx.hypot(dy), 0.5 * solid.size[0].hypot(solid.size[1]));
+    if distance <= radius {
+        return true;
+    }
+    let turn =
+        (dy.atan2(dx) - azimuth_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+    turn.abs() <= (radius / distance).asin() + half_rad
 }
 
 /// Where a ray on the ground enters and leaves a footprint, metres.

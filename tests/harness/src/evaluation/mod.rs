@@ -4,7 +4,7 @@
 //! them ([`bounds`] are scores too), and [`summary`] makes rates ([`counts`], [`cells`]), intervals
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
 //! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
-//! and [`examples`] picks what is worth a picture.
+//! [`pool`] joins several, and [`examples`] picks what is worth a picture.
 
 pub mod bootstrap;
 pub mod bounds;
@@ -15,6 +15,8 @@ pub mod counts;
 pub mod curve;
 pub mod examples;
 pub mod mount_error;
+pub mod pool;
+pub mod rejected;
 pub mod replay;
 pub mod returns;
 pub mod samples;
@@ -23,6 +25,17 @@ pub mod summary;
 pub mod units;
 
 use serde::{Deserialize, Serialize};
+
+use crate::estimators;
+use crate::recording::ReadOptions;
+
+/// Everything a replay can be told.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    pub reading: ReadOptions,
+    pub evaluation: Options,
+    pub estimators: estimators::Options,
+}
 
 /// The cells an object's visibility is judged on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]

@@ -3,9 +3,11 @@
 use rayon::prelude::*;
 
 use super::Options;
+use super::rejected;
 use super::samples::{self, FrameSamples};
-use super::score::{Estimator, Score, score};
+use super::score::{Score, score};
 use super::summary::Summary;
+use crate::estimators::Estimator;
 use crate::recording::Recording;
 
 /// Everything that replaying a recording gives; what pictures, tables and files are made of.
@@ -21,7 +23,7 @@ pub struct Replay {
 impl Replay {
     /// Runs estimators over a recording. `progress` is told each of [`steps`] done.
     pub fn new(
-        recording: Recording,
+        mut recording: Recording,
         estimators: &mut [Box<dyn Estimator>],
         options: &Options,
         progress: &(dyn Fn() + Sync),
@@ -31,6 +33,7 @@ impl Replay {
             .par_iter_mut()
             .map(|e| score(e.as_mut(), &recording, &samples, options.grid, &|| progress()))
             .collect();
+        rejected::tell(&mut recording, &scores);
         let summary = Summary::new(&recording, &samples, &scores, options);
         Self { recording, samples, scores, summary }
     }

@@ -5,12 +5,12 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::Options;
-use crate::geometry::polygon::Convex;
+use crate::geometry::polygon::{Bounds, Convex};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::geometry::sight::{box_in_sight, footprint_in_sight, shadow};
 use crate::geometry::solid::Solid;
+use crate::recording::truth::Object;
 use crate::recording::{Frame, RadarDetection, Recording};
-use crate::truth::Object;
 
 /// A 1 m cell (i, j) = [i, i+1) x [j, j+1) metres of the road frame.
 pub type Cell = (i32, i32);
@@ -47,25 +47,55 @@ pub struct FrameSamples {
 ///
 /// `progress` is told each frame done.
 pub fn collect(recording: &Recording, options: &Options, progress: &(dyn Fn() + Sync)) -> Vec<FrameSamples> {
+    collect_every(recording, options, 1, progress)
+}
+
+/// The same of every `every`-th frame alone; the others are not counted.
+pub fn collect_every(
+    recording: &Recording,
+    options: &Options,
+    every: usize,
+    progress: &(dyn Fn() + Sync),
+) -> Vec<FrameSamples> {
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let warm_up = if recording.sensor.frames_independent { 0.0 } else { options.warm_up_s };
-    let counted = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9 >= warm_up;
+    let counted =
+        |k: usize, f: &Frame| k.is_multiple_of(every) && f.time_ns.saturating_sub(start) as f64 * 1e-9 >= warm_up;
     let Some(truth) = &recording.truth else {
-        let unlabelled = |f| FrameSamples { counted: counted(f), ..FrameSamples::default() };
-        return recording.frames.iter().map(unlabelled).collect();
+        let unlabelled = |(k, f)| FrameSamples { counted: counted(k, f), ..FrameSamples::default() };
+        return recording.frames.iter().enumerate().map(unlabelled).collect();
     };
     let road = if recording.sensor.frames_independent { Vec::new() } else { road_cells(recording, options) };
     recording
         .frames
         .par_iter()
-        .map(|frame| {
+        .enumerate()
+        .map(|(k, frame)| {
             progress();
-            if !counted(frame) {
+            if !counted(k, frame) {
                 return FrameSamples::default();
             }
             frame_samples(recording, &truth.at(frame.time_ns), &frame.detections, &road, options)
         })
         .collect()
+}
+
+/// Tells anew which samples were detected, from another recording of the same truth at the same times. What is in
+/// sight does not depend on the sensor's measurements and stays.
+pub fn detect_again(recording: &Recording, samples: &mut [FrameSamples], options: &Options) {
+    let Some(truth) = &recording.truth else { return };
+    recording.frames.par_iter().zip(samples).for_each(|(frame, samples)| {
+        if samples.objects.is_empty() {
+            return;
+        }
+        let objects = truth.at(frame.time_ns);
+        let associated = associate(recording, &objects, &frame.detections, options);
+        for sample in &mut samples.objects {
+            let own = objects.iter().position(|o| o.track == sample.track);
+            sample.detections = own.map_or(0, |k| associated[k]);
+            sample.detected = sample.detections >= options.min_detections;
+        }
+    });
 }
 
 fn frame_samples(
@@ -100,12 +130,13 @@ fn frame_samples(
         });
     }
     let taken: BTreeSet<Cell> = objects.iter().flat_map(|o| o.solid.cells()).collect();
+    let bounded: Vec<(Bounds, &Convex)> = shadows.iter().flatten().map(|s| (s.bounds(), s)).collect();
     let cells = road
         .iter()
         .filter(|c| !taken.contains(c))
         .map(|&(i, j)| {
             let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5];
-            ((i, j), !shadows.iter().flatten().any(|s| s.contains(centre)))
+            ((i, j), !bounded.iter().any(|(b, s)| b.contains(centre) && s.contains(centre)))
         })
         .collect();
     FrameSamples { counted: true, objects: samples, cells }
@@ -152,6 +183,9 @@ pub fn associate(
     counts
 }
 
+/// Added to the distance beyond which a footprint is not looked at closer, for rounding, metres.
+const NOTICE_M: f64 = 0.01;
+
 /// The object a detection belongs to: nearest ungrown footprint among those whose grown footprint
 /// holds it and whose motion explains its Doppler; ties by centre.
 pub fn owner(
@@ -165,8 +199,16 @@ pub fn owner(
     let grown = !recording.sensor.frames_independent;
     let judge_doppler = grown && !recording.sensor.platform_moving;
     let line = line_of_sight(pose, p);
+    let moved =
+        (p[0] - pose.position[0]).hypot(p[1] - pose.position[1]) * options.growth_azimuth_deg.to_radians().tan();
     let mut best: Option<(f64, f64, usize)> = None;
     for (k, object) in objects.iter().enumerate() {
+        // farther than the grown footprint reaches in any direction
+        let [length, width, _] = object.solid.size;
+        let reach = 0.5 * length.hypot(width) + std::f64::consts::SQRT_2 * options.growth_m + moved + NOTICE_M;
+        if (p[0] - object.solid.center[0]).hypot(p[1] - object.solid.center[1]) > reach {
+            continue;
+        }
         let inside = if grown {
             in_grown_footprint(&object.solid, pose, p, options)
         } else {
@@ -227,8 +269,8 @@ fn in_grown_footprint(solid: &Solid, pose: &SensorPose, p: [f64; 3], options: &O
 pub mod by_hand {
     use super::*;
     use crate::recording::problems::Problems;
+    use crate::recording::truth::{Label, Truth};
     use crate::recording::{FieldOfView, Sensor};
-    use crate::truth::{Label, Truth};
 
     pub const PERIOD_NS: i64 = 100_000_000;
 
@@ -274,7 +316,9 @@ pub mod by_hand {
                 licence: None,
             },
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
-            frames: (0..frames).map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new() }).collect(),
+            frames: (0..frames)
+                .map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new(), refused: 0 })
+                .collect(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),
             occlusion: Default::default(),
             problems: Problems::default(),

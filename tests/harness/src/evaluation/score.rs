@@ -1,49 +1,15 @@
 //! Runs one estimator over a recording and scores its map at every counted frame.
 
-use viewshed::map::{CellState, RoadPoint, Visibility, VisibilityMap};
+use viewshed::map::{Visibility, VisibilityMap};
+use viewshed::sensor::road::RoadPoint;
 
 use super::Grid;
 use super::cells::{CellCounts, CellTally};
 use super::counts::Counts;
 use super::samples::{Cell, FrameSamples, Sample};
+use crate::estimators::Estimator;
 use crate::geometry::solid::Solid;
-use crate::recording::{Frame, Recording};
-
-/// A visibility estimator as the harness drives it: one radar frame in, one map out.
-pub trait Estimator: Send {
-    fn name(&self) -> &str;
-
-    /// Forgets every frame seen, but not what was counted (called before each frame of a recording
-    /// of independent frames).
-    fn reset(&mut self);
-
-    /// Takes a radar frame and brings the map up to its time.
-    fn step(&mut self, frame: &Frame);
-
-    fn map(&self) -> &dyn VisibilityMap;
-
-    /// The map's own polar cells, where it has any.
-    fn polar(&self) -> Option<PolarCells<'_>> {
-        None
-    }
-
-    /// What was rejected or dropped since construction, by reason.
-    fn counters(&self) -> Vec<(&'static str, u64)> {
-        Vec::new()
-    }
-}
-
-/// The cells of a polar map: azimuths from right to left, ranges from near to far.
-pub struct PolarCells<'a> {
-    pub azimuths: usize,
-    pub ranges: usize,
-    /// Outer edges, radians from the boresight's heading, + left.
-    pub azimuth_rad: [f64; 2],
-    /// Length of a cell along the ground, metres.
-    pub cell_m: f64,
-    /// State of (azimuth, range).
-    pub cell: Box<dyn Fn(usize, usize) -> CellState + 'a>,
-}
+use crate::recording::Recording;
 
 /// One object at one frame, as an estimator sees it. `grade` is `None` where all its cells are unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,6 +132,8 @@ fn points(solid: &Solid) -> impl Iterator<Item = RoadPoint> {
 
 #[cfg(test)]
 mod tests {
+    use viewshed::map::CellState;
+
     use super::*;
 
     /// x < 0 unknown, x < 10 m visible, beyond invisible with a grade falling with x.

@@ -9,6 +9,23 @@ const AREA_EPSILON: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Convex(Vec<Point>);
 
+/// An upright rectangle, to tell cheaply what cannot meet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    low: Point,
+    high: Point,
+}
+
+impl Bounds {
+    pub fn contains(&self, p: Point) -> bool {
+        (0..2).all(|k| self.low[k] <= p[k] && p[k] <= self.high[k])
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        (0..2).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
+    }
+}
+
 fn cross(o: Point, a: Point, b: Point) -> f64 {
     (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0])
 }
@@ -46,6 +63,15 @@ impl Convex {
             return 0.0;
         }
         (1..c.len() - 1).map(|i| cross(c[0], c[i], c[i + 1])).sum::<f64>() / 2.0
+    }
+
+    /// Least and greatest of each coordinate.
+    pub fn bounds(&self) -> Bounds {
+        let none = Bounds { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
+        self.0.iter().fold(none, |b, p| Bounds {
+            low: [b.low[0].min(p[0]), b.low[1].min(p[1])],
+            high: [b.high[0].max(p[0]), b.high[1].max(p[1])],
+        })
     }
 
     pub fn contains(&self, p: Point) -> bool {
@@ -106,9 +132,14 @@ pub fn uncovered_area<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a 
 pub fn uncovered<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a Convex>) -> Vec<Convex> {
     let mut pieces = vec![polygon];
     for cover in covers {
+        let bounds = cover.bounds();
         let mut next = Vec::with_capacity(pieces.len() + 2);
         for piece in pieces {
-            piece.minus(cover, &mut next);
+            if bounds.meets(&piece.bounds()) {
+                piece.minus(cover, &mut next);
+            } else {
+                next.push(piece);
+            }
         }
         pieces = next;
         if pieces.is_empty() {

@@ -49,11 +49,23 @@ pub fn box_in_sight<'a>(sensor: [f64; 3], target: &Solid, others: impl IntoItera
     let Some(outline) = outline(&toward, target) else { return true };
     let covers: Vec<Convex> = others
         .into_iter()
-        .filter(|other| in_front(sensor, other, target))
+        .filter(|other| may_overlap(sensor, other, target) && in_front(sensor, other, target))
         .filter_map(|other| self::outline(&toward, other))
         .collect();
     // tangents: 1e-6 m^2 seen from 1 km
     uncovered_area(outline, &covers) > VISIBLE_AREA * 1e-6
+}
+
+/// Whether two boxes can lie in one direction at all, told from the circles around their footprints.
+fn may_overlap(sensor: [f64; 3], a: &Solid, b: &Solid) -> bool {
+    let seen = |s: &Solid| {
+        let (dx, dy) = (s.center[0] - sensor[0], s.center[1] - sensor[1]);
+        let (distance, radius) = (dx.hypot(dy), 0.5 * s.size[0].hypot(s.size[1]));
+        (distance > radius).then(|| (dy.atan2(dx), (radius / distance).asin()))
+    };
+    let (Some((to_a, half_a)), Some((to_b, half_b))) = (seen(a), seen(b)) else { return true };
+    let turn = (to_a - to_b + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+    turn.abs() <= half_a + half_b + 1e-6
 }
 
 /// Projection of a box on the image plane at unit distance (left and up), clipped to what lies ahead of

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile;
 use viewshed::inputs::ars408::{Ars408, Config, Counters, Outcome};
-use viewshed::time::Time;
 
 use super::candump::Line;
 use super::capture::{self, Kind};
@@ -46,7 +46,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
             problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
         }
         let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame { time_ns: nanoseconds(scan.time), detections });
+        frames.push(Frame { time_ns: nanoseconds(scan.time), detections, refused: scan.refused.into() });
     });
     if frames.is_empty() {
         bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");

@@ -1,19 +1,24 @@
 //! Files beside a recording, and the part of it that is wanted.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
 use super::{Frame, ReadOptions, Recording, labels};
-use crate::truth::Truth;
+use crate::recording::truth::Truth;
+
+/// Labels and occlusion grades beside a recording, there or not.
+pub fn files(path: &Path) -> [PathBuf; 2] {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    ["labels", "occlusion"].map(|suffix| path.with_file_name(format!("{name}.{suffix}.csv")))
+}
 
 /// Adds `NAME.labels.csv` (replaces the labels inside) and `NAME.occlusion.csv`, and cuts to the time asked for.
 ///
 /// # Errors
 /// Files that cannot be read, and a time without frames.
 pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) -> Result<Recording> {
-    let beside = |suffix: &str| path.with_file_name(format!("{}.{suffix}.csv", recording.name));
-    let (labels_csv, occlusion_csv) = (beside("labels"), beside("occlusion"));
+    let [labels_csv, occlusion_csv] = files(path);
     if labels_csv.exists() {
         let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
         let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::problems::Problems;
 use super::{FieldOfView, Frame, RadarDetection, ReadOptions, Recording, Sensor};
 use crate::geometry::pose::SensorPose;
-use viewshed::detection::Detection;
+use viewshed::frame::detection::Detection;
 
 /// Height of a mount that is not told, metres: a usual pole or gantry.
 const HEIGHT_M: f64 = 6.0;

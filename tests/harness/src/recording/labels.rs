@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
 use crate::geometry::solid::Solid;
-use crate::truth::Label;
+use crate::recording::truth::Label;
 
 /// Length, width, height in metres assumed for a class where the labels give none.
 pub fn class_size(class: &str) -> Option<[f64; 3]> {

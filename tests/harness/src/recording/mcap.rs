@@ -14,7 +14,7 @@ use super::transforms::Transforms;
 use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::truth::{Label, Truth};
+use crate::recording::truth::{Label, Truth};
 
 pub const POINTS_TOPIC: &str = "/radar/points";
 pub const TRUTH_TOPIC: &str = "/ground_truth/objects";
@@ -177,7 +177,8 @@ impl Reader {
         self.problems.add_many(topic, NOT_FINITE, time_ns, points.not_finite);
         self.problems.add_many(topic, NOT_A_RANGE, time_ns, points.not_a_range);
         self.radar_frame.get_or_insert_with(|| header.frame_id.clone());
-        self.frames.push(Frame { time_ns, detections: points.detections });
+        let refused = points.not_finite + points.not_a_range;
+        self.frames.push(Frame { time_ns, detections: points.detections, refused });
     }
 
     fn objects(&mut self, topic: &str, data: &[u8]) -> Result<(), String> {

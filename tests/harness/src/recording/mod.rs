@@ -14,15 +14,16 @@ pub mod ros;
 pub mod serial_log;
 pub mod ti;
 pub mod transforms;
+pub mod truth;
 pub mod write;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
 use crate::geometry::pose::{SensorPose, Spherical};
-use crate::truth::Truth;
+use crate::recording::truth::Truth;
 use problems::Problems;
 
 /// One low-level radar measurement, as recorded.
@@ -55,6 +56,8 @@ pub struct Frame {
     /// Measurement time.
     pub time_ns: i64,
     pub detections: Vec<RadarDetection>,
+    /// Points dropped when it was read: not finite, or at no distance.
+    pub refused: u64,
 }
 
 /// Static field of view, in the sensor frame.
@@ -132,6 +135,11 @@ pub struct ReadOptions {
     pub ti_dialect: Option<viewshed::inputs::ti::Dialect>,
     /// Time between frames of a TI capture.
     pub frame_period_s: Option<f64>,
+}
+
+/// Every file that [`read`] may read for a recording.
+pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
+    [path.to_owned()].into_iter().chain(beside::files(path))
 }
 
 /// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, a capture of a TI mmWave radar or of

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::native::{Config, Counters, Outcome, Receiver, VERSION, data_id, id};
-use viewshed::time::Time;
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::serial::Unstuffer;
 
@@ -92,7 +92,8 @@ pub fn read(name: String, messages: &Messages, broken: u32, options: &ReadOption
         if scan.fault {
             problems.add("native", "scan of a radar that reports a fault", time_ns);
         }
-        frames.push(Frame { time_ns, detections: scan.detections.iter().map(capture::detection).collect() });
+        let detections = scan.detections.iter().map(capture::detection).collect();
+        frames.push(Frame { time_ns, detections, refused: scan.refused.into() });
     });
     let Some(start) = frames.first().map(|f| f.time_ns) else {
         bail!("{name}: no whole scan of sensor {sensor}; `viewshed doctor` says what there is")

@@ -1,9 +1,9 @@
 //! Recordings from raw captures of a TI mmWave radar's data port.
 
 use anyhow::{Context, Result, bail};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ti::{Config, Counters, Dialect, Family, Flaw, Outcome, Ti};
-use viewshed::time::Time;
 
 use super::capture::{self, Kind};
 use super::problems::Problems;
@@ -50,7 +50,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
     let mut clock = Clock::new(period_s);
     scans(&mut radar, bytes, |scan| {
         let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame { time_ns: clock.time_ns(scan.number), detections });
+        frames.push(Frame { time_ns: clock.time_ns(scan.number), detections, refused: scan.refused.into() });
     });
     let c = *radar.counters();
     let first = frames.first().map(|f| f.time_ns).with_context(|| {

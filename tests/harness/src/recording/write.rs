@@ -16,7 +16,7 @@ use super::ros::{
 };
 use super::{Frame, RadarDetection, Sensor};
 use crate::geometry::pose::{SensorPose, direction};
-use crate::truth::Label;
+use crate::recording::truth::Label;
 
 pub const TF_TOPIC: &str = "/tf_static";
 const RADAR_FRAME: &str = "radar";

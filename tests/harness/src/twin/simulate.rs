@@ -20,9 +20,9 @@ use super::traffic::{self, Region, Traffic};
 use super::world::{Body, Sides, World};
 use crate::geometry::solid::Solid;
 use crate::recording::camera::CameraFrame;
+use crate::recording::truth::Label;
 use crate::recording::write::RecordingWriter;
 use crate::recording::{Frame, RadarDetection, Sensor};
-use crate::truth::Label;
 
 /// Vehicles are known this far beyond the radar's range, metres: tracks begin before the field of view does.
 const BEYOND_M: f64 = 40.0;
@@ -166,7 +166,7 @@ impl Simulation {
             }
         };
         let in_view = self.in_view(&labels);
-        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections }), labels, in_view })
+        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections, refused: 0 }), labels, in_view })
     }
 
     /// What the camera sees at one of its frames.

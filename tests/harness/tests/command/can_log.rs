@@ -17,7 +17,7 @@ fn doctor(folder: &Path, arguments: &[&str]) -> Output {
 /// Judges lines of a log; exit code and report.
 fn judge(folder: &Path, lines: &[&str]) -> (i32, Value) {
     std::fs::write(folder.join("a.log"), lines.join("\n")).unwrap();
-    let output = doctor(folder, &["a.log", "--json", "d.json"]);
+    let output = doctor(folder, &["a.log", "--json", "d.json", "--force"]);
     assert!(!stderr(&output).contains("panicked"), "{}", stderr(&output));
     (output.status.code().unwrap(), json(&folder.join("d.json")))
 }
@@ -211,8 +211,8 @@ fn the_doctor_knows_a_clone_by_its_distances_and_judges_it_by_its_profile() {
     let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
     let (_, report) = judge(&folder, &lines);
     let (_, remedy) = finding(&report, "50 % of its entries lie beyond 260 m").expect("a finding");
-    assert!(remedy.contains("--profile SR75"), "{remedy}");
-    let output = doctor(&folder, &["a.log", "--profile", "SR75", "--json", "d.json", "--detections", "d.csv"]);
+    assert!(remedy.contains("--radar SR75"), "{remedy}");
+    let output = doctor(&folder, &["a.log", "--radar", "SR75", "--force", "--json", "d.json", "--detections", "d.csv"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let report = json(&folder.join("d.json"));
     assert_eq!(finding(&report, "beyond 260 m"), None);

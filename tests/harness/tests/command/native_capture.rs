@@ -3,10 +3,10 @@
 use std::process::Command;
 
 use serde_json::{Value, json};
-use viewshed::angle::Angle;
-use viewshed::detection::Detection;
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::inputs::native::{Medium, Sender, id};
-use viewshed::time::Time;
 use viewshed_harness::recording::candump::{Content, Line};
 use viewshed_harness::recording::{ReadOptions, read};
 
@@ -64,7 +64,7 @@ fn log() -> String {
 }
 
 fn doctor(folder: &std::path::Path, name: &str) -> (i32, Value) {
-    let arguments = ["doctor", name, "--json", "d.json"];
+    let arguments = ["doctor", name, "--json", "d.json", "--force"];
     let output = Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(folder).args(arguments).output().unwrap();
     (output.status.code().unwrap(), json(&folder.join("d.json")))
 }

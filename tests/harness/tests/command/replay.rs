@@ -1,7 +1,7 @@
 //! Results of a replay, as table, JSON and CSV.
 
 use serde_json::{Value, json};
-use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::recording::{RadarDetection, ReadOptions, mcap};
 
 use crate::scene::{FRAMES, PERIOD_NS, Scene, folder, json, replay, stderr, stdout};
 
@@ -153,7 +153,7 @@ fn labelled_and_unlabelled_recordings_share_one_csv_in_any_order() {
     Scene::default().save(&folder, "with");
     Scene { labelled: false, ..Scene::default() }.save(&folder, "without");
     for order in [["with.mcap", "without.mcap"], ["without.mcap", "with.mcap"]] {
-        let output = replay(&folder, &[&order[..], &["--csv", "r.csv"]].concat());
+        let output = replay(&folder, &[&order[..], &["--csv", "r.csv", "--force"]].concat());
         assert!(output.status.success(), "{}", stderr(&output));
         let csv = std::fs::read_to_string(folder.join("r.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + 3 * COUNTED);
@@ -197,4 +197,37 @@ fn a_piece_of_the_recording_is_replayed_alone() {
     assert!(output.status.success(), "{}", stderr(&output));
     // frames 16 to 30 of 66 ms
     assert_eq!(json(&folder.join("r.json"))["frames"], json!(15));
+}
+
+/// What the report says of a scene every detection of which was changed, and the cells visible on the road.
+fn spoilt(name: &str, change: impl Fn(&mut RadarDetection)) -> (Vec<String>, String) {
+    let folder = folder(name);
+    let mut scene = Scene::default();
+    scene.steps.iter_mut().flat_map(|(frame, _)| &mut frame.detections).for_each(change);
+    scene.save(&folder, "scene");
+    let output = replay(&folder, &["scene.mcap", "--json", "r.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report = json(&folder.join("r.json"));
+    let problems = report["input"]["problems"].as_array().unwrap();
+    let radar = row(&report, "radar-3d");
+    // unknown, as everything has to be after the first second
+    let visible = radar["tv"].as_u64().unwrap() + radar["fv"].as_u64().unwrap();
+    assert!(visible <= 3 * 2, "{name}: {visible} visible");
+    (problems.iter().map(|p| p["what"].as_str().unwrap().to_owned()).collect(), stdout(&output))
+}
+
+#[test]
+fn points_that_are_all_rejected_are_a_problem_with_a_hint_and_no_free_road() {
+    let rejected = |why: &str| format!("{0} of {0} points rejected (most: {why}", 4 * FRAMES);
+    let (problems, text) = spoilt("spoilt_nan", |d| d.azimuth_rad = f32::NAN);
+    let expected = rejected("dropped when read): does the sensor send NaN?");
+    assert!(problems.contains(&expected) && text.contains(&expected), "{problems:?}");
+    let (problems, text) = spoilt("spoilt_degrees", |d| {
+        d.azimuth_rad = d.azimuth_rad.to_degrees() + 4.0;
+        d.elevation_rad = d.elevation_rad.map(f32::to_degrees);
+    });
+    assert_eq!(problems, [rejected("absurd): angles in degrees?")]);
+    assert!(!text.contains("Problems of the input: none"), "{text}");
+    let (problems, _) = spoilt("spoilt_outside", |d| d.azimuth_rad = 1.5);
+    assert_eq!(problems, [rejected("azimuth): angles in degrees, or a wrong field of view?")]);
 }

@@ -9,9 +9,9 @@ use std::process::{Command, Output};
 
 use viewshed_harness::geometry::pose::{SensorPose, direction};
 use viewshed_harness::geometry::solid::Solid;
+use viewshed_harness::recording::truth::Label;
 use viewshed_harness::recording::write::RecordingWriter;
 use viewshed_harness::recording::{FieldOfView, Frame, RadarDetection, Sensor};
-use viewshed_harness::truth::Label;
 
 /// Speed of everything, m/s along the road.
 const SPEED: f64 = 12.0;
@@ -72,7 +72,7 @@ fn step(pose: &SensorPose, k: usize) -> (Frame, Vec<Label>) {
         })
         .map(|p| detection(pose, p))
         .collect();
-    (Frame { time_ns, detections }, labels)
+    (Frame { time_ns, detections, refused: 0 }, labels)
 }
 
 /// What the radar measures at a road point that drives with everything else.

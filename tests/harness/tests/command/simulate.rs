@@ -5,9 +5,9 @@ use std::process::{Command, Output};
 
 use viewshed_harness::evaluation::bounds::{self, BOX};
 use viewshed_harness::evaluation::{self, samples};
-use viewshed_harness::experiment::hidden;
-use viewshed_harness::experiment::plan::Plan;
 use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::studies::experiment::hidden;
+use viewshed_harness::studies::experiment::plan::Plan;
 
 use crate::scene::{folder, json, replay, stderr, stdout};
 
@@ -240,8 +240,13 @@ fn an_experiment_pools_its_reporting_days_and_tells_each() {
     let plan = "scene = \"small.toml\"\nduration_s = 3.0\n[training]\nfcd = \"small.fcd.xml\"\nseed = 1\n\
                 [[reporting]]\nfcd = \"b.fcd.xml\"\nseed = 2\n[[reporting]]\nfcd = \"c.fcd.xml\"\nseed = 3\n";
     std::fs::write(folder.join("plan.toml"), plan).unwrap();
-    let arguments = "experiment plan.toml --bootstrap 0 --json e.json --keep days --beside days/b.mcap";
-    let output = viewshed(&folder, "2", &arguments.split(' ').collect::<Vec<_>>());
+    let experiment = |results: &str| {
+        let arguments = format!("experiment plan.toml --bootstrap 0 {results}");
+        viewshed(&folder, "2", &arguments.split(' ').collect::<Vec<_>>())
+    };
+    let output = experiment("--keep days");
+    assert!(output.status.success(), "{}", stderr(&output));
+    let output = experiment("--json e.json --beside days/b.mcap");
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
     assert!(text.contains("3D radar, perfect occupancy") && text.contains("small (training, not pooled)"), "{text}");

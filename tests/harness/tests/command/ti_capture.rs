@@ -35,7 +35,7 @@ fn capture() -> Vec<u8> {
 
 fn judge(folder: &std::path::Path, bytes: &[u8]) -> (i32, Value) {
     std::fs::write(folder.join("a.bin"), bytes).unwrap();
-    let arguments = ["doctor", "a.bin", "--json", "d.json"];
+    let arguments = ["doctor", "a.bin", "--json", "d.json", "--force"];
     let output = Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(folder).args(arguments).output().unwrap();
     assert!(!stderr(&output).contains("panicked"));
     (output.status.code().unwrap(), json(&folder.join("d.json")))
@@ -155,7 +155,7 @@ fn a_header_of_48_bytes_is_learnt_and_targets_are_taken_on_demand() {
     let first: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
     // 2 m to the left, 30 m ahead, 0.5 m up, 10 m/s nearer
     assert_eq!((first[2], first[3], first[5]), ("30.07", "3.8123", "-9.98"), "{first:?}");
-    let output = replay(&folder, &["a.bin", "--ti-dialect", "targets", "--json", "r.json"]);
+    let output = replay(&folder, &["a.bin", "--ti-dialect", "targets", "--json", "r.json", "--force"]);
     assert!(output.status.success(), "{}", stderr(&output));
     let output = replay(&folder, &["a.bin", "--ti-header", "40"]);
     assert_eq!(output.status.code(), Some(2), "another header gives no frame");

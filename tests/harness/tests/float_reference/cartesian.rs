@@ -1,7 +1,7 @@
 //! The flat grid's Gaussian around a detection, in integers and by its formula.
 
-use viewshed::cartesian::CartesianConfig;
-use viewshed::reflection::NoiseConfig;
+use viewshed::radar_2d::cartesian::CartesianConfig;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Ground, Placed, across, along, difference};
 
@@ -26,8 +26,8 @@ mod tests {
     use super::*;
     use crate::geometry::{Levelled, place};
     use crate::scene::{self, Random, mounts, within};
-    use viewshed::cartesian::CartesianGrid;
-    use viewshed::map::RoadPoint;
+    use viewshed::radar_2d::cartesian::CartesianGrid;
+    use viewshed::sensor::road::RoadPoint;
 
     /// Cells of the grid along and across the road, in eights.
     const NX: usize = 512;

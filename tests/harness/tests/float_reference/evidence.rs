@@ -1,16 +1,16 @@
 //! The inverse sensor model: what a detection, and the lack of one, say of a cell.
 
-use viewshed::evidence::EvidenceConfig;
-use viewshed::reflection::NoiseConfig;
+use viewshed::grid::evidence::EvidenceConfig;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::Placed;
+use crate::grid::raycast::Map;
 use crate::grid::{Axes, Grid};
-use crate::raycast::Map;
 
 /// Standard deviations of azimuth a detection's evidence reaches.
 const REACH: f64 = 2.0;
-/// Range cells before a detection's own that its line of sight does not clear.
-const SPARED: usize = 2;
+/// Range cells to each side of its own that a detection's evidence reaches at most.
+const MOST_REACH: usize = 8;
 /// Lines of sight of one frame that clear a column.
 const SIGHTS: usize = 6;
 
@@ -22,6 +22,8 @@ pub struct InverseSensor {
     azimuth_sigma: f64,
     /// Standard deviation of range with that of an even spread over a cell, metres.
     range_sigma: f64,
+    /// Range cells to each side of its own that a detection's evidence reaches.
+    range_reach: usize,
 }
 
 /// exp(-x^2 / 2)
@@ -32,10 +34,12 @@ fn bell(x: f64) -> f64 {
 impl InverseSensor {
     pub fn new(config: &EvidenceConfig, noise: &NoiseConfig, axes: &Axes) -> Self {
         let azimuth_rad = f64::from(noise.azimuth_deg).to_radians();
+        let range_sigma = f64::from(noise.range_m).hypot(axes.cell_m / 12.0_f64.sqrt());
         Self {
             config: *config,
             azimuth_sigma: azimuth_rad / axes.span_rad * axes.azimuths as f64,
-            range_sigma: f64::from(noise.range_m).hypot(axes.cell_m / 12.0_f64.sqrt()),
+            range_sigma,
+            range_reach: ((2.0 * range_sigma / axes.cell_m + 0.5) as usize).clamp(1, MOST_REACH),
         }
     }
 
@@ -77,7 +81,7 @@ impl InverseSensor {
     fn clear_column(&self, d: &Placed, a: usize, axes: &Axes, grid: &mut Grid) {
         let (height, _) = self.height(d);
         let row = axes.row_place(axes.slope(height, d.ground())).ceil() as usize;
-        let end = ((d.ground() / axes.cell_m) as usize).saturating_sub(SPARED).min(axes.ranges);
+        let end = ((d.ground() / axes.cell_m) as usize).saturating_sub(self.range_reach + 1).min(axes.ranges);
         for r in 0..end {
             for cell in grid.stack_mut(a, r).iter_mut().skip(row) {
                 *cell *= 1.0 - f64::from(self.config.clearing);
@@ -97,7 +101,7 @@ impl InverseSensor {
             if (a as f64 + 1.0) < place - reach || a as f64 > place + reach {
                 continue;
             }
-            for r in middle.saturating_sub(1)..(middle + 2).min(axes.ranges) {
+            for r in middle.saturating_sub(self.range_reach)..(middle + self.range_reach + 1).min(axes.ranges) {
                 let [across, along] = [a as f64 + 0.5 - place, (r as f64 + 0.5) * axes.cell_m - d.ground()];
                 let weight = gain * bell(across / self.azimuth_sigma) * bell(along / self.range_sigma);
                 for (row, cell) in grid.stack_mut(a, r).iter_mut().enumerate() {
@@ -119,12 +123,12 @@ mod tests {
     use super::*;
     use crate::geometry::{Levelled, place};
     use crate::scene::{self, AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, mounts, raise, within};
-    use viewshed::detection::Measurement;
-    use viewshed::evidence::InverseSensor as IntegerSensor;
-    use viewshed::mount::{Levelling, Mount};
-    use viewshed::polar::PolarMap;
-    use viewshed::reflection::Noise;
-    use viewshed::time::Step;
+    use viewshed::fixed::time::Step;
+    use viewshed::frame::detection::Measurement;
+    use viewshed::grid::evidence::InverseSensor as IntegerSensor;
+    use viewshed::map::polar::PolarMap;
+    use viewshed::sensor::mount::{Levelling, Mount};
+    use viewshed::sensor::noise::Noise;
 
     /// One mount's model and grid, in integers and in real numbers.
     struct Both {
@@ -266,15 +270,12 @@ mod tests {
     }
 
     #[test]
-    fn a_second_of_frames_fades_as_the_exponential_and_faster_the_more_frames() {
-        let [hidden, half, visible] = faded(15);
-        within("15 frames, hidden, steps of 255", hidden, 6.5);
-        within("15 frames, half visible, steps of 255", half, 3.0);
-        within("15 frames, visible, steps of 255", visible, 2.0);
-        // every frame rounds down
-        let [hidden, half, visible] = faded(60);
-        within("60 frames, hidden, steps of 255", hidden, 13.5);
-        within("60 frames, half visible, steps of 255", half, 23.5);
-        within("60 frames, visible, steps of 255", visible, 18.5);
+    fn a_second_of_frames_fades_as_the_exponential_however_many_they_are() {
+        for frames in [5, 15, 60] {
+            let [hidden, half, visible] = faded(frames);
+            within(&format!("{frames} frames, hidden, steps of 255"), hidden, 3.0);
+            within(&format!("{frames} frames, half visible, steps of 255"), half, 3.0);
+            within(&format!("{frames} frames, visible, steps of 255"), visible, 3.0);
+        }
     }
 }

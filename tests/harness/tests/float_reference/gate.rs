@@ -1,9 +1,10 @@
 //! Which measurements are used: the limits on single ones, and the strongest of the rest.
 
-use viewshed::detection::{MAX_RANGE_M, Measurement};
-use viewshed::field_of_view::FieldOfView;
-use viewshed::gate::{GateConfig, Rejection};
-use viewshed::reflection::NoiseConfig;
+use viewshed::frame::detection::{MAX_RANGE_M, Measurement};
+use viewshed::frame::gate::{GateConfig, Rejection};
+use viewshed::frame::health::Points;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Levelled, Placed, place};
 
@@ -56,8 +57,8 @@ pub fn refusal(m: &Measurement, gate: &GateConfig, view: &FieldOfView) -> Option
 pub struct Scan {
     pub placed: Vec<Placed>,
     pub refused: Vec<Rejection>,
-    /// Detections reported, used or not.
-    pub reported: usize,
+    /// Where the measurements were, used or not.
+    pub points: Points,
 }
 
 impl Scan {
@@ -70,9 +71,17 @@ impl Scan {
         levelled: &Levelled,
     ) -> Self {
         let mut scan = Self::default();
-        for m in measurements.iter().filter(|m| is_detection(m)) {
-            scan.reported += 1;
-            if let Some(reason) = refusal(m, gate, view) {
+        for m in measurements {
+            if !is_detection(m) {
+                scan.points.refused += 1;
+                continue;
+            }
+            let reason = refusal(m, gate, view);
+            match reason {
+                Some(Rejection::Range | Rejection::Azimuth | Rejection::Elevation) => scan.points.outside += 1,
+                _ => scan.points.inside += 1,
+            }
+            if let Some(reason) = reason {
                 scan.refused.push(reason);
                 continue;
             }
@@ -92,7 +101,7 @@ impl Scan {
 mod tests {
     use super::*;
     use crate::scene::{Random, VIEW, mounts, within};
-    use viewshed::detection::Detection;
+    use viewshed::frame::detection::Detection;
 
     #[test]
     fn the_same_detections_pass_for_the_same_reasons() {
@@ -126,9 +135,10 @@ mod tests {
             let levelling = mount.levelling().unwrap();
             let measurements: Vec<Measurement> = (0..400).map(|_| random.measurement()).collect();
             let exact = Scan::new(&measurements, &config, &VIEW, &noise, &Levelled::new(&mount));
-            let mut scan = viewshed::scan::Scan::<256>::new();
+            let mut scan = viewshed::frame::scan::Scan::<256>::new();
             let detections: Vec<Detection> = measurements.iter().map(|m| Detection::new(m).unwrap()).collect();
-            scan.gather(detections.iter(), &gate, |d| noises.place(d, &levelling));
+            let points = scan.gather(detections.iter(), 0, &gate, |d| noises.place(d, &levelling));
+            assert_eq!(points, exact.points);
             assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
             for (got, exact) in scan.reflections().iter().zip(&exact.placed) {
                 assert_eq!(f64::from(got.strength), exact.strength);

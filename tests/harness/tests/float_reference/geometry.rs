@@ -1,8 +1,8 @@
 //! Levelling and placing: a measurement in the sensor frame becomes a point on the road.
 
-use viewshed::detection::Measurement;
-use viewshed::mount::Mount;
-use viewshed::reflection::NoiseConfig;
+use viewshed::frame::detection::Measurement;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
 use viewshed_harness::geometry::pose::{SensorPose, Spherical};
 
 /// A vector on the ground of the levelled frame: ahead and to the left.
@@ -117,8 +117,8 @@ pub fn place(m: &Measurement, noise: &NoiseConfig, levelled: &Levelled) -> Place
 mod tests {
     use super::*;
     use crate::scene::{Random, mounts, raise, within};
-    use viewshed::detection::Detection;
-    use viewshed::map::RoadPoint;
+    use viewshed::frame::detection::Detection;
+    use viewshed::sensor::road::RoadPoint;
 
     #[test]
     fn detections_are_placed_within_7_cm_and_a_twentieth_of_a_degree() {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use viewshed::field_of_view::FieldOfView;
+use viewshed::sensor::field_of_view::FieldOfView;
 
 use crate::geometry::Levelled;
 
@@ -192,7 +192,7 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use crate::scene::{self, AZIMUTHS, ELEVATIONS, RANGES, Random, mounts, raise, within};
-    use viewshed::angle::Angle;
+    use viewshed::fixed::angle::Angle;
 
     #[test]
     fn columns_rows_and_slice_lie_where_the_formulas_put_them() {

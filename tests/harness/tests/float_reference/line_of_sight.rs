@@ -5,17 +5,17 @@
 
 #[cfg(test)]
 mod tests {
-    use viewshed::angle::Angle;
+    use viewshed::fixed::angle::Angle;
+    use viewshed::fixed::trig;
+    use viewshed::grid::raycast::cast;
+    use viewshed::grid::voxelise::voxelise;
     use viewshed::map::Visibility;
-    use viewshed::mount::Mount;
-    use viewshed::polar::PolarMap;
-    use viewshed::raycast::cast;
-    use viewshed::trig;
-    use viewshed::voxelise::voxelise;
+    use viewshed::map::polar::PolarMap;
+    use viewshed::sensor::mount::Mount;
     use viewshed_harness::geometry::solid::Solid;
 
+    use crate::grid::voxelise::crossing;
     use crate::scene::{AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, VIEW, mounts, within};
-    use crate::voxelise::crossing;
 
     const SLICE_M: f64 = 1.0;
 
@@ -43,9 +43,9 @@ mod tests {
     }
 
     /// A box in the library's terms.
-    fn integer(b: &Solid) -> viewshed::solid::Solid {
+    fn integer(b: &Solid) -> viewshed::obstacles::solid::Solid {
         let cm = |m: f64| (m * 100.0).round() as i32;
-        viewshed::solid::Solid {
+        viewshed::obstacles::solid::Solid {
             x_cm: cm(b.center[0]),
             y_cm: cm(b.center[1]),
             heading: trig::direction(Angle::from_radians(b.yaw_rad as f32)),

@@ -1,26 +1,27 @@
 //! All stages in order, from measurements to a polar map; an estimator for the evaluation.
 
-use viewshed::detection::Measurement;
-use viewshed::gate::Rejection;
-use viewshed::health::{Condition, Continuity, Health, HealthLimits};
-use viewshed::map::{CellState, RoadPoint, VisibilityMap};
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Measurement;
+use viewshed::frame::gate::Rejection;
+use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
+use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
-use viewshed::time::Time;
-use viewshed_harness::evaluation::score::{Estimator, PolarCells};
+use viewshed::sensor::road::RoadPoint;
+use viewshed_harness::estimators::{Estimator, PolarCells};
 use viewshed_harness::recording::Frame;
 
-use crate::evidence::InverseSensor;
-use crate::gate::Scan;
-use crate::geometry::Levelled;
+use crate::frame::gate::Scan;
+use crate::geometry::{Levelled, Placed};
+use crate::grid::evidence::InverseSensor;
+use crate::grid::raycast::{Map, cast};
+use crate::grid::voxelise::voxelise;
 use crate::grid::{Axes, Grid};
 use crate::obstacles::{Obstacles, Rules};
-use crate::raycast::{Map, cast};
 use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
-use crate::voxelise::voxelise;
 
 /// Obstacles followed at most.
-const OBSTACLES: usize = 64;
+const OBSTACLES: usize = 96;
 /// How far behind the field of view's range obstacles are followed, metres.
 const BEYOND_M: f64 = 25.0;
 
@@ -65,7 +66,16 @@ impl Pipeline {
     pub fn process(&mut self, now: Time, measurements: &[Measurement]) {
         let (view, noise) = (&self.sensor.field_of_view, &self.sensor.noise);
         let scan = Scan::new(measurements, &self.config.gate, view, noise, &self.levelled);
-        let continuity = self.health.frame(now, scan.reported, false, &self.health_limits);
+        let mut points = scan.points;
+        let reached = |d: &Placed| {
+            let place = self.axes.column_place(d.bearing());
+            let column = (place >= 0.0).then(|| self.axes.view.get(place as usize)).flatten();
+            column.is_some_and(|view| d.ground() / self.axes.cell_m < view.end as f64)
+        };
+        if !scan.placed.iter().any(reached) {
+            (points.inside, points.outside) = (0, points.inside + points.outside);
+        }
+        let continuity = self.health.frame(now, &points, false, &self.health_limits);
         if continuity.resets() {
             self.obstacles.list.clear();
             self.grid.clear();

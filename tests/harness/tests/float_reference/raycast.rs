@@ -92,7 +92,7 @@ pub fn cast(grid: &Grid, axes: &Axes, map: &mut Map) {
 mod tests {
     use super::*;
     use crate::scene::{self, AZIMUTHS, IntegerGrid, RANGES, Random, mounts, raise, within};
-    use viewshed::polar::PolarMap;
+    use viewshed::map::polar::PolarMap;
 
     /// The same random occupancy in both grids, `density` of the stacks filled in part.
     fn fill(grid: &mut IntegerGrid, exact: &mut Grid, density: f64, random: &mut Random) {
@@ -121,7 +121,7 @@ mod tests {
                 fill(&mut grid, &mut exact_grid, density, &mut random);
                 let mut map = Box::new(PolarMap::unknown(axes.polar(&mount.levelling().unwrap()), 128, 128));
                 let mut exact = Map::unknown(&exact_axes);
-                viewshed::raycast::cast(&grid, &axes, &mut map);
+                viewshed::grid::raycast::cast(&grid, &axes, &mut map);
                 cast(&exact_grid, &exact_axes, &mut exact);
                 for (a, r) in (0..AZIMUTHS).flat_map(|a| (0..RANGES).map(move |r| (a, r))) {
                     let got = map.cell(a, r);

@@ -2,11 +2,12 @@
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use viewshed::detection::{Detection, Measurement};
-use viewshed::field_of_view::FieldOfView;
-use viewshed::mount::{Levelling, Mount};
-use viewshed::reflection::{Noise, NoiseConfig, Reflection};
-use viewshed::spherical::SphericalGrid;
+use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::frame::reflection::Reflection;
+use viewshed::grid::spherical::SphericalGrid;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::{Levelling, Mount};
+use viewshed::sensor::noise::{Noise, NoiseConfig};
 
 use crate::geometry::{Ground, Levelled, along};
 use crate::grid::{Axes, Grid};
@@ -16,7 +17,7 @@ pub const RANGES: usize = 200;
 pub const AZIMUTHS: usize = 120;
 pub const ELEVATIONS: usize = 16;
 
-pub type IntegerAxes = viewshed::axes::Axes<RANGES, AZIMUTHS, ELEVATIONS>;
+pub type IntegerAxes = viewshed::grid::axes::Axes<RANGES, AZIMUTHS, ELEVATIONS>;
 pub type IntegerGrid = SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>;
 
 /// What the library makes of a measurement, its height included.

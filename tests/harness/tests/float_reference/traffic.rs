@@ -2,14 +2,14 @@
 
 #[cfg(test)]
 mod tests {
-    use viewshed::detection::{Detection, Measurement};
+    use viewshed::fixed::time::Time;
+    use viewshed::frame::detection::{Detection, Measurement};
+    use viewshed::map::polar::PolarMap;
     use viewshed::map::{CellState, Visibility};
-    use viewshed::mount::Mount;
-    use viewshed::polar::PolarMap;
     use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
-    use viewshed::reflection::NoiseConfig;
     use viewshed::sensor::Sensor;
-    use viewshed::time::Time;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
     use viewshed::unit::profile::reference::State;
 
     use crate::geometry::{Ground, Levelled, left, moved};

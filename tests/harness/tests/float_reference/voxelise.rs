@@ -58,11 +58,11 @@ pub fn crossing(solid: &Solid, bearing_rad: f64) -> Option<(f64, f64)> {
 mod tests {
     use super::*;
     use crate::scene::{self, AZIMUTHS, IntegerGrid, RANGES, Random, mounts, within};
-    use viewshed::angle::Angle;
-    use viewshed::trig;
+    use viewshed::fixed::angle::Angle;
+    use viewshed::fixed::trig;
 
     /// A box in both scales, somewhere on the road.
-    fn any_box(random: &mut Random) -> (viewshed::solid::Solid, Solid) {
+    fn any_box(random: &mut Random) -> (viewshed::obstacles::solid::Solid, Solid) {
         let [half_length_cm, half_width_cm, height_cm] =
             [random.whole(190, 830), random.whole(40, 128), random.whole(60, 400)];
         let (distance, bearing) = (random.between(15.0, 195.0), random.between(-1.0, 1.0));
@@ -75,7 +75,7 @@ mod tests {
             size: [2.0 * cm(half_length_cm), 2.0 * cm(half_width_cm), cm(height_cm)],
         };
         let heading = trig::direction(heading);
-        (viewshed::solid::Solid { x_cm, y_cm, heading, half_length_cm, half_width_cm, height_cm }, exact)
+        (viewshed::obstacles::solid::Solid { x_cm, y_cm, heading, half_length_cm, half_width_cm, height_cm }, exact)
     }
 
     #[test]
@@ -89,7 +89,7 @@ mod tests {
                 let (solid, exact) = any_box(&mut random);
                 grid.clear();
                 exact_grid.clear();
-                viewshed::voxelise::voxelise(&solid, &axes, &mut grid);
+                viewshed::grid::voxelise::voxelise(&solid, &axes, &mut grid);
                 voxelise(&exact, &exact_axes, &mut exact_grid);
                 for (off, _) in scene::differences(&grid, &exact_grid) {
                     cells += 1.0;

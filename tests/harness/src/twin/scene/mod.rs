@@ -397,6 +397,15 @@ impl Scene {
         })
     }
 
+    /// Every file the scene reads beside its own.
+    ///
+    /// # Errors
+    /// No traffic is named.
+    pub fn files(&self, fcd: Option<&Path>) -> Result<Vec<PathBuf>> {
+        let Source { path, types, net, .. } = self.source(fcd)?;
+        Ok([path].into_iter().chain(types).chain(net).collect())
+    }
+
     /// The traffic file's time at the first frame.
     pub fn from_s(&self) -> f64 {
         self.traffic.as_ref().map_or(0.0, |t| t.from_s)

@@ -4,7 +4,7 @@ use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::solid::Solid;
-use crate::truth::Label;
+use crate::recording::truth::Label;
 use crate::twin::body::{Block, blocks};
 use crate::twin::random::{Dice, Use, name};
 use crate::twin::scatter::{Scatterer, scatterers};

@@ -3,8 +3,8 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::time::Time;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::message::{Addresses, Message, Received};

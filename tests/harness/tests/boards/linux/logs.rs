@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::Command;
 
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::Config;
-use viewshed::polar::PolarMap;
-use viewshed::time::Time;
+use viewshed::map::polar::PolarMap;
 use viewshed::unit::build;
 use viewshed::unit::profile::reference::{Parameters, Radar, Sender, State, Unit};
 use viewshed::unit::settings::Settings;

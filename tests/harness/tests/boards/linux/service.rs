@@ -204,6 +204,16 @@ fn linux_mistakes_are_told_with_file_line_and_key() {
     let output = Command::new(program()).arg("--config").arg(&missing).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("none.toml: cannot be read: No such file"));
+    // at start as well as by --check, before anything is written
+    let log = folder.0.join("in.log");
+    std::fs::write(&log, "(1.0) can0 123#00\n").unwrap();
+    let text = sample.replace("interface = \"can0\"", &format!("candump = {log:?}"));
+    let text = text.replace("interface = \"can1\"", &format!("candump = {log:?}"));
+    let (code, said) = check(&text);
+    assert!(code == Some(2) && said.contains("output.candump: ") && said.contains("would destroy"), "{said}");
+    let output = Command::new(program()).arg("--config").arg(&path).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(&log).unwrap(), "(1.0) can0 123#00\n");
     // a log that is not there is no device to wait for
     std::fs::write(&path, sample.replace("interface = \"can0\"", "candump = \"none.log\"")).unwrap();
     let output = Command::new(program()).arg("--config").arg(&path).output().unwrap();

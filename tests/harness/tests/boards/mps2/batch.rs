@@ -7,6 +7,8 @@ use viewshed_harness::boards::check::{self, Checked};
 use viewshed_harness::boards::scans::Scan;
 use viewshed_harness::boards::{Board, Profile, Run, firmware, host, machine, stress};
 
+use viewshed_harness::results::files::OutputArgs;
+
 use crate::shipped;
 
 /// Instructions a frame may take, of the recording, which has more detections than either grid keeps, and of
@@ -77,7 +79,9 @@ fn a_controller_that_computes_something_else_is_found_out_cell_by_cell() {
     assert!(checked.first_difference.is_some() && checked.equal < scans.len());
     let difference = check::difference(&answer, &here, 3, &geometry).unwrap();
     assert!(difference.text().contains("cells differ"), "{}", difference.text());
-    assert!(difference.draw(&std::env::temp_dir().join("viewshed-boards-difference"), "test").is_ok());
+    let folder = std::env::temp_dir().join("viewshed-boards-difference");
+    let folder = OutputArgs::default().beside([]).folder("--out", &folder).unwrap();
+    assert!(difference.draw(&folder, "test").is_ok());
 }
 
 #[test]

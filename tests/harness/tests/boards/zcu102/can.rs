@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use viewshed::bench::flash::Flash;
-use viewshed::time::Time;
+use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, State};
 use viewshed_harness::boards::can::CanBoard;
-use viewshed_harness::boards::can_twin::{MEDIUM, SENSOR, Sent, Step, clusters, flashed, log};
+use viewshed_harness::boards::can_twin::{Sent, Step, clusters, flashed, log};
 use viewshed_harness::boards::listener::{Listener, Telling};
+use viewshed_harness::boards::listener::{MEDIUM, SENSOR};
 use viewshed_harness::boards::{Board, Profile, firmware};
 use viewshed_harness::recording::{self, ReadOptions};
 

@@ -2,6 +2,7 @@
 
 mod obstacle;
 mod outline;
+mod own_way;
 mod rules;
 mod synthetic;
 
@@ -149,10 +150,13 @@ impl Obstacles {
             let places = [o.extent.front, o.extent.middle(), o.extent.rear];
             let loss = if o.existence < rules.confirm_hits {
                 rules.tentative_loss
-            } else if places.iter().any(|by| in_view(o.ahead(*by))) {
-                rules.visible_loss
             } else {
-                rules.hidden_loss
+                match (o.is_standing(rules), places.iter().any(|by| in_view(o.ahead(*by)))) {
+                    (false, true) => rules.visible_loss,
+                    (false, false) => rules.hidden_loss,
+                    (true, true) => rules.standing_visible_loss,
+                    (true, false) => rules.standing_hidden_loss,
+                }
             };
             o.existence -= loss * dt;
         }

@@ -2,7 +2,8 @@
 
 use viewshed_harness::geometry::solid::Solid;
 
-use super::outline::{BIN_M, Extent, Profile, Tallness, size};
+use super::outline::{BIN_M, Extent, Profile, Tallness, least_length, size};
+use super::own_way::FreeMotion;
 use super::rules::Rules;
 use crate::geometry::{Ground, Placed, across, along, difference, left, moved};
 
@@ -12,6 +13,10 @@ const ON_VEHICLE_SIGMA: f64 = 0.5;
 const LENGTH_TO_SPARE: f64 = 1.0;
 /// Fastest drift to one side that turns a heading, m/s.
 const FASTEST_DRIFT: f64 = 1.0;
+/// Variance across a car that reflects on both its sides alike, m^2, and most it can be.
+const EVEN_SPREAD: f64 = 0.85 * 0.85;
+/// Detections over which the spread to the sides is taken.
+const SPREAD_MEMORY: f64 = 40.0;
 
 #[derive(Debug, Clone)]
 pub struct Obstacle {
@@ -19,27 +24,39 @@ pub struct Obstacle {
     pub anchor: Ground,
     pub velocity: Ground,
     pub heading: Ground,
-    profile: Profile,
+    pub profile: Profile,
     pub extent: Extent,
     /// Inverse variance of the lateral place, 1/m^2.
-    lateral_weight: f64,
+    pub lateral_weight: f64,
+    /// Variance of where across it the detections lie, m^2.
+    spread: f64,
     /// Evidence that it is there, detections.
     pub existence: f64,
     pub hits: f64,
     pub age: u32,
     travelled: f64,
     tallness: Tallness,
-    gathered: Gathered,
+    pub free: FreeMotion,
+    pub unexplained: u32,
+    pub free_heading: bool,
+    pub gathered: Gathered,
 }
 
 /// Sums over the detections of one frame.
 #[derive(Debug, Clone, Copy, Default)]
-struct Gathered {
-    count: f64,
+pub struct Gathered {
+    pub count: f64,
     /// Projection x error, and projection squared.
     speed: (f64, f64),
     /// Weight x offset, and weights.
     lateral: (f64, f64),
+    /// Offsets ahead and to the left, squared ones to the left, radial speed errors.
+    pub offset: [f64; 2],
+    squares: f64,
+    pub radial: f64,
+    /// Of the last.
+    pub sight: Ground,
+    pub sigma_across: f64,
 }
 
 fn length(v: Ground) -> f64 {
@@ -55,11 +72,15 @@ impl Obstacle {
             profile: Profile::EMPTY,
             extent: Extent { rear: -BIN_M / 2.0, front: BIN_M / 2.0 },
             lateral_weight: 0.0,
+            spread: EVEN_SPREAD,
             existence: 0.0,
             hits: 0.0,
             age: 0,
             travelled: 0.0,
             tallness: Tallness::default(),
+            free: FreeMotion::newborn(seed.at, heading.map(|c| c * speed)),
+            unexplained: 0,
+            free_heading: false,
             gathered: Gathered::default(),
         }
     }
@@ -82,6 +103,7 @@ impl Obstacle {
     pub fn predict(&mut self, dt: f64, rules: &Rules) {
         self.anchor = moved(self.anchor, self.velocity, dt);
         self.travelled += length(self.velocity) * dt;
+        self.free.predict(dt, rules.turning_noise);
         self.lateral_weight *= (-dt / rules.lateral_memory).exp();
         self.gathered = Gathered::default();
         self.age += 1;
@@ -93,6 +115,10 @@ impl Obstacle {
 
     pub fn is_fixture(&self, rules: &Rules) -> bool {
         !self.is_mover(rules) && self.age >= 2 && length(self.velocity) < rules.fixture_speed
+    }
+
+    pub fn is_standing(&self, rules: &Rules) -> bool {
+        self.is_mover(rules) && length(self.velocity) < rules.standing_speed
     }
 
     /// Measured radial velocity less the one this motion explains.
@@ -160,6 +186,11 @@ impl Obstacle {
         g.speed.1 += projection * projection;
         g.lateral.0 += weight * left;
         g.lateral.1 += weight;
+        g.offset = [g.offset[0] + ahead, g.offset[1] + left];
+        g.squares += left * left;
+        g.radial += error;
+        g.sight = d.sight;
+        g.sigma_across = d.sigma_across;
         self.profile.add(ahead, 1.0);
         if let Some((height, sigma)) = d.height {
             self.tallness.add(height, sigma);
@@ -188,11 +219,30 @@ impl Obstacle {
         if !self.seen() {
             return;
         }
-        let young = self.age < rules.young;
-        let inertia = if young { rules.young_inertia } else { rules.inertia };
-        self.velocity = moved(self.velocity, self.heading, g.speed.0 / (g.speed.1 + inertia));
+        self.follow(rules);
         self.lateral_weight += g.lateral.1;
         let offset = g.lateral.0 / self.lateral_weight;
+        if self.free_heading && self.knows_its_way(rules) {
+            self.velocity = self.free.velocity;
+            self.heading = self.velocity.map(|v| v / length(self.velocity));
+            self.anchor = moved(self.anchor, left(self.heading), offset);
+        } else {
+            self.go_along_heading(offset, dt, rules);
+        }
+        let noise = g.sigma_across * along(self.heading, g.sight);
+        let spread = (g.squares / g.count - noise.powi(2)).clamp(0.0, 4.0 * EVEN_SPREAD);
+        self.spread += (spread - self.spread) * g.count / (g.count + SPREAD_MEMORY);
+        self.question_heading(rules);
+        self.update_extent(rules);
+        self.hits += g.count;
+        self.existence = (self.existence + g.count.min(rules.most_hits_a_frame)).min(rules.max_evidence);
+    }
+
+    /// Corrects the speed along the heading and the place across it, and lets a lasting drift turn it.
+    fn go_along_heading(&mut self, offset: f64, dt: f64, rules: &Rules) {
+        let (young, g) = (self.age < rules.young, self.gathered);
+        let inertia = if young { rules.young_inertia } else { rules.inertia };
+        self.velocity = moved(self.velocity, self.heading, g.speed.0 / (g.speed.1 + inertia));
         self.anchor = moved(self.anchor, left(self.heading), offset);
         if !young {
             let drift = (offset * rules.drift_gain / dt).clamp(-FASTEST_DRIFT, FASTEST_DRIFT);
@@ -202,14 +252,16 @@ impl Obstacle {
                 self.heading = self.velocity.map(|v| v / speed);
             }
         }
-        self.update_extent(rules);
-        self.hits += g.count;
-        self.existence = (self.existence + g.count.min(rules.most_hits_a_frame)).min(rules.max_evidence);
     }
 
     /// Reads the outline and keeps the anchor near its middle.
     fn update_extent(&mut self, rules: &Rules) {
         let Some(extent) = self.profile.extent(rules.outline_min_hits, rules.outline_share) else { return };
+        let g = self.gathered;
+        // azimuth's noise lengthens what stands across the line of sight
+        let noise = rules.outline_sigmas * g.sigma_across * across(self.heading, g.sight).abs();
+        let shrink = noise.min(extent.length() / 4.0);
+        let extent = Extent { rear: extent.rear + shrink, front: extent.front - shrink };
         self.extent = extent;
         let bins = (extent.middle() / BIN_M).trunc();
         if bins.abs() >= rules.recentre_bins {
@@ -276,12 +328,18 @@ impl Obstacle {
 
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
     pub fn solid(&self, rules: &Rules) -> Solid {
-        let [length, width, height] = size(&rules.sizes, self.extent.length());
-        let hidden = (length - self.extent.length()).max(0.0) / 2.0;
+        let (seen, tall) = (self.extent.length(), self.tallness.floor());
+        let [length, width, height] = size(&rules.sizes, seen.max(least_length(&rules.sizes, tall)));
         let middle = self.ahead(self.extent.middle());
-        let receding = along(self.heading, middle) >= 0.0;
-        let [x, y] = moved(middle, self.heading, if receding { hidden } else { -hidden });
-        let height = height.max(self.tallness.floor());
+        let [ahead, aside] = [along(self.heading, middle), across(self.heading, middle)];
+        // behind the end and behind the side that is seen
+        let hidden = (length - seen).max(0.0) / 2.0;
+        let (side, end) = (length * aside.abs(), width * ahead.abs());
+        let unseen = (width / 2.0 - (self.spread * 1.125).sqrt()).max(0.0) * (2.0 * side / (side + end)).min(1.0);
+        let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
+        let middle = moved(middle, self.heading, away(hidden, ahead));
+        let [x, y] = moved(middle, left(self.heading), away(unseen, aside));
+        let height = height.max(tall);
         let yaw_rad = self.heading[1].atan2(self.heading[0]);
         Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width, height] }
     }

@@ -143,13 +143,23 @@ pub fn size(sizes: &SizeConfig, length: f64) -> [f64; 3] {
     [length.max(f64::from(sizes.min_length_m)), width, height]
 }
 
+/// Shortest length whose usual height reaches this one; 0 for what is lower than all.
+pub fn least_length(sizes: &SizeConfig, height: f64) -> f64 {
+    let points = sizes.points.map(|p| [p.length_m, p.height_m].map(f64::from));
+    let Some(k) = points.iter().position(|p| p[1] >= height) else { return points[points.len() - 1][0] };
+    match k.checked_sub(1).map(|i| points[i]) {
+        None => 0.0,
+        Some(a) => a[0] + (points[k][0] - a[0]) * (height - a[1]) / (points[k][1] - a[1]),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Random, raise, within};
+    use viewshed::fixed::time::Step;
     use viewshed::obstacles::profile::{HIT, Profile as IntegerProfile};
     use viewshed::obstacles::tallness::Tallness as IntegerTallness;
-    use viewshed::time::Step;
 
     /// A frame of reflections somewhere along a vehicle, centimetres.
     fn hits(length: f64, random: &mut Random) -> Vec<i32> {
@@ -201,6 +211,16 @@ mod tests {
                 exact.add(f64::from(height) / 100.0 - 1e-9, f64::from(sigma) / 100.0);
                 assert!((f64::from(integer.floor_cm()) / 100.0 - exact.floor()).abs() < 1e-9);
             }
+        }
+    }
+
+    #[test]
+    fn heights_imply_the_same_lengths() {
+        let config = SizeConfig::default();
+        let integer = config.sizes().unwrap();
+        for cm in 0..450 {
+            let exact = least_length(&config, f64::from(cm) / 100.0);
+            assert!((f64::from(integer.least_length_cm(cm)) / 100.0 - exact).abs() < 0.02, "{cm} cm: not {exact}");
         }
     }
 

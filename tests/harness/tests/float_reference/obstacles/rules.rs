@@ -1,9 +1,11 @@
 //! Parameters of tracking in metres and seconds.
 
+use viewshed::obstacles::config::ObstacleConfig;
 use viewshed::obstacles::size::SizeConfig;
-use viewshed::obstacles::tracking::ObstacleConfig;
-use viewshed::reflection::NoiseConfig;
-use viewshed::trig::Direction;
+use viewshed::obstacles::tracking::{
+    INERTIA, MERGE_PARALLEL, MOST_HITS_A_FRAME, RECENTRE_BINS, YOUNG_FRAMES, YOUNG_INERTIA,
+};
+use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Ground, Placed, along};
 
@@ -47,13 +49,22 @@ pub struct Rules {
     pub road: Ground,
     /// How far obstacles are followed.
     pub limit: f64,
-    // rules that cannot be configured
     pub merge_lateral: f64,
     pub abreast: f64,
     pub merge_speed: f64,
     /// Least cosine between headings.
     pub merge_parallel: f64,
     pub half_width: f64,
+    pub outline_sigmas: f64,
+    pub turning_noise: f64,
+    pub own_way: f64,
+    pub own_way_share: f64,
+    pub own_way_follow: f64,
+    pub own_way_sigmas: f64,
+    pub heading_sigmas: f64,
+    pub standing_speed: f64,
+    pub standing_visible_loss: f64,
+    pub standing_hidden_loss: f64,
     /// Frames.
     pub young: u32,
     pub young_inertia: f64,
@@ -67,8 +78,6 @@ pub struct Rules {
 
 impl Rules {
     pub fn new(c: &ObstacleConfig, noise: &NoiseConfig, road: Ground, limit: f64) -> Self {
-        let integer = noise.noise().and_then(|n| c.tracking(n, Direction::AHEAD, 0)).expect("checked before");
-        let cm = |v: i32| f64::from(v) / 100.0;
         let real = f64::from;
         Self {
             min_speed: real(c.min_speed_mps),
@@ -97,19 +106,29 @@ impl Rules {
             speed_sigma: real(noise.radial_velocity_mps),
             road,
             limit,
-            merge_lateral: cm(integer.merge_lateral_cm),
-            abreast: cm(integer.abreast_cm),
-            merge_speed: cm(integer.merge_speed) / 256.0,
-            merge_parallel: f64::from(integer.merge_parallel) / 16384.0,
-            half_width: cm(integer.half_width_cm),
-            young: u32::from(integer.young),
-            young_inertia: f64::from(integer.young_inertia) / 16384.0,
-            inertia: f64::from(integer.inertia) / 16384.0,
-            most_hits_a_frame: f64::from(integer.most_hits_a_frame),
-            mover: cm(integer.mover_cm),
-            fixture_speed: cm(integer.fixture_speed) / 256.0,
-            turning_speed: cm(integer.turning_speed) / 16.0,
-            recentre_bins: f64::from(integer.recentre_bins),
+            merge_lateral: real(c.merge_lateral_m),
+            abreast: real(c.abreast_m),
+            merge_speed: real(c.merge_speed_mps),
+            merge_parallel: f64::from(MERGE_PARALLEL) / 16384.0,
+            half_width: real(c.half_width_m),
+            outline_sigmas: real(c.outline_sigmas),
+            turning_noise: real(c.turning_noise_mps),
+            own_way: real(c.own_way_mps),
+            own_way_share: real(c.own_way_share),
+            own_way_follow: real(c.own_way_follow),
+            own_way_sigmas: real(c.own_way_sigmas),
+            heading_sigmas: real(c.heading_sigmas),
+            standing_speed: real(c.standing_speed_mps),
+            standing_visible_loss: real(c.standing_visible_loss_per_s),
+            standing_hidden_loss: real(c.standing_hidden_loss_per_s),
+            young: u32::from(YOUNG_FRAMES),
+            young_inertia: f64::from(YOUNG_INERTIA) / 16384.0,
+            inertia: f64::from(INERTIA) / 16384.0,
+            most_hits_a_frame: f64::from(MOST_HITS_A_FRAME),
+            mover: real(c.mover_way_m),
+            fixture_speed: real(c.min_speed_mps) / 2.0,
+            turning_speed: real(c.turning_speed_mps),
+            recentre_bins: f64::from(RECENTRE_BINS),
         }
     }
 

@@ -2,13 +2,14 @@
 
 #[cfg(test)]
 mod tests {
-    use viewshed::detection::Measurement;
-    use viewshed::mount::Mount;
+    use viewshed::fixed::time::Step;
+    use viewshed::frame::detection::Measurement;
+    use viewshed::frame::reflection::Reflection;
     use viewshed::obstacles::Obstacles as IntegerObstacles;
+    use viewshed::obstacles::config::ObstacleConfig;
     use viewshed::obstacles::obstacle::Obstacle as IntegerObstacle;
-    use viewshed::obstacles::tracking::ObstacleConfig;
-    use viewshed::reflection::{NoiseConfig, Reflection};
-    use viewshed::time::Step;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
 
     use super::super::{Obstacle, Obstacles, Rules};
     use crate::geometry::{Ground, Levelled, Placed, across, along, difference, left, moved, place};
@@ -51,7 +52,7 @@ mod tests {
     struct Both {
         levelled: Levelled,
         noise: NoiseConfig,
-        levelling: viewshed::mount::Levelling,
+        levelling: viewshed::sensor::mount::Levelling,
         tracking: viewshed::obstacles::tracking::Tracking,
         rules: Rules,
         integer: IntegerObstacles<16>,
@@ -241,7 +242,7 @@ mod tests {
             let mut exact = Obstacle::new(&place(&seed, &both.noise, &both.levelled), both.rules.road, 25.0);
             let step = Step::from_micros(PERIOD_US);
             for _ in 0..15 {
-                integer.predict(step, both.tracking.kept_over(step).lateral);
+                integer.predict(step, both.tracking.kept_over(step).lateral, &both.tracking);
                 exact.predict(PERIOD_US as f64 * 1e-6, &both.rules);
             }
             let off = difference(metres(integer.anchor()), exact.anchor);

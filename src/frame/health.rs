@@ -1,0 +1,341 @@
+//! Whether the sensor's silence means a free road, a blind sensor or no sensor at all.
+//!
+//! A healthy frame within its hold time is evidence for the whole field of view, so an empty road
+//! is visible. A run of empty frames after traffic is a sensor that went blind, and no frames at all
+//! make everything unknown. Rejected is not empty: where points keep coming of which none can be
+//! right (not finite, in another unit, all outside the field of view), the sensor or its mount is not
+//! what it is taken for, and everything is unknown from the first such run on.
+
+use crate::fixed::time::Time;
+use crate::sensor::config::{ConfigError, within};
+
+/// When maps end.
+///
+/// # Units
+/// Seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct HealthConfig {
+    /// How long a map holds after its frame.
+    pub hold_s: f32,
+    /// How long frames may be empty after traffic before the sensor counts as blind; and how long, also
+    /// from the first frame on, their points may be none that can be used.
+    pub blind_after_s: f32,
+    /// A longer gap between frames resets the grids.
+    pub reset_gap_s: f32,
+}
+
+impl Default for HealthConfig {
+    fn default() -> Self {
+        Self { hold_s: 0.5, blind_after_s: 1.0, reset_gap_s: 1.0 }
+    }
+}
+
+/// [`HealthConfig`] in microseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HealthLimits {
+    hold_us: u64,
+    blind_after_us: u64,
+    reset_gap_us: u64,
+}
+
+impl HealthConfig {
+    /// Checks the times.
+    ///
+    /// # Errors
+    /// Names the parameter outside its limits.
+    #[allow(clippy::cast_sign_loss)] // limits are positive
+    pub fn limits(&self) -> Result<HealthLimits, ConfigError> {
+        let micros = |name, v| within(name, v, 0.01, 60.0).map(|s: f32| crate::fixed::math::round_i32(s * 1e6) as u64);
+        Ok(HealthLimits {
+            hold_us: micros("health.hold_s", self.hold_s)?,
+            blind_after_us: micros("health.blind_after_s", self.blind_after_s)?,
+            reset_gap_us: micros("health.reset_gap_s", self.reset_gap_s)?,
+        })
+    }
+}
+
+/// What the sensor's frames say of the sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Condition {
+    /// No frame yet.
+    Starting,
+    /// The last frame is evidence.
+    Healthy,
+    /// Frames come, but they have been empty since there was traffic, or the sensor says so.
+    Blind,
+    /// No frame within the hold time.
+    Stale,
+    /// Points keep coming, but none that can be used: not finite, or outside the field of view.
+    Unusable,
+}
+
+/// What a frame says besides its detections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FrameStatus {
+    /// The sensor's own fault flag.
+    pub fault: bool,
+    /// Points that are no detections, see [`NotADetection`](crate::frame::detection::NotADetection): whoever
+    /// decodes a frame drops them and counts them here.
+    pub refused: u16,
+}
+
+impl From<bool> for FrameStatus {
+    /// Of a frame every point of which was a detection.
+    fn from(fault: bool) -> Self {
+        Self { fault, refused: 0 }
+    }
+}
+
+/// Where the points of a frame were, used or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Points {
+    /// In the field of view, strong enough or not.
+    pub inside: u32,
+    /// Outside of it.
+    pub outside: u32,
+    /// Nowhere: no detections.
+    pub refused: u32,
+}
+
+impl Points {
+    /// Whether there are points and nothing can be said from them. A field of view narrower than the
+    /// radar's leaves most of its points outside; but no radar has most of them refused, and of angles
+    /// in degrees a few always look like radians near the axis.
+    fn unusable(&self) -> bool {
+        let placed = self.inside.saturating_add(self.outside);
+        self.refused > placed || (self.inside == 0 && placed.saturating_add(self.refused) > 0)
+    }
+}
+
+/// How a frame follows the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Continuity {
+    /// The first frame.
+    First,
+    /// Microseconds since the last frame.
+    Follows(u64),
+    /// A gap too long for the grids to bridge.
+    Gap,
+    /// The clock stepped back or stood still.
+    ClockStepped,
+}
+
+impl Continuity {
+    /// Whether the grids start over.
+    pub fn resets(self) -> bool {
+        matches!(self, Self::Gap | Self::ClockStepped)
+    }
+}
+
+/// Keeps track of the sensor's frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Health {
+    last_frame: Option<Time>,
+    /// Whether there has been traffic.
+    traffic: bool,
+    /// First of the empty frames since then.
+    empty_since: Option<Time>,
+    blind: bool,
+    /// First and last of the frames with points of which none could be used.
+    unusable: Option<(Time, Time)>,
+    misled: bool,
+}
+
+impl Default for Health {
+    fn default() -> Self {
+        Self::NEW
+    }
+}
+
+impl Health {
+    /// Before the first frame.
+    pub const NEW: Self =
+        Self { last_frame: None, traffic: false, empty_since: None, blind: false, unusable: None, misled: false };
+
+    /// Takes note of a frame and of what the radar reported in it, gated or not; `fault` is its own flag.
+    pub fn frame(&mut self, now: Time, points: &Points, fault: bool, limits: &HealthLimits) -> Continuity {
+        let continuity = match self.last_frame {
+            None => Continuity::First,
+            Some(last) => match now.since(last) {
+                None | Some(0) => Continuity::ClockStepped,
+                Some(gap) if gap > limits.reset_gap_us => Continuity::Gap,
+                Some(gap) => Continuity::Follows(gap),
+            },
+        };
+        if continuity.resets() {
+            // a run of frames has to be seen without a break; a blind sensor stays blind
+            (self.empty_since, self.unusable) = (None, None);
+        }
+        let long = |since: Time| now.since(since).is_some_and(|us| us >= limits.blind_after_us);
+        if points.unusable() {
+            let (since, _) = self.unusable.unwrap_or((now, now));
+            self.unusable = Some((since, now));
+            self.misled |= long(since);
+        } else if points.inside > 0 {
+            (self.unusable, self.misled) = (None, false);
+        }
+        if *points != Points::default() {
+            self.traffic = true;
+            self.empty_since = None;
+            // what measures places, wherever they are, is not blind
+            self.blind &= points.inside == 0 && points.outside == 0;
+        } else {
+            // a stray point now and then does not keep coming
+            let stray = |(_, last): &(Time, Time)| now.since(*last).is_none_or(|us| us >= limits.blind_after_us / 2);
+            self.unusable = self.unusable.filter(|run| !stray(run));
+            if self.traffic {
+                let since = *self.empty_since.get_or_insert(now);
+                self.blind |= long(since);
+            }
+        }
+        self.blind |= fault;
+        self.last_frame = Some(now);
+        continuity
+    }
+
+    /// The sensor's condition at a moment.
+    pub fn condition(&self, now: Time, limits: &HealthLimits) -> Condition {
+        match self.last_frame {
+            None => Condition::Starting,
+            Some(last) if now.since(last).is_none_or(|age| age > limits.hold_us) => Condition::Stale,
+            Some(_) if self.misled => Condition::Unusable,
+            Some(_) if self.blind => Condition::Blind,
+            Some(_) => Condition::Healthy,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits() -> HealthLimits {
+        HealthConfig::default().limits().unwrap()
+    }
+
+    fn at(ms: u64) -> Time {
+        Time::from_micros(ms * 1000)
+    }
+
+    fn inside(inside: u32) -> Points {
+        Points { inside, ..Points::default() }
+    }
+
+    #[test]
+    fn an_empty_road_from_the_start_is_healthy() {
+        let (mut h, l) = (Health::NEW, limits());
+        assert_eq!(h.condition(at(0), &l), Condition::Starting);
+        for i in 0..100 {
+            h.frame(at(i * 66), &inside(0), false, &l);
+            assert_eq!(h.condition(at(i * 66), &l), Condition::Healthy);
+        }
+    }
+
+    #[test]
+    fn silence_after_traffic_is_blindness_until_something_is_seen() {
+        let (mut h, l) = (Health::NEW, limits());
+        h.frame(at(0), &inside(5), false, &l);
+        for i in 1..15 {
+            h.frame(at(i * 66), &inside(0), false, &l);
+        }
+        assert_eq!(h.condition(at(14 * 66), &l), Condition::Healthy);
+        h.frame(at(1065), &inside(0), false, &l);
+        assert_eq!(h.condition(at(1065), &l), Condition::Healthy);
+        h.frame(at(1066), &inside(0), false, &l);
+        assert_eq!(h.condition(at(1066), &l), Condition::Blind, "a second after the first empty frame");
+        h.frame(at(1132), &inside(1), false, &l);
+        assert_eq!(h.condition(at(1132), &l), Condition::Healthy);
+        h.frame(at(1198), &inside(1), true, &l);
+        assert_eq!(h.condition(at(1198), &l), Condition::Blind, "the sensor says so itself");
+    }
+
+    #[test]
+    fn a_map_holds_half_a_second() {
+        let (mut h, l) = (Health::NEW, limits());
+        h.frame(at(0), &inside(5), false, &l);
+        assert_eq!(h.condition(at(500), &l), Condition::Healthy);
+        assert_eq!(h.condition(at(501), &l), Condition::Stale);
+    }
+
+    #[test]
+    fn gaps_and_steps_of_the_clock_reset() {
+        let (mut h, l) = (Health::NEW, limits());
+        assert_eq!(h.frame(at(5000), &inside(1), false, &l), Continuity::First);
+        assert_eq!(h.frame(at(5066), &inside(1), false, &l), Continuity::Follows(66_000));
+        assert_eq!(h.frame(at(6066), &inside(1), false, &l), Continuity::Follows(1_000_000));
+        assert_eq!(h.frame(at(7067), &inside(1), false, &l), Continuity::Gap);
+        assert_eq!(h.frame(at(7067), &inside(1), false, &l), Continuity::ClockStepped);
+        assert_eq!(h.frame(at(3000), &inside(0), false, &l), Continuity::ClockStepped);
+        assert!(Continuity::Gap.resets() && !Continuity::First.resets());
+        // a step back never makes a later moment look fresh
+        assert_eq!(h.condition(at(2000), &l), Condition::Stale);
+    }
+
+    /// Condition after each frame of the same points, every 66 ms.
+    fn run(h: &mut Health, from_ms: u64, frames: u64, points: Points) -> std::vec::Vec<Condition> {
+        let l = limits();
+        let times = (0..frames).map(|i| at(from_ms + i * 66));
+        times
+            .map(|t| {
+                h.frame(t, &points, false, &l);
+                h.condition(t, &l)
+            })
+            .collect()
+    }
+
+    const NOT_FINITE: Points = Points { inside: 0, outside: 0, refused: 80 };
+    const OUTSIDE: Points = Points { inside: 0, outside: 3, refused: 0 };
+
+    #[test]
+    fn rejected_is_not_empty_from_the_first_frame_on() {
+        let mostly = Points { inside: 5, outside: 4, refused: 10 };
+        for points in [NOT_FINITE, OUTSIDE, mostly] {
+            let mut h = Health::NEW;
+            let conditions = run(&mut h, 0, 20, points);
+            assert_eq!(conditions[15], Condition::Healthy, "990 ms: {points:?}");
+            assert_eq!(conditions[16], Condition::Unusable, "1056 ms: {points:?}");
+            assert_eq!(run(&mut h, 20 * 66, 1, inside(0)), [Condition::Unusable], "silence does not mend it");
+            assert_eq!(run(&mut h, 21 * 66, 1, inside(1)), [Condition::Healthy], "a point in view does");
+        }
+    }
+
+    #[test]
+    fn a_view_narrower_than_the_radars_and_weak_clutter_are_healthy() {
+        for points in [Points { inside: 1, outside: 90, refused: 1 }, inside(1)] {
+            assert!(run(&mut Health::default(), 0, 60, points).iter().all(|c| *c == Condition::Healthy), "{points:?}");
+        }
+        // a car beyond the view's edge, now and then one within
+        let mut h = Health::NEW;
+        for i in 0..20 {
+            for (at, points) in [(0, OUTSIDE), (330, inside(0)), (660, inside(1))] {
+                assert_eq!(run(&mut h, i * 990 + at, 1, points), [Condition::Healthy]);
+            }
+        }
+    }
+
+    #[test]
+    fn two_stray_points_a_second_apart_do_not_keep_coming() {
+        let mut h = Health::NEW;
+        for i in 0..6 {
+            for (at, frames, points) in [(0, 1, OUTSIDE), (66, 12, inside(0))] {
+                let conditions = run(&mut h, i * 13 * 66 + at, frames, points);
+                assert!(conditions.iter().all(|c| *c == Condition::Healthy), "{i}: {conditions:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_that_are_none_do_not_end_blindness_and_points_outside_do() {
+        let mut h = Health::NEW;
+        run(&mut h, 0, 1, inside(5));
+        assert_eq!(run(&mut h, 66, 20, inside(0)).last(), Some(&Condition::Blind));
+        assert_eq!(run(&mut h, 21 * 66, 1, NOT_FINITE), [Condition::Blind]);
+        assert_eq!(run(&mut h, 22 * 66, 1, OUTSIDE), [Condition::Healthy]);
+    }
+}

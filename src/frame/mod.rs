@@ -1,0 +1,7 @@
+//! One radar frame: its detections, which of them count, where they lie on the road, and what a missing one means.
+
+pub mod detection;
+pub mod gate;
+pub mod health;
+pub mod reflection;
+pub mod scan;

@@ -1,0 +1,158 @@
+//! Detections placed on the ground of the levelled frame.
+//!
+//! A detection marks a reflection point of something standing on the road. Its measured elevation
+//! is noisy (1 degree is 2.6 m at 150 m), so the *place* is taken where range and azimuth meet a
+//! usual reflector height, and the *height* is kept beside it as measured.
+
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig::{self, Direction, ONE};
+use crate::frame::detection::Detection;
+use crate::sensor::mount::Levelling;
+use crate::sensor::noise::Noise;
+
+/// A reflection point on the road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reflection {
+    /// Place in the levelled frame, centimetres.
+    pub x_cm: i32,
+    /// Place in the levelled frame, centimetres, + left.
+    pub y_cm: i32,
+    /// Distance along the ground, centimetres.
+    pub ground_cm: u16,
+    /// Ground components of the unit line of sight (shorter than one where it points down).
+    pub sight: Direction,
+    /// Radial velocity, cm/s, + receding.
+    pub radial_velocity_cm_s: i16,
+    /// Standard deviation across the line of sight, centimetres.
+    pub across_cm: u16,
+    /// Measured height above the road and its standard deviation, centimetres.
+    pub height_cm: Option<(i16, u16)>,
+    /// What decides who stays when a list is full, half dB.
+    pub strength: i16,
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
+impl Noise {
+    /// Places a detection on the ground, with its height where its elevation was measured.
+    pub fn place(&self, d: &Detection, levelling: &Levelling) -> Reflection {
+        let azimuth = trig::direction(d.azimuth);
+        let height_cm = d.elevation.map(|elevation| self.height(d, azimuth, elevation, levelling));
+        Reflection { height_cm, ..self.place_along(d, azimuth, levelling) }
+    }
+
+    /// Places a detection on the ground, its height left open.
+    pub fn place_flat(&self, d: &Detection, levelling: &Levelling) -> Reflection {
+        self.place_along(d, trig::direction(d.azimuth), levelling)
+    }
+
+    fn place_along(&self, d: &Detection, azimuth: Direction, levelling: &Levelling) -> Reflection {
+        let range = i32::from(d.range_cm);
+        // the half-plane of this azimuth, levelled: ahead (elevation 0) and up
+        let ahead = levelling.level([i32::from(azimuth.x), i32::from(azimuth.y), 0]);
+        let up = levelling.up();
+        let fall = ((self.reflector_height_cm - levelling.height_cm) << 14) / range.max(1);
+        let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
+        let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
+        let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
+        Reflection {
+            x_cm,
+            y_cm,
+            ground_cm: math::length(x_cm, y_cm) as u16,
+            sight: Direction { x: x as i16, y: y as i16 },
+            radial_velocity_cm_s: d.radial_velocity_cm_s,
+            across_cm: math::mul_shift(range, self.azimuth, 16).clamp(1, 65_535) as u16,
+            height_cm: None,
+            strength: d.strength(),
+        }
+    }
+
+    /// Height above the road and its standard deviation, centimetres.
+    fn height(&self, d: &Detection, azimuth: Direction, elevation: Angle, levelling: &Levelling) -> (i16, u16) {
+        let range = i32::from(d.range_cm);
+        let up = trig::direction(elevation);
+        let level = |part: i16| (i32::from(part) * i32::from(up.x)) >> 14;
+        let rise = levelling.rise([level(azimuth.x), level(azimuth.y), i32::from(up.y)]);
+        let height = levelling.height_cm + ((rise * range) >> 14);
+        let sigma = math::mul_shift(range, self.elevation, 16);
+        (height.clamp(-30_000, 30_000) as i16, sigma.clamp(1, 65_535) as u16)
+    }
+}
+
+impl Reflection {
+    /// Levelled azimuth.
+    pub fn bearing(&self) -> Angle {
+        trig::bearing(self.x_cm, self.y_cm)
+    }
+}
+
+/// Cosine and sine of the elevation at which a half-plane meets a height: ahead cos + up sin = fall,
+/// all 2^-14; straight up or down where it never does.
+#[allow(clippy::cast_possible_wrap, clippy::cast_sign_loss, clippy::cast_possible_truncation)] // squares of 2^14 fit
+fn meet_height(fall: i32, ahead: i32, up: i32) -> (i32, i32) {
+    let square = (ahead * ahead + up * up).max(1);
+    let fall = fall.clamp(-ONE, ONE);
+    let (fall, rest) = match square - fall * fall {
+        rest @ 0.. => (fall, math::root(rest.unsigned_abs()) as i32),
+        _ => (fall.signum() * math::root(square.unsigned_abs()) as i32, 0),
+    };
+    let scaled = |v: i32| (v / (square >> 14).max(1)).clamp(-ONE, ONE);
+    (scaled(ahead * fall + up * rest), scaled(up * fall - ahead * rest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::mount::Mount;
+    use crate::sensor::noise::NoiseConfig;
+
+    fn place(range_m: f32, azimuth_deg: f32, elevation_deg: Option<f32>, pitch_deg: f32) -> Reflection {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
+        let d = Detection {
+            range_cm: (range_m * 100.0) as u16,
+            azimuth: Angle::from_degrees(azimuth_deg),
+            elevation: elevation_deg.map(Angle::from_degrees),
+            radial_velocity_cm_s: 100,
+            rcs_half_dbsm: None,
+            snr_half_db: Some(30),
+        };
+        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
+        noise.place(&d, &levelling)
+    }
+
+    #[test]
+    fn a_reflection_lies_at_reflector_height_under_its_azimuth() {
+        let r = place(100.0, 30.0, None, 0.0);
+        // sqrt(100^2 - 5.2^2) = 99.86 m along the ground
+        assert!((i32::from(r.ground_cm) - 9986).abs() <= 3, "{r:?}");
+        assert!((r.x_cm - 8648).abs() <= 5 && (r.y_cm - 4993).abs() <= 5, "{r:?}");
+        assert_eq!(r.height_cm, None);
+        assert!((i32::from(r.across_cm) - 87).abs() <= 1, "half a degree at 100 m");
+    }
+
+    #[test]
+    fn pitch_turns_the_line_of_sight_and_not_the_place() {
+        let level = place(60.0, 40.0, None, 0.0);
+        let down = place(60.0, 40.0, None, 4.0);
+        assert!(level.ground_cm.abs_diff(down.ground_cm) <= 5);
+        // looking down, the same sensor azimuth meets the ground a little farther out
+        assert!(down.bearing().raw() > level.bearing().raw());
+        assert!((down.bearing().raw() - level.bearing().raw()) < 80);
+    }
+
+    #[test]
+    fn elevation_up_is_height_up() {
+        let (up, _) = place(100.0, 0.0, Some(-1.0), 0.0).height_cm.unwrap();
+        let (down, sigma) = place(100.0, 0.0, Some(-3.0), 0.0).height_cm.unwrap();
+        assert!((up - (600 - 175)).abs() <= 3 && (down - (600 - 523)).abs() <= 3, "{up} {down}");
+        assert!(sigma.abs_diff(174) <= 1);
+        let (pitched, _) = place(100.0, 0.0, Some(0.0), 3.0).height_cm.unwrap();
+        assert!((pitched - (600 - 523)).abs() <= 3, "nose down lowers the axis: {pitched}");
+    }
+
+    #[test]
+    fn a_range_shorter_than_the_mast_lies_below_the_sensor() {
+        let r = place(4.0, 20.0, None, 0.0);
+        assert!(r.ground_cm < 20, "{r:?}");
+    }
+}

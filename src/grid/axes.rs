@@ -1,0 +1,408 @@
+//! The axes of the sensor-centred grid: azimuth columns, range cells, elevation rows.
+//!
+//! # Model
+//! All three are taken in the levelled frame, so that a line of sight is one column and one row.
+//! Range runs along the ground. Elevation is told by *slope*, height over ground range, which is
+//! what similar triangles need. Rows are laid where the slice plane needs them: their edges are the
+//! slopes under which the plane at slice height is seen at ground distances
+//! `(sqrt(near) + k (sqrt(far) - sqrt(near)) / E)^2`. Uniform rows would spend most of their number
+//! on sky: from 6 m, one of 2 degrees covers the road from 71 to 143 m.
+
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::trig::Direction;
+use crate::map::polar::PolarGeometry;
+use crate::sensor::config::{ConfigError, Problem, within};
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Levelling;
+
+/// Fraction bits of a slope.
+const SLOPE_BITS: u32 = 18;
+
+/// Height above or below the sensor up to which slopes fit, centimetres.
+const FARTHEST_RISE_CM: i32 = 4000;
+
+/// The steepest edge a row can have: 89.8 degrees.
+const STEEPEST: i32 = 1 << (SLOPE_BITS + 8);
+
+/// What lies this close to an angular limit of the field of view lies on it.
+const ON_THE_LIMIT_DEG: f32 = 0.01;
+
+/// The view of a column the slice plane never enters.
+const NOTHING: (u8, u8) = (1, 0);
+
+/// A sensor closer to the slice plane than this has no slopes to tell distances by, centimetres.
+const LEAST_DROP_CM: i32 = 10;
+
+/// Geometry of a grid of `R` range cells, `A` azimuth columns and `E` elevation rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Axes<const R: usize, const A: usize, const E: usize> {
+    /// Length of a range cell, centimetres.
+    pub cell_cm: i32,
+    /// Levelled azimuth of the first column's right edge.
+    pub azimuth_origin: Angle,
+    /// Width of all columns together, 2^-16 turn.
+    pub azimuth_span: u16,
+    /// Height of the sensor, centimetres.
+    height_cm: i32,
+    /// Lower edges of the rows, ascending slopes, 2^-18.
+    row_edges: [i32; E],
+    /// Upper edge of the last row.
+    row_top: i32,
+    /// For every range cell: the slice point's weight of the upper of its two rows, 2^-8.
+    slice_share: [u8; R],
+    /// Stretches of range cells whose slice points lie above the same row's centre.
+    slice_rows: [SliceRow; E],
+    /// For every column: the first and the last range cell in view on the slice plane.
+    view: [(u8, u8); A],
+}
+
+/// A stretch of range cells on which the slice plane runs between the same two rows' centres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SliceRow {
+    /// The lower row.
+    pub lower: u8,
+    /// First range cell behind the stretch; stretches follow one another from the first cell on.
+    pub end: u16,
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // indices below 2^8
+impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
+    /// Lays the axes for a mount and a field of view.
+    ///
+    /// # Errors
+    /// A field of view that the slice plane never enters.
+    pub fn new(levelling: &Levelling, view: &FieldOfView, slice_height_m: f32) -> Result<Self, ConfigError> {
+        const { assert!(R <= crate::fixed::bits::RangeBits::CAPACITY && R >= 2 && A >= 2 && E >= 2 && A <= 512 && E <= 64) }
+        let limits = view.limits()?;
+        within("visibility.slice_height_m", slice_height_m, 0.0, 10.0)?;
+        let cell_cm = (limits.range_cm[1] + R as i32 - 1) / R as i32;
+        let slice_cm = math::round_i32(slice_height_m * 100.0);
+        let drop = levelling.height_cm - slice_cm;
+        let drop = if drop.abs() < LEAST_DROP_CM { LEAST_DROP_CM } else { drop };
+        let mut axes = Self {
+            cell_cm,
+            azimuth_origin: Angle::ZERO,
+            azimuth_span: 0,
+            height_cm: slice_cm + drop,
+            row_edges: [0; E],
+            row_top: 0,
+            slice_share: [0; R],
+            slice_rows: [SliceRow { lower: 0, end: 0 }; E],
+            view: [NOTHING; A],
+        };
+        // a limit itself is in view, whatever a float makes of it
+        let wide = FieldOfView {
+            azimuth_min_deg: view.azimuth_min_deg - ON_THE_LIMIT_DEG,
+            azimuth_max_deg: view.azimuth_max_deg + ON_THE_LIMIT_DEG,
+            elevation_min_deg: view.elevation_min_deg - ON_THE_LIMIT_DEG,
+            elevation_max_deg: view.elevation_max_deg + ON_THE_LIMIT_DEG,
+            ..*view
+        };
+        let in_view = |bearing: f32, ground_cm: f32| {
+            let (x, y) = (math::cos(bearing) * ground_cm, math::sin(bearing) * ground_cm);
+            wide.contains(levelling.unlevel_exact([x, y, -drop as f32]).map(|v| v / 100.0))
+        };
+        axes.lay_columns(&in_view).ok_or(ConfigError {
+            parameter: "field_of_view.elevation_min_deg",
+            value: view.elevation_min_deg,
+            problem: Problem::NothingInView,
+        })?;
+        axes.find_view(&in_view);
+        axes.lay_rows(drop);
+        Ok(axes)
+    }
+
+    /// Widest azimuths at which the slice plane is in view, with a quarter of a degree to spare.
+    fn lay_columns(&mut self, in_view: &impl Fn(f32, f32) -> bool) -> Option<()> {
+        const STEPS: i32 = 720;
+        let far = (self.cell_cm * R as i32) as f32;
+        let bearing = |i: i32| (i as f32 / STEPS as f32 - 0.5) * core::f32::consts::PI;
+        let any = |i: &i32| (1..=24).any(|k| in_view(bearing(*i), far * (k as f32 - 0.5) / 24.0));
+        let first = (0..=STEPS).find(any)?;
+        let last = (0..=STEPS).rev().find(any)?;
+        self.azimuth_origin = Angle::from_radians(bearing(first - 1));
+        let right = self.azimuth_origin;
+        self.azimuth_span = (Angle::from_radians(bearing(last + 1)) - right).raw() as u16;
+        Some(())
+    }
+
+    /// The longest stretch of cells in view: a ray across a turned field of view can leave and enter
+    /// it again, and what lies between must stay unknown.
+    fn find_view(&mut self, in_view: &impl Fn(f32, f32) -> bool) {
+        for a in 0..A {
+            let bearing = self.azimuth_of((a as i32 * 256) + 128).radians();
+            let mut stretch = 0..0;
+            let mut longest = 0..0;
+            for r in 0..R {
+                if !in_view(bearing, (r as f32 + 0.5) * self.cell_cm as f32) {
+                    continue;
+                }
+                let start = if stretch.end == r { stretch.start } else { r };
+                stretch = start..r + 1;
+                if stretch.len() > longest.len() {
+                    longest = stretch.clone();
+                }
+            }
+            if let (Some(v), false) = (self.view.get_mut(a), longest.is_empty()) {
+                *v = (longest.start as u8, (longest.end - 1) as u8);
+            }
+        }
+    }
+
+    fn lay_rows(&mut self, drop: i32) {
+        let near_cell = self.view.iter().filter(|v| **v != NOTHING).map(|v| v.0).min().unwrap_or(0);
+        let near = math::sqrt((f32::from(near_cell) + 0.5) * self.cell_cm as f32);
+        let far = math::sqrt((self.cell_cm * R as i32) as f32);
+        let slope = |k: usize| {
+            // ascending slopes: from near to far if the sensor looks down on the plane, else back
+            let k = if drop > 0 { k } else { E - k };
+            let root = near + (far - near) * k as f32 / E as f32;
+            math::round_i32(-(drop as f32) / (root * root) * (1 << SLOPE_BITS) as f32).clamp(-STEEPEST, STEEPEST)
+        };
+        for (k, edge) in self.row_edges.iter_mut().enumerate() {
+            *edge = slope(k);
+        }
+        self.row_top = slope(E);
+        let mut stretch = 0;
+        for r in 0..R {
+            let ground = r as i32 * self.cell_cm + self.cell_cm / 2;
+            let place = self.row_place(self.slope(self.height_cm - drop, ground)) - 128;
+            let place = place.clamp(0, (E as i32 - 1) * 256);
+            let lower = (place >> 8).min(E as i32 - 2);
+            if let Some(share) = self.slice_share.get_mut(r) {
+                *share = (place - lower * 256).min(255) as u8;
+            }
+            if r > 0 && self.slice_rows.get(stretch).is_some_and(|s| i32::from(s.lower) != lower) {
+                stretch += 1;
+            }
+            // places are monotonic in range, so there are at most as many stretches as rows
+            for s in self.slice_rows.iter_mut().skip(stretch) {
+                *s = SliceRow { lower: lower as u8, end: r as u16 + 1 };
+            }
+        }
+    }
+
+    /// The geometry of the maps cast on these axes.
+    pub fn polar(&self, levelling: &Levelling) -> PolarGeometry {
+        PolarGeometry {
+            levelling: *levelling,
+            cell_cm: self.cell_cm,
+            azimuth_origin: self.azimuth_origin,
+            azimuth_span: self.azimuth_span,
+        }
+    }
+
+    /// Height the slopes are taken from, centimetres.
+    pub fn sensor_height_cm(&self) -> i32 {
+        self.height_cm
+    }
+
+    /// Slope under which a point of this height and ground distance is seen; more than 40 m above or
+    /// below the sensor counts as 40 m.
+    pub fn slope(&self, height_cm: i32, ground_cm: i32) -> i32 {
+        ((height_cm - self.height_cm).clamp(-FARTHEST_RISE_CM, FARTHEST_RISE_CM) << SLOPE_BITS) / ground_cm.max(1)
+    }
+
+    /// Height at which a slope passes a ground distance, centimetres.
+    pub fn height_at(&self, slope: i32, ground_cm: i32) -> i32 {
+        self.height_cm + math::mul_shift(slope, ground_cm, SLOPE_BITS)
+    }
+
+    /// Place of a slope on the row axis, 2^-8 rows from the first row's lower edge.
+    pub fn row_place(&self, slope: i32) -> i32 {
+        self.row_places().of(slope)
+    }
+
+    /// [`row_place`](Self::row_place) for slopes that follow one another closely.
+    pub fn row_places(&self) -> RowPlaces<'_, E> {
+        RowPlaces { edges: &self.row_edges, top: self.row_top, row: 0 }
+    }
+
+    /// Slope of a row's centre.
+    pub fn row_centre(&self, row: usize) -> i32 {
+        let low = self.row_edges.get(row).copied().unwrap_or(self.row_top);
+        let high = self.row_edges.get(row + 1).copied().unwrap_or(self.row_top);
+        (low + high) / 2
+    }
+
+    /// Lower and upper slope of a row, for tables and reports.
+    pub fn row_slopes(&self, row: usize) -> (f64, f64) {
+        let edge = |row: usize| self.row_edges.get(row).copied().unwrap_or(self.row_top);
+        let slope = |edge: i32| f64::from(edge) / f64::from(1 << SLOPE_BITS);
+        (slope(edge(row)), slope(edge(row + 1)))
+    }
+
+    /// Weight of the upper row at every slice point, 2^-8.
+    pub fn slice_share(&self) -> &[u8; R] {
+        &self.slice_share
+    }
+
+    /// The two rows the slice plane runs between, by stretches of range.
+    pub fn slice_rows(&self) -> &[SliceRow; E] {
+        &self.slice_rows
+    }
+
+    /// Place of a bearing on the column axis, 2^-8 columns from the first one's right edge; negative
+    /// or beyond `A` columns outside.
+    pub fn column_place(&self, bearing: Angle) -> i32 {
+        let from_origin = i32::from((bearing - self.azimuth_origin).raw());
+        from_origin * (A as i32 * 256 / 4) / (i32::from(self.azimuth_span) / 4).max(1)
+    }
+
+    /// Column of a bearing.
+    pub fn column(&self, bearing: Angle) -> Option<usize> {
+        usize::try_from(self.column_place(bearing) >> 8).ok().filter(|a| *a < A)
+    }
+
+    /// Bearing of a place on the column axis.
+    pub fn azimuth_of(&self, place: i32) -> Angle {
+        self.azimuth_origin + Angle::from_raw((place * (i32::from(self.azimuth_span) / 4) / (A as i32 * 64)) as i16)
+    }
+
+    /// Direction of a column's centre.
+    pub fn column_direction(&self, column: usize) -> Direction {
+        crate::fixed::trig::direction(self.azimuth_of(column as i32 * 256 + 128))
+    }
+
+    /// Range cell of a ground distance.
+    pub fn range_cell(&self, ground_cm: i32) -> Option<usize> {
+        usize::try_from(ground_cm / self.cell_cm.max(1)).ok().filter(|r| *r < R)
+    }
+
+    /// Range cells of a column that are in view on the slice plane.
+    pub fn view(&self, column: usize) -> core::ops::Range<usize> {
+        match self.view.get(column) {
+            Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
+            _ => 0..0,
+        }
+    }
+}
+
+/// Finds slopes on the row axis, beginning with the row of the last.
+#[derive(Debug, Clone)]
+pub struct RowPlaces<'a, const E: usize> {
+    edges: &'a [i32; E],
+    top: i32,
+    row: usize,
+}
+
+impl<const E: usize> RowPlaces<'_, E> {
+    /// Place of a slope, 2^-8 rows from the first row's lower edge.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 64 rows
+    pub fn of(&mut self, slope: i32) -> i32 {
+        while self.row + 1 < E && self.edge(self.row + 1) <= slope {
+            self.row += 1;
+        }
+        while self.row > 0 && self.edge(self.row) > slope {
+            self.row -= 1;
+        }
+        let lower = self.edge(self.row);
+        if slope < lower { 0 } else { self.row as i32 * 256 + part_of(slope - lower, self.edge(self.row + 1) - lower) }
+    }
+
+    fn edge(&self, row: usize) -> i32 {
+        self.edges.get(row).copied().unwrap_or(self.top)
+    }
+}
+
+/// What part of a row's height lies below a slope, 2^-8; both from its lower edge.
+fn part_of(slope: i32, height: i32) -> i32 {
+    if slope >= height {
+        256
+    } else if slope < 1 << 23 {
+        (slope << 8) / height.max(1)
+    } else {
+        // rows this high lie at the sensor's feet
+        slope / (height >> 8).max(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sensor::mount::Mount;
+
+    fn axes(height_m: f32, pitch_deg: f32) -> Axes<200, 120, 16> {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
+        let view = FieldOfView {
+            azimuth_min_deg: -60.0,
+            azimuth_max_deg: 60.0,
+            elevation_min_deg: -16.0,
+            elevation_max_deg: 16.0,
+            range_min_m: 3.0,
+            range_max_m: 200.0,
+        };
+        Axes::new(&mount.levelling().unwrap(), &view, 1.0).unwrap()
+    }
+
+    #[test]
+    fn left_is_the_higher_column() {
+        let a = axes(6.0, 0.0);
+        let column = |deg: f32| a.column(Angle::from_degrees(deg));
+        assert!(column(30.0) > column(-30.0));
+        assert!((a.azimuth_of(60 * 256).radians()).abs() < 0.005, "the middle is straight ahead");
+        assert_eq!(column(62.0), None);
+        assert_eq!(column(-62.0), None);
+        for c in 0..120 {
+            assert_eq!(a.column(a.azimuth_of(c * 256 + 128)), Some(c as usize), "centres stay in their column");
+        }
+    }
+
+    #[test]
+    fn near_range_below_the_lower_limit_is_outside_the_view() {
+        // 5 m above the plane at 16 degrees: 17.4 m; pitched down 4 degrees: 20 degrees, 13.7 m
+        assert_eq!(axes(6.0, 0.0).view(60), 17..200);
+        assert_eq!(axes(6.0, 4.0).view(60).start, 14);
+        assert!(axes(6.0, 0.0).view(60).end == 200);
+    }
+
+    #[test]
+    fn rows_ascend_and_the_slice_runs_through_them() {
+        for height in [6.0, 3.5, 0.6] {
+            let a = axes(height, 0.0);
+            assert!(a.row_edges.windows(2).all(|w| w[0] < w[1]), "{height}: {:?}", a.row_edges);
+            assert!(*a.row_edges.last().unwrap() < a.row_top);
+            let rows: std::vec::Vec<u8> = a.slice_rows.iter().map(|s| s.lower).collect();
+            let (near, far) = (rows[0], rows[15]);
+            assert_eq!(far > near, height > 1.0, "seen from above, farther is higher; from below, lower");
+            assert_eq!(a.slice_rows[15].end, 200, "every range cell lies between two rows");
+        }
+    }
+
+    #[test]
+    fn row_places_interpolate_slopes() {
+        let a = axes(6.0, 0.0);
+        let (low, high) = (a.row_edges[3], a.row_edges[4]);
+        assert_eq!(a.row_place(low), 3 * 256);
+        assert!((a.row_place((low + high) / 2) - (3 * 256 + 128)).abs() <= 1);
+        assert_eq!(a.row_place(i32::MIN / 2), 0);
+        assert_eq!(a.row_place(1 << 18), 16 * 256);
+        assert!((a.row_place(a.row_centre(5)) - (5 * 256 + 128)).abs() <= 1);
+    }
+
+    #[test]
+    fn slopes_fall_towards_the_road_and_give_heights_back() {
+        let a = axes(6.0, 0.0);
+        let s = a.slope(100, 10_000);
+        assert!(s < 0);
+        assert!((a.height_at(s, 10_000) - 100).abs() <= 1);
+        assert!((a.height_at(s, 5_000) - 350).abs() <= 1, "half way it is half way down");
+    }
+
+    #[test]
+    fn a_plane_never_in_view_is_an_error() {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: -45.0, roll_deg: 0.0 };
+        let view = FieldOfView {
+            azimuth_min_deg: -10.0,
+            azimuth_max_deg: 10.0,
+            elevation_min_deg: -5.0,
+            elevation_max_deg: 5.0,
+            range_min_m: 3.0,
+            range_max_m: 100.0,
+        };
+        let e = Axes::<100, 64, 8>::new(&mount.levelling().unwrap(), &view, 1.0).unwrap_err();
+        let said = "field_of_view.elevation_min_deg is -5: with this mount no point at slice height is in view, check height and pitch";
+        assert_eq!(std::format!("{e}"), said);
+    }
+}

@@ -1,0 +1,101 @@
+//! The box an obstacle fills: what was seen of it, and what that leaves unseen.
+
+use super::obstacle::Obstacle;
+use super::size::Size;
+use super::tracking::Tracking;
+use crate::fixed::math::root;
+use crate::obstacles::solid::Solid;
+
+/// Variance across a car that reflects on both its sides alike, cm^2.
+pub(super) const EVEN_SPREAD: i32 = 85 * 85;
+
+impl Obstacle {
+    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
+    pub fn solid(&self, t: &Tracking) -> Solid {
+        let tall = self.tallness.floor_cm();
+        let seen = self.extent.length_cm();
+        let size = t.sizes.of(seen.max(t.sizes.least_length_cm(tall)));
+        let (x, y) = self.global(self.extent.middle_cm(), 0);
+        let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
+        let hidden = (size.length_cm - seen).max(0) / 2;
+        let aside = self.beside_the_detections(&size, ahead, left);
+        let (x, y) = self.global(
+            self.extent.middle_cm() + if ahead >= 0 { hidden } else { -hidden },
+            if left >= 0 { aside } else { -aside },
+        );
+        Solid {
+            x_cm: x,
+            y_cm: y,
+            heading: self.heading,
+            half_length_cm: size.length_cm / 2,
+            half_width_cm: size.width_cm / 2,
+            height_cm: size.height_cm.max(tall),
+        }
+    }
+
+    /// How far the middle of its width lies behind its detections, centimetres. A radar beside a
+    /// vehicle sees the near side: its detections then spread over less than the width, and have their
+    /// centre near that side. One ahead or behind sees both.
+    #[allow(clippy::cast_possible_wrap)] // the root of a clamped variance
+    fn beside_the_detections(&self, size: &Size, ahead: i32, left: i32) -> i32 {
+        let (side, end) = (size.length_cm * left.abs(), size.width_cm * ahead.abs());
+        // from where the side makes up half of what is seen, 2^-8
+        let shown = (side / ((side + end) / 512).max(1)).min(256);
+        // an even spread over the width has a variance of a twelfth of its square; noise makes it a little more
+        let half_seen = root((self.spread + self.spread / 8).unsigned_abs()) as i32;
+        ((size.width_cm / 2 - half_seen).max(0) * shown) >> 8
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Obstacles;
+    use super::super::by_hand::{PERIOD_S, reflection, rules, seen_at};
+    use super::super::obstacle::Obstacle;
+    use crate::fixed::time::Step;
+    use crate::fixed::trig::Direction;
+    use std::vec::Vec;
+
+    const AHEAD: Direction = Direction::AHEAD;
+
+    /// Follows reflections in a row along a lorry 13 m long, and gives the middle of its box aside, metres.
+    fn middle_of(rows_m: &[f64], x_m: f64) -> f64 {
+        let (mut list, t) = (Obstacles::<16>::new(), rules());
+        for k in 0..40 {
+            let x = x_m + 5.0 * PERIOD_S * f64::from(k);
+            let places = (0..5).flat_map(|i| rows_m.iter().map(move |y| [x + 3.2 * f64::from(i) - 6.4, *y]));
+            let reflections: Vec<_> = places.map(|p| reflection(p, [5.0, 0.0])).collect();
+            list.step::<64>(&reflections, Step::from_micros((PERIOD_S * 1e6) as u64), &t, |_, _| true);
+        }
+        let boxes: Vec<_> = list.solids(&t).collect();
+        assert_eq!(boxes.len(), 1);
+        f64::from(boxes[0].y_cm) / 100.0
+    }
+
+    #[test]
+    fn a_lorry_beside_the_radar_lies_behind_the_side_that_is_seen() {
+        // 10 m to either side, where the flank is nearly all there is to see
+        for side in [1.0, -1.0] {
+            let middle = middle_of(&[side * 10.0], 8.0) * side;
+            assert!((10.7..11.4).contains(&middle), "{middle} m, half of 2.5 m farther");
+        }
+    }
+
+    #[test]
+    fn a_lorry_seen_on_both_sides_or_from_behind_stays_where_it_is() {
+        let both = middle_of(&[9.15, 10.85], 8.0);
+        // the rows lie within a lorry as wide as they are long; from one side only it would be 1.25 m
+        assert!((both - 10.0).abs() < 0.5, "{both} m");
+        let behind = middle_of(&[2.0], 90.0);
+        assert!((behind - 2.0).abs() < 0.3, "{behind} m");
+    }
+
+    #[test]
+    fn what_was_hidden_of_a_vehicle_lies_behind_its_face() {
+        let t = rules();
+        for heading in [AHEAD, AHEAD.reversed()] {
+            let solid = Obstacle::new(&seen_at(5000, 0, 0), heading, 2000).solid(&t);
+            assert!(solid.x_cm - solid.half_length_cm > 4900, "{heading:?}: {solid:?}");
+        }
+    }
+}

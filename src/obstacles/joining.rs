@@ -1,0 +1,157 @@
+//! Parts of one vehicle that were taken for several.
+
+use super::gathered::sigma_of_weight;
+use super::obstacle::{FRACTION, Obstacle};
+use super::profile::BIN_CM;
+use super::tracking::{MERGE_PARALLEL, Tracking};
+use crate::fixed::math::hypot_gate;
+
+impl Obstacle {
+    /// Whether another obstacle is near enough to be a part of the same vehicle, or to lie within it.
+    #[inline]
+    pub fn is_near(&self, other: &Self, t: &Tracking) -> bool {
+        let far = (2 * t.max_length_cm) << FRACTION;
+        (self.position.0 - other.position.0).abs() <= far && (self.position.1 - other.position.1).abs() <= far
+    }
+
+    /// Whether another obstacle, a [near](Self::is_near) one, is a part of the same vehicle: in line, equally fast, and no farther
+    /// away than vehicles keep from each other at this speed.
+    #[inline]
+    pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
+        let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
+        if hypot_gate(dvx, dvy) > t.merge_speed {
+            return false;
+        }
+        if self.heading.cosine(other.heading) < MERGE_PARALLEL {
+            return false;
+        }
+        let (ox, oy) = other.global(other.extent.middle_cm(), 0);
+        let (along, left) = self.local(ox, oy);
+        let half = other.extent.length_cm() / 2;
+        let (rear, front) = (along - half, along + half);
+        let gap = (rear - self.extent.front_cm).max(self.extent.rear_cm - front);
+        let uncertain = (t.sigmas * (self.lateral_sigma() + other.lateral_sigma())) >> 4;
+        let abreast = if gap <= 0 { t.abreast_cm } else { 0 };
+        if left.abs() > abreast.max(t.merge_lateral_cm + uncertain) {
+            return false;
+        }
+        let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
+        let coupled = i32::from(self.travelled_cm.min(other.travelled_cm)) >= t.coupled_way_cm
+            && hypot_gate(dvx, dvy) <= t.coupled_speed
+            && left.abs() <= t.merge_lateral_cm;
+        let widest = if coupled { self.headway_cm(t.coupled_headway, t) } else { self.gap_cm(t) };
+        gap <= widest && length <= t.max_length_cm
+    }
+
+    /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
+    /// for a vehicle, or an echo between the two.
+    #[inline]
+    pub fn encloses(&self, other: &Self, t: &Tracking) -> bool {
+        let far = t.max_length_cm << FRACTION;
+        if (self.position.0 - other.position.0).abs() > far || (self.position.1 - other.position.1).abs() > far {
+            return false;
+        }
+        let (x, y) = other.global(other.extent.middle_cm(), 0);
+        let (along, left) = self.local(x, y);
+        left.abs() <= t.merge_lateral_cm && self.extent.beyond_cm(along) == 0
+    }
+
+    /// Standard deviation of the lateral place, centimetres.
+    fn lateral_sigma(&self) -> i32 {
+        sigma_of_weight(self.lateral_weight)
+    }
+
+    /// Takes over what another obstacle knows of the same vehicle.
+    #[allow(clippy::cast_possible_truncation)] // a share of the offset
+    pub fn join(&mut self, other: &Self, t: &Tracking) {
+        // the histogram is no longer than the longest vehicle: its middle first
+        let (ax, ay) = other.anchor();
+        let (along, _) = self.local(ax, ay);
+        let rear = self.extent.rear_cm.min(along + other.extent.rear_cm);
+        let front = self.extent.front_cm.max(along + other.extent.front_cm);
+        self.recentre((rear + front) / 2 / BIN_CM);
+        let (along, left) = self.local(ax, ay);
+        self.profile.merge(&other.profile, along);
+        let weight = self.lateral_weight.saturating_add(other.lateral_weight).max(1);
+        let share = (i64::from(left << FRACTION) * i64::from(other.lateral_weight) / i64::from(weight)) as i32;
+        self.move_left(share);
+        self.lateral_weight = weight;
+        self.existence = (self.existence + other.existence).min(t.existence_max);
+        self.hits = self.hits.saturating_add(other.hits);
+        self.travelled_cm = self.travelled_cm.max(other.travelled_cm);
+        self.tallness.join(&other.tallness);
+        self.update_extent(t);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::by_hand::{rules, seen_at};
+    use super::super::obstacle::MOST_WEIGHT;
+    use super::super::profile::Extent;
+    use super::*;
+    use crate::fixed::trig::Direction;
+
+    const AHEAD: Direction = Direction::AHEAD;
+
+    /// Two obstacles in one lane, `apart_cm` between the first's front and the second's rear end.
+    fn two(apart_cm: i32, left_cm: i32, speed: i32) -> (Obstacle, Obstacle) {
+        let mut a = Obstacle::new(&seen_at(5000, 0, 0), AHEAD, 2000);
+        a.extent = Extent { rear_cm: -200, front_cm: 200 };
+        let mut b = Obstacle::new(&seen_at(5000 + 400 + apart_cm, left_cm, 0), AHEAD, speed);
+        b.extent = Extent { rear_cm: -200, front_cm: 200 };
+        (a.lateral_weight, b.lateral_weight) = (MOST_WEIGHT, MOST_WEIGHT);
+        (a, b)
+    }
+
+    #[test]
+    fn parts_of_one_vehicle_are_in_line_equally_fast_and_close() {
+        let t = rules();
+        let one = |apart, left, speed| {
+            let (a, b) = two(apart, left, speed);
+            let (forward, back) = (a.is_one_with(&b, &t), b.is_one_with(&a, &t));
+            assert_eq!(forward, back, "{apart} {left} {speed}");
+            forward
+        };
+        assert!(one(500, 50, 2000) && one(500, -50, 2100));
+        assert!(!one(500, 50, 2300), "another speed");
+        assert!(!one(500, 250, 2000) && !one(500, -250, 2000), "another lane");
+        assert!(!one(800, 0, 2000), "farther than the gap within a vehicle");
+        let (a, mut b) = two(500, 0, 2000);
+        b.heading = AHEAD.left();
+        assert!(!a.is_one_with(&b, &t), "across the road");
+        // together longer than any vehicle
+        let (mut a, b) = two(600, 0, 2000);
+        a.extent.rear_cm = -1000;
+        assert!(!a.is_one_with(&b, &t));
+    }
+
+    #[test]
+    fn only_what_lies_between_the_ends_is_enclosed() {
+        let t = rules();
+        let (a, b) = two(-350, 0, 2000);
+        assert!(a.encloses(&b, &t), "its middle 50 cm ahead of the other's");
+        let (a, b) = two(-100, 0, 2000);
+        assert!(!a.encloses(&b, &t), "its middle 300 cm ahead");
+        let (a, b) = two(-350, 150, 2000);
+        assert!(!a.encloses(&b, &t), "beside it");
+    }
+
+    #[test]
+    fn joined_obstacles_reach_from_end_to_end_and_lie_where_the_surer_one_did() {
+        let t = rules();
+        let (mut a, mut b) = two(500, 40, 2000);
+        for (o, x) in [(&mut a, 5000), (&mut b, 5900)] {
+            (0..20).for_each(|_| o.profile.add(-180));
+            (0..20).for_each(|_| o.profile.add(180));
+            assert_eq!(o.anchor().0, x);
+        }
+        a.lateral_weight = MOST_WEIGHT / 4;
+        (a.hits, b.hits, b.travelled_cm) = (30, 10, 700);
+        a.join(&b, &t);
+        let (rear, front) = (a.anchor().0 + a.extent.rear_cm, a.anchor().0 + a.extent.front_cm);
+        assert!((rear - 4820).abs() < 60 && (front - 6080).abs() < 60, "{rear} to {front}");
+        assert!((30..=34).contains(&a.anchor().1), "four fifths of the way: {:?}", a.anchor());
+        assert_eq!((a.hits, a.travelled_cm), (40, 700));
+    }
+}

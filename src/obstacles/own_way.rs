@@ -1,0 +1,127 @@
+//! Obstacles that go their own way: across the road, or around a corner.
+//!
+//! Most traffic follows the road, and its axis tells a heading that Doppler alone cannot. Beside that,
+//! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
+//! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
+
+use super::motion::{FreeMotion, Seen};
+use super::obstacle::{FRACTION, NEWBORN_PLACE, Obstacle};
+use super::profile::{BIN_CM, Extent, Profile};
+use super::tracking::Tracking;
+use crate::fixed::math::{length, mul_shift};
+use crate::fixed::trig::Direction;
+
+/// Frames in a row in which motion along the heading must fail.
+const OWN_WAY_FRAMES: u8 = 2;
+/// Variance of the speed across the line of sight of what is slow and has a heading, (cm/s)^2.
+const SLOW_SPEED: i32 = 150 * 150;
+/// Least variance of where a frame's detections have their centre, cm^2.
+const LEAST_VARIANCE: i32 = 20 * 20;
+
+impl Obstacle {
+    /// Whether the heading of one that goes its own way is known better than what it was while faster.
+    pub(super) fn knows_its_way(&self, t: &Tracking) -> bool {
+        let (vx, vy) = self.free.velocity;
+        let speed = length(vx >> FRACTION, vy >> FRACTION);
+        self.speed() > t.turning_speed && self.free.is_sure_of(speed, t.heading_sigmas)
+    }
+
+    /// Lets the free motion follow this frame's detections.
+    pub(super) fn follow(&mut self, t: &Tracking) {
+        let g = self.gathered;
+        let (along, left) = ((g.offset.0 << FRACTION) / g.count.max(1), (g.offset.1 << FRACTION) / g.count.max(1));
+        let (hx, hy) = (i32::from(self.heading.x), i32::from(self.heading.y));
+        let length_cm = self.extent.length_cm().max(t.sizes.min_length_cm);
+        let own = g.sight.along(self.velocity.0, self.velocity.1);
+        self.free.update(&Seen {
+            count: g.count,
+            centre: (
+                self.position.0 + mul_shift(along, hx, 14) - mul_shift(left, hy, 14),
+                self.position.1 + mul_shift(along, hy, 14) + mul_shift(left, hx, 14),
+            ),
+            variance: g.centre_variance(self.heading, length_cm).max(LEAST_VARIANCE),
+            sight: g.sight,
+            radial: own + ((g.radial / g.count.max(1)) << 4),
+        });
+        if self.free_heading {
+            let (dx, dy) = (self.free.place.0 - self.position.0, self.free.place.1 - self.position.1);
+            let ahead = self.heading.along(dx, dy) - (self.extent.middle_cm() << FRACTION);
+            let by = mul_shift(ahead, t.own_way_follow, 16);
+            self.position.0 += mul_shift(by, hx, 14);
+            self.position.1 += mul_shift(by, hy, 14);
+        }
+    }
+
+    /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way.
+    pub(super) fn question_heading(&mut self, t: &Tracking) {
+        if self.free_heading {
+            if self.speed() <= t.turning_speed {
+                self.free = FreeMotion::new(self.position, NEWBORN_PLACE, self.velocity, SLOW_SPEED);
+            }
+            return;
+        }
+        let (fx, fy) = self.free.velocity;
+        let (dx, dy) = ((fx - self.velocity.0) >> FRACTION, (fy - self.velocity.1) >> FRACTION);
+        let aside = self.heading.across(dx, dy).abs();
+        let least = t.own_way_cm_s.max(mul_shift(self.speed(), t.own_way_share, 16 + FRACTION));
+        if aside > least && self.free.is_sure_of(length(dx, dy), t.own_way_sigmas) {
+            self.unexplained += 1;
+        } else {
+            self.unexplained = 0;
+        }
+        if self.unexplained >= OWN_WAY_FRAMES {
+            self.go_own_way();
+        }
+    }
+
+    /// Goes on from the free motion, with a new outline.
+    fn go_own_way(&mut self) {
+        self.free_heading = true;
+        self.position = self.free.place;
+        self.velocity = self.free.velocity;
+        self.heading = Direction::of(self.velocity.0, self.velocity.1);
+        self.profile = Profile::EMPTY;
+        self.extent = Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 };
+        self.lateral_weight = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Obstacles;
+    use super::super::by_hand::{car, follow, rules};
+    use std::vec::Vec;
+
+    /// Headings of the boxes after a time, degrees from the road's axis, and their places, metres.
+    fn boxes(at: [f64; 2], heading: [f64; 2], speed: f64, seconds: f64) -> (Vec<[f64; 3]>, [f64; 2]) {
+        let mut list = Obstacles::<16>::new();
+        let mut cars = [car(at, heading, speed)];
+        follow(&mut list, &mut cars, seconds, true);
+        let t = rules();
+        let of = |s: crate::obstacles::solid::Solid| {
+            let degrees = f64::from(s.heading.y).atan2(f64::from(s.heading.x)).to_degrees();
+            [degrees, f64::from(s.x_cm) / 100.0, f64::from(s.y_cm) / 100.0]
+        };
+        (list.solids(&t).map(of).collect(), cars[0].at)
+    }
+
+    #[test]
+    fn a_car_that_crosses_gets_its_own_heading_and_one_box_where_it_is() {
+        for (heading, expected) in [([0.0, 1.0], 90.0), ([0.0, -1.0], -90.0)] {
+            let (boxes, at) = boxes([40.0, -12.0 * heading[1]], heading, 9.0, 2.0);
+            assert_eq!(boxes.len(), 1, "{boxes:?}");
+            let [degrees, x, y] = boxes[0];
+            assert!((degrees - expected).abs() < 12.0, "{boxes:?}");
+            assert!((x - at[0]).abs() < 1.0 && (y - at[1]).abs() < 1.5, "{boxes:?}, it is at {at:?}");
+        }
+    }
+
+    #[test]
+    fn a_car_on_the_road_keeps_the_roads_heading() {
+        for (heading, expected) in [([1.0, 0.0], 0.0), ([-1.0, 0.0], 180.0)] {
+            let (boxes, _) = boxes([50.0 - 25.0 * heading[0], 6.0], heading, 20.0, 2.0);
+            assert_eq!(boxes.len(), 1, "{boxes:?}");
+            assert!((boxes[0][0].abs() - expected).abs() < 4.0, "{boxes:?}");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Vehicles that stop, stand and leave, as tests of all the rules together.
+
+use std::vec::Vec;
+
+use super::Obstacles;
+use super::by_hand::{car, change_speed, follow, reflection, rules};
+use super::solid::Solid;
+use crate::fixed::time::Step;
+use crate::frame::reflection::Reflection;
+
+fn boxes<const N: usize>(list: &Obstacles<N>) -> Vec<Solid> {
+    list.solids(&rules()).collect()
+}
+
+/// A car that came along the road and has stopped 50 m ahead.
+fn stopped() -> (Obstacles<16>, Solid) {
+    let mut list = Obstacles::new();
+    let mut cars = [car([30.0, 3.0], [1.0, 0.0], 10.0)];
+    follow(&mut list, &mut cars, 2.0, true);
+    change_speed(&mut list, &mut cars, 0.0);
+    follow(&mut list, &mut cars, 2.0, true);
+    let found = boxes(&list);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!((f64::from(found[0].x_cm) / 100.0 - cars[0].at[0]).abs() < 1.5, "{found:?}");
+    (list, found[0])
+}
+
+#[test]
+fn what_has_stopped_keeps_its_box_through_a_red_light_in_a_shadow() {
+    let (mut list, found) = stopped();
+    follow(&mut list, &mut [], 30.0, false);
+    let after = boxes(&list);
+    assert_eq!(after.len(), 1);
+    assert!((after[0].x_cm - found.x_cm).abs() < 50 && after[0].height_cm == found.height_cm, "{after:?}");
+    // seen free, it is given up
+    follow(&mut list, &mut [], 6.0, true);
+    assert!(boxes(&list).is_empty());
+}
+
+#[test]
+fn what_was_moving_is_given_up_in_a_shadow() {
+    let mut list = Obstacles::<16>::new();
+    follow(&mut list, &mut [car([30.0, 3.0], [1.0, 0.0], 10.0)], 2.0, true);
+    assert_eq!(boxes(&list).len(), 1);
+    follow(&mut list, &mut [], 8.0, false);
+    assert!(boxes(&list).is_empty());
+}
+
+#[test]
+fn a_lorry_that_stands_for_an_hour_stays_the_same_box() {
+    let mut list = Obstacles::<16>::new();
+    let mut lorry = [car([30.0, 5.0], [1.0, 0.0], 6.0)];
+    lorry[0].size = [9.0, 2.0];
+    follow(&mut list, &mut lorry, 3.0, true);
+    change_speed(&mut list, &mut lorry, 0.0);
+    follow(&mut list, &mut lorry, 3.0, true);
+    let before = boxes(&list);
+    follow(&mut list, &mut lorry, 3600.0, true);
+    let after = boxes(&list);
+    assert_eq!((before.len(), after.len()), (1, 1));
+    assert!((after[0].x_cm - before[0].x_cm).abs() < 100 && (after[0].y_cm - before[0].y_cm).abs() < 50);
+    assert!((after[0].half_length_cm - before[0].half_length_cm).abs() < 50, "{before:?} {after:?}");
+}
+
+#[test]
+fn a_crowd_of_standing_detections_makes_no_obstacle() {
+    let crowd: Vec<Reflection> =
+        (0..256).map(|i| reflection([10.0 + f64::from(i % 16) * 8.0, f64::from(i / 16) - 8.0], [0.0; 2])).collect();
+    let mut list = Obstacles::<16>::new();
+    for _ in 0..100 {
+        let claimed = list.step::<256>(&crowd, Step::from_micros(66_972), &rules(), |_, _| true);
+        assert!((0..256).all(|i| !claimed.contains(i)));
+    }
+    assert_eq!((list.iter().count(), list.dropped()), (0, 0));
+}
+
+#[test]
+fn a_jam_the_unit_started_in_is_followed_once_it_moves() {
+    let mut list = Obstacles::<16>::new();
+    let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
+    follow(&mut list, &mut cars, 5.0, true);
+    assert!(boxes(&list).is_empty());
+    change_speed(&mut list, &mut cars, 2.0);
+    follow(&mut list, &mut cars, 3.0, true);
+    assert_eq!(boxes(&list).len(), 6);
+}

@@ -1,0 +1,103 @@
+//! Checking a configuration in SI units, once, before the loop.
+
+/// A parameter that cannot be worked with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ConfigError {
+    /// Path of the parameter, as in `gate.max_speed_mps`.
+    pub parameter: &'static str,
+    /// Its value.
+    pub value: f32,
+    /// What is wrong with it.
+    pub problem: Problem,
+}
+
+/// What is wrong with a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Problem {
+    /// Infinite or not a number.
+    NotFinite,
+    /// Outside the limits.
+    OutOfLimits {
+        /// Smallest value allowed.
+        min: f32,
+        /// Largest value allowed.
+        max: f32,
+    },
+    /// With this mount nothing at slice height is in view.
+    NothingInView,
+    /// Not above its lower neighbour.
+    NotAscending {
+        /// The neighbour's value.
+        lower: f32,
+    },
+    /// A bit rate that no divider of a controller's clock meets.
+    NoDivider {
+        /// The clock.
+        clock_hz: u32,
+    },
+}
+
+impl core::fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { parameter, value, problem } = self;
+        match problem {
+            Problem::NotFinite => write!(f, "{parameter} is {value}, not a finite number"),
+            Problem::OutOfLimits { min, max } => write!(f, "{parameter} is {value}, outside {min} to {max}"),
+            Problem::NothingInView => write!(
+                f,
+                "{parameter} is {value}: with this mount no point at slice height is in view, check height and pitch"
+            ),
+            Problem::NotAscending { lower } => write!(f, "{parameter} is {value}, not above {lower}"),
+            Problem::NoDivider { clock_hz } => {
+                write!(f, "{parameter} is {value}, which no divider of {clock_hz} Hz meets")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+/// A value within limits.
+///
+/// # Errors
+/// Names the parameter.
+#[inline(never)] // called for every parameter, once
+pub(crate) fn within(parameter: &'static str, value: f32, min: f32, max: f32) -> Result<f32, ConfigError> {
+    let problem = if !value.is_finite() {
+        Problem::NotFinite
+    } else if value < min || value > max {
+        Problem::OutOfLimits { min, max }
+    } else {
+        return Ok(value);
+    };
+    Err(ConfigError { parameter, value, problem })
+}
+
+/// A value above another.
+///
+/// # Errors
+/// Names the parameter.
+#[inline(never)]
+pub(crate) fn above(parameter: &'static str, value: f32, lower: f32) -> Result<f32, ConfigError> {
+    if value > lower {
+        Ok(value)
+    } else {
+        Err(ConfigError { parameter, value, problem: Problem::NotAscending { lower } })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn the_parameter_is_named_with_its_limits() {
+        let e = within("mount.height_m", -1.0, 0.1, 20.0).unwrap_err();
+        assert_eq!(e.to_string(), "mount.height_m is -1, outside 0.1 to 20");
+        assert_eq!(within("a", f32::NAN, 0.0, 1.0).unwrap_err().problem, Problem::NotFinite);
+        assert_eq!(above("b", 1.0, 1.0).unwrap_err().to_string(), "b is 1, not above 1");
+    }
+}

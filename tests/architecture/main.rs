@@ -1,0 +1,5 @@
+//! The shape of the library: folders that use one another in one direction, and a face that stays small.
+
+mod circles;
+mod extending;
+mod public_names;

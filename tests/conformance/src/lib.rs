@@ -1,0 +1,31 @@
+//! Faults of buses for receivers of visibility maps, and logs to compare receivers by: see `README.md`.
+
+pub mod class;
+pub mod input;
+pub mod library;
+pub mod logs;
+mod made_up;
+pub mod measure;
+pub mod program;
+mod random;
+pub mod receivers;
+pub mod sender;
+pub mod world;
+
+use std::path::Path;
+
+use anyhow::Result;
+use viewshed_harness::bus::traffic::Maps;
+use viewshed_harness::{estimators, recording};
+
+/// The maps of the shipped recording, without those of its first second, in which there is hardly one.
+///
+/// # Errors
+/// It cannot be read.
+pub fn maps() -> Result<Maps> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
+    let recording = recording::mcap::read(&path, &recording::ReadOptions::default())?;
+    let mut maps = Maps::new(&recording, &estimators::Options::default(), &|| ())?;
+    maps.scans.drain(..15);
+    Ok(maps)
+}

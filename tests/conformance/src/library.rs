@@ -1,0 +1,122 @@
+//! The library's receiver, fed and answering as `README.md` says.
+
+use std::fmt::Write as _;
+
+use flate2::Crc;
+use viewshed::fixed::time::Time;
+use viewshed::wire::code::ray::Ray;
+use viewshed::wire::message::{Addresses, Plane};
+use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::serial::Unstuffer;
+
+use crate::input::{Bus, Input};
+
+/// Most azimuths, and words of 32 ranges, of any map.
+pub const A: usize = 128;
+pub const W: usize = 8;
+
+/// Visible cells, azimuth by azimuth, a bit each.
+pub type Visible = Vec<[u32; W]>;
+
+/// A receiver and what it listens to.
+pub struct Library {
+    bus: Bus,
+    sensor: u8,
+    receiver: Box<Receiver<1, A, W>>,
+    line: Unstuffer,
+}
+
+impl Default for Library {
+    fn default() -> Self {
+        Self::new(Bus::Can, 0)
+    }
+}
+
+impl Library {
+    pub fn new(bus: Bus, sensor: u8) -> Self {
+        let receiver = Box::new(Receiver::new([sensor], Addresses::STANDARD, Limits::DEFAULT));
+        Self { bus, sensor, receiver, line: Unstuffer::new() }
+    }
+
+    /// Takes a line; the answer if it is a question.
+    pub fn take(&mut self, input: &Input) -> Option<String> {
+        match input {
+            Input::Start { bus, sensor } => *self = Self::new(*bus, *sensor),
+            Input::Frame { time, .. } => {
+                if let Some(frame) = input.frame(self.bus) {
+                    // what is refused changes nothing
+                    let _ = self.receiver.frame(Time::from_micros(*time), &frame);
+                }
+            }
+            Input::Bytes { time, data } => self.bytes(Time::from_micros(*time), data),
+            Input::Look { time } => return Some(self.look(*time)),
+            Input::Cells { time } => return Some(self.cells(*time)),
+        }
+        None
+    }
+
+    fn bytes(&mut self, now: Time, mut data: &[u8]) {
+        while !data.is_empty() {
+            let (taken, message) = self.line.push(data);
+            if let Some(message) = message {
+                let _ = self.receiver.message(now, message);
+            }
+            data = &data[taken..];
+        }
+    }
+
+    /// Ranges and rays; none where nothing is told.
+    fn rays(&self, time: u64) -> (usize, Vec<Ray<W>>) {
+        let map = self.receiver.map(self.sensor, Time::from_micros(time));
+        let Some(header) = map.header() else { return (0, Vec::new()) };
+        let rays = (0..usize::from(header.azimuths)).map(|azimuth| map.ray(Plane::Visibility, azimuth));
+        (usize::from(header.ranges), rays.collect())
+    }
+
+    /// What is visible at a time.
+    pub fn visible(&self, time: u64) -> Visible {
+        self.rays(time).1.iter().map(|ray| *ray.bits().words()).collect()
+    }
+
+    fn look(&self, time: u64) -> String {
+        let (ranges, rays) = self.rays(time);
+        let (mut crc, mut count) = (Crc::new(), [0; 3]);
+        let mut row = Vec::with_capacity(ranges);
+        for ray in &rays {
+            row.clear();
+            row.extend((0..ranges).map(|cell| state(ray, cell)));
+            row.iter().for_each(|state| count[usize::from(*state)] += 1);
+            crc.update(&row);
+        }
+        let [_, invisible, visible] = count;
+        let hash = if visible + invisible == 0 { 0 } else { crc.sum() };
+        format!("{time} {visible} {invisible} {hash:08x}")
+    }
+
+    fn cells(&self, time: u64) -> String {
+        let (ranges, rays) = self.rays(time);
+        let mut text = time.to_string();
+        if rays.iter().all(|ray| ray.known.is_empty()) {
+            return text;
+        }
+        for ray in &rays {
+            text.push(' ');
+            text.extend((0..ranges).map(|cell| ['?', '#', '.'][usize::from(state(ray, cell))]));
+        }
+        text
+    }
+}
+
+/// 0 unknown, 1 not visible, 2 visible.
+fn state(ray: &Ray<W>, cell: usize) -> u8 {
+    if ray.known.contains(cell) { 1 + u8::from(ray.get(cell)) } else { 0 }
+}
+
+/// Answers every line.
+pub fn answers<'a>(lines: impl IntoIterator<Item = &'a Input>) -> String {
+    let mut library = Library::default();
+    lines.into_iter().filter_map(|input| library.take(input)).fold(String::new(), |mut text, answer| {
+        let _ = writeln!(text, "{answer}");
+        text
+    })
+}

@@ -1,0 +1,322 @@
+//! The radar-3d estimator from detections to map, on small worlds whose answer is known.
+
+use crate::common::{FRAME_US, Rig, Vehicle, detection, gantry};
+use viewshed::fixed::angle::Angle;
+use viewshed::fixed::time::Time;
+use viewshed::fixed::trig::Direction;
+use viewshed::frame::detection::Detection;
+use viewshed::frame::gate::Rejection;
+use viewshed::frame::health::{Condition, Continuity, FrameStatus};
+use viewshed::map::Visibility;
+use viewshed::map::query::{self, Answer, Footprint};
+use viewshed::sensor::Sensor;
+
+#[test]
+fn a_truck_in_the_left_lane_hides_the_left_lane_behind_it() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    // approaching; its middle is at 60 m when the picture is taken
+    rig.drive(&[Vehicle::truck(60.0 + 25.0 * 29.0 / 15.0, 6.0, -25.0)], 30, true);
+    let expected = "
+?.................###########
+?..............##############
+?..........#############.....
+??.......OOOO####............
+??...........................
+??...........................
+??...........................
+??...........................
+";
+    let got = rig.draw(5..150, -5..15);
+    assert_eq!(got, expected, "{got}");
+}
+
+#[test]
+fn the_same_truck_on_the_right_hides_the_right() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    // receding this time
+    rig.drive(&[Vehicle::truck(60.0 - 25.0 * 29.0 / 15.0, -6.0, 25.0)], 30, true);
+    let t = rig.last();
+    assert!(t > 1.0);
+    assert_eq!(rig.visibility(100.0, -9.0), Visibility::Invisible);
+    assert_eq!(rig.visibility(100.0, 9.0), Visibility::Visible);
+    assert_eq!(rig.visibility(40.0, -4.0), Visibility::Visible, "in front of it the road is free");
+}
+
+#[test]
+fn a_radar_without_elevation_sees_the_same_shadow() {
+    let vehicles = [Vehicle::truck(110.0, 6.0, -25.0), Vehicle::car(150.0, -4.0, -30.0)];
+    let mut with = Rig::new(gantry(6.0, 0.0));
+    with.drive(&vehicles, 30, true);
+    let mut without = Rig::new(gantry(6.0, 0.0));
+    without.drive(&vehicles, 30, false);
+    assert!(with.draw(5..200, -15..15).contains('#'));
+    assert_eq!(with.draw(5..200, -15..15), without.draw(5..200, -15..15));
+}
+
+#[test]
+fn a_car_hides_little_and_a_low_sensor_is_hidden_by_it_longer() {
+    let hidden = |height_m: f32| {
+        let mut rig = Rig::new(gantry(height_m, 0.0));
+        rig.drive(&[Vehicle::car(60.0 + 25.0 * 29.0 / 15.0, 0.0, -25.0)], 30, true);
+        (62..190).filter(|x| rig.visibility(f64::from(*x) + 0.5, 0.0) == Visibility::Invisible).count()
+    };
+    // similar triangles over the roof at 62 m: to 62 * 5 / 4.5 = 69 m, and to 62 * 2.5 / 2 = 78 m
+    let (high, low) = (hidden(6.0), hidden(3.5));
+    assert!((4..=10).contains(&high) && (11..=20).contains(&low), "{high} m from 6 m, {low} m from 3.5 m");
+}
+
+#[test]
+fn a_shadow_moves_with_its_truck_and_leaves_nothing_behind() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let truck = Vehicle::truck(60.0, 0.0, 20.0);
+    rig.drive(&[truck], 45, true);
+    let x = truck.at(rig.last()).x;
+    assert_eq!(rig.visibility(x + 20.0, 0.0), Visibility::Invisible);
+    for behind in [15.0, 20.0, 30.0] {
+        assert_eq!(rig.visibility(x - behind, 0.0), Visibility::Visible, "where the truck was {behind} m ago");
+    }
+}
+
+#[test]
+fn a_yawed_sensor_puts_the_shadow_at_the_same_place_of_the_road() {
+    let truck = Vehicle::truck(110.0, 6.0, -25.0);
+    let picture = |yaw: f32| {
+        let mut rig = Rig::new(gantry(6.0, yaw));
+        rig.drive(&[truck], 30, true);
+        rig.draw(40..150, -10..20)
+    };
+    let (straight, yawed) = (picture(0.0), picture(-10.0));
+    let differ = straight.chars().zip(yawed.chars()).filter(|(a, b)| a != b).count();
+    assert!(straight.contains('#') && differ <= 8, "{differ} differ{straight}{yawed}");
+}
+
+#[test]
+fn a_vehicle_that_stops_stays_an_obstacle() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let mut truck = Vehicle::truck(80.0, 4.0, -10.0);
+    for frame in 0..150 {
+        let speed = (10.0 - f64::from(frame) / 6.0).max(0.0);
+        truck.x -= speed * FRAME_US as f64 * 1e-6;
+        truck.speed = -speed;
+        let d = truck.detections(&rig.sensor, true);
+        rig.frame(&d);
+    }
+    assert_eq!(rig.visibility(truck.x + 20.0, 5.0), Visibility::Invisible, "standing for five seconds");
+}
+
+#[test]
+fn a_guard_rail_hides_nothing() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    for frame in 0..60 {
+        let rail = (0..50)
+            .filter_map(|k| detection(&rig.sensor, [20.0 + f64::from(k * 3 + frame % 3), 8.0, 0.6], [0.0; 2], true));
+        let d: Vec<Detection> = rail.collect();
+        rig.frame(&d);
+    }
+    assert!(!rig.draw(30..190, -15..25).contains('#'), "{}", rig.draw(30..190, -15..25));
+}
+
+#[test]
+fn an_empty_road_is_visible_to_the_limit_and_unknown_beyond() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let report = rig.frame(&[]);
+    assert_eq!((report.condition, report.continuity), (Condition::Healthy, Continuity::First));
+    assert_eq!(rig.visibility(150.0, 0.0), Visibility::Visible);
+    assert_eq!(rig.visibility(5.0, 0.0), Visibility::Unknown, "below the lower limit");
+    assert_eq!(rig.visibility(-50.0, 0.0), Visibility::Unknown, "behind the sensor");
+    assert_eq!(rig.visibility(201.0, 0.0), Visibility::Unknown);
+    assert_eq!(rig.visibility(50.0, 100.0), Visibility::Unknown, "63 degrees to the left");
+}
+
+#[test]
+fn before_the_first_frame_after_the_hold_time_and_when_blind_all_is_unknown() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    assert_eq!(rig.visibility(100.0, 0.0), Visibility::Unknown);
+    rig.drive(&[Vehicle::car(80.0, 0.0, 5.0)], 5, true);
+    assert_eq!(rig.visibility(60.0, 10.0), Visibility::Visible);
+    let late = |ms: u64| Time::from_micros(rig.now().micros() - FRAME_US + ms * 1000);
+    let (held, stale) = (late(500), late(501));
+    assert_eq!(rig.state.expire(&rig.parameters, held, &mut rig.map), Condition::Healthy);
+    assert_eq!(rig.visibility(60.0, 10.0), Visibility::Visible);
+    assert_eq!(rig.state.expire(&rig.parameters, stale, &mut rig.map), Condition::Stale);
+    assert_eq!(rig.visibility(60.0, 10.0), Visibility::Unknown);
+    let conditions: Vec<Condition> = (0..20).map(|_| rig.frame(&[]).condition).collect();
+    assert_eq!(conditions.first(), Some(&Condition::Healthy));
+    assert_eq!(conditions.last(), Some(&Condition::Blind), "empty for a second after traffic");
+    assert_eq!(rig.visibility(60.0, 10.0), Visibility::Unknown);
+}
+
+/// Conditions over one and a half seconds of frames, 15 a second, and whether anything is on the last map.
+fn conditions(rig: &mut Rig, status: FrameStatus, detections: &[Detection]) -> (Vec<Condition>, bool) {
+    let told = (0..23)
+        .map(|_| {
+            let now = rig.now();
+            rig.frames += 1;
+            rig.state.process(&rig.parameters, now, detections, status, &mut rig.map).condition
+        })
+        .collect();
+    (told, (20..200).any(|x| rig.visibility(f64::from(x), 0.0) != Visibility::Unknown))
+}
+
+#[test]
+fn rejected_is_not_empty() {
+    let row = |sensor: &Sensor| -> Vec<Detection> {
+        (30..190).filter_map(|x| detection(sensor, [f64::from(x), 4.0, 0.6], [-20.0, 0.0], true)).collect()
+    };
+    let right = gantry(6.0, 0.0);
+    // nothing but NaN; degrees taken for radians, of which the few within 3 degrees of the axis are none that
+    // the gate takes; a mount that looks 30 degrees farther down, so that the map ends at 20 m
+    let degrees: Vec<Detection> = row(&right)
+        .iter()
+        .filter(|d| d.azimuth.radians().to_degrees().abs() < 3.14)
+        .map(|d| Detection { azimuth: Angle::from_radians(d.azimuth.radians().to_degrees()), ..*d })
+        .collect();
+    let refused = (row(&right).len() - degrees.len()) as u16;
+    assert!(refused > 0 && !degrees.is_empty());
+    let mut down = right;
+    down.mount.pitch_deg = 33.0;
+    let cases = [
+        ("NaN", right, 160, Vec::new()),
+        ("mostly NaN", right, 161, row(&right)),
+        ("degrees", right, 160 - degrees.len() as u16, degrees),
+        ("outside", right, 0, row(&right).iter().map(|d| Detection { range_cm: d.range_cm + 18_000, ..*d }).collect()),
+        ("mount", down, 0, row(&right)),
+    ];
+    for (what, sensor, refused, detections) in cases {
+        let mut rig = Rig::new(sensor);
+        let (told, known) = conditions(&mut rig, FrameStatus { fault: false, refused }, &detections);
+        assert_eq!(told.first(), Some(&Condition::Healthy), "{what}");
+        assert_eq!(told.last(), Some(&Condition::Unusable), "{what}: unknown within 1.5 s");
+        assert!(!known, "{what}");
+    }
+}
+
+#[test]
+fn weak_clutter_few_detections_and_what_stands_at_the_sensors_feet_stay_visible() {
+    let sensor = gantry(6.0, 0.0);
+    let at = |x: f64, y: f64, z: f64| detection(&sensor, [x, y, z], [0.0; 2], true).unwrap();
+    let weak = |d: Detection| Detection { snr_half_db: Some(2), ..d };
+    let cases = [
+        ("an empty road", vec![]),
+        ("weak clutter", vec![weak(at(60.0, 9.0, 0.3)), weak(at(90.0, -8.0, 0.3))]),
+        ("weak clutter, some of it outside", vec![weak(at(60.0, 9.0, 0.3)), weak(at(60.0, 150.0, 0.3))]),
+        ("one detection", vec![at(70.0, 2.0, 0.5)]),
+        ("three, two of them outside", vec![at(70.0, 2.0, 0.5), at(20.0, 60.0, 0.5), at(230.0, 0.0, 0.5)]),
+        ("the roof of a lorry under the gantry", vec![at(9.0, 1.0, 4.0)]),
+    ];
+    for (what, detections) in cases {
+        let (told, known) = conditions(&mut Rig::new(sensor), FrameStatus::default(), &detections);
+        assert!(known && told.iter().all(|c| *c == Condition::Healthy), "{what}: {told:?}");
+    }
+}
+
+#[test]
+fn a_gap_or_a_step_back_of_the_clock_forgets_the_obstacles() {
+    let truck = Vehicle::truck(110.0, 0.0, -20.0);
+    for jump in [2_000_000_i64, -5_000_000] {
+        let mut rig = Rig::new(gantry(6.0, 0.0));
+        rig.drive(&[truck], 60, true);
+        let now = Time::from_micros(rig.now().micros().saturating_add_signed(jump));
+        let report = rig.state.process(&rig.parameters, now, &[], false, &mut rig.map);
+        assert!(report.continuity.resets(), "{jump}");
+        assert_eq!((report.obstacles, report.condition), (0, Condition::Healthy));
+        assert!(!rig.draw(20..190, -15..15).contains('#'));
+    }
+}
+
+#[test]
+fn ten_thousand_detections_are_taken_by_strength_and_counted() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let many: Vec<Detection> = (0..10_000_i32)
+        .map(|i| Detection {
+            range_cm: (500 + i % 19_000) as u16,
+            azimuth: Angle::from_raw((i * 37 % 20_000 - 10_000) as i16),
+            elevation: Some(Angle::from_raw((i % 2000 - 1000) as i16)),
+            radial_velocity_cm_s: (i % 6000 - 3000) as i16,
+            rcs_half_dbsm: None,
+            snr_half_db: Some((20 + i % 100) as i16),
+        })
+        .collect();
+    for _ in 0..10 {
+        let report = rig.frame(&many);
+        assert_eq!(report.used, 256);
+        assert_eq!(u32::from(report.used) + report.rejections.total(), 10_000, "nothing is lost silently");
+        assert!(report.rejections.count(Rejection::Overflow) > 9_000);
+    }
+}
+
+#[test]
+fn queries_answer_in_the_four_words() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let truck = Vehicle::truck(60.0 + 25.0 * 29.0 / 15.0, 0.0, -25.0);
+    rig.drive(&[truck], 30, true);
+    let x = (truck.at(rig.last()).x * 100.0) as i32;
+    let place = |x_cm: i32, y_cm: i32| Footprint {
+        centre: viewshed::sensor::road::RoadPoint::new(x_cm, y_cm),
+        heading: Direction::AHEAD,
+        half_length_cm: 220,
+        half_width_cm: 90,
+    };
+    assert_eq!(query::object(&*rig.map, &place(x, 0)), Answer::VisibleOccupied);
+    assert_eq!(query::object(&*rig.map, &place(x + 3000, 0)), Answer::Invisible);
+    assert_eq!(query::area(&*rig.map, &place(x - 3000, 500)), Answer::VisibleFree);
+    assert_eq!(query::area(&*rig.map, &place(300, 0)), Answer::Unknown);
+}
+
+/// Detections of a moving thing at points of its own axes: ahead of its middle and to its left.
+fn points(rig: &Rig, v: &Vehicle, at: &[(f64, f64)], speed: f64) -> Vec<Detection> {
+    at.iter().filter_map(|(x, y)| detection(&rig.sensor, [v.x + x, v.y + y, 0.8], [speed, 0.0], true)).collect()
+}
+
+#[test]
+fn a_truck_seen_only_at_both_ends_is_one_vehicle() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let truck = Vehicle::truck(60.0, 4.0, 22.0);
+    let mut report = None;
+    for frame in 0..30 {
+        let now = truck.at(f64::from(frame) * FRAME_US as f64 * 1e-6);
+        let d = points(&rig, &now, &[(-8.2, -1.0), (-8.2, 1.0), (-6.0, 0.0), (6.0, 0.0), (8.2, 0.0)], truck.speed);
+        report = Some(rig.frame(&d));
+    }
+    assert_eq!(report.unwrap().obstacles, 1);
+    let now = truck.at(29.0 * FRAME_US as f64 * 1e-6);
+    assert_eq!(rig.visibility(now.x + 30.0, 5.5), Visibility::Invisible, "a truck is high, two cars are not");
+}
+
+#[test]
+fn two_cars_at_a_safe_headway_are_two_vehicles() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    // 1 s from bumper to bumper
+    let cars = [Vehicle::car(50.0, 0.0, 22.0), Vehicle::car(50.0 + 22.0 + 4.4, 0.0, 22.0)];
+    rig.drive(&cars, 30, true);
+    let report = rig.frame(&[]);
+    assert_eq!(report.obstacles, 2);
+}
+
+#[test]
+fn spinning_wheels_are_no_vehicles_of_their_own() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let car = Vehicle::car(40.0, 4.0, 20.0);
+    let mut report = None;
+    for frame in 0..30 {
+        let now = car.at(f64::from(frame) * FRAME_US as f64 * 1e-6);
+        let mut d = now.detections(&rig.sensor, true);
+        d.extend(points(&rig, &now, &[(-1.3, -0.8), (1.3, -0.8)], car.speed * 1.6));
+        report = Some(rig.frame(&d));
+    }
+    assert_eq!(report.unwrap().obstacles, 1);
+}
+
+#[test]
+fn both_flanks_of_a_truck_are_one_vehicle() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    rig.drive(&[Vehicle::truck(110.0, 6.0, -25.0)], 30, true);
+    assert_eq!(rig.state.obstacles().iter().count(), 1);
+}
+
+#[test]
+fn two_cars_side_by_side_are_two_vehicles() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    rig.drive(&[Vehicle::car(40.0, 2.0, 20.0), Vehicle::car(40.0, -1.5, 20.0)], 30, true);
+    assert_eq!(rig.state.obstacles().iter().count(), 2);
+}

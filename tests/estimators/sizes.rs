@@ -1,0 +1,65 @@
+//! Memory the estimators take, asserted. kB = 1000 bytes; output maps are not counted.
+
+use std::mem::size_of;
+
+use viewshed::inputs::ars408::Ars408;
+use viewshed::inputs::native::{Receiver, SerialReceiver};
+use viewshed::inputs::ti::Ti;
+use viewshed::map::polar::PolarMap;
+use viewshed::radar_2d::{Radar2d, Radar2dParameters};
+use viewshed::unit::profile::{reference, small};
+use viewshed::wire::broadcast::Broadcaster;
+use viewshed::wire::receive::SensorReceiver;
+
+#[test]
+fn the_reference_grid_fits_450_kb() {
+    let state = size_of::<reference::State>();
+    let parameters = size_of::<reference::Parameters>();
+    println!("radar-3d 200 x 120 x 16: state {state} B, parameters {parameters} B");
+    assert!(state + parameters <= 450_000, "{state} + {parameters}");
+}
+
+#[test]
+fn the_small_profile_fits_64_kb_in_all() {
+    let state = size_of::<small::State>();
+    let parameters = size_of::<small::Parameters>();
+    println!("radar-3d 100 x 64 x 8: state {state} B, parameters {parameters} B");
+    assert!(state + parameters <= 64_000, "{state} + {parameters}");
+}
+
+#[test]
+fn the_flat_baseline_fits_450_kb() {
+    let state = size_of::<Radar2d<208, 45, 320, 256>>();
+    let parameters = size_of::<Radar2dParameters>();
+    println!("radar-2d 208 x 360 m: state {state} B, parameters {parameters} B");
+    assert!(state + parameters <= 450_000, "{state} + {parameters}");
+}
+
+#[test]
+fn a_polar_map_takes_two_bytes_a_cell() {
+    let map = size_of::<PolarMap<200, 120>>();
+    println!("polar map 200 x 120: {map} B");
+    assert!(map <= 2 * 200 * 120 + 128, "{map}");
+}
+
+#[test]
+fn a_radar_input_for_256_detections_fits_6500_bytes() {
+    let sizes = [
+        ("ARS408", size_of::<Ars408<256>>()),
+        ("native over CAN FD", size_of::<Receiver<256>>()),
+        ("native over a serial line", size_of::<SerialReceiver<256>>()),
+        ("TI mmWave", size_of::<Ti<256>>()),
+    ];
+    for (input, bytes) in sizes {
+        println!("{input}: {bytes} B");
+        assert!(bytes <= 6_500, "{input}: {bytes}");
+    }
+}
+
+#[test]
+fn a_sensor_at_its_receiver_fits_8_kb_and_its_sender_9_kb() {
+    let receiver = size_of::<SensorReceiver<120, 7, 1>>();
+    let sender = size_of::<Broadcaster<120, 7>>();
+    println!("receiver of 120 x 200: {receiver} B a sensor, sender: {sender} B");
+    assert!(receiver <= 8000 && sender <= 9000, "{receiver}, {sender}");
+}

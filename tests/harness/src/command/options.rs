@@ -1,0 +1,381 @@
+//! Options of the command line and the configuration file, brought together.
+//!
+//! Defaults are overridden by `--config FILE`, that by single options.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::Args;
+use serde::Deserialize;
+use viewshed::inputs::ars408::profile::{PROFILES, Profile};
+use viewshed::inputs::ti::{AngleUnit, Dialect, Entries, Family, PolarPoints};
+
+use crate::estimators;
+use crate::evaluation::{self, Grid, Settings};
+use crate::recording::{FieldOfView, ReadOptions};
+
+/// The tables of a configuration file.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Config {
+    evaluation: evaluation::Options,
+    estimators: estimators::Options,
+}
+
+/// Groups of options that subcommands share: how to read recordings, and how to judge.
+#[derive(Debug, Clone, Default, Args)]
+pub struct SettingsArgs {
+    #[command(flatten)]
+    reading: ReadingArgs,
+    #[command(flatten)]
+    judging: JudgingArgs,
+}
+
+/// How estimators run and how they are judged, whatever they are given.
+#[derive(Debug, Clone, Default, Args)]
+pub struct JudgingArgs {
+    #[command(flatten)]
+    evaluation: EvaluationArgs,
+    #[command(flatten)]
+    estimators: EstimatorArgs,
+    /// TOML file with the tables [evaluation] and [estimators]
+    ///
+    /// Its keys are those that --json writes under "options", for example
+    ///
+    ///   [evaluation]
+    ///   min_speed_mps = 2.0
+    ///
+    /// An unknown key is an error. Options of the command line win over the file.
+    #[arg(long, value_name = "FILE", help_heading = "Configuration", verbatim_doc_comment)]
+    config: Option<PathBuf>,
+}
+
+/// What the file does not say, or says wrongly.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Reading")]
+struct ReadingArgs {
+    /// Topic of the radar's points [default: /radar/points, or whatever carries radar_msgs/msg/RadarScan]
+    ///
+    /// A PointCloud2 with the fields range, azimuth (or azimuth_angle), radial_velocity (or radial_speed)
+    /// and, where measured, elevation (or elevation_angle), rcs and snr; or a RadarScan. A topic that is
+    /// not there makes an error that lists those that are.
+    #[arg(long, value_name = "TOPIC")]
+    radar_topic: Option<String>,
+    /// Topic of the labelled objects, a Detection3DArray in frame `road` [default: /ground_truth/objects]
+    ///
+    /// A file NAME.labels.csv beside NAME.mcap replaces them. Without labels there are maps and no rates.
+    #[arg(long, value_name = "TOPIC")]
+    truth_topic: Option<String>,
+    /// Where the radar hangs: x,y,z,yaw,pitch,roll in metres and degrees [default: /tf_static of the file]
+    ///
+    /// In the road frame: x along the road, y to the left, z = height above the road. Yaw + to the left,
+    /// pitch + nose down, roll + left side up. A gantry at 6 m looking 4 degrees down: --mount 0,0,6,0,4,0
+    #[arg(long, value_name = "X,Y,Z,YAW,PITCH,ROLL", value_parser = mount, allow_hyphen_values = true)]
+    mount: Option<[f64; 6]>,
+    /// Field of view: az_min,az_max,el_min,el_max,r_min,r_max in degrees and metres [default: the file's metadata]
+    ///
+    /// In the sensor frame: azimuth + to the left, elevation + up. Example: --fov -60,60,-16,16,3,200
+    #[arg(long, value_name = "AZ,AZ,EL,EL,R,R", value_parser = field_of_view, allow_hyphen_values = true)]
+    fov: Option<FieldOfView>,
+    /// Sensor id of the radar in a CAN log or capture that has several
+    #[arg(long, value_name = "ID")]
+    sensor_id: Option<u8>,
+    #[command(flatten)]
+    kind: KindArgs,
+    /// Time between frames of a TI mmWave capture, which holds none [default: 0.1]
+    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    frame_period: Option<f64>,
+    /// Begin this many seconds after the first radar frame
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    from: Option<f64>,
+    /// End this many seconds after the first radar frame
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    to: Option<f64>,
+}
+
+/// What a raw log or capture does not tell of its radar.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct KindArgs {
+    /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
+    #[arg(long, value_name = "NAME", value_parser = profile)]
+    pub radar: Option<&'static Profile>,
+    /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
+    #[arg(long, value_name = "BYTES", value_parser = ti_header)]
+    pub ti_header: Option<Family>,
+    /// What a TI mmWave capture does not tell of its firmware, between commas [default: none of it]
+    ///
+    /// degrees       angles of spherical points (type 1000) are in degrees, not radians
+    /// raised        points behind 52 bytes have an elevation
+    /// no-elevation  the antenna measures none
+    /// targets       take the tracked targets in place of the points
+    /// doppler=M/S   velocity of a Doppler step, without which SDK 1 and 2 tell none
+    #[arg(long, value_name = "LIST", value_parser = ti_dialect, verbatim_doc_comment)]
+    pub ti_dialect: Option<Dialect>,
+}
+
+/// The rules by which objects and cells are counted.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Evaluation")]
+struct EvaluationArgs {
+    /// Objects slower than this are not counted, in m/s; they still hide others [default: 1]
+    #[arg(long, value_name = "M/S")]
+    min_speed: Option<f64>,
+    /// Height above the road at which visibility is judged, in metres [default: 1]
+    #[arg(long, value_name = "METRES")]
+    slice_height: Option<f64>,
+    /// Start of each recording that is not counted, in seconds [default: 1; 0 for independent frames]
+    #[arg(long, value_name = "SECONDS")]
+    warm_up: Option<f64>,
+    /// A detection belongs to an object within this distance of its footprint, in metres [default: 1]
+    #[arg(long, value_name = "METRES")]
+    growth: Option<f64>,
+    /// The footprint grows further across the line of sight, in degrees of azimuth to each side [default: 1]
+    #[arg(long, value_name = "DEGREES")]
+    growth_azimuth: Option<f64>,
+    /// A detection's radial velocity must match the object's within this, in m/s [default: 1.5]
+    #[arg(long, value_name = "M/S")]
+    doppler_tolerance: Option<f64>,
+    /// An object is detected from this many detections on [default: 1]
+    ///
+    /// More where labels were drawn on what the radar itself saw.
+    #[arg(long, value_name = "N")]
+    min_detections: Option<u32>,
+    /// Cells an object's visibility is judged on [default: cartesian]
+    #[arg(long, value_enum)]
+    grid: Option<Grid>,
+    /// Draws behind each 95 % interval; 0 for no intervals [default: 1000]
+    ///
+    /// Tracks are drawn with replacement (independent frames where the recording has them; for cells
+    /// blocks of one second), since samples of one track are correlated. All estimators share the draws.
+    #[arg(long, value_name = "N")]
+    bootstrap: Option<u32>,
+    /// Seed of the draws [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+/// What the estimators are given.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Estimators")]
+struct EstimatorArgs {
+    /// Detections a frame that estimators take, after the gate; the weakest beyond are dropped and counted [default: 256]
+    #[arg(long, value_name = "N")]
+    max_detections: Option<usize>,
+    /// Share of a cell that boxes must fill for `reference` to call it occupied [default: 0.5]
+    #[arg(long, value_name = "SHARE")]
+    reference_share: Option<f64>,
+}
+
+impl SettingsArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.judging.files()
+    }
+
+    /// Defaults, then the file, then the command line.
+    ///
+    /// # Errors
+    /// Those of [`JudgingArgs::settings`].
+    pub fn settings(&self) -> Result<Settings> {
+        Ok(Settings { reading: self.reading.options(), ..self.judging.settings()? })
+    }
+}
+
+impl JudgingArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.config.clone().into_iter()
+    }
+
+    /// Defaults, then the file, then the command line; recordings are read as they are.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a key it should not have (with its line), a value out of range.
+    pub fn settings(&self) -> Result<Settings> {
+        let config = self.config.as_deref().map(read_config).transpose()?.unwrap_or_default();
+        let mut settings =
+            Settings { reading: ReadOptions::default(), evaluation: config.evaluation, estimators: config.estimators };
+        self.evaluation.apply(&mut settings.evaluation);
+        self.estimators.apply(&mut settings.estimators);
+        settings.evaluation.check()?;
+        settings.estimators.judge_at(settings.evaluation.slice_height_m);
+        Ok(settings)
+    }
+}
+
+fn read_config(path: &Path) -> Result<Config> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    toml::from_str(&text).with_context(|| format!("configuration {}", path.display()))
+}
+
+impl ReadingArgs {
+    fn options(&self) -> ReadOptions {
+        ReadOptions {
+            radar_topic: self.radar_topic.clone(),
+            truth_topic: self.truth_topic.clone(),
+            mount: self.mount,
+            field_of_view: self.fov,
+            from_s: self.from,
+            to_s: self.to,
+            sensor_id: self.sensor_id,
+            profile: self.kind.radar,
+            ti_header: self.kind.ti_header,
+            ti_dialect: self.kind.ti_dialect,
+            frame_period_s: self.frame_period,
+        }
+    }
+}
+
+fn set<T: Copy>(option: Option<T>, place: &mut T) {
+    if let Some(value) = option {
+        *place = value;
+    }
+}
+
+impl EvaluationArgs {
+    fn apply(&self, options: &mut evaluation::Options) {
+        set(self.min_speed, &mut options.min_speed_mps);
+        set(self.slice_height, &mut options.slice_height_m);
+        set(self.warm_up, &mut options.warm_up_s);
+        set(self.growth, &mut options.growth_m);
+        set(self.growth_azimuth, &mut options.growth_azimuth_deg);
+        set(self.doppler_tolerance, &mut options.doppler_tolerance_mps);
+        set(self.min_detections, &mut options.min_detections);
+        set(self.grid, &mut options.grid);
+        set(self.bootstrap, &mut options.bootstrap);
+        set(self.seed, &mut options.seed);
+    }
+}
+
+impl EstimatorArgs {
+    fn apply(&self, options: &mut estimators::Options) {
+        set(self.max_detections, &mut options.max_detections);
+        set(self.reference_share, &mut options.reference_share);
+    }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let value: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
+    if value.is_finite() { Ok(value) } else { Err(format!("`{text}` is not finite")) }
+}
+
+/// `N` numbers between commas.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let values = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
+    let found = values.len();
+    values.try_into().map_err(|_| format!("{found} values, {N} are needed"))
+}
+
+fn profile(text: &str) -> Result<&'static Profile, String> {
+    let names = || PROFILES.map(|p| p.name).join(", ");
+    Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
+}
+
+fn ti_header(text: &str) -> Result<Family, String> {
+    let bytes = text.trim().parse().unwrap_or(0);
+    Family::ALL.into_iter().find(|f| f.header() == bytes).ok_or_else(|| format!("`{text}` is not 36, 40, 44, 48 or 52"))
+}
+
+fn ti_dialect(text: &str) -> Result<Dialect, String> {
+    text.split(',').map(str::trim).try_fold(Dialect::USUAL, |mut dialect, word| {
+        match (word, word.strip_prefix("doppler=").map(finite)) {
+            ("degrees", _) => dialect.angles = AngleUnit::Degrees,
+            ("raised", _) => dialect.polar_points = PolarPoints::Raised,
+            ("no-elevation", _) => dialect.has_elevation = false,
+            ("targets", _) => dialect.entries = Entries::Targets,
+            (_, Some(Ok(step))) if step > 0.0 => dialect.doppler_step_mps = Some(step as f32),
+            (_, Some(_)) => return Err(format!("`{word}`: a Doppler step is a number of m/s above 0")),
+            _ => return Err(format!("no `{word}`; there are degrees, raised, no-elevation, targets, doppler=M/S")),
+        }
+        Ok(dialect)
+    })
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    let seconds = finite(text)?;
+    if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
+}
+
+fn mount(text: &str) -> Result<[f64; 6], String> {
+    let [x, y, z, yaw, pitch, roll] = numbers(text)?;
+    if z <= 0.0 {
+        return Err(format!("the mount's height z = {z} m is not above the road"));
+    }
+    Ok([x, y, z, yaw.to_radians(), pitch.to_radians(), roll.to_radians()])
+}
+
+fn field_of_view(text: &str) -> Result<FieldOfView, String> {
+    let [az0, az1, el0, el1, r0, r1] = numbers(text)?;
+    for (what, lo, hi) in [("azimuth", az0, az1), ("elevation", el0, el1), ("range", r0, r1)] {
+        if lo >= hi {
+            return Err(format!("{what} from {lo} to {hi} is no interval: the lower limit comes first"));
+        }
+    }
+    Ok(FieldOfView {
+        azimuth_rad: [az0.to_radians(), az1.to_radians()],
+        elevation_rad: [el0.to_radians(), el1.to_radians()],
+        range_m: [r0, r1],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: SettingsArgs,
+    }
+
+    fn parse(line: &[&str]) -> Result<Settings> {
+        Line::try_parse_from([&["viewshed"], line].concat())?.settings.settings()
+    }
+
+    #[test]
+    fn angles_are_given_in_degrees() {
+        let s = parse(&["--mount", "-1,2,6,0,4,0", "--fov=-60,60,-16,16,3,200"]).unwrap();
+        let [x, .., pitch, _] = s.reading.mount.unwrap();
+        assert_eq!((x, pitch), (-1.0, 4_f64.to_radians()));
+        assert_eq!(s.reading.field_of_view.unwrap().azimuth_rad[0], -60_f64.to_radians());
+    }
+
+    #[test]
+    fn impossible_values_say_what_is_wrong() {
+        let error = |line: &[&str]| parse(line).unwrap_err().to_string();
+        assert!(error(&["--mount", "0,0,-6,0,4,0"]).contains("not above the road"));
+        assert!(error(&["--mount", "0,0,6"]).contains("3 values, 6 are needed"));
+        assert!(error(&["--fov", "60,-60,-16,16,3,200"]).contains("azimuth from 60 to -60 is no interval"));
+        assert!(error(&["--fov", "nan,60,-16,16,3,200"]).contains("not finite"));
+        assert!(error(&["--min-detections", "0"]).contains("`min_detections` is 0"));
+    }
+
+    #[test]
+    fn a_dialect_is_a_list() {
+        let dialect = |text: &str| parse(&["--ti-dialect", text]).map(|s| s.reading.ti_dialect.unwrap());
+        let all = dialect("degrees,raised, no-elevation,targets,doppler=0.12").unwrap();
+        let expected = Dialect {
+            angles: AngleUnit::Degrees,
+            polar_points: PolarPoints::Raised,
+            has_elevation: false,
+            doppler_step_mps: Some(0.12),
+            entries: Entries::Targets,
+        };
+        assert_eq!(all, expected);
+        assert_eq!(dialect("targets").unwrap(), Dialect { entries: Entries::Targets, ..Dialect::USUAL });
+        assert!(dialect("radians").unwrap_err().to_string().contains("there are degrees"));
+        assert!(dialect("doppler=0").is_err() && dialect("doppler=x").is_err() && dialect("").is_err());
+    }
+
+    #[test]
+    fn the_command_line_wins_over_the_defaults() {
+        let s = parse(&["--min-speed", "3", "--grid", "polar", "--max-detections", "4096"]).unwrap();
+        assert_eq!((s.evaluation.min_speed_mps, s.evaluation.grid), (3.0, Grid::Polar));
+        assert_eq!(s.evaluation.growth_m, 1.0);
+        assert_eq!(s.estimators.max_detections, 4096);
+        let s = parse(&["--slice-height", "0.5"]).unwrap();
+        assert_eq!(s.estimators.radar_3d.visibility.slice_height_m, 0.5, "truth and estimators share the height");
+    }
+}

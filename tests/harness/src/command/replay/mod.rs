@@ -1,0 +1,221 @@
+//! `viewshed replay`: recordings in, the paper's table out.
+
+mod board;
+mod out;
+mod pictures;
+pub mod shipped;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+
+use super::progress::bar;
+use super::{BAD_INPUT, complain, print};
+use crate::command::options::SettingsArgs;
+use crate::evaluation::Settings;
+use crate::evaluation::examples::{self, Example};
+use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
+use crate::evaluation::replay::{Replay, steps};
+use crate::results::files::{OutputArgs, Target};
+use crate::results::foxglove;
+use crate::results::report::csv::SampleWriter;
+use crate::results::report::json::{self, Report};
+use crate::results::report::{ORIGIN, table};
+use crate::{estimators, recording};
+
+/// The estimator examples are looked for in.
+const SHOWN: &str = "radar-3d";
+
+/// Replay recordings through the estimators and report how far their maps can be trusted
+///
+/// For every radar frame each estimator says where the sensor can see. Every labelled object inside the
+/// field of view is then compared: was it called visible (V), was it detected (D)? TVR = share of detected
+/// objects called visible, FVR = share of undetected ones called visible (unknown blind spots: unsafe),
+/// FIR = share of detected ones called invisible (less availability). The rows geometry-slice and
+/// geometry-box are exact lines of sight past the labelled boxes, the bounds of any such method. Cell FVR
+/// and FIR compare the map itself with exact lines of sight, wherever traffic passes.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// MCAP recordings, CAN logs of `candump -L` (ARS408), captures of a TI mmWave radar's data port or of the
+    /// native format [default: the MCAP files in tests/recordings]
+    #[arg(value_name = "RECORDING")]
+    recordings: Vec<PathBuf>,
+    /// Write everything that was found as JSON: an object, for several recordings an array
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    json: Option<PathBuf>,
+    /// Write every object at every counted frame as CSV: V_O and grade of each estimator, D_O, class, range
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    csv: Option<PathBuf>,
+    /// Write the input with an estimator's map beside it, to open in Foxglove or Lichtblick
+    ///
+    /// The map is a foxglove.Grid on /visibility/ESTIMATOR: blue is visible, orange invisible, dark occupied,
+    /// nothing unknown. Show it in a 3D panel with `road` as the fixed frame.
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    mcap: Option<PathBuf>,
+    /// Estimator whose map goes into --mcap
+    #[arg(long, value_name = "NAME", default_value = SHOWN, help_heading = "Results")]
+    mcap_estimator: String,
+    /// Write table and pictures into this folder, one subfolder a recording where there are several
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    out: Option<PathBuf>,
+    /// Print the rates by class and by distance too
+    #[arg(long, help_heading = "Results")]
+    breakdown: bool,
+    /// Replay again with the mount wrong by this pitch (degrees) and height (metres), each way
+    ///
+    /// Only the estimators are told the wrong mount, truth keeps the right one. Without values 0.5,0.2;
+    /// others as --mount-error=1,0.1
+    #[arg(
+        long,
+        value_name = "PITCH,HEIGHT",
+        value_parser = extent,
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0.5,0.2",
+        help_heading = "Results"
+    )]
+    mount_error: Option<Extent>,
+    #[command(flatten)]
+    processor: board::BoardArgs,
+    #[command(flatten)]
+    outputs: OutputArgs,
+    #[command(flatten)]
+    settings: SettingsArgs,
+}
+
+/// Replays one recording after the other. One that cannot be replayed is told, and the rest go on.
+///
+/// # Errors
+/// Options that cannot be used at all, and files that cannot be written.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    let settings = args.settings.settings()?;
+    let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
+    outputs.reads(args.settings.files());
+    let json_file = outputs.file("--json", args.json.as_deref())?;
+    let out = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
+    if args.processor.board.is_some() || args.processor.port.is_some() {
+        let pictures = out.map_or_else(|| outputs.folder("--out", Path::new("out")), Ok)?;
+        return board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings);
+    }
+    if args.mcap.is_some() && paths.len() > 1 {
+        bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());
+    }
+    let mcap = outputs.file("--mcap", args.mcap.as_deref())?;
+    let csv = outputs.file("--csv", args.csv.as_deref())?;
+    let folders = out.map(|out| out::folders(&out, &paths)).transpose()?;
+    let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
+    let mut reports = Vec::new();
+    let mut failed = false;
+    for (k, path) in paths.iter().enumerate() {
+        let one = match replay(path, args, mcap.as_ref(), &settings) {
+            Ok(one) => one,
+            Err(error) => {
+                complain(&error);
+                failed = true;
+                continue;
+            }
+        };
+        let text = one.text(args, &settings);
+        print(&text)?;
+        if let Some(csv) = &mut samples {
+            csv.write(&one.replay)?;
+        }
+        if let Some(folder) = folders.as_ref().and_then(|f| f.get(k)) {
+            out::write(folder, &text, &one.replay, &one.examples, &settings)?;
+        }
+        reports.push(one.report(&settings));
+    }
+    if let Some(csv) = samples.filter(|_| !reports.is_empty()) {
+        csv.finish()?.finish()?;
+    }
+    if let Some(file) = json_file {
+        // the number asked for decides the form, not the number that could be read
+        match (&paths[..], &reports[..]) {
+            ([_], []) => {}
+            ([_], [report, ..]) => file.write(json::object(report)?)?,
+            (_, several) => file.write(json::array(several)?)?,
+        }
+    }
+    if !reports.is_empty() {
+        print(&format!("\n{ORIGIN}\n"))?;
+    }
+    Ok(if failed { ExitCode::from(BAD_INPUT) } else { ExitCode::SUCCESS })
+}
+
+/// One recording replayed, with what was asked for beside its rates.
+struct Replayed {
+    replay: Replay,
+    examples: Vec<Example>,
+    mount_error: Option<Vec<Sensitivity>>,
+}
+
+fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) -> Result<Replayed> {
+    let recording = recording::read(path, &settings.reading).map_err(|error| named(error, path))?;
+    let mut running = estimators::all(&recording, &settings.estimators)?;
+    let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
+    let replaying = bar(&format!("replaying {name}"), passes);
+    let replay = Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step());
+    drop(replaying);
+
+    if let Some(target) = mcap {
+        write_mcap(path, target, &args.mcap_estimator, &replay, settings)?;
+    }
+    let wrong = |extent: Extent| {
+        let again = bar(&format!("replaying {name} with a wrong mount"), 4 * passes);
+        sensitivity(&replay, extent, &settings.evaluation, &settings.estimators, &|| again.step())
+    };
+    // without truth there are no rates that could move
+    let labelled = replay.recording.truth.is_some();
+    let mount_error = args.mount_error.filter(|_| labelled).map(wrong).transpose()?;
+    let examples =
+        replay.score(SHOWN).map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
+    Ok(Replayed { replay, examples, mount_error })
+}
+
+/// The error with the file's name before it, where it does not say it itself.
+fn named(error: anyhow::Error, path: &Path) -> anyhow::Error {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    if format!("{error:#}").contains(&*stem) { error } else { error.context(path.display().to_string()) }
+}
+
+fn write_mcap(source: &Path, target: &Target, estimator: &str, replay: &Replay, settings: &Settings) -> Result<()> {
+    let recording = &replay.recording;
+    let mut all = estimators::all(recording, &settings.estimators)?;
+    let names: Vec<String> = all.iter().map(|e| e.name().to_owned()).collect();
+    let Some(estimator) = all.iter_mut().find(|e| e.name() == estimator) else {
+        bail!("--mcap-estimator: no estimator `{estimator}`; there are {}", names.join(", "));
+    };
+    let writing = bar(&format!("writing {}", target.path().display()), recording.frames.len() as u64);
+    foxglove::write(source, target, recording, &settings.reading, estimator.as_mut(), &|| writing.step())
+}
+
+impl Replayed {
+    fn text(&self, args: &Args, settings: &Settings) -> String {
+        let mut text = table::text(&self.replay, &settings.evaluation);
+        if args.breakdown {
+            text += &table::breakdown(&self.replay.summary);
+        }
+        if let Some(sensitivities) = &self.mount_error {
+            text += &table::mount_error(sensitivities);
+        }
+        text
+    }
+
+    fn report(&self, settings: &Settings) -> Report {
+        let options = json::Options {
+            reading: &settings.reading,
+            evaluation: &settings.evaluation,
+            estimators: &settings.estimators,
+        };
+        json::report(&self.replay, self.mount_error.as_deref(), &self.examples, options)
+    }
+}
+
+fn extent(text: &str) -> Result<Extent, String> {
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
+    let wrong = || format!("`{text}` is not PITCH,HEIGHT: two numbers from 0, in degrees and metres");
+    let (pitch, height) = text.split_once(',').ok_or_else(wrong)?;
+    Ok(Extent { pitch_deg: number(pitch).ok_or_else(wrong)?, height_m: number(height).ok_or_else(wrong)? })
+}

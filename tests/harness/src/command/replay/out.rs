@@ -1,0 +1,54 @@
+//! What `--out` leaves in a folder: the table as text, and pictures.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+
+use super::{SHOWN, pictures};
+use crate::evaluation::Settings;
+use crate::evaluation::examples::Example;
+use crate::evaluation::replay::Replay;
+use crate::results::files::Folder;
+use crate::results::report::ORIGIN;
+
+/// The folder of each recording: the one named for a single recording, one inside it for each of several.
+///
+/// # Errors
+/// Two recordings of one name: the second would overwrite the first.
+pub fn folders(dir: &Folder, recordings: &[PathBuf]) -> Result<Vec<Folder>> {
+    if recordings.len() == 1 {
+        return Ok(vec![dir.clone()]);
+    }
+    let names: Vec<&OsStr> = recordings.iter().map(|path| path.file_stem().unwrap_or_default()).collect();
+    let distinct = names.iter().collect::<BTreeSet<_>>().len();
+    ensure!(distinct == names.len(), "--out: two of the recordings have one name; replay them one by one");
+    Ok(names.iter().map(|name| dir.folder(name)).collect())
+}
+
+/// Fills one recording's folder.
+pub fn write(folder: &Folder, text: &str, replay: &Replay, examples: &[Example], settings: &Settings) -> Result<()> {
+    folder.file("table.txt")?.write(format!("{text}\n{ORIGIN}\n"))?;
+    pictures::write(folder, replay, SHOWN, examples, settings)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::results::files::OutputArgs;
+
+    #[test]
+    fn several_recordings_have_a_folder_each() {
+        let paths = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
+        let folder = OutputArgs::default().beside([]).folder("--out", Path::new("o")).unwrap();
+        let of = |names: &[&str]| {
+            folders(&folder, &paths(names)).map(|all| all.iter().map(|f| f.path().to_owned()).collect())
+        };
+        assert_eq!(of(&["a/x.mcap"]).ok(), Some(paths(&["o"])));
+        assert_eq!(of(&["a/x.mcap", "y.mcap"]).ok(), Some(paths(&["o/x", "o/y"])));
+        assert!(of(&["a/x.mcap", "b/x.mcap"]).is_err());
+    }
+}

@@ -1,0 +1,233 @@
+//! The pictures of one replay: a frame from above, found examples, the polar grid, the trade-offs.
+
+use anyhow::Result;
+
+use crate::command::progress::bar;
+use crate::estimators;
+use crate::estimators::Estimator;
+use crate::evaluation::Settings;
+use crate::evaluation::counts::Outcome;
+use crate::evaluation::curve::CurvePoint;
+use crate::evaluation::examples::Example;
+use crate::evaluation::replay::{Replay, visit};
+use crate::evaluation::score::Score;
+use crate::evaluation::summary::Row;
+use crate::geometry::solid::Solid;
+use crate::results::files::Folder;
+use crate::results::pictures::birdseye;
+use crate::results::pictures::polar::{self, PolarGrid};
+use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
+use crate::results::pictures::tradeoff::{self, Curve, Marker, MarkerKind, Span, TradeOff};
+use crate::results::pictures::{canvas::Canvas, palette};
+
+/// Estimators that are drawn from above at the chosen frame, beside the one examples are of.
+const ALSO_DRAWN: [&str; 2] = ["radar-2d", "reference"];
+
+/// Draws everything into a folder.
+pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example], settings: &Settings) -> Result<()> {
+    let drawing = bar("drawing pictures", 1);
+    let chosen = chosen_frame(replay, examples);
+    let mut all = estimators::all(&replay.recording, &settings.estimators)?;
+    for estimator in &mut all {
+        let name = estimator.name().to_owned();
+        if name == shown {
+            let mut frames: Vec<usize> = examples.iter().map(|e| e.frame).collect();
+            frames.push(chosen);
+            let mut outcome = Ok(());
+            visit(&replay.recording, estimator.as_mut(), &frames, |frame, estimator| {
+                if outcome.is_ok() {
+                    outcome = shown_frame(folder, replay, examples, estimator, frame, frame == chosen, settings);
+                }
+            });
+            outcome?;
+        } else if ALSO_DRAWN.contains(&name.as_str()) {
+            let mut canvas = None;
+            visit(&replay.recording, estimator.as_mut(), &[chosen], |frame, estimator| {
+                canvas = Some(from_above(replay, estimator, frame, None, settings));
+            });
+            save(canvas, folder, &format!("birdseye-{name}"))?;
+        }
+    }
+    save(trade_off(replay, "objects", |row| (&row.curve, rates(row))), folder, "tradeoff-objects")?;
+    save(trade_off(replay, "road cells", |row| (&row.cell_curve, cell_rates(row))), folder, "tradeoff-cells")?;
+    drawing.step();
+    Ok(())
+}
+
+fn save(canvas: Option<Canvas>, folder: &Folder, name: &str) -> Result<()> {
+    canvas.map_or(Ok(()), |c| c.save(&folder.file(format!("{name}.png"))?))
+}
+
+/// The frame of the true invisible example, which has something to show; else the middle one.
+fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
+    let telling = examples.iter().find(|e| e.outcome == Outcome::Ti).or(examples.first());
+    telling.map_or(replay.recording.frames.len() / 2, |e| e.frame)
+}
+
+fn shown_frame(
+    folder: &Folder,
+    replay: &Replay,
+    examples: &[Example],
+    estimator: &dyn Estimator,
+    frame: usize,
+    chosen: bool,
+    settings: &Settings,
+) -> Result<()> {
+    let name = estimator.name();
+    if chosen {
+        save(Some(from_above(replay, estimator, frame, None, settings)), folder, &format!("birdseye-{name}"))?;
+        save(polar_grid(replay, estimator, frame), folder, &format!("polar-{name}"))?;
+    }
+    for example in examples.iter().filter(|e| e.frame == frame) {
+        let picture = from_above(replay, estimator, frame, Some(example), settings);
+        save(Some(picture), folder, &format!("example-{}", example.outcome.name()))?;
+    }
+    Ok(())
+}
+
+fn title(replay: &Replay, name: &str, frame: usize) -> String {
+    let recording = &replay.recording;
+    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+    let time = recording.frames.get(frame).map_or(0, |f| f.time_ns.saturating_sub(start));
+    format!("{} · {name} · {:.2} s", recording.name, time as f64 * 1e-9)
+}
+
+/// What has to be said of the data: whose it is.
+fn caption(replay: &Replay) -> Option<String> {
+    let sensor = &replay.recording.sensor;
+    Some(match &sensor.licence {
+        Some(licence) => format!("{} · {licence}", sensor.name),
+        None => sensor.name.clone(),
+    })
+}
+
+fn from_above(
+    replay: &Replay,
+    estimator: &dyn Estimator,
+    frame: usize,
+    example: Option<&Example>,
+    settings: &Settings,
+) -> Canvas {
+    let recording = &replay.recording;
+    let objects =
+        recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default();
+    let boxes: Vec<TruthBox> = objects
+        .iter()
+        .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
+        .collect();
+    let highlight = example.and_then(|e| {
+        let sample = replay.samples.get(frame)?.objects.get(e.object)?;
+        let solid = objects.iter().find(|o| o.track == sample.track)?.solid;
+        let note = format!(
+            "{}: {} {} at {:.0} m, lasting {} frames",
+            e.outcome.name(),
+            e.class,
+            e.object_id,
+            e.distance_m,
+            e.lasts
+        );
+        Some(Highlight::on(solid, &recording.pose, note))
+    });
+    let scene = Scene {
+        map: estimator.map(),
+        pose: recording.pose,
+        field_of_view: recording.sensor.field_of_view,
+        slice_height_m: settings.evaluation.slice_height_m,
+        window: window(replay),
+        detections: recording.frames.get(frame).map_or(&[], |f| &f.detections),
+        boxes,
+        road: &[],
+        title: title(replay, estimator.name(), frame),
+        caption: caption(replay),
+        highlight,
+    };
+    birdseye::draw(&scene)
+}
+
+/// Everything labelled inside the field of view, and the sensor; without labels the detections.
+fn window(replay: &Replay) -> Window {
+    let recording = &replay.recording;
+    let inside = |p: [f64; 3]| recording.sensor.field_of_view.contains(recording.pose.to_spherical(p));
+    let sensor = [recording.pose.position[0], recording.pose.position[1]];
+    let solids = recording.truth.iter().flat_map(|t| t.solids());
+    let mut points: Vec<[f64; 2]> =
+        solids.filter(|s: &&Solid| inside(s.center)).map(|s| [s.center[0], s.center[1]]).collect();
+    if points.is_empty() {
+        let detections = recording.frames.iter().flat_map(|f| &f.detections);
+        points = detections
+            .map(|d| d.road_position(&recording.pose, 1.0))
+            .filter(|p| inside(*p))
+            .map(|p| [p[0], p[1]])
+            .collect();
+    }
+    points.push(sensor);
+    Window::around(points, 6.0)
+}
+
+/// How an estimator's verdict on a track compares with its detection; `None` where it is not counted.
+fn outcome(replay: &Replay, name: &str, frame: usize, track: usize) -> Option<palette::Outcome> {
+    let samples = replay.samples.get(frame)?;
+    let index = samples.objects.iter().position(|s| s.track == track)?;
+    let score: &Score = replay.score(name)?;
+    let verdict = score.verdicts.get(frame)?.get(index)?;
+    Some(palette::Outcome::of(verdict.visible, samples.objects.get(index)?.detected))
+}
+
+fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
+    let cells = estimator.polar()?;
+    Some(polar::draw(&PolarGrid {
+        azimuths: cells.azimuths,
+        ranges: cells.ranges,
+        azimuth_rad: cells.azimuth_rad,
+        range_m: [0.0, cells.cell_m * cells.ranges as f64],
+        state: &*cells.cell,
+        title: title(replay, estimator.name(), frame),
+        caption: caption(replay),
+    }))
+}
+
+/// A point with its intervals: FVR, FIR.
+type Rates = [(Option<f64>, Option<[f64; 2]>); 2];
+
+fn rates(row: &Row) -> Rates {
+    let i = &row.intervals;
+    [(row.counts.fvr(), i.fvr.as_ref().map(|i| [i.0, i.1])), (row.counts.fir(), i.fir.as_ref().map(|i| [i.0, i.1]))]
+}
+
+fn cell_rates(row: &Row) -> Rates {
+    let i = &row.intervals;
+    [
+        (row.cell_fvr(), i.cell_fvr.as_ref().map(|i| [i.0, i.1])),
+        (row.cell_fir(), i.cell_fir.as_ref().map(|i| [i.0, i.1])),
+    ]
+}
+
+/// The chart, unless there is nothing to draw.
+fn trade_off(replay: &Replay, what: &str, of: impl Fn(&Row) -> (&Vec<CurvePoint>, Rates)) -> Option<Canvas> {
+    let mut chart = TradeOff {
+        curves: Vec::new(),
+        markers: Vec::new(),
+        span: Span::Full,
+        title: format!(
+            "{} · {what} · false visible against false invisible, by the threshold on the grade",
+            replay.recording.name
+        ),
+        caption: caption(replay),
+    };
+    for row in &replay.summary.rows {
+        let (points, [(fvr, fvr_interval), (fir, fir_interval)]) = of(row);
+        if !points.is_empty() && row.name != "radar-2d-first" {
+            // both readings of the flat grid lie on one curve
+            let points = points.iter().map(|p| tradeoff::CurvePoint {
+                threshold: Some(f64::from(p.threshold)),
+                fvr: p.fvr,
+                fir: p.fir,
+            });
+            chart.curves.push(Curve { name: row.name.clone(), points: points.collect() });
+        }
+        let (Some(fvr), Some(fir)) = (fvr, fir) else { continue };
+        let kind = if points.is_empty() { MarkerKind::Bound } else { MarkerKind::OperatingPoint };
+        chart.markers.push(Marker { name: row.name.clone(), kind, fvr, fir, fvr_interval, fir_interval });
+    }
+    (!chart.markers.is_empty()).then(|| tradeoff::draw(&chart))
+}

@@ -1,0 +1,179 @@
+//! Several recordings judged as one: their seconds in a row, their tracks told apart.
+//!
+//! A long recording is first summed up by seconds, the blocks that cells are drawn again by ([`super::units`]):
+//! what rates and intervals are made of stays, the maps' cells frame by frame go.
+
+use super::Options;
+use super::cells::CellTally;
+use super::replay::Replay;
+use super::samples::FrameSamples;
+use super::score::{Score, Verdict};
+use super::summary::Summary;
+use super::units::BLOCK_NS;
+use crate::recording::problems::Problems;
+use crate::recording::truth::Truth;
+use crate::recording::{Frame, Recording};
+
+/// One recording's samples and scores by seconds from its first frame on.
+#[derive(Debug)]
+pub struct Seconds {
+    recording: Recording,
+    seconds: Vec<Second>,
+    /// Scores without verdicts and cells, which are in `seconds`.
+    scores: Vec<Score>,
+}
+
+#[derive(Debug, Default, Clone)]
+struct Second {
+    /// Counted frames in it.
+    frames: usize,
+    samples: FrameSamples,
+    /// Of each score.
+    verdicts: Vec<Vec<Verdict>>,
+    cells: Vec<CellTally>,
+}
+
+impl Seconds {
+    /// Sums up what was scored; `samples` lie in the recording's order.
+    pub fn new(mut recording: Recording, samples: &[FrameSamples], mut scores: Vec<Score>) -> Self {
+        let frames = std::mem::take(&mut recording.frames);
+        let start = frames.first().map_or(0, |f| f.time_ns);
+        let mut seconds: Vec<Second> = Vec::new();
+        for (k, (frame, sample)) in frames.iter().zip(samples).enumerate() {
+            if !sample.counted {
+                continue;
+            }
+            let at = usize::try_from(frame.time_ns.saturating_sub(start) / BLOCK_NS).unwrap_or(0);
+            let empty = Second {
+                verdicts: vec![Vec::new(); scores.len()],
+                cells: vec![CellTally::default(); scores.len()],
+                ..Second::default()
+            };
+            if seconds.len() <= at {
+                seconds.resize(at + 1, empty);
+            }
+            let second = &mut seconds[at];
+            second.frames += 1;
+            second.samples.counted = true;
+            // the cells under an object have been looked at
+            second.samples.objects.extend(sample.objects.iter().cloned().map(|mut s| {
+                s.cells = Vec::new();
+                s
+            }));
+            for (i, score) in scores.iter().enumerate() {
+                second.verdicts[i].extend_from_slice(&score.verdicts[k]);
+                if let Some(tally) = score.cells.get(k) {
+                    second.cells[i].counts += tally.counts;
+                    second.cells[i].grades.add_times(&tally.grades, 1);
+                }
+            }
+        }
+        for score in &mut scores {
+            score.verdicts = Vec::new();
+            score.cells = Vec::new();
+        }
+        Self { recording, seconds, scores }
+    }
+}
+
+/// Judges the seconds of all `parts` from `from_s` on together. All parts have the same scores.
+///
+/// The frames of the result are seconds, but for the number of frames in its summary.
+pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> Option<Replay> {
+    let first = parts.first()?;
+    let mut tracks = Vec::new();
+    let mut frames = Vec::new();
+    let mut counted = 0;
+    let mut samples = Vec::new();
+    let mut scores: Vec<Score> = first.scores.iter().map(|s| Score { counters: Vec::new(), ..s.clone() }).collect();
+    for part in parts {
+        let known = tracks.len();
+        tracks.extend(part.recording.truth.iter().flat_map(|t| t.tracks.iter().cloned()));
+        for (sum, score) in scores.iter_mut().zip(&part.scores) {
+            for (reason, n) in &score.counters {
+                match sum.counters.iter_mut().find(|(known, _)| known == reason) {
+                    Some((_, total)) => *total += n,
+                    None => sum.counters.push((reason.clone(), *n)),
+                }
+            }
+        }
+        for (_, second) in part.seconds.iter().enumerate().filter(|(k, _)| *k as f64 >= from_s) {
+            frames.push(Frame { time_ns: frames.len() as i64 * BLOCK_NS, detections: Vec::new() });
+            counted += second.frames;
+            let mut sample = second.samples.clone();
+            sample.objects.iter_mut().for_each(|s| s.track += known);
+            samples.push(sample);
+            for (i, score) in scores.iter_mut().enumerate() {
+                // a second without a counted frame has nothing of any score
+                score.verdicts.push(second.verdicts.get(i).cloned().unwrap_or_default());
+                score.cells.push(second.cells.get(i).cloned().unwrap_or_default());
+            }
+        }
+    }
+    let recording = Recording {
+        name: name.to_owned(),
+        sensor: first.recording.sensor.clone(),
+        pose: first.recording.pose,
+        frames,
+        truth: Some(Truth { tracks }),
+        occlusion: Default::default(),
+        problems: Problems::default(),
+    };
+    let mut summary = Summary::new(&recording, &samples, &scores, options);
+    summary.frames = counted;
+    Some(Replay { recording, samples, scores, summary })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bounds::SLICE;
+    use super::super::cells::CellCounts;
+    use super::super::samples::by_hand::{frames, recording, sample};
+    use super::super::score::by_hand::score;
+    use super::*;
+
+    /// 3 s at 10 Hz of two tracks; the second is hidden and found in the last second only.
+    fn part() -> (Recording, Vec<FrameSamples>, Score) {
+        let objects = |k: usize| vec![sample(0, 40.0, true, true), sample(1, 60.0, k >= 20, false)];
+        let samples = frames((0..30).map(objects));
+        let mut score = score("radar-3d", &samples, |s| Some(if s.distance_m < 50.0 { 255 } else { 0 }));
+        for tally in &mut score.cells {
+            tally.add(true, true, Some(200));
+            tally.add(false, true, Some(180));
+        }
+        score.counters = vec![("snr".into(), 2)];
+        (recording(30, 2), samples, score)
+    }
+
+    fn seconds() -> Seconds {
+        let (recording, samples, score) = part();
+        Seconds::new(recording, &samples, vec![score])
+    }
+
+    #[test]
+    fn a_pool_of_one_recording_counts_what_the_recording_counts() {
+        let (recording, samples, score) = part();
+        let whole = Summary::new(&recording, &samples, std::slice::from_ref(&score), &Options::default());
+        let pooled = pool("one", &[&seconds()], 0.0, &Options::default()).unwrap().summary;
+        assert_eq!((pooled.frames, pooled.objects, pooled.blocks), (30, 2, 3));
+        for name in ["radar-3d", SLICE] {
+            let [a, b] = [&whole, &pooled].map(|s| s.row(name).unwrap());
+            assert_eq!((a.counts, &a.to_slice), (b.counts, &b.to_slice), "{name}");
+        }
+        let [a, b] = [&whole.rows[0], &pooled.rows[0]];
+        assert_eq!((a.cells, &a.intervals, &a.cell_curve), (b.cells, &b.intervals, &b.cell_curve));
+    }
+
+    #[test]
+    fn tracks_of_two_recordings_are_not_mixed_up_and_the_warm_up_is_left_out() {
+        let parts = [seconds(), seconds()];
+        let pooled = pool("two", &[&parts[0], &parts[1]], 2.0, &Options::default()).unwrap().summary;
+        assert_eq!((pooled.frames, pooled.objects, pooled.drawn_units, pooled.blocks), (20, 4, 4, 2));
+        let row = &pooled.rows[0];
+        assert_eq!((row.counts.tv, row.counts.fi, row.counts.total()), (20, 20, 40), "the last second of each");
+        let cells = CellCounts { blocked: 20, blocked_visible: 20, clear: 20, clear_not_visible: 0 };
+        assert_eq!(row.cells, Some(cells));
+        assert_eq!(row.counters, [("snr".to_owned(), 4)]);
+        assert!(pool("none", &[], 0.0, &Options::default()).is_none());
+    }
+}

@@ -1,0 +1,147 @@
+//! A recording with an estimator's map beside it, as an MCAP file for Foxglove.
+//!
+//! Radar points, mount and ground truth are copied as they are; after each radar message comes the
+//! map of that frame as a `foxglove.Grid` (JSON) on `/visibility/ESTIMATOR`. In Foxglove: a 3D panel
+//! with fixed frame `road`, and the topic switched on.
+
+pub mod grid;
+pub mod input;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions, Writer};
+
+use crate::estimators::Estimator;
+use crate::geometry::pose::SensorPose;
+use crate::recording::mcap::{POINTS_TOPIC, TRUTH_TOPIC};
+use crate::recording::write::{TF_TOPIC, mount_message, sensor_metadata};
+use crate::recording::{ReadOptions, Recording, Sensor};
+use crate::results::files::{Target, Unfinished};
+use input::{Input, RawMessage};
+
+const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
+
+/// Writes the estimator's maps over `recording`, read from `source` with `options`, to `target`.
+///
+/// `progress` is told each frame done.
+///
+/// # Errors
+/// Files that cannot be read or written, and a field of view too large for a grid.
+pub fn write(
+    source: &Path,
+    target: &Target,
+    recording: &Recording,
+    options: &ReadOptions,
+    estimator: &mut dyn Estimator,
+    progress: &dyn Fn(),
+) -> Result<()> {
+    let extent = grid::Extent::covering(recording)?;
+    let is_radar = |topic: &str, schema: &str| {
+        options.radar_topic.as_deref().unwrap_or(POINTS_TOPIC) == topic
+            || (options.radar_topic.is_none() && schema == RADAR_SCAN)
+    };
+    let is_truth = |topic: &str| options.truth_topic.as_deref().unwrap_or(TRUTH_TOPIC) == topic;
+    // a mount given by hand stands in place of the one recorded
+    let is_mount = |topic: &str| options.mount.is_none() && topic.ends_with("tf_static");
+    let bytes = input::bytes(source, recording)?;
+    let input = input::read(&bytes, |topic, schema| is_radar(topic, schema) || is_truth(topic) || is_mount(topic))?;
+    let radar =
+        |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_radar(&c.topic, &c.schema_name));
+    let mount = |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_mount(&c.topic));
+    let frames = frames_of(&input, recording, radar);
+    let played =
+        input.messages.iter().zip(&frames).filter(|(_, frame)| frame.is_some()).map(|(m, _)| m.header.log_time);
+    let (first, last) = (played.clone().min().unwrap_or(0), played.max().unwrap_or(u64::MAX));
+
+    let mut output = Output::new(target.create()?, &input, &recording.sensor, estimator.name())?;
+    if options.mount.is_some() {
+        let seen = input.messages.iter().zip(&frames).find(|(_, frame)| frame.is_some());
+        let frame_id = seen.and_then(|(m, _)| m.ros_header()).map_or_else(|| "radar".into(), |h| h.frame_id);
+        output.mount(&recording.pose, &frame_id, first)?;
+    }
+    for (message, frame) in input.messages.iter().zip(&frames) {
+        if !mount(message) && !(first..=last).contains(&message.header.log_time) {
+            continue;
+        }
+        output.copy(message)?;
+        if let Some(frame) = frame.and_then(|k| recording.frames.get(k)) {
+            if recording.sensor.frames_independent {
+                estimator.reset();
+            }
+            estimator.step(frame);
+            let data = grid::message(estimator.map(), extent, frame.time_ns)?;
+            output.grid(message.header.log_time, &data)?;
+            progress();
+        }
+    }
+    output.writer.finish().with_context(|| format!("cannot write {}", target.path().display()))?;
+    output.writer.into_inner().finish()
+}
+
+/// Which frame each message became: frames are the readable radar messages, in their order.
+fn frames_of(input: &Input, recording: &Recording, radar: impl Fn(&RawMessage) -> bool) -> Vec<Option<usize>> {
+    let mut next = 0;
+    let frame = |message: &RawMessage| {
+        let wanted = recording.frames.get(next)?.time_ns;
+        (radar(message) && message.stamp_ns() == Some(wanted)).then(|| {
+            next += 1;
+            next - 1
+        })
+    };
+    input.messages.iter().map(frame).collect()
+}
+
+/// The file being written.
+struct Output {
+    writer: Writer<Unfinished>,
+    /// Channels of the input by its number.
+    copied: BTreeMap<u16, u16>,
+    grids: u16,
+    sequence: u32,
+}
+
+impl Output {
+    /// The sensor as it was used goes along, so that the copy can be replayed too.
+    fn new(sink: Unfinished, input: &Input, sensor: &Sensor, estimator: &str) -> Result<Self> {
+        let mut writer = WriteOptions::new().compression(Some(Compression::Zstd)).create(sink)?;
+        writer.write_metadata(&sensor_metadata(sensor))?;
+        let mut copied = BTreeMap::new();
+        for (&id, c) in &input.channels {
+            let schema = match c.schema_name.as_str() {
+                "" => 0,
+                name => writer.add_schema(name, &c.schema_encoding, &c.schema_data)?,
+            };
+            copied.insert(id, writer.add_channel(schema, &c.topic, &c.message_encoding, &c.metadata)?);
+        }
+        let schema = writer.add_schema(grid::SCHEMA_NAME, "jsonschema", grid::SCHEMA.as_bytes())?;
+        let grids = writer.add_channel(schema, &format!("/visibility/{estimator}"), "json", &BTreeMap::new())?;
+        Ok(Self { writer, copied, grids, sequence: 0 })
+    }
+
+    fn copy(&mut self, message: &RawMessage) -> Result<()> {
+        if let Some(&channel_id) = self.copied.get(&message.header.channel_id) {
+            let header = MessageHeader { channel_id, ..message.header };
+            self.writer.write_to_known_channel(&header, &message.data)?;
+        }
+        Ok(())
+    }
+
+    fn grid(&mut self, log_time: u64, data: &[u8]) -> Result<()> {
+        let header =
+            MessageHeader { channel_id: self.grids, sequence: self.sequence, log_time, publish_time: log_time };
+        self.sequence = self.sequence.wrapping_add(1);
+        Ok(self.writer.write_to_known_channel(&header, data)?)
+    }
+
+    /// The mount in use, from the road to the frame the radar's messages name.
+    fn mount(&mut self, pose: &SensorPose, frame_id: &str, log_time: u64) -> Result<()> {
+        let (schema, definition, data) = mount_message(pose, frame_id, log_time as i64)?;
+        let schema = self.writer.add_schema(schema, "ros2msg", definition.as_bytes())?;
+        let channel_id = self.writer.add_channel(schema, TF_TOPIC, "cdr", &BTreeMap::new())?;
+        let header = MessageHeader { channel_id, sequence: 0, log_time, publish_time: log_time };
+        Ok(self.writer.write_to_known_channel(&header, &data)?)
+    }
+}

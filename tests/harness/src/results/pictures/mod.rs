@@ -1,0 +1,22 @@
+//! Pictures for people: maps from above, polar grids, trade-off curves, heat maps, as PNG.
+//!
+//! Every function takes plain data and gives a [`canvas::Canvas`]; the same input gives the same
+//! bytes. Text is set in DejaVu Sans from inside the program, so no font has to be installed.
+
+pub mod birdseye;
+pub mod canvas;
+mod closeup;
+pub mod heatmap;
+pub mod palette;
+pub mod polar;
+pub mod returns;
+pub mod scene;
+pub mod site;
+pub mod tradeoff;
+
+mod axes;
+mod cells;
+mod labels;
+mod legend;
+mod overlay;
+mod text;

@@ -1,0 +1,249 @@
+//! A replay as JSON with stable keys.
+//!
+//! Rates are shares, 0 to 1; `null` is n/a: nothing to divide by. Distances and differences are in
+//! points (hundredths). Intervals are `[low, high]`, 95 %.
+
+use anyhow::Result;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::ORIGIN;
+use crate::estimators;
+use crate::evaluation::breakdown::{Breakdown, band_name};
+use crate::evaluation::comparison::Comparison;
+use crate::evaluation::counts::Counts;
+use crate::evaluation::curve::CurvePoint;
+use crate::evaluation::examples::Example;
+use crate::evaluation::mount_error::Sensitivity;
+use crate::evaluation::replay::Replay;
+use crate::evaluation::summary::{Distance, Intervals, Row, Summary};
+use crate::evaluation::{self, Grid};
+use crate::geometry::pose::SensorPose;
+use crate::recording::problems::Problem;
+use crate::recording::{FieldOfView, ReadOptions, Recording};
+
+/// Everything one recording gave.
+#[derive(Serialize)]
+pub struct Report {
+    /// File stem.
+    pub recording: String,
+    /// Counted frames.
+    pub frames: usize,
+    /// Distinct tracks counted.
+    pub objects: usize,
+    pub coverage_rate: Option<f64>,
+    pub estimators: Vec<Estimator>,
+    coverage_interval: Option<Value>,
+    comparisons: Vec<Comparison>,
+    mount_error: Option<Vec<Sensitivity>>,
+    examples: Vec<Example>,
+    resampling: Resampling,
+    sensor: Value,
+    input: Input,
+    options: Value,
+    origin: &'static str,
+}
+
+/// One row of the table.
+#[derive(Serialize)]
+pub struct Estimator {
+    pub name: String,
+    #[serde(flatten)]
+    rates: Rates,
+    pub cell_fvr: Option<f64>,
+    pub cell_fir: Option<f64>,
+    /// Cell-time-steps: `blocked`, `blocked_visible`, `clear`, `clear_not_visible`.
+    cells: Option<Value>,
+    intervals: Intervals,
+    distance_to_geometry_slice: Distance,
+    distance_to_geometry_box: Distance,
+    /// Object-time-steps with no known cell.
+    unknown: u64,
+    grid: Grid,
+    breakdown: Value,
+    curve: Vec<CurvePoint>,
+    cell_curve: Vec<CurvePoint>,
+    counters: Map<String, Value>,
+}
+
+/// Counts and the rates made of them.
+#[derive(Serialize)]
+pub(super) struct Rates {
+    tv: u64,
+    fv: u64,
+    ti: u64,
+    fi: u64,
+    tvr: Option<f64>,
+    fvr: Option<f64>,
+    tir: Option<f64>,
+    fir: Option<f64>,
+}
+
+/// What the intervals were drawn from.
+#[derive(Serialize)]
+pub(super) struct Resampling {
+    objects_over: &'static str,
+    object_units: usize,
+    cells_over: &'static str,
+    cell_units: usize,
+}
+
+/// What was read.
+#[derive(Serialize)]
+struct Input {
+    frames: usize,
+    detections: usize,
+    duration_s: f64,
+    labelled: bool,
+    problems: Vec<Problem>,
+}
+
+/// Options as they were used.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    pub reading: &'a ReadOptions,
+    pub evaluation: &'a evaluation::Options,
+    pub estimators: &'a estimators::Options,
+}
+
+/// One report for one recording.
+pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[Example], options: Options) -> Report {
+    let Replay { recording, summary, .. } = replay;
+    Report {
+        recording: recording.name.clone(),
+        frames: summary.frames,
+        objects: summary.objects,
+        coverage_rate: summary.coverage_rate,
+        estimators: summary.rows.iter().map(estimator).collect(),
+        coverage_interval: summary.coverage_interval.map(|i| json!(i)),
+        comparisons: summary.comparisons.clone(),
+        mount_error: mount_error.map(<[_]>::to_vec),
+        examples: examples.to_vec(),
+        resampling: resampling(summary),
+        sensor: sensor(recording),
+        input: Input {
+            frames: recording.frames.len(),
+            detections: recording.frames.iter().map(|f| f.detections.len()).sum(),
+            duration_s: recording.duration_s(),
+            labelled: recording.truth.is_some(),
+            problems: recording.problems.iter().collect(),
+        },
+        options: json!({
+            "evaluation": options.evaluation,
+            "reading": reading(options.reading),
+            "estimators": options.estimators,
+        }),
+        origin: ORIGIN,
+    }
+}
+
+/// The file for one recording.
+pub fn object(report: &Report) -> Result<String> {
+    Ok(serde_json::to_string_pretty(report)? + "\n")
+}
+
+/// The file for several.
+pub fn array(reports: &[Report]) -> Result<String> {
+    Ok(serde_json::to_string_pretty(reports)? + "\n")
+}
+
+pub(super) fn estimator(row: &Row) -> Estimator {
+    Estimator {
+        name: row.name.clone(),
+        rates: rates(&row.counts),
+        cell_fvr: row.cell_fvr(),
+        cell_fir: row.cell_fir(),
+        cells: row.cells.map(|c| json!(c)),
+        intervals: row.intervals.clone(),
+        distance_to_geometry_slice: row.to_slice.clone(),
+        distance_to_geometry_box: row.to_box.clone(),
+        unknown: row.unknown,
+        grid: row.grid,
+        breakdown: breakdown(&row.breakdown),
+        curve: row.curve.clone(),
+        cell_curve: row.cell_curve.clone(),
+        counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
+    }
+}
+
+pub(super) fn rates(c: &Counts) -> Rates {
+    Rates { tv: c.tv, fv: c.fv, ti: c.ti, fi: c.fi, tvr: c.tvr(), fvr: c.fvr(), tir: c.tir(), fir: c.fir() }
+}
+
+fn breakdown(groups: &Breakdown) -> Value {
+    let group = |name: String, counts: &Counts| {
+        let mut value = json!(rates(counts));
+        if let Value::Object(map) = &mut value {
+            map.insert("group".into(), name.into());
+            map.insert("coverage_rate".into(), json!(counts.coverage()));
+        }
+        value
+    };
+    json!({
+        "class": groups.class.iter().map(|(class, c)| group(class.clone(), c)).collect::<Vec<_>>(),
+        "distance_m": groups.distance.iter().map(|(&band, c)| group(band_name(band), c)).collect::<Vec<_>>(),
+        "occlusion": groups.occlusion.iter().map(|(grade, c)| group(grade.to_string(), c)).collect::<Vec<_>>(),
+    })
+}
+
+pub(super) fn resampling(summary: &Summary) -> Resampling {
+    Resampling {
+        objects_over: summary.drawn,
+        object_units: summary.drawn_units,
+        cells_over: "blocks of 1 s",
+        cell_units: summary.blocks,
+    }
+}
+
+fn sensor(recording: &Recording) -> Value {
+    let sensor = &recording.sensor;
+    json!({
+        "name": sensor.name,
+        "mount": mount(&recording.pose),
+        "field_of_view": field_of_view(&sensor.field_of_view),
+        "has_elevation": sensor.has_elevation,
+        "frames_independent": sensor.frames_independent,
+        "platform_moving": sensor.platform_moving,
+        "licence": sensor.licence,
+    })
+}
+
+fn mount(pose: &SensorPose) -> Value {
+    let [x, y, z] = pose.position;
+    json!({
+        "x_m": x, "y_m": y, "z_m": z,
+        "yaw_deg": pose.yaw_rad().to_degrees(),
+        "pitch_deg": pose.pitch_rad().to_degrees(),
+        "roll_deg": pose.roll_rad().to_degrees(),
+    })
+}
+
+fn field_of_view(view: &FieldOfView) -> Value {
+    json!({
+        "azimuth_deg": view.azimuth_rad.map(f64::to_degrees),
+        "elevation_deg": view.elevation_rad.map(f64::to_degrees),
+        "range_m": view.range_m,
+    })
+}
+
+/// Reading options as given; `null` where the file itself decided.
+fn reading(options: &ReadOptions) -> Value {
+    let mount = options.mount.map(|[x, y, z, yaw, pitch, roll]| {
+        json!({
+            "x_m": x, "y_m": y, "z_m": z,
+            "yaw_deg": yaw.to_degrees(), "pitch_deg": pitch.to_degrees(), "roll_deg": roll.to_degrees(),
+        })
+    });
+    json!({
+        "radar_topic": options.radar_topic,
+        "truth_topic": options.truth_topic,
+        "mount": mount,
+        "field_of_view": options.field_of_view.as_ref().map(field_of_view),
+        "sensor_id": options.sensor_id,
+        "profile": options.profile.map(|p| p.name),
+        "ti_header": options.ti_header.map(|f| f.header()),
+        "frame_period_s": options.frame_period_s,
+        "from_s": options.from_s,
+        "to_s": options.to_s,
+    })
+}

@@ -1,0 +1,348 @@
+//! Crossings and queues of the twin: several scenes with a mount each, pooled to one table.
+//!
+//! A [`Plan`] names scenes to train on and scenes to report. Each is simulated and replayed, with elevation and,
+//! where asked, without; seconds are kept, so that the same run is counted after its warm-up and from its start.
+
+use std::collections::BTreeSet;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::estimators;
+use crate::evaluation::Settings;
+use crate::evaluation::pool::{Seconds, pool};
+use crate::evaluation::replay::Replay;
+use crate::evaluation::samples::{self, FrameSamples};
+use crate::evaluation::score::score;
+use crate::recording::{Recording, mcap};
+use crate::twin::scene::Scene;
+use crate::twin::simulate::Simulation;
+
+/// What is simulated, and what each scene is for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// What may be tuned on.
+    pub training: Set,
+    /// What is reported, and never tuned on.
+    pub reporting: Set,
+    /// What `radar-3d` has to reach, and what it should.
+    pub floor: Option<Goal>,
+    pub aim: Option<Goal>,
+    /// Folder of the file.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+/// Scenes that are pooled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Set {
+    /// Start of each scene that is not counted, seconds: an estimator may need time to learn a site.
+    pub warm_up_s: f64,
+    /// Scene files, seen from the plan's folder.
+    pub scenes: Vec<PathBuf>,
+}
+
+/// Rates to be reached, FVR and FIR, in points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Goal {
+    /// Of road cells.
+    pub cells: [f64; 2],
+    /// Of objects, from `geometry-slice`.
+    pub objects_from_slice: [f64; 2],
+}
+
+impl Plan {
+    /// Reads a plan and all its scenes.
+    ///
+    /// # Errors
+    /// File, line and key of what cannot be read; a scene, a seed or traffic that two scenes share.
+    pub fn read(path: &Path) -> Result<Self> {
+        let place = || format!("experiment {}", path.display());
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("cannot read experiment {}", path.display()))?;
+        let mut plan: Self = toml::from_str(&text).with_context(place)?;
+        plan.folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        plan.check().with_context(place)?;
+        Ok(plan)
+    }
+
+    fn check(&self) -> Result<()> {
+        let (mut seeds, mut files) = (BTreeSet::new(), BTreeSet::new());
+        for (name, set) in [("training", &self.training), ("reporting", &self.reporting)] {
+            ensure!(!set.scenes.is_empty(), "[{name}] has no scenes");
+            for scene in self.scenes(set)? {
+                let traffic = scene.source(None)?.path;
+                ensure!(
+                    set.warm_up_s >= 0.0 && set.warm_up_s < scene.duration_s,
+                    "[{name}] warm_up_s {} leaves nothing of `{}`, which has {} s",
+                    set.warm_up_s,
+                    scene.name,
+                    scene.duration_s
+                );
+                ensure!(seeds.insert(scene.seed), "`{}` has the seed {} of another scene", scene.name, scene.seed);
+                ensure!(
+                    files.insert(traffic.clone()),
+                    "`{}` has the traffic {} of another scene",
+                    scene.name,
+                    traffic.display()
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// The scenes of one of its sets.
+    ///
+    /// # Errors
+    /// Those of reading a scene.
+    pub fn scenes(&self, set: &Set) -> Result<Vec<Scene>> {
+        set.scenes.iter().map(|path| Scene::read(&self.folder.join(path))).collect()
+    }
+}
+
+/// How much is run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Every how many frames are judged; estimators are given all.
+    pub every: usize,
+    /// Whether each scene is run again with a radar that measures no elevation.
+    pub without_elevation: bool,
+}
+
+/// One scene, run.
+#[derive(Debug)]
+pub struct SceneResult {
+    pub scene: Scene,
+    with_elevation: Seconds,
+    without_elevation: Option<Seconds>,
+}
+
+/// What is counted of the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variant {
+    /// With elevation, after the warm-up: what is reported.
+    Main,
+    /// Without elevation, after the warm-up.
+    WithoutElevation,
+    /// With elevation, from the first second on.
+    WithoutWarmUp,
+}
+
+impl Variant {
+    pub const ALL: [Self; 3] = [Self::Main, Self::WithoutElevation, Self::WithoutWarmUp];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Main => "with elevation, after the warm-up",
+            Self::WithoutElevation => "without elevation",
+            Self::WithoutWarmUp => "without warm-up",
+        }
+    }
+}
+
+/// One way of counting, all scenes together and each alone.
+#[derive(Debug)]
+pub struct Counted {
+    pub variant: Variant,
+    pub pooled: Replay,
+    pub scenes: Vec<Replay>,
+}
+
+/// Simulates and replays every scene. `keep` is given the name and the bytes of each recording with elevation,
+/// `progress` told each of [`total_steps`] done.
+///
+/// # Errors
+/// Those of the scenes, the traffic and of the estimators' parameters.
+pub fn run(
+    scenes: &[Scene],
+    settings: &Settings,
+    extent: Extent,
+    keep: &(dyn Fn(&str, &[u8]) -> Result<()> + Sync),
+    progress: &(dyn Fn() + Sync),
+) -> Result<Vec<SceneResult>> {
+    let one = |scene: &Scene| -> Result<SceneResult> {
+        let recording = record(scene, settings, keep, progress)?;
+        let mut samples = samples::collect_every(&recording, &settings.evaluation, extent.every, progress);
+        let with_elevation = seconds(recording, &samples, settings, progress)?;
+        let without_elevation = extent
+            .without_elevation
+            .then(|| {
+                let mut flat = scene.clone();
+                flat.radar.has_elevation = false;
+                let recording = record(&flat, settings, &|_, _| Ok(()), progress)?;
+                samples::detect_again(&recording, &mut samples, &settings.evaluation);
+                seconds(recording, &samples, settings, progress)
+            })
+            .transpose()?;
+        Ok(SceneResult { scene: scene.clone(), with_elevation, without_elevation })
+    };
+    scenes.par_iter().map(|scene| one(scene).with_context(|| format!("scene `{}`", scene.name))).collect()
+}
+
+fn record(
+    scene: &Scene,
+    settings: &Settings,
+    keep: &dyn Fn(&str, &[u8]) -> Result<()>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Recording> {
+    let (sink, _) = Simulation::new(scene.clone(), None)?.record(Cursor::new(Vec::new()), progress)?;
+    let bytes = sink.into_inner();
+    keep(&scene.name, &bytes)?;
+    mcap::parse(&bytes, scene.name.clone(), &settings.reading).context("the simulated recording")
+}
+
+fn seconds(
+    recording: Recording,
+    samples: &[FrameSamples],
+    settings: &Settings,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Seconds> {
+    let mut running = estimators::all(&recording, &settings.estimators)?;
+    let scores = running
+        .par_iter_mut()
+        .map(|e| score(e.as_mut(), &recording, samples, settings.evaluation.grid, &|| progress()))
+        .collect();
+    Ok(Seconds::new(recording, samples, scores))
+}
+
+/// Counts the runs in one way; `None` where a scene was not run for it.
+pub fn count(results: &[SceneResult], variant: Variant, warm_up_s: f64, settings: &Settings) -> Option<Counted> {
+    let runs = results.iter().map(|r| match variant {
+        Variant::Main | Variant::WithoutWarmUp => Some(&r.with_elevation),
+        Variant::WithoutElevation => r.without_elevation.as_ref(),
+    });
+    let runs: Vec<&Seconds> = runs.collect::<Option<_>>()?;
+    let from_s = if variant == Variant::WithoutWarmUp { 0.0 } else { warm_up_s };
+    let pooled = pool("pooled", &runs, from_s, &settings.evaluation)?;
+    let alone =
+        |(run, result): (&&Seconds, &SceneResult)| pool(&result.scene.name, &[*run], from_s, &settings.evaluation);
+    let scenes = runs.par_iter().zip(results).map(alone).collect::<Option<_>>()?;
+    Some(Counted { variant, pooled, scenes })
+}
+
+/// Steps `progress` of [`run`] is told of.
+pub fn total_steps(scenes: &[Scene], extent: Extent, estimators: u64) -> u64 {
+    let frames: u64 = scenes.iter().map(|s| (s.duration_s * s.radar.rate_hz).ceil() as u64).sum();
+    // simulated and sampled, and once an estimator; without elevation the samples are there
+    frames * (2 + estimators + if extent.without_elevation { 1 + estimators } else { 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shipped(name: &str) -> Plan {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings");
+        Plan::read(&folder.join(name).join("scenes.toml")).unwrap()
+    }
+
+    #[test]
+    fn the_shipped_scenes_are_those_that_were_fixed() {
+        let fixed = |name: &str| -> Vec<(String, u64, f64, f64)> {
+            let plan = shipped(name);
+            [&plan.training, &plan.reporting]
+                .iter()
+                .flat_map(|set| plan.scenes(set).unwrap())
+                .map(|s| (s.name.clone(), s.seed, s.duration_s, s.radar.mount.height_m))
+                .collect()
+        };
+        let of = |all: &[(&str, u64, f64, f64)]| -> Vec<(String, u64, f64, f64)> {
+            all.iter().map(|&(name, seed, s, h)| (name.to_owned(), seed, s, h)).collect()
+        };
+        let crossings = [
+            ("train-1", 1101, 90.0, 5.5),
+            ("train-2", 1102, 90.0, 6.5),
+            ("wide-1", 2101, 150.0, 6.0),
+            ("wide-2", 2102, 150.0, 7.5),
+            ("skewed-1", 2103, 150.0, 4.5),
+            ("skewed-2", 2104, 150.0, 8.0),
+            ("tee-1", 2105, 150.0, 7.0),
+            ("tee-2", 2106, 150.0, 5.0),
+        ];
+        let queues = [
+            ("train-1", 3101, 90.0, 6.0),
+            ("train-2", 3102, 90.0, 7.0),
+            ("exit-1", 4101, 150.0, 6.5),
+            ("exit-2", 4102, 150.0, 4.5),
+            ("waves-1", 4103, 150.0, 8.0),
+            ("waves-2", 4104, 150.0, 5.0),
+        ];
+        assert_eq!((fixed("crossing"), fixed("queue")), (of(&crossings), of(&queues)));
+        for name in ["crossing", "queue"] {
+            let plan = shipped(name);
+            assert_eq!(plan.reporting.warm_up_s, 60.0);
+            assert!(plan.scenes(&plan.reporting).unwrap().iter().all(|s| s.radar.has_elevation));
+        }
+    }
+
+    #[test]
+    fn the_traffic_script_makes_every_scenes_traffic_and_no_other() {
+        for name in ["crossing", "queue"] {
+            let plan = shipped(name);
+            let script = std::fs::read_to_string(plan.folder.join("traffic.sh")).unwrap();
+            let lines = script.lines().filter_map(|l| l.strip_prefix("traffic "));
+            let mut made: Vec<(String, f64)> = lines
+                .map(|l| {
+                    let words: Vec<&str> = l.split(' ').collect();
+                    (words[0].to_owned(), words[words.len() - 1].parse().unwrap())
+                })
+                .collect();
+            let sets = [&plan.training, &plan.reporting];
+            let scenes: Vec<Scene> = sets.iter().flat_map(|set| plan.scenes(set).unwrap()).collect();
+            let mut used: Vec<(String, f64)> = scenes.iter().map(|s| (s.name.clone(), s.duration_s)).collect();
+            for scene in &scenes {
+                let file = scene.source(None).unwrap().path;
+                assert_eq!(file.file_name().unwrap().to_str(), Some(&*format!("{}.fcd.xml.gz", scene.name)));
+                assert!(file.exists(), "{}", file.display());
+            }
+            made.sort_by(|a, b| a.0.cmp(&b.0));
+            used.sort_by(|a, b| a.0.cmp(&b.0));
+            assert_eq!(made, used, "{name}");
+        }
+    }
+
+    #[test]
+    fn every_scene_has_what_it_is_named_after() {
+        use crate::twin::traffic::types::Class;
+        for name in ["crossing", "queue"] {
+            let plan = shipped(name);
+            for scene in plan.scenes(&plan.reporting).unwrap() {
+                let (id, seconds) = (format!("{name}/{}", scene.name), scene.duration_s);
+                let simulation = Simulation::new(scene, None).unwrap();
+                let classes: BTreeSet<Class> = simulation.traffic.vehicles.iter().map(|v| v.kind.class).collect();
+                let of_a_town = [Class::Bus, Class::Bicycle, Class::Pedestrian];
+                assert!(classes.contains(&Class::Truck), "{id}");
+                assert!(name == "queue" || of_a_town.iter().all(|c| classes.contains(c)), "{id}: {classes:?}");
+                let (mut steps, mut standing, mut driving) = (0, 0, 0);
+                for since_s in (0..seconds as u32).step_by(5) {
+                    for (_, pose) in simulation.traffic.at(simulation.scene.from_s() + f64::from(since_s)) {
+                        let speed = pose.velocity[0].hypot(pose.velocity[1]);
+                        steps += 1;
+                        standing += u32::from(speed < 2.5);
+                        driving += u32::from(speed > 5.0);
+                    }
+                }
+                assert!(steps > 30 * (seconds / 5.0) as u32, "{id}: {steps} vehicle-steps");
+                assert!(standing * 5 > steps && driving * 5 > steps, "{id}: {standing} and {driving} of {steps}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_reported_is_not_trained_on() {
+        let mut plan = shipped("crossing");
+        plan.reporting.scenes.push(plan.training.scenes[0].clone());
+        let error = plan.check().unwrap_err().to_string();
+        assert!(error.contains("`train-1` has the seed 1101 of another scene"), "{error}");
+        let mut plan = shipped("queue");
+        plan.reporting.warm_up_s = 200.0;
+        assert!(plan.check().unwrap_err().to_string().contains("leaves nothing of `exit-1`, which has 150 s"));
+    }
+}

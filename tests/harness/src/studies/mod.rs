@@ -1,0 +1,4 @@
+//! Questions put to the digital twin: the paper's experiment, and where to mount a sensor.
+
+pub mod experiment;
+pub mod site;

@@ -1,0 +1,43 @@
+//! Bytes of a TI mmWave radar in, scans out.
+
+mod frames;
+mod framing;
+mod points;
+mod random;
+mod session;
+
+use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
+use viewshed::inputs::ti::{Config, Dialect, Family, Flaw, Outcome, Ti};
+
+/// What came out, in short.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Got {
+    Learnt(Family),
+    /// Number, detections, missing.
+    Scan(u32, Vec<Detection>, u16),
+    Broken(Flaw),
+}
+
+/// Everything that comes of bytes cut into chunks.
+pub fn feed<const N: usize>(radar: &mut Ti<N>, bytes: &[u8], chunk: usize) -> Vec<Got> {
+    let mut got = Vec::new();
+    for (i, mut rest) in bytes.chunks(chunk).enumerate() {
+        while !rest.is_empty() {
+            let (taken, outcome) = radar.push(rest, Time::from_micros(i as u64));
+            assert!(taken > 0);
+            rest = &rest[taken..];
+            got.extend(match outcome {
+                Outcome::Taken => None,
+                Outcome::Learnt(family) => Some(Got::Learnt(family)),
+                Outcome::Scan(s) => Some(Got::Scan(s.number, s.detections.to_vec(), s.missing)),
+                Outcome::Broken(flaw) => Some(Got::Broken(flaw)),
+            });
+        }
+    }
+    got
+}
+
+pub fn radar(family: Family) -> Ti<64> {
+    Ti::new(Config { family: Some(family), dialect: Dialect::USUAL })
+}

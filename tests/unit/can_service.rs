@@ -1,0 +1,280 @@
+//! A unit configured over CAN: written, read back, applied at the restart; and what may go wrong on the way.
+
+use proptest::prelude::*;
+use viewshed::fixed::time::Time;
+use viewshed::unit::Flow;
+use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
+use viewshed::unit::profile::small;
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
+use viewshed::wire::broadcast::Medium;
+use viewshed::wire::frame::{CanFrame, CanId};
+use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
+use viewshed::wire::receive::{Accepted, Limits, Receiver, Refused};
+use viewshed::wire::status::{Reason, State, Status};
+
+use crate::common::gantry;
+
+const SENSOR: u8 = 2;
+const CLASSIC: Medium = Medium::Can(Addresses::STANDARD);
+const FD: Medium = Medium::CanFd(Addresses::STANDARD);
+
+#[derive(Clone)]
+struct InRam([[u8; BLOCK_LEN]; 2], usize);
+
+impl Slots for InRam {
+    fn slot(&self, slot: usize) -> &[u8] {
+        &self.0[slot]
+    }
+
+    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+        self.0[slot] = *block;
+        self.1 += 1;
+    }
+}
+
+fn empty() -> InRam {
+    InRam([[0xFF; BLOCK_LEN]; 2], 0)
+}
+
+fn at(ms: u64) -> Time {
+    Time::from_micros(ms * 1000)
+}
+
+fn settings(height_m: f32) -> Settings {
+    Settings::of(gantry(height_m, 0.0))
+}
+
+fn stored(slots: &InRam) -> Stored {
+    Stored::read(slots, small::CHECK)
+}
+
+fn start(medium: Medium, slots: &InRam) -> CanService {
+    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, medium) };
+    CanService::start(config, Epoch::new(1), at(0), stored(slots))
+}
+
+fn send(frames: impl Iterator<Item = CanFrame>, unit: &mut CanService, slots: &mut InRam) {
+    for frame in frames {
+        assert_eq!(unit.take(&frame, slots), Some(Flow::Continue));
+    }
+}
+
+/// Everything the unit has to say now.
+fn told(unit: &mut CanService, slots: &InRam, medium: Medium) -> Vec<Told> {
+    let mut answers = Answers::new(SENSOR, medium);
+    std::iter::from_fn(|| unit.next_frame(at(0), slots)).filter_map(|frame| answers.take(&frame)).collect()
+}
+
+#[test]
+fn a_block_is_written_read_back_and_counts_from_the_restart_on() {
+    for medium in [CLASSIC, FD] {
+        let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, medium));
+        let mut unit = start(medium, &slots);
+        let mut sequence = 0;
+        for height in [6.0, 7.0, 8.0] {
+            let before = unit.settings().copied();
+            for frame in tool.write(&settings(height).to_block(99)) {
+                assert_eq!(unit.take(&frame, &mut slots), Some(Flow::Continue));
+            }
+            sequence += 1;
+            assert!(told(&mut unit, &slots, medium).contains(&Told::Written(sequence)));
+            assert_eq!(unit.settings().copied(), before, "not before the restart");
+            assert_eq!(unit.take(&tool.restart().unwrap(), &mut slots), Some(Flow::Restart));
+            unit = start(medium, &slots);
+            assert_eq!(unit.settings(), Some(&settings(height)));
+            let slot = 1 - (sequence & 1) as u8;
+            assert_eq!(told(&mut unit, &slots, medium), [Told::Started(Some((slot, sequence)))], "slots take turns");
+            unit.take(&tool.read().unwrap(), &mut slots);
+            let read = told(&mut unit, &slots, medium);
+            let [Told::Block(block)] = read.as_slice() else { panic!("{read:?}") };
+            assert_eq!(Settings::from_block(block), Ok((sequence, settings(height))));
+        }
+    }
+}
+
+#[test]
+fn the_messages_are_these_bytes() {
+    let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, CLASSIC));
+    let block = settings(6.0).to_block(1);
+    let frames: Vec<String> = tool.write(&block).map(|frame| format!("{frame:?}")).collect();
+    assert_eq!(frames.len(), 2 + BLOCK_LEN / 4);
+    // begin, 148 bytes; part 0 is the magic; part 36 and the completion have the check sum
+    let sum: String = block[BLOCK_LEN - 4..].iter().map(|b| format!("{b:02X}")).collect();
+    assert_eq!(frames[0], "458#4D00010000940000");
+    assert_eq!(frames[1], "458#3F01020056534342");
+    assert_eq!(frames[37][6..], format!("070224{sum}"), "{}", frames[37]);
+    assert_eq!(frames[38][6..], format!("080300{sum}"), "{}", frames[38]);
+    // the rest is the specification's example
+    let mut unit = start(CLASSIC, &slots);
+    let mut talk: Vec<CanFrame> = (0..2).map(|_| unit.next_frame(at(0), &slots).unwrap()).collect();
+    let read = tool.read().unwrap();
+    assert_eq!(unit.take(&read, &mut slots), Some(Flow::Continue));
+    talk.extend([read, unit.next_frame(at(0), &slots).unwrap(), tool.restart().unwrap()]);
+    let page = include_str!("../../src/wire/SPECIFICATION.md");
+    let (_, example) = page.split_once("```configuration\n").unwrap();
+    let (example, _) = example.split_once("```").unwrap();
+    let example: Vec<&str> = example.lines().map(|line| line.split(' ').next().unwrap()).collect();
+    assert_eq!(talk.iter().map(|frame| format!("{frame:?}")).collect::<Vec<_>>(), example);
+}
+
+#[test]
+fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_state() {
+    let mut slots = InRam([settings(6.0).to_block(1), [0xFF; BLOCK_LEN]], 0);
+    slots.0[0][40] ^= 1;
+    for medium in [CLASSIC, FD] {
+        let mut unit = start(medium, &slots);
+        assert_eq!((unit.settings(), unit.refusal()), (None, Some(BlockError::CheckSum)));
+        let told = told(&mut unit, &slots, medium);
+        assert!(matches!(told[..], [Told::Started(None), Told::Refused(r)] if r.reason == 4), "{told:?}");
+        // the status says it to everybody, at least twice a second
+        let mut receiver = Receiver::<1, 120, 7>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+        let mut last = 0;
+        for ms in 0..3000 {
+            let Some(frame) = unit.next_status(at(ms), Status::starting(0)) else { continue };
+            // a session begins with the second
+            let expected = if last == 0 { Err(Refused::FirstOfEpoch) } else { Ok(Accepted::Status) };
+            assert_eq!(receiver.frame(at(ms), &frame), expected, "{ms} ms");
+            assert!(ms - last <= 500);
+            last = ms.max(1);
+        }
+        let status = receiver.sensor(SENSOR).and_then(|s| s.status()).unwrap();
+        assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+        assert!(status.uptime_s >= 1 && last >= 2500);
+    }
+}
+
+#[test]
+fn a_parameter_is_refused_by_its_name_and_value() {
+    let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, CLASSIC));
+    let mut unit = start(CLASSIC, &slots);
+    let mut narrow = settings(6.0);
+    narrow.visibility.slice_height_m = 50.0;
+    for (block, name, value) in
+        [(settings(50.0).to_block(1), "mount.height_m", 50.0), (narrow.to_block(1), "visibility.slice_height_m", 50.0)]
+    {
+        send(tool.write(&block), &mut unit, &mut slots);
+        let told = told(&mut unit, &slots, CLASSIC);
+        let Some(Told::Refused(refusal)) = told.last() else { panic!("{told:?}") };
+        assert_eq!((refusal.reason, refusal.parameter(), refusal.value()), (5, name, value));
+    }
+    assert_eq!(slots.1, 0, "nothing was written");
+}
+
+#[test]
+fn a_lost_part_is_asked_for_and_a_repeated_completion_writes_once() {
+    let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, CLASSIC));
+    let mut unit = start(CLASSIC, &slots);
+    let block = settings(6.0).to_block(1);
+    let frames: Vec<CanFrame> = tool.write(&block).collect();
+    for (k, frame) in frames.iter().enumerate() {
+        if k != 18 {
+            unit.take(frame, &mut slots);
+        }
+    }
+    let said = told(&mut unit, &slots, CLASSIC);
+    let Some(Told::Refused(refusal)) = said.last() else { panic!("{said:?}") };
+    assert_eq!((refusal.reason, refusal.detail[0], slots.1), (INCOMPLETE, 17, 0));
+    send(tool.again(&block, 17), &mut unit, &mut slots);
+    assert_eq!(told(&mut unit, &slots, CLASSIC), [Told::Written(1)]);
+    unit.take(&frames[38], &mut slots);
+    assert_eq!((told(&mut unit, &slots, CLASSIC), slots.1), (vec![Told::Written(1)], 1), "the answer was lost");
+    // the parts alone, without a beginning, are of no block
+    send(frames[1..].iter().copied(), &mut unit, &mut slots);
+    assert_eq!(slots.1, 1);
+}
+
+#[test]
+fn receivers_of_maps_and_other_sensors_units_leave_these_messages_alone() {
+    let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, CLASSIC));
+    let block = settings(6.0).to_block(1);
+    let mut other = CanService::start(CanServiceConfig::new(3, CLASSIC), Epoch::new(1), at(0), stored(&slots));
+    let mut receiver = Receiver::<1, 120, 7>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+    let mut unit = start(CLASSIC, &slots);
+    let status = unit.next_status(at(0), Status::starting(0)).unwrap();
+    assert_eq!(receiver.frame(at(0), &status), Err(Refused::FirstOfEpoch));
+    assert_eq!(receiver.frame(at(0), &status), Ok(Accepted::Status));
+    for frame in tool.write(&block) {
+        assert_eq!(other.take(&frame, &mut slots), None);
+        assert_eq!(receiver.frame(at(10), &frame), Ok(Accepted::Other(REQUEST)));
+        let mut damaged = frame.data().to_vec();
+        damaged[5] ^= 4;
+        assert_eq!(unit.take(&CanFrame::classic(frame.id, &damaged).unwrap(), &mut slots), None);
+    }
+    let answer = unit.next_frame(at(20), &slots).unwrap();
+    assert_eq!(receiver.frame(at(20), &answer), Ok(Accepted::Other(ANSWER)));
+    // requests are of epoch 0 and the unit of epoch 1: the session goes on
+    assert_eq!(receiver.sensor(SENSOR).unwrap().epoch(), Some(Epoch::new(1)));
+    let foreign = CanFrame::classic(CanId::Standard(0x600), &[0; 8]).unwrap();
+    assert_eq!(unit.take(&foreign, &mut slots), None);
+}
+
+#[test]
+fn answers_keep_their_distance_and_identifiers_are_where_the_installation_has_them() {
+    let slots = InRam([settings(6.0).to_block(1), settings(7.0).to_block(2)], 0);
+    let addresses = Addresses::new(CanId::Extended(0x0A00_0000)).unwrap();
+    let medium = Medium::Can(addresses);
+    let config = CanServiceConfig::new(SENSOR, medium);
+    let mut unit = CanService::start(config, Epoch::new(1), at(0), stored(&slots));
+    let mut tool = Tool::new(SENSOR, medium);
+    unit.take(&tool.read().unwrap(), &mut slots.clone());
+    let mut sent = Vec::new();
+    for us in 0..200_000 {
+        let now = Time::from_micros(us);
+        sent.extend(unit.next_frame(now, &slots).map(|frame| (us, frame)));
+    }
+    assert_eq!(sent.len(), 1 + BLOCK_LEN / 4);
+    assert!(sent.windows(2).all(|w| w[1].0 - w[0].0 == 2000));
+    assert!(sent.iter().all(|(_, frame)| frame.id == CanId::Extended(0x0A00_0000 + 32 * 2 + 25)));
+    // a clock that steps back does not silence it
+    unit.take(&tool.read().unwrap(), &mut slots.clone());
+    assert!(unit.next_frame(Time::from_micros(0), &slots).is_some());
+}
+
+proptest! {
+    /// Whatever requests and answers pass their check sums, nothing is written that does not hold.
+    #[test]
+    fn any_requests_and_answers_are_taken(
+        messages in prop::collection::vec((prop_oneof![0_u8..7, 128_u8..136, any::<u8>()], any::<[u8; 5]>()), 0..200),
+    ) {
+        let (mut slots, mut unit) = (empty(), start(CLASSIC, &empty()));
+        let mut answers = Answers::new(SENSOR, CLASSIC);
+        for (kind, [number, rest @ ..]) in messages {
+            let own = [&[kind, number][..], &rest[..]].concat();
+            for message in [REQUEST, ANSWER] {
+                let packet = Packet::new(Packing::Classic, SENSOR, message, Epoch::new(3), &own).protect(0, None);
+                let frame = packet.frame(&Addresses::STANDARD).unwrap();
+                let _ = (unit.take(&frame, &mut slots), answers.take(&frame));
+            }
+            prop_assert!(std::iter::from_fn(|| unit.next_frame(at(0), &slots)).take(200).count() < 200);
+            prop_assert_eq!(slots.1, 0, "no block of random bytes holds");
+        }
+    }
+
+    /// Two blocks on a bus that loses, repeats and reorders: whatever is written is one of them, whole.
+    #[test]
+    fn only_whole_blocks_are_written(
+        order in prop::collection::vec((0_usize..78, 0_usize..6), 0..160),
+        lost in prop::collection::vec(0_usize..78, 0..4),
+    ) {
+        let mut tool = Tool::new(SENSOR, CLASSIC);
+        let blocks = [settings(6.0).to_block(1), settings(7.0).to_block(1)];
+        let mut frames: Vec<(usize, CanFrame)> = tool.write(&blocks[0]).collect::<Vec<_>>().into_iter().enumerate().collect();
+        frames.extend(tool.write(&blocks[1]).enumerate().map(|(k, frame)| (39 + k, frame)));
+        frames.retain(|(k, _)| !lost.contains(k));
+        for (k, to) in order {
+            let Some(place) = frames.iter().position(|(n, _)| *n == k) else { continue };
+            let copy = frames[place];
+            frames.insert((place + to).min(frames.len()), copy);
+        }
+        let mut slots = empty();
+        let mut unit = start(CLASSIC, &slots);
+        for (_, frame) in &frames {
+            unit.take(frame, &mut slots);
+            for slot in &slots.0 {
+                let read = Settings::from_block(slot).map(|(_, settings)| settings);
+                let whole = [Err(BlockError::Empty), Ok(settings(6.0)), Ok(settings(7.0))];
+                prop_assert!(whole.contains(&read), "{read:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! A whole unit: its sessions, its service, its loop on a bus, and the files of the bench.
+
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // a test may fail
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod can_service;
+mod pil;
+mod roadside;
+mod session;
+mod status;

@@ -1,0 +1,19 @@
+//! Maps on the wire: code, protection, authentication, receivers, and the promise that nothing is seen that is not.
+
+#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // a test may fail
+
+#[path = "../dbc/mod.rs"]
+mod dbc;
+#[path = "../shadows/mod.rs"]
+mod shadows;
+
+mod bus_description;
+#[cfg(feature = "secoc")]
+mod bus_description_secured;
+mod c_receiver;
+mod e2e;
+mod fail_safe;
+mod maps;
+#[cfg(feature = "secoc")]
+mod secured;
+mod specification;
