@@ -6,9 +6,6 @@ use super::tracking::Tracking;
 use crate::fixed::math::root;
 use crate::obstacles::solid::Solid;
 
-/// Variance across a car that reflects on both its sides alike, cm^2.
-pub(super) const EVEN_SPREAD: i32 = 85 * 85;
-
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
     pub fn solid(&self, t: &Tracking) -> Solid {

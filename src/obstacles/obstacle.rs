@@ -1,12 +1,12 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
-use super::body::EVEN_SPREAD;
 use super::gathered::Gathered;
 use super::motion::FreeMotion;
 use super::profile::{BIN_CM, Extent, Profile};
-use super::search::speed_error;
 use super::tallness::Tallness;
-use super::tracking::{INERTIA, MOST_HITS_A_FRAME, RECENTRE_BINS, Tracking, YOUNG_FRAMES, YOUNG_INERTIA};
+use super::tracking::{
+    EVEN_SPREAD, INERTIA, MOST_HITS_A_FRAME, RECENTRE_BINS, Tracking, YOUNG_FRAMES, YOUNG_INERTIA, speed_error,
+};
 use crate::fixed::math::{hypot_gate, mul_shift, ratio};
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;

@@ -3,7 +3,7 @@
 use super::gathered::{sigma_across, sigma_along};
 use super::obstacle::Obstacle;
 use super::profile::Extent;
-use super::tracking::Tracking;
+use super::tracking::{Tracking, speed_error};
 use crate::fixed::math::length;
 use crate::fixed::trig::Direction;
 use crate::frame::reflection::Reflection;
@@ -123,12 +123,6 @@ impl Search {
         let by_speed = error * error / SPEED_SCALE;
         Some(by_length + by_width + by_speed)
     }
-}
-
-/// Difference between a detection's radial velocity and the one a motion (2^-4 cm/s) explains,
-/// 2^-4 cm/s.
-pub(super) fn speed_error(velocity: (i32, i32), r: &Reflection) -> i32 {
-    (i32::from(r.radial_velocity_cm_s) << 4) - r.sight.along(velocity.0, velocity.1)
 }
 
 impl Obstacle {

@@ -96,6 +96,15 @@ pub const MERGE_PARALLEL: i32 = 15_500;
 /// Bins the outline's middle may leave the anchor before that is moved: 3 m of the histogram's 24.
 pub const RECENTRE_BINS: i32 = 6;
 
+/// Variance across a car that reflects on both its sides alike, cm^2.
+pub(super) const EVEN_SPREAD: i32 = 85 * 85;
+
+/// Difference between a detection's radial velocity and the one a motion (2^-4 cm/s) explains,
+/// 2^-4 cm/s.
+pub(super) fn speed_error(velocity: (i32, i32), r: &Reflection) -> i32 {
+    (i32::from(r.radial_velocity_cm_s) << 4) - r.sight.along(velocity.0, velocity.1)
+}
+
 impl Tracking {
     /// What a time step leaves of every obstacle's memories.
     pub fn kept_over(&self, step: Step) -> Kept {

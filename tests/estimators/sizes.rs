@@ -20,11 +20,11 @@ fn the_reference_grid_fits_450_kb() {
 }
 
 #[test]
-fn the_small_profile_fits_64_kb_in_all() {
+fn the_small_profile_fits_72_kb_in_all() {
     let state = size_of::<small::State>();
     let parameters = size_of::<small::Parameters>();
     println!("radar-3d 100 x 64 x 8: state {state} B, parameters {parameters} B");
-    assert!(state + parameters <= 64_000, "{state} + {parameters}");
+    assert!(state + parameters <= 72_000, "{state} + {parameters}");
 }
 
 #[test]

@@ -172,7 +172,9 @@ proptest! {
             for (a, column) in grid.columns().enumerate() {
                 for (cell, _) in column.stacks() {
                     let centre = (cell as i32) * axes.cell_cm + axes.cell_cm / 2;
-                    prop_assert!((centre - i32::from(r.ground_cm)).abs() <= 2 * axes.cell_cm);
+                    // two standard deviations of range, at most 8 cells
+                    let reach = (setup.sensor.noise.range_m * 200.0) as i32 + 2 * axes.cell_cm;
+                    prop_assert!((centre - i32::from(r.ground_cm)).abs() <= reach.min(9 * axes.cell_cm));
                     let columns = (axes.column_place(r.bearing()) - (a as i32 * 256 + 128)).abs();
                     let sigma = setup.sensor.noise.azimuth_deg / 360.0 * 65536.0 / f32::from(axes.azimuth_span) * A as f32;
                     prop_assert!(columns as f32 <= 256.0 * (2.0 * sigma + 0.6), "{} of 256", columns);

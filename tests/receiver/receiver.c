@@ -427,9 +427,9 @@ static bool misfits(sensor_t *s, uint64_t now) {
 }
 
 static bool in_time(sensor_t *s, uint64_t now, uint32_t ahead) {
-    if (ahead) { misfits(s, now); return true; }
     s->map_heard = now;
-    s->misfit_since = NEVER;
+    if (ahead) misfits(s, now);
+    else s->misfit_since = NEVER;
     return true;
 }
 
@@ -452,7 +452,7 @@ static bool refuse(sensor_t *s, uint64_t now, uint32_t lag) {
 /* Rules 2 and 3: whether a frame with a scan number is in time. */
 static bool hear(sensor_t *s, uint64_t now, int scan) {
     uint32_t lag = lag_of(now, scan), ahead = s->clock.there ? ahead_of(clock_lag(s, now), lag) : 0;
-    if (ahead > 1500000 || (ahead && now - s->map_heard <= D_US)) return refuse(s, now, lag);
+    if (ahead > 1500000) return refuse(s, now, lag);
     if (!s->measure.there) return measure_anew(s, now, lag, ahead);
     uint32_t late = behind(lag, least(s, now));
     if (late > D_US && late <= PERIOD / 2) return refuse(s, now, lag);

@@ -91,7 +91,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
         Self {
             addresses,
             limits,
-            sensors: sensors.map(|number| (number, SensorReceiver::NEW)),
+            sensors: sensors.map(|number| (number, SensorReceiver::new())),
             foreign: 0,
             latest: Cell::new(Time::from_micros(0)),
         }

@@ -131,29 +131,31 @@ pub struct SensorReceiver<const A: usize, const W: usize, const P: usize> {
 
 impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     /// Nothing heard yet.
-    pub const NEW: Self = Self {
-        session: Session::NONE,
-        collector: Collector::NEW,
-        fits: true,
-        clock: None,
-        status: None,
-        planes: [const { Sectors::new() }; P],
-        assemblies: [Assembly::NEW; P],
-        purged: None,
-        sequences: [Counter::NEW; 32],
-        counters: Counters {
-            accepted: 0,
-            protection: 0,
-            not_authentic: 0,
-            lost: 0,
-            repeated: 0,
-            out_of_sequence: 0,
-            late: 0,
-            epoch: 0,
-            early: 0,
-            malformed: 0,
-        },
-    };
+    pub(super) const fn new() -> Self {
+        Self {
+            session: Session::none(),
+            collector: Collector::NEW,
+            fits: true,
+            clock: None,
+            status: None,
+            planes: [const { Sectors::new() }; P],
+            assemblies: [Assembly::NEW; P],
+            purged: None,
+            sequences: [Counter::NEW; 32],
+            counters: Counters {
+                accepted: 0,
+                protection: 0,
+                not_authentic: 0,
+                lost: 0,
+                repeated: 0,
+                out_of_sequence: 0,
+                late: 0,
+                epoch: 0,
+                early: 0,
+                malformed: 0,
+            },
+        }
+    }
 
     /// Its status, as far as it is heard.
     pub fn status(&self) -> Option<&Status> {

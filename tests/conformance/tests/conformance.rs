@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 use std::process::Command;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 use viewshed_conformance::class::Class;
@@ -17,8 +18,10 @@ const SECOND: u64 = 1_000_000;
 
 /// The receivers beside the library's, by their language. What is missing is said past the test's own capture.
 fn others() -> Vec<(&'static str, Program)> {
-    let c = receivers::c(Path::new(env!("CARGO_TARGET_TMPDIR"))).expect("the C receiver compiles");
-    let mut all = vec![("C", "cc", c)];
+    // tests run side by side, and none may run what another is still writing
+    static COMPILED: OnceLock<Option<Program>> = OnceLock::new();
+    let c = || receivers::c(Path::new(env!("CARGO_TARGET_TMPDIR"))).expect("the C receiver compiles");
+    let mut all = vec![("C", "cc", COMPILED.get_or_init(c).clone())];
     if receivers::python_there() {
         all.push(("Python", "python3", receivers::python()));
     }

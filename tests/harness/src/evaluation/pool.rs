@@ -44,12 +44,12 @@ impl Seconds {
                 continue;
             }
             let at = usize::try_from(frame.time_ns.saturating_sub(start) / BLOCK_NS).unwrap_or(0);
-            let empty = Second {
-                verdicts: vec![Vec::new(); scores.len()],
-                cells: vec![CellTally::default(); scores.len()],
-                ..Second::default()
-            };
             if seconds.len() <= at {
+                let empty = Second {
+                    verdicts: vec![Vec::new(); scores.len()],
+                    cells: vec![CellTally::default(); scores.len()],
+                    ..Second::default()
+                };
                 seconds.resize(at + 1, empty);
             }
             let second = &mut seconds[at];
@@ -98,7 +98,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
             }
         }
         for (_, second) in part.seconds.iter().enumerate().filter(|(k, _)| *k as f64 >= from_s) {
-            frames.push(Frame { time_ns: frames.len() as i64 * BLOCK_NS, detections: Vec::new() });
+            frames.push(Frame { time_ns: frames.len() as i64 * BLOCK_NS, detections: Vec::new(), refused: 0 });
             counted += second.frames;
             let mut sample = second.samples.clone();
             sample.objects.iter_mut().for_each(|s| s.track += known);

@@ -125,21 +125,18 @@ impl Convex {
 
 /// Area of `polygon` that no member of `covers` covers.
 pub fn uncovered_area<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a Convex>) -> f64 {
-    uncovered(polygon, covers).iter().map(Convex::area).sum()
+    let bounds = polygon.bounds();
+    let near = covers.into_iter().filter(|cover| bounds.meets(&cover.bounds()));
+    uncovered(polygon, near).iter().map(Convex::area).sum()
 }
 
 /// What of `polygon` no member of `covers` covers, in disjoint convex pieces.
 pub fn uncovered<'a>(polygon: Convex, covers: impl IntoIterator<Item = &'a Convex>) -> Vec<Convex> {
     let mut pieces = vec![polygon];
     for cover in covers {
-        let bounds = cover.bounds();
         let mut next = Vec::with_capacity(pieces.len() + 2);
         for piece in pieces {
-            if bounds.meets(&piece.bounds()) {
-                piece.minus(cover, &mut next);
-            } else {
-                next.push(piece);
-            }
+            piece.minus(cover, &mut next);
         }
         pieces = next;
         if pieces.is_empty() {

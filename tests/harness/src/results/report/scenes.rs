@@ -4,7 +4,8 @@ use anyhow::Result;
 use serde_json::{Value, json};
 
 use super::json::{self, Options, Report};
-use super::table::{percent, rates, signed, table};
+use super::percent;
+use super::table::{rates, signed, table};
 use super::{ORIGIN, notes};
 use crate::evaluation::Options as EvaluationOptions;
 use crate::evaluation::replay::Replay;

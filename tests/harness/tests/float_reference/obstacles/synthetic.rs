@@ -160,7 +160,7 @@ mod tests {
             }
         }
         // a lorry that is followed as two halves side by side is off by half its width
-        apart.limit("integer and exact", [0.02, 0.06, 0.009, 0.01], [0.15, 3.0, 0.06, 0.06]);
+        apart.limit("integer and exact", [0.02, 0.06, 0.009, 0.02], [0.15, 3.0, 0.06, 0.06]);
         within("integer to the right of exact", -apart.left / apart.n, 0.05);
         // bins of half a metre and noise lengthen the outline
         let (means, worst) = ([0.07, 0.35, 0.045, 0.6], [0.2, 1.6, 0.22, 0.75]);
