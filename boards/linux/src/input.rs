@@ -24,7 +24,7 @@ use viewshed::wire::message::Epoch;
 use viewshed::wire::status::Reason;
 
 use crate::can::Interface;
-use crate::sensor::config::{ClockSource, Config, Radar};
+use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;
 use crate::output::{Lines, Output};
 use crate::serial::Serial;

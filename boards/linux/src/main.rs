@@ -22,7 +22,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Parser;
 use log::{Level, LevelFilter, error};
 
-use crate::sensor::config::Config;
+use crate::config::Config;
 
 /// Computes where a roadside radar can see, and broadcasts it
 ///

@@ -19,7 +19,7 @@ use viewshed::wire::serial::MOST_STUFFED;
 use viewshed::wire::status::{Reason, Status};
 
 use crate::can::Interface;
-use crate::sensor::config::{ClockSource, Config};
+use crate::config::{ClockSource, Config};
 use crate::frames;
 use crate::run::version;
 use crate::serial::Serial;

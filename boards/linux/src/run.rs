@@ -14,7 +14,7 @@ use viewshed::unit::profile::reference::{CHECK, Map, Parameters, Sender, State, 
 use viewshed::unit::settings::{BlockError, Stored};
 use viewshed::wire::status::{Reason, State as Told};
 
-use crate::sensor::config::{ClockSource, Config};
+use crate::config::{ClockSource, Config};
 use crate::input::{self, Input, Step, Work};
 use crate::output::Output;
 use crate::state::{FileSlots, next_epoch};

@@ -72,7 +72,7 @@ fn main() -> ! {
         let mut session = session(epoch, &flash, &mut lines);
         let settings = session.settings();
         let mut parameters: Option<Parameters> = None;
-        start(&mut parameters, sender, settings, Medium::Serial, epoch, session.now());
+        start::<State, _>(&mut parameters, sender, settings, Medium::Serial, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         loop {

@@ -54,7 +54,7 @@ extern "C" fn main() -> ! {
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());
+        start::<State, _>(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         while session.turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}

@@ -109,7 +109,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());
+        start::<State, _>(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut *state, &mut *map, sender));
         let mut last = None;

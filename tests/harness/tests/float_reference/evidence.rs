@@ -4,8 +4,8 @@ use viewshed::grid::evidence::EvidenceConfig;
 use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::Placed;
-use crate::grid::raycast::Map;
 use crate::grid::{Axes, Grid};
+use crate::raycast::Map;
 
 /// Standard deviations of azimuth a detection's evidence reaches.
 const REACH: f64 = 2.0;

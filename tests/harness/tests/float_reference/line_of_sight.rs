@@ -14,8 +14,8 @@ mod tests {
     use viewshed::sensor::mount::Mount;
     use viewshed_harness::geometry::solid::Solid;
 
-    use crate::grid::voxelise::crossing;
     use crate::scene::{AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, VIEW, mounts, within};
+    use crate::voxelise::crossing;
 
     const SLICE_M: f64 = 1.0;
 

@@ -11,14 +11,14 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed_harness::estimators::{Estimator, PolarCells};
 use viewshed_harness::recording::Frame;
 
-use crate::frame::gate::Scan;
+use crate::evidence::InverseSensor;
+use crate::gate::Scan;
 use crate::geometry::{Levelled, Placed};
-use crate::grid::evidence::InverseSensor;
-use crate::grid::raycast::{Map, cast};
-use crate::grid::voxelise::voxelise;
 use crate::grid::{Axes, Grid};
 use crate::obstacles::{Obstacles, Rules};
+use crate::raycast::{Map, cast};
 use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
+use crate::voxelise::voxelise;
 
 /// Obstacles followed at most.
 const OBSTACLES: usize = 96;
