@@ -82,7 +82,7 @@ impl FreeMotion {
         // gains in 2^-12, the second one per second
         let (to_place, to_speed) = (ratio::<12>(place, total), ratio::<12>(both, total));
         let radial = seen.radial - sight.along(self.velocity.0, self.velocity.1);
-        let radial = radial - radial / (seen.count + 1);
+        let radial = radial - radial / (seen.count + 1).max(1);
         let across = mul_shift(left, to_speed, 12);
         self.push(sight, radial, across);
         // ranges are good to decimetres, but where on the vehicle the reflection is varies as across

@@ -213,7 +213,7 @@ impl Obstacle {
         }
         self.lateral_weight = weight;
         let off = g.spread(self.heading).clamp(0, 4 * EVEN_SPREAD) - self.spread;
-        self.spread += off * g.count / (g.count + SPREAD_MEMORY);
+        self.spread += off * g.count / (g.count + SPREAD_MEMORY).max(1);
         self.question_heading(t);
         self.update_extent(t);
         self.hits = self.hits.saturating_add(g.count as u16);

@@ -41,7 +41,7 @@ const G474: Board = Board {
     dma: 0x2000_0000..0x2000_0800,
     stack: None,
     most_flash: 147_456,
-    most_ram: 100_000,
+    most_ram: 102_000,
     least_stack: 24_000,
 };
 
