@@ -22,7 +22,7 @@ pub mod frame_queue;
 pub mod profile;
 pub mod radar_clock;
 pub mod roadside;
-pub mod safe_state;
+mod safe_state;
 pub mod sender;
 pub mod serial_service;
 pub mod service;

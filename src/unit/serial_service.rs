@@ -17,7 +17,7 @@ pub trait Line {
 
 /// What a request asks of the loop around the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Asked {
+pub(crate) enum Asked {
     /// Nothing: it is answered.
     Nothing,
     /// A start with the newest block.
@@ -28,7 +28,7 @@ pub enum Asked {
 
 /// Requests in, replies out, from start to restart.
 #[derive(Debug)]
-pub struct SerialService {
+pub(crate) struct SerialService {
     sensor: u8,
     stored: Stored,
     safe: SafeState,
