@@ -14,7 +14,6 @@ use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::profile::reference::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
 use viewshed::unit::settings::{Settings, Stored};
 use viewshed::unit::{Flow, Unit};
-use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::listener::{MEDIUM, Map, SENSOR};
