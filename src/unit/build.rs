@@ -20,33 +20,29 @@ pub trait InUnit: Estimator {
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError>;
 }
 
-/// What a unit is made of by its settings: its parameters, and the header of its maps. A start and the check of a
-/// block that came are this same function, so that none is accepted that cannot start.
-#[inline(never)] // what it takes of the stack is free again afterwards
-fn make<E: InUnit>(settings: &Settings) -> Result<(E::Parameters, Header), ConfigError> {
-    settings.radar_bus.check("radar_bus")?;
-    settings.broadcast_bus.check("broadcast_bus")?;
-    let parameters = E::parameters(&E::config(settings))?;
-    let header = E::header(settings, &parameters)?;
-    Ok((parameters, header))
-}
-
-/// Makes a unit's parameters, where they stay, and the header of its maps.
+/// Makes a unit's parameters, where they stay, and the header of its maps. A start and the check of a block that
+/// came are this same function, so that none is accepted that cannot start.
 ///
 /// # Errors
 /// Names the first parameter that cannot be worked with; there are no parameters then.
-#[inline(never)] // as above
+#[inline(never)] // what it takes of the stack is free again afterwards
 pub fn build<E: InUnit>(settings: &Settings, parameters: &mut Option<E::Parameters>) -> Result<Header, ConfigError> {
     *parameters = None;
-    let (made, header) = make::<E>(settings)?;
-    *parameters = Some(made);
-    Ok(header)
+    settings.radar_bus.check("radar_bus")?;
+    settings.broadcast_bus.check("broadcast_bus")?;
+    // large: moved once
+    let made = parameters.insert(E::parameters(&E::config(settings))?);
+    let header = E::header(settings, made);
+    if header.is_err() {
+        *parameters = None;
+    }
+    header
 }
 
 /// Whether a unit with this sender can be made by these settings.
-#[inline(never)]
+#[inline(never)] // as above
 fn check<E: InUnit, S: Sender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
-    make::<E>(settings).and_then(|(_, header)| S::fits(&header))
+    build::<E>(settings, &mut None).and_then(|header| S::fits(&header))
 }
 
 impl Check {

@@ -122,6 +122,7 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
     }
 
     /// Takes a frame and offers its map to the sender.
+    #[inline(never)] // a feed calls it from several places: what a scan takes of the stack is there once
     pub fn frame(&mut self, frame: &Frame<'_, E::Input>, event: &mut impl FnMut(Event)) -> Progress {
         let Frame { measured, input, incomplete, status } = *frame;
         event(Event::Began);
