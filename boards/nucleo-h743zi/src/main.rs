@@ -154,6 +154,6 @@ async fn main(_spawner: Spawner) {
     let start = Start { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
     let mut ports = Ports { radar, broadcast, serial, slots };
     let decoder = Radar::new(ars408::Config::sensor(SENSOR));
-    let roadside = Roadside::start(start, memory, decoder, now(), &mut ports);
-    unit::run(roadside, ports, Output::new(p.PB0, Level::Low, Speed::Low), watchdog).await
+    let mut roadside = Roadside::start(start, memory, decoder, now(), &mut ports);
+    unit::run(&mut roadside, &mut ports, Output::new(p.PB0, Level::Low, Speed::Low), watchdog).await
 }

@@ -57,10 +57,11 @@ pub fn start(broadcast: Receiver, line: Uart<'static, Async>) -> (Line, SendSpaw
     (serial, spawner)
 }
 
-/// Runs the unit, and resets the controller where an integrator asks for it.
+/// Runs the unit, and resets the controller where an integrator asks for it. Borrowed, as a future keeps what it is
+/// given several times.
 pub async fn run<E, S, F, R, B, P, O, W>(
-    mut unit: Roadside<'static, E, S, F>,
-    mut ports: Ports<R, B, Line, P>,
+    unit: &mut Roadside<'static, E, S, F>,
+    ports: &mut Ports<R, B, Line, P>,
     light: O,
     mut watchdog: IndependentWatchdog<'static, W>,
 ) -> !
@@ -77,7 +78,7 @@ where
     let mut light = StatusOutput::new(light);
     let mut told = None;
     loop {
-        let step = unit.step(now(), &mut ports);
+        let step = unit.step(now(), ports);
         let _ = light.show(step.state, now());
         if told.replace(step.state) != Some(step.state) {
             defmt::info!("{}", step.state);
