@@ -11,10 +11,11 @@
 //! use viewshed::sensor::road::RoadPoint;
 //! use viewshed::sensor::mount::Mount;
 //! use viewshed::map::query::{self, Answer, Footprint};
-//! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters, SmallProfile};
+//! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
 //! use viewshed::sensor::noise::NoiseConfig;
 //! use viewshed::sensor::Sensor;
 //! use viewshed::fixed::time::Time;
+//! use viewshed::unit::profile::small;
 //!
 //! // a gantry, 6 m up, looking 4 degrees down
 //! let sensor = Sensor {
@@ -31,7 +32,7 @@
 //! };
 //! let parameters = Radar3dParameters::new(&sensor, &Radar3dConfig::default())?;
 //! // on a controller: a static
-//! let mut radar = Box::new(SmallProfile::new());
+//! let mut radar = Box::new(small::State::new());
 //! let mut map = parameters.map();
 //!
 //! // one parked truck's reflection, again and again
@@ -69,12 +70,13 @@
 //! | [`obstacles`] | what moves is followed: place, length, width, height; [solid](obstacles::solid) boxes out |
 //! | [`map`] | what a map answers: the [interface](map::VisibilityMap), the [polar map](map::polar), [queries](map::query), the [1 m grid](map::resample), the [bitmap](map::bitmap) |
 //! | [`grid`] | range x azimuth x slope: boxes and [evidence](grid::evidence) in, [lines of sight](grid::raycast) and a polar map out |
+//! | [`estimator`] | what a unit asks of an estimator, whatever its sensor and its map |
 //! | [`radar_3d`] | the estimator: all stages above, in order |
 //! | [`radar_2d`] | the flat baseline, as an estimator of its own |
 //! | [`wire`] | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
 //! | [`inputs`] | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
 //! | [`mod@unit`] | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
-//! | [`pil`], [`stage`], [`profile`] | the same scans on a controller and on a PC, compared, stage by stage |
+//! | [`mod@bench`] | the same scans on a controller and on a PC, compared, stage by stage |
 //!
 //! # Words
 //!
@@ -128,20 +130,19 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod bench;
 #[cfg(doc)]
 #[doc = include_str!("EXTENDING.md")]
 pub mod extending {}
+pub mod estimator;
 pub mod fixed;
 pub mod frame;
 pub mod grid;
 pub mod inputs;
 pub mod map;
 pub mod obstacles;
-pub mod pil;
-pub mod profile;
 pub mod radar_2d;
 pub mod radar_3d;
 pub mod sensor;
-pub mod stage;
 pub mod unit;
 pub mod wire;

@@ -8,6 +8,7 @@
 //!                        polar map: grade, bit, occupancy <- slice at h <- ray casting
 //! ```
 
+use crate::estimator::{Estimator, Progress};
 use crate::fixed::math;
 use crate::fixed::time::{Step, Time};
 use crate::frame::detection::Detection;
@@ -28,7 +29,6 @@ use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::mount::Levelling;
 use crate::sensor::noise::Noise;
-use crate::stage::Stage;
 
 /// Everything that can be set, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -156,12 +156,6 @@ pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usiz
     rejections: Rejections,
 }
 
-/// The reference grid: 200 m in 1 m cells, 1 degree, 16 elevations.
-pub type ReferenceProfile = Radar3d<200, 120, 16, 7, 96, 256>;
-
-/// For controllers with 128 kB: 2 m cells.
-pub type SmallProfile = Radar3d<100, 64, 8, 4, 28, 176>;
-
 /// What a frame did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -231,10 +225,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         status: impl Into<FrameStatus>,
         map: &mut PolarMap<R, A>,
     ) -> FrameReport {
-        self.process_traced(p, now, detections, status, map, |_| {})
+        self.process_traced(p, now, detections, status, map, &mut || {})
     }
 
-    /// [`process`](Self::process) that tells each stage as it ends.
+    /// [`process`](Self::process) that calls `ended` as each of its seven stages ends.
     #[allow(clippy::cast_possible_truncation)] // bounded lists
     pub fn process_traced<'a>(
         &mut self,
@@ -243,7 +237,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
         status: impl Into<FrameStatus>,
         map: &mut PolarMap<R, A>,
-        mut ended: impl FnMut(Stage),
+        ended: &mut impl FnMut(),
     ) -> FrameReport {
         let FrameStatus { fault, refused } = status.into();
         let place = |d: &Detection| p.noise.place(d, &p.levelling);
@@ -258,17 +252,17 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             Continuity::Follows(micros) => Step::from_micros(micros),
             _ => Step::from_micros(0),
         };
-        ended(Stage::Gate);
+        ended();
         let claimed = self.follow_obstacles(p, step, map);
-        ended(Stage::Obstacles);
-        self.update_grid(p, step, continuity, &claimed, map, &mut ended);
+        ended();
+        self.update_grid(p, step, continuity, &claimed, map, ended);
         let condition = self.health.condition(now, &p.health);
         if condition == Condition::Healthy {
             raycast::cast(&self.grid, &p.axes, map);
         } else {
             map.forget();
         }
-        ended(Stage::RayCast);
+        ended();
         self.rejections.add_all(self.scan.rejections());
         let report = FrameReport {
             continuity,
@@ -295,26 +289,26 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         continuity: Continuity,
         claimed: &Claimed<D>,
         map: &PolarMap<R, A>,
-        ended: &mut impl FnMut(Stage),
+        ended: &mut impl FnMut(),
     ) {
         let first = !matches!(continuity, Continuity::Follows(_));
         self.grid.remove_solids();
         p.inverse_sensor.fade(&mut self.grid, map, step);
-        ended(Stage::Fade);
+        ended();
         let reflections = self.scan.reflections();
         p.inverse_sensor.clear(reflections, &p.axes, &mut self.grid);
-        ended(Stage::Clear);
+        ended();
         for (i, r) in reflections.iter().enumerate() {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
             if first || !(claimed.contains(i) || p.tracking.course(r).is_some()) {
                 p.inverse_sensor.add(r, first, &p.axes, &mut self.grid);
             }
         }
-        ended(Stage::Add);
+        ended();
         for solid in self.obstacles.solids(&p.tracking) {
             voxelise(&solid, &p.axes, &mut self.grid);
         }
-        ended(Stage::Voxelise);
+        ended();
     }
 
     /// Makes the map unknown when its time has run out; to be called when no frame comes.
@@ -339,5 +333,44 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     /// The occupancy grid.
     pub fn grid(&self) -> &SphericalGrid<R, A, E, W> {
         &self.grid
+    }
+}
+
+impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> Estimator
+    for Radar3d<R, A, E, W, N, D>
+{
+    type Config = (Sensor, Radar3dConfig);
+    type Parameters = Radar3dParameters<R, A, E>;
+    type Input = [Detection];
+    type Map = PolarMap<R, A>;
+
+    fn parameters((sensor, config): &Self::Config) -> Result<Self::Parameters, ConfigError> {
+        Radar3dParameters::new(sensor, config)
+    }
+
+    fn prepare(parameters: &Self::Parameters, map: &mut Self::Map) {
+        parameters.prepare(map);
+    }
+
+    fn forget(&mut self, map: &mut Self::Map) {
+        self.reset();
+        map.forget();
+    }
+
+    fn process(
+        &mut self,
+        parameters: &Self::Parameters,
+        measured: Time,
+        input: &[Detection],
+        status: FrameStatus,
+        map: &mut Self::Map,
+        ended: &mut impl FnMut(),
+    ) -> Progress {
+        let report = self.process_traced(parameters, measured, input, status, map, ended);
+        Progress { continuity: report.continuity, condition: report.condition, used: report.used }
+    }
+
+    fn expire(&mut self, parameters: &Self::Parameters, now: Time, map: &mut Self::Map) -> Condition {
+        Self::expire(self, parameters, now, map)
     }
 }

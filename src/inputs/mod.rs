@@ -14,6 +14,7 @@ pub mod ti;
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::frame::health::FrameStatus;
+use crate::wire::frame::CanFrame;
 
 /// The detections of one scan of a radar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +40,116 @@ impl RadarScan<'_> {
     /// What the estimators are told besides the detections.
     pub fn status(&self) -> FrameStatus {
         FrameStatus { fault: self.fault, refused: self.refused }
+    }
+
+    /// As a frame for an estimator.
+    pub fn frame(&self) -> Frame<'_, [Detection]> {
+        Frame { measured: self.time, input: self.detections, incomplete: self.missing > 0, status: self.status() }
+    }
+}
+
+/// What a sensor measured at a time, for an estimator.
+#[derive(Debug)]
+pub struct Frame<'a, I: ?Sized> {
+    /// When.
+    pub measured: Time,
+    /// What.
+    pub input: &'a I,
+    /// Something of it was announced and did not arrive.
+    pub incomplete: bool,
+    /// What the sensor says of itself, and what was refused.
+    pub status: FrameStatus,
+}
+
+/// A decoder that feeds an estimator: pieces of a sensor's line in, frames out.
+pub trait Feed {
+    /// What comes over the line at a time: a CAN frame, some bytes, a message.
+    type Piece: ?Sized;
+    /// What a frame holds.
+    type Input: ?Sized;
+
+    /// Takes a piece; `each` is given what is complete by then.
+    fn take(&mut self, piece: &Self::Piece, now: Time, each: &mut impl FnMut(&Frame<'_, Self::Input>));
+
+    /// Gives out what is over because nothing came.
+    fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, Self::Input>));
+
+    /// Frames that never came, since the start.
+    fn lost(&self) -> u32;
+}
+
+impl<const N: usize> Feed for ars408::Ars408<N> {
+    type Piece = CanFrame;
+    type Input = [Detection];
+
+    fn take(&mut self, piece: &CanFrame, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+        if let ars408::Outcome::Scan(scan) = self.push(piece, now) {
+            each(&scan.frame());
+        }
+        self.wait(now, each);
+    }
+
+    fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+        while let Some(outcome) = self.poll(now) {
+            if let ars408::Outcome::Scan(scan) = outcome {
+                each(&scan.frame());
+            }
+        }
+    }
+
+    fn lost(&self) -> u32 {
+        self.counters().lost
+    }
+}
+
+impl<const N: usize> Feed for ti::Ti<N> {
+    type Piece = [u8];
+    type Input = [Detection];
+
+    fn take(&mut self, mut piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+        while !piece.is_empty() {
+            let (taken, outcome) = self.push(piece, now);
+            if let ti::Outcome::Scan(scan) = outcome {
+                each(&scan.frame());
+            }
+            // a receiver that took nothing would hold up everything
+            piece = piece.get(taken.max(1)..).unwrap_or(&[]);
+        }
+    }
+
+    fn wait(&mut self, _: Time, _: &mut impl FnMut(&Frame<'_, [Detection]>)) {}
+
+    fn lost(&self) -> u32 {
+        self.counters().lost
+    }
+}
+
+/// Time on this line is that of its scans: what follows one is looked at by its stamp.
+impl<const N: usize> Feed for native::Receiver<N> {
+    type Piece = [u8];
+    type Input = [Detection];
+
+    fn take(&mut self, piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+        let mut now = now;
+        if let native::Outcome::Scan(scan) = self.push(piece, now) {
+            now = scan.time;
+            each(&scan.frame());
+        }
+        self.wait(now, each);
+    }
+
+    fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+        let mut now = now;
+        while let Some(outcome) = self.poll(now) {
+            if let native::Outcome::Scan(scan) = outcome {
+                now = scan.time;
+                each(&scan.frame());
+            }
+        }
+    }
+
+    fn lost(&self) -> u32 {
+        self.counters().lost
     }
 }
 

@@ -1,48 +1,65 @@
-//! A sensor's unit: scans in, the map kept up to date, its broadcast and its status out.
+//! A sensor's unit: frames in, the map kept up to date, its broadcast and its status out.
 //!
 //! This is the loop every controller runs, without its drivers. Time is always the caller's: on the
-//! road a timer's, in a test bench the recording's. A board calls [`Unit::scan`] with each scan,
-//! [`Unit::idle`] between them, at least ten times a second, and sends what [`Unit::next_line`] or
-//! [`Unit::next_frame`] gives until there is nothing more.
+//! road a timer's, in a test bench the recording's. A board gives [`Unit::take`] what comes over the
+//! sensor's line, calls [`Unit::wait`] when nothing came, at least ten times a second, and sends what
+//! [`Unit::next_line`] or [`Unit::next_frame`] gives until there is nothing more. Which sensor it is says
+//! the [`Estimator`], which line the [`Feed`], who sends the [`Sender`].
 //!
 //! | around it | modules |
 //! |---|---|
-//! | sessions: what comes over a line becomes scans and requests | [`session`], [`can_session`], [`ti_session`], [`radar_clock`] |
-//! | settings: the checked block, asked for and written over serial lines and CAN, kept in flash | [`settings`], [`stored`], [`service`], [`can_service`], [`flash_slots`], [`safe_state`] |
+//! | what an estimator needs to be in a unit, and the two sizes of radar-3d | [`build`](mod@build), [`profile`] |
+//! | settings: the checked block, two slots of it, in flash | [`settings`] |
+//! | the integrator: asked for and written over serial lines and CAN, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`safe_state`] |
+//! | native scans and the integrator on serial lines, and whose clock it is | [`session`], [`radar_clock`] |
 //! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
 //! | a unit on hardware of its own: the loop, and what its lamp shows | [`roadside`], [`status_output`] |
 
+pub mod build;
 pub mod can_bus;
 pub mod can_service;
-pub mod can_session;
-pub mod flash_slots;
 pub mod frame_queue;
+pub mod profile;
 pub mod radar_clock;
 pub mod roadside;
-pub mod safe_state;
+mod safe_state;
+pub mod sender;
+pub mod serial_service;
 pub mod service;
 pub mod session;
 pub mod settings;
 pub mod status_output;
-pub mod stored;
-pub mod ti_session;
 pub mod transmitter;
 
+pub use build::{InUnit, build};
+pub use sender::Sender;
+
+use crate::estimator::{Estimator, Progress};
 use crate::fixed::time::Time;
-use crate::frame::detection::Detection;
-use crate::frame::health::{Condition, Continuity, FrameStatus};
-use crate::grid::axes::Axes;
-use crate::map::polar::PolarMap;
-use crate::radar_3d::{FrameReport, Radar3d, Radar3dParameters};
-use crate::sensor::config::{ConfigError, Problem};
-use crate::stage::Stage;
-use crate::unit::settings::Settings;
-use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
-use crate::wire::code::ray::Known;
+use crate::frame::health::{Condition, Continuity};
+use crate::inputs::{Feed, Frame};
 use crate::wire::frame::CanFrame;
-use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
-use crate::wire::message::Epoch;
 use crate::wire::status::{Reason, State};
+
+/// What comes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flow {
+    /// More of what comes.
+    Continue,
+    /// A start with the newest block.
+    Restart,
+}
+
+/// What a unit does with a frame, for whoever measures it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// It begins.
+    Began,
+    /// A stage of the estimator ended; after the last one, the offer to the sender.
+    Ended,
+    /// It is done.
+    Done(Progress),
+}
 
 /// What went wrong is told in the status for this long, microseconds: in several messages, should some be lost.
 const DEGRADED_US: u64 = 1_000_000;
@@ -52,124 +69,82 @@ const UNKNOWN_EVERY_US: u64 = 100_000;
 
 /// One sensor's estimator, map and sender; each in the memory the board gave it.
 #[derive(Debug)]
-pub struct Unit<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> {
-    parameters: &'a Radar3dParameters<R, A, E>,
-    state: &'a mut Radar3d<R, A, E, W, N, D>,
-    map: &'a mut PolarMap<R, A>,
-    broadcast: &'a mut Broadcaster<A, W>,
+pub struct Unit<'a, E: Estimator, S> {
+    parameters: &'a E::Parameters,
+    state: &'a mut E,
+    map: &'a mut E::Map,
+    broadcast: &'a mut S,
     /// The last map that was offered to the sender.
     offered: Option<Time>,
-    /// The last scan, and the time from the one before to it.
-    scanned: Option<Time>,
+    /// The last frame, and the time from the one before to it.
+    measured: Option<Time>,
     period_us: Option<u64>,
-    /// Whether the radar says that it has a fault.
+    frames: u32,
+    /// Whether the sensor says that it has a fault.
     fault: bool,
     /// What went wrong last, and when.
     trouble: Option<(Time, Reason)>,
 }
 
-/// What a unit is made of by its settings: its parameters, and the header of its maps. A start and the check of a
-/// block that came are this same function, so that none is accepted that cannot start.
-#[inline(never)] // what it takes of the stack is free again afterwards
-fn make<const R: usize, const A: usize, const E: usize>(
-    settings: &Settings,
-) -> Result<(Radar3dParameters<R, A, E>, Header), ConfigError> {
-    settings.radar_bus.check("radar_bus")?;
-    settings.broadcast_bus.check("broadcast_bus")?;
-    let parameters = Radar3dParameters::new(&settings.sensor, &settings.radar_3d())?;
-    let header = header(settings, &parameters)?;
-    Ok((parameters, header))
-}
-
-/// Makes a unit's parameters, where they stay, and the header of its maps.
-///
-/// # Errors
-/// Names the first parameter that cannot be worked with; there are no parameters then.
-#[inline(never)] // as above
-pub fn build<const R: usize, const A: usize, const E: usize>(
-    settings: &Settings,
-    parameters: &mut Option<Radar3dParameters<R, A, E>>,
-) -> Result<Header, ConfigError> {
-    *parameters = None;
-    let (made, header) = make(settings)?;
-    *parameters = Some(made);
-    Ok(header)
-}
-
-/// Whether a unit of this grid, and a sender of this size, can be made by these settings.
-///
-/// # Errors
-/// Names the first parameter that cannot be worked with.
-#[inline(never)]
-pub fn check<const R: usize, const A: usize, const E: usize, const W: usize>(
-    settings: &Settings,
-) -> Result<(), ConfigError> {
-    make::<R, A, E>(settings).and_then(|(_, header)| Broadcaster::<A, W>::fits(&header))
-}
-
-fn header<const R: usize, const A: usize, const E: usize>(
-    settings: &Settings,
-    parameters: &Radar3dParameters<R, A, E>,
-) -> Result<Header, ConfigError> {
-    let axes: &Axes<R, A, E> = parameters.axes();
-    let view = axes.view(A / 2);
-    let geometry = axes.polar(parameters.levelling());
-    let usual = Known::new(view.start, view.end);
-    let header = Header::new::<R, A>(&settings.sensor.mount, &geometry, usual, 1, fingerprint(&settings.to_block(0)));
-    // the mount was checked with the parameters, so it is the grid
-    #[allow(clippy::cast_precision_loss)]
-    let most = Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 };
-    #[allow(clippy::cast_precision_loss)]
-    header.map_err(|_| ConfigError { parameter: "header.azimuths", value: A as f32, problem: most })
-}
-
-impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
-    Unit<'a, R, A, E, W, N, D>
-{
+impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
     /// Puts the parts together; the map becomes one of these parameters, everything on it unknown.
-    pub fn new(
-        parameters: &'a Radar3dParameters<R, A, E>,
-        state: &'a mut Radar3d<R, A, E, W, N, D>,
-        map: &'a mut PolarMap<R, A>,
-        broadcast: &'a mut Broadcaster<A, W>,
-    ) -> Self {
-        parameters.prepare(map);
-        state.reset();
+    pub fn new(parameters: &'a E::Parameters, state: &'a mut E, map: &'a mut E::Map, broadcast: &'a mut S) -> Self {
+        E::prepare(parameters, map);
+        state.forget(map);
         Self {
             parameters,
             state,
             map,
             broadcast,
             offered: None,
-            scanned: None,
+            measured: None,
             period_us: None,
+            frames: 0,
             fault: false,
             trouble: None,
         }
     }
 
-    /// Takes a scan measured at this time and offers its map to the sender.
-    pub fn scan<'d>(
-        &mut self,
-        measured: Time,
-        detections: impl IntoIterator<Item = &'d Detection, IntoIter: Clone>,
-        status: impl Into<FrameStatus>,
-        mut ended: impl FnMut(Stage),
-    ) -> FrameReport {
-        let status = status.into();
-        let report = self.state.process_traced(self.parameters, measured, detections, status, self.map, &mut ended);
-        self.fault = status.fault;
-        self.period_us = self.scanned.replace(measured).and_then(|last| measured.since(last));
-        if report.continuity == Continuity::ClockStepped {
-            self.degrade(measured, Reason::ClockStepped);
-        }
-        self.tell(report.condition, measured);
-        self.offer(measured);
-        ended(Stage::Broadcast);
-        report
+    /// Takes what came over the sensor's line.
+    pub fn take<F: Feed<Input = E::Input>>(&mut self, feed: &mut F, piece: &F::Piece, now: Time) {
+        feed.take(piece, now, &mut |frame| {
+            self.frame(frame, &mut |_| {});
+        });
     }
 
-    /// What is to be done when no scan came: the map runs out, and that is sent.
+    /// What is to be done when nothing came: frames that are over are taken, and the map runs out.
+    pub fn wait<F: Feed<Input = E::Input>>(&mut self, feed: &mut F, now: Time) {
+        feed.wait(now, &mut |frame| {
+            self.frame(frame, &mut |_| {});
+        });
+        self.idle(now);
+        self.broadcast.status_mut().radar_lost = u16::try_from(feed.lost()).unwrap_or(u16::MAX);
+    }
+
+    /// Takes a frame and offers its map to the sender.
+    #[inline(never)] // a feed calls it from several places: what a scan takes of the stack is there once
+    pub fn frame(&mut self, frame: &Frame<'_, E::Input>, event: &mut impl FnMut(Event)) -> Progress {
+        let Frame { measured, input, incomplete, status } = *frame;
+        event(Event::Began);
+        let ended = &mut || event(Event::Ended);
+        let progress = self.state.process(self.parameters, measured, input, status, self.map, ended);
+        self.fault = status.fault;
+        self.frames = self.frames.wrapping_add(1);
+        self.period_us = self.measured.replace(measured).and_then(|last| measured.since(last));
+        if progress.continuity == Continuity::ClockStepped {
+            self.degrade(measured, Reason::ClockStepped);
+        }
+        if incomplete {
+            self.degrade(measured, Reason::IncompleteScans);
+        }
+        self.tell(progress.condition, measured);
+        self.offer(measured);
+        event(Event::Ended);
+        event(Event::Done(progress));
+        progress
+    }
+
+    /// The map runs out, and that is sent.
     pub fn idle(&mut self, now: Time) -> Condition {
         let condition = self.state.expire(self.parameters, now, self.map);
         self.tell(condition, now);
@@ -182,8 +157,7 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
 
     fn offer(&mut self, measured: Time) {
         self.offered = Some(measured);
-        // not sent while the epoch is new: the next one will be
-        let _ = self.broadcast.scan(measured, &*self.map);
+        self.broadcast.offer(measured, self.map);
     }
 
     /// Maps go on, but something went wrong just now: told in the status for a second. A bus too narrow is told
@@ -200,8 +174,8 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         }
     }
 
-    /// A scan took so long to be worked up, microseconds, by the clock of `now`: told if it is longer than the
-    /// time from scan to scan.
+    /// A frame took so long to be worked up, microseconds, by the clock of `now`: told if it is longer than the
+    /// time from frame to frame.
     pub fn took(&mut self, now: Time, took_us: u64) {
         if self.period_us.is_some_and(|period| took_us > period) {
             self.degrade(now, Reason::Overrun);
@@ -227,11 +201,10 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
 
     /// Forgets everything but the counters: what comes next does not follow.
     pub fn reset(&mut self) {
-        self.state.reset();
-        self.map.forget();
+        self.state.forget(self.map);
     }
 
-    /// The next message for a serial line, if one is due; see [`Broadcaster::next_line`].
+    /// The next message for a serial line, if one is due.
     pub fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize> {
         self.broadcast.next_line(now, line)
     }
@@ -241,65 +214,173 @@ impl<'a, const R: usize, const A: usize, const E: usize, const W: usize, const N
         self.broadcast.next_frame(now)
     }
 
-    /// Time of the last map that was offered to the sender: it moves with every scan, and while there are
+    /// Frames taken since the start, modulo 2^32.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// When the last frame was measured.
+    pub fn measured(&self) -> Option<Time> {
+        self.measured
+    }
+
+    /// Time of the last map that was offered to the sender: it moves with every frame, and while there are
     /// none with every map that says unknown.
     pub fn offered(&self) -> Option<Time> {
         self.offered
     }
 
     /// The map.
-    pub fn map(&self) -> &PolarMap<R, A> {
+    pub fn map(&self) -> &E::Map {
         self.map
     }
 
     /// The sender, for its counters and its clock.
-    pub fn broadcast(&mut self) -> &mut Broadcaster<A, W> {
+    pub fn broadcast(&mut self) -> &mut S {
         self.broadcast
     }
 }
 
-/// Whether something happened within the time it is told for, before or after `now`: scans are of another clock
+/// Whether something happened within the time it is told for, before or after `now`: frames are of another clock
 /// than the loop around them.
 fn recent(since: Time, now: Time) -> bool {
     now.since(since).or_else(|| since.since(now)).is_some_and(|us| us < DEGRADED_US)
 }
 
-/// Puts parameters and sender of a unit in a test bench where they stay: every message is sent at the moment it
-/// is due. `None` without settings, and without ones that can be worked with. Apart, so that what this takes of
-/// the stack is free again before the first scan.
-#[inline(never)]
-pub fn start_bench<const R: usize, const A: usize, const E: usize, const W: usize>(
-    parameters: &mut Option<Radar3dParameters<R, A, E>>,
-    sender: &mut Option<Broadcaster<A, W>>,
-    settings: Option<&Settings>,
-    medium: Medium,
-    epoch: Epoch,
-    now: Time,
-) {
-    (*parameters, *sender) = (None, None);
-    let Some(Ok(header)) = settings.map(|settings| build(settings, parameters)) else { return };
-    start_bench_sender(sender, header, medium, epoch, now);
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::health::FrameStatus;
+    use crate::sensor::config::ConfigError;
+    use crate::wire::broadcast::BroadcastConfig;
+    use crate::wire::header::Header;
+    use crate::wire::message::Epoch;
+    use crate::wire::status::Status;
+    use std::vec::Vec;
 
-#[inline(never)]
-fn start_bench_sender<const A: usize, const W: usize>(
-    sender: &mut Option<Broadcaster<A, W>>,
-    header: Header,
-    medium: Medium,
-    epoch: Epoch,
-    now: Time,
-) {
-    *sender = bench_sender(header, medium, epoch, now);
-}
+    /// Sees squares of a road, as a camera would: neither its input nor its map is a radar's.
+    #[derive(Debug, Default)]
+    struct Camera {
+        last: Option<Time>,
+    }
 
-/// The sender of a unit in a test bench: every message at the moment it is due. `None` for a map that cannot be
-/// sent.
-pub fn bench_sender<const A: usize, const W: usize>(
-    header: Header,
-    medium: Medium,
-    epoch: Epoch,
-    now: Time,
-) -> Option<Broadcaster<A, W>> {
-    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
-    Broadcaster::new(config, header, epoch, now).ok()
+    /// An outline in a picture: rows from, to.
+    type Outline = [usize; 2];
+    type Squares = [[bool; 4]; 4];
+
+    impl Estimator for Camera {
+        type Config = usize;
+        type Parameters = usize;
+        type Input = [Outline];
+        type Map = Squares;
+
+        fn parameters(config: &usize) -> Result<usize, ConfigError> {
+            Ok(*config)
+        }
+
+        fn prepare(_: &usize, map: &mut Squares) {
+            *map = [[false; 4]; 4];
+        }
+
+        fn forget(&mut self, map: &mut Squares) {
+            (self.last, *map) = (None, [[false; 4]; 4]);
+        }
+
+        fn process(
+            &mut self,
+            rows: &usize,
+            measured: Time,
+            input: &[Outline],
+            _: FrameStatus,
+            map: &mut Squares,
+            ended: &mut impl FnMut(),
+        ) -> Progress {
+            for (row, squares) in map.iter_mut().enumerate().take(*rows) {
+                squares.fill(!input.iter().any(|[from, to]| (*from..*to).contains(&row)));
+            }
+            ended();
+            let continuity =
+                if self.last.replace(measured).is_none() { Continuity::First } else { Continuity::Follows(1) };
+            Progress { continuity, condition: Condition::Healthy, used: 1 }
+        }
+
+        fn expire(&mut self, _: &usize, now: Time, map: &mut Squares) -> Condition {
+            let fresh = self.last.is_some_and(|last| now.since(last).is_some_and(|us| us < 500_000));
+            if !fresh {
+                *map = [[false; 4]; 4];
+            }
+            if fresh { Condition::Healthy } else { Condition::Stale }
+        }
+    }
+
+    /// Keeps what it is to send.
+    #[derive(Default)]
+    struct Kept(Vec<Squares>, Status);
+
+    impl Sender<Squares> for Kept {
+        fn fits(_: &Header) -> Result<(), ConfigError> {
+            Ok(())
+        }
+        fn start(_: BroadcastConfig, _: Header, _: Epoch, _: Time) -> Result<Self, ConfigError> {
+            Ok(Self::default())
+        }
+        fn offer(&mut self, _: Time, map: &Squares) {
+            self.0.push(*map);
+        }
+        fn next_frame(&mut self, _: Time) -> Option<CanFrame> {
+            None
+        }
+        fn next_line(&mut self, _: Time, _: &mut [u8]) -> Option<usize> {
+            None
+        }
+        fn deadline(&self) -> Option<Time> {
+            None
+        }
+        fn status_mut(&mut self) -> &mut Status {
+            &mut self.1
+        }
+        fn count_dropped(&mut self, _: u16) {}
+        fn take_overload(&mut self) -> bool {
+            false
+        }
+    }
+
+    /// A line on which an outline is two bytes, and an empty piece a picture that was lost.
+    #[derive(Default)]
+    struct Pictures(u32);
+
+    impl Feed for Pictures {
+        type Piece = [u8];
+        type Input = [Outline];
+
+        fn take(&mut self, piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Outline]>)) {
+            let [from, to] = *piece else { return self.0 += 1 };
+            let input = &[[usize::from(from), usize::from(to)]][..];
+            each(&Frame { measured: now, input, incomplete: from > to, status: false.into() });
+        }
+        fn wait(&mut self, _: Time, _: &mut impl FnMut(&Frame<'_, [Outline]>)) {}
+        fn lost(&self) -> u32 {
+            self.0
+        }
+    }
+
+    #[test]
+    fn an_estimator_with_another_input_and_map_is_a_unit_as_well() {
+        let (mut camera, mut map, mut kept, mut feed) =
+            (Camera::default(), [[true; 4]; 4], Kept::default(), Pictures(0));
+        let at = |ms: u64| Time::from_micros(ms * 1000);
+        let mut unit = Unit::new(&3, &mut camera, &mut map, &mut kept);
+        assert_eq!(*unit.map(), [[false; 4]; 4], "nothing is known");
+        unit.take(&mut feed, &[1, 2], at(100));
+        assert_eq!(unit.map().map(|row| row[0]), [true, false, true, false]);
+        assert_eq!((unit.broadcast().1.state, unit.frames()), (State::Ok, 1));
+        unit.take(&mut feed, &[2, 1], at(200));
+        let status = unit.broadcast().1;
+        assert_eq!((status.state, status.reason), (State::Degraded, Reason::IncompleteScans), "one way for every feed");
+        unit.take(&mut feed, &[], at(250));
+        unit.wait(&mut feed, at(800));
+        let status = unit.broadcast().1;
+        assert_eq!((status.state, status.reason, status.radar_lost), (State::Blind, Reason::RadarSilent, 1));
+        assert_eq!((kept.0.len(), kept.0.last()), (3, Some(&[[false; 4]; 4])), "and what ran out is sent");
+    }
 }

@@ -3,6 +3,7 @@
 #![allow(dead_code)] // each test file uses a part
 #![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
+use viewshed::bench::start;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
@@ -15,7 +16,6 @@ use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::settings::Settings;
-use viewshed::unit::{bench_sender, build};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 
@@ -45,16 +45,20 @@ pub fn gantry(height_m: f32, yaw_deg: f32) -> Sensor {
     }
 }
 
-/// Parameters and sender of a unit of 50 x 40 x 8 cells in a test bench.
+/// A unit of 50 x 40 x 8 cells.
+pub type SmallState = Radar3d<50, 40, 8, 2, 16, 64>;
+pub type SmallSender = Broadcaster<40, 2>;
+
+/// Its parameters and its sender in a test bench.
 pub fn small_unit(
     settings: &Settings,
     medium: Medium,
     epoch: u8,
     now: Time,
-) -> (Radar3dParameters<50, 40, 8>, Broadcaster<40, 2>) {
-    let mut parameters = None;
-    let header = build(settings, &mut parameters).unwrap();
-    (parameters.unwrap(), bench_sender(header, medium, Epoch::new(epoch), now).unwrap())
+) -> (Radar3dParameters<50, 40, 8>, SmallSender) {
+    let (mut parameters, mut sender) = (None, None);
+    start::<SmallState, _>(&mut parameters, &mut sender, Some(settings), medium, Epoch::new(epoch), now);
+    (parameters.unwrap(), sender.unwrap())
 }
 
 /// An upright box that moves along the road, metres and m/s.

@@ -7,22 +7,22 @@ use viewshed::inputs::native::{Receiver, SerialReceiver};
 use viewshed::inputs::ti::Ti;
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
-use viewshed::radar_3d::{Radar3dParameters, ReferenceProfile, SmallProfile};
+use viewshed::unit::profile::{reference, small};
 use viewshed::wire::broadcast::Broadcaster;
 use viewshed::wire::receive::SensorReceiver;
 
 #[test]
 fn the_reference_grid_fits_450_kb() {
-    let state = size_of::<ReferenceProfile>();
-    let parameters = size_of::<Radar3dParameters<200, 120, 16>>();
+    let state = size_of::<reference::State>();
+    let parameters = size_of::<reference::Parameters>();
     println!("radar-3d 200 x 120 x 16: state {state} B, parameters {parameters} B");
     assert!(state + parameters <= 450_000, "{state} + {parameters}");
 }
 
 #[test]
 fn the_small_profile_fits_72_kb_in_all() {
-    let state = size_of::<SmallProfile>();
-    let parameters = size_of::<Radar3dParameters<100, 64, 8>>();
+    let state = size_of::<small::State>();
+    let parameters = size_of::<small::Parameters>();
     println!("radar-3d 100 x 64 x 8: state {state} B, parameters {parameters} B");
     assert!(state + parameters <= 72_000, "{state} + {parameters}");
 }

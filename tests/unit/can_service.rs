@@ -2,10 +2,10 @@
 
 use proptest::prelude::*;
 use viewshed::fixed::time::Time;
+use viewshed::unit::Flow;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
-use viewshed::unit::session::Flow;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
-use viewshed::unit::stored::{Check, Slots, Stored};
+use viewshed::unit::profile::small;
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
@@ -45,7 +45,7 @@ fn settings(height_m: f32) -> Settings {
 }
 
 fn stored(slots: &InRam) -> Stored {
-    Stored::read(slots, Check::of::<50, 40, 8, 2>())
+    Stored::read(slots, small::CHECK)
 }
 
 fn start(medium: Medium, slots: &InRam) -> CanService {

@@ -1,22 +1,20 @@
 //! The loop a controller runs, here on the host: jobs in, records out.
 
+use viewshed::bench::fingerprint::Fingerprint;
+use viewshed::bench::job::{Job, JobError, ScanBuffer, ScanHead, detection_to_bytes};
+use viewshed::bench::record::{RECORD_LEN, Record};
+use viewshed::bench::{Bench, run};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::pil::fingerprint::Fingerprint;
-use viewshed::pil::job::{Job, JobError, ScanBuffer, ScanHead, detection_to_bytes};
-use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::pil::{Bench, Memory, run};
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::radar_3d::Radar3dParameters;
 use viewshed::sensor::Sensor;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
-use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::wire::broadcast::Medium;
 use viewshed::wire::serial::MOST_STUFFED;
 use viewshed::wire::status::State;
 
-use crate::common::{Vehicle, gantry, small_unit};
-
-type Small = Radar3d<50, 40, 8, 2, 16, 64>;
+use crate::common::{SmallSender, SmallState, Vehicle, gantry, small_unit};
 
 /// Streams in memory that give and take a few bytes at a time; a counter that goes one up a look.
 struct Streams {
@@ -55,7 +53,7 @@ fn sensor() -> Sensor {
     gantry(6.0, 0.0)
 }
 
-fn unit(settings: &Settings) -> (Radar3dParameters<50, 40, 8>, Broadcaster<40, 2>) {
+fn unit(settings: &Settings) -> (Radar3dParameters<50, 40, 8>, SmallSender) {
     small_unit(settings, Medium::Serial, 0, Time::from_micros(0))
 }
 
@@ -79,10 +77,9 @@ fn answer(job: Vec<u8>) -> (Result<(), JobError>, Vec<u8>) {
     let mut streams = Streams { job, answer: Vec::new(), ticks: 0 };
     let outcome = Job::read(&mut streams).and_then(|job| {
         let (parameters, mut sender) = unit(&job.settings);
-        let (mut state, mut map, mut scan) = (Box::new(Small::new()), parameters.map(), ScanBuffer::<64>::new());
-        let unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
-        let memory = Memory { unit, scan: &mut scan };
-        run(&mut streams, &job, memory)
+        let (mut state, mut map, mut scan) = (Box::new(SmallState::new()), parameters.map(), ScanBuffer::<64>::new());
+        let mut unit = Unit::new(&parameters, &mut *state, &mut map, &mut sender);
+        run(&mut streams, &job, [50, 40, 8, 64], &mut unit, &mut scan)
     });
     (outcome, streams.answer)
 }
@@ -100,7 +97,7 @@ fn every_frame_is_answered_with_the_fingerprint_of_its_map() {
     assert_eq!(records.len(), scans.len() + 2);
     let settings = Settings::of(sensor());
     let (parameters, mut sender) = unit(&settings);
-    let (mut state, mut map) = (Box::new(Small::new()), parameters.map());
+    let (mut state, mut map) = (Box::new(SmallState::new()), parameters.map());
     let mut line = [0; MOST_STUFFED];
     let (mut seen, mut messages) = (std::collections::BTreeSet::new(), 0);
     for (k, scan) in scans.iter().enumerate() {

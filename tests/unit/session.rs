@@ -2,19 +2,17 @@
 
 use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{Medium as Native, Sender};
-use viewshed::pil::record::FrameRecord;
-use viewshed::radar_3d::Radar3d;
 use viewshed::unit::Unit;
+use viewshed::unit::serial_service::Line;
 use viewshed::unit::service::Request;
-use viewshed::unit::session::{Line, Session};
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::unit::stored::{Check, Slots, Stored};
+use viewshed::unit::session::Session;
+use viewshed::unit::settings::{BLOCK_LEN, Check, Settings, Slots, Stored};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Epoch, Message, Received};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 use viewshed::wire::status::{Reason, State, Status};
 
-use crate::common::{Vehicle, gantry, small_unit};
+use crate::common::{SmallSender, SmallState, Vehicle, gantry, small_unit};
 
 struct Block([u8; BLOCK_LEN]);
 
@@ -39,23 +37,17 @@ impl Line for Narrow {
         self.messages += usize::from(self.open);
         self.open
     }
-
-    fn ticks(&mut self) -> u32 {
-        0
-    }
-
-    fn trace(&mut self, _: &FrameRecord) {}
 }
 
 #[test]
 fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() {
     let settings = Settings::of(gantry(6.0, 0.0));
     let (parameters, mut sender) = small_unit(&settings, Medium::Serial, 1, Time::from_micros(0));
-    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    let mut state = Box::new(SmallState::new());
     let mut map = parameters.map();
-    let mut unit = Some(Unit::new(&parameters, &mut state, &mut map, &mut sender));
+    let mut unit = Some(Unit::new(&parameters, &mut *state, &mut map, &mut sender));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow::default());
-    let stored = Stored::read(&slots, Check::of::<50, 40, 8, 2>());
+    let stored = Stored::read(&slots, Check::of::<SmallState, SmallSender>());
     let mut session = Session::<64>::start(0, Epoch::new(1), stored, &mut line);
     assert_eq!(session.settings(), Some(&settings));
 
@@ -67,7 +59,7 @@ fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() 
         for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, Native::Serial) {
             let mut stuffed = [0; MOST_STUFFED];
             let n = stuff(message.bytes(), &mut stuffed).unwrap();
-            session.take(&stuffed[..n], &mut unit, &mut slots, &mut line);
+            session.take(&stuffed[..n], &mut unit, &mut slots, &mut line, &mut |_, _| {});
         }
         after.push((line.messages, unit.as_mut().unwrap().broadcast().status_mut().dropped));
     }
@@ -81,11 +73,11 @@ fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() 
 fn a_radar_that_stops_is_told_by_the_units_own_clock() {
     let settings = Settings::of(gantry(6.0, 0.0));
     let (parameters, mut sender) = small_unit(&settings, Medium::Serial, 1, Time::from_micros(0));
-    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    let mut state = Box::new(SmallState::new());
     let mut map = parameters.map();
-    let mut unit = Some(Unit::new(&parameters, &mut state, &mut map, &mut sender));
+    let mut unit = Some(Unit::new(&parameters, &mut *state, &mut map, &mut sender));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow { open: true, messages: 0 });
-    let stored = Stored::read(&slots, Check::of::<50, 40, 8, 2>());
+    let stored = Stored::read(&slots, Check::of::<SmallState, SmallSender>());
     let mut session = Session::<64>::start(0, Epoch::new(1), stored, &mut line);
 
     let (mut radar, car) = (Sender::new(0), Vehicle::car(40.0, 2.0, 22.0));
@@ -94,7 +86,7 @@ fn a_radar_that_stops_is_told_by_the_units_own_clock() {
         for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, Native::Serial) {
             let mut stuffed = [0; MOST_STUFFED];
             let n = stuff(message.bytes(), &mut stuffed).unwrap();
-            session.take(&stuffed[..n], &mut unit, &mut slots, &mut line);
+            session.take(&stuffed[..n], &mut unit, &mut slots, &mut line, &mut |_, _| {});
         }
     }
     let last = session.now();
@@ -126,12 +118,6 @@ impl Line for Kept {
         self.0.push(bytes.to_vec());
         true
     }
-
-    fn ticks(&mut self) -> u32 {
-        0
-    }
-
-    fn trace(&mut self, _: &FrameRecord) {}
 }
 
 #[test]
@@ -139,9 +125,9 @@ fn the_safe_state_is_told_in_the_epoch_of_the_start_four_times_a_second() {
     let mut slots = Block([0xFF; BLOCK_LEN]);
     for epoch in [Epoch::new(1), Epoch::new(9)] {
         let mut line = Kept::default();
-        let stored = Stored::read(&slots, Check::of::<50, 40, 8, 2>());
+        let stored = Stored::read(&slots, Check::of::<SmallState, SmallSender>());
         let mut session = Session::<64>::start(0, epoch, stored, &mut line);
-        let mut unit: Option<Unit<'_, 50, 40, 8, 2, 16, 64>> = None;
+        let mut unit: Option<Unit<'_, SmallState, SmallSender>> = None;
         line.0.clear();
         for ms in 0..10_000 {
             session.idle(Time::from_micros(1000 * ms), &mut unit, &mut line);
@@ -160,8 +146,8 @@ fn the_safe_state_is_told_in_the_epoch_of_the_start_four_times_a_second() {
         let mut stuffed = [0; MOST_STUFFED];
         let request = Request::Write(&Settings::of(gantry(6.0, 0.0)).to_block(0)).message(0, 0);
         let n = stuff(request.bytes(), &mut stuffed).unwrap();
-        session.take(&stuffed[..n], &mut unit, &mut slots, &mut line);
-        assert!(Stored::read(&slots, Check::of::<50, 40, 8, 2>()).settings().is_some());
+        session.take(&stuffed[..n], &mut unit, &mut slots, &mut line, &mut |_, _| {});
+        assert!(Stored::read(&slots, Check::of::<SmallState, SmallSender>()).settings().is_some());
         slots.0.fill(0xFF);
     }
 }

@@ -1,14 +1,14 @@
 //! What a unit's status says of it, message by message, as its receivers read it.
 
 use viewshed::fixed::time::Time;
-use viewshed::radar_3d::Radar3d;
+use viewshed::inputs::Frame;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Message, Received};
 use viewshed::wire::status::{Reason, State, Status};
 
-use crate::common::{Vehicle, gantry, small_unit};
+use crate::common::{SmallState, Vehicle, gantry, small_unit};
 
 /// Milliseconds between scans.
 const PERIOD: u64 = 60;
@@ -22,19 +22,17 @@ fn run(until: u64, scan: impl Fn(u64) -> Option<(bool, bool)>, time: impl Fn(u64
     let settings = Settings::of(gantry(6.0, 0.0));
     let medium = Medium::Can(Addresses::STANDARD);
     let (parameters, mut sender) = small_unit(&settings, medium, 1, Time::from_micros(1000 * time(0)));
-    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    let mut state = Box::new(SmallState::new());
     let mut map = parameters.map();
-    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+    let mut unit = Unit::new(&parameters, &mut *state, &mut map, &mut sender);
     let car = Vehicle::car(40.0, 2.0, 0.0);
     let mut told = Told::new();
     for ms in 0..until {
         let now = Time::from_micros(1000 * time(ms));
         match scan(ms).filter(|_| ms % PERIOD == 0) {
             Some((fault, missing)) => {
-                unit.scan(now, &car.at(0.0).detections(&gantry(6.0, 0.0), true), fault, |_| {});
-                if missing {
-                    unit.degrade(now, Reason::IncompleteScans);
-                }
+                let input = &car.at(0.0).detections(&gantry(6.0, 0.0), true)[..];
+                unit.frame(&Frame { measured: now, input, incomplete: missing, status: fault.into() }, &mut |_| {});
             }
             None => drop(unit.idle(now)),
         }

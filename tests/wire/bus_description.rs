@@ -12,8 +12,8 @@ use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::can_service::{ANSWER, CanService, CanServiceConfig, REQUEST, Tool};
-use viewshed::unit::settings::BLOCK_LEN;
-use viewshed::unit::stored::{Check, Slots, Stored};
+use viewshed::unit::profile::small;
+use viewshed::unit::settings::{BLOCK_LEN, Slots, Stored};
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, WireMount};
@@ -173,7 +173,7 @@ impl Slots for Nowhere {
 /// An integrator's requests and what a unit without a block answers.
 fn configuration(medium: Medium) -> Vec<CanFrame> {
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
-    let check = Check::of::<50, 40, 8, 2>();
+    let check = small::CHECK;
     let mut unit = CanService::start(config, Epoch::new(11), Time::from_micros(0), Stored::read(&Nowhere, check));
     let mut tool = Tool::new(0, medium);
     let mut frames: Vec<CanFrame> = tool.write(&[0x56; 12]).collect();

@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::sensor::config::ConfigError;
-use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::frame::gate::GateConfig;
 use viewshed::frame::health::HealthConfig;
 use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfiguration};
 use viewshed::inputs::ars408::profile::{self, Profile};
 use viewshed::inputs::ti;
-use viewshed::sensor::mount::Mount;
-use viewshed::profile::reference::CHECK;
 use viewshed::radar_3d::VisibilityConfig;
-use viewshed::sensor::noise::NoiseConfig;
 use viewshed::sensor::Sensor;
+use viewshed::sensor::config::ConfigError;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
+use viewshed::unit::profile::reference::CHECK;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanId;

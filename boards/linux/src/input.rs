@@ -8,17 +8,17 @@ use std::os::fd::BorrowedFd;
 use anyhow::{Context, Result, bail};
 use log::{info, warn};
 use socketcan::dump::{ParseError, Reader};
+use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::state::RadarState;
 use viewshed::inputs::ars408::upkeep::Upkeep;
-use viewshed::profile::reference::{DETECTIONS, Unit};
-use viewshed::fixed::time::Time;
+use viewshed::inputs::ti::Ti;
+use viewshed::unit::Flow;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper};
-use viewshed::unit::can_session::CanSession;
+use viewshed::unit::profile::reference::{DETECTIONS, Radar as Decoder, Unit};
 use viewshed::unit::radar_clock::RadarClock;
-use viewshed::unit::session::{Flow, Session};
-use viewshed::unit::stored::Stored;
-use viewshed::unit::ti_session::TiSession;
+use viewshed::unit::session::Session;
+use viewshed::unit::settings::Stored;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Epoch;
 use viewshed::wire::status::Reason;
@@ -91,7 +91,7 @@ pub fn open(config: &Config) -> Result<Box<dyn Input>> {
         (Radar::Ars408, Some(_), _) => Box::new(Log::open(config)?),
         (Radar::Ars408, None, Some(name)) => Box::new(Bus::new(config, name)),
         (Radar::Ars408, None, None) => bail!("input.interface is missing"),
-        (Radar::Ti, ..) => Box::new(TiPort { port: port(false)?, session: TiSession::new(input.ti()) }),
+        (Radar::Ti, ..) => Box::new(TiPort { port: port(false)?, decoder: Ti::new(input.ti()) }),
         (Radar::Native, ..) => {
             let bench = input.clock == ClockSource::Input;
             Box::new(NativePort {
@@ -110,7 +110,7 @@ pub fn open(config: &Config) -> Result<Box<dyn Input>> {
 struct Bus {
     interface: Interface,
     keeper: BusKeeper,
-    session: CanSession<DETECTIONS>,
+    decoder: Decoder,
     sensor: u8,
     upkeep: Option<Upkeep>,
     holds: bool,
@@ -124,8 +124,8 @@ impl Bus {
         let mut interface = Interface::new(name, false);
         // the radar's frames prove the bit rate before it is told anything
         let keeper = BusKeeper::start(&BusConfig::default(), &mut interface);
-        let session = CanSession::new(input.ars408());
-        Self { interface, keeper, session, sensor: input.sensor_id, upkeep, holds: false, last: Time::from_micros(0) }
+        let decoder = Decoder::new(input.ars408());
+        Self { interface, keeper, decoder, sensor: input.sensor_id, upkeep, holds: false, last: Time::from_micros(0) }
     }
 
     /// Tells the radar what it is to send, and that it stands.
@@ -162,13 +162,13 @@ impl Input for Bus {
             let age = u64::try_from(self.interface.age.as_micros()).unwrap_or(0);
             // when the kernel had it, but never before what is already known
             self.last = Time::from_micros(now.micros().saturating_sub(age)).max(self.last);
-            self.session.frame(&frame, self.last, unit);
+            unit.take(&mut self.decoder, &frame, self.last);
             work.output.send(self.last, unit, None);
             self.look_after(Some(&frame), now);
         }
         self.look_after(None, now);
         self.last = now;
-        self.session.idle(now, unit);
+        unit.wait(&mut self.decoder, now);
         if self.upkeep.as_ref().is_some_and(|upkeep| upkeep.disagrees(now)) {
             unit.degrade(now, Reason::RadarConfiguration);
         }
@@ -184,16 +184,16 @@ struct Log {
     begins: Time,
     last: Time,
     skipped: u64,
-    session: CanSession<DETECTIONS>,
+    decoder: Decoder,
 }
 
 impl Log {
     fn open(config: &Config) -> Result<Self> {
         let path = config.input.candump.as_ref().context("input.candump is missing")?;
         let reader = Reader::from_file(path).with_context(|| format!("input.candump: {}", path.display()))?;
-        let (session, begins) = (CanSession::new(config.input.ars408()), Time::from_micros(0));
+        let (decoder, begins) = (Decoder::new(config.input.ars408()), Time::from_micros(0));
         let interface = config.input.interface.clone();
-        let mut log = Self { reader, interface, next: None, begins, last: begins, skipped: 0, session };
+        let mut log = Self { reader, interface, next: None, begins, last: begins, skipped: 0, decoder };
         log.advance();
         let Some((first, _)) = log.next else {
             bail!("input.candump: {}: no frame in it, as `candump -L` writes them", path.display())
@@ -240,11 +240,11 @@ impl Input for Log {
         {
             // a log that steps back is as good as one that stands still
             self.last = time.max(self.last);
-            self.session.frame(&frame, self.last, unit);
+            unit.take(&mut self.decoder, &frame, self.last);
             work.output.send(self.last, unit, None);
             self.advance();
         }
-        self.session.idle(now, unit);
+        unit.wait(&mut self.decoder, now);
         let over = self.next.is_none() && now.since(self.last).is_some_and(|us| us >= SILENCE_US);
         if over { Step::End } else { Step::Now(now) }
     }
@@ -257,7 +257,7 @@ impl Input for Log {
 /// A TI radar's data port.
 struct TiPort {
     port: Serial,
-    session: TiSession<DETECTIONS>,
+    decoder: Ti<DETECTIONS>,
 }
 
 impl Input for TiPort {
@@ -274,11 +274,11 @@ impl Input for TiPort {
                 break;
             }
             if let Some(unit) = work.unit {
-                self.session.take(bytes, now, unit);
+                unit.take(&mut self.decoder, bytes, now);
             }
         }
         if let Some(unit) = work.unit {
-            self.session.idle(now, unit);
+            unit.wait(&mut self.decoder, now);
         }
         Step::Now(now)
     }
@@ -324,7 +324,7 @@ impl Input for NativePort {
             for (k, byte) in bytes.iter().enumerate() {
                 let before = session.now();
                 let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
-                if session.take(&[*byte], work.unit, work.slots, &mut lines) == Flow::Restart {
+                if session.take(&[*byte], work.unit, work.slots, &mut lines, &mut |_, _| {}) == Flow::Restart {
                     self.rest.extend_from_slice(bytes.get(k + 1..).unwrap_or(&[]));
                     return Step::Restart;
                 }

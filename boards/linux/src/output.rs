@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use log::{error, info};
-use viewshed::pil::record::FrameRecord;
-use viewshed::profile::reference::Unit;
 use viewshed::fixed::time::Time;
+use viewshed::unit::Flow;
 use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
-use viewshed::unit::session::{Flow, Line};
-use viewshed::unit::stored::Stored;
+use viewshed::unit::profile::reference::Unit;
+use viewshed::unit::serial_service::Line;
+use viewshed::unit::settings::Stored;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Epoch;
 use viewshed::wire::serial::MOST_STUFFED;
@@ -211,10 +211,4 @@ impl Line for Lines<'_> {
         *if sent { &mut self.output.sent } else { &mut self.output.refused } += 1;
         sent
     }
-
-    fn ticks(&mut self) -> u32 {
-        0
-    }
-
-    fn trace(&mut self, _: &FrameRecord) {}
 }

@@ -6,13 +6,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use viewshed::map::polar::PolarMap;
-use viewshed::profile::reference::{CHECK, Map, Parameters, Sender, State, Unit};
 use viewshed::fixed::time::Time;
+use viewshed::map::polar::PolarMap;
+use viewshed::unit::Flow;
 use viewshed::unit::build;
-use viewshed::unit::session::Flow;
-use viewshed::unit::settings::BlockError;
-use viewshed::unit::stored::Stored;
+use viewshed::unit::profile::reference::{CHECK, Map, Parameters, Sender, State, Unit};
+use viewshed::unit::settings::{BlockError, Stored};
 use viewshed::wire::status::{Reason, State as Told};
 
 use crate::config::{ClockSource, Config};
@@ -66,12 +65,13 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         if let Some(settings) = &settings {
             let medium = config.medium().context("output.base_id is no identifier")?;
             // what does not build was refused above
-            let header = build(settings, &mut parameters).map_err(|e| anyhow!("{e}"))?;
+            let header = build::<State>(settings, &mut parameters).map_err(|e| anyhow!("{e}"))?;
             let now = input.now(clock.now());
             let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
         }
-        let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut state, &mut map, s));
+        let mut unit =
+            parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut *state, &mut *map, &mut **s));
         if let Some(unit) = &mut unit {
             unit.broadcast().status_mut().firmware = version();
         }

@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::unit::stored::Slots;
+use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots};
 use viewshed::wire::message::Epoch;
-
 
 /// The files that are kept.
 pub const FILES: [&str; 2] = [EPOCH, SLOTS];
@@ -98,14 +96,14 @@ impl Slots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use viewshed::sensor::Sensor;
     use viewshed::sensor::config::ConfigError;
     use viewshed::sensor::field_of_view::FieldOfView;
     use viewshed::sensor::mount::Mount;
     use viewshed::sensor::noise::NoiseConfig;
-    use viewshed::profile::reference::CHECK;
-    use viewshed::sensor::Sensor;
+    use viewshed::unit::profile::reference::CHECK;
     use viewshed::unit::settings::BlockError;
-    use viewshed::unit::stored::Stored;
+    use viewshed::unit::settings::Stored;
 
     fn settings(height_m: f32) -> Settings {
         Settings::of(Sensor {

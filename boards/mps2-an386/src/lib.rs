@@ -1,18 +1,23 @@
 //! What the MPS2 board with a Cortex-M4F has, as QEMU's `mps2-an386` emulates it.
 //!
-//! The only unsafe code of this board is here: registers, the stack's limits and the panic handler.
+//! The only unsafe code of this board is here: registers and the stack's limits.
 #![no_std]
 
+// nothing panics
+use emulated as _;
+
 mod interrupts;
-pub mod semihost;
 pub mod stack;
 pub mod timer;
 pub mod uart;
 
 #[cfg(not(feature = "small"))]
-pub use viewshed::profile::reference as profile;
+pub use viewshed::unit::profile::reference as profile;
 #[cfg(feature = "small")]
-pub use viewshed::profile::small as profile;
+pub use viewshed::unit::profile::small as profile;
+
+/// What a board says of its size: range cells, azimuths, elevations, detections.
+pub const SHAPE: [usize; 4] = [profile::RANGES, profile::AZIMUTHS, profile::ELEVATIONS, profile::DETECTIONS];
 
 /// A register of a peripheral.
 #[derive(Clone, Copy)]
@@ -40,7 +45,7 @@ impl Core {
     }
 }
 
-impl viewshed::pil::files::Core for Core {
+impl viewshed::bench::files::Core for Core {
     fn ticks(&mut self) -> u32 {
         self.0.ticks()
     }
@@ -52,15 +57,4 @@ impl viewshed::pil::files::Core for Core {
     fn stack(&self) -> [u32; 2] {
         stack::used()
     }
-}
-
-/// A panic that could happen anywhere in the image makes this symbol needed, and nobody has it: the
-/// image does not link.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    unsafe extern "C" {
-        fn this_image_can_panic() -> !;
-    }
-    // SAFETY: never linked
-    unsafe { this_image_can_panic() }
 }

@@ -22,29 +22,24 @@
 mod caches;
 
 use defmt_rtt as _;
-use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
-use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::peripherals::{DMA1_CH0, DMA1_CH1, FDCAN1, FDCAN2, RNG, USART3};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllDiv, PllMul, PllPreDiv, PllSource, Sysclk, VoltageScale, mux,
 };
 use embassy_stm32::time::Hertz;
-use embassy_stm32::usart::{self, Uart, UartTx};
+use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{bind_interrupts, can, dma, flash, interrupt, mode, pac, rng};
-use embassy_time::Timer;
+use embassy_stm32::{bind_interrupts, can, dma, flash, pac, rng};
 use static_cell::{ConstStaticCell, StaticCell};
 use stm32::can::{Queue, Receiver, open, queue};
-use stm32::dma::SEND;
-use stm32::serial::{Line, Out, send};
-use stm32::{crash, now};
-use viewshed::profile::reference::{CHECK, Map, Parameters, Roadside, Sender, State};
-use viewshed::unit::flash_slots::FlashSlots;
+use stm32::unit::REQUESTS;
+use stm32::{crash, now, unit};
+use viewshed::inputs::ars408;
+use viewshed::unit::profile::reference::{CHECK, Map, Parameters, Radar, Roadside, Sender, State};
 use viewshed::unit::roadside::{Memory, Ports, ResetFlags, Start};
-use viewshed::unit::session::Flow;
-use viewshed::unit::status_output::StatusOutput;
-use viewshed::unit::stored::Stored;
+use viewshed::unit::settings::{FlashSlots, Stored};
 use viewshed::wire::message::Epoch;
 
 /// The radar's number on its bus and in the broadcast.
@@ -53,8 +48,6 @@ const CAN_CLOCK_HZ: u32 = 80_000_000;
 const BAUD: u32 = 115_200;
 /// Frames of the radar between interrupt and loop: 60 ms of a full bus.
 const FRAMES: usize = 256;
-/// Frames of the broadcast bus there, where an integrator asks one thing a millisecond.
-const REQUESTS: usize = 32;
 const FLASH_BASE: u32 = 0x0800_0000;
 /// The slots of the settings, from the beginning of the flash.
 const SETTINGS: [u32; 2] = [0x1C_0000, 0x1E_0000];
@@ -69,9 +62,6 @@ static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(No
 static BROADCAST: StaticCell<Option<Sender>> = StaticCell::new();
 static SERIAL: StaticCell<Option<Sender>> = StaticCell::new();
 static RADAR_QUEUE: Queue<FRAMES> = queue();
-static BROADCAST_QUEUE: Queue<REQUESTS> = queue();
-static OUT: Out = Out::new();
-static INTERRUPTS: InterruptExecutor = InterruptExecutor::new();
 
 bind_interrupts!(struct Irqs {
     FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
@@ -84,26 +74,9 @@ bind_interrupts!(struct Irqs {
     RNG => rng::InterruptHandler<RNG>;
 });
 
-/// Of a peripheral that is not used: the tasks below run in it, whatever the loop does.
-#[interrupt]
-unsafe fn UART5() {
-    // SAFETY: called from this interrupt only
-    unsafe { INTERRUPTS.on_interrupt() }
-}
-
 #[embassy_executor::task]
 async fn scans(receiver: Receiver) -> ! {
     receiver.run(&RADAR_QUEUE).await
-}
-
-#[embassy_executor::task]
-async fn requests(receiver: Receiver) -> ! {
-    receiver.run(&BROADCAST_QUEUE).await
-}
-
-#[embassy_executor::task]
-async fn transmit(transmitter: UartTx<'static, mode::Async>, buffer: &'static mut [u8; SEND]) -> ! {
-    send(transmitter, &OUT, buffer).await
 }
 
 fn config() -> embassy_stm32::Config {
@@ -162,20 +135,13 @@ async fn main(_spawner: Spawner) {
     let can = can::CanConfigurator::new(p.FDCAN1, p.PD0, p.PD1, Irqs);
     let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);
     let can = can::CanConfigurator::new(p.FDCAN2, p.PB5, p.PB6, Irqs);
-    let (broadcast_receiver, broadcast) = open(can, pac::FDCAN2, broadcast_timing, &BROADCAST_QUEUE);
+    let (broadcast_receiver, broadcast) = open(can, pac::FDCAN2, broadcast_timing, &REQUESTS);
 
     let mut line = usart::Config::default();
     line.baudrate = BAUD;
     let line = Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, line).expect("a baud rate it has");
-    let (transmitter, receiver) = line.split();
-    let buffers = stm32::dma::take().expect("taken once");
-    let serial = Line::new(receiver.into_ring_buffered(&mut buffers.receive), &OUT);
-
-    interrupt::UART5.set_priority(Priority::P6);
-    let interrupts = INTERRUPTS.start(interrupt::UART5);
+    let (serial, interrupts) = unit::start(broadcast_receiver, line);
     interrupts.spawn(scans(radar_receiver).expect("room for one"));
-    interrupts.spawn(requests(broadcast_receiver).expect("room for one"));
-    interrupts.spawn(transmit(transmitter, &mut buffers.send).expect("room for one"));
 
     let memory = Memory {
         parameters: PARAMETERS.take(),
@@ -187,22 +153,7 @@ async fn main(_spawner: Spawner) {
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let start = Start { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
     let mut ports = Ports { radar, broadcast, serial, slots };
-    let mut unit = Roadside::start(start, memory, now(), &mut ports);
-    let mut light = StatusOutput::new(Output::new(p.PB0, Level::Low, Speed::Low));
-
-    let mut told = None;
-    loop {
-        let step = unit.step(now(), &mut ports);
-        let _ = light.show(step.state, now());
-        if told.replace(step.state) != Some(step.state) {
-            defmt::info!("{}", step.state);
-        }
-        if step.frame_done {
-            watchdog.pet();
-        }
-        if step.flow == Flow::Restart {
-            cortex_m::peripheral::SCB::sys_reset();
-        }
-        Timer::after_micros(500).await;
-    }
+    let decoder = Radar::new(ars408::Config::sensor(SENSOR));
+    let mut roadside = Roadside::start(start, memory, decoder, now(), &mut ports);
+    unit::run(&mut roadside, &mut ports, Output::new(p.PB0, Level::Low, Speed::Low), watchdog).await
 }

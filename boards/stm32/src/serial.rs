@@ -8,6 +8,7 @@ use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use viewshed::unit::roadside::SerialPort;
+use viewshed::unit::serial_service;
 
 use crate::dma::SEND;
 
@@ -30,6 +31,12 @@ impl Line {
     }
 }
 
+impl serial_service::Line for Line {
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        self.out.free_capacity() >= bytes.len() && self.out.try_write(bytes) == Ok(bytes.len())
+    }
+}
+
 impl SerialPort for Line {
     fn receive(&mut self, buffer: &mut [u8]) -> usize {
         match poll_once(self.receiver.read(buffer)) {
@@ -37,10 +44,6 @@ impl SerialPort for Line {
             // noise and overruns cost bytes, which the messages' check sums notice; the next read goes on
             Poll::Ready(Err(_)) | Poll::Pending => 0,
         }
-    }
-
-    fn send(&mut self, bytes: &[u8]) -> bool {
-        self.out.free_capacity() >= bytes.len() && self.out.try_write(bytes) == Ok(bytes.len())
     }
 }
 

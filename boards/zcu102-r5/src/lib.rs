@@ -1,22 +1,27 @@
 //! What the Cortex-R5F of a Zynq UltraScale+ has, as QEMU's `xlnx-zcu102` emulates it.
 //!
-//! The only unsafe code of this board is here: start-up, the stack's limits and the panic handler.
+//! The only unsafe code of this board is here: start-up and the stack's limits.
 #![no_std]
 
+// nothing panics
+use emulated as _;
+
 pub mod can;
-pub mod semihost;
 pub mod stack;
 mod start;
 
 #[cfg(not(feature = "small"))]
-pub use viewshed::profile::reference as profile;
+pub use viewshed::unit::profile::reference as profile;
 #[cfg(feature = "small")]
-pub use viewshed::profile::small as profile;
+pub use viewshed::unit::profile::small as profile;
+
+/// What a board says of its size: range cells, azimuths, elevations, detections.
+pub const SHAPE: [usize; 4] = [profile::RANGES, profile::AZIMUTHS, profile::ELEVATIONS, profile::DETECTIONS];
 
 /// What the bench wants to know of this core, whose instructions the emulator cannot count.
 pub struct Core;
 
-impl viewshed::pil::files::Core for Core {
+impl viewshed::bench::files::Core for Core {
     fn ticks(&mut self) -> u32 {
         0
     }
@@ -28,15 +33,4 @@ impl viewshed::pil::files::Core for Core {
     fn stack(&self) -> [u32; 2] {
         stack::used()
     }
-}
-
-/// A panic that could happen anywhere in the image makes this symbol needed, and nobody has it: the
-/// image does not link.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    unsafe extern "C" {
-        fn this_image_can_panic() -> !;
-    }
-    // SAFETY: never linked
-    unsafe { this_image_can_panic() }
 }

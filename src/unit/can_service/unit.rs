@@ -2,10 +2,9 @@
 
 use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
 use crate::fixed::time::Time;
+use crate::unit::Flow;
 use crate::unit::safe_state::SafeState;
-use crate::unit::session::Flow;
-use crate::unit::settings::{BLOCK_LEN, BlockError, Settings};
-use crate::unit::stored::{Slots, Stored};
+use crate::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -40,9 +39,9 @@ impl CanServiceConfig {
 /// # use viewshed::sensor::mount::Mount;
 /// # use viewshed::sensor::noise::NoiseConfig;
 /// # use viewshed::sensor::Sensor;
-/// # use viewshed::unit::session::Flow;
-/// # use viewshed::unit::stored::{Check, Slots, Stored};
-/// # use viewshed::unit::settings::{BLOCK_LEN, Settings};
+/// # use viewshed::unit::Flow;
+/// # use viewshed::unit::profile::small;
+/// # use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots, Stored};
 /// # use viewshed::fixed::time::Time;
 /// # use viewshed::wire::broadcast::Medium;
 /// # use viewshed::wire::message::{Addresses, Epoch};
@@ -64,7 +63,7 @@ impl CanServiceConfig {
 /// let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(3, medium) };
 /// let (mut slots, now) = (InRam([[0xFF; BLOCK_LEN]; 2]), Time::from_micros(0));
 ///
-/// let check = Check::of::<50, 40, 8, 2>();
+/// let check = small::CHECK;
 ///
 /// let mut unit = CanService::start(config, Epoch::new(1), now, Stored::read(&slots, check));
 /// assert!(unit.settings().is_none());

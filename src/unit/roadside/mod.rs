@@ -25,31 +25,27 @@
 
 mod outbox;
 mod reset;
-mod service;
 
 use crate::fixed::time::Time;
-use crate::inputs::ars408;
-use crate::map::polar::PolarMap;
-use crate::radar_3d::{Radar3d, Radar3dParameters};
+use crate::inputs::Feed;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
-use crate::unit::can_session::CanSession;
-use crate::unit::safe_state::SafeState;
-use crate::unit::session::Flow;
-use crate::unit::settings::Settings;
-use crate::unit::stored::{Slots, Stored};
-use crate::unit::{Unit, build};
-use crate::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use crate::unit::serial_service::{Asked, Line, SerialService};
+use crate::unit::settings::{Settings, Slots, Stored};
+use crate::unit::{Flow, InUnit, Sender, Unit, build};
+use crate::wire::broadcast::{BroadcastConfig, Medium};
+use crate::wire::frame::CanFrame;
 use crate::wire::message::{Addresses, Epoch};
-use crate::wire::serial::MOST_STUFFED;
+use crate::wire::serial::{MOST_STUFFED, Unstuffer};
 use crate::wire::status::{Reason, ResetCause, State, Status};
 
 use outbox::Outbox;
 pub use reset::ResetFlags;
-use service::Service;
 
 /// Frames of a bus taken in a step.
 const MOST_FRAMES: usize = 64;
+/// Bytes of the serial line taken in a step.
+const MOST_BYTES: usize = 64;
 /// Messages sent on the serial line in a step.
 const MOST_MESSAGES: usize = 64;
 /// Time without a scan after which the map's age is looked at, microseconds.
@@ -58,12 +54,10 @@ const IDLE_US: u64 = 50_000;
 /// allow, for frames that lie in a mailbox while the next map is made.
 const STALE_MS: u16 = 80;
 
-/// The serial line, as a board offers it; neither call waits.
-pub trait SerialPort {
+/// The serial line, as a board offers it; no call waits.
+pub trait SerialPort: Line {
     /// Takes bytes that came; how many.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;
-    /// Sends all bytes or none; `false` if there is no room now.
-    fn send(&mut self, bytes: &[u8]) -> bool;
 }
 
 /// The drivers.
@@ -110,17 +104,17 @@ const fn number(digits: &str) -> u8 {
 
 /// The pieces of memory a unit works in.
 #[derive(Debug)]
-pub struct Memory<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize> {
+pub struct Memory<'u, E: InUnit, S> {
     /// The estimator's tables.
-    pub parameters: &'u mut Option<Radar3dParameters<R, A, E>>,
+    pub parameters: &'u mut Option<E::Parameters>,
     /// The estimator's state.
-    pub state: &'u mut Radar3d<R, A, E, W, N, G>,
+    pub state: &'u mut E,
     /// Its result.
-    pub map: &'u mut PolarMap<R, A>,
+    pub map: &'u mut E::Map,
     /// The sender on the broadcast bus.
-    pub broadcast: &'u mut Option<Broadcaster<A, W>>,
+    pub broadcast: &'u mut Option<S>,
     /// The sender on the serial line.
-    pub serial: &'u mut Option<Broadcaster<A, W>>,
+    pub serial: &'u mut Option<S>,
 }
 
 /// What a step led to.
@@ -136,78 +130,68 @@ pub struct Step {
 
 /// A unit and its second sender.
 #[derive(Debug)]
-struct Maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize> {
-    unit: Unit<'u, R, A, E, W, N, G>,
-    serial: &'u mut Broadcaster<A, W>,
+struct Maps<'u, E: InUnit, S> {
+    unit: Unit<'u, E, S>,
+    serial: &'u mut S,
 }
 
-/// The loop's state; `T` detections of a radar's scan.
+/// The loop's state: estimator, sender, and the decoder of the radar's frames.
 #[derive(Debug)]
-pub struct Roadside<
-    'u,
-    const T: usize,
-    const R: usize,
-    const A: usize,
-    const E: usize,
-    const W: usize,
-    const N: usize,
-    const G: usize,
-> {
+pub struct Roadside<'u, E: InUnit, S, F> {
     reset_cause: ResetCause,
-    service: Service,
+    unstuffer: Unstuffer,
+    service: SerialService,
     can_service: CanService,
-    maps: Option<Maps<'u, R, A, E, W, N, G>>,
-    safe: SafeState,
-    radar: CanSession<T>,
+    maps: Option<Maps<'u, E, S>>,
+    radar: F,
     radar_bus: BusKeeper,
     broadcast_bus: BusKeeper,
     outbox: Outbox,
     /// The last scan or look at the map's age.
     looked: Time,
     /// When the last step began, if a scan was worked up in it.
-    scanned: Option<Time>,
+    worked: Option<Time>,
     /// Frames of the radar lost between its bus and the loop.
     lost: u32,
 }
 
-impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>
-    Roadside<'u, T, R, A, E, W, N, G>
-{
+impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Input>> Roadside<'u, E, S, F> {
     /// Starts, and puts both controllers on their buses.
-    pub fn start<Rp: CanPort, Bp: CanPort, L: SerialPort, S: Slots>(
+    pub fn start<R: CanPort, B: CanPort, L: SerialPort, P: Slots>(
         start: Start,
-        memory: Memory<'u, R, A, E, W, N, G>,
+        memory: Memory<'u, E, S>,
+        radar: F,
         now: Time,
-        ports: &mut Ports<Rp, Bp, L, S>,
+        ports: &mut Ports<R, B, L, P>,
     ) -> Self {
-        let service = Service::start(start.sensor, start.stored, &mut ports.serial);
+        let service = SerialService::start(start.sensor, start.epoch, now, start.stored, &mut ports.serial);
         let asked = CanServiceConfig::new(start.sensor, Medium::Can(Addresses::STANDARD));
         let can_service = CanService::start(asked, start.epoch, now, start.stored);
-        let [radar, broadcast] = start.stored.buses();
+        let [radar_bus, broadcast_bus] = start.stored.buses();
         let maps = start.stored.settings().and_then(|settings| maps(&start, settings, memory, now));
         Self {
             reset_cause: start.reset_cause,
+            unstuffer: Unstuffer::new(),
             service,
             can_service,
             maps,
-            safe: SafeState::new(start.sensor, Medium::Serial, start.epoch, now),
-            radar: CanSession::new(ars408::Config::sensor(start.sensor)),
-            radar_bus: BusKeeper::start(&radar, &mut ports.radar),
-            broadcast_bus: BusKeeper::start(&broadcast, &mut ports.broadcast),
+            radar,
+            radar_bus: BusKeeper::start(&radar_bus, &mut ports.radar),
+            broadcast_bus: BusKeeper::start(&broadcast_bus, &mut ports.broadcast),
             outbox: Outbox::new(),
             looked: now,
-            scanned: None,
+            worked: None,
             lost: 0,
         }
     }
 
     /// Takes what came, and sends what is due.
-    pub fn step<Rp: CanPort, Bp: CanPort, L: SerialPort, S: Slots>(
+    pub fn step<R: CanPort, B: CanPort, L: SerialPort, P: Slots>(
         &mut self,
         now: Time,
-        ports: &mut Ports<Rp, Bp, L, S>,
+        ports: &mut Ports<R, B, L, P>,
     ) -> Step {
-        let mut flow = self.service.poll(&mut ports.serial, &mut ports.slots);
+        let mut flow = self.serve(&mut ports.serial, &mut ports.slots);
         self.radar_bus.poll(now, &mut ports.radar);
         self.broadcast_bus.poll(now, &mut ports.broadcast);
         for _ in 0..MOST_FRAMES {
@@ -223,41 +207,59 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
                 talk(now, maps, &mut ports.serial);
                 maps.unit.broadcast().status_mut().state
             }
-            None => self.say_safe(now, &mut ports.serial),
+            None => {
+                self.service.say_safe(now, self.told(), &mut ports.serial);
+                State::Fault
+            }
         };
         Step { frame_done, flow, state }
     }
 
+    /// Takes the integrator's requests on the serial line. The time is the controller's own here, nobody sets it.
+    fn serve(&mut self, line: &mut impl SerialPort, slots: &mut impl Slots) -> Flow {
+        let mut buffer = [0; MOST_BYTES];
+        let came = line.receive(&mut buffer);
+        let mut rest = buffer.get(..came).unwrap_or(&[]);
+        while !rest.is_empty() {
+            let (taken, message) = self.unstuffer.push(rest);
+            rest = rest.get(taken..).unwrap_or(&[]);
+            if message.and_then(|m| self.service.take(m, slots, line)) == Some(Asked::Restart) {
+                return Flow::Restart;
+            }
+        }
+        Flow::Continue
+    }
+
     /// Takes the radar's frames; whether a scan, or a time without one, was worked up.
     fn receive(&mut self, now: Time, port: &mut impl CanPort) -> bool {
-        if let (Some(began), Some(maps)) = (self.scanned.take(), &mut self.maps) {
+        if let (Some(began), Some(maps)) = (self.worked.take(), &mut self.maps) {
             maps.unit.took(now, now.since(began).unwrap_or(0));
         }
-        let before = self.radar.scans();
+        let mut scanned = false;
         self.lost = self.lost.saturating_add(port.take_lost());
         for _ in 0..MOST_FRAMES {
             let Some(frame) = self.radar_bus.receive(port) else { break };
             let Some(maps) = &mut self.maps else { continue };
-            let scans = self.radar.scans();
+            let before = maps.unit.frames();
             // it may have waited while the map before was made
             let came = port.arrived().filter(|came| *came <= now).unwrap_or(now);
-            self.radar.frame(&frame, came, &mut maps.unit);
-            if self.radar.scans() != scans {
+            maps.unit.take(&mut self.radar, &frame, came);
+            scanned = maps.unit.frames() != before;
+            if scanned {
                 // what was sent of the map before has to leave first
                 break;
             }
         }
-        let scanned = self.radar.scans() != before;
         // a clock that stepped back is looked at, too
         let due = now.since(self.looked).is_none_or(|us| us >= IDLE_US);
         if !scanned && !due {
             return false;
         }
         self.looked = now;
-        self.scanned = scanned.then_some(now);
+        self.worked = scanned.then_some(now);
         if let Some(maps) = &mut self.maps {
             if !scanned {
-                self.radar.idle(now, &mut maps.unit);
+                maps.unit.wait(&mut self.radar, now);
             }
             self.tell(now);
         }
@@ -287,12 +289,12 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..told };
         if let Some(measured) = maps.unit.offered() {
             // the same one again is refused
-            let _ = maps.serial.scan(measured, maps.unit.map());
+            maps.serial.offer(measured, maps.unit.map());
         }
     }
 
     /// Hands the driver what is due on the broadcast bus.
-    fn transmit<Rp, Bp: CanPort, L, S: Slots>(&mut self, now: Time, ports: &mut Ports<Rp, Bp, L, S>) {
+    fn transmit<R, B: CanPort, L, P: Slots>(&mut self, now: Time, ports: &mut Ports<R, B, L, P>) {
         // nothing is taken from a unit that cannot be sent
         if self.broadcast_bus.state() != BusState::Active {
             return;
@@ -317,17 +319,6 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
         }
     }
 
-    /// Tells the serial line that there are no settings.
-    fn say_safe(&mut self, now: Time, line: &mut impl SerialPort) -> State {
-        let told = self.told();
-        let mut stuffed = [0; MOST_STUFFED];
-        let length = self.safe.next_line(now, told, &mut stuffed);
-        if let Some(message) = length.and_then(|n| stuffed.get(..n)) {
-            let _ = line.send(message);
-        }
-        State::Fault
-    }
-
     /// What both lines are told of the controller in the safe state.
     fn told(&self) -> Status {
         let reset_cause = self.reset_cause;
@@ -342,17 +333,17 @@ impl<'u, const T: usize, const R: usize, const A: usize, const E: usize, const W
 /// Makes the unit and its senders in the memory there is; none where a setting cannot be worked with. Apart,
 /// so that what this takes of the stack is free again before the first scan.
 #[inline(never)]
-fn maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
+fn maps<'u, E: InUnit, S: Sender<E::Map>>(
     start: &Start,
     settings: &Settings,
-    memory: Memory<'u, R, A, E, W, N, G>,
+    memory: Memory<'u, E, S>,
     now: Time,
-) -> Option<Maps<'u, R, A, E, W, N, G>> {
-    let header = build(settings, memory.parameters).ok()?;
+) -> Option<Maps<'u, E, S>> {
+    let header = build::<E>(settings, memory.parameters).ok()?;
     let parameters = memory.parameters.as_ref()?;
     let sender = |medium| {
         let config = BroadcastConfig { stale_ms: STALE_MS, ..BroadcastConfig::new(start.sensor, medium) };
-        Broadcaster::new(config, header, start.epoch, now).ok()
+        S::start(config, header, start.epoch, now).ok()
     };
     *memory.broadcast = sender(Medium::Can(Addresses::STANDARD));
     *memory.serial = sender(Medium::Serial);
@@ -361,15 +352,11 @@ fn maps<'u, const R: usize, const A: usize, const E: usize, const W: usize, cons
 }
 
 /// Hands the driver what is due on the serial line.
-fn talk<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const G: usize>(
-    now: Time,
-    maps: &mut Maps<'_, R, A, E, W, N, G>,
-    port: &mut impl SerialPort,
-) {
+fn talk<E: InUnit, S: Sender<E::Map>>(now: Time, maps: &mut Maps<'_, E, S>, line: &mut impl Line) {
     let mut stuffed = [0; MOST_STUFFED];
     for _ in 0..MOST_MESSAGES {
         let Some(message) = maps.serial.next_line(now, &mut stuffed).and_then(|n| stuffed.get(..n)) else { return };
-        if !port.send(message) {
+        if !line.send(message) {
             maps.serial.count_dropped(1);
         }
     }

@@ -1,10 +1,10 @@
 //! Any requests and answers of an integrator on CAN, six own bytes each, with check sums that hold.
 
+use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
-use viewshed::pil::flash::Flash;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, REQUEST};
-use viewshed::unit::settings::{BlockError, Settings};
-use viewshed::unit::stored::{Check, Slots, Stored};
+use viewshed::unit::profile::small;
+use viewshed::unit::settings::{BlockError, Settings, Slots, Stored};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 
@@ -12,7 +12,7 @@ use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 pub fn run(bytes: &[u8]) {
     let medium = Medium::Can(Addresses::STANDARD);
     let mut flash = Flash::ERASED;
-    let check = Check::of::<50, 40, 8, 2>();
+    let check = small::CHECK;
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
     let mut unit = CanService::start(config, Epoch::new(0), Time::from_micros(0), Stored::read(&flash, check));
     let mut answers = Answers::new(0, medium);

@@ -1,14 +1,14 @@
 //! Any bytes as configuration block, service message and bench record: what is taken is within its limits
 //! and comes back as it was.
 
-use viewshed::pil::record::{RECORD_LEN, Record};
+use viewshed::bench::record::{RECORD_LEN, Record};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
+use viewshed::unit::profile::small;
 use viewshed::unit::service::{Reply, Request, data_id};
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::unit::stored::Check;
 use viewshed::wire::e2e::Profile;
 
 fn crc32(bytes: &[u8]) -> u32 {
@@ -45,7 +45,7 @@ fn block(content: &[u8]) -> [u8; BLOCK_LEN] {
 pub fn run(bytes: &[u8]) {
     let _ = Settings::from_block(bytes);
     let whole = block(bytes);
-    let check = Check::of::<50, 40, 8, 2>();
+    let check = small::CHECK;
     let slots = Settings::newest([bytes, &whole], |settings| check.settings(settings));
     match slots.map(|newest| (newest.next_sequence - 1, newest.settings)).map_err(|[_, reason]| reason) {
         Ok((sequence, settings)) => {

@@ -1,15 +1,15 @@
 //! A unit behind a radar's data port.
 
+use viewshed::bench::start;
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ti::{Config, Dialect, Family};
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::inputs::ti::{Config, Dialect, Family, Ti};
+use viewshed::radar_3d::Radar3d;
 use viewshed::sensor::Sensor;
 use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
+use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
-use viewshed::unit::ti_session::TiSession;
-use viewshed::unit::{Unit, bench_sender, build};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::{Addresses, Epoch};
 use viewshed::wire::status::{Reason, State};
@@ -32,20 +32,19 @@ fn frames_of_nothing_but_nan_are_blindness_with_a_reason_and_end_with_the_first_
 /// State, reason and visible cells after so many frames, 20 a second.
 fn run(points: impl Fn(u32) -> Vec<[f32; 4]>, frames: u32) -> (State, Reason, usize) {
     let settings = settings();
-    let mut parameters = None::<Radar3dParameters<50, 40, 8>>;
-    let header = build(&settings, &mut parameters).unwrap();
-    let parameters = parameters.unwrap();
-    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    type Small = Radar3d<50, 40, 8, 2, 16, 64>;
+    let (medium, begin) = (Medium::Can(Addresses::STANDARD), Time::from_micros(0));
+    let (mut parameters, mut sender) = (None, None::<Broadcaster<40, 2>>);
+    start::<Small, _>(&mut parameters, &mut sender, Some(&settings), medium, Epoch::new(1), begin);
+    let (parameters, mut sender) = (parameters.unwrap(), sender.unwrap());
+    let mut state = Box::new(Small::new());
     let mut map = parameters.map();
-    let (medium, start) = (Medium::Can(Addresses::STANDARD), Time::from_micros(0));
-    let mut sender: Broadcaster<40, 2> = bench_sender(header, medium, Epoch::new(1), start).unwrap();
-    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
-    let config = Config { family: Some(Family::Bytes40), dialect: Dialect::USUAL };
-    let mut session = TiSession::<64>::new(config);
+    let mut unit = Unit::new(&parameters, &mut *state, &mut map, &mut sender);
+    let mut radar = Ti::<64>::new(Config { family: Some(Family::Bytes40), dialect: Dialect::USUAL });
     for k in 0..frames {
         let now = Time::from_micros(500_000 + 50_000 * u64::from(k));
-        session.take(&Frame::new(Family::Bytes40, k).cartesian(&points(k)).bytes(), now, &mut unit);
-        session.idle(now, &mut unit);
+        unit.take(&mut radar, &Frame::new(Family::Bytes40, k).cartesian(&points(k)).bytes(), now);
+        unit.wait(&mut radar, now);
         // a bus that takes nothing is a trouble of its own
         while unit.next_frame(now).is_some() {}
     }
@@ -72,46 +71,46 @@ fn settings() -> Settings {
 #[test]
 fn every_frame_becomes_a_map_and_silence_is_told() {
     let settings = settings();
-    let mut parameters = None::<Radar3dParameters<50, 40, 8>>;
-    let header = build(&settings, &mut parameters).unwrap();
-    let parameters = parameters.unwrap();
-    let mut state = Box::new(Radar3d::<50, 40, 8, 2, 16, 64>::new());
+    type Small = Radar3d<50, 40, 8, 2, 16, 64>;
+    let (medium, begin) = (Medium::Can(Addresses::STANDARD), Time::from_micros(0));
+    let (mut parameters, mut sender) = (None, None::<Broadcaster<40, 2>>);
+    start::<Small, _>(&mut parameters, &mut sender, Some(&settings), medium, Epoch::new(1), begin);
+    let (parameters, mut sender) = (parameters.unwrap(), sender.unwrap());
+    let mut state = Box::new(Small::new());
     let mut map = parameters.map();
-    let (medium, start) = (Medium::Can(Addresses::STANDARD), Time::from_micros(0));
-    let mut sender: Broadcaster<40, 2> = bench_sender(header, medium, Epoch::new(1), start).unwrap();
-    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+    let mut unit = Unit::new(&parameters, &mut *state, &mut map, &mut sender);
     let config = Config { family: Some(Family::Bytes40), dialect: Dialect::USUAL };
-    let mut session = TiSession::<64>::new(config);
+    let mut radar = Ti::<64>::new(config);
 
-    let mut now = start;
+    let mut now = begin;
     for k in 0..30_u32 {
         now = Time::from_micros(500_000 + 50_000 * u64::from(k));
         // frame 7 never comes
         let frame = Frame::new(Family::Bytes40, if k < 7 { k } else { k + 1 });
         let bytes = frame.cartesian(&[[1.0, 30.0, -5.0, -12.0], [2.0, 40.0, -5.0, -12.0]]).bytes();
         for chunk in bytes.chunks(17) {
-            session.take(chunk, now, &mut unit);
+            unit.take(&mut radar, chunk, now);
         }
-        session.idle(now, &mut unit);
+        unit.wait(&mut radar, now);
         assert_eq!(unit.offered(), Some(now), "scan {k}");
         assert_eq!(unit.next_line(now, &mut [0; 242]), None, "a sender for CAN gives no lines");
         assert!(std::iter::from_fn(|| unit.next_frame(now)).count() > 0);
     }
-    assert_eq!(session.counters().scans, 30);
+    assert_eq!(radar.counters().scans, 30);
     let status = *unit.broadcast().status_mut();
     assert_eq!((status.state, status.radar_lost), (State::Ok, 1));
     // two points of three: told as long as it is recent, not until the next look
     let mut frame = Frame::new(Family::Bytes40, 31);
     frame.points = 1;
     now = Time::from_micros(now.micros() + 50_000);
-    session.take(&frame.cartesian(&[[1.0, 30.0, -5.0, -12.0], [2.0, 40.0, -5.0, -12.0]]).bytes(), now, &mut unit);
+    unit.take(&mut radar, &frame.cartesian(&[[1.0, 30.0, -5.0, -12.0], [2.0, 40.0, -5.0, -12.0]]).bytes(), now);
     for k in 0..4 {
-        session.idle(Time::from_micros(now.micros() + k * 10_000), &mut unit);
+        unit.wait(&mut radar, Time::from_micros(now.micros() + k * 10_000));
         let status = *unit.broadcast().status_mut();
         assert_eq!((status.state, status.reason), (State::Degraded, Reason::IncompleteScans), "{k}");
     }
-    session.take(&[0x55; 300], now, &mut unit);
-    session.idle(Time::from_micros(now.micros() + 600_000), &mut unit);
+    unit.take(&mut radar, &[0x55; 300], now);
+    unit.wait(&mut radar, Time::from_micros(now.micros() + 600_000));
     let status = *unit.broadcast().status_mut();
     assert_eq!((status.state, status.reason), (State::Blind, Reason::RadarSilent));
 }

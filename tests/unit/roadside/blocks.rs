@@ -4,8 +4,7 @@ use crc::Crc;
 use proptest::prelude::*;
 use viewshed::unit::can_service::{Refusal, Told, Tool};
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::BLOCK_LEN;
-use viewshed::unit::stored::Slots;
+use viewshed::unit::settings::{BLOCK_LEN, Slots};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::status::{Reason, State};
 

@@ -5,23 +5,23 @@ mod blocks;
 use std::collections::VecDeque;
 
 use viewshed::fixed::time::Time;
+use viewshed::inputs::ars408::{Ars408, Config};
 use viewshed::map::polar::PolarMap;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::unit::Flow;
 use viewshed::unit::can_bus::CanPort;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::roadside::{Memory, Ports, Roadside, SerialPort, Start, Step, VERSION};
+use viewshed::unit::serial_service;
 use viewshed::unit::service::Request;
-use viewshed::unit::session::Flow;
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::unit::stored::{Check, Slots, Stored};
-use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::unit::settings::{BLOCK_LEN, Check, Settings, Slots, Stored};
+use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 use viewshed::wire::status::{Reason, ResetCause, State, Status};
 
-use crate::common::gantry;
+use crate::common::{SmallSender, SmallState, gantry};
 
 const SENSOR: u8 = 0;
 const ADDRESSES: Addresses = Addresses::STANDARD;
@@ -93,6 +93,9 @@ impl SerialPort for Line {
         buffer.iter_mut().zip(self.incoming.drain(..came)).for_each(|(to, from)| *to = from);
         came
     }
+}
+
+impl serial_service::Line for Line {
     fn send(&mut self, bytes: &[u8]) -> bool {
         self.sent.extend_from_slice(bytes);
         true
@@ -111,7 +114,7 @@ impl Slots for InRam {
 }
 
 type Far = Receiver<1, 40, 2>;
-type Unit = Roadside<'static, 64, 50, 40, 8, 2, 16, 64>;
+type Unit = Roadside<'static, SmallState, SmallSender, Ars408<64>>;
 
 /// A board, the radar and the receivers at the far ends of its lines.
 struct World {
@@ -148,17 +151,17 @@ impl World {
     fn new(blocks: [[u8; BLOCK_LEN]; 2]) -> Self {
         // a program's statics
         let memory = Memory {
-            parameters: Box::leak(Box::new(None::<Radar3dParameters<50, 40, 8>>)),
-            state: Box::leak(Box::new(Radar3d::new())),
+            parameters: Box::leak(Box::new(None)),
+            state: Box::leak(Box::new(SmallState::new())),
             map: Box::leak(Box::new(PolarMap::NOWHERE)),
-            broadcast: Box::leak(Box::new(None::<Broadcaster<40, 2>>)),
+            broadcast: Box::leak(Box::new(None::<SmallSender>)),
             serial: Box::leak(Box::new(None)),
         };
         let mut ports =
             Ports { radar: Bus::default(), broadcast: Bus::default(), serial: Line::default(), slots: InRam(blocks) };
-        let stored = Stored::read(&ports.slots, Check::of::<50, 40, 8, 2>().on_can(CAN_CLOCK_HZ));
+        let stored = Stored::read(&ports.slots, Check::of::<SmallState, SmallSender>().on_can(CAN_CLOCK_HZ));
         let start = Start { sensor: SENSOR, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
-        let unit = Unit::start(start, memory, at(0), &mut ports);
+        let unit = Unit::start(start, memory, Ars408::new(Config::sensor(SENSOR)), at(0), &mut ports);
         assert!(ports.radar.silent && ports.broadcast.silent, "until the bit rate is proven");
         let far = || Far::new([SENSOR], ADDRESSES, Limits::DEFAULT);
         Self {

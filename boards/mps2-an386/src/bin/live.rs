@@ -3,17 +3,20 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use mps2_an386::profile::{CHECK, DETECTIONS, Map, Parameters, Sender, State, opening};
+use mps2_an386::SHAPE;
+use mps2_an386::profile::{CHECK, DETECTIONS, Map, Parameters, Sender, State};
 use mps2_an386::stack;
 use mps2_an386::timer::{TICKS_PER_256, Timer};
 use mps2_an386::uart::{PATIENCE, Uart};
 use static_cell::{ConstStaticCell, StaticCell};
-use viewshed::pil::flash::Flash;
-use viewshed::pil::record::{Closing, FrameRecord, Record};
-use viewshed::unit::session::{Flow, Line, Session};
-use viewshed::unit::stored::Stored;
+use viewshed::bench::flash::Flash;
+use viewshed::bench::record::{Closing, Opening, Record, Tracer};
+use viewshed::bench::start;
+use viewshed::unit::serial_service::Line;
+use viewshed::unit::session::Session;
+use viewshed::unit::settings::Stored;
 use viewshed::unit::transmitter::Transmitter;
-use viewshed::unit::{Unit, start_bench};
+use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Epoch;
 
@@ -41,14 +44,6 @@ impl Line for Lines {
         let (transmitter, uart) = &mut self.maps;
         transmitter.send(uart, bytes)
     }
-
-    fn ticks(&mut self) -> u32 {
-        self.timer.ticks()
-    }
-
-    fn trace(&mut self, record: &FrameRecord) {
-        self.record(&Record::Frame(*record));
-    }
 }
 
 /// Apart, so that what this takes of the stack is free again.
@@ -72,16 +67,22 @@ fn main() -> ! {
     loop {
         let epoch = flash.start();
         starts += 1;
-        lines.record(&Record::Opening(opening(TICKS_PER_256)));
+        lines.record(&Record::Opening(Opening::of::<State>(SHAPE, TICKS_PER_256)));
+        let mut tracer = Tracer::default();
         let mut session = session(epoch, &flash, &mut lines);
         let settings = session.settings();
         let mut parameters: Option<Parameters> = None;
-        start_bench(&mut parameters, sender, settings, Medium::Serial, epoch, session.now());
+        start::<State, _>(&mut parameters, sender, settings, Medium::Serial, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         loop {
             let Some(byte) = radar.read() else { continue };
-            if session.take(&[byte], &mut unit, &mut flash, &mut lines) == Flow::Restart {
+            let mut trace = |event, lines: &mut Lines| {
+                if let Some(frame) = tracer.event(event, lines.timer.ticks()) {
+                    lines.record(&Record::Frame(frame));
+                }
+            };
+            if session.take(&[byte], &mut unit, &mut flash, &mut lines, &mut trace) == Flow::Restart {
                 break;
             }
         }

@@ -2,22 +2,22 @@
 #![no_std]
 #![no_main]
 
+use emulated::semihost::HostFile;
 use semihosting::process::exit;
 use static_cell::{ConstStaticCell, StaticCell};
+use viewshed::bench::can::CanBench;
+use viewshed::bench::files::{FlashFile, answer};
+use viewshed::bench::record::{Closing, Record};
+use viewshed::bench::start;
 use viewshed::inputs::ars408::Config;
-use viewshed::pil::files::{FlashFile, answer};
-use viewshed::pil::record::{Closing, Record};
 use viewshed::unit::can_bus::BusKeeper;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
-use viewshed::unit::can_session::CanSession;
-use viewshed::unit::session::Flow;
-use viewshed::unit::stored::Stored;
-use viewshed::unit::{Unit, start_bench};
+use viewshed::unit::settings::Stored;
+use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Addresses;
 use zcu102_r5::can::Can;
-use zcu102_r5::profile::{CHECK, DETECTIONS, Map, Parameters, Sender, State};
-use zcu102_r5::semihost::HostFile;
+use zcu102_r5::profile::{CHECK, Map, Parameters, Radar, Sender, State};
 use zcu102_r5::stack;
 
 const SENSOR: u8 = 0;
@@ -38,7 +38,7 @@ extern "C" fn main() -> ! {
     let mut flash = FlashFile::<HostFile>::open();
     // answers without a gap: time comes in steps here
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
-    let mut session = CanSession::<DETECTIONS>::new(Config::sensor(SENSOR));
+    let mut session = CanBench::new(Radar::new(Config::sensor(SENSOR)));
     let (mut starts, mut told) = (0, false);
 
     loop {
@@ -50,14 +50,14 @@ extern "C" fn main() -> ! {
         let mut can = Can::new(timing);
         let mut keeper = BusKeeper::start(&bus, &mut can);
         while !told {
-            told = session.bench_clock(&mut keeper, &mut can);
+            told = session.clock(&mut keeper, &mut can);
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start_bench(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());
+        start::<State, _>(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
-        while session.bench_turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}
+        while session.turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}
         answer::<HostFile>(&Record::Closing(Closing { reason: 0, frames: starts, stack: stack::used() }));
     }
 }

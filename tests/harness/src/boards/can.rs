@@ -9,8 +9,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use viewshed::pil::flash::Flash;
-use viewshed::pil::record::{Closing, Record};
+use viewshed::bench::flash::Flash;
+use viewshed::bench::record::{Closing, Record};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::Board;

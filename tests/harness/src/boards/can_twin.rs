@@ -3,18 +3,17 @@
 use std::iter::Peekable;
 use std::mem;
 
+use viewshed::bench::can::{CanBench, TIME_ID};
+use viewshed::bench::flash::Flash;
+use viewshed::bench::start;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::Config;
-use viewshed::pil::flash::Flash;
-use viewshed::profile::reference::{CHECK, DETECTIONS, Map as PolarMap, Parameters, Sender, State};
 use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
-use viewshed::unit::can_session::{CanSession, TIME_ID};
-use viewshed::unit::session::Flow;
-use viewshed::unit::settings::Settings;
-use viewshed::unit::stored::Stored;
-use viewshed::unit::{Unit, start_bench};
+use viewshed::unit::profile::reference::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
+use viewshed::unit::settings::{Settings, Stored};
+use viewshed::unit::{Flow, Unit};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::listener::{MEDIUM, Map, SENSOR};
@@ -93,7 +92,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
     let mut sender: Box<Option<Sender>> = Box::new(None);
-    let mut session = CanSession::<DETECTIONS>::new(Config::sensor(SENSOR));
+    let mut session = CanBench::new(Radar::new(Config::sensor(SENSOR)));
     let frames = steps.iter().enumerate().flat_map(|(k, step)| step.all().map(move |frame| (k, frame))).peekable();
     let mut port = Scripted { frames, step: 0, quiet: false, sent: Vec::new(), starts: 0 };
     let empty = |step: &Step| Sent { time: step.time, frames: Vec::new(), maps: Vec::new(), starts_over: false };
@@ -105,18 +104,18 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
         let [bus, _] = stored.buses();
         let mut keeper = BusKeeper::start(&bus, &mut port);
         while !ticked && port.frames.peek().is_some() {
-            ticked = session.bench_clock(&mut keeper, &mut port);
+            ticked = session.clock(&mut keeper, &mut port);
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start_bench(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());
+        start::<State, _>(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());
         let sender = (*sender).as_mut();
-        let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
+        let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut *state, &mut *map, sender));
         let mut last = None;
         // what is due at once goes out before the next frame comes
         port.quiet = true;
         while port.quiet || port.frames.peek().is_some() {
-            let flow = session.bench_turn((&mut keeper, &mut port), &mut service, &mut unit, flash);
+            let flow = session.turn((&mut keeper, &mut port), &mut service, &mut unit, flash);
             let Some(now) = sent.get_mut(port.step) else { continue };
             now.frames.append(&mut port.sent);
             now.starts_over |= mem::take(&mut port.starts) > 0;

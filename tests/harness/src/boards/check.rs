@@ -1,9 +1,9 @@
 //! Comparing a controller's answer with the one the library gives here.
 
 use anyhow::{Result, bail, ensure};
+use viewshed::bench::record::{Closing, FrameRecord, Opening, RECORD_LEN, Record};
+use viewshed::bench::stage::Stage;
 use viewshed::map::polar::PolarGeometry;
-use viewshed::pil::record::{Closing, FrameRecord, Opening, RECORD_LEN, Record};
-use viewshed::stage::Stage;
 
 use super::image::Image;
 

@@ -1,14 +1,14 @@
 //! The controller's program, run here.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
+use viewshed::bench::job::{Job, ScanBuffer};
+use viewshed::bench::{Bench, run, start};
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarGeometry;
-use viewshed::pil::job::{Job, ScanBuffer};
-use viewshed::pil::{Bench, Memory, run};
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::unit::settings::Settings;
-use viewshed::unit::{Unit, bench_sender, build};
-use viewshed::wire::broadcast::Medium;
+use viewshed::unit::Unit;
+use viewshed::unit::settings::{Check, Settings};
+use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 
 use super::Profile;
@@ -40,16 +40,17 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     bench: &mut InMemory,
 ) -> Result<PolarGeometry> {
     let job = Job::read(bench).map_err(|e| anyhow::anyhow!("{e:?}"))?;
-    let mut parameters = None::<Radar3dParameters<R, A, E>>;
-    let header = build(&job.settings, &mut parameters)?;
-    let parameters = parameters.context("built")?;
+    Check::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>().settings(&job.settings)?;
+    let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
+    let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
+    let (settings, epoch, now) = (Some(&job.settings), Epoch::new(0), Time::from_micros(0));
+    start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
+    let (parameters, sender) = parameters.as_ref().zip((*sender).as_mut()).context("a unit that was checked")?;
     let (mut state, mut map) = (Box::new(Radar3d::<R, A, E, W, N, D>::new()), Box::new(parameters.map()));
-    let sender = bench_sender(header, Medium::Serial, Epoch::new(0), Time::from_micros(0));
-    let mut sender = Box::new(sender.ok_or_else(|| anyhow!("maps of this sensor cannot be sent"))?);
     let geometry = *map.geometry();
-    let unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+    let mut unit = Unit::new(parameters, &mut *state, &mut *map, sender);
     let mut scan = Box::new(ScanBuffer::<MOST_DETECTIONS>::new());
-    run(bench, &job, Memory { unit, scan: &mut scan }).map_err(|e| anyhow::anyhow!("{e:?}"))?;
+    run(bench, &job, [R, A, E, D], &mut unit, &mut scan).map_err(|e| anyhow::anyhow!("{e:?}"))?;
     Ok(geometry)
 }
 

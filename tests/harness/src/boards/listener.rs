@@ -2,10 +2,12 @@
 
 use std::collections::VecDeque;
 
+use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
-use viewshed::profile::reference::{AZIMUTHS, WORDS};
+use viewshed::map::polar::PolarMap;
 use viewshed::unit::Unit;
-use viewshed::wire::broadcast::Medium;
+use viewshed::unit::profile::reference::{AZIMUTHS, WORDS};
+use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::layers::Layers;
@@ -33,9 +35,12 @@ pub struct Map {
 
 impl Map {
     /// The map that a unit offered to its sender last; `None` if it offered none.
-    pub fn offered<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-        unit: &mut Unit<'_, R, A, E, W, N, D>,
-    ) -> Option<Self> {
+    pub fn offered<E, const R: usize, const A: usize, const W: usize>(
+        unit: &mut Unit<'_, E, Broadcaster<A, W>>,
+    ) -> Option<Self>
+    where
+        E: Estimator<Map = PolarMap<R, A>>,
+    {
         let sender = unit.broadcast();
         let (deadline, epoch) = (sender.deadline()?, sender.epoch());
         let measured = Time::from_micros(deadline.micros().checked_sub(STALE_US)?);

@@ -4,17 +4,17 @@ use std::cell::RefCell;
 use std::io::{Read, Write};
 use std::{iter, mem};
 
+use viewshed::bench::flash::Flash;
+use viewshed::bench::start;
 use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{Medium as Native, Sender};
 use viewshed::map::polar::PolarMap;
-use viewshed::pil::flash::Flash;
-use viewshed::pil::record::FrameRecord;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::unit::serial_service::Line;
 use viewshed::unit::service::Request;
-use viewshed::unit::session::{Flow, Line, Session};
-use viewshed::unit::settings::Settings;
-use viewshed::unit::stored::{Check, Stored};
-use viewshed::unit::{Unit, start_bench};
+use viewshed::unit::session::Session;
+use viewshed::unit::settings::{Check, Settings, Stored};
+use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
 
@@ -89,15 +89,16 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     'start: loop {
         let epoch = flash.start();
-        let stored = Stored::read(&flash, Check::of::<R, A, E, W>());
+        let stored = Stored::read(&flash, Check::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>());
         let mut session = Session::<D>::start(SENSOR, epoch, stored, &mut line);
         let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
-        start_bench(&mut parameters, &mut sender, session.settings(), Medium::Serial, epoch, session.now());
+        let (settings, now) = (session.settings(), session.now());
+        start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
         let sender = (*sender).as_mut();
-        let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut state, &mut map, sender));
+        let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut *state, &mut *map, sender));
         let mut last = None;
         for byte in &mut *bytes {
-            let flow = session.take(&[byte], &mut unit, &mut flash, &mut line);
+            let flow = session.take(&[byte], &mut unit, &mut flash, &mut line, &mut |_, _| {});
             let offered = unit.as_mut().and_then(|unit| {
                 let deadline = unit.broadcast().deadline();
                 let new = deadline != mem::replace(&mut last, deadline);
@@ -119,12 +120,6 @@ impl Line for Answer<'_> {
         (self.0)(bytes);
         true
     }
-
-    fn ticks(&mut self) -> u32 {
-        0
-    }
-
-    fn trace(&mut self, _: &FrameRecord) {}
 }
 
 /// Bytes for the board's line, message by message.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use comfy_table::{Cell, CellAlignment, Table, presets};
 use serde::Serialize;
+use viewshed::bench::stage::Stage;
 use viewshed::map::{CellState, Visibility};
-use viewshed::stage::Stage;
 
 use super::Run;
 use super::check::{Checked, Difference};

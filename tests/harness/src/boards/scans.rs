@@ -1,8 +1,8 @@
 //! A recording as scans for a controller.
 
+use viewshed::bench::job::{Job, ScanHead, detection_to_bytes};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::pil::job::{Job, ScanHead, detection_to_bytes};
 use viewshed::unit::settings::Settings;
 
 use crate::estimators::Intake;

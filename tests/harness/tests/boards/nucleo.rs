@@ -71,9 +71,10 @@ fn check(board: &Board) {
         assert!(board.stack.as_ref().is_none_or(|stack| !within(section, stack) || mark), "{section:?}");
     }
     let address = |parts: &[&str]| image.symbol(parts).unwrap_or_else(|| panic!("no {parts:?}")).address;
-    for name in ["STATE", "MAP", "RADAR_QUEUE", "BROADCAST_QUEUE"] {
+    for name in ["STATE", "MAP", "RADAR_QUEUE"] {
         assert!(board.ram.contains(&address(&["live", name])), "{name}");
     }
+    assert!(board.ram.contains(&address(&["stm32", "unit", "REQUESTS"])));
     assert!(board.dma.contains(&address(&["stm32", "dma", "SERIAL"])));
 
     let variables = image.ram_bytes();

@@ -6,10 +6,11 @@ mod tests {
     use viewshed::frame::detection::{Detection, Measurement};
     use viewshed::map::polar::PolarMap;
     use viewshed::map::{CellState, Visibility};
-    use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters, ReferenceProfile};
+    use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
     use viewshed::sensor::Sensor;
     use viewshed::sensor::mount::Mount;
     use viewshed::sensor::noise::NoiseConfig;
+    use viewshed::unit::profile::reference::State;
 
     use crate::geometry::{Ground, Levelled, left, moved};
     use crate::pipeline::Pipeline;
@@ -102,7 +103,7 @@ mod tests {
         let config = Radar3dConfig::default();
         let p = Box::new(Radar3dParameters::<RANGES, AZIMUTHS, ELEVATIONS>::new(&sensor, &config).unwrap());
         let mut map: Box<PolarMap<RANGES, AZIMUTHS>> = Box::new(p.map());
-        let mut state = Box::new(ReferenceProfile::new());
+        let mut state = Box::new(State::new());
         let mut exact = Pipeline::new(&sensor, &config);
         let levelled = Levelled::new(mount);
         for frame in 0..FRAMES.1 {

@@ -6,9 +6,8 @@ use std::process::Command;
 use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::Config;
 use viewshed::map::polar::PolarMap;
-use viewshed::profile::reference::{DETECTIONS, Parameters, Sender, State, Unit};
 use viewshed::unit::build;
-use viewshed::unit::can_session::CanSession;
+use viewshed::unit::profile::reference::{Parameters, Radar, Sender, State, Unit};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
@@ -29,7 +28,7 @@ type Sent = Vec<(u64, CanFrame)>;
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second after the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
     let mut parameters: Option<Parameters> = None;
-    let header = build(settings, &mut parameters).unwrap();
+    let header = build::<State>(settings, &mut parameters).unwrap();
     let parameters = parameters.unwrap();
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
@@ -37,9 +36,9 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     let at = Time::from_micros;
     let config = BroadcastConfig::new(0, medium);
     let mut sender = Box::new(Sender::new(config, header, EPOCH, at(first)).unwrap());
-    let mut unit = Unit::new(&parameters, &mut state, &mut map, &mut sender);
+    let mut unit = Unit::new(&parameters, &mut *state, &mut *map, &mut *sender);
     unit.broadcast().status_mut().firmware = [0, 1, 0];
-    let mut session = CanSession::<DETECTIONS>::new(Config::sensor(radar));
+    let mut decoder = Radar::new(Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
     let flush = |unit: &mut Unit<'_>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
@@ -48,10 +47,10 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
         now += 1000;
         while let Some(((time, frame), after)) = rest.split_first().filter(|((time, _), _)| *time <= now) {
             rest = after;
-            session.frame(frame, at(*time), &mut unit);
+            unit.take(&mut decoder, frame, at(*time));
             flush(&mut unit, *time, &mut sent);
         }
-        session.idle(at(now), &mut unit);
+        unit.wait(&mut decoder, at(now));
         if now >= last + 1_000_000 {
             break;
         }

@@ -1,7 +1,7 @@
 //! Batch mode: every map of a recording, here and there.
 
-use viewshed::pil::record::{RECORD_LEN, Record};
-use viewshed::stage::Stage;
+use viewshed::bench::record::{RECORD_LEN, Record};
+use viewshed::bench::stage::Stage;
 use viewshed::unit::settings::Settings;
 use viewshed_harness::boards::check::{self, Checked};
 use viewshed_harness::boards::scans::Scan;

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use viewshed::bench::record::{RECORD_LEN, Record};
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::pil::record::{RECORD_LEN, Record};
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::message::{Addresses, Received};

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
-use viewshed::pil::flash::Flash;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};

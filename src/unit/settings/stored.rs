@@ -5,9 +5,9 @@
 //! only those that can start count. If there is none, the unit has no maps and answers its service: the
 //! safe state.
 
+use super::{BLOCK_LEN, BlockError, Newest, Settings};
 use crate::sensor::config::ConfigError;
 use crate::unit::can_bus::BusConfig;
-use crate::unit::settings::{BLOCK_LEN, BlockError, Newest, Settings};
 
 /// Where configuration blocks are kept.
 pub trait Slots {
@@ -26,9 +26,9 @@ pub struct Check {
 }
 
 impl Check {
-    /// For a unit of `R` ranges (up to `32 W`), `A` azimuths and `E` elevations.
-    pub const fn of<const R: usize, const A: usize, const E: usize, const W: usize>() -> Self {
-        Self { build: super::check::<R, A, E, W>, can_clock_hz: None }
+    /// By this function; [`Check::of`] is the one for an estimator and a sender.
+    pub const fn by(build: fn(&Settings) -> Result<(), ConfigError>) -> Self {
+        Self { build, can_clock_hz: None }
     }
 
     /// And for CAN controllers of this clock, whose dividers have to meet the bit rates.

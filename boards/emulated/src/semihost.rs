@@ -5,7 +5,7 @@ use core::ffi::CStr;
 use semihosting::fd::BorrowedFd;
 use semihosting::sys;
 use semihosting::sys::arm_compat::{OpenMode, sys_open};
-use viewshed::pil::files;
+use viewshed::bench::files;
 
 /// An open file; it stays open until the emulator ends.
 #[derive(Debug)]

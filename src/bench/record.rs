@@ -13,11 +13,11 @@
 //!
 //! A map record is followed by its grades, then its occupancies, azimuth by azimuth.
 
+use super::stage::Stage;
+use crate::estimator::Estimator;
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::health::Condition;
-use crate::map::polar::PolarMap;
-use crate::radar_3d::{Radar3d, Radar3dParameters};
-use crate::stage::Stage;
+use crate::unit::Event;
 
 /// Bytes of a record.
 pub const RECORD_LEN: usize = 16 + 4 * Stage::COUNT;
@@ -54,17 +54,12 @@ pub struct Opening {
 impl Opening {
     /// Of an estimator of this size.
     #[allow(clippy::cast_possible_truncation)] // sizes of types that fit a controller
-    pub const fn of<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-        ticks_per_256: u32,
-    ) -> Self {
+    pub const fn of<E: Estimator>(shape: [usize; 4], ticks_per_256: u32) -> Self {
+        let [ranges, azimuths, elevations, detections] = shape;
         Self {
-            shape: [R as u16, A as u16, E as u16, D as u16],
+            shape: [ranges as u16, azimuths as u16, elevations as u16, detections as u16],
             ticks_per_256,
-            bytes: [
-                size_of::<Radar3d<R, A, E, W, N, D>>() as u32,
-                size_of::<Radar3dParameters<R, A, E>>() as u32,
-                size_of::<PolarMap<R, A>>() as u32,
-            ],
+            bytes: [size_of::<E>() as u32, size_of::<E::Parameters>() as u32, size_of::<E::Map>() as u32],
         }
     }
 }
@@ -82,6 +77,38 @@ pub struct FrameRecord {
     pub fingerprint: u64,
     /// Counter ticks of each stage.
     pub ticks: [u32; Stage::COUNT],
+}
+
+/// Counts what the stages of frames cost.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tracer {
+    frame: u32,
+    last: u32,
+    stage: usize,
+    ticks: [u32; Stage::COUNT],
+}
+
+impl Tracer {
+    /// Takes what a unit does and the counter at that moment; the record of a frame that is done.
+    #[inline]
+    pub fn event(&mut self, event: Event, counter: u32) -> Option<FrameRecord> {
+        match event {
+            Event::Began => (self.stage, self.ticks) = (0, [0; Stage::COUNT]),
+            Event::Ended => {
+                if let Some(ticks) = self.ticks.get_mut(self.stage) {
+                    *ticks = counter.wrapping_sub(self.last);
+                }
+                self.stage += 1;
+            }
+            Event::Done(done) => {
+                let (frame, ticks) = (self.frame, self.ticks);
+                self.frame = frame.wrapping_add(1);
+                return Some(FrameRecord { frame, condition: done.condition, used: done.used, fingerprint: 0, ticks });
+            }
+        }
+        self.last = counter;
+        None
+    }
 }
 
 /// How it ended.

@@ -2,10 +2,13 @@
 
 use super::fingerprint::Fingerprint;
 use super::job::{Job, JobError, ScanBuffer};
-use super::record::{Closing, FrameRecord, Opening, Record};
+use super::record::{Closing, Opening, Record, Tracer};
+use super::stage::Stage;
+use crate::estimator::Estimator;
+use crate::frame::detection::Detection;
+use crate::inputs::Frame;
 use crate::map::polar::PolarMap;
-use crate::stage::Stage;
-use crate::unit::Unit;
+use crate::unit::{Sender, Unit};
 use crate::wire::serial::MOST_STUFFED;
 
 /// What a controller offers: a byte stream each way and a counter.
@@ -25,44 +28,24 @@ pub trait Bench {
 /// Most messages of a frame.
 const MOST_MESSAGES: usize = 400;
 
-/// Where a run keeps its things.
-pub struct Memory<
-    'a,
-    const R: usize,
-    const A: usize,
-    const E: usize,
-    const W: usize,
-    const N: usize,
-    const D: usize,
-    const B: usize,
-> {
-    /// Estimator, map and sender.
-    pub unit: Unit<'a, R, A, E, W, N, D>,
-    /// The scan at hand.
-    pub scan: &'a mut ScanBuffer<B>,
-}
-
-/// Runs a job to the end of its stream; the last record says how it ended.
+/// Runs a job to the end of its stream; the last record says how it ended. `shape` is that of the opening record.
 ///
 /// # Errors
 /// A stream that breaks off or holds a scan that does not fit.
-pub fn run<
-    const R: usize,
-    const A: usize,
-    const E: usize,
-    const W: usize,
-    const N: usize,
-    const D: usize,
-    const B: usize,
->(
+pub fn run<E, S, const R: usize, const A: usize, const B: usize>(
     bench: &mut impl Bench,
     job: &Job,
-    memory: Memory<R, A, E, W, N, D, B>,
-) -> Result<(), JobError> {
-    let opening = Opening::of::<R, A, E, W, N, D>(bench.ticks_per_256());
-    bench.write(&Record::Opening(opening).to_bytes());
-    let Memory { mut unit, scan } = memory;
+    shape: [usize; 4],
+    unit: &mut Unit<'_, E, S>,
+    scan: &mut ScanBuffer<B>,
+) -> Result<(), JobError>
+where
+    E: Estimator<Input = [Detection], Map = PolarMap<R, A>>,
+    S: Sender<E::Map>,
+{
+    bench.write(&Record::Opening(Opening::of::<E>(shape, bench.ticks_per_256())).to_bytes());
     let mut line = [0; MOST_STUFFED];
+    let mut tracer = Tracer::default();
     let mut frames = 0_u32;
     let outcome = loop {
         let head = match scan.read(bench) {
@@ -73,15 +56,10 @@ pub fn run<
         if head.reset {
             unit.reset();
         }
-        let mut ticks = [0; Stage::COUNT];
-        let mut last = bench.ticks();
-        let report = unit.scan(head.time, scan.detections(), head.fault, |stage| {
-            let now = bench.ticks();
-            if let Some(t) = ticks.get_mut(stage as usize) {
-                *t = now.wrapping_sub(last);
-            }
-            last = now;
-        });
+        let mut done = None;
+        let frame =
+            Frame { measured: head.time, input: scan.detections(), incomplete: false, status: head.fault.into() };
+        unit.frame(&frame, &mut |event| done = tracer.event(event, bench.ticks()));
         let mut fingerprint = Fingerprint::of_map(unit.map());
         let mut sending = 0_u32;
         // as many as a map can take, and status and header
@@ -92,12 +70,13 @@ pub fn run<
             let Some(message) = message else { break };
             fingerprint.bytes(message);
         }
-        if let Some(t) = ticks.get_mut(Stage::Broadcast as usize) {
-            *t = sending.wrapping_add(*t);
+        if let Some(mut record) = done {
+            if let Some(ticks) = record.ticks.get_mut(Stage::Broadcast as usize) {
+                *ticks = sending.wrapping_add(*ticks);
+            }
+            record.fingerprint = fingerprint.value();
+            bench.write(&Record::Frame(record).to_bytes());
         }
-        let fingerprint = fingerprint.value();
-        let record = FrameRecord { frame: frames, condition: report.condition, used: report.used, fingerprint, ticks };
-        bench.write(&Record::Frame(record).to_bytes());
         if job.dump == Some(frames) {
             dump(bench, frames, unit.map());
         }

@@ -7,8 +7,7 @@ use core::ffi::CStr;
 use super::Bench;
 use super::flash::{FLASH_LEN, Flash};
 use super::record::Record;
-use crate::unit::settings::BLOCK_LEN;
-use crate::unit::stored::Slots;
+use crate::unit::settings::{BLOCK_LEN, Slots};
 use crate::wire::message::Epoch;
 
 const JOB: &CStr = c"job.bin";

@@ -1,7 +1,6 @@
 //! What a unit keeps over a loss of power, for boards and hosts of a test bench that have no flash.
 
-use crate::unit::settings::BLOCK_LEN;
-use crate::unit::stored::Slots;
+use crate::unit::settings::{BLOCK_LEN, Slots};
 use crate::wire::message::Epoch;
 
 /// Bytes of it: two slots, starts.

@@ -17,6 +17,12 @@
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 
+mod flash;
+mod stored;
+
+pub use flash::FlashSlots;
+pub use stored::{Check, Slots, Stored};
+
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
@@ -27,6 +33,7 @@ use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
 use crate::unit::can_bus::BusConfig;
+use crate::wire::header::fingerprint;
 
 /// Everything an integrator sets for one installation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,13 +152,13 @@ impl Settings {
             w.put(u16::from(bus.listen_first).to_le_bytes());
         }
         if let Some((body, sum)) = block.split_last_chunk_mut::<4>() {
-            *sum = crc32(body).to_le_bytes();
+            *sum = fingerprint(body).to_le_bytes();
         }
         block
     }
 
     /// Reads a block with its sequence; bytes after it do not matter. Its parameters may be anything: whether
-    /// a unit can run with them is [`Check`](crate::unit::stored::Check)'s to say.
+    /// a unit can run with them is [`Check`]'s to say.
     ///
     /// # Errors
     /// The first thing that does not hold.
@@ -169,7 +176,7 @@ impl Settings {
         let length = header.u16().ok_or(BlockError::Short)?;
         let block = bytes.get(..BLOCK_LEN).filter(|_| usize::from(length) == BLOCK_LEN).ok_or(BlockError::Short)?;
         let (body, sum) = block.split_last_chunk::<4>().ok_or(BlockError::Short)?;
-        if crc32(body) != u32::from_le_bytes(*sum) {
+        if fingerprint(body) != u32::from_le_bytes(*sum) {
             return Err(BlockError::CheckSum);
         }
         let sequence = header.u32().ok_or(BlockError::Short)?;
@@ -301,13 +308,6 @@ pub struct Newest {
     pub next_sequence: u32,
 }
 
-/// CRC-32 of IEEE 802.3, bit by bit: run at start-up only.
-fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, b| {
-        (0..8).fold(crc ^ u32::from(*b), |c, _| (c >> 1) ^ (0xEDB8_8320 & 0_u32.wrapping_sub(c & 1)))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -334,7 +334,7 @@ mod tests {
     fn a_block_reads_back() {
         let block = settings().to_block(7);
         assert_eq!(Settings::from_block(&block), Ok((7, settings())));
-        assert_eq!(crc32(b"123456789"), 0xCBF4_3926, "the check value of CRC-32");
+        assert_eq!(fingerprint(b"123456789"), 0xCBF4_3926, "the check value of CRC-32");
     }
 
     #[test]

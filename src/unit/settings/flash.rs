@@ -10,8 +10,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::unit::settings::BLOCK_LEN;
-use crate::unit::stored::Slots;
+use super::{BLOCK_LEN, Slots};
 
 /// A block up to the next whole word of any flash memory, which has at most 32 bytes.
 const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);

@@ -1,4 +1,6 @@
-//! The stages of a frame, for whoever measures what each costs.
+//! The stages of a frame of radar-3d, as their costs are reported.
+//!
+//! The estimator says that a stage ended, not which: they always end in this order.
 
 /// A stage of the radar-3d estimator in the order of its picture, and what follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

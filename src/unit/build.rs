@@ -1,0 +1,77 @@
+//! What settings make of a unit: the same for a start and for the check of a block that came.
+
+use crate::estimator::Estimator;
+use crate::radar_3d::Radar3d;
+use crate::sensor::config::{ConfigError, Problem};
+use crate::unit::sender::Sender;
+use crate::unit::settings::{Check, Settings};
+use crate::wire::code::ray::Known;
+use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
+
+/// An estimator that an integrator's settings can set up and whose maps can be broadcast.
+pub trait InUnit: Estimator {
+    /// Its configuration by the settings; what an integrator does not set is the library's.
+    fn config(settings: &Settings) -> Self::Config;
+
+    /// What is told of its maps.
+    ///
+    /// # Errors
+    /// Maps that cannot be sent.
+    fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError>;
+}
+
+/// Makes a unit's parameters, where they stay, and the header of its maps. A start and the check of a block that
+/// came are this same function, so that none is accepted that cannot start.
+///
+/// # Errors
+/// Names the first parameter that cannot be worked with; there are no parameters then.
+#[inline(never)] // what it takes of the stack is free again afterwards
+pub fn build<E: InUnit>(settings: &Settings, parameters: &mut Option<E::Parameters>) -> Result<Header, ConfigError> {
+    *parameters = None;
+    settings.radar_bus.check("radar_bus")?;
+    settings.broadcast_bus.check("broadcast_bus")?;
+    // large: moved once
+    let made = parameters.insert(E::parameters(&E::config(settings))?);
+    let header = E::header(settings, made);
+    if header.is_err() {
+        *parameters = None;
+    }
+    header
+}
+
+/// Whether a unit with this sender can be made by these settings.
+#[inline(never)] // as above
+fn check<E: InUnit, S: Sender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
+    build::<E>(settings, &mut None).and_then(|header| S::fits(&header))
+}
+
+impl Check {
+    /// For a unit of this estimator and sender.
+    pub const fn of<E: InUnit, S: Sender<E::Map>>() -> Self {
+        Self::by(check::<E, S>)
+    }
+}
+
+impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> InUnit
+    for Radar3d<R, A, E, W, N, D>
+{
+    fn config(settings: &Settings) -> Self::Config {
+        (settings.sensor, settings.radar_3d())
+    }
+
+    fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
+        let axes = parameters.axes();
+        let view = axes.view(A / 2);
+        let geometry = axes.polar(parameters.levelling());
+        let usual = Known::new(view.start, view.end);
+        let block = settings.to_block(0);
+        // the mount was checked with the parameters, so it is the grid
+        #[allow(clippy::cast_precision_loss)]
+        let refused = ConfigError {
+            parameter: "header.azimuths",
+            value: A as f32,
+            problem: Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 },
+        };
+        Header::new::<R, A>(&settings.sensor.mount, &geometry, usual, 1, fingerprint(&block)).map_err(|_| refused)
+    }
+}
