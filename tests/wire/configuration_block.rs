@@ -99,5 +99,8 @@ fn the_rest_of_the_block_is_as_on_the_page() {
     // no row is left for the order of the limits, which has its own reason
     let reversed = changed(36, &60.0_f32.to_le_bytes());
     let refused = check(&Settings::from_block(&reversed).unwrap().1).unwrap_err();
-    assert_eq!((refused.parameter, refused.problem), ("field_of_view.azimuth_max_deg", Problem::NotAscending { lower: 60.0 }));
+    assert_eq!(
+        (refused.parameter, refused.problem),
+        ("field_of_view.azimuth_max_deg", Problem::NotAscending { lower: 60.0 })
+    );
 }

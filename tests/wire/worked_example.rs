@@ -72,8 +72,7 @@ fn measured(scan: u8) -> Time {
 /// The map frames of these scans as a sender sends them that began before.
 fn sent(medium: Medium, scans: &[u8]) -> Vec<String> {
     let begun = Time::from_micros(measured(scans[0]).micros() - 1_000_000);
-    let mut sender =
-        Broadcaster::<AZIMUTHS, 1>::new(BroadcastConfig::new(0, medium), header(), EPOCH, begun).unwrap();
+    let mut sender = Broadcaster::<AZIMUTHS, 1>::new(BroadcastConfig::new(0, medium), header(), EPOCH, begun).unwrap();
     let mut frames = Vec::new();
     for scan in scans {
         sender.scan(measured(*scan), &picture(*scan)).unwrap();
@@ -156,7 +155,8 @@ fn parsed(frame: &str) -> CanFrame {
     let (id, data) = frame.split_once('#').unwrap();
     let id = CanId::standard(u16::from_str_radix(id, 16).unwrap()).unwrap();
     let (fd, data) = data.strip_prefix('#').map_or((false, data), |data| (true, data));
-    let bytes: Vec<u8> = (0..data.len() / 2).map(|i| u8::from_str_radix(&data[2 * i..2 * i + 2], 16).unwrap()).collect();
+    let bytes: Vec<u8> =
+        (0..data.len() / 2).map(|i| u8::from_str_radix(&data[2 * i..2 * i + 2], 16).unwrap()).collect();
     if fd { CanFrame::fd(id, &bytes) } else { CanFrame::classic(id, &bytes) }.unwrap()
 }
 
@@ -373,7 +373,8 @@ impl Page {
     /// "Blocks".
     fn block(&mut self, delta: bool, scan: u8, start: usize, (words, word_bits, most): (&[u64], u32, usize)) {
         let mut n = Number { words, word_bits, most, v: words[0], w: 1 << word_bits, u: 1, rows: Vec::new() };
-        let named = if delta { Some(scan.wrapping_sub(n.plain("age less one", 4) as u8).wrapping_sub(1)) } else { None };
+        let named =
+            if delta { Some(scan.wrapping_sub(n.plain("age less one", 4) as u8).wrapping_sub(1)) } else { None };
         let mut before = (NONE, NONE);
         let (mut as_expected, mut unchanged) = (true, true);
         for azimuth in start..AZIMUTHS {
@@ -402,7 +403,10 @@ impl Page {
                     let mut ray = refresh;
                     let changed = |cell: &usize| !first && before.0.bit[*cell] != before.1.bit[*cell];
                     let within = ray.near..ray.end;
-                    (0..RANGES).filter(changed).filter(|c| within.contains(c)).for_each(|c| ray.bit[c] = before.0.bit[c]);
+                    (0..RANGES)
+                        .filter(changed)
+                        .filter(|c| within.contains(c))
+                        .for_each(|c| ray.bit[c] = before.0.bit[c]);
                     ray
                 }
             };
