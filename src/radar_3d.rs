@@ -19,7 +19,7 @@ use crate::grid::axes::Axes;
 use crate::grid::evidence::{EvidenceConfig, InverseSensor};
 use crate::grid::raycast;
 use crate::grid::spherical::SphericalGrid;
-use crate::grid::voxelise::voxelise;
+use crate::grid::shadow;
 use crate::map::polar::PolarMap;
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::tracking::Tracking;
@@ -269,6 +269,14 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             map.forget();
         }
         ended(Stage::RayCast);
+        for solid in self.obstacles.solids(&p.tracking) {
+            shadow::cast(&solid, &p.axes, &mut self.grid, map);
+        }
+        for o in self.obstacles.vehicles(&p.tracking) {
+            let mut s = o.solid(&p.tracking);
+            if o.quiet == 0 { s.half_length_cm /= 4; s.half_width_cm /= 2; shadow::show(&s, &p.axes, map, 255); }
+        }
+        ended(Stage::Shadows);
         self.rejections.add_all(self.scan.rejections());
         let report = FrameReport {
             continuity,
@@ -298,7 +306,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         ended: &mut impl FnMut(Stage),
     ) {
         let first = !matches!(continuity, Continuity::Follows(_));
-        self.grid.remove_solids();
         p.inverse_sensor.fade(&mut self.grid, map, step);
         ended(Stage::Fade);
         let reflections = self.scan.reflections();
@@ -311,10 +318,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             }
         }
         ended(Stage::Add);
-        for solid in self.obstacles.solids(&p.tracking) {
-            voxelise(&solid, &p.axes, &mut self.grid);
-        }
-        ended(Stage::Voxelise);
     }
 
     /// Makes the map unknown when its time has run out; to be called when no frame comes.

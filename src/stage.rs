@@ -14,10 +14,10 @@ pub enum Stage {
     Clear,
     /// Detections add evidence.
     Add,
-    /// Obstacles become occupied cells.
-    Voxelise,
     /// Ray casting and slice.
     RayCast,
+    /// Obstacles and their shadows on the map.
+    Shadows,
     /// The map into messages; no part of the estimator.
     Broadcast,
 }
@@ -36,8 +36,8 @@ impl Stage {
         Self::Fade,
         Self::Clear,
         Self::Add,
-        Self::Voxelise,
         Self::RayCast,
+        Self::Shadows,
         Self::Broadcast,
     ];
 
@@ -49,8 +49,8 @@ impl Stage {
             Self::Fade => "fade",
             Self::Clear => "clear",
             Self::Add => "add",
-            Self::Voxelise => "voxelise",
             Self::RayCast => "ray cast",
+            Self::Shadows => "shadows",
             Self::Broadcast => "broadcast",
         }
     }

@@ -45,6 +45,8 @@ pub struct Axes<const R: usize, const A: usize, const E: usize> {
     pub azimuth_span: u16,
     /// Height of the sensor, centimetres.
     height_cm: i32,
+    /// Height of the slice plane, centimetres.
+    slice_cm: i32,
     /// Lower edges of the rows, ascending slopes, 2^-18.
     row_edges: [i32; E],
     /// Upper edge of the last row.
@@ -85,6 +87,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             azimuth_origin: Angle::ZERO,
             azimuth_span: 0,
             height_cm: slice_cm + drop,
+            slice_cm,
             row_edges: [0; E],
             row_top: 0,
             slice_share: [0; R],
@@ -196,6 +199,29 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// Height the slopes are taken from, centimetres.
     pub fn sensor_height_cm(&self) -> i32 {
         self.height_cm
+    }
+
+    /// Height of the slice plane, centimetres.
+    pub fn slice_cm(&self) -> i32 {
+        self.slice_cm
+    }
+
+    /// Between which distances a box of this height hides the slice plane, centimetres, if rays enter and
+    /// leave it at these (up to 655 m); `None` where it hides nothing of it.
+    pub fn hidden_behind(&self, height_cm: i32, enter_cm: i32, leave_cm: i32) -> Option<(i32, i32)> {
+        let drop = self.height_cm - self.slice_cm;
+        let stretched = |cm: i32, by: i32, over: i32| cm.clamp(0, 0xFFFF) * by / over.max(1);
+        if drop > 0 {
+            // seen from above: over the far edge
+            let left = self.height_cm - height_cm;
+            let end = if left > 0 { stretched(leave_cm, drop, left) } else { i32::MAX };
+            (height_cm > self.slice_cm).then_some((leave_cm, end))
+        } else {
+            // from below: over the near edge, and never again
+            let over = height_cm - self.height_cm;
+            let begin = if height_cm < self.slice_cm { stretched(enter_cm, -drop, over) } else { 0 };
+            (over > 0).then_some((leave_cm.max(begin), i32::MAX))
+        }
     }
 
     /// Slope under which a point of this height and ground distance is seen; more than 40 m above or

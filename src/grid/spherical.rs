@@ -31,8 +31,6 @@ pub struct Column<const R: usize, const E: usize, const W: usize = 8> {
     stacks: [[u8; E]; R],
     /// Range cells whose stack may hold something.
     used: Bits<W>,
-    /// Range cells filled by a solid of this frame.
-    solid: Bits<W>,
 }
 
 impl<const R: usize, const A: usize, const E: usize, const W: usize> Default for SphericalGrid<R, A, E, W> {
@@ -78,18 +76,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize> SphericalGr
     pub fn column_mut(&mut self, azimuth: usize) -> Option<&mut Column<R, E, W>> {
         self.columns.get_mut(azimuth)
     }
-
-    /// Takes out the solids of the last frame. A place something solid moved through holds no
-    /// older evidence: it was swept.
-    pub fn remove_solids(&mut self) {
-        for c in &mut self.columns {
-            c.remove_solids();
-        }
-    }
 }
 
 impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
-    const EMPTY: Self = Self { stacks: [[0; E]; R], used: Bits::NONE, solid: Bits::NONE };
+    const EMPTY: Self = Self { stacks: [[0; E]; R], used: Bits::NONE };
 
     fn clear(&mut self) {
         for r in self.used.iter() {
@@ -98,17 +88,6 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
             }
         }
         self.used = Bits::NONE;
-        self.solid = Bits::NONE;
-    }
-
-    fn remove_solids(&mut self) {
-        for r in self.solid.iter() {
-            if let Some(s) = self.stacks.get_mut(r) {
-                *s = [0; E];
-            }
-            self.used.clear(r);
-        }
-        self.solid = Bits::NONE;
     }
 
     /// Range cells that hold something, nearest first, with their stacks.
@@ -146,26 +125,18 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
         Some(stack)
     }
 
-    /// Fills a stack up to `top` (2^-8 rows) by `share` of its width. What is already fuller stays.
-    pub fn fill(&mut self, r: usize, top: i32, share: u8) {
-        let Some(stack) = self.stacks.get_mut(r) else { return };
-        self.used.set(r);
-        self.solid.set(r);
-        let full = usize::try_from(top >> 8).unwrap_or(0).min(E);
-        let (below, above) = stack.split_at_mut(full);
-        for cell in below {
-            *cell = (*cell).max(share);
-        }
-        if let (Some(cell), 0..) = (above.first_mut(), top) {
-            *cell = (*cell).max(scaled(share, top & 0xFF));
+    /// Empties the stacks of some range cells.
+    pub fn empty(&mut self, cells: core::ops::Range<usize>) {
+        for r in cells {
+            if !self.used.get(r) {
+                continue;
+            }
+            if let Some(s) = self.stacks.get_mut(r) {
+                *s = [0; E];
+            }
+            self.used.clear(r);
         }
     }
-}
-
-/// `share * part / 256`, for a part below 256.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below 255
-fn scaled(share: u8, part: i32) -> u8 {
-    ((i32::from(share) * part) >> 8) as u8
 }
 
 #[cfg(test)]

@@ -95,7 +95,12 @@ impl<const N: usize> Obstacles<N> {
 
     /// Boxes of the confirmed.
     pub fn solids<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
-        self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t)).map(|o| o.solid(t))
+        self.vehicles(t).map(|o| o.solid(t))
+    }
+
+    /// The confirmed.
+    pub fn vehicles<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = &'a Obstacle> + 'a {
+        self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t))
     }
 
     /// Takes one frame's detections: moves every obstacle on, gives each detection to the obstacle
