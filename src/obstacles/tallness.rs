@@ -13,9 +13,16 @@ const PROOF: u16 = 3;
 /// in 50 strays over from the next lane.
 const ONE_IN: u16 = 20;
 
+const MOST: i16 = 4096;
+const TALL: i16 = 1024;
+const LOW: i16 = 1536;
+const RATIO: [i16; 33] = [-21, -21, -21, -20, -20, -20, -20, -19, -18, -18, -16, -15, -13, -11, -8, -5, 0, 6, 13, 22, 33, 47, 63, 83, 106, 133, 164, 198, 237, 280, 326, 375, 426];
+
 /// Reflections counted by the levels they prove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Tallness {
+    /// How much likelier all heights are of something tall than of a car, 2^-8 nats.
+    likelier: i16,
     measured: u16,
     above: [u16; LEVELS_CM.len()],
 }
@@ -28,6 +35,7 @@ impl Tallness {
             self.above.iter_mut().for_each(|n| *n /= 2);
         }
         self.measured += 1;
+        self.weigh(height_cm, sigma_cm);
         let sure = height_cm - SIGMAS * sigma_cm;
         for (n, level) in self.above.iter_mut().zip(LEVELS_CM) {
             if sure <= level {
@@ -37,9 +45,23 @@ impl Tallness {
         }
     }
 
+    fn weigh(&mut self, height_cm: i32, sigma_cm: i32) {
+        let sigma = sigma_cm.min(3000);
+        let s2 = 35 * 35 + sigma * sigma;
+        let e = ((height_cm.clamp(-5000, 5000) - 165) * 190 * 4 / s2.max(1)).clamp(-16, 16);
+        let gain = RATIO.get((e + 16) as usize).copied().unwrap_or(0);
+        self.likelier = (self.likelier + gain).clamp(-MOST, MOST);
+    }
+
+    /// The height it does not exceed, as far as its reflections tell, centimetres.
+    pub fn ceiling_cm(&self) -> i32 {
+        if self.likelier <= -LOW { 160 } else { i32::MAX }
+    }
+
     /// Takes over another's counts.
     pub fn join(&mut self, other: &Self) {
         self.measured = self.measured.saturating_add(other.measured);
+        self.likelier = (self.likelier + other.likelier).clamp(-MOST, MOST);
         for (n, m) in self.above.iter_mut().zip(other.above) {
             *n = n.saturating_add(m);
         }
@@ -47,9 +69,10 @@ impl Tallness {
 
     /// The height that is proven, centimetres; 0 while nothing is.
     pub fn floor_cm(&self) -> i32 {
+        let tall = if self.likelier >= TALL { 260 } else { 0 };
         let proven = |n: &u16| *n >= PROOF && u32::from(*n) * u32::from(ONE_IN) >= u32::from(self.measured);
         let mut levels = self.above.iter().zip(&LEVELS_CM).rev();
-        levels.find(|(n, _)| proven(n)).map_or(0, |(_, level)| *level)
+        levels.find(|(n, _)| proven(n)).map_or(0, |(_, level)| *level).max(tall)
     }
 }
 
