@@ -1,11 +1,11 @@
 //! The radar-3d estimator: all stages in order, from detections to a polar map.
 //!
 //! ```text
-//! detections -> gate -> reflections on the ground -> moving obstacles -+-> solids ---+
-//!                                                                      |             v
-//!                                             unclaimed detections -> evidence -> spherical grid
-//!                                                                                    |
-//!                        polar map: grade, bit, occupancy <- slice at h <- ray casting
+//! detections -> gate -> reflections on the ground -> moving obstacles -+-> boxes -> shadows -+
+//!                                                                      |                     |
+//!      unclaimed detections -> evidence -> spherical grid <------------+                     |
+//!                                               |                                            v
+//!                                               +-> ray casting -> slice at h -> polar map: grade, bit, occupancy
 //! ```
 
 use crate::fixed::math;
@@ -18,8 +18,8 @@ use crate::frame::scan::Scan;
 use crate::grid::axes::Axes;
 use crate::grid::evidence::{EvidenceConfig, InverseSensor};
 use crate::grid::raycast;
-use crate::grid::spherical::SphericalGrid;
 use crate::grid::shadow;
+use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::tracking::Tracking;
@@ -269,13 +269,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             map.forget();
         }
         ended(Stage::RayCast);
-        for solid in self.obstacles.solids(&p.tracking) {
-            shadow::cast(&solid, &p.axes, &mut self.grid, map);
-        }
-        for o in self.obstacles.vehicles(&p.tracking) {
-            let mut s = o.solid(&p.tracking);
-            if o.quiet == 0 { s.half_length_cm /= 4; s.half_width_cm /= 2; shadow::show(&s, &p.axes, map, 255); }
-        }
+        self.put_obstacles(p, map);
         ended(Stage::Shadows);
         self.rejections.add_all(self.scan.rejections());
         let report = FrameReport {
@@ -318,6 +312,15 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             }
         }
         ended(Stage::Add);
+    }
+
+    fn put_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, map: &mut PolarMap<R, A>) {
+        for (solid, _) in self.obstacles.boxes(&p.tracking) {
+            shadow::cast(&solid, &p.axes, &mut self.grid, map);
+        }
+        for (solid, _) in self.obstacles.boxes(&p.tracking).filter(|(_, seen)| *seen) {
+            shadow::show(&solid, &p.axes, map);
+        }
     }
 
     /// Makes the map unknown when its time has run out; to be called when no frame comes.

@@ -237,12 +237,10 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Place of a slope on the row axis, 2^-8 rows from the first row's lower edge.
     pub fn row_place(&self, slope: i32) -> i32 {
-        self.row_places().of(slope)
-    }
-
-    /// [`row_place`](Self::row_place) for slopes that follow one another closely.
-    pub fn row_places(&self) -> RowPlaces<'_, E> {
-        RowPlaces { edges: &self.row_edges, top: self.row_top, row: 0 }
+        let edge = |row: usize| self.row_edges.get(row).copied().unwrap_or(self.row_top);
+        let row = self.row_edges.partition_point(|e| *e <= slope).saturating_sub(1);
+        let lower = edge(row);
+        if slope < lower { 0 } else { row as i32 * 256 + part_of(slope - lower, edge(row + 1) - lower) }
     }
 
     /// Slope of a row's centre.
@@ -302,33 +300,6 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
             _ => 0..0,
         }
-    }
-}
-
-/// Finds slopes on the row axis, beginning with the row of the last.
-#[derive(Debug, Clone)]
-pub struct RowPlaces<'a, const E: usize> {
-    edges: &'a [i32; E],
-    top: i32,
-    row: usize,
-}
-
-impl<const E: usize> RowPlaces<'_, E> {
-    /// Place of a slope, 2^-8 rows from the first row's lower edge.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 64 rows
-    pub fn of(&mut self, slope: i32) -> i32 {
-        while self.row + 1 < E && self.edge(self.row + 1) <= slope {
-            self.row += 1;
-        }
-        while self.row > 0 && self.edge(self.row) > slope {
-            self.row -= 1;
-        }
-        let lower = self.edge(self.row);
-        if slope < lower { 0 } else { self.row as i32 * 256 + part_of(slope - lower, self.edge(self.row + 1) - lower) }
-    }
-
-    fn edge(&self, row: usize) -> i32 {
-        self.edges.get(row).copied().unwrap_or(self.top)
     }
 }
 

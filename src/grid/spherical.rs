@@ -1,10 +1,9 @@
 //! The sensor-centred occupancy grid: range x azimuth x elevation, one byte a cell.
 //!
 //! # Model
-//! A byte is the occupied share of its cell, 0 to 255. Evidence lasts and fades; solids are the
-//! boxes of moving obstacles, put in anew at every frame and taken out before the next. The `E`
-//! cells of one azimuth and range lie together (a *stack*), so a box is a run of filled stacks and
-//! a ray over all elevations is a byte-wise running maximum. Empty stacks are skipped by bit rows.
+//! A byte is the occupied share of its cell, 0 to 255. Evidence lasts and fades. The `E` cells of one
+//! azimuth and range lie together (a *stack*), so a ray over all elevations is a byte-wise running
+//! maximum. Empty stacks are skipped by bit rows.
 
 use crate::fixed::bits::Bits;
 use crate::grid::stack;
@@ -13,7 +12,7 @@ use crate::grid::stack;
 /// which of the `R` stacks of an azimuth hold something.
 ///
 /// # Limits
-/// `R * A * E` bytes and `8 W` bytes per azimuth; `R` up to `32 W`.
+/// `R * A * E` bytes and `4 W` bytes per azimuth; `R` up to `32 W`.
 #[derive(Debug, Clone)]
 pub struct SphericalGrid<const R: usize, const A: usize, const E: usize, const W: usize = 8> {
     columns: [Column<R, E, W>; A],
@@ -145,34 +144,25 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn a_fill_stands_on_the_ground_and_ends_within_a_row() {
-        let mut g: SphericalGrid<4, 2, 4> = SphericalGrid::new();
-        let c = g.column_mut(1).unwrap();
-        c.fill(2, 2 * 256 + 64, 255);
-        c.fill(2, 256, 100);
-        assert_eq!(c.stacks().collect::<Vec<_>>(), [(2, &[255, 255, 63, 0])]);
-    }
-
-    #[test]
-    fn solids_go_and_evidence_stays() {
+    fn stacks_that_are_emptied_or_faint_are_skipped_and_others_stay() {
         let mut g: SphericalGrid<4, 1, 2> = SphericalGrid::new();
         let c = g.column_mut(0).unwrap();
-        c.evidence(1).unwrap()[0] = 90;
-        c.fill(3, 512, 255);
-        g.remove_solids();
-        let c = g.column_mut(0).unwrap();
+        for r in [1, 2, 3] {
+            c.evidence(r).unwrap()[0] = 90;
+        }
+        c.empty(2..9);
         assert_eq!(c.stacks().collect::<Vec<_>>(), [(1, &[90, 0])]);
         c.change(|_, s| s[0] = 8);
         assert_eq!(c.stacks().count(), 1);
         c.change(|_, s| s[0] = 7);
         assert_eq!(c.stacks().count(), 0);
-        assert_eq!(c.evidence(1), Some(&mut [0, 0]), "and nothing of it comes back");
+        assert_eq!(*c.evidence(1).unwrap(), [0, 0], "and nothing of it comes back");
     }
 
     #[test]
     fn clearing_leaves_nothing_behind() {
         let mut g: SphericalGrid<4, 1, 2> = SphericalGrid::new();
-        g.column_mut(0).unwrap().fill(3, 512, 255);
+        *g.column_mut(0).unwrap().evidence(3).unwrap() = [255, 255];
         g.clear();
         let c = g.column_mut(0).unwrap();
         *c.evidence(3).unwrap() = [1, 1];

@@ -45,7 +45,6 @@ pub struct Obstacle {
     /// Way made so far, centimetres, saturating.
     pub(super) travelled_cm: u16,
     pub(super) tallness: Tallness,
-    pub quiet: u8,
     /// Its motion where the road's direction is not assumed.
     pub(super) free: FreeMotion,
     /// Frames in a row in which motion along its heading did not explain where it is.
@@ -93,7 +92,6 @@ impl Obstacle {
             age: 0,
             travelled_cm: 0,
             tallness: Tallness::default(),
-            quiet: 0,
             gathered: Gathered::NONE,
         }
     }
@@ -138,7 +136,6 @@ impl Obstacle {
         self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
         self.gathered = Gathered::NONE;
         self.age = self.age.saturating_add(1);
-        self.quiet = self.quiet.saturating_add(1);
     }
 
     /// Whether it has moved far enough to be no fixture that clutter gave a speed.
@@ -204,7 +201,6 @@ impl Obstacle {
         if g.count == 0 {
             return;
         }
-        self.quiet = 0;
         self.follow(t);
         let weight = self.lateral_weight.saturating_add(g.lateral.1).clamp(1, MOST_WEIGHT);
         let offset = ratio::<FRACTION>(g.lateral.0, weight);
