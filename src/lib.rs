@@ -69,7 +69,7 @@
 //! | [`frame`] | one radar frame: [detections](frame::detection) in, [gated](frame::gate) and counted, [placed on the road](frame::reflection); what a silent or [blind](frame::health) sensor means |
 //! | [`obstacles`] | what moves is followed: place, length, width, height; [solid](obstacles::solid) boxes out |
 //! | [`map`] | what a map answers: the [interface](map::VisibilityMap), the [polar map](map::polar), [queries](map::query), the [1 m grid](map::resample), the [bitmap](map::bitmap) |
-//! | [`grid`] | range x azimuth x slope: boxes and [evidence](grid::evidence) in, [lines of sight](grid::raycast) and a polar map out |
+//! | [`grid`] | range x azimuth x slope: [evidence](grid::evidence) and boxes in, [lines of sight](grid::raycast), [shadows](grid::shadow) and a polar map out |
 //! | [`estimator`] | what a unit asks of an estimator, whatever its sensor and its map |
 //! | [`radar_3d`] | the estimator: all stages above, in order |
 //! | [`radar_2d`] | the flat baseline, as an estimator of its own |
@@ -85,7 +85,7 @@
 //! | detection | one measurement of the radar: range, azimuth, perhaps elevation, radial velocity, strength |
 //! | reflection | a detection placed on the road, in the levelled frame under the sensor |
 //! | obstacle | what is followed over many frames because its reflections move together: a vehicle |
-//! | solid | the upright box that an obstacle becomes for the grid |
+//! | solid | the upright box that an obstacle becomes; it casts its shadow on the map |
 //! | evidence | occupancy of the grid's cells from reflections that no obstacle explains; fades by the second |
 //! | slope | height over ground range; a row of the grid is a range of slopes, so a line of sight is a row |
 //! | slice | the plane, 1 m above the road, on which visibility is judged |
@@ -105,17 +105,21 @@
 //! - **Moving vehicles are obstacles before they are cells.** A radar sees a handful of reflections of
 //!   a truck, never its outline; a grid alone has no way to know its length. Detections that move
 //!   together are followed, the ends of their reflections over time give the length, length gives width
-//!   and height (with elevation as a floor), and the box is what fills the grid. Unmoving things enter
+//!   and height, corrected by elevation, and the box casts its shadow on the map. Unmoving things enter
 //!   the grid by the inverse sensor model instead, where evidence decays per second and is cleared only
 //!   where the map says that it could have been seen.
 //! - **Gaps end with headway.** Reflections in line and equally fast belong to one vehicle while the
 //!   gap between them is smaller than vehicles keep at that speed, and for longer gaps once they have
 //!   come some way at the same distance. What turns (wheels) or lies inside an outline is no vehicle.
+//! - **Boxes are not drawn into cells.** Shadows of boxes end where similar triangles say, not at the edge
+//!   of a row of slopes: in queues that is every twentieth blocked cell.
 //! - **A thing never hides itself.** Along a row only cells behind the *end* of an occupied run are
-//!   hidden by it, so a vehicle's own cells keep the grade of its front.
-//! - **Elevation only proves a least height.** Seeing reflections *past* an obstacle was tried as a
-//!   ceiling on its height and left out: road bounce under trucks makes it lie, and each lie is a false
-//!   "visible".
+//!   hidden by it, and a box shades only what lies behind it. The middle of a vehicle that is seen in this
+//!   frame is shown, whatever stands before it.
+//! - **Elevation says how high, within what length allows.** A reflection well above a level proves it; many
+//!   together tell a car from a van or a lorry where none alone does; and what is as long as a lorry is never
+//!   called low. Seeing reflections *past* an obstacle was tried as a ceiling on its height and left out: road
+//!   bounce under trucks makes it lie, and each lie is a false "visible".
 //! - **No floats after start-up**: angles are binary (2^16 a turn), lengths centimetres; `libm` makes
 //!   the start-up tables, `micromath` helps only where a test shows that its error cannot matter, and
 //!   both are named in one file. TI's radars send floats: their decoder computes in them, in software

@@ -1,11 +1,11 @@
 //! The radar-3d estimator: all stages in order, from detections to a polar map.
 //!
 //! ```text
-//! detections -> gate -> reflections on the ground -> moving obstacles -+-> solids ---+
-//!                                                                      |             v
-//!                                             unclaimed detections -> evidence -> spherical grid
-//!                                                                                    |
-//!                        polar map: grade, bit, occupancy <- slice at h <- ray casting
+//! detections -> gate -> reflections on the ground -> moving obstacles -+-> boxes -> shadows -+
+//!                                                                      |                     |
+//!      unclaimed detections -> evidence -> spherical grid <------------+                     |
+//!                                               |                                            v
+//!                                               +-> ray casting -> slice at h -> polar map: grade, bit, occupancy
 //! ```
 
 use crate::estimator::{Estimator, Progress};
@@ -19,8 +19,8 @@ use crate::frame::scan::Scan;
 use crate::grid::axes::Axes;
 use crate::grid::evidence::{EvidenceConfig, InverseSensor};
 use crate::grid::raycast;
+use crate::grid::shadow;
 use crate::grid::spherical::SphericalGrid;
-use crate::grid::voxelise::voxelise;
 use crate::map::polar::PolarMap;
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::tracking::Tracking;
@@ -263,6 +263,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             map.forget();
         }
         ended();
+        self.put_obstacles(p, map);
+        ended();
         self.rejections.add_all(self.scan.rejections());
         let report = FrameReport {
             continuity,
@@ -292,7 +294,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         ended: &mut impl FnMut(),
     ) {
         let first = !matches!(continuity, Continuity::Follows(_));
-        self.grid.remove_solids();
         p.inverse_sensor.fade(&mut self.grid, map, step);
         ended();
         let reflections = self.scan.reflections();
@@ -305,10 +306,15 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             }
         }
         ended();
-        for solid in self.obstacles.solids(&p.tracking) {
-            voxelise(&solid, &p.axes, &mut self.grid);
+    }
+
+    fn put_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, map: &mut PolarMap<R, A>) {
+        for (solid, _) in self.obstacles.boxes(&p.tracking) {
+            shadow::cast(&solid, &p.axes, &mut self.grid, map);
         }
-        ended();
+        for (solid, _) in self.obstacles.boxes(&p.tracking).filter(|(_, seen)| *seen) {
+            shadow::show(&solid, &p.axes, map);
+        }
     }
 
     /// Makes the map unknown when its time has run out; to be called when no frame comes.

@@ -16,10 +16,10 @@ pub enum Stage {
     Clear,
     /// Detections add evidence.
     Add,
-    /// Obstacles become occupied cells.
-    Voxelise,
     /// Ray casting and slice.
     RayCast,
+    /// Obstacles and their shadows on the map.
+    Shadows,
     /// The map into messages; no part of the estimator.
     Broadcast,
 }
@@ -38,8 +38,8 @@ impl Stage {
         Self::Fade,
         Self::Clear,
         Self::Add,
-        Self::Voxelise,
         Self::RayCast,
+        Self::Shadows,
         Self::Broadcast,
     ];
 
@@ -51,8 +51,8 @@ impl Stage {
             Self::Fade => "fade",
             Self::Clear => "clear",
             Self::Add => "add",
-            Self::Voxelise => "voxelise",
             Self::RayCast => "ray cast",
+            Self::Shadows => "shadows",
             Self::Broadcast => "broadcast",
         }
     }

@@ -45,6 +45,8 @@ pub struct Axes<const R: usize, const A: usize, const E: usize> {
     pub azimuth_span: u16,
     /// Height of the sensor, centimetres.
     height_cm: i32,
+    /// Height of the slice plane, centimetres.
+    slice_cm: i32,
     /// Lower edges of the rows, ascending slopes, 2^-18.
     row_edges: [i32; E],
     /// Upper edge of the last row.
@@ -85,6 +87,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             azimuth_origin: Angle::ZERO,
             azimuth_span: 0,
             height_cm: slice_cm + drop,
+            slice_cm,
             row_edges: [0; E],
             row_top: 0,
             slice_share: [0; R],
@@ -198,6 +201,29 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         self.height_cm
     }
 
+    /// Height of the slice plane, centimetres.
+    pub fn slice_cm(&self) -> i32 {
+        self.slice_cm
+    }
+
+    /// Between which distances a box of this height hides the slice plane, centimetres, if rays enter and
+    /// leave it at these (up to 655 m); `None` where it hides nothing of it.
+    pub fn hidden_behind(&self, height_cm: i32, enter_cm: i32, leave_cm: i32) -> Option<(i32, i32)> {
+        let drop = self.height_cm - self.slice_cm;
+        let stretched = |cm: i32, by: i32, over: i32| cm.clamp(0, 0xFFFF) * by / over.max(1);
+        if drop > 0 {
+            // seen from above: over the far edge
+            let left = self.height_cm - height_cm;
+            let end = if left > 0 { stretched(leave_cm, drop, left) } else { i32::MAX };
+            (height_cm > self.slice_cm).then_some((leave_cm, end))
+        } else {
+            // from below: over the near edge, and never again
+            let over = height_cm - self.height_cm;
+            let begin = if height_cm < self.slice_cm { stretched(enter_cm, -drop, over) } else { 0 };
+            (over > 0).then_some((leave_cm.max(begin), i32::MAX))
+        }
+    }
+
     /// Slope under which a point of this height and ground distance is seen; more than 40 m above or
     /// below the sensor counts as 40 m.
     pub fn slope(&self, height_cm: i32, ground_cm: i32) -> i32 {
@@ -211,12 +237,10 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
 
     /// Place of a slope on the row axis, 2^-8 rows from the first row's lower edge.
     pub fn row_place(&self, slope: i32) -> i32 {
-        self.row_places().of(slope)
-    }
-
-    /// [`row_place`](Self::row_place) for slopes that follow one another closely.
-    pub fn row_places(&self) -> RowPlaces<'_, E> {
-        RowPlaces { edges: &self.row_edges, top: self.row_top, row: 0 }
+        let edge = |row: usize| self.row_edges.get(row).copied().unwrap_or(self.row_top);
+        let row = self.row_edges.partition_point(|e| *e <= slope).saturating_sub(1);
+        let lower = edge(row);
+        if slope < lower { 0 } else { row as i32 * 256 + part_of(slope - lower, edge(row + 1) - lower) }
     }
 
     /// Slope of a row's centre.
@@ -276,33 +300,6 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
             _ => 0..0,
         }
-    }
-}
-
-/// Finds slopes on the row axis, beginning with the row of the last.
-#[derive(Debug, Clone)]
-pub struct RowPlaces<'a, const E: usize> {
-    edges: &'a [i32; E],
-    top: i32,
-    row: usize,
-}
-
-impl<const E: usize> RowPlaces<'_, E> {
-    /// Place of a slope, 2^-8 rows from the first row's lower edge.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 64 rows
-    pub fn of(&mut self, slope: i32) -> i32 {
-        while self.row + 1 < E && self.edge(self.row + 1) <= slope {
-            self.row += 1;
-        }
-        while self.row > 0 && self.edge(self.row) > slope {
-            self.row -= 1;
-        }
-        let lower = self.edge(self.row);
-        if slope < lower { 0 } else { self.row as i32 * 256 + part_of(slope - lower, self.edge(self.row + 1) - lower) }
-    }
-
-    fn edge(&self, row: usize) -> i32 {
-        self.edges.get(row).copied().unwrap_or(self.top)
     }
 }
 

@@ -1,14 +1,14 @@
 //! The spherical grid: what is occupied around the sensor, and the lines of sight through it.
 //!
 //! ```text
-//! obstacles -> voxelise -+
-//!                        v
-//! evidence -----> spherical grid -> raycast -> polar map
+//! evidence -> spherical grid -> raycast -+-> polar map
+//!                                        |
+//! obstacles -----------------> shadow ---+
 //! ```
 
 pub mod axes;
 pub mod evidence;
 pub mod raycast;
+pub mod shadow;
 pub mod spherical;
 mod stack;
-pub mod voxelise;

@@ -19,6 +19,8 @@ const OCCUPIED: u8 = 128;
 
 /// Grade of a cell that is known and blocked.
 pub(crate) const BLOCKED: u8 = 1;
+/// Grade of a cell with nothing in the way.
+pub(crate) const CLEAR: u8 = 255;
 
 /// Casts all rays and writes the visibility and occupancy at slice height. Cells out of view stay
 /// unknown.
@@ -172,7 +174,7 @@ impl Pair {
 mod tests {
     use super::*;
     use crate::fixed::trig::Direction;
-    use crate::grid::voxelise::voxelise;
+    use crate::grid::shadow;
     use crate::map::{Visibility, VisibilityMap};
     use crate::obstacles::solid::Solid;
     use crate::sensor::field_of_view::FieldOfView;
@@ -197,11 +199,11 @@ mod tests {
         let levelling = mount.levelling().unwrap();
         let axes = Axes::<100, 120, 16>::new(&levelling, &VIEW, 1.0).unwrap();
         let mut grid = SphericalGrid::<100, 120, 16>::new();
-        for s in solids {
-            voxelise(s, &axes, &mut grid);
-        }
         let mut map = PolarMap::unknown(axes.polar(&levelling), 128, 128);
         cast(&grid, &axes, &mut map);
+        for s in solids {
+            shadow::cast(s, &axes, &mut grid, &mut map);
+        }
         let mut picture = String::new();
         for j in (-4..=4).rev() {
             for i in 0..20 {

@@ -1,10 +1,9 @@
 //! The sensor-centred occupancy grid: range x azimuth x elevation, one byte a cell.
 //!
 //! # Model
-//! A byte is the occupied share of its cell, 0 to 255. Evidence lasts and fades; solids are the
-//! boxes of moving obstacles, put in anew at every frame and taken out before the next. The `E`
-//! cells of one azimuth and range lie together (a *stack*), so a box is a run of filled stacks and
-//! a ray over all elevations is a byte-wise running maximum. Empty stacks are skipped by bit rows.
+//! A byte is the occupied share of its cell, 0 to 255. Evidence lasts and fades. The `E` cells of one
+//! azimuth and range lie together (a *stack*), so a ray over all elevations is a byte-wise running
+//! maximum. Empty stacks are skipped by bit rows.
 
 use crate::fixed::bits::Bits;
 use crate::grid::stack;
@@ -13,7 +12,7 @@ use crate::grid::stack;
 /// which of the `R` stacks of an azimuth hold something.
 ///
 /// # Limits
-/// `R * A * E` bytes and `8 W` bytes per azimuth; `R` up to `32 W`.
+/// `R * A * E` bytes and `4 W` bytes per azimuth; `R` up to `32 W`.
 #[derive(Debug, Clone)]
 pub struct SphericalGrid<const R: usize, const A: usize, const E: usize, const W: usize = 8> {
     columns: [Column<R, E, W>; A],
@@ -31,8 +30,6 @@ pub struct Column<const R: usize, const E: usize, const W: usize = 8> {
     stacks: [[u8; E]; R],
     /// Range cells whose stack may hold something.
     used: Bits<W>,
-    /// Range cells filled by a solid of this frame.
-    solid: Bits<W>,
 }
 
 impl<const R: usize, const A: usize, const E: usize, const W: usize> Default for SphericalGrid<R, A, E, W> {
@@ -78,18 +75,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize> SphericalGr
     pub fn column_mut(&mut self, azimuth: usize) -> Option<&mut Column<R, E, W>> {
         self.columns.get_mut(azimuth)
     }
-
-    /// Takes out the solids of the last frame. A place something solid moved through holds no
-    /// older evidence: it was swept.
-    pub fn remove_solids(&mut self) {
-        for c in &mut self.columns {
-            c.remove_solids();
-        }
-    }
 }
 
 impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
-    const EMPTY: Self = Self { stacks: [[0; E]; R], used: Bits::NONE, solid: Bits::NONE };
+    const EMPTY: Self = Self { stacks: [[0; E]; R], used: Bits::NONE };
 
     fn clear(&mut self) {
         for r in self.used.iter() {
@@ -98,17 +87,6 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
             }
         }
         self.used = Bits::NONE;
-        self.solid = Bits::NONE;
-    }
-
-    fn remove_solids(&mut self) {
-        for r in self.solid.iter() {
-            if let Some(s) = self.stacks.get_mut(r) {
-                *s = [0; E];
-            }
-            self.used.clear(r);
-        }
-        self.solid = Bits::NONE;
     }
 
     /// Range cells that hold something, nearest first, with their stacks.
@@ -146,26 +124,18 @@ impl<const R: usize, const E: usize, const W: usize> Column<R, E, W> {
         Some(stack)
     }
 
-    /// Fills a stack up to `top` (2^-8 rows) by `share` of its width. What is already fuller stays.
-    pub fn fill(&mut self, r: usize, top: i32, share: u8) {
-        let Some(stack) = self.stacks.get_mut(r) else { return };
-        self.used.set(r);
-        self.solid.set(r);
-        let full = usize::try_from(top >> 8).unwrap_or(0).min(E);
-        let (below, above) = stack.split_at_mut(full);
-        for cell in below {
-            *cell = (*cell).max(share);
-        }
-        if let (Some(cell), 0..) = (above.first_mut(), top) {
-            *cell = (*cell).max(scaled(share, top & 0xFF));
+    /// Empties the stacks of some range cells.
+    pub fn empty(&mut self, cells: core::ops::Range<usize>) {
+        for r in cells {
+            if !self.used.get(r) {
+                continue;
+            }
+            if let Some(s) = self.stacks.get_mut(r) {
+                *s = [0; E];
+            }
+            self.used.clear(r);
         }
     }
-}
-
-/// `share * part / 256`, for a part below 256.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below 255
-fn scaled(share: u8, part: i32) -> u8 {
-    ((i32::from(share) * part) >> 8) as u8
 }
 
 #[cfg(test)]
@@ -174,34 +144,25 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn a_fill_stands_on_the_ground_and_ends_within_a_row() {
-        let mut g: SphericalGrid<4, 2, 4> = SphericalGrid::new();
-        let c = g.column_mut(1).unwrap();
-        c.fill(2, 2 * 256 + 64, 255);
-        c.fill(2, 256, 100);
-        assert_eq!(c.stacks().collect::<Vec<_>>(), [(2, &[255, 255, 63, 0])]);
-    }
-
-    #[test]
-    fn solids_go_and_evidence_stays() {
+    fn stacks_that_are_emptied_or_faint_are_skipped_and_others_stay() {
         let mut g: SphericalGrid<4, 1, 2> = SphericalGrid::new();
         let c = g.column_mut(0).unwrap();
-        c.evidence(1).unwrap()[0] = 90;
-        c.fill(3, 512, 255);
-        g.remove_solids();
-        let c = g.column_mut(0).unwrap();
+        for r in [1, 2, 3] {
+            c.evidence(r).unwrap()[0] = 90;
+        }
+        c.empty(2..9);
         assert_eq!(c.stacks().collect::<Vec<_>>(), [(1, &[90, 0])]);
         c.change(|_, s| s[0] = 8);
         assert_eq!(c.stacks().count(), 1);
         c.change(|_, s| s[0] = 7);
         assert_eq!(c.stacks().count(), 0);
-        assert_eq!(c.evidence(1), Some(&mut [0, 0]), "and nothing of it comes back");
+        assert_eq!(*c.evidence(1).unwrap(), [0, 0], "and nothing of it comes back");
     }
 
     #[test]
     fn clearing_leaves_nothing_behind() {
         let mut g: SphericalGrid<4, 1, 2> = SphericalGrid::new();
-        g.column_mut(0).unwrap().fill(3, 512, 255);
+        *g.column_mut(0).unwrap().evidence(3).unwrap() = [255, 255];
         g.clear();
         let c = g.column_mut(0).unwrap();
         *c.evidence(3).unwrap() = [1, 1];

@@ -6,12 +6,17 @@ use super::tracking::Tracking;
 use crate::fixed::math::root;
 use crate::obstacles::solid::Solid;
 
+/// Length from which nothing is low, centimetres.
+const LORRY_CM: i32 = 900;
+
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
     pub fn solid(&self, t: &Tracking) -> Solid {
         let tall = self.tallness.floor_cm();
         let seen = self.extent.length_cm();
-        let size = t.sizes.of(seen.max(t.sizes.least_length_cm(tall)));
+        let size = t.sizes.of(seen.max(self.remembered_length_cm(t)).max(t.sizes.least_length_cm(tall)));
+        // what is as long as a lorry may be one that shows nothing high
+        let lid = if size.length_cm < LORRY_CM { self.tallness.ceiling_cm() } else { i32::MAX };
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
         let hidden = (size.length_cm - seen).max(0) / 2;
@@ -26,7 +31,7 @@ impl Obstacle {
             heading: self.heading,
             half_length_cm: size.length_cm / 2,
             half_width_cm: size.width_cm / 2,
-            height_cm: size.height_cm.max(tall),
+            height_cm: size.height_cm.min(lid).max(tall),
         }
     }
 

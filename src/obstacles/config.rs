@@ -80,6 +80,12 @@ pub struct ObstacleConfig {
     pub own_way_share: f32,
     /// Share of the way to the place seen that the outline of what goes its own way is moved in a frame.
     pub own_way_follow: f32,
+    /// How long an outline must be longer until the box is, seconds.
+    pub length_growth_s: f32,
+    /// How long the box stays longer than an outline of which a part is hidden, seconds.
+    pub length_memory_s: f32,
+    /// Speed below which the box does so, m/s.
+    pub slow_mps: f32,
     /// Standard deviations a speed must have to tell the heading of what goes its own way.
     pub heading_sigmas: f32,
     /// Speed below which a mover has come to a stop, m/s.
@@ -129,6 +135,9 @@ impl Default for ObstacleConfig {
             own_way_mps: 2.0,
             own_way_share: 0.25,
             own_way_follow: 0.05,
+            length_growth_s: 1.0,
+            length_memory_s: 3.0,
+            slow_mps: 4.0,
             heading_sigmas: 4.0,
             standing_speed_mps: 0.7,
             standing_visible_loss_per_s: 3.0,
@@ -197,6 +206,9 @@ impl ObstacleConfig {
             own_way_sigmas: sigmas("obstacles.own_way_sigmas", self.own_way_sigmas)?,
             own_way_cm_s: cm("obstacles.own_way_mps", self.own_way_mps, 0.0, 50.0)?,
             own_way_share: math::round_i32(within("obstacles.own_way_share", self.own_way_share, 0.0, 2.0)? * 65536.0),
+            length_growth: seconds("obstacles.length_growth_s", self.length_growth_s)?,
+            length_memory: seconds("obstacles.length_memory_s", self.length_memory_s)?,
+            slow_speed: fine("obstacles.slow_mps", self.slow_mps, 0.0, 50.0)?,
             own_way_follow: math::round_i32(
                 within("obstacles.own_way_follow", self.own_way_follow, 0.0, 1.0)? * 65536.0,
             ),

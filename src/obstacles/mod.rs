@@ -95,7 +95,13 @@ impl<const N: usize> Obstacles<N> {
 
     /// Boxes of the confirmed.
     pub fn solids<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
-        self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t)).map(|o| o.solid(t))
+        self.boxes(t).map(|(solid, _)| solid)
+    }
+
+    /// Boxes of the confirmed, and whether each was seen in the last frame.
+    pub fn boxes<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = (Solid, bool)> + 'a {
+        let confirmed = self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t));
+        confirmed.map(|o| (o.solid(t), o.seen()))
     }
 
     /// Takes one frame's detections: moves every obstacle on, gives each detection to the obstacle

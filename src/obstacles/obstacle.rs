@@ -34,6 +34,8 @@ pub struct Obstacle {
     pub(super) lateral_weight: i32,
     /// Variance of where across it the detections lie, their noise taken off, cm^2.
     pub(super) spread: i32,
+    /// Length it has shown for long, 2^-4 cm.
+    pub(super) shown_length: i32,
     /// Evidence that it is there, 2^-8 detections.
     pub existence: i32,
     /// Detections so far, saturating.
@@ -61,6 +63,8 @@ const NEWBORN_SPEED: i32 = 1000 * 1000;
 const SPREAD_MEMORY: i32 = 40;
 /// Greatest weight of a lateral estimate: [`ratio`]'s limit.
 pub(super) const MOST_WEIGHT: i32 = 1 << 26;
+/// Fraction bits of the length it has shown.
+const LENGTH_FRACTION: u32 = 4;
 /// Fastest drift to one side that turns a heading, 2^-8 cm/s: a metre a second.
 const FASTEST_DRIFT: i32 = 100 << FRACTION;
 
@@ -82,6 +86,7 @@ impl Obstacle {
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
             lateral_weight: 0,
             spread: EVEN_SPREAD,
+            shown_length: 0,
             existence: 0,
             hits: 0,
             age: 0,
@@ -216,6 +221,7 @@ impl Obstacle {
         self.spread += off * g.count / (g.count + SPREAD_MEMORY).max(1);
         self.question_heading(t);
         self.update_extent(t);
+        self.remember_length(step, t);
         self.hits = self.hits.saturating_add(g.count as u16);
         let gained = g.count.min(MOST_HITS_A_FRAME) << 8;
         self.existence = (self.existence + gained).min(t.existence_max);
@@ -249,6 +255,19 @@ impl Obstacle {
         if self.speed() > t.turning_speed {
             self.heading = Direction::of(self.velocity.0, self.velocity.1);
         }
+    }
+
+    /// Lets the length it has shown follow the outline: quickly where that grows, slowly where a part of it
+    /// is hidden.
+    fn remember_length(&mut self, step: Step, t: &Tracking) {
+        let off = (self.extent.length_cm() << LENGTH_FRACTION) - self.shown_length;
+        let memory = if off > 0 { t.length_growth } else { t.length_memory };
+        self.shown_length += mul_shift(off, (1 << 16) - step.keep(memory), 16);
+    }
+
+    /// Length it has shown for long, centimetres, while slow.
+    pub(super) fn remembered_length_cm(&self, t: &Tracking) -> i32 {
+        if self.speed() < t.slow_speed { self.shown_length >> LENGTH_FRACTION } else { 0 }
     }
 
     /// Reads the outline and keeps the anchor near its middle.

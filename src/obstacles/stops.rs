@@ -84,3 +84,22 @@ fn a_jam_the_unit_started_in_is_followed_once_it_moves() {
     follow(&mut list, &mut cars, 3.0, true);
     assert_eq!(boxes(&list).len(), 6);
 }
+
+#[test]
+fn a_slow_lorry_half_hidden_for_seconds_stays_a_lorry() {
+    let mut list = Obstacles::<16>::new();
+    let mut lorry = [car([20.0, 5.0], [1.0, 0.0], 3.0)];
+    lorry[0].size = [12.0, 2.0];
+    follow(&mut list, &mut lorry, 6.0, true);
+    let whole = boxes(&list)[0];
+    // only its rear half reflects
+    lorry[0].at[0] -= 3.0;
+    lorry[0].size[0] = 6.0;
+    follow(&mut list, &mut lorry, 4.0, true);
+    let half_hidden = boxes(&list)[0];
+    assert!(whole.half_length_cm > 550, "{whole:?}");
+    assert!(half_hidden.half_length_cm > 360 && half_hidden.height_cm > 290, "{half_hidden:?}");
+    // the hidden half lies away from the sensor
+    let rear = f64::from(half_hidden.x_cm - half_hidden.half_length_cm) / 100.0;
+    assert!((rear - (lorry[0].at[0] - 3.0)).abs() < 1.5, "{rear}");
+}

@@ -65,6 +65,12 @@ pub struct Tracking {
     pub own_way_cm_s: i32,
     /// 2^-16
     pub own_way_follow: i32,
+    /// 2^-16 s
+    pub length_growth: i32,
+    /// 2^-16 s
+    pub length_memory: i32,
+    /// 2^-8 cm/s
+    pub slow_speed: i32,
     /// 2^-16
     pub own_way_share: i32,
     /// 2^-4

@@ -119,6 +119,9 @@ pub const OF_RADAR_3D: &[Parameter] = parameters! {
     "obstacles.turning_noise_mps" 0.1 10.0 radar_3d.obstacles.turning_noise_mps;
     "obstacles.own_way_sigmas" 0.0 8.0 radar_3d.obstacles.own_way_sigmas;
     "obstacles.own_way_mps" 0.0 50.0 radar_3d.obstacles.own_way_mps;
+    "obstacles.length_growth_s" 0.05 60.0 radar_3d.obstacles.length_growth_s;
+    "obstacles.length_memory_s" 0.05 60.0 radar_3d.obstacles.length_memory_s;
+    "obstacles.slow_mps" 0.0 50.0 radar_3d.obstacles.slow_mps;
     "obstacles.own_way_follow" 0.0 1.0 radar_3d.obstacles.own_way_follow;
     "obstacles.own_way_share" 0.0 2.0 radar_3d.obstacles.own_way_share;
     "obstacles.heading_sigmas" 0.0 8.0 radar_3d.obstacles.heading_sigmas;

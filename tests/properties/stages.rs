@@ -8,8 +8,9 @@ use viewshed::frame::reflection::Reflection;
 use viewshed::grid::axes::Axes;
 use viewshed::grid::evidence::EvidenceConfig;
 use viewshed::grid::raycast::cast;
+use viewshed::grid::shadow;
 use viewshed::grid::spherical::SphericalGrid;
-use viewshed::grid::voxelise::voxelise;
+use viewshed::map::Visibility;
 use viewshed::map::polar::PolarMap;
 use viewshed::obstacles::solid::Solid;
 
@@ -124,24 +125,36 @@ proptest! {
     }
 
     #[test]
-    fn boxes_anywhere_fill_no_more_than_all(
+    fn boxes_anywhere_hide_and_sweep_and_what_is_seen_is_shown(
         setup in setups(),
+        stacks in stacks(),
         boxes in proptest::collection::vec((-60_000..60_000_i32, -60_000..60_000_i32, any::<i16>(), 0..2500_i32, 0..400_i32, 0..1200_i32), 1..6),
         near in any::<bool>(),
     ) {
         let Some(axes) = axes(&setup) else { return Ok(()) };
         let (mut grid, mut map) = (Grid::new(), map(&axes));
+        put(&mut grid, &stacks);
+        cast(&grid, &axes, &mut map);
         for (x_cm, y_cm, heading, half_length_cm, half_width_cm, height_cm) in boxes {
             // around and over the sensor too
             let (x_cm, y_cm) = if near { (x_cm / 40, y_cm / 40) } else { (x_cm, y_cm) };
             let heading = trig::direction(Angle::from_raw(heading));
-            let before = contents(&grid);
-            voxelise(&Solid { x_cm, y_cm, heading, half_length_cm, half_width_cm, height_cm }, &axes, &mut grid);
-            prop_assert!(none_higher(&contents(&grid), &before), "a box takes nothing away");
+            let solid = Solid { x_cm, y_cm, heading, half_length_cm, half_width_cm, height_cm };
+            let (held, before) = (contents(&grid), map.clone());
+            shadow::cast(&solid, &axes, &mut grid, &mut map);
+            prop_assert!(none_higher(&held, &contents(&grid)), "a box brings no evidence");
+            for (a, r) in (0..A).flat_map(|a| (0..R).map(move |r| (a, r))) {
+                let (before, after) = (before.cell(a, r), map.cell(a, r));
+                prop_assert!(after.grade <= before.grade && after.occupancy >= before.occupancy);
+                prop_assert_eq!(after.visibility == Visibility::Unknown, before.visibility == Visibility::Unknown);
+            }
+            let before = map.clone();
+            shadow::show(&solid, &axes, &mut map);
+            for (a, r) in (0..A).flat_map(|a| (0..R).map(move |r| (a, r))) {
+                let (before, after) = (before.cell(a, r), map.cell(a, r));
+                prop_assert!(after.grade == before.grade || after.grade == 255 && before.grade > 0);
+            }
         }
-        cast(&grid, &axes, &mut map);
-        grid.remove_solids();
-        prop_assert!(contents(&grid).iter().all(|stack| *stack == [0; E]));
     }
 
     #[test]

@@ -27,6 +27,8 @@ pub struct Axes {
     pub span_rad: f64,
     /// Height the slopes are taken from.
     pub height_m: f64,
+    /// Height of the slice plane.
+    pub slice_m: f64,
     /// Slopes between the rows, from below the first to above the last.
     edges: Vec<f64>,
     /// For every range cell: the lower of the two rows whose centres the slice point lies between,
@@ -70,8 +72,19 @@ impl Axes {
         };
         let edges = (0..=rows).map(slope).collect();
         let height_m = slice_height_m + drop;
-        let mut axes =
-            Self { ranges, azimuths, rows, cell_m, right_rad, span_rad, height_m, edges, slice: Vec::new(), view };
+        let mut axes = Self {
+            ranges,
+            azimuths,
+            rows,
+            cell_m,
+            right_rad,
+            span_rad,
+            height_m,
+            slice_m: slice_height_m,
+            edges,
+            slice: Vec::new(),
+            view,
+        };
         axes.slice = (0..ranges)
             .map(|r| {
                 let place = axes.row_place(axes.slope(slice_height_m, centre(r))) - 0.5;
@@ -145,14 +158,12 @@ pub struct Grid {
     ranges: usize,
     rows: usize,
     cells: Vec<f64>,
-    /// Stacks filled by a solid of this frame.
-    solid: Vec<bool>,
 }
 
 impl Grid {
     pub fn new(axes: &Axes) -> Self {
         let stacks = axes.ranges * axes.azimuths;
-        Self { ranges: axes.ranges, rows: axes.rows, cells: vec![0.0; stacks * axes.rows], solid: vec![false; stacks] }
+        Self { ranges: axes.ranges, rows: axes.rows, cells: vec![0.0; stacks * axes.rows] }
     }
 
     pub fn stack(&self, azimuth: usize, range: usize) -> &[f64] {
@@ -168,24 +179,6 @@ impl Grid {
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.cells.fill(0.0);
-        self.solid.fill(false);
-    }
-
-    /// Empties what the solids of the last frame stood in: it was swept.
-    pub fn remove_solids(&mut self) {
-        for (swept, stack) in self.solid.iter_mut().zip(self.cells.chunks_mut(self.rows)) {
-            if std::mem::take(swept) {
-                stack.fill(0.0);
-            }
-        }
-    }
-
-    /// Fills a stack up to `top` (rows) by `share` of its width. What is already fuller stays.
-    pub fn fill(&mut self, azimuth: usize, range: usize, top: f64, share: f64) {
-        for (row, cell) in self.stack_mut(azimuth, range).iter_mut().enumerate() {
-            *cell = cell.max(share * (top - row as f64).clamp(0.0, 1.0));
-        }
-        self.solid[azimuth * self.ranges + range] = true;
     }
 }
 

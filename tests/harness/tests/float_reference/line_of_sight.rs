@@ -1,4 +1,4 @@
-//! Boxes through voxelising, ray casting and the slice, against the exact line of sight past them.
+//! Boxes and their shadows on the map, against the exact line of sight past them.
 //!
 //! No second pipeline here: a point at slice height is hidden where the straight line from the sensor
 //! to it meets a box. The map may place the edge of a shadow a cell off, no more.
@@ -8,14 +8,14 @@ mod tests {
     use viewshed::fixed::angle::Angle;
     use viewshed::fixed::trig;
     use viewshed::grid::raycast::cast;
-    use viewshed::grid::voxelise::voxelise;
+    use viewshed::grid::shadow;
     use viewshed::map::Visibility;
     use viewshed::map::polar::PolarMap;
     use viewshed::sensor::mount::Mount;
     use viewshed_harness::geometry::solid::Solid;
 
     use crate::scene::{AZIMUTHS, IntegerAxes, IntegerGrid, RANGES, Random, VIEW, mounts, within};
-    use crate::voxelise::crossing;
+    use crate::shadow::crossing;
 
     const SLICE_M: f64 = 1.0;
 
@@ -59,9 +59,9 @@ mod tests {
         let levelling = mount.levelling().unwrap();
         let axes = Box::new(IntegerAxes::new(&levelling, &VIEW, SLICE_M as f32).unwrap());
         let mut grid = Box::<IntegerGrid>::default();
-        world.boxes.iter().for_each(|b| voxelise(&integer(b), &axes, &mut grid));
         let mut map = Box::new(PolarMap::unknown(axes.polar(&levelling), 128, 128));
         cast(&grid, &axes, &mut map);
+        world.boxes.iter().for_each(|b| shadow::cast(&integer(b), &axes, &mut grid, &mut map));
         (axes, map)
     }
 

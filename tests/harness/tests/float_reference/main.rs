@@ -17,11 +17,11 @@ mod obstacles;
 
 mod grid;
 
-mod voxelise;
-
 mod evidence;
 
 mod raycast;
+
+mod shadow;
 
 mod pipeline;
 

@@ -18,7 +18,7 @@ use crate::grid::{Axes, Grid};
 use crate::obstacles::{Obstacles, Rules};
 use crate::raycast::{Map, cast};
 use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
-use crate::voxelise::voxelise;
+use crate::shadow;
 
 /// Obstacles followed at most.
 const OBSTACLES: usize = 96;
@@ -87,7 +87,6 @@ impl Pipeline {
         let (axes, map, visible_from) = (&self.axes, &self.map, self.visible_from());
         let in_view = |at| axes.locate(at).and_then(|(a, r)| map.grade(a, r)).is_some_and(|g| g >= visible_from);
         let claimed = self.obstacles.step(&scan.placed, dt, &self.rules, in_view);
-        self.grid.remove_solids();
         self.inverse_sensor.fade(&mut self.grid, &self.map, &self.axes, dt);
         self.inverse_sensor.clear(&scan.placed, &self.axes, &mut self.grid);
         for (d, claimed) in scan.placed.iter().zip(claimed) {
@@ -96,13 +95,16 @@ impl Pipeline {
                 self.inverse_sensor.add(d, first, &self.axes, &mut self.grid);
             }
         }
-        for solid in self.obstacles.solids(&self.rules) {
-            voxelise(&solid, &self.axes, &mut self.grid);
-        }
         if self.health.condition(now, &self.health_limits) == Condition::Healthy {
             cast(&self.grid, &self.axes, &mut self.map);
         } else {
             self.map.forget();
+        }
+        for (solid, _) in self.obstacles.boxes(&self.rules) {
+            shadow::cast(&solid, &self.axes, &mut self.grid, &mut self.map);
+        }
+        for (solid, _) in self.obstacles.boxes(&self.rules).filter(|(_, seen)| *seen) {
+            shadow::show(&solid, &self.axes, &mut self.map);
         }
         self.refused.extend(scan.refused);
     }

@@ -37,6 +37,12 @@ impl Map {
         self.grades[azimuth * self.ranges + range]
     }
 
+    /// Grade, where known, and occupancy of a cell, to be changed.
+    pub fn cell_mut(&mut self, azimuth: usize, range: usize) -> (&mut Option<f64>, &mut f64) {
+        let cell = azimuth * self.ranges + range;
+        (&mut self.grades[cell], &mut self.occupancy[cell])
+    }
+
     pub fn occupancy(&self, azimuth: usize, range: usize) -> f64 {
         self.occupancy[azimuth * self.ranges + range]
     }

@@ -30,6 +30,8 @@ pub struct Obstacle {
     pub lateral_weight: f64,
     /// Variance of where across it the detections lie, m^2.
     spread: f64,
+    /// Length it has shown for long.
+    shown_length: f64,
     /// Evidence that it is there, detections.
     pub existence: f64,
     pub hits: f64,
@@ -63,6 +65,9 @@ fn length(v: Ground) -> f64 {
     v[0].hypot(v[1])
 }
 
+/// Length from which nothing is low.
+const LORRY_M: f64 = 9.0;
+
 impl Obstacle {
     pub fn new(seed: &Placed, heading: Ground, speed: f64) -> Self {
         Self {
@@ -73,6 +78,7 @@ impl Obstacle {
             extent: Extent { rear: -BIN_M / 2.0, front: BIN_M / 2.0 },
             lateral_weight: 0.0,
             spread: EVEN_SPREAD,
+            shown_length: 0.0,
             existence: 0.0,
             hits: 0.0,
             age: 0,
@@ -234,6 +240,9 @@ impl Obstacle {
         self.spread += (spread - self.spread) * g.count / (g.count + SPREAD_MEMORY);
         self.question_heading(rules);
         self.update_extent(rules);
+        let off = self.extent.length() - self.shown_length;
+        let memory = if off > 0.0 { rules.length_growth } else { rules.length_memory };
+        self.shown_length += off * (1.0 - (-dt / memory).exp());
         self.hits += g.count;
         self.existence = (self.existence + g.count.min(rules.most_hits_a_frame)).min(rules.max_evidence);
     }
@@ -326,10 +335,16 @@ impl Obstacle {
         self.update_extent(rules);
     }
 
+    /// Length it has shown for long, while slow.
+    fn remembered_length(&self, rules: &Rules) -> f64 {
+        if length(self.velocity) < rules.slow { self.shown_length } else { 0.0 }
+    }
+
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
     pub fn solid(&self, rules: &Rules) -> Solid {
         let (seen, tall) = (self.extent.length(), self.tallness.floor());
-        let [length, width, height] = size(&rules.sizes, seen.max(least_length(&rules.sizes, tall)));
+        let [length, width, height] =
+            size(&rules.sizes, seen.max(self.remembered_length(rules)).max(least_length(&rules.sizes, tall)));
         let middle = self.ahead(self.extent.middle());
         let [ahead, aside] = [along(self.heading, middle), across(self.heading, middle)];
         // behind the end and behind the side that is seen
@@ -339,7 +354,9 @@ impl Obstacle {
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
         let [x, y] = moved(middle, left(self.heading), away(unseen, aside));
-        let height = height.max(tall);
+        // what is as long as a lorry may be one that shows nothing high
+        let lid = if length < LORRY_M { self.tallness.ceiling() } else { f64::INFINITY };
+        let height = height.min(lid).max(tall);
         let yaw_rad = self.heading[1].atan2(self.heading[0]);
         Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width, height] }
     }

@@ -1,0 +1,259 @@
+//! Boxes and their shadows on the map, with exact ends.
+//!
+//! # Model
+//! A column is covered by the share of a window around its centre, half a column wide, that the
+//! box's outline spans. At the half way mark this is "the centre is covered" exactly, and the
+//! result is graded towards the edges. Within a column the box reaches from where the ray enters to
+//! where it leaves. Seen from the height `H`, a box of height `T` that a ray leaves at the distance
+//! `d` hides the slice plane at `h` as far as `d (H - h) / (H - T)`; one as high as the sensor without
+//! end. Through the rows of the grid such an end is right to a tenth of a row, which is a metre 60 m
+//! away.
+//!
+//! A box never hides the place it fills itself, and a vehicle seen in this frame is in sight, whatever
+//! stands before it: the middle of its box is shown. Nothing else can be there. Evidence in a box's place
+//! leaves the grid: the place was swept.
+
+use core::ops::Range;
+
+use crate::fixed::trig;
+use crate::grid::axes::Axes;
+use crate::grid::raycast::{BLOCKED, CLEAR};
+use crate::grid::spherical::SphericalGrid;
+use crate::map::polar::PolarMap;
+use crate::obstacles::solid::Solid;
+
+/// Half the window a column's coverage is taken over, 2^-8 columns.
+const WINDOW: i32 = 64;
+
+/// What a box covers of a column.
+struct Covered {
+    column: usize,
+    /// Of the window, up to 255.
+    share: u8,
+    /// Where the ray enters and leaves, centimetres.
+    enter_cm: i32,
+    leave_cm: i32,
+    /// Range cells it fills; the last counts where the box reaches its middle.
+    cells: Range<usize>,
+}
+
+/// Puts a box and its shadow on a map that was cast from the grid, and takes evidence in its place out of that.
+///
+/// Costs a step for each column, and for each range cell in shadow.
+pub fn cast<const R: usize, const A: usize, const E: usize, const W: usize>(
+    solid: &Solid,
+    axes: &Axes<R, A, E>,
+    grid: &mut SphericalGrid<R, A, E, W>,
+    map: &mut PolarMap<R, A>,
+) {
+    for covered in columns(solid, axes) {
+        let Covered { column, share, enter_cm, leave_cm, cells } = covered;
+        if let Some(column) = grid.column_mut(column) {
+            column.empty(cells.clone());
+        }
+        let Some((grades, occupancy)) = map.rows_mut(column) else { continue };
+        if solid.height_cm > axes.slice_cm() {
+            for o in occupancy.get_mut(cells.clone()).unwrap_or(&mut []) {
+                *o = (*o).max(share);
+            }
+        }
+        if let Some(hidden) = axes.hidden_behind(solid.height_cm, enter_cm, leave_cm) {
+            shade(grades, cells.end, hidden, axes.cell_cm, share);
+        }
+    }
+}
+
+/// Shows the middle of a box that is seen, half as wide and a quarter as long.
+pub fn show<const R: usize, const A: usize, const E: usize>(
+    solid: &Solid,
+    axes: &Axes<R, A, E>,
+    map: &mut PolarMap<R, A>,
+) {
+    let middle = Solid { half_length_cm: solid.half_length_cm / 4, half_width_cm: solid.half_width_cm / 2, ..*solid };
+    for covered in columns(&middle, axes).filter(|c| c.share > u8::MAX / 2) {
+        let Some((grades, _)) = map.rows_mut(covered.column) else { continue };
+        for g in grades.get_mut(covered.cells).unwrap_or(&mut []).iter_mut().filter(|g| **g >= BLOCKED) {
+            *g = CLEAR;
+        }
+    }
+}
+
+/// The columns a box covers, and what of them.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // column and range indices are checked
+fn columns<const R: usize, const A: usize, const E: usize>(
+    solid: &Solid,
+    axes: &Axes<R, A, E>,
+) -> impl Iterator<Item = Covered> {
+    let origin = solid.origin();
+    let (low, high) = outline(solid, axes);
+    let first = (low >> 8).clamp(0, A as i32);
+    let last = (high >> 8).clamp(-1, A as i32 - 1);
+    let cell_cm = axes.cell_cm.max(1);
+    let farthest = R as i32 * cell_cm;
+    (first..=last).filter_map(move |a| {
+        let centre = a * 256 + 128;
+        let (from, to) = (low.max(centre - WINDOW), high.min(centre + WINDOW));
+        if from >= to {
+            return None;
+        }
+        let (enter, leave) = solid.crossing(origin, trig::direction(axes.azimuth_of((from + to) / 2)))?;
+        let (enter_cm, leave_cm) = (enter.min(farthest), leave.min(farthest));
+        let nearest = (enter_cm / cell_cm) as usize;
+        let end = (((leave_cm + cell_cm / 2) / cell_cm) as usize).max(nearest + 1).min(R);
+        let share = ((to - from) * 255 / (2 * WINDOW)) as u8;
+        Some(Covered { column: a as usize, share, enter_cm, leave_cm, cells: nearest..end })
+    })
+}
+
+/// Lowers the grades of cells between two distances, from cell `first` on, by the part of them that is hidden.
+/// What is unknown stays unknown.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // range indices and bytes
+fn shade<const R: usize>(grades: &mut [u8; R], first: usize, (from, to): (i32, i32), cell_cm: i32, share: u8) {
+    let cell_cm = cell_cm.max(1);
+    let to = to.min(R as i32 * cell_cm);
+    let (first, last) = (first.max((from / cell_cm) as usize), (to / cell_cm) as usize);
+    let lower = |g: &mut u8, by: u8| {
+        if *g > BLOCKED {
+            *g = (*g).min((CLEAR - by).max(BLOCKED));
+        }
+    };
+    for g in grades.get_mut(first..last).unwrap_or(&mut []) {
+        lower(g, share);
+    }
+    if let Some(g) = grades.get_mut(last).filter(|_| last >= first) {
+        lower(g, (i32::from(share) * (to - last as i32 * cell_cm) / cell_cm) as u8);
+    }
+}
+
+/// Right and left edge of a box on the column axis, 2^-8 columns.
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 512 columns
+fn outline<const R: usize, const A: usize, const E: usize>(solid: &Solid, axes: &Axes<R, A, E>) -> (i32, i32) {
+    let corners = solid.corners();
+    if corners.iter().any(|c| c.0 <= 0) {
+        // beside or under the sensor: let the rays decide
+        return (0, A as i32 * 256);
+    }
+    corners
+        .iter()
+        .map(|c| axes.column_place(trig::bearing(c.0, c.1)))
+        .fold((i32::MAX, i32::MIN), |(lo, hi), p| (lo.min(p), hi.max(p)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::trig::Direction;
+    use crate::map::Visibility;
+    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::mount::Mount;
+    use std::vec::Vec;
+
+    type World = (Axes<60, 4, 16>, SphericalGrid<60, 4, 16>, PolarMap<60, 4>);
+
+    /// 60 m in cells of 1 m, four columns from 30 degrees to the right to 30 to the left, and a map that is clear.
+    fn world(sensor_m: f32) -> World {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: sensor_m, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+        let view = FieldOfView {
+            azimuth_min_deg: -30.0,
+            azimuth_max_deg: 30.0,
+            elevation_min_deg: -80.0,
+            elevation_max_deg: 30.0,
+            range_min_m: 1.0,
+            range_max_m: 60.0,
+        };
+        let levelling = mount.levelling().unwrap();
+        let axes = Axes::new(&levelling, &view, 1.0).unwrap();
+        let (grid, mut map) = (SphericalGrid::new(), PolarMap::unknown(axes.polar(&levelling), 128, 128));
+        crate::grid::raycast::cast(&grid, &axes, &mut map);
+        (axes, grid, map)
+    }
+
+    /// A box across the two middle columns, which begins and ends so many centimetres ahead.
+    fn wall(from_cm: i32, to_cm: i32, height_cm: i32) -> Solid {
+        let (x_cm, half_length_cm) = ((from_cm + to_cm) / 2, (to_cm - from_cm) / 2);
+        Solid { x_cm, y_cm: 0, heading: Direction::AHEAD, half_length_cm, half_width_cm: 900, height_cm }
+    }
+
+    /// Invisible cells of the second column behind a box.
+    fn hidden(sensor_m: f32, solid: Solid) -> Vec<usize> {
+        let (axes, mut grid, mut map) = world(sensor_m);
+        cast(&solid, &axes, &mut grid, &mut map);
+        (0..60).filter(|r| map.cell(1, *r).visibility == Visibility::Invisible).collect()
+    }
+
+    #[test]
+    fn a_shadow_ends_where_similar_triangles_say() {
+        // the column's centre runs 7.5 degrees aside: what is 30 m ahead is 30.3 m along the ray
+        for (height_cm, ends_m) in [(150, 30.3 * 5.0 / 4.5), (250, 30.3 * 5.0 / 3.5), (300, 30.3 * 5.0 / 3.0)] {
+            let cells = hidden(6.0, wall(2500, 3000, height_cm));
+            assert_eq!(cells.first(), Some(&30), "the box does not hide itself");
+            let last = *cells.last().unwrap() as f64 + 0.5;
+            assert!((last - (ends_m - 0.5)).abs() <= 0.5, "{height_cm} cm: last {last} m, ends {ends_m} m");
+        }
+        assert_eq!(hidden(6.0, wall(2500, 3000, 600)), (30..60).collect::<Vec<_>>(), "as high as the sensor");
+        assert_eq!(hidden(6.0, wall(2500, 3000, 100)), [0_usize; 0], "no higher than the slice plane");
+    }
+
+    #[test]
+    fn from_below_the_near_edge_hides_and_nothing_is_seen_again() {
+        // a sensor at 0.5 m, the plane at 1 m: a box of 0.75 m hides it from twice its near edge on
+        assert_eq!(hidden(0.5, wall(1000, 1500, 75)).first(), Some(&20));
+        assert_eq!(hidden(0.5, wall(1000, 1500, 150)), (15..60).collect::<Vec<_>>());
+        assert_eq!(hidden(0.5, wall(1000, 1500, 50)), [0_usize; 0]);
+    }
+
+    #[test]
+    fn the_last_cell_of_a_box_counts_where_it_reaches_its_middle() {
+        for (ends_cm, occupied) in [(2900, 25..29), (2960, 25..30)] {
+            let (axes, mut grid, mut map) = world(6.0);
+            cast(&wall(2500, ends_cm, 300), &axes, &mut grid, &mut map);
+            let cells: Vec<usize> = (0..60).filter(|r| map.cell(1, *r).occupied).collect();
+            assert_eq!(cells, occupied.collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_box_beside_the_sensor_covers_the_columns_its_rays_cross() {
+        let (axes, mut grid, mut map) = world(6.0);
+        let heading = Direction::AHEAD;
+        // from 4 m behind to 12 m ahead of the sensor, 4 m to its left
+        let solid = Solid { x_cm: 400, y_cm: 500, heading, half_length_cm: 800, half_width_cm: 100, height_cm: 400 };
+        cast(&solid, &axes, &mut grid, &mut map);
+        let covered: Vec<bool> = (0..4).map(|a| (0..60).any(|r| map.cell(a, r).occupied)).collect();
+        assert_eq!(covered, [false, false, false, true]);
+    }
+
+    #[test]
+    fn evidence_in_a_boxs_place_is_swept_and_beside_it_stays() {
+        let (axes, mut grid, mut map) = world(6.0);
+        for r in [10, 26] {
+            *grid.column_mut(1).unwrap().evidence(r).unwrap() = [200; 16];
+        }
+        cast(&wall(2500, 3000, 150), &axes, &mut grid, &mut map);
+        let left: Vec<usize> = grid.column_mut(1).unwrap().stacks().map(|(r, _)| r).collect();
+        assert_eq!(left, [10]);
+    }
+
+    #[test]
+    fn what_is_seen_shows_its_middle_and_nothing_of_the_shadow_around_it() {
+        let (axes, mut grid, mut map) = world(6.0);
+        cast(&wall(1000, 1500, 400), &axes, &mut grid, &mut map);
+        let behind = wall(2000, 2800, 150);
+        cast(&behind, &axes, &mut grid, &mut map);
+        assert!((15..28).all(|r| !map.cell(1, r).visible()), "all of it lies in the shadow of the first");
+        show(&behind, &axes, &mut map);
+        let shown: Vec<usize> = (15..28).filter(|r| map.cell(1, *r).visible()).collect();
+        // a quarter of 8 m around 24 m, 24.2 m along the ray
+        assert_eq!(shown, [23, 24]);
+    }
+
+    #[test]
+    fn what_is_unknown_is_neither_shaded_nor_shown() {
+        let (axes, mut grid, mut map) = world(6.0);
+        map.forget();
+        let solid = wall(1000, 1500, 400);
+        cast(&solid, &axes, &mut grid, &mut map);
+        show(&solid, &axes, &mut map);
+        assert!((0..60).all(|r| map.cell(1, r).visibility == Visibility::Unknown));
+    }
+}
