@@ -114,8 +114,7 @@
 //! - **Boxes are not drawn into cells.** Shadows of boxes end where similar triangles say, not at the edge
 //!   of a row of slopes: in queues that is every twentieth blocked cell.
 //! - **A thing never hides itself.** Along a row only cells behind the *end* of an occupied run are
-//!   hidden by it, and a box shades only what lies behind it. The middle of a vehicle that is seen in this
-//!   frame is shown, whatever stands before it.
+//!   hidden by it, and a box shades only what lies behind it.
 //! - **Elevation says how high, within what length allows.** A reflection well above a level proves it; many
 //!   together tell a car from a van or a lorry where none alone does; and what is as long as a lorry is never
 //!   called low. Seeing reflections *past* an obstacle was tried as a ceiling on its height and left out: road

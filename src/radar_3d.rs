@@ -309,11 +309,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     fn put_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, map: &mut PolarMap<R, A>) {
-        for (solid, _) in self.obstacles.boxes(&p.tracking) {
+        for solid in self.obstacles.solids(&p.tracking) {
             shadow::cast(&solid, &p.axes, &mut self.grid, map);
-        }
-        for (solid, _) in self.obstacles.boxes(&p.tracking).filter(|(_, seen)| *seen) {
-            shadow::show(&solid, &p.axes, map);
         }
     }
 

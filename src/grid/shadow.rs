@@ -9,9 +9,9 @@
 //! end. Through the rows of the grid such an end is right to a tenth of a row, which is a metre 60 m
 //! away.
 //!
-//! A box never hides the place it fills itself, and a vehicle seen in this frame is in sight, whatever
-//! stands before it: the middle of its box is shown. Nothing else can be there. Evidence in a box's place
-//! leaves the grid: the place was swept.
+//! A box never hides the place it fills itself. Evidence in a box's place leaves the grid: the place was
+//! swept. A vehicle that is detected in another's shadow stays in it: showing its place would be right of
+//! every detected object by construction, and say nothing of the lines of sight there.
 
 use core::ops::Range;
 
@@ -59,21 +59,6 @@ pub fn cast<const R: usize, const A: usize, const E: usize, const W: usize>(
         }
         if let Some(hidden) = axes.hidden_behind(solid.height_cm, enter_cm, leave_cm) {
             shade(grades, cells.end, hidden, axes.cell_cm, share);
-        }
-    }
-}
-
-/// Shows the middle of a box that is seen, half as wide and a quarter as long.
-pub fn show<const R: usize, const A: usize, const E: usize>(
-    solid: &Solid,
-    axes: &Axes<R, A, E>,
-    map: &mut PolarMap<R, A>,
-) {
-    let middle = Solid { half_length_cm: solid.half_length_cm / 4, half_width_cm: solid.half_width_cm / 2, ..*solid };
-    for covered in columns(&middle, axes).filter(|c| c.share > u8::MAX / 2) {
-        let Some((grades, _)) = map.rows_mut(covered.column) else { continue };
-        for g in grades.get_mut(covered.cells).unwrap_or(&mut []).iter_mut().filter(|g| **g >= BLOCKED) {
-            *g = CLEAR;
         }
     }
 }
@@ -235,25 +220,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_shows_its_middle_and_nothing_of_the_shadow_around_it() {
-        let (axes, mut grid, mut map) = world(6.0);
-        cast(&wall(1000, 1500, 400), &axes, &mut grid, &mut map);
-        let behind = wall(2000, 2800, 150);
-        cast(&behind, &axes, &mut grid, &mut map);
-        assert!((15..28).all(|r| !map.cell(1, r).visible()), "all of it lies in the shadow of the first");
-        show(&behind, &axes, &mut map);
-        let shown: Vec<usize> = (15..28).filter(|r| map.cell(1, *r).visible()).collect();
-        // a quarter of 8 m around 24 m, 24.2 m along the ray
-        assert_eq!(shown, [23, 24]);
-    }
-
-    #[test]
-    fn what_is_unknown_is_neither_shaded_nor_shown() {
+    fn what_is_unknown_stays_so() {
         let (axes, mut grid, mut map) = world(6.0);
         map.forget();
         let solid = wall(1000, 1500, 400);
         cast(&solid, &axes, &mut grid, &mut map);
-        show(&solid, &axes, &mut map);
         assert!((0..60).all(|r| map.cell(1, r).visibility == Visibility::Unknown));
     }
 }

@@ -95,13 +95,8 @@ impl<const N: usize> Obstacles<N> {
 
     /// Boxes of the confirmed.
     pub fn solids<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
-        self.boxes(t).map(|(solid, _)| solid)
-    }
-
-    /// Boxes of the confirmed, and whether each was seen in the last frame.
-    pub fn boxes<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = (Solid, bool)> + 'a {
         let confirmed = self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t));
-        confirmed.map(|o| (o.solid(t), o.seen()))
+        confirmed.map(|o| o.solid(t))
     }
 
     /// Takes one frame's detections: moves every obstacle on, gives each detection to the obstacle

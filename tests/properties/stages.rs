@@ -125,7 +125,7 @@ proptest! {
     }
 
     #[test]
-    fn boxes_anywhere_hide_and_sweep_and_what_is_seen_is_shown(
+    fn boxes_anywhere_hide_and_sweep_and_show_nothing(
         setup in setups(),
         stacks in stacks(),
         boxes in proptest::collection::vec((-60_000..60_000_i32, -60_000..60_000_i32, any::<i16>(), 0..2500_i32, 0..400_i32, 0..1200_i32), 1..6),
@@ -147,12 +147,6 @@ proptest! {
                 let (before, after) = (before.cell(a, r), map.cell(a, r));
                 prop_assert!(after.grade <= before.grade && after.occupancy >= before.occupancy);
                 prop_assert_eq!(after.visibility == Visibility::Unknown, before.visibility == Visibility::Unknown);
-            }
-            let before = map.clone();
-            shadow::show(&solid, &axes, &mut map);
-            for (a, r) in (0..A).flat_map(|a| (0..R).map(move |r| (a, r))) {
-                let (before, after) = (before.cell(a, r), map.cell(a, r));
-                prop_assert!(after.grade == before.grade || after.grade == 255 && before.grade > 0);
             }
         }
     }

@@ -100,11 +100,8 @@ impl Pipeline {
         } else {
             self.map.forget();
         }
-        for (solid, _) in self.obstacles.boxes(&self.rules) {
+        for solid in self.obstacles.solids(&self.rules) {
             shadow::cast(&solid, &self.axes, &mut self.grid, &mut self.map);
-        }
-        for (solid, _) in self.obstacles.boxes(&self.rules).filter(|(_, seen)| *seen) {
-            shadow::show(&solid, &self.axes, &mut self.map);
         }
         self.refused.extend(scan.refused);
     }

@@ -57,18 +57,6 @@ fn hidden(axes: &Axes, top: f64, enter: f64, leave: f64) -> (f64, f64) {
     }
 }
 
-/// Shows the middle of a box that is seen: half as wide and a quarter as long.
-pub fn show(solid: &Solid, axes: &Axes, map: &mut Map) {
-    let [length, width, height] = solid.size;
-    let middle = Solid { size: [length / 4.0, width / 2.0, height], ..*solid };
-    for covered in columns(&middle, axes).filter(|c| c.share > 0.5) {
-        for r in covered.cells {
-            let (grade, _) = map.cell_mut(covered.column, r);
-            *grade = grade.map(|_| 1.0);
-        }
-    }
-}
-
 fn columns(solid: &Solid, axes: &Axes) -> impl Iterator<Item = Covered> {
     let (low, high) = outline(solid, axes);
     (0..axes.azimuths).filter_map(move |column| {
@@ -142,16 +130,12 @@ mod tests {
             let (mut grid, mut exact_grid) = (Box::<IntegerGrid>::default(), Grid::new(&exact_axes));
             let mut map = Box::new(PolarMap::unknown(axes.polar(&mount.levelling().unwrap()), 128, 128));
             let mut exact_map = Map::unknown(&exact_axes);
-            for k in 0..300 {
+            for _ in 0..300 {
                 let (solid, exact) = any_box(&mut random);
                 viewshed::grid::raycast::cast(&grid, &axes, &mut map);
                 crate::raycast::cast(&exact_grid, &exact_axes, &mut exact_map);
                 viewshed::grid::shadow::cast(&solid, &axes, &mut grid, &mut map);
                 cast(&exact, &exact_axes, &mut exact_grid, &mut exact_map);
-                if k % 2 == 0 {
-                    viewshed::grid::shadow::show(&solid, &axes, &mut map);
-                    show(&exact, &exact_axes, &mut exact_map);
-                }
                 for (a, r) in (0..AZIMUTHS).flat_map(|a| (0..RANGES).map(move |r| (a, r))) {
                     let got = map.cell(a, r);
                     let Some(grade) = exact_map.grade(a, r).filter(|_| got.grade > 0) else { continue };

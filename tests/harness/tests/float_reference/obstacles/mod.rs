@@ -29,11 +29,10 @@ impl Obstacles {
         Self { list: Vec::new(), capacity }
     }
 
-    /// Boxes of those that are confirmed, at least two frames old, and have moved, and whether each was seen
-    /// in the last frame.
-    pub fn boxes<'a>(&'a self, rules: &'a Rules) -> impl Iterator<Item = (Solid, bool)> + 'a {
+    /// Boxes of those that are confirmed, at least two frames old, and have moved.
+    pub fn solids<'a>(&'a self, rules: &'a Rules) -> impl Iterator<Item = Solid> + 'a {
         let stands = |o: &&Obstacle| o.existence >= rules.confirm_hits && o.age >= 2 && o.is_mover(rules);
-        self.list.iter().filter(stands).map(|o| (o.solid(rules), o.seen()))
+        self.list.iter().filter(stands).map(|o| o.solid(rules))
     }
 
     /// Takes one frame's detections; returns for each whether it belongs to an obstacle. `in_view` says
