@@ -9,8 +9,8 @@ use crate::fixed::time::Time;
 use crate::inputs::Feed;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::CanService;
-use crate::unit::settings::Slots;
-use crate::unit::{Flow, Sender, Unit};
+use crate::unit::settings::SettingsSlots;
+use crate::unit::{Flow, MapSender, Unit};
 use crate::wire::frame::{CanFrame, CanId};
 use crate::wire::status::Status;
 
@@ -43,12 +43,12 @@ impl<F: Feed<Piece = CanFrame>> CanBench<F> {
     }
 
     /// One turn of the loop: at most one frame in, all that is due out.
-    pub fn turn<E: Estimator<Input = F::Input>, S: Sender<E::Map>>(
+    pub fn turn<E: Estimator<Input = F::Input>, S: MapSender<E::Map>>(
         &mut self,
         (keeper, port): (&mut BusKeeper, &mut impl CanPort),
         service: &mut CanService,
         unit: &mut Option<Unit<'_, E, S>>,
-        slots: &mut impl Slots,
+        slots: &mut impl SettingsSlots,
     ) -> Flow {
         keeper.poll(self.now, port);
         if let Some(frame) = keeper.receive(port) {
@@ -75,7 +75,7 @@ impl<F: Feed<Piece = CanFrame>> CanBench<F> {
     fn take<E, S>(&mut self, frame: &CanFrame, unit: Option<&mut Unit<'_, E, S>>)
     where
         E: Estimator<Input = F::Input>,
-        S: Sender<E::Map>,
+        S: MapSender<E::Map>,
     {
         let told = time(frame);
         self.now = told.unwrap_or(self.now);

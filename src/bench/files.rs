@@ -7,7 +7,7 @@ use core::ffi::CStr;
 use super::Bench;
 use super::flash::{FLASH_LEN, Flash};
 use super::record::Record;
-use crate::unit::settings::{BLOCK_LEN, Slots};
+use crate::unit::settings::{BLOCK_LEN, SettingsSlots};
 use crate::wire::message::Epoch;
 
 const JOB: &CStr = c"job.bin";
@@ -128,7 +128,7 @@ impl<F: HostFile> FlashFile<F> {
     }
 }
 
-impl<F: HostFile> Slots for FlashFile<F> {
+impl<F: HostFile> SettingsSlots for FlashFile<F> {
     fn slot(&self, slot: usize) -> &[u8] {
         self.flash.slot(slot)
     }

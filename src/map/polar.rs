@@ -172,7 +172,8 @@ mod tests {
     fn a_cell_is_what_its_grade_and_its_occupancy_say() {
         let mut m = map();
         let (grades, occupancy) = m.rows_mut(4).unwrap();
-        (grades[..5].copy_from_slice(&[0, 1, 99, 100, 255]), occupancy[..5].copy_from_slice(&[200, 49, 50, 0, 255]));
+        grades[..5].copy_from_slice(&[0, 1, 99, 100, 255]);
+        occupancy[..5].copy_from_slice(&[200, 49, 50, 0, 255]);
         let cells: std::vec::Vec<CellState> = (0..5).map(|r| m.cell(4, r)).collect();
         assert_eq!(cells[0], CellState::UNKNOWN, "whatever its occupancy");
         use Visibility::{Invisible, Visible};

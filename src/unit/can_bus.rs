@@ -205,6 +205,11 @@ impl BusKeeper {
         self.state
     }
 
+    /// Whether it takes part.
+    pub fn is_active(&self) -> bool {
+        self.state == BusState::Active
+    }
+
     /// How often it was bus-off.
     pub fn bus_off(&self) -> u16 {
         self.bus_off

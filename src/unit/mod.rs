@@ -4,7 +4,7 @@
 //! road a timer's, in a test bench the recording's. A board gives [`Unit::take`] what comes over the
 //! sensor's line, calls [`Unit::wait`] when nothing came, at least ten times a second, and sends what
 //! [`Unit::next_line`] or [`Unit::next_frame`] gives until there is nothing more. Which sensor it is says
-//! the [`Estimator`], which line the [`Feed`], who sends the [`Sender`].
+//! the [`Estimator`], which line the [`Feed`], who sends the [`MapSender`].
 //!
 //! | around it | modules |
 //! |---|---|
@@ -31,15 +31,15 @@ pub mod settings;
 pub mod status_output;
 pub mod transmitter;
 
-pub use build::{InUnit, build};
-pub use sender::Sender;
+pub use build::InUnit;
+pub use sender::MapSender;
 
 use crate::estimator::{Estimator, Progress};
 use crate::fixed::time::Time;
 use crate::frame::health::{Condition, Continuity};
 use crate::inputs::{Feed, Frame};
 use crate::wire::frame::CanFrame;
-use crate::wire::status::{Reason, State};
+use crate::wire::status::{Reason, UnitState};
 
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +86,7 @@ pub struct Unit<'a, E: Estimator, S> {
     trouble: Option<(Time, Reason)>,
 }
 
-impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
+impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
     /// Puts the parts together; the map becomes one of these parameters, everything on it unknown.
     pub fn new(parameters: &'a E::Parameters, state: &'a mut E, map: &'a mut E::Map, broadcast: &'a mut S) -> Self {
         E::prepare(parameters, map);
@@ -169,8 +169,8 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
         }
         self.trouble = Some((now, reason));
         let status = self.broadcast.status_mut();
-        if status.state == State::Ok {
-            (status.state, status.reason) = (State::Degraded, reason);
+        if status.state == UnitState::Ok {
+            (status.state, status.reason) = (UnitState::Degraded, reason);
         }
     }
 
@@ -189,13 +189,13 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
         let trouble = self.trouble.filter(|(since, _)| recent(*since, now)).map(|(_, reason)| reason);
         let status = self.broadcast.status_mut();
         (status.state, status.reason) = match (condition, trouble) {
-            (Condition::Stale, _) => (State::Blind, Reason::RadarSilent),
-            _ if self.fault => (State::Fault, Reason::RadarFault),
-            (Condition::Starting, _) => (State::Starting, Reason::None),
-            (Condition::Blind, _) => (State::Blind, Reason::None),
-            (Condition::Unusable, _) => (State::Blind, Reason::UnusablePoints),
-            (Condition::Healthy, Some(reason)) => (State::Degraded, reason),
-            (Condition::Healthy, None) => (State::Ok, Reason::None),
+            (Condition::Stale, _) => (UnitState::Blind, Reason::RadarSilent),
+            _ if self.fault => (UnitState::Fault, Reason::RadarFault),
+            (Condition::Starting, _) => (UnitState::Starting, Reason::None),
+            (Condition::Blind, _) => (UnitState::Blind, Reason::None),
+            (Condition::Unusable, _) => (UnitState::Blind, Reason::UnusablePoints),
+            (Condition::Healthy, Some(reason)) => (UnitState::Degraded, reason),
+            (Condition::Healthy, None) => (UnitState::Ok, Reason::None),
         };
     }
 
@@ -317,7 +317,7 @@ mod tests {
     #[derive(Default)]
     struct Kept(Vec<Squares>, Status);
 
-    impl Sender<Squares> for Kept {
+    impl MapSender<Squares> for Kept {
         fn fits(_: &Header) -> Result<(), ConfigError> {
             Ok(())
         }
@@ -373,14 +373,18 @@ mod tests {
         assert_eq!(*unit.map(), [[false; 4]; 4], "nothing is known");
         unit.take(&mut feed, &[1, 2], at(100));
         assert_eq!(unit.map().map(|row| row[0]), [true, false, true, false]);
-        assert_eq!((unit.broadcast().1.state, unit.frames()), (State::Ok, 1));
+        assert_eq!((unit.broadcast().1.state, unit.frames()), (UnitState::Ok, 1));
         unit.take(&mut feed, &[2, 1], at(200));
         let status = unit.broadcast().1;
-        assert_eq!((status.state, status.reason), (State::Degraded, Reason::IncompleteScans), "one way for every feed");
+        assert_eq!(
+            (status.state, status.reason),
+            (UnitState::Degraded, Reason::IncompleteScans),
+            "one way for every feed"
+        );
         unit.take(&mut feed, &[], at(250));
         unit.wait(&mut feed, at(800));
         let status = unit.broadcast().1;
-        assert_eq!((status.state, status.reason, status.radar_lost), (State::Blind, Reason::RadarSilent, 1));
+        assert_eq!((status.state, status.reason, status.radar_lost), (UnitState::Blind, Reason::RadarSilent, 1));
         assert_eq!((kept.0.len(), kept.0.last()), (3, Some(&[[false; 4]; 4])), "and what ran out is sent");
     }
 }

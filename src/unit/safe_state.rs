@@ -5,7 +5,7 @@ use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet};
 use crate::wire::serial;
-use crate::wire::status::{PAGES, Reason, State, Status};
+use crate::wire::status::{PAGES, Reason, Status, UnitState};
 
 /// Time between two status messages, microseconds: at least two a second.
 const PERIOD_US: u64 = 250_000;
@@ -32,7 +32,7 @@ impl SafeState {
     fn status(&self, now: Time, told: Status) -> Status {
         let uptime_s = now.since(self.started).unwrap_or(0) / 1_000_000;
         let uptime_s = u32::try_from(uptime_s).unwrap_or(u32::MAX);
-        Status { state: State::Fault, reason: Reason::Configuration, uptime_s, ..told }
+        Status { state: UnitState::Fault, reason: Reason::Configuration, uptime_s, ..told }
     }
 
     fn next(&mut self, now: Time, told: Status) -> Option<Packet> {

@@ -10,7 +10,7 @@ use crate::wire::message::Epoch;
 use crate::wire::status::Status;
 
 /// A sender of maps `M`; each method is [`Broadcaster`]'s.
-pub trait Sender<M>: Sized {
+pub trait MapSender<M>: Sized {
     /// Whether maps of this header can be sent.
     ///
     /// # Errors
@@ -38,7 +38,7 @@ pub trait Sender<M>: Sized {
     fn take_overload(&mut self) -> bool;
 }
 
-impl<M: Layers<W>, const A: usize, const W: usize, const P: usize> Sender<M> for Broadcaster<A, W, P> {
+impl<M: Layers<W>, const A: usize, const W: usize, const P: usize> MapSender<M> for Broadcaster<A, W, P> {
     fn fits(header: &Header) -> Result<(), ConfigError> {
         Self::fits(header)
     }

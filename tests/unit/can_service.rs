@@ -5,12 +5,12 @@ use viewshed::fixed::time::Time;
 use viewshed::unit::Flow;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 use viewshed::wire::receive::{Accepted, Limits, Receiver, Refused};
-use viewshed::wire::status::{Reason, State, Status};
+use viewshed::wire::status::{Reason, Status, UnitState};
 
 use crate::common::gantry;
 
@@ -21,7 +21,7 @@ const FD: Medium = Medium::CanFd(Addresses::STANDARD);
 #[derive(Clone)]
 struct InRam([[u8; BLOCK_LEN]; 2], usize);
 
-impl Slots for InRam {
+impl SettingsSlots for InRam {
     fn slot(&self, slot: usize) -> &[u8] {
         &self.0[slot]
     }
@@ -44,8 +44,8 @@ fn settings(height_m: f32) -> Settings {
     Settings::of(gantry(height_m, 0.0))
 }
 
-fn stored(slots: &InRam) -> Stored {
-    Stored::read(slots, small::CHECK)
+fn stored(slots: &InRam) -> StoredSettings {
+    StoredSettings::read(slots, small::CHECK)
 }
 
 fn start(medium: Medium, slots: &InRam) -> CanService {
@@ -138,7 +138,7 @@ fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_stat
             last = ms.max(1);
         }
         let status = receiver.sensor(SENSOR).and_then(|s| s.status()).unwrap();
-        assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+        assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
         assert!(status.uptime_s >= 1 && last >= 2500);
     }
 }

@@ -6,7 +6,7 @@ use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Message, Received};
-use viewshed::wire::status::{Reason, State, Status};
+use viewshed::wire::status::{Reason, Status, UnitState};
 
 use crate::common::{SmallState, Vehicle, gantry, small_unit};
 
@@ -14,7 +14,7 @@ use crate::common::{SmallState, Vehicle, gantry, small_unit};
 const PERIOD: u64 = 60;
 
 /// States and reasons in the order they are told, with the time of the first and the number of messages.
-type Told = Vec<(State, Reason, u64, usize)>;
+type Told = Vec<(UnitState, Reason, u64, usize)>;
 
 /// Runs a unit: `scan` says, at every time one is due, whether there is one, whether the radar has a fault, and whether entries
 /// are missing.
@@ -52,14 +52,15 @@ fn run(until: u64, scan: impl Fn(u64) -> Option<(bool, bool)>, time: impl Fn(u64
     told
 }
 
-fn states(told: &Told) -> Vec<(State, Reason)> {
+fn states(told: &Told) -> Vec<(UnitState, Reason)> {
     told.iter().map(|t| (t.0, t.1)).collect()
 }
 
 #[test]
 fn from_the_start_to_silence() {
     let told = run(6000, |ms| (500..3000).contains(&ms).then_some((false, false)), |ms| ms);
-    let expected = [(State::Starting, Reason::None), (State::Ok, Reason::None), (State::Blind, Reason::RadarSilent)];
+    let expected =
+        [(UnitState::Starting, Reason::None), (UnitState::Ok, Reason::None), (UnitState::Blind, Reason::RadarSilent)];
     assert_eq!(states(&told), expected);
     // a quarter of a second between messages, half a second a map is held
     assert!(told[1].2 < 1000 && (3250..4000).contains(&told[2].2), "{told:?}");
@@ -69,7 +70,8 @@ fn from_the_start_to_silence() {
 #[test]
 fn a_fault_is_a_fault_for_as_long_as_the_radar_says_so() {
     let told = run(8000, |ms| Some(((2000..4000).contains(&ms), false)), |ms| ms);
-    let expected = [(State::Ok, Reason::None), (State::Fault, Reason::RadarFault), (State::Ok, Reason::None)];
+    let expected =
+        [(UnitState::Ok, Reason::None), (UnitState::Fault, Reason::RadarFault), (UnitState::Ok, Reason::None)];
     assert_eq!(states(&told), expected);
     assert!(told[1].3 >= 7 && told[1].2 < 2500 && told[2].2 < 4500, "{told:?}");
 }
@@ -77,13 +79,14 @@ fn a_fault_is_a_fault_for_as_long_as_the_radar_says_so() {
 #[test]
 fn a_fault_followed_by_silence_is_silence() {
     let told = run(6000, |ms| (ms < 3000).then_some((ms > 2000, false)), |ms| ms);
-    assert_eq!(told.last().map(|t| (t.0, t.1)), Some((State::Blind, Reason::RadarSilent)));
+    assert_eq!(told.last().map(|t| (t.0, t.1)), Some((UnitState::Blind, Reason::RadarSilent)));
 }
 
 #[test]
 fn missing_entries_degrade_for_a_second_and_are_not_overlooked() {
     let told = run(6000, |ms| Some((false, ms == 34 * PERIOD)), |ms| ms);
-    let expected = [(State::Ok, Reason::None), (State::Degraded, Reason::IncompleteScans), (State::Ok, Reason::None)];
+    let expected =
+        [(UnitState::Ok, Reason::None), (UnitState::Degraded, Reason::IncompleteScans), (UnitState::Ok, Reason::None)];
     assert_eq!(states(&told), expected);
     assert!((3..=5).contains(&told[1].3), "{told:?}");
 }
@@ -91,6 +94,6 @@ fn missing_entries_degrade_for_a_second_and_are_not_overlooked() {
 #[test]
 fn a_clock_that_steps_is_told() {
     let told = run(8000, |_| Some((false, false)), |ms| if ms < 3000 { ms } else { ms - 1500 });
-    assert!(states(&told).contains(&(State::Degraded, Reason::ClockStepped)), "{told:?}");
-    assert_eq!(told.last().map(|t| (t.0, t.1)), Some((State::Ok, Reason::None)));
+    assert!(states(&told).contains(&(UnitState::Degraded, Reason::ClockStepped)), "{told:?}");
+    assert_eq!(told.last().map(|t| (t.0, t.1)), Some((UnitState::Ok, Reason::None)));
 }

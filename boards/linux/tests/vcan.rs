@@ -7,16 +7,16 @@ use std::time::{Duration, Instant};
 
 use socketcan::dump::Reader;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
 use viewshed::wire::receive::{Limits, Receiver};
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 
 const RADAR: &str = "vsradar";
 const MAPS: &str = "vsmaps";
@@ -183,7 +183,7 @@ impl Bench {
 
     /// Whether maps come and show something.
     fn is_ok(&self) -> bool {
-        self.state().is_some_and(|(state, _)| state == State::Ok) && self.visible() > 5000
+        self.state().is_some_and(|(state, _)| state == UnitState::Ok) && self.visible() > 5000
     }
 
     /// Listens until something is so; `false` if it is not within ten seconds.
@@ -198,7 +198,7 @@ impl Bench {
         true
     }
 
-    fn state(&self) -> Option<(State, Reason)> {
+    fn state(&self) -> Option<(UnitState, Reason)> {
         self.receiver.sensor(0).and_then(|sensor| sensor.status()).map(|status| (status.state, status.reason))
     }
 
@@ -245,7 +245,7 @@ fn frames_come_and_go_over_the_kernels_buses() {
         assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}", bench.state());
 
         // silence
-        let blind = Some((State::Blind, Reason::RadarSilent));
+        let blind = Some((UnitState::Blind, Reason::RadarSilent));
         assert!(bench.until(|bench| bench.state() == blind && bench.visible() == 0), "{medium}: {:?}", bench.state());
 
         // the bus of the maps goes down and comes back
@@ -264,7 +264,7 @@ fn frames_come_and_go_over_the_kernels_buses() {
         assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}, {}", bench.state(), daemon.log());
 
         assert_eq!(daemon.terminate().code(), Some(0));
-        let gone = Some((State::Starting, Reason::None));
+        let gone = Some((UnitState::Starting, Reason::None));
         assert!(bench.until(|bench| bench.state() == gone && bench.visible() == 0), "{medium}: {:?}", bench.state());
     }
 }

@@ -47,6 +47,6 @@ mod learning;
 mod points;
 mod receiver;
 
-pub use family::Family;
-pub use points::{AngleUnit, Dialect, Entries, PolarPoints};
-pub use receiver::{Config, Counters, Flaw, Outcome, Ti};
+pub use family::TiFamily;
+pub use points::{Entries, PolarPoints, TiAngleUnit, TiDialect};
+pub use receiver::{Flaw, Ti, TiConfig, TiCounters, TiOutcome};

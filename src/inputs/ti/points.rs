@@ -6,7 +6,7 @@ use crate::frame::detection::{Detection, Measurement, NotADetection};
 /// Unit of the angles of spherical points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum AngleUnit {
+pub enum TiAngleUnit {
     /// What TI's own programs take them for.
     Radians,
     /// What the comment in one SDK says.
@@ -36,9 +36,9 @@ pub enum Entries {
 /// What a firmware's messages do not tell of themselves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Dialect {
+pub struct TiDialect {
     /// Unit of the angles of spherical points, type 1000.
-    pub angles: AngleUnit,
+    pub angles: TiAngleUnit,
     /// Points behind a 52-byte header, type 6.
     pub polar_points: PolarPoints,
     /// Whether the antenna measures elevation; where it does not, z is sent as zero.
@@ -50,10 +50,10 @@ pub struct Dialect {
     pub entries: Entries,
 }
 
-impl Dialect {
+impl TiDialect {
     /// Radians, an antenna with elevation, no Doppler step, points.
     pub const USUAL: Self = Self {
-        angles: AngleUnit::Radians,
+        angles: TiAngleUnit::Radians,
         polar_points: PolarPoints::Flat,
         has_elevation: true,
         doppler_step_mps: None,
@@ -130,7 +130,7 @@ impl Layout {
     }
 
     /// Reads a record of [`record`](Self::record) bytes.
-    pub(super) fn read(self, bytes: &[u8; LONGEST_RECORD], dialect: &Dialect) -> Record {
+    pub(super) fn read(self, bytes: &[u8; LONGEST_RECORD], dialect: &TiDialect) -> Record {
         let float = |n: usize| f32::from_bits(chunk(bytes, 4 * n).map_or(0, u32::from_le_bytes));
         let short = |at: usize| chunk(bytes, at).map_or(0, u16::from_le_bytes);
         let signed = |at: usize| chunk(bytes, at).map_or(0, i16::from_le_bytes);
@@ -146,8 +146,8 @@ impl Layout {
             }
             Self::Spherical => {
                 let unit = match dialect.angles {
-                    AngleUnit::Radians => 1.0,
-                    AngleUnit::Degrees => core::f32::consts::PI / 180.0,
+                    TiAngleUnit::Radians => 1.0,
+                    TiAngleUnit::Degrees => core::f32::consts::PI / 180.0,
                 };
                 let (azimuth, elevation) = (float(1) * unit, float(2) * unit);
                 Record::Point(spherical(float(0), azimuth, Some(elevation), float(3), None, dialect))
@@ -181,7 +181,7 @@ impl Layout {
                 Record::Point(target([float(1), float(2), float(3)], [float(4), float(5), float(6)], dialect))
             }
             Self::FlatTargets => {
-                let flat = Dialect { has_elevation: false, ..*dialect };
+                let flat = TiDialect { has_elevation: false, ..*dialect };
                 Record::Point(target([float(1), float(2), 0.0], [float(3), float(4), 0.0], &flat))
             }
             Self::SideInfo => Record::Snr(halves(signed(0))),
@@ -201,7 +201,7 @@ fn chunk<const N: usize>(bytes: &[u8; LONGEST_RECORD], at: usize) -> Option<[u8;
 }
 
 /// A target's place and velocity, x to the right, y ahead, z up.
-fn target(place: [f32; 3], velocity: [f32; 3], dialect: &Dialect) -> Result<Detection, NotADetection> {
+fn target(place: [f32; 3], velocity: [f32; 3], dialect: &TiDialect) -> Result<Detection, NotADetection> {
     let along = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
     let radial = along(velocity, place) / math::sqrt(along(place, place));
     cartesian(place, radial, None, dialect)
@@ -212,7 +212,7 @@ fn cartesian(
     [x, y, z]: [f32; 3],
     velocity: f32,
     snr_db: Option<f32>,
-    dialect: &Dialect,
+    dialect: &TiDialect,
 ) -> Result<Detection, NotADetection> {
     let ground = math::sqrt(x * x + y * y);
     Detection::new(&Measurement {
@@ -232,7 +232,7 @@ fn spherical(
     elevation: Option<f32>,
     velocity: f32,
     ratio: Option<f32>,
-    dialect: &Dialect,
+    dialect: &TiDialect,
 ) -> Result<Detection, NotADetection> {
     Detection::new(&Measurement {
         range_m: range,

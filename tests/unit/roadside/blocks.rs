@@ -4,9 +4,9 @@ use crc::Crc;
 use proptest::prelude::*;
 use viewshed::unit::can_service::{Refusal, Told, Tool};
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, Slots};
+use viewshed::unit::settings::{BLOCK_LEN, SettingsSlots};
 use viewshed::wire::broadcast::Medium;
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 
 use super::{ADDRESSES, SENSOR, World, settings};
 
@@ -128,16 +128,16 @@ impl World {
                 assert_eq!(read, stored);
                 assert!(self.told.contains(&Told::Block(stored.try_into().unwrap())), "{:?}", self.told);
                 assert!(
-                    state != State::Fault && status.iter().all(|s| s.reason != Reason::Configuration),
+                    state != UnitState::Fault && status.iter().all(|s| s.reason != Reason::Configuration),
                     "{status:?}"
                 );
                 assert!(self.bus.sensor(SENSOR).unwrap().header().is_some(), "it has a map to send");
                 Came::Up(sequence)
             }
             None => {
-                assert!(read.is_empty() && state == State::Fault, "{state:?}");
+                assert!(read.is_empty() && state == UnitState::Fault, "{state:?}");
                 assert!(
-                    status.iter().all(|s| (s.state, s.reason) == (State::Fault, Reason::Configuration)),
+                    status.iter().all(|s| (s.state, s.reason) == (UnitState::Fault, Reason::Configuration)),
                     "{status:?}"
                 );
                 Came::Safe(self.refusals().last().expect("says why").parameter().to_owned())

@@ -7,7 +7,7 @@ use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarGeometry;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::unit::Unit;
-use viewshed::unit::settings::{Check, Settings};
+use viewshed::unit::settings::{Settings, SettingsCheck};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 
@@ -40,7 +40,7 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     bench: &mut InMemory,
 ) -> Result<PolarGeometry> {
     let job = Job::read(bench).map_err(|e| anyhow::anyhow!("{e:?}"))?;
-    Check::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>().settings(&job.settings)?;
+    SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>().settings(&job.settings)?;
     let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     let (settings, epoch, now) = (Some(&job.settings), Epoch::new(0), Time::from_micros(0));

@@ -10,7 +10,7 @@ use viewshed::unit::settings::Settings;
 use viewshed::wire::message::{Addresses, Message, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::Unstuffer;
-use viewshed::wire::status::{Reason, State, Status};
+use viewshed::wire::status::{Reason, Status, UnitState};
 use viewshed_harness::boards::Profile;
 use viewshed_harness::boards::live::{Answered, SENSOR, Script, answer};
 use viewshed_harness::boards::machine::Folder;
@@ -151,7 +151,7 @@ impl Heard {
         }
     }
 
-    fn is(&self, state: State, reason: Reason) -> bool {
+    fn is(&self, state: UnitState, reason: Reason) -> bool {
         self.status.is_some_and(|s| (s.state, s.reason) == (state, reason))
     }
 
@@ -212,7 +212,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     // maps are those of the library, whatever noise comes between the scans
     let (mut script, mut far) = (Script::default(), Heard::new());
     let sent = stream(&mut radar, &mut script, &scans[..30], begin, true);
-    assert!(far.until(&ear, |far| far.visible() > 5000 && far.is(State::Ok, Reason::None)), "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.visible() > 5000 && far.is(UnitState::Ok, Reason::None)), "{:?}", far.status);
     let should = maps(&messages(&expected(&settings, &sent).bytes));
     assert!(should.len() >= 30, "{}", should.len());
     let got = || {
@@ -226,7 +226,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     println!("{} map messages the same, with noise between the scans", should.len());
 
     // silence
-    let blind = |far: &Heard| far.is(State::Blind, Reason::RadarSilent) && far.visible() == 0;
+    let blind = |far: &Heard| far.is(UnitState::Blind, Reason::RadarSilent) && far.visible() == 0;
     assert!(far.until(&ear, blind), "{:?}, {} visible", far.status, far.visible());
 
     // the radar's cable is pulled and plugged in again
@@ -242,7 +242,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     }
     assert!(twin.visible() > 5000, "{}", twin.visible());
     assert!(far.until(&ear, |far| far.cells() == twin.cells()), "{} and {}", far.visible(), twin.visible());
-    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None)), "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.is(UnitState::Ok, Reason::None)), "{:?}", far.status);
 
     // and the other one
     drop(ear);
@@ -257,7 +257,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     // stopped: the last map says unknown, the last status that there is none
     daemon.terminate();
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
-    let gone = |far: &Heard| far.is(State::Starting, Reason::None) && far.visible() == 0;
+    let gone = |far: &Heard| far.is(UnitState::Starting, Reason::None) && far.visible() == 0;
     assert!(far.until(&ear, gone), "{:?}, {} visible", far.status, far.visible());
     assert!(daemon.log().contains("stopping"), "{}", daemon.log());
 }

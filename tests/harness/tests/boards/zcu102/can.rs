@@ -8,7 +8,7 @@ use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{Answers, Told, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::can::CanBoard;
 use viewshed_harness::boards::can_twin::{Sent, Step, clusters, flashed, log};
 use viewshed_harness::boards::listener::{Listener, Telling};
@@ -65,7 +65,7 @@ fn every_map_of_two_hundred_scans_arrives_cell_by_cell() {
     let visible = told.last().unwrap().visible_cells;
     assert!((5_000..24_000).contains(&visible), "{visible} cells are visible in the end");
     let status = listener.receiver().sensor(SENSOR).and_then(|s| s.status().copied());
-    assert_eq!(status.map(|s| s.state), Some(State::Ok));
+    assert_eq!(status.map(|s| s.state), Some(UnitState::Ok));
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
     assert_eq!(Settings::from_block(read.unwrap()), Ok((1, settings)));
     let (listener, told) = heard(&sent[..20]);
     let status = listener.receiver().sensor(SENSOR).and_then(|s| s.status().copied()).unwrap();
-    assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+    assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
     assert!(
         told.iter().all(|told| told.azimuths == 0) && listener.receiver().sensor(SENSOR).unwrap().header().is_none()
     );
