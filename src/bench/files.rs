@@ -22,7 +22,7 @@ pub trait HostFile: Sized {
     fn create(name: &CStr) -> Option<Self>;
     /// Reads up to as many bytes as the buffer has; 0 at the end.
     fn read(&mut self, buffer: &mut [u8]) -> usize;
-    /// Writes some of the bytes, and tells how many; 0 if it takes none.
+    /// Writes some of the bytes; how many, 0 if it takes none.
     fn write(&mut self, bytes: &[u8]) -> usize;
 }
 

@@ -1,7 +1,7 @@
 //! Radars: bytes or CAN frames in, complete scans in the units of [`Detection`] out.
 //!
 //! Every decoder is an accumulator. It is fed with single CAN frames or with chunks of bytes cut
-//! anywhere, is told the time with each, and answers with a named outcome: nothing yet, a
+//! anywhere, gets the time with each, and answers with a named outcome: nothing yet, a
 //! [`RadarScan`], or what was wrong. Bad input is counted and never stops a decoder.
 
 pub mod ars408;
@@ -37,7 +37,7 @@ pub struct RadarScan<'a> {
 }
 
 impl RadarScan<'_> {
-    /// What the estimators are told besides the detections.
+    /// What the estimators get besides the detections.
     pub fn status(&self) -> FrameStatus {
         FrameStatus { fault: self.fault, refused: self.refused }
     }

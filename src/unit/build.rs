@@ -13,7 +13,7 @@ pub trait InUnit: Estimator {
     /// Its configuration by the settings; what an integrator does not set is the library's.
     fn config(settings: &Settings) -> Self::Config;
 
-    /// What is told of its maps.
+    /// What receivers have to know of its maps.
     ///
     /// # Errors
     /// Maps that cannot be sent.

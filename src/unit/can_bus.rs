@@ -108,7 +108,7 @@ pub trait CanPort {
     fn arrived(&self) -> Option<Time> {
         None
     }
-    /// Frames in the mailboxes, where the controller tells.
+    /// Frames in the mailboxes, where the controller counts them.
     fn waiting(&mut self) -> usize {
         0
     }

@@ -61,7 +61,7 @@ pub enum Event {
     Done(Progress),
 }
 
-/// What went wrong is told in the status for this long, microseconds: in several messages, should some be lost.
+/// What went wrong stays in the status for this long, microseconds: in several messages, should some be lost.
 const DEGRADED_US: u64 = 1_000_000;
 
 /// Time between two maps that say unknown, microseconds.
@@ -137,7 +137,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         if incomplete {
             self.degrade(measured, Reason::IncompleteScans);
         }
-        self.tell(progress.condition, measured);
+        self.set_status(progress.condition, measured);
         self.offer(measured);
         event(Event::Ended);
         event(Event::Done(progress));
@@ -147,7 +147,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
     /// The map runs out, and that is sent.
     pub fn idle(&mut self, now: Time) -> Condition {
         let condition = self.state.expire(self.parameters, now, self.map);
-        self.tell(condition, now);
+        self.set_status(condition, now);
         let due = self.offered.is_none_or(|last| now.since(last).is_none_or(|us| us >= UNKNOWN_EVERY_US));
         if condition != Condition::Healthy && due {
             self.offer(now);
@@ -160,7 +160,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         self.broadcast.offer(measured, self.map);
     }
 
-    /// Maps go on, but something went wrong just now: told in the status for a second. A bus too narrow is told
+    /// Maps go on, but something went wrong just now: it is in the status for a second. A bus too narrow is reported
     /// only where nothing else went wrong, which may be why.
     pub fn degrade(&mut self, now: Time, reason: Reason) {
         let known = self.trouble.is_some_and(|(since, other)| other != reason && recent(since, now));
@@ -174,7 +174,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         }
     }
 
-    /// A frame took so long to be worked up, microseconds, by the clock of `now`: told if it is longer than the
+    /// A frame took so long to be worked up, microseconds, by the clock of `now`: reported if it is longer than the
     /// time from frame to frame.
     pub fn took(&mut self, now: Time, took_us: u64) {
         if self.period_us.is_some_and(|period| took_us > period) {
@@ -182,7 +182,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         }
     }
 
-    fn tell(&mut self, condition: Condition, now: Time) {
+    fn set_status(&mut self, condition: Condition, now: Time) {
         if self.broadcast.take_overload() {
             self.degrade(now, Reason::BusOverload);
         }
@@ -241,7 +241,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
     }
 }
 
-/// Whether something happened within the time it is told for, before or after `now`: frames are of another clock
+/// Whether something happened within the time it is reported for, before or after `now`: frames are of another clock
 /// than the loop around them.
 fn recent(since: Time, now: Time) -> bool {
     now.since(since).or_else(|| since.since(now)).is_some_and(|us| us < DEGRADED_US)

@@ -30,7 +30,7 @@ pub trait MapSender<M>: Sized {
     fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize>;
     /// When what was handed out is to be aborted.
     fn deadline(&self) -> Option<Time>;
-    /// What is told of the unit.
+    /// The unit's status, as it is sent next.
     fn status_mut(&mut self) -> &mut Status;
     /// Counts messages that did not leave.
     fn count_dropped(&mut self, messages: u16);

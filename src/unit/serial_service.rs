@@ -77,11 +77,11 @@ impl SerialService {
         Some(Asked::Nothing)
     }
 
-    /// Without settings: the status, if it is due, versions and counters as in `told`.
+    /// Without settings: the status, if it is due, versions and counters as in `base`.
     #[inline(never)] // its buffer is not on the stack while a scan is worked up
-    pub fn say_safe(&mut self, now: Time, told: Status, line: &mut impl SerialLine) {
+    pub fn say_safe(&mut self, now: Time, base: Status, line: &mut impl SerialLine) {
         let mut stuffed = [0; MOST_STUFFED];
-        let length = self.safe.next_line(now, told, &mut stuffed);
+        let length = self.safe.next_line(now, base, &mut stuffed);
         if let Some(message) = length.and_then(|n| stuffed.get(..n)) {
             let _ = line.send(message);
         }

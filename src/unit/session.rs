@@ -60,7 +60,7 @@ impl<const D: usize> SerialSession<D> {
         self.now
     }
 
-    /// Takes bytes as they come, cut anywhere, and sends what follows from them. `event` is told what the unit
+    /// Takes bytes as they come, cut anywhere, and sends what follows from them. `event` is called with what the unit
     /// does with each frame.
     pub fn take<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,

@@ -28,7 +28,7 @@ fn car() -> Detection {
     }
 }
 
-/// A detection that can be told from others by its range.
+/// A detection that differs from others in its range.
 fn nth(n: usize) -> Detection {
     Detection { range_cm: 100 + n as u16, elevation: None, rcs_half_dbsm: None, snr_half_db: None, ..car() }
 }
@@ -164,7 +164,7 @@ fn a_lost_part_costs_itself_and_most_parts_lost_cost_the_scan() {
     let got = push(&mut receiver, second[1].bytes(), 70);
     let kept: Vec<Detection> = [&many[..5], &many[10..]].concat();
     assert_eq!(got, [(0, kept, 5)]);
-    // one of three is not a scan; a message that is a whole scan comes out behind it
+    // one of three is not a scan; a message that is a whole scan comes out after it
     let got = push(&mut receiver, third[0].bytes(), 140);
     assert_eq!(got, [(2, many[..2].to_vec(), 0)]);
     let c = receiver.counters();

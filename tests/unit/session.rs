@@ -91,22 +91,22 @@ fn a_radar_that_stops_is_told_by_the_units_own_clock() {
     }
     let last = session.now();
     assert_eq!(unit.as_ref().unwrap().offered(), Some(last));
-    let mut told = Vec::new();
+    let mut sent = Vec::new();
     for ms in [400, 500, 501, 550, 601, 700, 702] {
         let before = line.messages;
         session.idle(Time::from_micros(last.micros() + 1000 * ms), &mut unit, &mut line);
         let unit = unit.as_mut().unwrap();
         let offered = unit.offered().and_then(|t| t.since(last)).unwrap();
         let status = unit.broadcast().status_mut();
-        told.push((ms, status.state, status.reason, offered / 1000, line.messages > before));
+        sent.push((ms, status.state, status.reason, offered / 1000, line.messages > before));
     }
     // held for half a second, then unknown, ten times a second
     let (ok, silent) = ((UnitState::Ok, Reason::None), (UnitState::Blind, Reason::RadarSilent));
     let expected = [(400, ok, 0), (500, ok, 0), (501, silent, 501), (550, silent, 501), (601, silent, 601)];
-    for (told, (ms, (state, reason), offered)) in told.iter().zip(expected) {
-        assert_eq!((told.0, told.1, told.2, told.3), (ms, state, reason, offered));
+    for (sent, (ms, (state, reason), offered)) in sent.iter().zip(expected) {
+        assert_eq!((sent.0, sent.1, sent.2, sent.3), (ms, state, reason, offered));
     }
-    assert!(told[2].4 && told[4].4, "{told:?}");
+    assert!(sent[2].4 && sent[4].4, "{sent:?}");
 }
 
 /// Messages as they are stuffed.

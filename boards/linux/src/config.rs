@@ -84,7 +84,7 @@ impl Default for Ars408 {
     }
 }
 
-/// What the radar is told to send.
+/// What the radar is configured to send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wanted {
@@ -222,7 +222,7 @@ impl Config {
             _ => {}
         }
         if input.clock == ClockSource::Input && input.candump.is_none() && input.radar != Radar::Native {
-            add("input.clock", "\"input\" is for logs and the native format, whose input tells the time");
+            add("input.clock", "\"input\" is for logs and the native format, whose input has the time");
         }
         if on_can && input.sensor_id > 7 {
             add("input.sensor_id", "an ARS408's is 0 to 7");
@@ -400,7 +400,7 @@ impl Input {
         Ars408Config { profile, ..Ars408Config::sensor(self.sensor_id) }
     }
 
-    /// What the ARS408 is to be told, if anything.
+    /// What the ARS408 is configured to, if anything.
     pub fn configure(&self) -> Option<Ars408Configuration> {
         Some(match self.ars408.as_ref()?.configure? {
             Wanted::Clusters => Ars408Configuration::CLUSTERS,
@@ -410,14 +410,14 @@ impl Input {
 
     /// TI's decoder.
     pub fn ti(&self) -> TiConfig {
-        let told = self.ti.clone().unwrap_or_default();
-        let angles = match told.angles {
+        let given = self.ti.clone().unwrap_or_default();
+        let angles = match given.angles {
             Angles::Radians => TiAngleUnit::Radians,
             Angles::Degrees => TiAngleUnit::Degrees,
         };
-        let (has_elevation, doppler_step_mps) = (told.has_elevation, told.doppler_step_mps);
+        let (has_elevation, doppler_step_mps) = (given.has_elevation, given.doppler_step_mps);
         let dialect = TiDialect { angles, has_elevation, doppler_step_mps, ..TiDialect::USUAL };
-        TiConfig { family: told.header_bytes.and_then(family), dialect }
+        TiConfig { family: given.header_bytes.and_then(family), dialect }
     }
 }
 

@@ -26,7 +26,7 @@ use crate::state::FileSlots;
 const CHUNK: usize = 4096;
 /// Reads in a row before the rest of the daemon has its turn.
 const ROW: usize = 16;
-/// How long a log goes on behind its last frame: the radar is silent, and that is to be seen.
+/// How long a log goes on after its last frame: the radar is silent, and that is to be seen.
 const SILENCE_US: u64 = 1_000_000;
 
 /// What an input works on.
@@ -113,13 +113,13 @@ impl Bus {
         let input = &config.input;
         let upkeep = input.configure().map(|settings| Ars408Upkeep::new(input.sensor_id, settings));
         let mut interface = Interface::new(name, false);
-        // the radar's frames prove the bit rate before it is told anything
+        // the radar's frames prove the bit rate before anything is sent to it
         let keeper = BusKeeper::start(&BusConfig::default(), &mut interface);
         let decoder = Decoder::new(input.ars408());
         Self { interface, keeper, decoder, upkeep, holds: false, last: Time::from_micros(0) }
     }
 
-    /// Tells the radar what it is to send, and that it stands.
+    /// Sends the radar its configuration, and that it stands.
     fn look_after(&mut self, frame: Option<&CanFrame>, now: Time) {
         let Some(upkeep) = &mut self.upkeep else { return };
         if let Some(frame) = frame {
@@ -159,7 +159,7 @@ impl Input for Bus {
         self.last = now;
         unit.wait(&mut self.decoder, now);
         if self.upkeep.as_ref().is_some_and(|upkeep| upkeep.disagrees(now)) {
-            unit.degrade(now, Reason::Ars408Configuration);
+            unit.degrade(now, Reason::RadarConfiguration);
         }
         Step::Now(now)
     }
@@ -281,7 +281,7 @@ struct NativePort {
     sensor: u8,
     session: Option<SerialSession<{ State::DETECTIONS }>>,
     clock: RadarClock,
-    /// What came behind a restart.
+    /// What came after a restart.
     rest: Vec<u8>,
 }
 
@@ -309,7 +309,7 @@ impl Input for NativePort {
                 break;
             }
             let bytes = std::mem::take(&mut self.rest);
-            // byte by byte: what stands behind a restart belongs to the next session
+            // byte by byte: what stands after a restart belongs to the next session
             for (k, byte) in bytes.iter().enumerate() {
                 let before = session.now();
                 let mut lines = Lines { output: work.output, own: Some(&mut self.port) };

@@ -108,8 +108,8 @@ impl Output {
     /// Answers the integrator; in the safe state, says that it is one.
     pub fn answer(&mut self, now: Time, safe: bool, slots: &FileSlots) {
         let Some(service) = &mut self.service else { return };
-        let told = Status { firmware: version(), ..Status::starting(0) };
-        let status = if safe { service.next_status(now, told) } else { None };
+        let base = Status { firmware: version(), ..Status::starting(0) };
+        let status = if safe { service.next_status(now, base) } else { None };
         let answer = service.next_frame(now, slots);
         for frame in status.iter().chain(&answer) {
             let sent = self.put(now, frame);

@@ -23,7 +23,7 @@ pub type Unit<'u> = viewshed::Unit<'u, State, Sender>;
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);
 const CALM: Duration = Duration::from_millis(5);
-/// A step of a clock that is told by a log, microseconds.
+/// A step of the clock while a log is read, microseconds.
 const TICK_US: u64 = 1_000;
 /// How long is said, at the end, that there is no map any more: a status is due every 250 ms.
 const FAREWELL_TICKS: u64 = 300;
@@ -188,30 +188,30 @@ struct Watch {
     maps: u64,
     /// Messages of the safe state.
     said: u64,
-    told: Option<(UnitState, Reason)>,
+    shown: Option<(UnitState, Reason)>,
     /// Why there is no unit.
     refused: Option<BlockError>,
 }
 
 impl Watch {
     /// Whether a frame was completed since the last look: estimated, and its map given to the sender. In the
-    /// safe state, whether that was told.
+    /// safe state, whether that was sent.
     fn look(&mut self, unit: Option<&mut Unit<'_>>, output: &Output) -> bool {
         let Some(unit) = unit else {
             let said = output.sent + output.refused;
             return std::mem::replace(&mut self.said, said) != said;
         };
         let status = unit.broadcast().status_mut();
-        let told = (status.state, status.reason);
+        let shown = (status.state, status.reason);
         // what one frame does not say the next does: only states are worth a line
-        if self.told.is_none_or(|before| before.0 != told.0) {
-            let reason = if told.1 == Reason::None { String::new() } else { format!(": {:?}", told.1) };
-            match told.0 {
-                UnitState::Starting | UnitState::Ok => info!("radar {:?}{reason}", told.0),
-                _ => warn!("radar {:?}{reason}", told.0),
+        if self.shown.is_none_or(|before| before.0 != shown.0) {
+            let reason = if shown.1 == Reason::None { String::new() } else { format!(": {:?}", shown.1) };
+            match shown.0 {
+                UnitState::Starting | UnitState::Ok => info!("radar {:?}{reason}", shown.0),
+                _ => warn!("radar {:?}{reason}", shown.0),
             }
         }
-        self.told = Some(told);
+        self.shown = Some(shown);
         let done = unit.offered() != self.offered;
         self.offered = unit.offered();
         self.maps += u64::from(done);
@@ -219,9 +219,9 @@ impl Watch {
     }
 
     fn text(&self, output: &Output) -> String {
-        let state = match (&self.refused, self.told) {
+        let state = match (&self.refused, self.shown) {
             (Some(reason), _) => format!("safe state: {reason}"),
-            (None, told) => format!("radar {:?}", told.map_or(UnitState::Starting, |(state, _)| state)),
+            (None, shown) => format!("radar {:?}", shown.map_or(UnitState::Starting, |(state, _)| state)),
         };
         format!("{state}; {} maps, {} messages sent, {} refused", self.maps, output.sent, output.refused)
     }

@@ -14,7 +14,7 @@ pub const FILES: [&str; 2] = [EPOCH, SLOTS];
 const EPOCH: &str = "epoch";
 const SLOTS: &str = "slots";
 
-/// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
+/// The epoch after `last`, or after that of the last start, a number kept in the folder. Where nothing can be
 /// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
 pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
     let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);

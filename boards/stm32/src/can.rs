@@ -90,7 +90,7 @@ pub fn open<const N: usize>(
         FdCanConfig::default()
             .set_nominal_bit_timing(nominal.unwrap_or_default())
             .set_global_filter(filter)
-            // maps are told in order
+            // maps are sent in order
             .set_tx_buffer_mode(TxBufferMode::Fifo)
             // the library decides when, and counts
             .set_automatic_bus_off_recovery(false),

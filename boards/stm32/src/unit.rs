@@ -72,11 +72,11 @@ where
     W: Instance,
 {
     let mut light = StatusOutput::new(light);
-    let mut told = None;
+    let mut shown = None;
     loop {
         let step = unit.step(now(), ports);
         let _ = light.show(step.state, now());
-        if told.replace(step.state) != Some(step.state) {
+        if shown.replace(step.state) != Some(step.state) {
             defmt::info!("{}", step.state);
         }
         if step.frame_done {

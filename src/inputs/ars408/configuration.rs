@@ -1,4 +1,4 @@
-//! Telling a sensor what to send, and limits on it.
+//! What a sensor is to send, and limits on it.
 //!
 //! Settings take effect at once and are to be read back from
 //! [`RadarState`](super::state::RadarState). Storing them for good wears the sensor's memory: a few
@@ -159,7 +159,7 @@ impl Ars408Configuration {
 
     /// The frame for the sensor that has this id now; always there.
     pub fn frame(&self, sensor: u8) -> Option<CanFrame> {
-        CanFrame::classic(Message::Ars408Configuration.id(sensor), &self.bytes())
+        CanFrame::classic(Message::RadarConfiguration.id(sensor), &self.bytes())
     }
 }
 

@@ -7,7 +7,7 @@ use crate::wire::frame::CanId;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Message {
     /// To the sensor: what it is to send.
-    Ars408Configuration,
+    RadarConfiguration,
     /// From it, once a second: how it is set, and its faults.
     RadarState,
     /// To the sensor: a limit on what it sends.
@@ -37,7 +37,7 @@ pub enum Message {
 impl Message {
     /// All messages, by identifier.
     pub const ALL: [Self; 13] = [
-        Self::Ars408Configuration,
+        Self::RadarConfiguration,
         Self::RadarState,
         Self::FilterConfiguration,
         Self::Speed,
@@ -55,7 +55,7 @@ impl Message {
     /// Identifier of sensor 0.
     pub const fn base(self) -> u16 {
         match self {
-            Self::Ars408Configuration => 0x200,
+            Self::RadarConfiguration => 0x200,
             Self::RadarState => 0x201,
             Self::FilterConfiguration => 0x202,
             Self::Speed => 0x300,
@@ -78,7 +78,7 @@ impl Message {
             Self::ObjectStatus | Self::Version => 4,
             Self::FilterConfiguration | Self::ClusterStatus | Self::ClusterQuality => 5,
             Self::ObjectQuality => 7,
-            Self::Ars408Configuration
+            Self::RadarConfiguration
             | Self::RadarState
             | Self::ObjectGeneral
             | Self::ObjectExtended
@@ -88,13 +88,13 @@ impl Message {
 
     /// Whether the sensor sends it, rather than being sent it.
     pub const fn from_sensor(self) -> bool {
-        !matches!(self, Self::Ars408Configuration | Self::FilterConfiguration | Self::Speed | Self::YawRate)
+        !matches!(self, Self::RadarConfiguration | Self::FilterConfiguration | Self::Speed | Self::YawRate)
     }
 
     /// Its name in the vendor's description.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Ars408Configuration => "RadarConfiguration",
+            Self::RadarConfiguration => "RadarConfiguration",
             Self::RadarState => "RadarState",
             Self::FilterConfiguration => "FilterCfg",
             Self::Speed => "SpeedInformation",
@@ -132,7 +132,7 @@ mod tests {
     fn the_sensor_id_lies_in_bits_4_to_6() {
         assert_eq!(Message::of(CanId::Standard(0x701)), Some((Message::ClusterGeneral, 0)));
         assert_eq!(Message::of(CanId::Standard(0x63B)), Some((Message::ObjectGeneral, 3)));
-        assert_eq!(Message::of(CanId::Standard(0x270)), Some((Message::Ars408Configuration, 7)));
+        assert_eq!(Message::of(CanId::Standard(0x270)), Some((Message::RadarConfiguration, 7)));
         assert_eq!(Message::of(CanId::Standard(0x68B)), None, "bit 7 is no part of it");
         assert_eq!(Message::of(CanId::Extended(0x701)), None);
         for message in Message::ALL {

@@ -131,7 +131,7 @@ struct Scan {
     medium: NativeMedium,
 }
 
-/// A scan number this far behind the newest is late; farther, the sender started over.
+/// A scan number this far before the newest is late; farther, the sender started over.
 const LATE: u8 = 8;
 
 impl<const N: usize> NativeReceiver<N> {

@@ -41,7 +41,7 @@ pub(super) struct Header {
     pub(super) total: u32,
     pub(super) items: u32,
     pub(super) number: u32,
-    /// Points announced, where that is told.
+    /// Points announced, where a header has that.
     pub(super) points: Option<u16>,
     pub(super) sub_frame: u32,
     /// Major number of the SDK's version.

@@ -13,13 +13,13 @@ pub enum TiAngleUnit {
     Degrees,
 }
 
-/// Points behind a 52-byte header.
+/// Points after a 52-byte header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PolarPoints {
     /// Range, azimuth, velocity, ratio: 16 bytes.
     Flat,
-    /// With an elevation behind the azimuth: 20 bytes.
+    /// With an elevation after the azimuth: 20 bytes.
     Raised,
 }
 
@@ -33,13 +33,13 @@ pub enum Entries {
     Targets,
 }
 
-/// What a firmware's messages do not tell of themselves.
+/// What a firmware's messages do not say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TiDialect {
     /// Unit of the angles of spherical points, type 1000.
     pub angles: TiAngleUnit,
-    /// Points behind a 52-byte header, type 6.
+    /// Points after a 52-byte header, type 6.
     pub polar_points: PolarPoints,
     /// Whether the antenna measures elevation; where it does not, z is sent as zero.
     pub has_elevation: bool,
@@ -80,7 +80,7 @@ pub(super) enum Layout {
     Polar(PolarPoints),
     /// Units and numbers, to come.
     ExtendedHead,
-    /// x, y, z, velocity, ratio, noise: in these units of place, velocity and ratio, and so many; 0 where that is not told.
+    /// x, y, z, velocity, ratio, noise: in these units of place, velocity and ratio, and so many; 0 where it is not announced.
     Extended([f32; 3], u16),
     /// Number, x, y, z, their velocities, and what is of no interest.
     Targets,
@@ -96,7 +96,7 @@ pub(super) const LONGEST_RECORD: usize = 28;
 /// What a record holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Record {
-    /// What the records behind it need.
+    /// What the records after it need.
     Head(Layout),
     Point(Result<Detection, NotADetection>),
     /// Half dB.
@@ -120,7 +120,7 @@ impl Layout {
 
     /// Whether its own count of points is another.
     pub(super) const fn miscounts(self, points: u16) -> bool {
-        matches!(self, Self::Extended(_, told) if told != 0 && told != points)
+        matches!(self, Self::Extended(_, announced) if announced != 0 && announced != points)
     }
 
     /// Whether it makes detections or belongs to them, given what is wanted.
@@ -168,8 +168,8 @@ impl Layout {
                 Record::Point(spherical(float(0), float(1), Some(float(2)), float(3), Some(float(4)), dialect))
             }
             Self::ExtendedHead => {
-                let told = short(16).saturating_add(short(18));
-                Record::Head(Self::Extended([float(0), float(1), float(2)], told))
+                let announced = short(16).saturating_add(short(18));
+                Record::Head(Self::Extended([float(0), float(1), float(2)], announced))
             }
             Self::Extended([place, velocity, ratio], _) => {
                 let metres = |at| f32::from(signed(at)) * place;

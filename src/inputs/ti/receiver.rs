@@ -13,7 +13,7 @@ use crate::inputs::{RadarScan, count, usable};
 pub struct TiConfig {
     /// Its kind of header; `None`: to be learnt.
     pub family: Option<TiFamily>,
-    /// What its messages do not tell of themselves.
+    /// What its messages do not say.
     pub dialect: TiDialect,
 }
 
@@ -314,7 +314,7 @@ impl<const N: usize> Ti<N> {
         self.next()
     }
 
-    /// The stage behind an item or the header.
+    /// The stage after an item or the header.
     fn next(&mut self) -> Result<(), Flaw> {
         let rest = self.header.total.checked_sub(self.position).ok_or(Flaw::Items)?;
         (self.stage, self.end) = match self.left {
@@ -361,7 +361,7 @@ impl<const N: usize> Ti<N> {
     /// Takes a whole record.
     fn take_record(&mut self) {
         match self.layout.read(&self.record, &self.config.dialect) {
-            Record::Head(behind) => self.layout = behind,
+            Record::Head(after) => self.layout = after,
             Record::Point(point) => {
                 match point.map(|point| self.collected.add(self.points, point)) {
                     Err(_) => {
@@ -386,8 +386,8 @@ impl<const N: usize> Ti<N> {
     fn complete(&mut self) -> TiOutcome<'_> {
         let header = self.header;
         // points, not targets, are announced
-        let told = header.points.filter(|_| self.config.dialect.entries == Entries::Points);
-        let announced = told.unwrap_or(self.points);
+        let of_header = header.points.filter(|_| self.config.dialect.entries == Entries::Points);
+        let announced = of_header.unwrap_or(self.points);
         if !usable(announced, self.points) {
             count(&mut self.counters.broken);
             return TiOutcome::Broken(Flaw::Points);

@@ -1,4 +1,4 @@
-//! The unit's end: takes a block, keeps it, tells what it runs with, and what it says without one.
+//! The unit's end: takes a block, keeps it, answers what it runs with, and what it sends without one.
 
 use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
 use crate::fixed::time::Time;
@@ -65,8 +65,8 @@ impl CanServiceConfig {
 /// for frame in tool.write(&settings.to_block(0)) {
 ///     unit.take(&frame, &mut slots);
 /// }
-/// let mut told = std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|f| answers.take(&f));
-/// assert!(told.any(|told| told == Told::Written(1)));
+/// let mut reported = std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|f| answers.take(&f));
+/// assert!(reported.any(|report| report == Told::Written(1)));
 /// let restart = tool.restart().unwrap();
 /// assert_eq!(unit.take(&restart, &mut slots), Some(Flow::Restart));
 ///
@@ -145,9 +145,9 @@ impl CanService {
     }
 
     /// The next status of a unit in its safe state, where nothing else of it is sent; versions and counters as
-    /// in `told`.
-    pub fn next_status(&mut self, now: Time, told: Status) -> Option<CanFrame> {
-        self.safe.next_frame(now, told)
+    /// in `base`.
+    pub fn next_status(&mut self, now: Time, base: Status) -> Option<CanFrame> {
+        self.safe.next_frame(now, base)
     }
 }
 
@@ -167,7 +167,7 @@ impl Incoming {
     const NONE: Self = Self { bytes: [0; BLOCK_LEN], came: 0, length: None, written: None };
 
     fn begin(&mut self, length: u16) {
-        // what is longer is of another layout, which its first bytes tell
+        // what is longer is of another layout, as its first bytes say
         (self.came, self.length) = (0, Some(usize::from(length).min(BLOCK_LEN)));
     }
 

@@ -73,7 +73,7 @@ pub struct RoadsidePorts<R, B, L, S> {
     pub slots: S,
 }
 
-/// What a start is told.
+/// What a start needs to know.
 #[derive(Debug, Clone, Copy)]
 pub struct RoadsideStart {
     /// The sensor's number, on its own bus as on the broadcast's.
@@ -208,7 +208,7 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
                 maps.unit.broadcast().status_mut().state
             }
             None => {
-                self.service.say_safe(now, self.told(), &mut ports.serial);
+                self.service.say_safe(now, self.safe_status(), &mut ports.serial);
                 UnitState::Fault
             }
         };
@@ -261,13 +261,13 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             if !scanned {
                 maps.unit.wait(&mut self.radar, now);
             }
-            self.tell(now);
+            self.complete_status(now);
         }
         true
     }
 
     /// Offers the map to the second sender and completes the status of both.
-    fn tell(&mut self, now: Time) {
+    fn complete_status(&mut self, now: Time) {
         let bus_off = self.bus_off();
         let off = [&self.radar_bus, &self.broadcast_bus].iter().any(|k| matches!(k.state(), BusState::Off(_)));
         let radar_lost = self.radar.lost().saturating_add(self.lost);
@@ -284,9 +284,9 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         status.firmware = VERSION;
         status.bus_off = bus_off;
         status.radar_lost = u16::try_from(radar_lost).unwrap_or(u16::MAX);
-        let told = *status;
+        let first = *status;
         let second = maps.serial.status_mut();
-        *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..told };
+        *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..first };
         if let Some(measured) = maps.unit.offered() {
             // the same one again is refused
             maps.serial.offer(measured, maps.unit.map());
@@ -304,7 +304,7 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         if !self.outbox.flush(now, &mut self.broadcast_bus, port) {
             return;
         }
-        let told = self.told();
+        let safe = self.safe_status();
         let answer = self.can_service.next_frame(now, &ports.slots);
         let (frame, deadline) = match &mut self.maps {
             Some(maps) => {
@@ -312,15 +312,15 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
                 sender.count_dropped(late);
                 (answer.or_else(|| sender.next_frame(now)), sender.deadline())
             }
-            None => (answer.or_else(|| self.can_service.next_status(now, told)), None),
+            None => (answer.or_else(|| self.can_service.next_status(now, safe)), None),
         };
         if let Some(frame) = frame {
             self.outbox.send(frame, deadline, now, &mut self.broadcast_bus, port);
         }
     }
 
-    /// What both lines are told of the controller in the safe state.
-    fn told(&self) -> Status {
+    /// The controller's part of the status in the safe state.
+    fn safe_status(&self) -> Status {
         let reset_cause = self.reset_cause;
         Status { reset_cause, firmware: VERSION, bus_off: self.bus_off(), ..Status::starting(0) }
     }

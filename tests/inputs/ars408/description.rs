@@ -19,7 +19,7 @@ fn described() -> Vec<Described> {
 /// Every field the library names, by its message and its name in the description.
 fn fields(message: Message) -> Vec<(&'static str, Signal)> {
     match message {
-        Message::Ars408Configuration => vec![
+        Message::RadarConfiguration => vec![
             ("MaxDistance_valid", set::MAX_DISTANCE_VALID),
             ("SensorID_valid", set::SENSOR_ID_VALID),
             ("RadarPower_valid", set::POWER_VALID),

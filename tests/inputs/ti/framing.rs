@@ -5,7 +5,7 @@ use viewshed::inputs::ti::{Flaw, Ti, TiConfig, TiFamily};
 use super::frames::{Frame, MAGIC, floats, shorts};
 use super::{Got, feed, radar};
 
-/// A usual frame of a family, with a few points at distances that tell its number.
+/// A usual frame of a family, with a few points at distances that contain its number.
 fn usual(family: TiFamily, number: u32) -> Frame {
     let y = 10.0 + number as f32;
     match family {

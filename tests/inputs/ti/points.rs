@@ -143,10 +143,10 @@ fn a_frame_behind_48_bytes_byte_by_byte() {
 }
 
 /// Units of an item of type 301, what it says of its points, and points: x, y, z, velocity, then ratio and noise.
-fn extended(told: [i16; 2], points: &[([i16; 4], [u8; 2])]) -> Vec<u8> {
+fn extended(announced: [i16; 2], points: &[([i16; 4], [u8; 2])]) -> Vec<u8> {
     let units = floats(&[[0.01, 0.02, 0.25, 1.0]]);
     let points = points.iter().flat_map(|(four, two)| [shorts(four), two.to_vec()].concat());
-    [units, shorts(&told), points.collect()].concat()
+    [units, shorts(&announced), points.collect()].concat()
 }
 
 #[test]
@@ -225,7 +225,7 @@ fn points_of_sdk_1_are_indices_and_fixed_point() {
     // x = 1 m to the right, y = 20 m; x = 2 m to the left, y = 10 m, z = 0.5 m
     assert_eq!(d.iter().map(|d| d.range_cm).collect::<Vec<_>>(), [2002, 1021]);
     assert!(d[0].azimuth.raw() < 0 && d[1].azimuth.raw() > 0);
-    // the same behind 40 bytes, by the version
+    // the same after 40 bytes, by the version
     (frame.family, frame.version) = (TiFamily::Bytes40, 0x0200_0004);
     assert_eq!(detections(dialect, &frame), d);
     // and without a Doppler step there is no velocity, so no detection

@@ -59,7 +59,7 @@ proptest! {
         prop_assert!(radar.counters().frames as usize * 8 + radar.counters().stray_bytes as usize <= bytes.len() + 7);
     }
 
-    /// Bytes flipped, lost and inserted: a frame without a fault right behind one comes through.
+    /// Bytes flipped, lost and inserted: a frame without a fault right after one comes through.
     #[test]
     fn a_damaged_stream_recovers(
         damage in prop::collection::vec((0_usize..3000, 0_u8..3, any::<u8>()), 0..20),

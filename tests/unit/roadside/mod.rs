@@ -256,7 +256,7 @@ impl World {
         self.statuses.each_ref().map(|all| all.iter().copied().filter(|ms| *ms > from).collect())
     }
 
-    /// What the receivers were told of the sender: bus, serial line.
+    /// What the receivers got of the sender's status: bus, serial line.
     fn status(&self) -> [Status; 2] {
         [&self.bus, &self.line].map(|far| *far.sensor(SENSOR).unwrap().status().unwrap())
     }
@@ -374,7 +374,7 @@ fn what_nobody_acknowledges_is_taken_back_and_never_sent_late() {
     world.run(400);
     assert!(world.ports.broadcast.aborted >= 3, "{}", world.ports.broadcast.aborted);
     let status = world.status()[1];
-    assert_eq!((status.state, status.reason), (UnitState::Degraded, Reason::BusOverload), "told on the other line");
+    assert_eq!((status.state, status.reason), (UnitState::Degraded, Reason::BusOverload), "reported on the other line");
     assert!(world.visible()[1] > 1000, "which is not held up");
     world.ports.broadcast.stuck = false;
     world.run(1000);
@@ -426,13 +426,13 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
 
 #[test]
 fn work_that_takes_longer_than_the_time_between_scans_is_told() {
-    for (work_ms, told) in [(60, false), (70, true)] {
+    for (work_ms, reported) in [(60, false), (70, true)] {
         let mut world = World::with_settings();
         world.run(1000);
         world.work_ms = work_ms;
         world.run(300);
         let overrun = world.status().iter().all(|s| (s.state, s.reason) == (UnitState::Degraded, Reason::Overrun));
-        assert_eq!(overrun, told, "{work_ms} ms: {:?}", world.status());
+        assert_eq!(overrun, reported, "{work_ms} ms: {:?}", world.status());
         world.work_ms = 0;
         world.run(2500);
         assert_eq!(world.last.unwrap().state, UnitState::Ok);

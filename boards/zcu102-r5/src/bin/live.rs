@@ -39,7 +39,7 @@ extern "C" fn main() -> ! {
     // answers without a gap: time comes in steps here
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
     let mut session = CanBench::new(Radar::new(Ars408Config::sensor(SENSOR)));
-    let (mut starts, mut told) = (0, false);
+    let (mut starts, mut has_time) = (0, false);
 
     loop {
         let epoch = flash.start();
@@ -49,8 +49,8 @@ extern "C" fn main() -> ! {
         let Some(timing) = bus.timing(CAN_CLOCK_HZ) else { exit(1) };
         let mut can = Can::new(timing);
         let mut keeper = BusKeeper::start(&bus, &mut can);
-        while !told {
-            told = session.clock(&mut keeper, &mut can);
+        while !has_time {
+            has_time = session.clock(&mut keeper, &mut can);
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
