@@ -144,7 +144,6 @@
 #[cfg(test)]
 extern crate std;
 
-/// The same scans on a controller and on a PC, compared, stage by stage.
 #[cfg(feature = "bench")]
 pub mod bench;
 #[cfg(doc)]

@@ -205,6 +205,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     pub const ELEVATIONS: usize = E;
     /// Words of 32 range cells.
     pub const WORDS: usize = W;
+    /// Moving obstacles.
+    pub const OBSTACLES: usize = N;
     /// Detections a scan.
     pub const DETECTIONS: usize = D;
 

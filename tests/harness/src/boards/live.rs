@@ -10,6 +10,7 @@ use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::unit::profile::{reference, small};
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::SerialSession;
@@ -72,19 +73,19 @@ type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
 
 fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
     match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(bytes, send, after),
-        Profile::Small => work::<100, 64, 8, 4, 28, 176>(bytes, send, after),
+        Profile::Reference => work(Box::new(reference::State::new()), bytes, send, after),
+        Profile::Small => work(Box::new(small::State::new()), bytes, send, after),
     }
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+    mut state: Box<Radar3d<R, A, E, W, N, D>>,
     bytes: &mut dyn Iterator<Item = u8>,
     send: &mut dyn FnMut(&[u8]),
     after: After<'_>,
 ) {
     let mut flash = Flash::ERASED;
     let mut line = Answer(send);
-    let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
     let mut map = Box::new(PolarMap::<R, A>::NOWHERE);
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     'start: loop {

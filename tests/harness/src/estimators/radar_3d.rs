@@ -19,7 +19,7 @@ pub const ELEVATIONS: usize = State::ELEVATIONS;
 
 struct Driver<const D: usize> {
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
-    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 7, 96, D>>,
+    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
     intake: Intake,
 }
