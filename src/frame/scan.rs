@@ -104,7 +104,7 @@ impl<const D: usize> Scan<D> {
     }
 }
 
-/// Steps of strength that are told apart, of half a decibel.
+/// Steps of strength that are distinguished, of half a decibel.
 const STEPS: usize = 256;
 
 /// The first step's strength, half dB.

@@ -437,7 +437,7 @@ mod tests {
             let _: Claimed<4> = all.step(&seen, Step::from_micros(66_667), &t, |_, _| true);
             frames += 1;
         }
-        // after 2 m of way, which takes it two frames behind the first
+        // after 2 m of way, which takes it two frames after the first
         assert_eq!(frames, 3);
     }
 }

@@ -148,14 +148,14 @@ fn before_the_first_frame_after_the_hold_time_and_when_blind_all_is_unknown() {
 
 /// Conditions over one and a half seconds of frames, 15 a second, and whether anything is on the last map.
 fn conditions(rig: &mut Rig, status: FrameStatus, detections: &[Detection]) -> (Vec<Condition>, bool) {
-    let told = (0..23)
+    let conditions = (0..23)
         .map(|_| {
             let now = rig.now();
             rig.frames += 1;
             rig.state.process(&rig.parameters, now, detections, status, &mut rig.map).condition
         })
         .collect();
-    (told, (20..200).any(|x| rig.visibility(f64::from(x), 0.0) != Visibility::Unknown))
+    (conditions, (20..200).any(|x| rig.visibility(f64::from(x), 0.0) != Visibility::Unknown))
 }
 
 #[test]
@@ -184,9 +184,9 @@ fn rejected_is_not_empty() {
     ];
     for (what, sensor, refused, detections) in cases {
         let mut rig = Rig::new(sensor);
-        let (told, known) = conditions(&mut rig, FrameStatus { fault: false, refused }, &detections);
-        assert_eq!(told.first(), Some(&Condition::Healthy), "{what}");
-        assert_eq!(told.last(), Some(&Condition::Unusable), "{what}: unknown within 1.5 s");
+        let (seen, known) = conditions(&mut rig, FrameStatus { fault: false, refused }, &detections);
+        assert_eq!(seen.first(), Some(&Condition::Healthy), "{what}");
+        assert_eq!(seen.last(), Some(&Condition::Unusable), "{what}: unknown within 1.5 s");
         assert!(!known, "{what}");
     }
 }
@@ -205,8 +205,8 @@ fn weak_clutter_few_detections_and_what_stands_at_the_sensors_feet_stay_visible(
         ("the roof of a lorry under the gantry", vec![at(9.0, 1.0, 4.0)]),
     ];
     for (what, detections) in cases {
-        let (told, known) = conditions(&mut Rig::new(sensor), FrameStatus::default(), &detections);
-        assert!(known && told.iter().all(|c| *c == Condition::Healthy), "{what}: {told:?}");
+        let (seen, known) = conditions(&mut Rig::new(sensor), FrameStatus::default(), &detections);
+        assert!(known && seen.iter().all(|c| *c == Condition::Healthy), "{what}: {seen:?}");
     }
 }
 

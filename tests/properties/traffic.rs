@@ -71,7 +71,7 @@ impl Mover {
 }
 
 fn movers() -> impl Strategy<Value = Vec<Mover>> {
-    // many of them close to the boresight, where range tells how far they got
+    // many of them close to the boresight, where range says how far they got
     let mover = (any_detection(), 0..6_u32, -400..400_i16, 1..8_u8).prop_map(|(d, narrow, spacing_cm, count)| {
         let azimuth = Angle::from_raw(d.azimuth.raw() >> narrow);
         Mover { first: Detection { azimuth, snr_half_db: None, rcs_half_dbsm: None, ..d }, spacing_cm, count }

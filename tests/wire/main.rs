@@ -11,9 +11,11 @@ mod bus_description;
 #[cfg(feature = "secoc")]
 mod bus_description_secured;
 mod c_receiver;
+mod configuration_block;
 mod e2e;
 mod fail_safe;
 mod maps;
 #[cfg(feature = "secoc")]
 mod secured;
 mod specification;
+mod worked_example;

@@ -2,12 +2,13 @@
 
 use std::collections::VecDeque;
 
-use crate::shadows::{A, Map, Shadows, W, header};
+use crate::shadows::{A, Map, R, Shadows, W, header};
+use viewshed::fixed::bits::Bits;
 use viewshed::fixed::time::Time;
 use viewshed::map::query::{self, Answer};
 use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
-use viewshed::wire::code::ray::Ray;
+use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Plane, Received};
@@ -388,6 +389,54 @@ fn conflict(others: Epoch) {
             2600..4000 => assert!(!visible && condition == Condition::Conflict, "{now}"),
             _ => {}
         }
+    }
+}
+
+/// All cells are known, and none is visible.
+struct Dark;
+
+impl Layers<W> for Dark {
+    fn ray(&self, _: Plane, _: usize) -> Ray<W> {
+        Ray::new(Known::new(0, R), Bits::NONE)
+    }
+}
+
+#[test]
+fn of_two_senders_with_one_epoch_and_one_header_the_one_whose_clock_is_ahead_is_shown() {
+    // the second sender begins after 2 s, its clock so much after or before the first one's
+    for (other_ms, ahead) in [(9000, true), (7000, false)] {
+        let mut line = Line::<1>::new(MEDIA[0], BroadcastConfig::new(SENSOR, MEDIA[0]));
+        let config = BroadcastConfig::new(SENSOR, MEDIA[0]);
+        line.sender = Broadcaster::new(config, header(7), Epoch::new(3), ms(8000)).unwrap();
+        let mut other = Broadcaster::<A, W>::new(config, header(7), Epoch::new(3), ms(other_ms + 2000)).unwrap();
+        let map = Shadows::new(2).next();
+        let mut shown = [0; 2];
+        for now in 0..6000 {
+            if now % 67 == 0 {
+                let _ = line.sender.scan(ms(8000 + now), &map);
+            }
+            if now % 67 == 30 && now >= 2000 {
+                let _ = other.scan(ms(other_ms + now), &Dark);
+            }
+            if let Some(frame) = line.sender.next_frame(ms(8000 + now)) {
+                let _ = line.receiver.frame(ms(now), &frame);
+            }
+            if let Some(frame) = other.next_frame(ms(other_ms + now)).filter(|_| now >= 2000) {
+                let _ = line.receiver.frame(ms(now), &frame);
+            }
+            let condition = line.receiver.sensor(SENSOR).unwrap().condition(ms(now), &Limits::DEFAULT);
+            assert!(condition != Condition::Conflict, "nothing contradicts");
+            let rays = line.received(Plane::Visibility, ms(now));
+            let dark: Ray<W> = Dark.ray(Plane::Visibility, 0);
+            let of_other = rays.iter().filter(|ray| **ray == dark).count();
+            let of_first = rays.iter().filter(|ray| **ray != dark && !ray.known.is_empty()).count();
+            assert!(of_other == 0 || of_first == 0, "never both, {now}");
+            if now > 3500 {
+                shown[0] += usize::from(of_first > 0);
+                shown[1] += usize::from(of_other > 0);
+            }
+        }
+        assert!(shown[usize::from(ahead)] > 2300 && shown[usize::from(!ahead)] == 0, "{shown:?}");
     }
 }
 

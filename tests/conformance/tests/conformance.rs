@@ -190,8 +190,22 @@ fn every_class(count: u64, runs_of: impl Fn(&str) -> (u64, u64) + Sync) {
         })
         .collect();
     let all: Vec<(Bus, Class)> = logs::names().collect();
-    let wrong: Vec<String> =
-        all.par_iter().flat_map_iter(|(bus, class)| runs(*class, *bus, &maps, count, &others).1).collect();
+    let each = |(bus, class): &(Bus, Class)| {
+        let (figures, wrong) = runs(*class, *bus, &maps, count, &others);
+        if count >= 100 {
+            // an hour is long: what is done is shown as it is done, past the test's own capture
+            let (name, arrived) = (class.name(), 100.0 * figures.arrived());
+            let Figures { looks, wrong_looks, .. } = figures;
+            let _ = writeln!(
+                std::io::stderr(),
+                "{name} {}: {looks} looks, {wrong_looks} wrong, {arrived:.1} % arrive, {} complaints",
+                bus.name(),
+                wrong.len()
+            );
+        }
+        wrong
+    };
+    let wrong: Vec<String> = all.par_iter().flat_map_iter(each).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

@@ -31,10 +31,10 @@ pub struct Step {
 }
 
 impl Step {
-    /// The frame that tells the time, and the others.
+    /// The frame of the time, and the others.
     pub fn all(&self) -> impl Iterator<Item = CanFrame> {
-        let told = CanFrame::classic(TIME_ID, &self.time.micros().to_be_bytes());
-        told.into_iter().chain(self.frames.iter().copied())
+        let time = CanFrame::classic(TIME_ID, &self.time.micros().to_be_bytes());
+        time.into_iter().chain(self.frames.iter().copied())
     }
 }
 
@@ -97,14 +97,14 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut port = Scripted { frames, step: 0, quiet: false, sent: Vec::new(), starts: 0 };
     let empty = |step: &Step| Sent { time: step.time, frames: Vec::new(), maps: Vec::new(), starts_over: false };
     let mut sent: Vec<Sent> = steps.iter().map(empty).collect();
-    let mut told = false;
+    let mut ticked = false;
     'start: loop {
         let epoch = flash.start();
         let stored = StoredSettings::read(flash, CHECK);
         let [bus, _] = stored.buses();
         let mut keeper = BusKeeper::start(&bus, &mut port);
-        while !told && port.frames.peek().is_some() {
-            told = session.clock(&mut keeper, &mut port);
+        while !ticked && port.frames.peek().is_some() {
+            ticked = session.clock(&mut keeper, &mut port);
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;

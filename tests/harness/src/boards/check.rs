@@ -57,7 +57,7 @@ pub fn compare(answer: &[u8], here: &[u8], scans: usize) -> Result<Checked> {
     let [used, there] = closing.stack;
     ensure!(
         there == 0 || used < there,
-        "the stack of {there} bytes was used to its end, and what lies behind it overwritten"
+        "the stack of {there} bytes was used to its end, and what lies beyond it overwritten"
     );
     ensure!(frames.len() == scans, "{} scans sent, {} frames answered", scans, frames.len());
     let differs = |(frame, expected): &(&FrameRecord, &u64)| frame.fingerprint != **expected;
@@ -110,9 +110,9 @@ fn fingerprints(answer: &[u8]) -> Vec<u64> {
 fn records(answer: &[u8]) -> Vec<Record> {
     let mut rest = answer;
     let mut all = Vec::new();
-    while let Some((bytes, behind)) = rest.split_first_chunk::<RECORD_LEN>() {
+    while let Some((bytes, after)) = rest.split_first_chunk::<RECORD_LEN>() {
         let Some(record) = Record::from_bytes(bytes) else { break };
-        rest = behind;
+        rest = after;
         if let Record::Map { cells, .. } = record {
             let bytes = 2 * cells.map(usize::from).iter().product::<usize>();
             rest = rest.get(bytes..).unwrap_or(&[]);
@@ -146,12 +146,12 @@ impl Difference {
 /// Range cells, and every cell of the map of a frame.
 fn dumped(answer: &[u8], wanted: usize) -> Option<(usize, Vec<[u8; 2]>)> {
     let mut rest = answer;
-    while let Some((bytes, behind)) = rest.split_first_chunk::<RECORD_LEN>() {
-        rest = behind;
+    while let Some((bytes, after)) = rest.split_first_chunk::<RECORD_LEN>() {
+        rest = after;
         if let Record::Map { frame, cells } = Record::from_bytes(bytes)? {
             let [ranges, azimuths] = cells.map(usize::from);
-            let (grades, behind) = rest.split_at_checked(ranges * azimuths)?;
-            let occupancy = behind.get(..ranges * azimuths)?;
+            let (grades, after) = rest.split_at_checked(ranges * azimuths)?;
+            let occupancy = after.get(..ranges * azimuths)?;
             let cells = grades.iter().zip(occupancy).map(|(g, o)| [*g, *o]).collect();
             return (frame as usize == wanted).then_some((ranges, cells));
         }

@@ -118,8 +118,8 @@ pub fn can(board: Board, name: &str, settings: &Settings, steps: &[Step]) -> Res
     let turns: Vec<Turn> = expected
         .iter()
         .map(|sent| {
-            let (board, behind) = rest.split_at(sent.frames.len().min(rest.len()));
-            rest = behind;
+            let (board, after) = rest.split_at(sent.frames.len().min(rest.len()));
+            rest = after;
             let heard = |frames: &[CanFrame]| frames.iter().copied().map(Heard::Frame).collect();
             Turn { time: sent.time, host: heard(&sent.frames), board: heard(board) }
         })

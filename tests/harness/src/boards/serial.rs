@@ -69,7 +69,7 @@ pub struct SerialBoard {
 
 /// A serial line with a board at its far end, emulated or real.
 pub trait Far {
-    /// Puts in some of the bytes, and tells how many.
+    /// Puts in some of the bytes, and returns how many.
     ///
     /// # Errors
     /// The line is gone.

@@ -7,7 +7,7 @@
 
 use viewshed::wire::frame::{CanFrame, CanId};
 
-/// Bits behind the check sum: its delimiter, acknowledgement, end of frame, intermission.
+/// Bits after the check sum: its delimiter, acknowledgement, end of frame, intermission.
 const TAIL: u32 = 13;
 
 /// Bits of a frame, at the nominal rate and at CAN FD's data rate.
@@ -41,7 +41,7 @@ impl Sequence {
             last = Some(bit);
             before.push(stuffed);
         }
-        // one may be due behind the last bit
+        // one may be due after the last bit
         before.push(stuffed + u32::from(run == 5));
         before
     }
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn the_check_sum_is_cans() {
-        // of the number 1 behind 14 zeros: the polynomial itself
+        // of the number 1 after 14 zeros: the polynomial itself
         let mut bits = vec![false; 14];
         bits.push(true);
         assert_eq!(crc_15(&bits), 0x4599);

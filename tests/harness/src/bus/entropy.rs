@@ -1,4 +1,4 @@
-//! How little a map could be told in: the entropy of its cells, given what is known already.
+//! How few bits a map needs: the entropy of its cells, given what is known already.
 //!
 //! Counted, not modelled: for every known cell the neighbours that a decoder has before it make a
 //! context, and the bits of the cell under that context are counted over the whole recording.

@@ -1,4 +1,4 @@
-//! What a log of a bus tells of the maps on it.
+//! The maps in a log of a bus.
 
 use std::collections::BTreeMap;
 
@@ -49,7 +49,7 @@ pub struct Heard {
     pub condition: String,
     pub epoch: Option<u8>,
     pub header: Option<Mounted>,
-    pub status: Option<Told>,
+    pub status: Option<StatusSeen>,
     pub counters: Counted,
     pub maps: Vec<Moment>,
 }
@@ -73,7 +73,7 @@ pub struct Mounted {
 
 /// The status.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Told {
+pub struct StatusSeen {
     pub state: String,
     pub reason: String,
     pub reset_cause: String,
@@ -197,7 +197,7 @@ impl Listening {
                 fingerprint: h.fingerprint,
             }
         });
-        let status = sensor.status().map(|s| Told {
+        let status = sensor.status().map(|s| StatusSeen {
             state: format!("{:?}", s.state),
             reason: format!("{:?}", s.reason),
             reset_cause: format!("{:?}", s.reset_cause),
@@ -235,7 +235,7 @@ impl Listening {
     }
 }
 
-/// A cell as pictures show it: occupied only where that is told.
+/// A cell as pictures show it: occupied only where that is sent.
 pub fn shown(map: &Map<'_>, azimuth: usize, range: usize) -> CellState {
     let cell = map.cell(azimuth, range);
     let occupied = cell.occupied && map.has(Plane::Occupancy) && cell.visibility != Visibility::Unknown;

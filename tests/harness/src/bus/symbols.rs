@@ -82,8 +82,8 @@ impl Symbols {
         let all = tables(&BELOW);
         let (mut at, mut words) = (0, 0);
         while at < scan.now.len() {
-            let mut told = Words::NONE;
-            let mut coder = Counting { encoder: Encoder::new(&mut told, form), seen: Vec::new() };
+            let mut words_out = Words::NONE;
+            let mut coder = Counting { encoder: Encoder::new(&mut words_out, form), seen: Vec::new() };
             let end = block::encode(&mut coder, &context, kind, at, scan);
             let Counting { encoder, seen } = coder;
             encoder.finish();
@@ -92,7 +92,7 @@ impl Symbols {
                     self.0[place][symbol] += 1;
                 }
             }
-            words += if end == at { 12 } else { told.as_slice().len() };
+            words += if end == at { 12 } else { words_out.as_slice().len() };
             at = end.max(at + 1);
         }
         words

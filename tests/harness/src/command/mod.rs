@@ -42,7 +42,7 @@ enum Command {
 }
 
 impl Cli {
-    /// Runs the subcommand; an error has been told on stderr.
+    /// Runs the subcommand; an error has been printed to stderr.
     pub fn run(&self) -> ExitCode {
         let outcome = match &self.command {
             Command::Replay(args) => replay::run(args),

@@ -93,7 +93,7 @@ struct ReadingArgs {
     to: Option<f64>,
 }
 
-/// What a raw log or capture does not tell of its radar.
+/// What a raw log or capture does not say of its radar.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct KindArgs {
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
@@ -102,13 +102,13 @@ pub struct KindArgs {
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
     pub ti_header: Option<TiFamily>,
-    /// What a TI mmWave capture does not tell of its firmware, between commas [default: none of it]
+    /// What a TI mmWave capture does not say of its firmware, between commas [default: none of it]
     ///
     /// degrees       angles of spherical points (type 1000) are in degrees, not radians
-    /// raised        points behind 52 bytes have an elevation
+    /// raised        points after 52 bytes have an elevation
     /// no-elevation  the antenna measures none
     /// targets       take the tracked targets in place of the points
-    /// doppler=M/S   velocity of a Doppler step, without which SDK 1 and 2 tell none
+    /// doppler=M/S   velocity of a Doppler step, without which SDK 1 and 2 have none
     #[arg(long, value_name = "LIST", value_parser = ti_dialect, verbatim_doc_comment)]
     pub ti_dialect: Option<TiDialect>,
 }

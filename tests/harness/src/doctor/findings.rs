@@ -257,8 +257,8 @@ fn faults(found: &mut Findings, sensor: &Sensor) {
                 (Severity::Warning, "another radar of the band faces it: turn one, or set another frequency".to_owned())
             }
             "speed missing" | "yaw rate missing" => {
-                let told: Vec<String> = standing(sensor.sensor).map(|f| format!("{f:?}")).collect();
-                (Severity::Warning, format!("tell it that it stands: send {} every 50 ms", told.join(" and ")))
+                let frames: Vec<String> = standing(sensor.sensor).map(|f| format!("{f:?}")).collect();
+                (Severity::Warning, format!("tell it that it stands: send {} every 50 ms", frames.join(" and ")))
             }
             "supply voltage" => (Severity::Error, "it wants 8 to 32 V at its plug, under load".to_owned()),
             "temperature" => (Severity::Error, "let it cool; shade it".to_owned()),

@@ -125,7 +125,7 @@ fn judge(report: &Report, family: Option<TiFamily>, entries: Entries) -> Vec<Fin
             if tracked {
                 "switch points on, or take the targets that are there with --ti-dialect targets"
             } else {
-                "switch points on: the first value behind the sub-frame in guiMonitor is 1 or 2. SDK 1 and 2 send Doppler steps, which need the configuration's velocity resolution: --ti-dialect doppler=M/S"
+                "switch points on: the first value after the sub-frame in guiMonitor is 1 or 2. SDK 1 and 2 send Doppler steps, which need the configuration's velocity resolution: --ti-dialect doppler=M/S"
             },
         );
     }

@@ -206,7 +206,7 @@ impl Intake {
     }
 
     fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {
-        // those that are no detections are told apart here
+        // those that are no detections are counted apart here
         let gate = Rejection::ALL.into_iter().filter(|r| *r != Rejection::Refused);
         let gate = gate.map(|r| (r.name(), u64::from(rejections.count(r))));
         let absurd = (ABSURD, self.absurd);

@@ -23,7 +23,7 @@ use crate::recording::{Frame, Recording};
 /// Sub-columns a column is divided into.
 const SUB_COLUMNS: usize = 8;
 
-/// Part of a column, around its centre, over which the share is taken. A bit tells the visibility at
+/// Part of a column, around its centre, over which the share is taken. A bit is the visibility at
 /// the centre, so what stands beside the centre line must not fill the cell.
 const WINDOW: f64 = 0.5;
 

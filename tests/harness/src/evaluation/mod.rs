@@ -29,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use crate::estimators;
 use crate::recording::ReadOptions;
 
-/// Everything a replay can be told.
+/// Every option of a replay.
 #[derive(Debug, Clone, Default)]
 pub struct Settings {
     pub reading: ReadOptions,

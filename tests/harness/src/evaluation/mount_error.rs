@@ -1,4 +1,4 @@
-//! How the rates move when the estimators are told a wrong mount.
+//! How the rates move when the estimators are given a wrong mount.
 //!
 //! A wrong pitch or height makes silent errors: the map looks as good as ever. So every estimator is
 //! run again with the mount off by a little each way, and scored against the samples of the true one.
@@ -40,7 +40,7 @@ impl Extent {
 /// The rates under one wrong mount.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sensitivity {
-    /// Mount as told to the estimators minus true mount.
+    /// Mount as given to the estimators minus true mount.
     pub error: Extent,
     pub estimators: Vec<Moved>,
 }
@@ -80,7 +80,7 @@ pub fn misplaced(recording: &Recording, error: Extent) -> Result<Recording> {
     Ok(altered)
 }
 
-/// Runs every estimator again under each error. `progress` is told each frame an estimator has done.
+/// Runs every estimator again under each error. `progress` is called after each frame of each estimator.
 ///
 /// # Errors
 /// A mount that would not be above the road, or that the estimators refuse.

@@ -1,4 +1,4 @@
-//! Several recordings judged as one: their seconds in a row, their tracks told apart.
+//! Several recordings judged as one: their seconds in a row, their tracks kept apart.
 //!
 //! A long recording is first summed up by seconds, the blocks that cells are drawn again by ([`super::units`]):
 //! what rates and intervals are made of stays, the maps' cells frame by frame go.

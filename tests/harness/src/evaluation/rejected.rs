@@ -22,7 +22,7 @@ fn hint(reason: &str) -> &'static str {
 }
 
 /// Adds it to the recording's problems where most of the points were rejected.
-pub fn tell(recording: &mut Recording, scores: &[Score]) {
+pub fn report(recording: &mut Recording, scores: &[Score]) {
     let outside = [Rejection::Range, Rejection::Azimuth, Rejection::Elevation].map(Rejection::name);
     let all: u64 = recording.frames.iter().map(|f| f.detections.len() as u64 + f.refused).sum();
     let counted = scores.iter().map(|s| {

@@ -21,7 +21,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Runs estimators over a recording. `progress` is told each of [`steps`] done.
+    /// Runs estimators over a recording. `progress` is called after each of [`steps`].
     pub fn new(
         mut recording: Recording,
         estimators: &mut [Box<dyn Estimator>],
@@ -33,7 +33,7 @@ impl Replay {
             .par_iter_mut()
             .map(|e| score(e.as_mut(), &recording, &samples, options.grid, &|| progress()))
             .collect();
-        rejected::tell(&mut recording, &scores);
+        rejected::report(&mut recording, &scores);
         let summary = Summary::new(&recording, &samples, &scores, options);
         Self { recording, samples, scores, summary }
     }

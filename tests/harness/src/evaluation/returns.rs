@@ -12,7 +12,7 @@ use crate::recording::Recording;
 
 /// Width of a range band, metres.
 pub const BAND_M: f64 = 12.5;
-/// Fewest objects a band is told with.
+/// Fewest objects a band is reported with.
 const FEWEST: usize = 10;
 
 /// Vehicles that are compared with each other.

@@ -43,9 +43,9 @@ pub struct FrameSamples {
     pub cells: Vec<(Cell, bool)>,
 }
 
-/// Samples of every frame. Without labels no frame has any, but warm-up is told from the rest.
+/// Samples of every frame. Without labels no frame has any, but warm-up is kept apart from the rest.
 ///
-/// `progress` is told each frame done.
+/// `progress` is called after each frame.
 pub fn collect(recording: &Recording, options: &Options, progress: &(dyn Fn() + Sync)) -> Vec<FrameSamples> {
     collect_every(recording, options, 1, progress)
 }

@@ -50,7 +50,7 @@ impl Score {
     }
 }
 
-/// Scores one estimator over a whole recording. `progress` is told each frame done.
+/// Scores one estimator over a whole recording. `progress` is called after each frame.
 pub fn score(
     estimator: &mut dyn Estimator,
     recording: &Recording,

@@ -9,7 +9,7 @@ const AREA_EPSILON: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Convex(Vec<Point>);
 
-/// An upright rectangle, to tell cheaply what cannot meet.
+/// An upright rectangle, to find cheaply what cannot meet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     low: Point,

@@ -56,7 +56,7 @@ pub fn box_in_sight<'a>(sensor: [f64; 3], target: &Solid, others: impl IntoItera
     uncovered_area(outline, &covers) > VISIBLE_AREA * 1e-6
 }
 
-/// Whether two boxes can lie in one direction at all, told from the circles around their footprints.
+/// Whether two boxes can lie in one direction at all, judged from the circles around their footprints.
 fn may_overlap(sensor: [f64; 3], a: &Solid, b: &Solid) -> bool {
     let seen = |s: &Solid| {
         let (dx, dy) = (s.center[0] - sensor[0], s.center[1] - sensor[1]);

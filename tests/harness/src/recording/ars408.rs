@@ -51,7 +51,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
     if frames.is_empty() {
         bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");
     }
-    tell(&mut problems, &interface, start, radar.counters());
+    report(&mut problems, &interface, start, radar.counters());
     let kind = Kind {
         name: format!("{} {sensor} on {interface}", profile.name),
         azimuth_deg: 60.0,
@@ -145,8 +145,8 @@ fn choose(name: &str, lines: &[Line], options: &ReadOptions) -> Result<(String, 
 }
 
 /// What the decoder counted, as problems of the input.
-fn tell(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counters) {
-    let told = [
+fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counters) {
+    let counted = [
         ("scan of which entries or qualities are missing", c.incomplete),
         ("scan of which most is missing, dropped", c.broken),
         ("scan that never came, by the radar's counter", c.lost),
@@ -160,7 +160,7 @@ fn tell(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counters
         ("entry that the radar itself marks as predicted or invalid, left out", c.unwanted),
         ("entry beyond what is kept, dropped", c.overflow),
     ];
-    for (what, n) in told {
+    for (what, n) in counted {
         problems.add_many(interface, what, start, u64::from(n));
     }
 }

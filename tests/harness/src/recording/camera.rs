@@ -52,7 +52,7 @@ pub struct CameraFrame {
     pub boxes: Vec<Box2d>,
 }
 
-/// The message of a frame. Boxes are told to a quarter of a pixel.
+/// The message of a frame. Boxes are written to a quarter of a pixel.
 pub fn message(frame: &CameraFrame, header: &Header) -> Detection2DArray {
     let quarter = |v: f64| (v * 4.0).round() / 4.0;
     let detection = |b: &Box2d| {

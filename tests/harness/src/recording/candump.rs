@@ -38,7 +38,7 @@ impl Line {
         };
         // `candump -x` says at the end whether the frame was received or sent
         if words.any(|word| word != "R" && word != "T") {
-            return Err("more behind the frame than `R` or `T`".into());
+            return Err("more after the frame than `R` or `T`".into());
         }
         Ok(Self { time_ns: nanoseconds(time)?, interface: interface.to_owned(), content: content(frame)? })
     }
@@ -173,7 +173,7 @@ mod tests {
             ("(5.1) can0 0060A#00", "identifier"),
             ("(5.-1) can0 60A#00", "not a time"),
             ("(99999999999999999999.1) can0 60A#00", "not a time"),
-            ("(5.1) can0 60A#00 what", "more behind"),
+            ("(5.1) can0 60A#00 what", "more after"),
             ("(5.1) can0 60A#é0", "not whole bytes"),
         ] {
             let error = Line::parse(text).unwrap_err();

@@ -1,4 +1,4 @@
-//! Raw captures: what they do not say of their sensor is assumed, and told.
+//! Raw captures: what they do not say of their sensor is assumed, and reported.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use super::{FieldOfView, Frame, RadarDetection, ReadOptions, Recording, Sensor};
 use crate::geometry::pose::SensorPose;
 use viewshed::frame::detection::Detection;
 
-/// Height of a mount that is not told, metres: a usual pole or gantry.
+/// Height of a mount that is not given, metres: a usual pole or gantry.
 const HEIGHT_M: f64 = 6.0;
 
 /// A kind of radar, as its data sheet has it.
@@ -19,7 +19,7 @@ pub struct Kind {
     pub has_elevation: bool,
 }
 
-/// A recording of a raw capture's frames. Mount and field of view that are not given are assumed and told.
+/// A recording of a raw capture's frames. Mount and field of view that are not given are assumed and reported.
 pub fn recording(
     name: String,
     kind: Kind,
@@ -31,8 +31,7 @@ pub fn recording(
     let pose = match options.mount {
         Some([x, y, z, yaw, pitch, roll]) => SensorPose::new([x, y, z], yaw, pitch, roll),
         None => {
-            let what =
-                format!("a raw capture tells no mount: {HEIGHT_M} m high and level assumed; give it with --mount");
+            let what = format!("a raw capture has no mount: {HEIGHT_M} m high and level assumed; give it with --mount");
             problems.add("capture", what, start);
             SensorPose::new([0.0, 0.0, HEIGHT_M], 0.0, 0.0, 0.0)
         }
@@ -40,7 +39,7 @@ pub fn recording(
     let field_of_view = options.field_of_view.unwrap_or_else(|| {
         let (azimuth, elevation, [near, far]) = (kind.azimuth_deg, kind.elevation_deg, kind.range_m);
         let what = format!(
-            "a raw capture tells no field of view: +-{azimuth} and +-{elevation} degrees, {near} to {far} m assumed; give it with --fov"
+            "a raw capture has no field of view: +-{azimuth} and +-{elevation} degrees, {near} to {far} m assumed; give it with --fov"
         );
         problems.add("capture", what, start);
         FieldOfView {

@@ -131,7 +131,7 @@ pub struct ReadOptions {
     pub profile: Option<&'static viewshed::inputs::ars408::profile::Ars408Profile>,
     /// Kind of header of a TI capture.
     pub ti_header: Option<viewshed::inputs::ti::TiFamily>,
-    /// What a TI capture does not tell of its firmware.
+    /// What a TI capture does not say of its firmware.
     pub ti_dialect: Option<viewshed::inputs::ti::TiDialect>,
     /// Time between frames of a TI capture.
     pub frame_period_s: Option<f64>,

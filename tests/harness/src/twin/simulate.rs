@@ -262,7 +262,7 @@ impl Simulation {
         }
     }
 
-    /// Simulates everything and writes it. `progress` is told each radar frame done.
+    /// Simulates everything and writes it. `progress` is called after each radar frame.
     ///
     /// # Errors
     /// Those of [`Simulation::step`], and a sink that takes no more.

@@ -99,8 +99,8 @@ fn a_board_behind_a_port_that_hears_something_else_fails_with_a_picture() {
     let (output, json) = replay(&folder, "motorway.mcap", &["--port", &path, "--profile", "small", "--to", "3"]);
     assert!(!output.status.success());
     assert!(json[0]["equal"].as_u64() < json[0]["scans"].as_u64(), "{json}");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("here") && told.contains("difference.png"), "{told}");
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(printed.contains("here") && printed.contains("difference.png"), "{printed}");
     let pictures = std::fs::read_dir(folder.join("out/live")).unwrap().count();
     assert_eq!(pictures, 3, "here, there, and what differs");
 }
@@ -112,6 +112,6 @@ fn a_port_with_nobody_behind_it_is_told() {
     let path = near.name().unwrap();
     let (output, _) = replay(&folder, "motorway.mcap", &["--port", &path, "--to", "3"]);
     assert!(!output.status.success());
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("not answered") || told.contains("takes no more"), "{told}");
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(printed.contains("not answered") || printed.contains("takes no more"), "{printed}");
 }

@@ -107,7 +107,7 @@ fn the_doctor_says_what_a_capture_holds_and_lacks() {
     assert!(report["findings"][0]["do"].as_str().unwrap().contains("guiMonitor"));
 }
 
-/// A frame behind 48 bytes: two compressed points and a target that comes nearer on the left.
+/// A frame after a header of 48 bytes: two compressed points and a target that comes nearer on the left.
 fn people_counting(number: u32, points: bool) -> Vec<u8> {
     let floats = |v: &[f32]| v.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
     let words = |w: &[u32]| w.iter().flat_map(|w| w.to_le_bytes()).collect::<Vec<u8>>();

@@ -77,7 +77,7 @@ mod tests {
             }
         }
         assert!(detections > 150.0);
-        // distances are told in quarters of a standard deviation
+        // distances are in quarters of a standard deviation
         within("mean difference, steps of 255", sum / n, 20.0);
         within("centres apart, mean, m", centre_off / detections, 0.2);
     }

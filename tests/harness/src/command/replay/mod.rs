@@ -64,7 +64,7 @@ pub struct Args {
     breakdown: bool,
     /// Replay again with the mount wrong by this pitch (degrees) and height (metres), each way
     ///
-    /// Only the estimators are told the wrong mount, truth keeps the right one. Without values 0.5,0.2;
+    /// Only the estimators are given the wrong mount, truth keeps the right one. Without values 0.5,0.2;
     /// others as --mount-error=1,0.1
     #[arg(
         long,
@@ -84,7 +84,7 @@ pub struct Args {
     settings: SettingsArgs,
 }
 
-/// Replays one recording after the other. One that cannot be replayed is told, and the rest go on.
+/// Replays one recording after the other. One that cannot be replayed is reported, and the rest go on.
 ///
 /// # Errors
 /// Options that cannot be used at all, and files that cannot be written.

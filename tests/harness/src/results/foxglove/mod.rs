@@ -26,7 +26,7 @@ const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
 
 /// Writes the estimator's maps over `recording`, read from `source` with `options`, to `target`.
 ///
-/// `progress` is told each frame done.
+/// `progress` is called after each frame.
 ///
 /// # Errors
 /// Files that cannot be read or written, and a field of view too large for a grid.

@@ -1,4 +1,4 @@
-//! Colours shared by all pictures, told apart with any colour vision.
+//! Colours shared by all pictures, distinct with any colour vision.
 //!
 //! Ground: blue is visible, orange invisible, hatched grey unknown; the surer the grade, the
 //! stronger the tone. Outlines: the dash says "not detected", the hue says what the map said.

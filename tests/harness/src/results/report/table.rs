@@ -130,7 +130,7 @@ pub fn mount_error(sensitivities: &[Sensitivity]) -> String {
         [row(&name, "FVR / FIR", false), row("", "cell FVR / FIR", true)]
     });
     let table = table(&heading, rows);
-    format!("What a wrong mount does, told to the estimators and not to the truth (points):\n{table}\n")
+    format!("What a wrong mount does, given to the estimators and not to the truth (points):\n{table}\n")
 }
 
 #[cfg(test)]

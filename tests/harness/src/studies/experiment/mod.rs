@@ -93,7 +93,7 @@ pub fn hidden(of_box: &Counts) -> Option<f64> {
 
 impl Experiment {
     /// Simulates and replays every day of the plan. `keep` is given the bytes of each day's recording.
-    /// `progress` is told each of [`total_steps`] done.
+    /// `progress` is called after each of [`total_steps`].
     ///
     /// # Errors
     /// Those of the scene, the traffic and of the estimators' parameters.
@@ -150,7 +150,7 @@ fn rows<'a>(days: &'a [DayResult], name: &str) -> Vec<&'a Row> {
     days.iter().filter_map(|d| d.replay.summary.row(name)).collect()
 }
 
-/// Steps `progress` of [`Experiment::run`] is told of.
+/// Calls of `progress` by [`Experiment::run`].
 ///
 /// # Errors
 /// Those of the scene and the training day's traffic.

@@ -156,7 +156,7 @@ pub struct Counted {
 }
 
 /// Simulates and replays every scene. `keep` is given the name and the bytes of each recording with elevation,
-/// `progress` told each of [`total_steps`] done.
+/// `progress` called after each of [`total_steps`].
 ///
 /// # Errors
 /// Those of the scenes, the traffic and of the estimators' parameters.
@@ -227,7 +227,7 @@ pub fn count(results: &[SceneResult], variant: Variant, warm_up_s: f64, settings
     Some(Counted { variant, pooled, scenes })
 }
 
-/// Steps `progress` of [`run`] is told of.
+/// Calls of `progress` by [`run`].
 pub fn total_steps(scenes: &[Scene], extent: Extent, estimators: u64) -> u64 {
     let frames: u64 = scenes.iter().map(|s| (s.duration_s * s.radar.rate_hz).ceil() as u64).sum();
     // simulated and sampled, and once an estimator; without elevation the samples are there

@@ -36,7 +36,7 @@ use bits::Bits;
 /// Steps in which traffic is followed to find the road, seconds.
 const ROAD_STEP_S: f64 = 0.1;
 
-/// What a search is told.
+/// Options of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Search {
     pub mounts: Vec<Mount>,
@@ -101,7 +101,7 @@ struct Instant {
 }
 
 impl Site {
-    /// Lets every candidate look. `progress` is told each candidate done.
+    /// Lets every candidate look. `progress` is called after each candidate.
     ///
     /// # Errors
     /// Those of the traffic; no candidate that can be; nothing that any of them looks at.

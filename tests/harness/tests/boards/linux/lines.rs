@@ -4,6 +4,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use viewshed::fixed::time::Time;
+use viewshed::inputs::ti::Family;
 use viewshed::map::Visibility;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::Settings;
@@ -18,6 +19,7 @@ use viewshed_harness::boards::scans::Scan;
 
 use super::daemon::{Daemon, tables};
 use super::terminal::{Ear, Terminal};
+use super::ti::Frame;
 use crate::shipped;
 
 const PORTS: &str = "[output]\nmedium = \"serial\"\nport = \"FOLDER/maps\"\n";
@@ -48,7 +50,7 @@ fn content(message: &[u8]) -> (Vec<u8>, Option<Status>) {
     }
 }
 
-/// What maps tell, epoch left out.
+/// Contents of maps, epoch left out.
 fn maps(messages: &[Vec<u8>]) -> Vec<(u8, Vec<u8>)> {
     let is_map = |m: &&Vec<u8>| Received::from_bytes(m).is_ok_and(|r| matches!(r.message, Message::Map(..)));
     messages.iter().filter(is_map).map(|m| (m[3], m[6..].to_vec())).collect()
@@ -260,4 +262,42 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     let gone = |far: &Heard| far.is(UnitState::Starting, Reason::None) && far.visible() == 0;
     assert!(far.until(&ear, gone), "{:?}, {} visible", far.status, far.visible());
     assert!(daemon.log().contains("stopping"), "{}", daemon.log());
+}
+
+/// Frames of a TI radar at 20 Hz, each of these points.
+fn stream_ti(radar: &mut Terminal, numbers: std::ops::Range<u32>, points: &[[f32; 4]]) {
+    for number in numbers {
+        radar.send(&Frame::new(Family::Bytes40, number).cartesian(points).bytes());
+        sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_a_radar_that_sends_nan_is_blind_until_its_first_good_point() {
+    let (settings, _) = shipped(0.1);
+    let folder = Folder::new().unwrap();
+    let begin = Instant::now();
+    let mut radar = Terminal::plug(&folder.0.join("radar"));
+    let ear = Ear::plug(&folder.0.join("maps"), begin);
+    let input = "[input]\nradar = \"ti\"\nport = \"FOLDER/radar\"\n[input.ti]\nheader_bytes = 40\n";
+    let mut daemon = Daemon::start_in(folder, &format!("{input}{PORTS}{PATIENT}{}", tables(&settings)), &[]);
+    daemon.wait_for("started");
+    daemon.wait_for("radar: open");
+    let mut far = Heard::new();
+    stream_ti(&mut radar, 0..40, &[[f32::NAN; 4]; 20]);
+    let blind = |far: &Heard| far.is(State::Blind, Reason::UnusablePoints) && far.visible() == 0;
+    assert!(far.until(&ear, blind), "{:?}", far.status);
+    // and stays so
+    stream_ti(&mut radar, 40..60, &[[f32::NAN; 4]; 20]);
+    let seen = |far: &Heard| far.visible() > 0 || far.is(State::Ok, Reason::None);
+    let heard = ear.heard().len();
+    far.until(&ear, |far| seen(far) || far.taken == heard);
+    assert!(!seen(&far), "{:?}, {} visible", far.status, far.visible());
+    // one point on the road among them is a radar that sees
+    let good = [1.0, 30.0, -5.0, -12.0];
+    stream_ti(&mut radar, 60..80, &[[f32::NAN; 4], good]);
+    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None) && far.visible() > 5000), "{:?}", far.status);
+    daemon.terminate();
+    assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
 }

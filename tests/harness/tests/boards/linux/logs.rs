@@ -25,7 +25,7 @@ const EPOCH: Epoch = Epoch::new(5);
 /// Everything that is sent, and when.
 type Sent = Vec<(u64, CanFrame)>;
 
-/// What a unit sends that hears a log, looks once a millisecond, and is stopped a second behind the log's end.
+/// What a unit sends that hears a log, looks once a millisecond, and is stopped a second after the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
     let mut parameters: Option<Parameters> = None;
     let header = settings.build::<State>(&mut parameters).unwrap();
@@ -45,8 +45,8 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     };
     loop {
         now += 1000;
-        while let Some(((time, frame), behind)) = rest.split_first().filter(|((time, _), _)| *time <= now) {
-            rest = behind;
+        while let Some(((time, frame), after)) = rest.split_first().filter(|((time, _), _)| *time <= now) {
+            rest = after;
             unit.take(&mut decoder, frame, at(*time));
             flush(&mut unit, *time, &mut sent);
         }

@@ -5,3 +5,6 @@ mod lines;
 mod logs;
 mod service;
 mod terminal;
+#[allow(dead_code)] // of every kind of frame, few are sent here
+#[path = "../../../../inputs/ti/frames.rs"]
+mod ti;

@@ -16,14 +16,14 @@ use crate::shipped;
 /// The service manager's end of its socket.
 struct Manager {
     socket: UnixDatagram,
-    told: Vec<String>,
+    states: Vec<String>,
 }
 
 impl Manager {
     fn new(folder: &Folder) -> Self {
         let socket = UnixDatagram::bind(folder.0.join("notify")).unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(10))).unwrap();
-        Self { socket, told: Vec::new() }
+        Self { socket, states: Vec::new() }
     }
 
     /// Listens for a while.
@@ -32,13 +32,13 @@ impl Manager {
         let mut buffer = [0; 1024];
         while started.elapsed() < time {
             if let Ok(n) = self.socket.recv(&mut buffer) {
-                self.told.extend(String::from_utf8_lossy(&buffer[..n]).lines().map(str::to_owned));
+                self.states.extend(String::from_utf8_lossy(&buffer[..n]).lines().map(str::to_owned));
             }
         }
     }
 
     fn count(&self, what: &str) -> usize {
-        self.told.iter().filter(|told| *told == what).count()
+        self.states.iter().filter(|state| *state == what).count()
     }
 }
 
@@ -50,7 +50,7 @@ fn start(folder: Folder, config: &str) -> Daemon {
 
 #[test]
 #[ignore = "needs the daemon"]
-fn linux_the_service_manager_is_told_of_start_frames_and_end() {
+fn linux_the_service_manager_hears_of_start_frames_and_end() {
     let (settings, _) = shipped(0.1);
     let folder = Folder::new().unwrap();
     let mut manager = Manager::new(&folder);
@@ -64,14 +64,14 @@ fn linux_the_service_manager_is_told_of_start_frames_and_end() {
     let begin = Instant::now();
     let mut daemon = start(folder, &config);
     manager.listen(Duration::from_millis(2800));
-    assert_eq!(manager.told.first().map(String::as_str), Some("READY=1"), "{:?}", manager.told);
+    assert_eq!(manager.states.first().map(String::as_str), Some("READY=1"), "{:?}", manager.states);
     let fed = manager.count("WATCHDOG=1");
-    assert!((5..=50).contains(&fed), "{fed}: {:?}", manager.told);
-    assert!(manager.told.iter().any(|told| told.starts_with("STATUS=radar ")), "{:?}", manager.told);
+    assert!((5..=50).contains(&fed), "{fed}: {:?}", manager.states);
+    assert!(manager.states.iter().any(|state| state.starts_with("STATUS=radar ")), "{:?}", manager.states);
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
     assert!((2.9..20.0).contains(&begin.elapsed().as_secs_f64()), "{:?}", begin.elapsed());
     manager.listen(Duration::from_millis(50));
-    assert_eq!(manager.told.last().map(String::as_str), Some("STOPPING=1"), "{:?}", manager.told);
+    assert_eq!(manager.states.last().map(String::as_str), Some("STOPPING=1"), "{:?}", manager.states);
 }
 
 #[test]
@@ -121,9 +121,9 @@ fn linux_a_stored_block_that_cannot_run_leaves_the_daemon_up_answering_and_sayin
         let mut daemon = start(folder, config);
         daemon.wait_for(name);
         manager.listen(Duration::from_millis(1500));
-        assert!(manager.count("WATCHDOG=1") >= 2, "the safe state is no reason for a restart: {:?}", manager.told);
+        assert!(manager.count("WATCHDOG=1") >= 2, "the safe state is no reason for a restart: {:?}", manager.states);
         let status = format!("STATUS=safe state: configuration block: {name}");
-        assert!(manager.told.iter().any(|told| told.starts_with(&status)), "{:?}", manager.told);
+        assert!(manager.states.iter().any(|state| state.starts_with(&status)), "{:?}", manager.states);
         // the service's answers name it as well, and a block is taken
         let has = |text: &[u8]| ear.bytes().windows(text.len()).any(|w| w == text);
         assert!(has(name.as_bytes()), "refused by name");
@@ -131,13 +131,14 @@ fn linux_a_stored_block_that_cannot_run_leaves_the_daemon_up_answering_and_sayin
         script.configure(&settings);
         radar.send(&script.bytes);
         daemon.wait_for_times("started", 2);
-        script.bytes.clear();
+        // at the radar's pace: a burst of scans leaves maps unsent, and the status would say so
         for scan in &scans {
+            script.bytes.clear();
             script.scan(scan, scans[0].time);
+            radar.send(&script.bytes);
+            manager.listen(Duration::from_millis(50));
         }
-        radar.send(&script.bytes);
-        // not yet understood: fed all scans at once it is degraded by BusOverload and never says Ok
-        daemon.wait_for("radar ");
+        daemon.wait_for("radar Ok");
         daemon.terminate();
         assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
     }
@@ -165,7 +166,7 @@ fn linux_a_missing_bus_is_waited_for_and_sigterm_ends_it() {
 
 #[test]
 #[ignore = "needs the daemon"]
-fn linux_mistakes_are_told_with_file_line_and_key() {
+fn linux_mistakes_are_reported_with_file_line_and_key() {
     let folder = Folder::new().unwrap();
     let path = folder.0.join("viewshed.toml");
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../boards/linux/viewshed.toml");
@@ -184,7 +185,7 @@ fn linux_mistakes_are_told_with_file_line_and_key() {
     assert_eq!(code, Some(0), "{said}");
 
     let line = |text: &str, what: &str| 1 + text[..text.find(what).unwrap()].matches('\n').count();
-    for (key, wrong, told) in [
+    for (key, wrong, message) in [
         ("height_m = 6.0", "hight_m = 6.0", "mount.hight_m: unknown field `hight_m`"),
         ("height_m = 6.0", "height_m = 60.0", "mount.height_m: is 60, outside 0.1 to 20"),
         ("height_m = 6.0", "height_m = \"high\"", "mount.height_m: invalid type: string \"high\", expected f32"),
@@ -197,7 +198,7 @@ fn linux_mistakes_are_told_with_file_line_and_key() {
         let (code, said) = check(&text);
         let at = line(&text, wrong.rsplit('\n').next().unwrap());
         assert_eq!(code, Some(2), "{wrong}: {said}");
-        assert!(said.contains(&format!("viewshed.toml:{at}: {told}")), "{wrong}: {said}");
+        assert!(said.contains(&format!("viewshed.toml:{at}: {message}")), "{wrong}: {said}");
     }
     let (code, said) = check(&sample.replace("[mount]", "[mount"));
     assert!(code == Some(2) && said.contains("viewshed.toml:"), "{said}");

@@ -93,7 +93,7 @@ fn records(board: &Running) -> Vec<Record> {
 fn enough_stack(profile: Profile, board: &Running) {
     let closing =
         records(board).into_iter().rev().find_map(|r| if let Record::Closing(c) = r { Some(c) } else { None });
-    let [used, there] = closing.expect("told at the end of every start").stack;
+    let [used, there] = closing.expect("reported at the end of every start").stack;
     println!("live, {}: {used} of {there} bytes of stack", profile.name());
     assert!(used > 500 && used + 2048 <= there, "{used} of {there}");
 }
@@ -103,7 +103,7 @@ fn enough_stack(profile: Profile, board: &Running) {
 fn every_byte_of_five_seconds_is_the_same() {
     let (settings, scans) = shipped(5.0);
     let mut script = script(&settings, &scans);
-    // ends a start and tells what it took
+    // ends a start and reports what it took
     script.request(&Request::Restart);
     let board = same(Profile::Reference, &script);
     let frames = records(&board).into_iter().filter(|r| matches!(r, Record::Frame(f) if f.used > 0)).count();
@@ -242,7 +242,7 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
         board.line.deaf = deaf.contains(&k);
         board.line.send(&script.bytes[from..to]).unwrap();
         from = to;
-        // the frame is done when its trace is there, behind those of two starts
+        // the frame is done when its trace is there, after those of two starts
         let done = |line: &SerialBoard| line.trace.len() / RECORD_LEN > k + 3;
         let started = Instant::now();
         while !done(&board.line) && started.elapsed() < Duration::from_secs(120) {

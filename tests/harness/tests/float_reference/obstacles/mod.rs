@@ -35,7 +35,7 @@ impl Obstacles {
         self.list.iter().filter(stands).map(|o| o.solid(rules))
     }
 
-    /// Takes one frame's detections; tells for each whether it belongs to an obstacle. `in_view` tells
+    /// Takes one frame's detections; returns for each whether it belongs to an obstacle. `in_view` says
     /// whether a place is in plain view.
     pub fn step(&mut self, placed: &[Placed], dt: f64, rules: &Rules, in_view: impl Fn(Ground) -> bool) -> Vec<bool> {
         self.list.iter_mut().for_each(|o| o.predict(dt, rules));

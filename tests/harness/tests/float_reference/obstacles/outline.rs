@@ -1,4 +1,4 @@
-//! What an obstacle's reflections tell of its shape: a fading histogram along it, and proven height.
+//! An obstacle's shape, from its reflections: a fading histogram along it, and proven height.
 
 use viewshed::obstacles::profile::{BIN_CM, BINS};
 use viewshed::obstacles::size::SizeConfig;
@@ -93,7 +93,7 @@ impl Profile {
     }
 }
 
-/// Heights that are told apart, metres.
+/// Heights that are distinguished, metres.
 const LEVELS: [f64; 5] = [1.8, 2.2, 2.6, 3.1, 3.6];
 /// Standard deviations a reflection must lie above a level.
 const SIGMAS: f64 = 2.0;

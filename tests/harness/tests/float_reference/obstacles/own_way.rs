@@ -61,7 +61,7 @@ fn length(v: Ground) -> f64 {
 }
 
 impl Obstacle {
-    /// Whether its speed tells the heading of one that goes its own way.
+    /// Whether its speed gives the heading of one that goes its own way.
     pub fn knows_its_way(&self, rules: &Rules) -> bool {
         length(self.velocity) > rules.turning_speed
             && self.free.is_sure_of(length(self.free.velocity), rules.heading_sigmas)

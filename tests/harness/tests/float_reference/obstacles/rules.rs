@@ -9,7 +9,7 @@ use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Ground, Placed, along};
 
-/// Least projection of the line of sight on the road that tells motion along it.
+/// Least projection of the line of sight on the road that shows motion along it.
 const LEAST_PROJECTION: f64 = 0.15;
 /// Standard deviations of Doppler that what stands still may show.
 const STANDING_SIGMAS: f64 = 4.0;
@@ -137,10 +137,10 @@ impl Rules {
     pub fn course(&self, d: &Placed) -> Option<(Ground, f64)> {
         let projection = along(self.road, d.sight);
         let speed = d.radial_velocity / projection;
-        let tells = projection.abs() >= LEAST_PROJECTION
+        let shows = projection.abs() >= LEAST_PROJECTION
             && d.radial_velocity.abs() >= STANDING_SIGMAS * self.speed_sigma
             && speed.abs() >= self.min_speed
             && speed.abs() <= FASTEST;
-        tells.then(|| (self.road.map(|c| c * speed.signum()), speed.abs()))
+        shows.then(|| (self.road.map(|c| c * speed.signum()), speed.abs()))
     }
 }

@@ -1,0 +1,106 @@
+//! The configuration block as the specification describes it, byte by byte, is the one the code reads and checks.
+
+use super::specification::{PAGE, fenced};
+use crc::{CRC_32_ISO_HDLC, Crc};
+use viewshed::radar_3d::Radar3dParameters;
+use viewshed::sensor::Sensor;
+use viewshed::sensor::config::{ConfigError, Problem};
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
+use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::wire::header::fingerprint;
+
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+fn settings() -> Settings {
+    Settings::of(Sensor {
+        mount: Mount { x_m: 1.0, y_m: -2.0, height_m: 6.0, yaw_deg: 3.0, pitch_deg: 4.0, roll_deg: -5.0 },
+        field_of_view: FieldOfView {
+            azimuth_min_deg: -60.0,
+            azimuth_max_deg: 50.0,
+            elevation_min_deg: -16.0,
+            elevation_max_deg: 12.0,
+            range_min_m: 3.0,
+            range_max_m: 200.0,
+        },
+        noise: NoiseConfig::default(),
+    })
+}
+
+/// A block that holds, with some bytes in another way.
+fn changed(at: usize, bytes: &[u8]) -> [u8; BLOCK_LEN] {
+    let mut block = settings().to_block(7);
+    block[at..at + bytes.len()].copy_from_slice(bytes);
+    let sum = CRC.checksum(&block[..144]);
+    block[144..].copy_from_slice(&sum.to_le_bytes());
+    block
+}
+
+fn check(settings: &Settings) -> Result<(), ConfigError> {
+    Radar3dParameters::<50, 40, 8>::new(&settings.sensor, &settings.radar_3d())?;
+    settings.radar_bus.check("radar_bus")?;
+    settings.broadcast_bus.check("broadcast_bus")
+}
+
+struct Row {
+    at: usize,
+    name: &'static str,
+    least: f32,
+    most: f32,
+}
+
+fn rows() -> Vec<Row> {
+    let row = |line: &'static str| {
+        let [at, name, _, least, most] = line.split(' ').collect::<Vec<_>>()[..] else { panic!("{line}") };
+        Row { at: at.parse().unwrap(), name, least: least.parse().unwrap(), most: most.parse().unwrap() }
+    };
+    fenced("block").into_iter().map(row).collect()
+}
+
+/// A row's bytes with a value.
+fn bytes(row: &Row, value: f32) -> Vec<u8> {
+    match row.name.split_once('.').unwrap().1 {
+        "bit_rate" => (value as u32).to_le_bytes().to_vec(),
+        "sample_point_permille" | "listen_first" => (value as u16).to_le_bytes().to_vec(),
+        _ => value.to_le_bytes().to_vec(),
+    }
+}
+
+#[test]
+fn every_parameter_lies_where_the_page_says_and_has_its_limits() {
+    assert_eq!(check(&settings()), Ok(()));
+    let rows = rows();
+    let mut next = 12;
+    for row in &rows {
+        assert_eq!(row.at, next, "{}", row.name);
+        next += bytes(row, 0.0).len();
+        let read = |value| Settings::from_block(&changed(row.at, &bytes(row, value))).unwrap().1;
+        if row.name.ends_with("listen_first") {
+            let bus = |settings: Settings| if row.at < 136 { settings.radar_bus } else { settings.broadcast_bus };
+            assert_eq!((bus(read(0.0)).listen_first, bus(read(1.0)).listen_first), (false, true));
+            continue;
+        }
+        let refused = check(&read(-1e9)).unwrap_err();
+        assert_eq!(refused.parameter, row.name);
+        assert_eq!(refused.problem, Problem::OutOfLimits { min: row.least, max: row.most }, "{}", row.name);
+    }
+    assert_eq!((next, rows.len(), BLOCK_LEN), (144, 29 + 6, 148));
+}
+
+#[test]
+fn the_rest_of_the_block_is_as_on_the_page() {
+    let block = settings().to_block(0x0102_0304);
+    assert_eq!(block[..12], [0x56, 0x53, 0x43, 0x42, 1, 0, 148, 0, 4, 3, 2, 1]);
+    assert_eq!(block[144..], CRC.checksum(&block[..144]).to_le_bytes());
+    assert_eq!(CRC.algorithm.poly, 0x04C1_1DB7);
+    assert_eq!(fingerprint(&settings().to_block(0)), CRC.checksum(&settings().to_block(0)));
+    assert!(PAGE.contains("the CRC-32 of all 148 bytes with sequence 0"));
+    // no row is left for the order of the limits, which has its own reason
+    let reversed = changed(36, &60.0_f32.to_le_bytes());
+    let refused = check(&Settings::from_block(&reversed).unwrap().1).unwrap_err();
+    assert_eq!(
+        (refused.parameter, refused.problem),
+        ("field_of_view.azimuth_max_deg", Problem::NotAscending { lower: 60.0 })
+    );
+}
