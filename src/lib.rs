@@ -53,7 +53,7 @@
 //!
 //! # The interface
 //!
-//! These names are all there is to know; the rest of the crate is private.
+//! What a user needs, by use. All public names are in the lists at the end of this page; the rest is private.
 //!
 //! | for | names |
 //! |---|---|
@@ -138,7 +138,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
-// some of what rooms offer, only benches, tests and other rooms' features call
+// rooms also hold what only benches and tests call
 #![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
 
 #[cfg(test)]
