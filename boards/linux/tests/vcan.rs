@@ -10,7 +10,7 @@ use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFram
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::can_service::{Answers, Said, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
@@ -107,7 +107,7 @@ struct Bench {
     heard: usize,
     tool: Tool,
     answers: Answers,
-    told: Vec<Told>,
+    said: Vec<Said>,
 }
 
 impl Bench {
@@ -122,7 +122,7 @@ impl Bench {
         let receiver = Box::new(Receiver::new([0], Addresses::STANDARD, Limits::DEFAULT));
         let (tool, answers) = (Tool::new(0, medium), Answers::new(0, medium));
         let begin = Instant::now();
-        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, told: Vec::new() }
+        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, said: Vec::new() }
     }
 
     fn now(&self) -> Time {
@@ -141,7 +141,7 @@ impl Bench {
                 };
                 self.heard += 1;
                 let frame = frame.unwrap();
-                self.told.extend(self.answers.take(&frame));
+                self.said.extend(self.answers.take(&frame));
                 let _ = self.receiver.frame(self.now(), &frame);
             }
             std::thread::sleep(Duration::from_millis(1));
@@ -237,8 +237,8 @@ fn frames_come_and_go_over_the_kernels_buses() {
         let block: Vec<CanFrame> = bench.tool.write(&settings.to_block(0)).collect();
         bench.ask(&block);
         // a slow machine first works through the radar's frames
-        let written = |bench: &Bench| matches!(bench.told.last(), Some(Told::Written(_)));
-        assert!(bench.until(written), "{medium}: {:?}", bench.told);
+        let written = |bench: &Bench| matches!(bench.said.last(), Some(Said::Written(_)));
+        assert!(bench.until(written), "{medium}: {:?}", bench.said);
         let restart = bench.tool.restart().unwrap();
         bench.ask(&[restart]);
         daemon.wait_for("restart with the newest configuration block", 1);

@@ -38,7 +38,7 @@
 mod tool;
 mod unit;
 
-pub use tool::{Answers, Refusal, Told, Tool};
+pub use tool::{Answers, Refusal, Said, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
 use crate::unit::settings::BLOCK_LEN;

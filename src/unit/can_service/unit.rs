@@ -34,7 +34,7 @@ impl CanServiceConfig {
 /// # Example
 /// A block is sent in parts, written, and read by the next start:
 /// ```
-/// # use viewshed::unit::can_service::{Answers, Told, Tool};
+/// # use viewshed::unit::can_service::{Answers, Said, Tool};
 /// # use viewshed::{
 /// #     Addresses, BLOCK_LEN, CanService, CanServiceConfig, Epoch, FieldOfView, Flow, Medium, Mount, NoiseConfig, Sensor,
 /// #     Settings, SettingsSlots, StoredSettings, Time, small,
@@ -66,7 +66,7 @@ impl CanServiceConfig {
 ///     unit.take(&frame, &mut slots);
 /// }
 /// let mut reported = std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|f| answers.take(&f));
-/// assert!(reported.any(|report| report == Told::Written(1)));
+/// assert!(reported.any(|report| report == Said::Written(1)));
 /// let restart = tool.restart().unwrap();
 /// assert_eq!(unit.take(&restart, &mut slots), Some(Flow::Restart));
 ///

@@ -8,7 +8,7 @@ use viewshed::unit::settings::{BlockError, Settings, SettingsSlots, StoredSettin
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 
-/// A unit without settings and a tool, both told the same.
+/// A unit without settings and a tool, both given the same.
 pub fn run(bytes: &[u8]) {
     let medium = Medium::Can(Addresses::STANDARD);
     let mut flash = Flash::ERASED;

@@ -9,7 +9,7 @@ use viewshed::inputs::ars408::{Ars408, Ars408Config};
 use viewshed::map::polar::PolarMap;
 use viewshed::unit::Flow;
 use viewshed::unit::can_bus::CanPort;
-use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::can_service::{Answers, Said, Tool};
 use viewshed::unit::roadside::{
     Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, RoadsideStep, SerialPort, VERSION,
 };
@@ -129,7 +129,7 @@ struct World {
     line: Far,
     unstuffer: Unstuffer,
     answers: Answers,
-    told: Vec<Told>,
+    said: Vec<Said>,
     /// When a status came: bus, serial line.
     statuses: [Vec<u64>; 2],
     last: Option<RoadsideStep>,
@@ -180,7 +180,7 @@ impl World {
             line: far(),
             unstuffer: Unstuffer::new(),
             answers: Answers::new(SENSOR, Medium::Can(ADDRESSES)),
-            told: Vec::new(),
+            said: Vec::new(),
             statuses: [Vec::new(), Vec::new()],
             last: None,
             frames_done: 0,
@@ -227,7 +227,7 @@ impl World {
         if !self.ports.broadcast.stuck
             && let Some(frame) = self.ports.broadcast.mailboxes.pop_front()
         {
-            self.told.extend(self.answers.take(&frame));
+            self.said.extend(self.answers.take(&frame));
             let message = Received::from_frame(&frame, &ADDRESSES).unwrap().message;
             self.statuses[0].extend((message == Message::Status).then_some(self.ms));
             let _ = self.bus.frame(now, &frame);
@@ -397,8 +397,8 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
         assert_eq!(world.visible(), [0, 0]);
         assert_eq!(world.frames_done, 40, "the safe state is no reason for a reset");
         // said once the bus was proven, not into the void before
-        assert!(world.told.contains(&Told::Started(None)), "{:?}", world.told);
-        assert!(world.told.iter().any(|told| matches!(told, Told::Refused(r) if r.reason == 4)), "{:?}", world.told);
+        assert!(world.said.contains(&Said::Started(None)), "{:?}", world.said);
+        assert!(world.said.iter().any(|said| matches!(said, Said::Refused(r) if r.reason == 4)), "{:?}", world.said);
 
         let block = settings().to_block(0);
         let mut tool = Tool::new(SENSOR, Medium::Can(ADDRESSES));
@@ -408,7 +408,7 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
             world.ask(Request::Write(&block));
         }
         world.run(200);
-        assert_eq!(over_can, world.told.contains(&Told::Written(1)), "{:?}", world.told);
+        assert_eq!(over_can, world.said.contains(&Said::Written(1)), "{:?}", world.said);
         let newest = Settings::newest([world.ports.slots.slot(0), world.ports.slots.slot(1)], |_| Ok(()));
         assert_eq!(newest.map(|n| n.settings), Ok(settings()));
         if over_can {
