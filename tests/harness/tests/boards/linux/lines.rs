@@ -4,7 +4,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ti::Family;
+use viewshed::inputs::ti::TiFamily;
 use viewshed::map::Visibility;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::Settings;
@@ -267,7 +267,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
 /// Frames of a TI radar at 20 Hz, each of these points.
 fn stream_ti(radar: &mut Terminal, numbers: std::ops::Range<u32>, points: &[[f32; 4]]) {
     for number in numbers {
-        radar.send(&Frame::new(Family::Bytes40, number).cartesian(points).bytes());
+        radar.send(&Frame::new(TiFamily::Bytes40, number).cartesian(points).bytes());
         sleep(Duration::from_millis(50));
     }
 }
@@ -286,18 +286,18 @@ fn linux_a_radar_that_sends_nan_is_blind_until_its_first_good_point() {
     daemon.wait_for("radar: open");
     let mut far = Heard::new();
     stream_ti(&mut radar, 0..40, &[[f32::NAN; 4]; 20]);
-    let blind = |far: &Heard| far.is(State::Blind, Reason::UnusablePoints) && far.visible() == 0;
+    let blind = |far: &Heard| far.is(UnitState::Blind, Reason::UnusablePoints) && far.visible() == 0;
     assert!(far.until(&ear, blind), "{:?}", far.status);
     // and stays so
     stream_ti(&mut radar, 40..60, &[[f32::NAN; 4]; 20]);
-    let seen = |far: &Heard| far.visible() > 0 || far.is(State::Ok, Reason::None);
+    let seen = |far: &Heard| far.visible() > 0 || far.is(UnitState::Ok, Reason::None);
     let heard = ear.heard().len();
     far.until(&ear, |far| seen(far) || far.taken == heard);
     assert!(!seen(&far), "{:?}, {} visible", far.status, far.visible());
     // one point on the road among them is a radar that sees
     let good = [1.0, 30.0, -5.0, -12.0];
     stream_ti(&mut radar, 60..80, &[[f32::NAN; 4], good]);
-    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None) && far.visible() > 5000), "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.is(UnitState::Ok, Reason::None) && far.visible() > 5000), "{:?}", far.status);
     daemon.terminate();
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
 }
