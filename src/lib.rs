@@ -6,16 +6,9 @@
 //! argument. The same input gives the same bits on every machine.
 //!
 //! ```
-//! use viewshed::frame::detection::{Detection, Measurement};
-//! use viewshed::sensor::field_of_view::FieldOfView;
-//! use viewshed::sensor::road::RoadPoint;
-//! use viewshed::sensor::mount::Mount;
-//! use viewshed::map::query::{self, Answer, Footprint};
-//! use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
-//! use viewshed::sensor::noise::NoiseConfig;
-//! use viewshed::sensor::Sensor;
-//! use viewshed::fixed::time::Time;
-//! use viewshed::unit::profile::small;
+//! use viewshed::query::{self, Answer, Footprint};
+//! use viewshed::{Detection, FieldOfView, Measurement, Mount, NoiseConfig, Radar3dConfig, Radar3dParameters};
+//! use viewshed::{RoadPoint, Sensor, Time, small};
 //!
 //! // a gantry, 6 m up, looking 4 degrees down
 //! let sensor = Sensor {
@@ -55,8 +48,27 @@
 //! // is there room for a car in the next lane? (heading and size in degrees and metres)
 //! let car = Footprint::new(RoadPoint::from_metres(30.0, 3.5)?, 0.0, 4.6, 1.8)?;
 //! assert_eq!(query::area(&map, &car), Answer::VisibleFree);
-//! # Ok::<(), viewshed::sensor::config::ConfigError>(())
+//! # Ok::<(), viewshed::ConfigError>(())
 //! ```
+//!
+//! # The interface
+//!
+//! What a user needs, by use. All public names are in the lists at the end of this page; the rest is private.
+//!
+//! | for | names |
+//! |---|---|
+//! | a sensor as it is installed, in SI units, checked once | [`Sensor`], [`Mount`], [`FieldOfView`], [`NoiseConfig`], [`RoadPoint`]; errors name the parameter: [`ConfigError`] |
+//! | a frame of it | [`Detection`], [`Measurement`], [`Angle`], [`Time`], [`FrameStatus`] |
+//! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`]; the flat baseline [`Radar2d`] |
+//! | what is known of the road | [`PolarMap`], [`RoadGrid`]; every map answers [`VisibilityMap`] and the [questions](query) |
+//! | maps on CAN, CAN FD and serial lines | [`Broadcaster`], [`BroadcastConfig`], [`Medium`]; a [`Receiver`] gives maps back |
+//! | radars that are decoded | [`Ars408`], [`Ti`], [`NativeReceiver`]; each is a [`Feed`] |
+//! | a unit: radar in, maps out | [`Unit`] joins [`Estimator`], [`Feed`] and [`MapSender`]; [`Settings`] are kept in two slots |
+//! | a unit on hardware of its own | [`Roadside`], with a board's [`CanPort`], [`SerialPort`] and [`SettingsSlots`] |
+//! | a unit on serial lines, or with an operating system | [`SerialSession`], [`CanService`], [`BusKeeper`] |
+//!
+//! Feature `bench` makes every room public and adds the loops that compare boards with a PC: for benches, tests and
+//! those who work on the library (`cargo doc --features bench`), not for products.
 //!
 //! # What is where
 //!
@@ -64,19 +76,19 @@
 //!
 //! | folder | what comes in, and what goes out |
 //! |---|---|
-//! | [`fixed`] | integers with their scale: [angles](fixed::angle), [time](fixed::time), [directions](fixed::trig), [rows of bits](fixed::bits) |
-//! | [`sensor`] | a sensor as it is installed, in SI units, checked once: [mount](sensor::mount), [field of view](sensor::field_of_view), [noise](sensor::noise) |
-//! | [`frame`] | one radar frame: [detections](frame::detection) in, [gated](frame::gate) and counted, [placed on the road](frame::reflection); what a silent or [blind](frame::health) sensor means |
-//! | [`obstacles`] | what moves is followed: place, length, width, height; [solid](obstacles::solid) boxes out |
-//! | [`map`] | what a map answers: the [interface](map::VisibilityMap), the [polar map](map::polar), [queries](map::query), the [1 m grid](map::resample), the [bitmap](map::bitmap) |
-//! | [`grid`] | range x azimuth x slope: [evidence](grid::evidence) and boxes in, [lines of sight](grid::raycast), [shadows](grid::shadow) and a polar map out |
-//! | [`estimator`] | what a unit asks of an estimator, whatever its sensor and its map |
-//! | [`radar_3d`] | the estimator: all stages above, in order |
-//! | [`radar_2d`] | the flat baseline, as an estimator of its own |
-//! | [`wire`] | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
-//! | [`inputs`] | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
-//! | [`mod@unit`] | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
-//! | [`mod@bench`] | the same scans on a controller and on a PC, compared, stage by stage |
+//! | `fixed` | integers with their scale: angles, time, directions, rows of bits |
+//! | `sensor` | a sensor as it is installed, in SI units, checked once: mount, field of view, noise |
+//! | `frame` | one radar frame: detections in, gated and counted, placed on the road; what a silent or blind sensor means |
+//! | `obstacles` | what moves is followed: place, length, width, height; solid boxes out |
+//! | `map` | what a map answers: the interface, the polar map, queries, the 1 m grid, the bitmap |
+//! | `grid` | range x azimuth x slope: evidence and boxes in, lines of sight, shadows and a polar map out |
+//! | `estimator` | what a unit asks of an estimator, whatever its sensor and its map |
+//! | `radar_3d` | the estimator: all stages above, in order |
+//! | `radar_2d` | the flat baseline, as an estimator of its own |
+//! | `wire` | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
+//! | `inputs` | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
+//! | `unit` | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
+//! | `bench` | the same scans on a controller and on a PC, compared, stage by stage |
 //!
 //! # Words
 //!
@@ -129,23 +141,130 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
+// rooms also hold what only benches and tests call
+#![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
 
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "bench")]
 pub mod bench;
 #[cfg(doc)]
 #[doc = include_str!("EXTENDING.md")]
 pub mod extending {}
+#[cfg(all(doc, not(feature = "bench")))]
+#[doc = include_str!("wire/SPECIFICATION.md")]
+pub mod specification {}
+
+// What is public of the rooms stands below; benches and tests go into them.
+#[cfg(not(feature = "bench"))]
+mod estimator;
+#[cfg(feature = "bench")]
 pub mod estimator;
+#[cfg(not(feature = "bench"))]
+mod fixed;
+#[cfg(feature = "bench")]
 pub mod fixed;
+#[cfg(not(feature = "bench"))]
+mod frame;
+#[cfg(feature = "bench")]
 pub mod frame;
+#[cfg(not(feature = "bench"))]
+mod grid;
+#[cfg(feature = "bench")]
 pub mod grid;
+#[cfg(not(feature = "bench"))]
+mod inputs;
+#[cfg(feature = "bench")]
 pub mod inputs;
+#[cfg(not(feature = "bench"))]
+mod map;
+#[cfg(feature = "bench")]
 pub mod map;
+#[cfg(not(feature = "bench"))]
+mod obstacles;
+#[cfg(feature = "bench")]
 pub mod obstacles;
+#[cfg(not(feature = "bench"))]
+mod radar_2d;
+#[cfg(feature = "bench")]
 pub mod radar_2d;
+#[cfg(not(feature = "bench"))]
+mod radar_3d;
+#[cfg(feature = "bench")]
 pub mod radar_3d;
+#[cfg(not(feature = "bench"))]
+mod sensor;
+#[cfg(feature = "bench")]
 pub mod sensor;
+#[cfg(not(feature = "bench"))]
+mod unit;
+#[cfg(feature = "bench")]
 pub mod unit;
+#[cfg(not(feature = "bench"))]
+mod wire;
+#[cfg(feature = "bench")]
 pub mod wire;
+
+// A sensor and one frame of it.
+pub use fixed::angle::Angle;
+pub use fixed::time::Time;
+pub use frame::detection::{Detection, Measurement, NotADetection};
+pub use frame::health::{Condition, Continuity, FrameStatus};
+pub use sensor::Sensor;
+pub use sensor::config::{ConfigError, Problem};
+pub use sensor::field_of_view::FieldOfView;
+pub use sensor::mount::Mount;
+pub use sensor::noise::NoiseConfig;
+pub use sensor::road::RoadPoint;
+
+// Estimators and what can be set of them.
+pub use estimator::{Estimator, Progress};
+pub use frame::gate::GateConfig;
+pub use frame::health::HealthConfig;
+pub use grid::evidence::EvidenceConfig;
+pub use obstacles::config::ObstacleConfig;
+pub use radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading};
+pub use radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters, VisibilityConfig};
+
+// Maps and questions to them.
+pub use map::polar::PolarMap;
+pub use map::query;
+pub use map::resample::RoadGrid;
+pub use map::{CellState, Visibility, VisibilityMap};
+
+// Maps on a bus: sender and receiver.
+pub use wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+pub use wire::frame::{CanFrame, CanId};
+pub use wire::header::Header;
+pub use wire::message::{Addresses, Epoch};
+pub use wire::receive::{Limits as ReceiverLimits, Receiver};
+pub use wire::serial::{MOST_STUFFED, Unstuffer};
+pub use wire::status::{Reason, ResetCause, Status, UnitState};
+#[cfg(feature = "secoc")]
+pub use wire::{
+    receive::SecuredReceiver,
+    secoc::{Key, Sealer},
+};
+
+// Radars.
+pub use inputs::ars408::{
+    Ars408, Ars408Config, Ars408Outcome, configuration::Ars408Configuration, profile::Ars408Profile,
+    upkeep::Ars408Upkeep,
+};
+pub use inputs::native::{NativeConfig, NativeMedium, NativeOutcome, NativeReceiver, NativeSender};
+pub use inputs::ti::{Ti, TiAngleUnit, TiConfig, TiDialect, TiFamily, TiOutcome};
+pub use inputs::{Feed, Frame};
+
+// A unit: the loop of a board, its settings, its lines.
+pub use unit::can_bus::{BitTiming, BusConfig, BusKeeper, CanPort};
+pub use unit::can_service::{CanService, CanServiceConfig};
+pub use unit::frame_queue::FrameQueue;
+pub use unit::profile::{reference, small};
+pub use unit::radar_clock::RadarClock;
+pub use unit::roadside::{ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SerialPort};
+pub use unit::serial_service::SerialLine;
+pub use unit::session::SerialSession;
+pub use unit::settings::{BLOCK_LEN, BlockError, FlashSlots, Settings, SettingsCheck, SettingsSlots, StoredSettings};
+pub use unit::status_output::StatusOutput;
+pub use unit::{Flow, InUnit, MapSender, Unit};

@@ -197,6 +197,19 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
 impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
     Radar3d<R, A, E, W, N, D>
 {
+    /// Range cells.
+    pub const RANGES: usize = R;
+    /// Azimuths.
+    pub const AZIMUTHS: usize = A;
+    /// Elevation rows.
+    pub const ELEVATIONS: usize = E;
+    /// Words of 32 range cells.
+    pub const WORDS: usize = W;
+    /// Moving obstacles.
+    pub const OBSTACLES: usize = N;
+    /// Detections a scan.
+    pub const DETECTIONS: usize = D;
+
     /// Knows nothing; to be placed in static memory.
     pub const fn new() -> Self {
         Self {

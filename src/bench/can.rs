@@ -9,8 +9,8 @@ use crate::fixed::time::Time;
 use crate::inputs::Feed;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::CanService;
-use crate::unit::settings::Slots;
-use crate::unit::{Flow, Sender, Unit};
+use crate::unit::settings::SettingsSlots;
+use crate::unit::{Flow, MapSender, Unit};
 use crate::wire::frame::{CanFrame, CanId};
 use crate::wire::status::Status;
 
@@ -30,25 +30,25 @@ impl<F: Feed<Piece = CanFrame>> CanBench<F> {
         Self { radar, now: Time::from_micros(0) }
     }
 
-    /// The time that was told last.
+    /// The time that came last.
     pub fn now(&self) -> Time {
         self.now
     }
 
-    /// Starts the clock: no unit starts before it is told the time. Whether a frame told it now.
+    /// Starts the clock: no unit starts before the time came. Whether a frame brought it now.
     pub fn clock(&mut self, keeper: &mut BusKeeper, port: &mut impl CanPort) -> bool {
-        let told = keeper.receive(port).as_ref().and_then(time);
-        self.now = told.unwrap_or(self.now);
-        told.is_some()
+        let came = keeper.receive(port).as_ref().and_then(time);
+        self.now = came.unwrap_or(self.now);
+        came.is_some()
     }
 
     /// One turn of the loop: at most one frame in, all that is due out.
-    pub fn turn<E: Estimator<Input = F::Input>, S: Sender<E::Map>>(
+    pub fn turn<E: Estimator<Input = F::Input>, S: MapSender<E::Map>>(
         &mut self,
         (keeper, port): (&mut BusKeeper, &mut impl CanPort),
         service: &mut CanService,
         unit: &mut Option<Unit<'_, E, S>>,
-        slots: &mut impl Slots,
+        slots: &mut impl SettingsSlots,
     ) -> Flow {
         keeper.poll(self.now, port);
         if let Some(frame) = keeper.receive(port) {
@@ -75,11 +75,11 @@ impl<F: Feed<Piece = CanFrame>> CanBench<F> {
     fn take<E, S>(&mut self, frame: &CanFrame, unit: Option<&mut Unit<'_, E, S>>)
     where
         E: Estimator<Input = F::Input>,
-        S: Sender<E::Map>,
+        S: MapSender<E::Map>,
     {
-        let told = time(frame);
-        self.now = told.unwrap_or(self.now);
-        match (told, unit) {
+        let came = time(frame);
+        self.now = came.unwrap_or(self.now);
+        match (came, unit) {
             (Some(now), Some(unit)) => unit.wait(&mut self.radar, now),
             (None, Some(unit)) => unit.take(&mut self.radar, frame, self.now),
             (_, None) => {}
@@ -87,7 +87,7 @@ impl<F: Feed<Piece = CanFrame>> CanBench<F> {
     }
 }
 
-/// The time a frame tells.
+/// The time a frame brings.
 fn time(frame: &CanFrame) -> Option<Time> {
     let micros = <[u8; 8]>::try_from(frame.data()).ok().filter(|_| frame.id == TIME_ID)?;
     Some(Time::from_micros(u64::from_be_bytes(micros)))

@@ -7,7 +7,7 @@ use core::ffi::CStr;
 use super::Bench;
 use super::flash::{FLASH_LEN, Flash};
 use super::record::Record;
-use crate::unit::settings::{BLOCK_LEN, Slots};
+use crate::unit::settings::{BLOCK_LEN, SettingsSlots};
 use crate::wire::message::Epoch;
 
 const JOB: &CStr = c"job.bin";
@@ -22,7 +22,7 @@ pub trait HostFile: Sized {
     fn create(name: &CStr) -> Option<Self>;
     /// Reads up to as many bytes as the buffer has; 0 at the end.
     fn read(&mut self, buffer: &mut [u8]) -> usize;
-    /// Writes some of the bytes, and tells how many; 0 if it takes none.
+    /// Writes some of the bytes; how many, 0 if it takes none.
     fn write(&mut self, bytes: &[u8]) -> usize;
 }
 
@@ -128,7 +128,7 @@ impl<F: HostFile> FlashFile<F> {
     }
 }
 
-impl<F: HostFile> Slots for FlashFile<F> {
+impl<F: HostFile> SettingsSlots for FlashFile<F> {
     fn slot(&self, slot: usize) -> &[u8] {
         self.flash.slot(slot)
     }

@@ -1,6 +1,6 @@
 //! What a unit keeps over a loss of power, for boards and hosts of a test bench that have no flash.
 
-use crate::unit::settings::{BLOCK_LEN, Slots};
+use crate::unit::settings::{BLOCK_LEN, SettingsSlots};
 use crate::wire::message::Epoch;
 
 /// Bytes of it: two slots, starts.
@@ -43,7 +43,7 @@ impl Flash {
     }
 }
 
-impl Slots for Flash {
+impl SettingsSlots for Flash {
     fn slot(&self, slot: usize) -> &[u8] {
         self.bytes.get(slot * BLOCK_LEN..(slot + 1) * BLOCK_LEN).unwrap_or(&[])
     }

@@ -8,7 +8,7 @@ use crate::estimator::Estimator;
 use crate::frame::detection::Detection;
 use crate::inputs::Frame;
 use crate::map::polar::PolarMap;
-use crate::unit::{Sender, Unit};
+use crate::unit::{MapSender, Unit};
 use crate::wire::serial::MOST_STUFFED;
 
 /// What a controller offers: a byte stream each way and a counter.
@@ -41,7 +41,7 @@ pub fn run<E, S, const R: usize, const A: usize, const B: usize>(
 ) -> Result<(), JobError>
 where
     E: Estimator<Input = [Detection], Map = PolarMap<R, A>>,
-    S: Sender<E::Map>,
+    S: MapSender<E::Map>,
 {
     bench.write(&Record::Opening(Opening::of::<E>(shape, bench.ticks_per_256())).to_bytes());
     let mut line = [0; MOST_STUFFED];

@@ -2,7 +2,7 @@
 
 use crate::fixed::time::Time;
 use crate::unit::settings::Settings;
-use crate::unit::{InUnit, Sender, build};
+use crate::unit::{InUnit, MapSender};
 use crate::wire::broadcast::{BroadcastConfig, Medium};
 use crate::wire::header::Header;
 use crate::wire::message::Epoch;
@@ -10,7 +10,7 @@ use crate::wire::message::Epoch;
 /// Puts parameters and sender where they stay. `None` without settings, and without ones that can be worked with.
 /// Apart, so that what this takes of the stack is free again before the first scan.
 #[inline(never)]
-pub fn start<E: InUnit, S: Sender<E::Map>>(
+pub fn start<E: InUnit, S: MapSender<E::Map>>(
     parameters: &mut Option<E::Parameters>,
     sender: &mut Option<S>,
     settings: Option<&Settings>,
@@ -19,12 +19,12 @@ pub fn start<E: InUnit, S: Sender<E::Map>>(
     now: Time,
 ) {
     (*parameters, *sender) = (None, None);
-    let Some(Ok(header)) = settings.map(|settings| build::<E>(settings, parameters)) else { return };
+    let Some(Ok(header)) = settings.map(|settings| settings.build::<E>(parameters)) else { return };
     start_sender(sender, header, medium, epoch, now);
 }
 
 #[inline(never)]
-fn start_sender<M, S: Sender<M>>(sender: &mut Option<S>, header: Header, medium: Medium, epoch: Epoch, now: Time) {
+fn start_sender<M, S: MapSender<M>>(sender: &mut Option<S>, header: Header, medium: Medium, epoch: Epoch, now: Time) {
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     *sender = S::start(config, header, epoch, now).ok();
 }

@@ -54,6 +54,18 @@ pub enum NotADetection {
     Absurd,
 }
 
+impl core::fmt::Display for NotADetection {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::NotFinite => "a value of the detection is infinite or not a number",
+            Self::Range => "the detection's range is not within 0.01 to 655.35 m",
+            Self::Absurd => "an angle of the detection lies beyond half a turn, or its speed beyond 327.67 m/s",
+        })
+    }
+}
+
+impl core::error::Error for NotADetection {}
+
 /// Largest range a detection can hold, metres.
 pub const MAX_RANGE_M: f32 = 655.35;
 

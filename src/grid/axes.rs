@@ -11,7 +11,7 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig::Direction;
-use crate::map::polar::PolarGeometry;
+use crate::map::polar::{self, PolarGeometry};
 use crate::sensor::config::{ConfigError, Problem, within};
 use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::mount::Levelling;
@@ -270,8 +270,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// Place of a bearing on the column axis, 2^-8 columns from the first one's right edge; negative
     /// or beyond `A` columns outside.
     pub fn column_place(&self, bearing: Angle) -> i32 {
-        let from_origin = i32::from((bearing - self.azimuth_origin).raw());
-        from_origin * (A as i32 * 256 / 4) / (i32::from(self.azimuth_span) / 4).max(1)
+        polar::column_place(bearing - self.azimuth_origin, self.azimuth_span, A as i32)
     }
 
     /// Column of a bearing.

@@ -1,7 +1,7 @@
 //! Radars: bytes or CAN frames in, complete scans in the units of [`Detection`] out.
 //!
 //! Every decoder is an accumulator. It is fed with single CAN frames or with chunks of bytes cut
-//! anywhere, is told the time with each, and answers with a named outcome: nothing yet, a
+//! anywhere, gets the time with each, and answers with a named outcome: nothing yet, a
 //! [`RadarScan`], or what was wrong. Bad input is counted and never stops a decoder.
 
 pub mod ars408;
@@ -37,7 +37,7 @@ pub struct RadarScan<'a> {
 }
 
 impl RadarScan<'_> {
-    /// What the estimators are told besides the detections.
+    /// What the estimators get besides the detections.
     pub fn status(&self) -> FrameStatus {
         FrameStatus { fault: self.fault, refused: self.refused }
     }
@@ -83,7 +83,7 @@ impl<const N: usize> Feed for ars408::Ars408<N> {
     type Input = [Detection];
 
     fn take(&mut self, piece: &CanFrame, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
-        if let ars408::Outcome::Scan(scan) = self.push(piece, now) {
+        if let ars408::Ars408Outcome::Scan(scan) = self.push(piece, now) {
             each(&scan.frame());
         }
         self.wait(now, each);
@@ -91,7 +91,7 @@ impl<const N: usize> Feed for ars408::Ars408<N> {
 
     fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
         while let Some(outcome) = self.poll(now) {
-            if let ars408::Outcome::Scan(scan) = outcome {
+            if let ars408::Ars408Outcome::Scan(scan) = outcome {
                 each(&scan.frame());
             }
         }
@@ -109,7 +109,7 @@ impl<const N: usize> Feed for ti::Ti<N> {
     fn take(&mut self, mut piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
         while !piece.is_empty() {
             let (taken, outcome) = self.push(piece, now);
-            if let ti::Outcome::Scan(scan) = outcome {
+            if let ti::TiOutcome::Scan(scan) = outcome {
                 each(&scan.frame());
             }
             // a receiver that took nothing would hold up everything
@@ -125,13 +125,13 @@ impl<const N: usize> Feed for ti::Ti<N> {
 }
 
 /// Time on this line is that of its scans: what follows one is looked at by its stamp.
-impl<const N: usize> Feed for native::Receiver<N> {
+impl<const N: usize> Feed for native::NativeReceiver<N> {
     type Piece = [u8];
     type Input = [Detection];
 
     fn take(&mut self, piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
         let mut now = now;
-        if let native::Outcome::Scan(scan) = self.push(piece, now) {
+        if let native::NativeOutcome::Scan(scan) = self.push(piece, now) {
             now = scan.time;
             each(&scan.frame());
         }
@@ -141,7 +141,7 @@ impl<const N: usize> Feed for native::Receiver<N> {
     fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
         let mut now = now;
         while let Some(outcome) = self.poll(now) {
-            if let native::Outcome::Scan(scan) = outcome {
+            if let native::NativeOutcome::Scan(scan) = outcome {
                 now = scan.time;
                 each(&scan.frame());
             }

@@ -23,13 +23,17 @@ pub struct PolarGeometry {
     pub azimuth_span: u16,
 }
 
+/// Place of a bearing among so many columns of a span, 2^-8 columns from the first one's right edge; negative or
+/// beyond the last one's left edge outside. Grid and map round alike.
+pub(crate) fn column_place(from_origin: Angle, span: u16, columns: i32) -> i32 {
+    i32::from(from_origin.raw()) * (columns * 64) / (i32::from(span) / 4).max(1)
+}
+
 impl PolarGeometry {
     /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size.
     pub fn locate(&self, x_cm: i32, y_cm: i32, ranges: usize, azimuths: usize) -> Option<(usize, usize)> {
-        let bearing = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
-        let span = i32::from(self.azimuth_span).max(1);
-        // the same rounding as the grid's columns
-        let place = i32::from(bearing.raw()) * i32::try_from(azimuths * 64).ok()? / (span / 4).max(1);
+        let from_origin = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
+        let place = column_place(from_origin, self.azimuth_span, i32::try_from(azimuths).ok()?);
         let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < azimuths)?;
         let range = usize::try_from(math::length(x_cm, y_cm) / self.cell_cm.max(1)).ok()?;
         (range < ranges).then_some((azimuth, range))
@@ -172,7 +176,8 @@ mod tests {
     fn a_cell_is_what_its_grade_and_its_occupancy_say() {
         let mut m = map();
         let (grades, occupancy) = m.rows_mut(4).unwrap();
-        (grades[..5].copy_from_slice(&[0, 1, 99, 100, 255]), occupancy[..5].copy_from_slice(&[200, 49, 50, 0, 255]));
+        grades[..5].copy_from_slice(&[0, 1, 99, 100, 255]);
+        occupancy[..5].copy_from_slice(&[200, 49, 50, 0, 255]);
         let cells: std::vec::Vec<CellState> = (0..5).map(|r| m.cell(4, r)).collect();
         assert_eq!(cells[0], CellState::UNKNOWN, "whatever its occupancy");
         use Visibility::{Invisible, Visible};

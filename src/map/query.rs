@@ -49,7 +49,7 @@ pub struct Footprint {
 }
 
 /// Largest side of a footprint that is looked at, metres; beyond it the answer is unknown.
-pub const MAX_SIDE_M: i32 = 100;
+const MAX_SIDE_M: i32 = 100;
 
 /// What of this point?
 pub fn point(map: &impl VisibilityMap, at: RoadPoint) -> Answer {
@@ -88,7 +88,7 @@ impl Footprint {
     /// width in metres, rounded up to 2 cm.
     ///
     /// # Errors
-    /// A heading that is not finite or beyond a turn, a length or width outside 0.02 to [`MAX_SIDE_M`].
+    /// A heading that is not finite or beyond a turn, a length or width outside 0.02 to 100 m.
     pub fn new(centre: RoadPoint, heading_deg: f32, length_m: f32, width_m: f32) -> Result<Self, ConfigError> {
         let heading = within("footprint.heading_deg", heading_deg, -360.0, 360.0)?;
         let half = |name, m| {
@@ -103,7 +103,7 @@ impl Footprint {
     }
 
     /// Visits the centres of the 1 m cells that share area with the footprint; false, and no visit,
-    /// if it is larger than [`MAX_SIDE_M`] or turned inside out.
+    /// if it is larger than 100 m or turned inside out.
     fn each_cell(&self, mut visit: impl FnMut(RoadPoint)) -> bool {
         let limit = MAX_SIDE_M * 50;
         if !(1..=limit).contains(&self.half_length_cm) || !(1..=limit).contains(&self.half_width_cm) {

@@ -102,7 +102,7 @@ impl Radar2dParameters {
 /// Which places behind an occupied one count as visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Reading {
+pub enum Radar2dReading {
     /// All up to the last occupied cell on the ray: the sensor measured there.
     Last,
     /// All up to the end of the first occupied run.
@@ -187,10 +187,10 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
     }
 
     /// The map, by one reading.
-    pub fn map<'a>(&'a self, p: &'a Radar2dParameters, reading: Reading) -> Radar2dMap<'a, NX, NW, N> {
+    pub fn map<'a>(&'a self, p: &'a Radar2dParameters, reading: Radar2dReading) -> Radar2dMap<'a, NX, NW, N> {
         let visible_from = match reading {
-            Reading::Last => 2,
-            Reading::First => 255,
+            Radar2dReading::Last => 2,
+            Radar2dReading::First => 255,
         };
         Radar2dMap { grid: &self.grid, sightlines: &self.sightlines, known: self.known, visible_from, parameters: p }
     }

@@ -46,7 +46,7 @@ impl FieldOfView {
     ///
     /// # Errors
     /// Limits that are reversed or not finite, an azimuth beyond 85 degrees (a roadside radar looks
-    /// ahead), a range beyond [`MAX_RANGE_M`].
+    /// ahead), a range beyond 400 m.
     pub fn limits(&self) -> Result<Limits, ConfigError> {
         within("field_of_view.azimuth_min_deg", self.azimuth_min_deg, -85.0, 85.0)?;
         within("field_of_view.azimuth_max_deg", self.azimuth_max_deg, -85.0, 85.0)?;

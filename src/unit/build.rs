@@ -3,8 +3,8 @@
 use crate::estimator::Estimator;
 use crate::radar_3d::Radar3d;
 use crate::sensor::config::{ConfigError, Problem};
-use crate::unit::sender::Sender;
-use crate::unit::settings::{Check, Settings};
+use crate::unit::sender::MapSender;
+use crate::unit::settings::{Settings, SettingsCheck};
 use crate::wire::code::ray::Known;
 use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
 
@@ -13,41 +13,43 @@ pub trait InUnit: Estimator {
     /// Its configuration by the settings; what an integrator does not set is the library's.
     fn config(settings: &Settings) -> Self::Config;
 
-    /// What is told of its maps.
+    /// What receivers have to know of its maps.
     ///
     /// # Errors
     /// Maps that cannot be sent.
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError>;
 }
 
-/// Makes a unit's parameters, where they stay, and the header of its maps. A start and the check of a block that
-/// came are this same function, so that none is accepted that cannot start.
-///
-/// # Errors
-/// Names the first parameter that cannot be worked with; there are no parameters then.
-#[inline(never)] // what it takes of the stack is free again afterwards
-pub fn build<E: InUnit>(settings: &Settings, parameters: &mut Option<E::Parameters>) -> Result<Header, ConfigError> {
-    *parameters = None;
-    settings.radar_bus.check("radar_bus")?;
-    settings.broadcast_bus.check("broadcast_bus")?;
-    // large: moved once
-    let made = parameters.insert(E::parameters(&E::config(settings))?);
-    let header = E::header(settings, made);
-    if header.is_err() {
+impl Settings {
+    /// Makes a unit's parameters, where they stay, and the header of its maps. A start and the check of a block
+    /// that came are this same function, so that none is accepted that cannot start.
+    ///
+    /// # Errors
+    /// Names the first parameter that cannot be worked with; there are no parameters then.
+    #[inline(never)] // what it takes of the stack is free again afterwards
+    pub fn build<E: InUnit>(&self, parameters: &mut Option<E::Parameters>) -> Result<Header, ConfigError> {
         *parameters = None;
+        self.radar_bus.check("radar_bus")?;
+        self.broadcast_bus.check("broadcast_bus")?;
+        // large: moved once
+        let made = parameters.insert(E::parameters(&E::config(self))?);
+        let header = E::header(self, made);
+        if header.is_err() {
+            *parameters = None;
+        }
+        header
     }
-    header
 }
 
 /// Whether a unit with this sender can be made by these settings.
 #[inline(never)] // as above
-fn check<E: InUnit, S: Sender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
-    build::<E>(settings, &mut None).and_then(|header| S::fits(&header))
+fn check<E: InUnit, S: MapSender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
+    settings.build::<E>(&mut None).and_then(|header| S::fits(&header))
 }
 
-impl Check {
+impl SettingsCheck {
     /// For a unit of this estimator and sender.
-    pub const fn of<E: InUnit, S: Sender<E::Map>>() -> Self {
+    pub const fn of<E: InUnit, S: MapSender<E::Map>>() -> Self {
         Self::by(check::<E, S>)
     }
 }

@@ -108,7 +108,7 @@ pub trait CanPort {
     fn arrived(&self) -> Option<Time> {
         None
     }
-    /// Frames in the mailboxes, where the controller tells.
+    /// Frames in the mailboxes, where the controller counts them.
     fn waiting(&mut self) -> usize {
         0
     }
@@ -203,6 +203,11 @@ impl BusKeeper {
     /// Where the controller stands.
     pub fn state(&self) -> BusState {
         self.state
+    }
+
+    /// Whether it takes part.
+    pub fn is_active(&self) -> bool {
+        self.state == BusState::Active
     }
 
     /// How often it was bus-off.

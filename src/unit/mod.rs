@@ -4,13 +4,13 @@
 //! road a timer's, in a test bench the recording's. A board gives [`Unit::take`] what comes over the
 //! sensor's line, calls [`Unit::wait`] when nothing came, at least ten times a second, and sends what
 //! [`Unit::next_line`] or [`Unit::next_frame`] gives until there is nothing more. Which sensor it is says
-//! the [`Estimator`], which line the [`Feed`], who sends the [`Sender`].
+//! the [`Estimator`], which line the [`Feed`], who sends the [`MapSender`].
 //!
 //! | around it | modules |
 //! |---|---|
 //! | what an estimator needs to be in a unit, and the two sizes of radar-3d | [`build`](mod@build), [`profile`] |
 //! | settings: the checked block, two slots of it, in flash | [`settings`] |
-//! | the integrator: asked for and written over serial lines and CAN, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`safe_state`] |
+//! | the integrator: asked for and written over serial lines and CAN, and what is said without settings | [`service`], [`serial_service`], [`can_service`], `safe_state` |
 //! | native scans and the integrator on serial lines, and whose clock it is | [`session`], [`radar_clock`] |
 //! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
 //! | a unit on hardware of its own: the loop, and what its lamp shows | [`roadside`], [`status_output`] |
@@ -31,15 +31,15 @@ pub mod settings;
 pub mod status_output;
 pub mod transmitter;
 
-pub use build::{InUnit, build};
-pub use sender::Sender;
+pub use build::InUnit;
+pub use sender::MapSender;
 
 use crate::estimator::{Estimator, Progress};
 use crate::fixed::time::Time;
 use crate::frame::health::{Condition, Continuity};
 use crate::inputs::{Feed, Frame};
 use crate::wire::frame::CanFrame;
-use crate::wire::status::{Reason, State};
+use crate::wire::status::{Reason, UnitState};
 
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +61,7 @@ pub enum Event {
     Done(Progress),
 }
 
-/// What went wrong is told in the status for this long, microseconds: in several messages, should some be lost.
+/// What went wrong stays in the status for this long, microseconds: in several messages, should some be lost.
 const DEGRADED_US: u64 = 1_000_000;
 
 /// Time between two maps that say unknown, microseconds.
@@ -86,7 +86,7 @@ pub struct Unit<'a, E: Estimator, S> {
     trouble: Option<(Time, Reason)>,
 }
 
-impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
+impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
     /// Puts the parts together; the map becomes one of these parameters, everything on it unknown.
     pub fn new(parameters: &'a E::Parameters, state: &'a mut E, map: &'a mut E::Map, broadcast: &'a mut S) -> Self {
         E::prepare(parameters, map);
@@ -137,7 +137,7 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
         if incomplete {
             self.degrade(measured, Reason::IncompleteScans);
         }
-        self.tell(progress.condition, measured);
+        self.set_status(progress.condition, measured);
         self.offer(measured);
         event(Event::Ended);
         event(Event::Done(progress));
@@ -147,7 +147,7 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
     /// The map runs out, and that is sent.
     pub fn idle(&mut self, now: Time) -> Condition {
         let condition = self.state.expire(self.parameters, now, self.map);
-        self.tell(condition, now);
+        self.set_status(condition, now);
         let due = self.offered.is_none_or(|last| now.since(last).is_none_or(|us| us >= UNKNOWN_EVERY_US));
         if condition != Condition::Healthy && due {
             self.offer(now);
@@ -160,7 +160,7 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
         self.broadcast.offer(measured, self.map);
     }
 
-    /// Maps go on, but something went wrong just now: told in the status for a second. A bus too narrow is told
+    /// Maps go on, but something went wrong just now: it is in the status for a second. A bus too narrow is reported
     /// only where nothing else went wrong, which may be why.
     pub fn degrade(&mut self, now: Time, reason: Reason) {
         let known = self.trouble.is_some_and(|(since, other)| other != reason && recent(since, now));
@@ -169,12 +169,12 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
         }
         self.trouble = Some((now, reason));
         let status = self.broadcast.status_mut();
-        if status.state == State::Ok {
-            (status.state, status.reason) = (State::Degraded, reason);
+        if status.state == UnitState::Ok {
+            (status.state, status.reason) = (UnitState::Degraded, reason);
         }
     }
 
-    /// A frame took so long to be worked up, microseconds, by the clock of `now`: told if it is longer than the
+    /// A frame took so long to be worked up, microseconds, by the clock of `now`: reported if it is longer than the
     /// time from frame to frame.
     pub fn took(&mut self, now: Time, took_us: u64) {
         if self.period_us.is_some_and(|period| took_us > period) {
@@ -182,20 +182,20 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
         }
     }
 
-    fn tell(&mut self, condition: Condition, now: Time) {
+    fn set_status(&mut self, condition: Condition, now: Time) {
         if self.broadcast.take_overload() {
             self.degrade(now, Reason::BusOverload);
         }
         let trouble = self.trouble.filter(|(since, _)| recent(*since, now)).map(|(_, reason)| reason);
         let status = self.broadcast.status_mut();
         (status.state, status.reason) = match (condition, trouble) {
-            (Condition::Stale, _) => (State::Blind, Reason::RadarSilent),
-            _ if self.fault => (State::Fault, Reason::RadarFault),
-            (Condition::Starting, _) => (State::Starting, Reason::None),
-            (Condition::Blind, _) => (State::Blind, Reason::None),
-            (Condition::Unusable, _) => (State::Blind, Reason::UnusablePoints),
-            (Condition::Healthy, Some(reason)) => (State::Degraded, reason),
-            (Condition::Healthy, None) => (State::Ok, Reason::None),
+            (Condition::Stale, _) => (UnitState::Blind, Reason::RadarSilent),
+            _ if self.fault => (UnitState::Fault, Reason::RadarFault),
+            (Condition::Starting, _) => (UnitState::Starting, Reason::None),
+            (Condition::Blind, _) => (UnitState::Blind, Reason::None),
+            (Condition::Unusable, _) => (UnitState::Blind, Reason::UnusablePoints),
+            (Condition::Healthy, Some(reason)) => (UnitState::Degraded, reason),
+            (Condition::Healthy, None) => (UnitState::Ok, Reason::None),
         };
     }
 
@@ -241,7 +241,7 @@ impl<'a, E: Estimator, S: Sender<E::Map>> Unit<'a, E, S> {
     }
 }
 
-/// Whether something happened within the time it is told for, before or after `now`: frames are of another clock
+/// Whether something happened within the time it is reported for, before or after `now`: frames are of another clock
 /// than the loop around them.
 fn recent(since: Time, now: Time) -> bool {
     now.since(since).or_else(|| since.since(now)).is_some_and(|us| us < DEGRADED_US)
@@ -317,7 +317,7 @@ mod tests {
     #[derive(Default)]
     struct Kept(Vec<Squares>, Status);
 
-    impl Sender<Squares> for Kept {
+    impl MapSender<Squares> for Kept {
         fn fits(_: &Header) -> Result<(), ConfigError> {
             Ok(())
         }
@@ -373,14 +373,18 @@ mod tests {
         assert_eq!(*unit.map(), [[false; 4]; 4], "nothing is known");
         unit.take(&mut feed, &[1, 2], at(100));
         assert_eq!(unit.map().map(|row| row[0]), [true, false, true, false]);
-        assert_eq!((unit.broadcast().1.state, unit.frames()), (State::Ok, 1));
+        assert_eq!((unit.broadcast().1.state, unit.frames()), (UnitState::Ok, 1));
         unit.take(&mut feed, &[2, 1], at(200));
         let status = unit.broadcast().1;
-        assert_eq!((status.state, status.reason), (State::Degraded, Reason::IncompleteScans), "one way for every feed");
+        assert_eq!(
+            (status.state, status.reason),
+            (UnitState::Degraded, Reason::IncompleteScans),
+            "one way for every feed"
+        );
         unit.take(&mut feed, &[], at(250));
         unit.wait(&mut feed, at(800));
         let status = unit.broadcast().1;
-        assert_eq!((status.state, status.reason, status.radar_lost), (State::Blind, Reason::RadarSilent, 1));
+        assert_eq!((status.state, status.reason, status.radar_lost), (UnitState::Blind, Reason::RadarSilent, 1));
         assert_eq!((kept.0.len(), kept.0.last()), (3, Some(&[[false; 4]; 4])), "and what ran out is sent");
     }
 }

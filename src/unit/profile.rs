@@ -5,36 +5,27 @@ macro_rules! size {
         $(#[$doc])*
         pub mod $name {
             use crate::estimator::Estimator;
+            use crate::inputs::ars408::Ars408;
+            use crate::radar_3d::Radar3d;
+            use crate::unit::settings::SettingsCheck;
+            use crate::wire::broadcast::Broadcaster;
 
-            /// Range cells.
-            pub const RANGES: usize = $ranges;
-            /// Azimuths.
-            pub const AZIMUTHS: usize = $azimuths;
-            /// Elevation rows.
-            pub const ELEVATIONS: usize = $elevations;
             /// Words of 32 range cells.
-            pub const WORDS: usize = RANGES.div_ceil(32);
-            /// Moving obstacles.
-            pub const OBSTACLES: usize = $obstacles;
-            /// Detections a scan.
-            pub const DETECTIONS: usize = $detections;
-            /// Whether a unit of this size can run with settings.
-            pub const CHECK: crate::unit::settings::Check = crate::unit::settings::Check::of::<State, Sender>();
+            const WORDS: usize = usize::div_ceil($ranges, 32);
 
             /// The estimator.
-            pub type State = crate::radar_3d::Radar3d<RANGES, AZIMUTHS, ELEVATIONS, WORDS, OBSTACLES, DETECTIONS>;
+            pub type State = Radar3d<$ranges, $azimuths, $elevations, WORDS, $obstacles, $detections>;
             /// What it works with.
             pub type Parameters = <State as Estimator>::Parameters;
             /// Its map.
             pub type Map = <State as Estimator>::Map;
             /// Who sends it.
-            pub type Sender = crate::wire::broadcast::Broadcaster<AZIMUTHS, WORDS>;
-            /// All of them together.
-            pub type Unit<'a> = crate::unit::Unit<'a, State, Sender>;
+            pub type Sender = Broadcaster<$azimuths, WORDS>;
             /// A radar of the ARS408 family with as many detections.
-            pub type Radar = crate::inputs::ars408::Ars408<DETECTIONS>;
-            /// The loop around unit and radar on hardware of its own.
-            pub type Roadside<'a> = crate::unit::roadside::Roadside<'a, State, Sender, Radar>;
+            pub type Radar = Ars408<$detections>;
+
+            /// Whether a unit of this size can run with settings.
+            pub const CHECK: SettingsCheck = SettingsCheck::of::<State, Sender>();
         }
     };
 }

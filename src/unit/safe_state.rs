@@ -5,7 +5,7 @@ use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet};
 use crate::wire::serial;
-use crate::wire::status::{PAGES, Reason, State, Status};
+use crate::wire::status::{PAGES, Reason, Status, UnitState};
 
 /// Time between two status messages, microseconds: at least two a second.
 const PERIOD_US: u64 = 250_000;
@@ -28,19 +28,19 @@ impl SafeState {
         Self { sensor, medium, epoch, started: now, sent: None, counter: 0, page: 0 }
     }
 
-    /// What is told now, versions and counters as in `told`.
-    fn status(&self, now: Time, told: Status) -> Status {
+    /// What is sent now, with the versions and counters of `base`.
+    fn status(&self, now: Time, base: Status) -> Status {
         let uptime_s = now.since(self.started).unwrap_or(0) / 1_000_000;
         let uptime_s = u32::try_from(uptime_s).unwrap_or(u32::MAX);
-        Status { state: State::Fault, reason: Reason::Configuration, uptime_s, ..told }
+        Status { state: UnitState::Fault, reason: Reason::Configuration, uptime_s, ..base }
     }
 
-    fn next(&mut self, now: Time, told: Status) -> Option<Packet> {
+    fn next(&mut self, now: Time, base: Status) -> Option<Packet> {
         if self.sent.and_then(|last| now.since(last)).is_some_and(|us| us < PERIOD_US) {
             return None;
         }
         self.sent = Some(now);
-        let status = self.status(now, told);
+        let status = self.status(now, base);
         let packing = self.medium.packing(false);
         let of = |own: &[u8]| Packet::new(packing, self.sensor, Message::Status, self.epoch, own);
         let packet = if packing.is_classic() { of(&status.emit_page(self.page)) } else { of(&status.emit()) };
@@ -52,13 +52,13 @@ impl SafeState {
     }
 
     /// The next status on a CAN bus, if one is due.
-    pub fn next_frame(&mut self, now: Time, told: Status) -> Option<CanFrame> {
+    pub fn next_frame(&mut self, now: Time, base: Status) -> Option<CanFrame> {
         let (Medium::Can(addresses) | Medium::CanFd(addresses)) = self.medium else { return None };
-        self.next(now, told)?.frame(&addresses)
+        self.next(now, base)?.frame(&addresses)
     }
 
     /// Writes the next status as it goes on a serial line, if one is due; how many bytes it takes.
-    pub fn next_line(&mut self, now: Time, told: Status, line: &mut [u8]) -> Option<usize> {
-        serial::stuff(self.next(now, told)?.bytes(), line)
+    pub fn next_line(&mut self, now: Time, base: Status, line: &mut [u8]) -> Option<usize> {
+        serial::stuff(self.next(now, base)?.bytes(), line)
     }
 }

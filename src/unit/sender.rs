@@ -10,7 +10,7 @@ use crate::wire::message::Epoch;
 use crate::wire::status::Status;
 
 /// A sender of maps `M`; each method is [`Broadcaster`]'s.
-pub trait Sender<M>: Sized {
+pub trait MapSender<M>: Sized {
     /// Whether maps of this header can be sent.
     ///
     /// # Errors
@@ -30,7 +30,7 @@ pub trait Sender<M>: Sized {
     fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize>;
     /// When what was handed out is to be aborted.
     fn deadline(&self) -> Option<Time>;
-    /// What is told of the unit.
+    /// The unit's status, as it is sent next.
     fn status_mut(&mut self) -> &mut Status;
     /// Counts messages that did not leave.
     fn count_dropped(&mut self, messages: u16);
@@ -38,7 +38,7 @@ pub trait Sender<M>: Sized {
     fn take_overload(&mut self) -> bool;
 }
 
-impl<M: Layers<W>, const A: usize, const W: usize, const P: usize> Sender<M> for Broadcaster<A, W, P> {
+impl<M: Layers<W>, const A: usize, const W: usize, const P: usize> MapSender<M> for Broadcaster<A, W, P> {
     fn fits(header: &Header) -> Result<(), ConfigError> {
         Self::fits(header)
     }

@@ -3,14 +3,14 @@
 use crate::fixed::time::Time;
 use crate::unit::safe_state::SafeState;
 use crate::unit::service::{Reply, Request};
-use crate::unit::settings::{Slots, Stored};
+use crate::unit::settings::{SettingsSlots, StoredSettings};
 use crate::wire::broadcast::Medium;
 use crate::wire::message::{Epoch, Packing};
 use crate::wire::serial::{MOST_STUFFED, stuff};
 use crate::wire::status::Status;
 
 /// An outgoing serial line.
-pub trait Line {
+pub trait SerialLine {
     /// Sends all bytes or none; `false` if the line takes no more now.
     fn send(&mut self, bytes: &[u8]) -> bool;
 }
@@ -30,7 +30,7 @@ pub(crate) enum Asked {
 #[derive(Debug)]
 pub(crate) struct SerialService {
     sensor: u8,
-    stored: Stored,
+    stored: StoredSettings,
     safe: SafeState,
     counter: u8,
     /// Messages the line did not take.
@@ -39,7 +39,7 @@ pub(crate) struct SerialService {
 
 impl SerialService {
     /// Says what the unit starts with, or why with nothing.
-    pub fn start(sensor: u8, epoch: Epoch, now: Time, stored: Stored, line: &mut impl Line) -> Self {
+    pub fn start(sensor: u8, epoch: Epoch, now: Time, stored: StoredSettings, line: &mut impl SerialLine) -> Self {
         let safe = SafeState::new(sensor, Medium::Serial, epoch, now);
         let mut service = Self { sensor, stored, safe, counter: 0, refused: 0 };
         let place = stored.place();
@@ -51,12 +51,17 @@ impl SerialService {
     }
 
     /// The block in use.
-    pub fn stored(&self) -> &Stored {
+    pub fn stored(&self) -> &StoredSettings {
         &self.stored
     }
 
     /// Takes a message and answers it; `None` if it is none of the integrator's.
-    pub fn take(&mut self, message: &[u8], slots: &mut impl Slots, line: &mut impl Line) -> Option<Asked> {
+    pub fn take(
+        &mut self,
+        message: &[u8],
+        slots: &mut impl SettingsSlots,
+        line: &mut impl SerialLine,
+    ) -> Option<Asked> {
         match Request::read(message, self.sensor)? {
             Request::Restart => return Some(Asked::Restart),
             Request::Time(time) => return Some(Asked::Time(time)),
@@ -72,11 +77,11 @@ impl SerialService {
         Some(Asked::Nothing)
     }
 
-    /// Without settings: the status, if it is due, versions and counters as in `told`.
+    /// Without settings: the status, if it is due, versions and counters as in `base`.
     #[inline(never)] // its buffer is not on the stack while a scan is worked up
-    pub fn say_safe(&mut self, now: Time, told: Status, line: &mut impl Line) {
+    pub fn say_safe(&mut self, now: Time, base: Status, line: &mut impl SerialLine) {
         let mut stuffed = [0; MOST_STUFFED];
-        let length = self.safe.next_line(now, told, &mut stuffed);
+        let length = self.safe.next_line(now, base, &mut stuffed);
         if let Some(message) = length.and_then(|n| stuffed.get(..n)) {
             let _ = line.send(message);
         }
@@ -88,7 +93,7 @@ impl SerialService {
     }
 
     #[inline(never)] // as above
-    fn reply(&mut self, reply: &Reply<'_>, line: &mut impl Line) {
+    fn reply(&mut self, reply: &Reply<'_>, line: &mut impl SerialLine) {
         let message = reply.message(self.sensor, self.counter);
         self.counter = Packing::Long.profile().next(self.counter);
         let mut stuffed = [0; MOST_STUFFED];

@@ -14,10 +14,10 @@ use crate::estimator::Estimator;
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::inputs::Feed;
-use crate::inputs::native::{Config, Receiver};
-use crate::unit::serial_service::{Asked, Line, SerialService};
-use crate::unit::settings::{Settings, Slots, Stored};
-use crate::unit::{Event, Flow, Sender, Unit};
+use crate::inputs::native::{NativeConfig, NativeReceiver};
+use crate::unit::serial_service::{Asked, SerialLine, SerialService};
+use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
+use crate::unit::{Event, Flow, MapSender, Unit};
 use crate::wire::message::Epoch;
 use crate::wire::serial::{MOST_STUFFED, Unstuffer};
 use crate::wire::status::Status;
@@ -27,24 +27,24 @@ const MOST_MESSAGES: usize = 400;
 
 /// What lies between the lines and the unit. `D` detections a scan.
 #[derive(Debug)]
-pub struct Session<const D: usize> {
+pub struct SerialSession<const D: usize> {
     unstuffer: Unstuffer,
     service: SerialService,
-    radar: Receiver<D>,
+    radar: NativeReceiver<D>,
     now: Time,
     /// Messages the line did not take.
     refused: u16,
 }
 
-impl<const D: usize> Session<D> {
+impl<const D: usize> SerialSession<D> {
     /// Starts with a block, or without.
     #[inline(never)] // what it takes of the stack is free again afterwards
-    pub fn start(sensor: u8, epoch: Epoch, stored: Stored, line: &mut impl Line) -> Self {
+    pub fn start(sensor: u8, epoch: Epoch, stored: StoredSettings, line: &mut impl SerialLine) -> Self {
         let now = Time::from_micros(0);
         Self {
             unstuffer: Unstuffer::new(),
             service: SerialService::start(sensor, epoch, now, stored, line),
-            radar: Receiver::new(Config::sensor(sensor)),
+            radar: NativeReceiver::new(NativeConfig::sensor(sensor)),
             now,
             refused: 0,
         }
@@ -60,13 +60,13 @@ impl<const D: usize> Session<D> {
         self.now
     }
 
-    /// Takes bytes as they come, cut anywhere, and sends what follows from them. `event` is told what the unit
+    /// Takes bytes as they come, cut anywhere, and sends what follows from them. `event` is called with what the unit
     /// does with each frame.
-    pub fn take<E: Estimator<Input = [Detection]>, S: Sender<E::Map>, L: Line>(
+    pub fn take<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,
         bytes: &[u8],
         unit: &mut Option<Unit<'_, E, S>>,
-        slots: &mut impl Slots,
+        slots: &mut impl SettingsSlots,
         line: &mut L,
         event: &mut impl FnMut(Event, &mut L),
     ) -> Flow {
@@ -95,7 +95,7 @@ impl<const D: usize> Session<D> {
 
     /// What is to be done when no bytes came, where the unit has a clock; it has to be the one its scans
     /// are stamped by, see [`RadarClock`](crate::unit::radar_clock::RadarClock).
-    pub fn idle<E: Estimator<Input = [Detection]>, S: Sender<E::Map>, L: Line>(
+    pub fn idle<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,
         now: Time,
         unit: &mut Option<Unit<'_, E, S>>,
@@ -106,7 +106,7 @@ impl<const D: usize> Session<D> {
     }
 
     /// Time went on.
-    fn wait<E: Estimator<Input = [Detection]>, S: Sender<E::Map>, L: Line>(
+    fn wait<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,
         now: Time,
         unit: &mut Option<Unit<'_, E, S>>,
@@ -124,7 +124,11 @@ impl<const D: usize> Session<D> {
     }
 
     #[inline(never)] // its buffer is not on the stack while a scan is worked up
-    fn flush<E: Estimator, S: Sender<E::Map>>(&mut self, unit: &mut Option<Unit<'_, E, S>>, line: &mut impl Line) {
+    fn flush<E: Estimator, S: MapSender<E::Map>>(
+        &mut self,
+        unit: &mut Option<Unit<'_, E, S>>,
+        line: &mut impl SerialLine,
+    ) {
         let Some(unit) = unit else { return self.service.say_safe(self.now, Status::starting(0), line) };
         let damaged = self.radar.counters().damaged.saturating_add(self.unstuffer.errors());
         let refused = core::mem::take(&mut self.refused).saturating_add(self.service.take_refused());

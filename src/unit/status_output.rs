@@ -14,7 +14,7 @@
 use embedded_hal::digital::OutputPin;
 
 use crate::fixed::time::Time;
-use crate::wire::status::State;
+use crate::wire::status::UnitState;
 
 /// Half a period of blinking, microseconds.
 const SLOW_US: u64 = 500_000;
@@ -27,12 +27,12 @@ pub struct StatusOutput<P> {
 }
 
 /// Whether the output is on.
-fn on(state: State, now: Time) -> bool {
+fn on(state: UnitState, now: Time) -> bool {
     let half = |us: u64| (now.micros() / us).is_multiple_of(2);
     match state {
-        State::Ok | State::Degraded => true,
-        State::Starting | State::Blind => half(SLOW_US),
-        State::Fault => half(FAST_US),
+        UnitState::Ok | UnitState::Degraded => true,
+        UnitState::Starting | UnitState::Blind => half(SLOW_US),
+        UnitState::Fault => half(FAST_US),
     }
 }
 
@@ -46,7 +46,7 @@ impl<P: OutputPin> StatusOutput<P> {
     ///
     /// # Errors
     /// The pin's own.
-    pub fn show(&mut self, state: State, now: Time) -> Result<(), P::Error> {
+    pub fn show(&mut self, state: UnitState, now: Time) -> Result<(), P::Error> {
         if on(state, now) { self.pin.set_high() } else { self.pin.set_low() }
     }
 }
@@ -77,7 +77,7 @@ mod tests {
     }
 
     /// Two seconds, a character every 50 ms.
-    fn pattern(state: State) -> String {
+    fn pattern(state: UnitState) -> String {
         let mut output = StatusOutput::new(Pin::default());
         let at = |k: u64| Time::from_micros(k * 50_000);
         (0..40)
@@ -90,10 +90,10 @@ mod tests {
 
     #[test]
     fn each_state_looks_different_enough() {
-        assert_eq!(pattern(State::Ok), "########################################");
-        assert_eq!(pattern(State::Degraded), pattern(State::Ok), "maps are sent");
-        assert_eq!(pattern(State::Blind), "##########..........##########..........");
-        assert_eq!(pattern(State::Starting), pattern(State::Blind));
-        assert_eq!(pattern(State::Fault), "##..##..##..##..##..##..##..##..##..##..");
+        assert_eq!(pattern(UnitState::Ok), "########################################");
+        assert_eq!(pattern(UnitState::Degraded), pattern(UnitState::Ok), "maps are sent");
+        assert_eq!(pattern(UnitState::Blind), "##########..........##########..........");
+        assert_eq!(pattern(UnitState::Starting), pattern(UnitState::Blind));
+        assert_eq!(pattern(UnitState::Fault), "##..##..##..##..##..##..##..##..##..##..");
     }
 }

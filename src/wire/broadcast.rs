@@ -358,7 +358,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     /// Takes a map measured at this time. What was still to be sent of the one before is dropped.
     ///
     /// # Errors
-    /// The map is not sent: [`NotSent`] says why.
+    /// The map is not sent: `NotSent` says why.
     pub fn scan(&mut self, measured: Time, map: &impl Layers<W>) -> Result<(), NotSent> {
         let number = ScanNumber::at(measured);
         let since = match self.last.map(|last| measured.since(last)) {

@@ -125,7 +125,7 @@ impl Header {
     /// For the maps of an estimator.
     ///
     /// # Errors
-    /// [`NotAHeader::Unsendable`] if the map has more than 128 azimuths or 256 range cells, or the
+    /// `NotAHeader::Unsendable` if the map has more than 128 azimuths or 256 range cells, or the
     /// mount is none.
     pub fn new<const R: usize, const A: usize>(
         mount: &Mount,

@@ -221,6 +221,11 @@ impl Addresses {
         if room < sensors { room as u8 } else { sensors as u8 }
     }
 
+    /// The first identifier of a sensor; `None` if it lies beyond the last.
+    pub const fn first(&self, sensor: u8) -> Option<CanId> {
+        self.id(sensor, Message::Status)
+    }
+
     /// The identifier of a sensor's message; `None` if the sensor's lie beyond the last.
     pub const fn id(&self, sensor: u8, message: Message) -> Option<CanId> {
         let raw = self.base.raw() + 32 * sensor as u32 + message.number() as u32;

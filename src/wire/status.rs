@@ -26,7 +26,7 @@ pub const LONG: usize = 2 + 4 * PAGES as usize;
 /// What the sender's maps are worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum State {
+pub enum UnitState {
     /// No map yet.
     #[default]
     Starting,
@@ -167,7 +167,7 @@ impl ResetCause {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
     /// What the maps are worth.
-    pub state: State,
+    pub state: UnitState,
     /// Why not more.
     pub reason: Reason,
     /// Why the sender last started.
@@ -207,7 +207,7 @@ impl Status {
     /// A status before anything is known.
     pub const fn starting(fingerprint: u32) -> Self {
         Self {
-            state: State::Starting,
+            state: UnitState::Starting,
             reason: Reason::None,
             reset_cause: ResetCause::Unknown,
             uptime_s: 0,
@@ -271,11 +271,11 @@ impl Status {
     pub fn take(&mut self, own: &[u8]) -> Result<(), NotAStatus> {
         let [first, reason, pages @ ..] = own else { return Err(NotAStatus::TooShort) };
         let state = match first & 0x0F {
-            0 => State::Starting,
-            1 => State::Ok,
-            2 => State::Blind,
-            3 => State::Degraded,
-            4 => State::Fault,
+            0 => UnitState::Starting,
+            1 => UnitState::Ok,
+            2 => UnitState::Blind,
+            3 => UnitState::Degraded,
+            4 => UnitState::Fault,
             state => return Err(NotAStatus::State { state }),
         };
         let (chunks, _) = pages.as_chunks::<4>();
@@ -298,7 +298,7 @@ mod tests {
     use super::*;
 
     const STATUS: Status = Status {
-        state: State::Blind,
+        state: UnitState::Blind,
         reason: Reason::RadarSilent,
         reset_cause: ResetCause::Watchdog,
         uptime_s: 0x0102_0304,
@@ -328,7 +328,7 @@ mod tests {
         let mut got = Status::starting(0);
         for page in 0..6 {
             got.take(&STATUS.emit_page(page)).unwrap();
-            assert_eq!((got.state, got.reason), (State::Blind, Reason::RadarSilent), "in every page");
+            assert_eq!((got.state, got.reason), (UnitState::Blind, Reason::RadarSilent), "in every page");
         }
         assert_eq!(got, STATUS);
     }
@@ -337,7 +337,7 @@ mod tests {
     fn of_a_page_of_a_later_version_state_and_reason_count() {
         let mut got = STATUS;
         assert_eq!(got.take(&[0x63, 12, 1, 2, 3, 4]), Ok(()));
-        assert_eq!(got, Status { state: State::Degraded, reason: Reason::Other(12), ..STATUS });
+        assert_eq!(got, Status { state: UnitState::Degraded, reason: Reason::Other(12), ..STATUS });
     }
 
     #[test]

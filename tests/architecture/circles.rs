@@ -52,7 +52,7 @@ fn sources(src: &Path) -> BTreeMap<Module, String> {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            let within = || [&module[..], &[name.clone()]].concat();
+            let within = || [&module[..], std::slice::from_ref(&name)].concat();
             if path.is_dir() {
                 folders.push((path, within()));
             } else if path.extension().is_some_and(|e| e == "rs") {

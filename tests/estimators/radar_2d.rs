@@ -4,13 +4,13 @@ use crate::common::{FRAME_US, detection, gantry};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::map::{Visibility, VisibilityMap};
-use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
+use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::road::RoadPoint;
 
 /// Posts seen for three frames, then the road from above: rows from left (top) to right, 4 m each; x
 /// ahead to the right, 4 m a character.
-fn draw(sensor: &Sensor, posts: &[[f64; 2]], reading: Reading) -> String {
+fn draw(sensor: &Sensor, posts: &[[f64; 2]], reading: Radar2dReading) -> String {
     let p = Box::new(Radar2dParameters::new::<208, 45, 320>(sensor, &Radar2dConfig::default()).unwrap());
     let mut state = Box::new(Radar2d::<208, 45, 320, 256>::new());
     let seen: Vec<Detection> =
@@ -73,7 +73,7 @@ fn behind_the_last_of_what_was_seen_all_is_invisible() {
 ????????................O####...........
 ?????????...................#####.......
 ";
-    let got = draw(&sensor, &posts, Reading::Last);
+    let got = draw(&sensor, &posts, Radar2dReading::Last);
     assert_eq!(got, expected, "{got}");
 }
 
@@ -104,6 +104,6 @@ fn behind_the_first_of_what_was_seen_all_is_invisible() {
 ????????.................####...........
 ?????????...................#####.......
 ";
-    let got = draw(&sensor, &posts, Reading::First);
+    let got = draw(&sensor, &posts, Radar2dReading::First);
     assert_eq!(got, expected, "{got}");
 }

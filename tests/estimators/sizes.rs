@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use viewshed::inputs::ars408::Ars408;
-use viewshed::inputs::native::{Receiver, SerialReceiver};
+use viewshed::inputs::native::{NativeReceiver, NativeSerialReceiver};
 use viewshed::inputs::ti::Ti;
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
@@ -46,8 +46,8 @@ fn a_polar_map_takes_two_bytes_a_cell() {
 fn a_radar_input_for_256_detections_fits_6500_bytes() {
     let sizes = [
         ("ARS408", size_of::<Ars408<256>>()),
-        ("native over CAN FD", size_of::<Receiver<256>>()),
-        ("native over a serial line", size_of::<SerialReceiver<256>>()),
+        ("native over CAN FD", size_of::<NativeReceiver<256>>()),
+        ("native over a serial line", size_of::<NativeSerialReceiver<256>>()),
         ("TI mmWave", size_of::<Ti<256>>()),
     ];
     for (input, bytes) in sizes {

@@ -5,7 +5,7 @@ use viewshed::fixed::time::Time;
 use viewshed::frame::health::Condition;
 use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_2d::sightlines::{Fan, Sightlines};
-use viewshed::radar_2d::{Radar2d, Radar2dParameters, Reading};
+use viewshed::radar_2d::{Radar2d, Radar2dParameters, Radar2dReading};
 use viewshed::sensor::road::RoadPoint;
 
 use crate::cases;
@@ -42,7 +42,8 @@ impl Rig {
     }
 
     fn check(&self, condition: Condition) -> Result<(), TestCaseError> {
-        let [last, first] = [Reading::Last, Reading::First].map(|reading| self.state.map(&self.parameters, reading));
+        let [last, first] =
+            [Radar2dReading::Last, Radar2dReading::First].map(|reading| self.state.map(&self.parameters, reading));
         for p in self.points() {
             let (last, first) = (last.at(p), first.at(p));
             prop_assert!(first.visibility <= last.visibility, "the first run ends no later than the last");
@@ -78,7 +79,7 @@ proptest! {
             let condition = rig.frame(f);
             prop_assert_eq!(condition, twin.frame(f));
             rig.check(condition)?;
-            let [a, b] = [&rig, &twin].map(|r| r.state.map(&r.parameters, Reading::First));
+            let [a, b] = [&rig, &twin].map(|r| r.state.map(&r.parameters, Radar2dReading::First));
             prop_assert!(rig.points().all(|p| a.at(p) == b.at(p)), "the same input gives the same bits");
         }
     }
@@ -111,7 +112,7 @@ proptest! {
         let [mut small, mut large] = [Rig::new(&setup), Rig::new(&larger)];
         let empty = Frame { now: Time::from_micros(1), fault: false, detections: Vec::new() };
         prop_assert_eq!([small.frame(&empty), large.frame(&empty)], [Condition::Healthy; 2]);
-        let [a, b] = [&small, &large].map(|rig| rig.state.map(&rig.parameters, Reading::First));
+        let [a, b] = [&small, &large].map(|rig| rig.state.map(&rig.parameters, Radar2dReading::First));
         for p in small.points() {
             prop_assert!(!a.at(p).visible() || b.at(p).visible(), "an empty road is visible: {:?}", p);
         }
@@ -123,7 +124,7 @@ proptest! {
         world.1.iter().for_each(|f| { rig.frame(f); });
         let m = world.0.sensor.mount;
         let away = (f64::from(x) / 100.0 - f64::from(m.x_m)).hypot(f64::from(y) / 100.0 - f64::from(m.y_m));
-        let known = rig.state.map(&rig.parameters, Reading::Last).at(RoadPoint::new(x, y)).visibility != Visibility::Unknown;
+        let known = rig.state.map(&rig.parameters, Radar2dReading::Last).at(RoadPoint::new(x, y)).visibility != Visibility::Unknown;
         prop_assert!(!known || away <= f64::from(world.0.sensor.field_of_view.range_max_m) + 0.1);
     }
 

@@ -3,14 +3,14 @@
 use proptest::prelude::*;
 use viewshed::fixed::time::Time;
 use viewshed::unit::Flow;
-use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Told, Tool};
+use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Said, Tool};
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 use viewshed::wire::receive::{Accepted, Limits, Receiver, Refused};
-use viewshed::wire::status::{Reason, State, Status};
+use viewshed::wire::status::{Reason, Status, UnitState};
 
 use crate::common::gantry;
 
@@ -21,7 +21,7 @@ const FD: Medium = Medium::CanFd(Addresses::STANDARD);
 #[derive(Clone)]
 struct InRam([[u8; BLOCK_LEN]; 2], usize);
 
-impl Slots for InRam {
+impl SettingsSlots for InRam {
     fn slot(&self, slot: usize) -> &[u8] {
         &self.0[slot]
     }
@@ -44,8 +44,8 @@ fn settings(height_m: f32) -> Settings {
     Settings::of(gantry(height_m, 0.0))
 }
 
-fn stored(slots: &InRam) -> Stored {
-    Stored::read(slots, small::CHECK)
+fn stored(slots: &InRam) -> StoredSettings {
+    StoredSettings::read(slots, small::CHECK)
 }
 
 fn start(medium: Medium, slots: &InRam) -> CanService {
@@ -60,7 +60,7 @@ fn send(frames: impl Iterator<Item = CanFrame>, unit: &mut CanService, slots: &m
 }
 
 /// Everything the unit has to say now.
-fn told(unit: &mut CanService, slots: &InRam, medium: Medium) -> Vec<Told> {
+fn answers(unit: &mut CanService, slots: &InRam, medium: Medium) -> Vec<Said> {
     let mut answers = Answers::new(SENSOR, medium);
     std::iter::from_fn(|| unit.next_frame(at(0), slots)).filter_map(|frame| answers.take(&frame)).collect()
 }
@@ -77,16 +77,16 @@ fn a_block_is_written_read_back_and_counts_from_the_restart_on() {
                 assert_eq!(unit.take(&frame, &mut slots), Some(Flow::Continue));
             }
             sequence += 1;
-            assert!(told(&mut unit, &slots, medium).contains(&Told::Written(sequence)));
+            assert!(answers(&mut unit, &slots, medium).contains(&Said::Written(sequence)));
             assert_eq!(unit.settings().copied(), before, "not before the restart");
             assert_eq!(unit.take(&tool.restart().unwrap(), &mut slots), Some(Flow::Restart));
             unit = start(medium, &slots);
             assert_eq!(unit.settings(), Some(&settings(height)));
             let slot = 1 - (sequence & 1) as u8;
-            assert_eq!(told(&mut unit, &slots, medium), [Told::Started(Some((slot, sequence)))], "slots take turns");
+            assert_eq!(answers(&mut unit, &slots, medium), [Said::Started(Some((slot, sequence)))], "slots take turns");
             unit.take(&tool.read().unwrap(), &mut slots);
-            let read = told(&mut unit, &slots, medium);
-            let [Told::Block(block)] = read.as_slice() else { panic!("{read:?}") };
+            let read = answers(&mut unit, &slots, medium);
+            let [Said::Block(block)] = read.as_slice() else { panic!("{read:?}") };
             assert_eq!(Settings::from_block(block), Ok((sequence, settings(height))));
         }
     }
@@ -124,8 +124,8 @@ fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_stat
     for medium in [CLASSIC, FD] {
         let mut unit = start(medium, &slots);
         assert_eq!((unit.settings(), unit.refusal()), (None, Some(BlockError::CheckSum)));
-        let told = told(&mut unit, &slots, medium);
-        assert!(matches!(told[..], [Told::Started(None), Told::Refused(r)] if r.reason == 4), "{told:?}");
+        let said = answers(&mut unit, &slots, medium);
+        assert!(matches!(said[..], [Said::Started(None), Said::Refused(r)] if r.reason == 4), "{said:?}");
         // the status says it to everybody, at least twice a second
         let mut receiver = Receiver::<1, 120, 7>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
         let mut last = 0;
@@ -138,7 +138,7 @@ fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_stat
             last = ms.max(1);
         }
         let status = receiver.sensor(SENSOR).and_then(|s| s.status()).unwrap();
-        assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+        assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
         assert!(status.uptime_s >= 1 && last >= 2500);
     }
 }
@@ -153,8 +153,8 @@ fn a_parameter_is_refused_by_its_name_and_value() {
         [(settings(50.0).to_block(1), "mount.height_m", 50.0), (narrow.to_block(1), "visibility.slice_height_m", 50.0)]
     {
         send(tool.write(&block), &mut unit, &mut slots);
-        let told = told(&mut unit, &slots, CLASSIC);
-        let Some(Told::Refused(refusal)) = told.last() else { panic!("{told:?}") };
+        let said = answers(&mut unit, &slots, CLASSIC);
+        let Some(Said::Refused(refusal)) = said.last() else { panic!("{said:?}") };
         assert_eq!((refusal.reason, refusal.parameter(), refusal.value()), (5, name, value));
     }
     assert_eq!(slots.1, 0, "nothing was written");
@@ -171,13 +171,13 @@ fn a_lost_part_is_asked_for_and_a_repeated_completion_writes_once() {
             unit.take(frame, &mut slots);
         }
     }
-    let said = told(&mut unit, &slots, CLASSIC);
-    let Some(Told::Refused(refusal)) = said.last() else { panic!("{said:?}") };
+    let said = answers(&mut unit, &slots, CLASSIC);
+    let Some(Said::Refused(refusal)) = said.last() else { panic!("{said:?}") };
     assert_eq!((refusal.reason, refusal.detail[0], slots.1), (INCOMPLETE, 17, 0));
     send(tool.again(&block, 17), &mut unit, &mut slots);
-    assert_eq!(told(&mut unit, &slots, CLASSIC), [Told::Written(1)]);
+    assert_eq!(answers(&mut unit, &slots, CLASSIC), [Said::Written(1)]);
     unit.take(&frames[38], &mut slots);
-    assert_eq!((told(&mut unit, &slots, CLASSIC), slots.1), (vec![Told::Written(1)], 1), "the answer was lost");
+    assert_eq!((answers(&mut unit, &slots, CLASSIC), slots.1), (vec![Said::Written(1)], 1), "the answer was lost");
     // the parts alone, without a beginning, are of no block
     send(frames[1..].iter().copied(), &mut unit, &mut slots);
     assert_eq!(slots.1, 1);

@@ -12,7 +12,7 @@ use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::serial::MOST_STUFFED;
-use viewshed::wire::status::State;
+use viewshed::wire::status::UnitState;
 
 use crate::common::{SmallSender, SmallState, Vehicle, gantry, small_unit};
 
@@ -108,7 +108,7 @@ fn every_frame_is_answered_with_the_fingerprint_of_its_map() {
         let now = Time::from_micros(k as u64 * 66_667);
         let report = state.process(&parameters, now, scan, false, &mut map);
         let _ = sender.scan(now, &map);
-        sender.status_mut().state = State::Ok;
+        sender.status_mut().state = UnitState::Ok;
         let mut fingerprint = Fingerprint::of_map(&map);
         while let Some(n) = sender.next_line(now, &mut line) {
             fingerprint.bytes(&line[..n]);

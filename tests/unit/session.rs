@@ -1,22 +1,22 @@
 //! A unit on serial lines that take nothing for a while.
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::native::{Medium as Native, Sender};
+use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::unit::Unit;
-use viewshed::unit::serial_service::Line;
+use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
-use viewshed::unit::session::Session;
-use viewshed::unit::settings::{BLOCK_LEN, Check, Settings, Slots, Stored};
+use viewshed::unit::session::SerialSession;
+use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Epoch, Message, Received};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
-use viewshed::wire::status::{Reason, State, Status};
+use viewshed::wire::status::{Reason, Status, UnitState};
 
 use crate::common::{SmallSender, SmallState, Vehicle, gantry, small_unit};
 
 struct Block([u8; BLOCK_LEN]);
 
-impl Slots for Block {
+impl SettingsSlots for Block {
     fn slot(&self, slot: usize) -> &[u8] {
         if slot == 0 { &self.0 } else { &[] }
     }
@@ -32,7 +32,7 @@ struct Narrow {
     messages: usize,
 }
 
-impl Line for Narrow {
+impl SerialLine for Narrow {
     fn send(&mut self, _: &[u8]) -> bool {
         self.messages += usize::from(self.open);
         self.open
@@ -47,16 +47,16 @@ fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() 
     let mut map = parameters.map();
     let mut unit = Some(Unit::new(&parameters, &mut *state, &mut map, &mut sender));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow::default());
-    let stored = Stored::read(&slots, Check::of::<SmallState, SmallSender>());
-    let mut session = Session::<64>::start(0, Epoch::new(1), stored, &mut line);
+    let stored = StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>());
+    let mut session = SerialSession::<64>::start(0, Epoch::new(1), stored, &mut line);
     assert_eq!(session.settings(), Some(&settings));
 
-    let (mut radar, car) = (Sender::new(0), Vehicle::car(40.0, 2.0, 22.0));
+    let (mut radar, car) = (NativeSender::new(0), Vehicle::car(40.0, 2.0, 22.0));
     let mut after = Vec::new();
     for k in 0..60_u64 {
         line.open = k >= 40;
         let scan = car.at(k as f64 / 15.0).detections(&gantry(6.0, 0.0), true);
-        for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, Native::Serial) {
+        for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, NativeMedium::Serial) {
             let mut stuffed = [0; MOST_STUFFED];
             let n = stuff(message.bytes(), &mut stuffed).unwrap();
             session.take(&stuffed[..n], &mut unit, &mut slots, &mut line, &mut |_, _| {});
@@ -77,13 +77,13 @@ fn a_radar_that_stops_is_told_by_the_units_own_clock() {
     let mut map = parameters.map();
     let mut unit = Some(Unit::new(&parameters, &mut *state, &mut map, &mut sender));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow { open: true, messages: 0 });
-    let stored = Stored::read(&slots, Check::of::<SmallState, SmallSender>());
-    let mut session = Session::<64>::start(0, Epoch::new(1), stored, &mut line);
+    let stored = StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>());
+    let mut session = SerialSession::<64>::start(0, Epoch::new(1), stored, &mut line);
 
-    let (mut radar, car) = (Sender::new(0), Vehicle::car(40.0, 2.0, 22.0));
+    let (mut radar, car) = (NativeSender::new(0), Vehicle::car(40.0, 2.0, 22.0));
     for k in 0..20_u64 {
         let scan = car.at(k as f64 / 15.0).detections(&gantry(6.0, 0.0), true);
-        for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, Native::Serial) {
+        for message in radar.scan(Time::from_micros(1 + k * 66_667), false, &scan, NativeMedium::Serial) {
             let mut stuffed = [0; MOST_STUFFED];
             let n = stuff(message.bytes(), &mut stuffed).unwrap();
             session.take(&stuffed[..n], &mut unit, &mut slots, &mut line, &mut |_, _| {});
@@ -91,29 +91,29 @@ fn a_radar_that_stops_is_told_by_the_units_own_clock() {
     }
     let last = session.now();
     assert_eq!(unit.as_ref().unwrap().offered(), Some(last));
-    let mut told = Vec::new();
+    let mut sent = Vec::new();
     for ms in [400, 500, 501, 550, 601, 700, 702] {
         let before = line.messages;
         session.idle(Time::from_micros(last.micros() + 1000 * ms), &mut unit, &mut line);
         let unit = unit.as_mut().unwrap();
         let offered = unit.offered().and_then(|t| t.since(last)).unwrap();
         let status = unit.broadcast().status_mut();
-        told.push((ms, status.state, status.reason, offered / 1000, line.messages > before));
+        sent.push((ms, status.state, status.reason, offered / 1000, line.messages > before));
     }
     // held for half a second, then unknown, ten times a second
-    let (ok, silent) = ((State::Ok, Reason::None), (State::Blind, Reason::RadarSilent));
+    let (ok, silent) = ((UnitState::Ok, Reason::None), (UnitState::Blind, Reason::RadarSilent));
     let expected = [(400, ok, 0), (500, ok, 0), (501, silent, 501), (550, silent, 501), (601, silent, 601)];
-    for (told, (ms, (state, reason), offered)) in told.iter().zip(expected) {
-        assert_eq!((told.0, told.1, told.2, told.3), (ms, state, reason, offered));
+    for (sent, (ms, (state, reason), offered)) in sent.iter().zip(expected) {
+        assert_eq!((sent.0, sent.1, sent.2, sent.3), (ms, state, reason, offered));
     }
-    assert!(told[2].4 && told[4].4, "{told:?}");
+    assert!(sent[2].4 && sent[4].4, "{sent:?}");
 }
 
 /// Messages as they are stuffed.
 #[derive(Default)]
 struct Kept(Vec<Vec<u8>>);
 
-impl Line for Kept {
+impl SerialLine for Kept {
     fn send(&mut self, bytes: &[u8]) -> bool {
         self.0.push(bytes.to_vec());
         true
@@ -125,8 +125,8 @@ fn the_safe_state_is_told_in_the_epoch_of_the_start_four_times_a_second() {
     let mut slots = Block([0xFF; BLOCK_LEN]);
     for epoch in [Epoch::new(1), Epoch::new(9)] {
         let mut line = Kept::default();
-        let stored = Stored::read(&slots, Check::of::<SmallState, SmallSender>());
-        let mut session = Session::<64>::start(0, epoch, stored, &mut line);
+        let stored = StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>());
+        let mut session = SerialSession::<64>::start(0, epoch, stored, &mut line);
         let mut unit: Option<Unit<'_, SmallState, SmallSender>> = None;
         line.0.clear();
         for ms in 0..10_000 {
@@ -139,7 +139,7 @@ fn the_safe_state_is_told_in_the_epoch_of_the_start_four_times_a_second() {
             assert_eq!((received.message, received.epoch), (Message::Status, epoch));
             let mut status = Status::default();
             status.take(received.own).unwrap();
-            assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+            assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
             assert_eq!(status.uptime_s, k as u32 / 4);
         }
         // it takes a block all the same
@@ -147,7 +147,7 @@ fn the_safe_state_is_told_in_the_epoch_of_the_start_four_times_a_second() {
         let request = Request::Write(&Settings::of(gantry(6.0, 0.0)).to_block(0)).message(0, 0);
         let n = stuff(request.bytes(), &mut stuffed).unwrap();
         session.take(&stuffed[..n], &mut unit, &mut slots, &mut line, &mut |_, _| {});
-        assert!(Stored::read(&slots, Check::of::<SmallState, SmallSender>()).settings().is_some());
+        assert!(StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>()).settings().is_some());
         slots.0.fill(0xFF);
     }
 }

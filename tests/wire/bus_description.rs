@@ -13,14 +13,14 @@ use viewshed::fixed::time::Time;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::can_service::{ANSWER, CanService, CanServiceConfig, REQUEST, Tool};
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{BLOCK_LEN, Slots, Stored};
+use viewshed::unit::settings::{BLOCK_LEN, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, WireMount};
 use viewshed::wire::map_message::{self, LIMITS, Plain};
 use viewshed::wire::message::{Addresses, Epoch, Message, Part, Plane, Received, Word};
 use viewshed::wire::scan_number::ScanNumber;
-use viewshed::wire::status::{Reason, ResetCause, State};
+use viewshed::wire::status::{Reason, ResetCause, UnitState};
 use viewshed::wire::visible_range;
 
 const CLASSIC: Medium = Medium::Can(Addresses::STANDARD);
@@ -61,7 +61,7 @@ fn frames(medium: Medium) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
     sender.set_synchronised(true);
     let status = sender.status_mut();
     (status.state, status.reason, status.reset_cause) =
-        (State::Degraded, Reason::IncompleteScans, ResetCause::Watchdog);
+        (UnitState::Degraded, Reason::IncompleteScans, ResetCause::Watchdog);
     (status.firmware, status.radar_lost, status.e2e_errors, status.bus_off) = ([1, 22, 3], 40_000, 515, 2);
     let mut shadows = Shadows::new(3);
     let (mut frames, mut maps) = (Vec::new(), Vec::new());
@@ -162,7 +162,7 @@ fn ranges_words_and_cells_read_as_they_were_sent() {
 /// Nothing is kept.
 struct Nowhere;
 
-impl Slots for Nowhere {
+impl SettingsSlots for Nowhere {
     fn slot(&self, _: usize) -> &[u8] {
         &[]
     }
@@ -174,7 +174,8 @@ impl Slots for Nowhere {
 fn configuration(medium: Medium) -> Vec<CanFrame> {
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
     let check = small::CHECK;
-    let mut unit = CanService::start(config, Epoch::new(11), Time::from_micros(0), Stored::read(&Nowhere, check));
+    let mut unit =
+        CanService::start(config, Epoch::new(11), Time::from_micros(0), StoredSettings::read(&Nowhere, check));
     let mut tool = Tool::new(0, medium);
     let mut frames: Vec<CanFrame> = tool.write(&[0x56; 12]).collect();
     frames.extend([tool.read().unwrap(), tool.restart().unwrap()]);

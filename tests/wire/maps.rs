@@ -14,7 +14,7 @@ use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Plane, Received};
 use viewshed::wire::receive::{Accepted, Condition, Limits, Receiver, Refused};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer};
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 
 const SENSOR: u8 = 5;
 const MEDIA: [Medium; 3] = [Medium::Can(Addresses::STANDARD), Medium::CanFd(Addresses::EXTENDED), Medium::Serial];
@@ -162,7 +162,7 @@ fn who_joins_late_has_everything_within_a_second() {
 fn the_gap_is_kept_and_the_status_comes_twice_a_second_even_in_a_fault() {
     let config = BroadcastConfig { gap_us: 700, ..BroadcastConfig::new(SENSOR, MEDIA[0]) };
     let mut line = Line::<1>::new(MEDIA[0], config);
-    line.sender.status_mut().state = State::Fault;
+    line.sender.status_mut().state = UnitState::Fault;
     line.sender.status_mut().reason = Reason::RadarSilent;
     let (mut last, mut status) = (None, Vec::new());
     for us in (0..5_000_000).step_by(100) {

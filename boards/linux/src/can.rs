@@ -7,8 +7,7 @@ use std::time::{Duration, SystemTime};
 use log::{info, warn};
 use rustix::io::Errno;
 use socketcan::{CanAnyFrame, CanFdSocket, ShouldRetry, Socket, SocketOptions};
-use viewshed::unit::can_bus::CanPort;
-use viewshed::wire::frame::CanFrame;
+use viewshed::{CanFrame, CanPort};
 
 use crate::frames::{from_socketcan, to_socketcan};
 

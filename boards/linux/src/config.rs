@@ -3,22 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::frame::gate::GateConfig;
-use viewshed::frame::health::HealthConfig;
-use viewshed::inputs::ars408::configuration::{Output as Entries, RadarConfiguration};
-use viewshed::inputs::ars408::profile::{self, Profile};
-use viewshed::inputs::ti;
-use viewshed::radar_3d::VisibilityConfig;
-use viewshed::sensor::Sensor;
-use viewshed::sensor::config::ConfigError;
-use viewshed::sensor::field_of_view::FieldOfView;
-use viewshed::sensor::mount::Mount;
-use viewshed::sensor::noise::NoiseConfig;
-use viewshed::unit::profile::reference::CHECK;
-use viewshed::unit::settings::Settings;
-use viewshed::wire::broadcast::{BroadcastConfig, Medium};
-use viewshed::wire::frame::CanId;
-use viewshed::wire::message::{Addresses, Message};
+use viewshed::{
+    Addresses, Ars408Config, Ars408Configuration, Ars408Profile, BroadcastConfig, CanId, ConfigError, FieldOfView,
+    GateConfig, HealthConfig, Medium, Mount, NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily,
+    VisibilityConfig, reference,
+};
 
 use crate::locate;
 use crate::one_file::is_one_file;
@@ -91,11 +80,11 @@ pub struct Ars408 {
 
 impl Default for Ars408 {
     fn default() -> Self {
-        Self { profile: profile::ARS408.name.into(), configure: None }
+        Self { profile: Ars408Profile::ARS408.name.into(), configure: None }
     }
 }
 
-/// What the radar is told to send.
+/// What the radar is configured to send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wanted {
@@ -233,7 +222,7 @@ impl Config {
             _ => {}
         }
         if input.clock == ClockSource::Input && input.candump.is_none() && input.radar != Radar::Native {
-            add("input.clock", "\"input\" is for logs and the native format, whose input tells the time");
+            add("input.clock", "\"input\" is for logs and the native format, whose input has the time");
         }
         if on_can && input.sensor_id > 7 {
             add("input.sensor_id", "an ARS408's is 0 to 7");
@@ -242,8 +231,8 @@ impl Config {
             if !on_can {
                 add("input.ars408", "this radar is none");
             }
-            if Profile::named(&ars408.profile).is_none() {
-                let known: Vec<&str> = profile::PROFILES.iter().map(|p| p.name).collect();
+            if Ars408Profile::named(&ars408.profile).is_none() {
+                let known: Vec<&str> = Ars408Profile::ALL.iter().map(|p| p.name).collect();
                 add("input.ars408.profile", &format!("\"{}\" is none of {}", ars408.profile, known.join(", ")));
             }
         }
@@ -289,7 +278,7 @@ impl Config {
         problems.extend(refused.map(|e| of_library(&e)));
         let missing = [("mount", self.mount.is_none()), ("field_of_view", self.field_of_view.is_none())];
         match self.settings() {
-            Some(settings) => problems.extend(CHECK.settings(&settings).err().map(|e| of_library(&e))),
+            Some(settings) => problems.extend(reference::CHECK.settings(&settings).err().map(|e| of_library(&e))),
             // the integrator's messages can bring them
             None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {}
             None => {
@@ -332,7 +321,7 @@ impl Config {
         let from = place(&input.interface, &input.port, input.baud(), &input.candump);
         let to = place(&output.interface, &output.port, output.baud(), &output.candump);
         lines.push(format!("in:    {radar} from {from}"));
-        let ids = self.addresses().and_then(|a| a.id(output.sensor, Message::Status)).map(|id| match id {
+        let ids = self.addresses().and_then(|a| a.first(output.sensor)).map(|id| match id {
             CanId::Standard(raw) => format!(", identifiers from 0x{raw:03X}"),
             CanId::Extended(raw) => format!(", identifiers from 0x{raw:08X}"),
         });
@@ -405,31 +394,30 @@ impl Input {
     }
 
     /// The ARS408's decoder.
-    pub fn ars408(&self) -> viewshed::inputs::ars408::Config {
-        let name = self.ars408.as_ref().map_or(profile::ARS408.name, |a| &a.profile);
-        let profile = *Profile::named(name).unwrap_or(&profile::ARS408);
-        viewshed::inputs::ars408::Config { profile, ..viewshed::inputs::ars408::Config::sensor(self.sensor_id) }
+    pub fn ars408(&self) -> Ars408Config {
+        let name = self.ars408.as_ref().map_or(Ars408Profile::ARS408.name, |a| &a.profile);
+        let profile = *Ars408Profile::named(name).unwrap_or(&Ars408Profile::ARS408);
+        Ars408Config { profile, ..Ars408Config::sensor(self.sensor_id) }
     }
 
-    /// What the ARS408 is to be told, if anything.
-    pub fn configure(&self) -> Option<RadarConfiguration> {
-        let output = match self.ars408.as_ref()?.configure? {
-            Wanted::Clusters => Entries::Clusters,
-            Wanted::Objects => Entries::Objects,
-        };
-        Some(RadarConfiguration { output: Some(output), ..RadarConfiguration::CLUSTERS })
+    /// What the ARS408 is configured to, if anything.
+    pub fn configure(&self) -> Option<Ars408Configuration> {
+        Some(match self.ars408.as_ref()?.configure? {
+            Wanted::Clusters => Ars408Configuration::CLUSTERS,
+            Wanted::Objects => Ars408Configuration::OBJECTS,
+        })
     }
 
     /// TI's decoder.
-    pub fn ti(&self) -> ti::Config {
-        let told = self.ti.clone().unwrap_or_default();
-        let angles = match told.angles {
-            Angles::Radians => ti::AngleUnit::Radians,
-            Angles::Degrees => ti::AngleUnit::Degrees,
+    pub fn ti(&self) -> TiConfig {
+        let given = self.ti.clone().unwrap_or_default();
+        let angles = match given.angles {
+            Angles::Radians => TiAngleUnit::Radians,
+            Angles::Degrees => TiAngleUnit::Degrees,
         };
-        let (has_elevation, doppler_step_mps) = (told.has_elevation, told.doppler_step_mps);
-        let dialect = ti::Dialect { angles, has_elevation, doppler_step_mps, ..ti::Dialect::USUAL };
-        ti::Config { family: told.header_bytes.and_then(family), dialect }
+        let (has_elevation, doppler_step_mps) = (given.has_elevation, given.doppler_step_mps);
+        let dialect = TiDialect { angles, has_elevation, doppler_step_mps, ..TiDialect::USUAL };
+        TiConfig { family: given.header_bytes.and_then(family), dialect }
     }
 }
 
@@ -439,8 +427,8 @@ impl Output {
     }
 }
 
-fn family(bytes: u32) -> Option<ti::Family> {
-    ti::Family::ALL.into_iter().find(|family| family.header() == bytes)
+fn family(bytes: u32) -> Option<TiFamily> {
+    TiFamily::ALL.into_iter().find(|family| family.header() == bytes)
 }
 
 /// The library's name of a parameter is the file's, but for the broadcast's table.

@@ -3,8 +3,7 @@
 use socketcan::dump::CanDumpRecord;
 use socketcan::id::FdFlags;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, EmbeddedFrame, ExtendedId, Id, StandardId};
-use viewshed::fixed::time::Time;
-use viewshed::wire::frame::{CanFrame, CanId};
+use viewshed::{CanFrame, CanId, Time};
 
 /// The library's frame; `None` for remote and error frames.
 pub fn from_socketcan(frame: &CanAnyFrame) -> Option<CanFrame> {

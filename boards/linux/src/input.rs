@@ -8,25 +8,17 @@ use std::os::fd::BorrowedFd;
 use anyhow::{Context, Result, bail};
 use log::{info, warn};
 use socketcan::dump::{ParseError, Reader};
-use viewshed::fixed::time::Time;
-use viewshed::inputs::ars408::message::Message;
-use viewshed::inputs::ars408::state::RadarState;
-use viewshed::inputs::ars408::upkeep::Upkeep;
-use viewshed::inputs::ti::Ti;
-use viewshed::unit::Flow;
-use viewshed::unit::can_bus::{BusConfig, BusKeeper};
-use viewshed::unit::profile::reference::{DETECTIONS, Radar as Decoder, Unit};
-use viewshed::unit::radar_clock::RadarClock;
-use viewshed::unit::session::Session;
-use viewshed::unit::settings::Stored;
-use viewshed::wire::frame::CanFrame;
-use viewshed::wire::message::Epoch;
-use viewshed::wire::status::Reason;
+use viewshed::{
+    Ars408Upkeep, BusConfig, BusKeeper, CanFrame, Epoch, Flow, RadarClock, Reason, SerialSession, StoredSettings, Ti,
+    Time,
+    reference::{Radar as Decoder, State},
+};
 
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;
 use crate::output::{Lines, Output};
+use crate::run::Unit;
 use crate::serial::Serial;
 use crate::state::FileSlots;
 
@@ -34,7 +26,7 @@ use crate::state::FileSlots;
 const CHUNK: usize = 4096;
 /// Reads in a row before the rest of the daemon has its turn.
 const ROW: usize = 16;
-/// How long a log goes on behind its last frame: the radar is silent, and that is to be seen.
+/// How long a log goes on after its last frame: the radar is silent, and that is to be seen.
 const SILENCE_US: u64 = 1_000_000;
 
 /// What an input works on.
@@ -58,7 +50,7 @@ pub enum Step {
 /// A radar.
 pub trait Input {
     /// A start, with a block or without, where the radar's line takes messages.
-    fn start(&mut self, _epoch: Epoch, _stored: Stored, _output: &mut Output) {}
+    fn start(&mut self, _epoch: Epoch, _stored: StoredSettings, _output: &mut Output) {}
     /// For waiting until something comes.
     fn fd(&self) -> Option<BorrowedFd<'_>>;
     /// Takes what came up to now, and what follows from time alone.
@@ -111,8 +103,7 @@ struct Bus {
     interface: Interface,
     keeper: BusKeeper,
     decoder: Decoder,
-    sensor: u8,
-    upkeep: Option<Upkeep>,
+    upkeep: Option<Ars408Upkeep>,
     holds: bool,
     last: Time,
 }
@@ -120,21 +111,19 @@ struct Bus {
 impl Bus {
     fn new(config: &Config, name: &str) -> Self {
         let input = &config.input;
-        let upkeep = input.configure().map(|settings| Upkeep::new(input.sensor_id, settings));
+        let upkeep = input.configure().map(|settings| Ars408Upkeep::new(input.sensor_id, settings));
         let mut interface = Interface::new(name, false);
-        // the radar's frames prove the bit rate before it is told anything
+        // the radar's frames prove the bit rate before anything is sent to it
         let keeper = BusKeeper::start(&BusConfig::default(), &mut interface);
         let decoder = Decoder::new(input.ars408());
-        Self { interface, keeper, decoder, sensor: input.sensor_id, upkeep, holds: false, last: Time::from_micros(0) }
+        Self { interface, keeper, decoder, upkeep, holds: false, last: Time::from_micros(0) }
     }
 
-    /// Tells the radar what it is to send, and that it stands.
+    /// Sends the radar its configuration, and that it stands.
     fn look_after(&mut self, frame: Option<&CanFrame>, now: Time) {
         let Some(upkeep) = &mut self.upkeep else { return };
-        let state =
-            frame.filter(|f| f.id == Message::RadarState.id(self.sensor)).and_then(|f| RadarState::read(f.data()));
-        if let Some(state) = state {
-            upkeep.state(&state);
+        if let Some(frame) = frame {
+            upkeep.take(frame);
             if self.holds != upkeep.holds() {
                 self.holds = upkeep.holds();
                 info!("the radar {} as it is to be", if self.holds { "is configured" } else { "is not configured" });
@@ -257,7 +246,7 @@ impl Input for Log {
 /// A TI radar's data port.
 struct TiPort {
     port: Serial,
-    decoder: Ti<DETECTIONS>,
+    decoder: Ti<{ State::DETECTIONS }>,
 }
 
 impl Input for TiPort {
@@ -290,17 +279,17 @@ struct NativePort {
     /// Time is what the input says.
     bench: bool,
     sensor: u8,
-    session: Option<Session<DETECTIONS>>,
+    session: Option<SerialSession<{ State::DETECTIONS }>>,
     clock: RadarClock,
-    /// What came behind a restart.
+    /// What came after a restart.
     rest: Vec<u8>,
 }
 
 impl Input for NativePort {
-    fn start(&mut self, epoch: Epoch, stored: Stored, output: &mut Output) {
+    fn start(&mut self, epoch: Epoch, stored: StoredSettings, output: &mut Output) {
         self.port.keep_open();
         let mut lines = Lines { output, own: Some(&mut self.port) };
-        self.session = Some(Session::start(self.sensor, epoch, stored, &mut lines));
+        self.session = Some(SerialSession::start(self.sensor, epoch, stored, &mut lines));
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {
@@ -320,7 +309,7 @@ impl Input for NativePort {
                 break;
             }
             let bytes = std::mem::take(&mut self.rest);
-            // byte by byte: what stands behind a restart belongs to the next session
+            // byte by byte: what stands after a restart belongs to the next session
             for (k, byte) in bytes.iter().enumerate() {
                 let before = session.now();
                 let mut lines = Lines { output: work.output, own: Some(&mut self.port) };

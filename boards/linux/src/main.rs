@@ -51,7 +51,7 @@ Examples:
 A first try without hardware: input.candump = \"LOG\", input.clock = \"input\" and output.candump = \"OUT\" turn a
 log written by `candump -L` into the log of its broadcast, as fast as it goes; `viewshed listen OUT` decodes that.
 
-Interfaces that are down and ports that are unplugged are tried again until they work. A silent radar is told
+Interfaces that are down and ports that are unplugged are tried again until they work. A silent radar is reported
 to the receivers: maps become unknown, the status says blind.
 
 Exit codes: 0 stopped, or the log is over; 1 failed while running; 2 the configuration cannot be used.";

@@ -6,22 +6,15 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use log::{error, info};
-use viewshed::fixed::time::Time;
-use viewshed::unit::Flow;
-use viewshed::unit::can_bus::{BusConfig, BusKeeper, BusState};
-use viewshed::unit::can_service::{CanService, CanServiceConfig};
-use viewshed::unit::profile::reference::Unit;
-use viewshed::unit::serial_service::Line;
-use viewshed::unit::settings::Stored;
-use viewshed::wire::frame::CanFrame;
-use viewshed::wire::message::Epoch;
-use viewshed::wire::serial::MOST_STUFFED;
-use viewshed::wire::status::{Reason, Status};
+use viewshed::{
+    BusConfig, BusKeeper, CanFrame, CanService, CanServiceConfig, Epoch, Flow, MOST_STUFFED, Reason, SerialLine,
+    Status, StoredSettings, Time,
+};
 
 use crate::can::Interface;
 use crate::config::{ClockSource, Config};
 use crate::frames;
-use crate::run::version;
+use crate::run::{Unit, version};
 use crate::serial::Serial;
 use crate::state::FileSlots;
 
@@ -77,7 +70,7 @@ impl Output {
     }
 
     /// A start: from here on the integrator's messages are answered, where that is wanted.
-    pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, stored: Stored) {
+    pub fn start(&mut self, config: &Config, epoch: Epoch, now: Time, stored: StoredSettings) {
         // nothing of the epoch before
         self.held = None;
         let medium = config.medium().filter(|_| config.output.service);
@@ -90,14 +83,14 @@ impl Output {
         match &mut self.sink {
             Sink::Can(interface, keeper) => {
                 keeper.poll(now, interface);
-                let before = keeper.state();
+                let before = keeper.is_active();
                 while let Some(frame) = keeper.receive(interface) {
                     let flow = self.service.as_mut().and_then(|service| service.take(&frame, slots));
                     if flow == Some(Flow::Restart) {
                         return Flow::Restart;
                     }
                 }
-                if matches!((before, keeper.state()), (BusState::Listening(_), BusState::Active)) {
+                if !before && keeper.is_active() {
                     info!("frames of others prove the bit rate right: sending");
                 }
             }
@@ -115,8 +108,8 @@ impl Output {
     /// Answers the integrator; in the safe state, says that it is one.
     pub fn answer(&mut self, now: Time, safe: bool, slots: &FileSlots) {
         let Some(service) = &mut self.service else { return };
-        let told = Status { firmware: version(), ..Status::starting(0) };
-        let status = if safe { service.next_status(now, told) } else { None };
+        let base = Status { firmware: version(), ..Status::starting(0) };
+        let status = if safe { service.next_status(now, base) } else { None };
         let answer = service.next_frame(now, slots);
         for frame in status.iter().chain(&answer) {
             let sent = self.put(now, frame);
@@ -201,7 +194,7 @@ pub struct Lines<'a> {
     pub own: Option<&'a mut Serial>,
 }
 
-impl Line for Lines<'_> {
+impl SerialLine for Lines<'_> {
     fn send(&mut self, bytes: &[u8]) -> bool {
         let sent = match (&mut self.output.sink, &mut self.own) {
             (Sink::Serial(Some(port)), _) => port.send(bytes),

@@ -6,13 +6,10 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use viewshed::fixed::time::Time;
-use viewshed::map::polar::PolarMap;
-use viewshed::unit::Flow;
-use viewshed::unit::build;
-use viewshed::unit::profile::reference::{CHECK, Map, Parameters, Sender, State, Unit};
-use viewshed::unit::settings::{BlockError, Stored};
-use viewshed::wire::status::{Reason, State as Told};
+use viewshed::{
+    BlockError, Flow, PolarMap, Reason, StoredSettings, Time, UnitState,
+    reference::{CHECK, Map, Parameters, Sender, State},
+};
 
 use crate::config::{ClockSource, Config};
 use crate::input::{self, Input, Step, Work};
@@ -20,10 +17,13 @@ use crate::output::Output;
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
 
+/// The daemon's unit: radar-3d on the reference grid.
+pub type Unit<'u> = viewshed::Unit<'u, State, Sender>;
+
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);
 const CALM: Duration = Duration::from_millis(5);
-/// A step of a clock that is told by a log, microseconds.
+/// A step of the clock while a log is read, microseconds.
 const TICK_US: u64 = 1_000;
 /// How long is said, at the end, that there is no map any more: a status is due every 250 ms.
 const FAREWELL_TICKS: u64 = 300;
@@ -38,7 +38,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let _ = folder.map(std::fs::create_dir_all);
     let settings = config.settings();
     let mut slots = FileSlots::open(folder, settings.as_ref());
-    let stored = Stored::read(&slots, CHECK);
+    let stored = StoredSettings::read(&slots, CHECK);
     if config.has_service() && settings.is_some() && stored.settings().is_some_and(|s| Some(*s) != settings) {
         warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
     }
@@ -53,7 +53,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         let epoch = next_epoch(folder, last_epoch);
         last_epoch = Some(epoch);
         output.keep_up(clock.now(), &mut slots);
-        let stored = Stored::read(&slots, CHECK);
+        let stored = StoredSettings::read(&slots, CHECK);
         input.start(epoch, stored, &mut output);
         // where blocks are taken the newest that can run, else what the file says
         let settings = if config.has_service() { stored.settings().copied() } else { config.settings() };
@@ -65,7 +65,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         if let Some(settings) = &settings {
             let medium = config.medium().context("output.base_id is no identifier")?;
             // what does not build was refused above
-            let header = build::<State>(settings, &mut parameters).map_err(|e| anyhow!("{e}"))?;
+            let header = settings.build::<State>(&mut parameters).map_err(|e| anyhow!("{e}"))?;
             let now = input.now(clock.now());
             let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
@@ -188,30 +188,30 @@ struct Watch {
     maps: u64,
     /// Messages of the safe state.
     said: u64,
-    told: Option<(Told, Reason)>,
+    shown: Option<(UnitState, Reason)>,
     /// Why there is no unit.
     refused: Option<BlockError>,
 }
 
 impl Watch {
     /// Whether a frame was completed since the last look: estimated, and its map given to the sender. In the
-    /// safe state, whether that was told.
+    /// safe state, whether that was sent.
     fn look(&mut self, unit: Option<&mut Unit<'_>>, output: &Output) -> bool {
         let Some(unit) = unit else {
             let said = output.sent + output.refused;
             return std::mem::replace(&mut self.said, said) != said;
         };
         let status = unit.broadcast().status_mut();
-        let told = (status.state, status.reason);
+        let shown = (status.state, status.reason);
         // what one frame does not say the next does: only states are worth a line
-        if self.told.is_none_or(|before| before.0 != told.0) {
-            let reason = if told.1 == Reason::None { String::new() } else { format!(": {:?}", told.1) };
-            match told.0 {
-                Told::Starting | Told::Ok => info!("radar {:?}{reason}", told.0),
-                _ => warn!("radar {:?}{reason}", told.0),
+        if self.shown.is_none_or(|before| before.0 != shown.0) {
+            let reason = if shown.1 == Reason::None { String::new() } else { format!(": {:?}", shown.1) };
+            match shown.0 {
+                UnitState::Starting | UnitState::Ok => info!("radar {:?}{reason}", shown.0),
+                _ => warn!("radar {:?}{reason}", shown.0),
             }
         }
-        self.told = Some(told);
+        self.shown = Some(shown);
         let done = unit.offered() != self.offered;
         self.offered = unit.offered();
         self.maps += u64::from(done);
@@ -219,9 +219,9 @@ impl Watch {
     }
 
     fn text(&self, output: &Output) -> String {
-        let state = match (&self.refused, self.told) {
+        let state = match (&self.refused, self.shown) {
             (Some(reason), _) => format!("safe state: {reason}"),
-            (None, told) => format!("radar {:?}", told.map_or(Told::Starting, |(state, _)| state)),
+            (None, shown) => format!("radar {:?}", shown.map_or(UnitState::Starting, |(state, _)| state)),
         };
         format!("{state}; {} maps, {} messages sent, {} refused", self.maps, output.sent, output.refused)
     }

@@ -7,15 +7,14 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots};
-use viewshed::wire::message::Epoch;
+use viewshed::{BLOCK_LEN, Epoch, Settings, SettingsSlots};
 
 /// The files that are kept.
 pub const FILES: [&str; 2] = [EPOCH, SLOTS];
 const EPOCH: &str = "epoch";
 const SLOTS: &str = "slots";
 
-/// The epoch behind `last`, or behind that of the last start, a number kept in the folder. Where nothing can be
+/// The epoch after `last`, or after that of the last start, a number kept in the folder. Where nothing can be
 /// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
 pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
     let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
@@ -77,7 +76,7 @@ impl FileSlots {
     }
 }
 
-impl Slots for FileSlots {
+impl SettingsSlots for FileSlots {
     fn slot(&self, slot: usize) -> &[u8] {
         self.slots.get(slot).map_or(&[], |block| block)
     }
@@ -96,14 +95,9 @@ impl Slots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viewshed::sensor::Sensor;
-    use viewshed::sensor::config::ConfigError;
-    use viewshed::sensor::field_of_view::FieldOfView;
-    use viewshed::sensor::mount::Mount;
-    use viewshed::sensor::noise::NoiseConfig;
-    use viewshed::unit::profile::reference::CHECK;
-    use viewshed::unit::settings::BlockError;
-    use viewshed::unit::settings::Stored;
+    use viewshed::{
+        BlockError, ConfigError, FieldOfView, Mount, NoiseConfig, Sensor, StoredSettings, reference::CHECK,
+    };
 
     fn settings(height_m: f32) -> Settings {
         Settings::of(Sensor {
@@ -128,7 +122,7 @@ mod tests {
     }
 
     fn height(slots: &FileSlots) -> Result<f32, BlockError> {
-        let stored = Stored::read(slots, CHECK);
+        let stored = StoredSettings::read(slots, CHECK);
         stored.place().map(|_| stored.settings().unwrap().sensor.mount.height_m)
     }
 
@@ -174,7 +168,7 @@ mod tests {
         let mut short = settings(6.0);
         (short.sensor.field_of_view.range_min_m, short.sensor.field_of_view.range_max_m) = (0.5, 4.0);
         let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
-        let refused = Stored::read(&slots, CHECK).write(&short.to_block(0), &mut slots);
+        let refused = StoredSettings::read(&slots, CHECK).write(&short.to_block(0), &mut slots);
         assert!(matches!(refused, Err(BlockError::Parameter(ConfigError { .. }))), "{refused:?}");
         assert!(!folder.join("slots").exists());
         // an older version stored it

@@ -7,16 +7,16 @@ use std::time::{Duration, Instant};
 
 use socketcan::dump::Reader;
 use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
+use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::fixed::time::Time;
-use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::can_service::{Answers, Said, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
 use viewshed::wire::receive::{Limits, Receiver};
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 
 const RADAR: &str = "vsradar";
 const MAPS: &str = "vsmaps";
@@ -107,7 +107,7 @@ struct Bench {
     heard: usize,
     tool: Tool,
     answers: Answers,
-    told: Vec<Told>,
+    said: Vec<Said>,
 }
 
 impl Bench {
@@ -122,7 +122,7 @@ impl Bench {
         let receiver = Box::new(Receiver::new([0], Addresses::STANDARD, Limits::DEFAULT));
         let (tool, answers) = (Tool::new(0, medium), Answers::new(0, medium));
         let begin = Instant::now();
-        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, told: Vec::new() }
+        Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, said: Vec::new() }
     }
 
     fn now(&self) -> Time {
@@ -141,7 +141,7 @@ impl Bench {
                 };
                 self.heard += 1;
                 let frame = frame.unwrap();
-                self.told.extend(self.answers.take(&frame));
+                self.said.extend(self.answers.take(&frame));
                 let _ = self.receiver.frame(self.now(), &frame);
             }
             std::thread::sleep(Duration::from_millis(1));
@@ -183,7 +183,7 @@ impl Bench {
 
     /// Whether maps come and show something.
     fn is_ok(&self) -> bool {
-        self.state().is_some_and(|(state, _)| state == State::Ok) && self.visible() > 5000
+        self.state().is_some_and(|(state, _)| state == UnitState::Ok) && self.visible() > 5000
     }
 
     /// Listens until something is so; `false` if it is not within ten seconds.
@@ -198,7 +198,7 @@ impl Bench {
         true
     }
 
-    fn state(&self) -> Option<(State, Reason)> {
+    fn state(&self) -> Option<(UnitState, Reason)> {
         self.receiver.sensor(0).and_then(|sensor| sensor.status()).map(|status| (status.state, status.reason))
     }
 
@@ -237,8 +237,8 @@ fn frames_come_and_go_over_the_kernels_buses() {
         let block: Vec<CanFrame> = bench.tool.write(&settings.to_block(0)).collect();
         bench.ask(&block);
         // a slow machine first works through the radar's frames
-        let written = |bench: &Bench| matches!(bench.told.last(), Some(Told::Written(_)));
-        assert!(bench.until(written), "{medium}: {:?}", bench.told);
+        let written = |bench: &Bench| matches!(bench.said.last(), Some(Said::Written(_)));
+        assert!(bench.until(written), "{medium}: {:?}", bench.said);
         let restart = bench.tool.restart().unwrap();
         bench.ask(&[restart]);
         daemon.wait_for("restart with the newest configuration block", 1);
@@ -247,7 +247,7 @@ fn frames_come_and_go_over_the_kernels_buses() {
         assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}", bench.state());
 
         // silence
-        let blind = Some((State::Blind, Reason::RadarSilent));
+        let blind = Some((UnitState::Blind, Reason::RadarSilent));
         assert!(bench.until(|bench| bench.state() == blind && bench.visible() == 0), "{medium}: {:?}", bench.state());
 
         // the bus of the maps goes down and comes back
@@ -266,7 +266,7 @@ fn frames_come_and_go_over_the_kernels_buses() {
         assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}, {}", bench.state(), daemon.log());
 
         assert_eq!(daemon.terminate().code(), Some(0));
-        let gone = Some((State::Starting, Reason::None));
+        let gone = Some((UnitState::Starting, Reason::None));
         assert!(bench.until(|bench| bench.state() == gone && bench.visible() == 0), "{medium}: {:?}", bench.state());
     }
 }

@@ -4,7 +4,7 @@ unsafe extern "C" {
     fn DefaultHandler();
 }
 
-/// The vector table's part behind the core's exceptions.
+/// The vector table's part after the core's exceptions.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [unsafe extern "C" fn(); 32] = [DefaultHandler; 32];

@@ -11,13 +11,14 @@ pub mod stack;
 pub mod timer;
 pub mod uart;
 
+use profile::State;
 #[cfg(not(feature = "small"))]
 pub use viewshed::unit::profile::reference as profile;
 #[cfg(feature = "small")]
 pub use viewshed::unit::profile::small as profile;
 
 /// What a board says of its size: range cells, azimuths, elevations, detections.
-pub const SHAPE: [usize; 4] = [profile::RANGES, profile::AZIMUTHS, profile::ELEVATIONS, profile::DETECTIONS];
+pub const SHAPE: [usize; 4] = [State::RANGES, State::AZIMUTHS, State::ELEVATIONS, State::DETECTIONS];
 
 /// A register of a peripheral.
 #[derive(Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Caches on, but not for what others than the core read and write.
 //!
 //! Without them the core waits for AXI SRAM and flash at each access. DMA controllers do not see the data
-//! cache, so their region is not cached; neither are the settings, which are erased behind its back.
+//! cache, so their region is not cached; neither are the settings, which are erased without its knowledge.
 //!
 //! # References
 //! Arm, "ARMv7-M Architecture Reference Manual" (DDI 0403), B3.5: MPU_RBAR, MPU_RASR, MPU_CTRL.

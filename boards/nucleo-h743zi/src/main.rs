@@ -36,11 +36,11 @@ use static_cell::{ConstStaticCell, StaticCell};
 use stm32::can::{Queue, Receiver, open, queue};
 use stm32::unit::REQUESTS;
 use stm32::{crash, now, unit};
-use viewshed::inputs::ars408;
-use viewshed::unit::profile::reference::{CHECK, Map, Parameters, Radar, Roadside, Sender, State};
-use viewshed::unit::roadside::{Memory, Ports, ResetFlags, Start};
-use viewshed::unit::settings::{FlashSlots, Stored};
-use viewshed::wire::message::Epoch;
+use viewshed::{
+    Ars408Config, Epoch, FlashSlots, ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart,
+    StoredSettings,
+    reference::{CHECK, Map, Parameters, Radar, Sender, State},
+};
 
 /// The radar's number on its bus and in the broadcast.
 const SENSOR: u8 = 0;
@@ -130,7 +130,7 @@ async fn main(_spawner: Spawner) {
 
     let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS, |slot| last.readable(slot));
     crash::read_done();
-    let stored = Stored::read(&slots, CHECK.on_can(CAN_CLOCK_HZ));
+    let stored = StoredSettings::read(&slots, CHECK.on_can(CAN_CLOCK_HZ));
     let [radar_timing, broadcast_timing] = stored.buses().map(|bus| bus.timing(CAN_CLOCK_HZ));
     let can = can::CanConfigurator::new(p.FDCAN1, p.PD0, p.PD1, Irqs);
     let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);
@@ -143,7 +143,7 @@ async fn main(_spawner: Spawner) {
     let (serial, interrupts) = unit::start(broadcast_receiver, line);
     interrupts.spawn(scans(radar_receiver).expect("room for one"));
 
-    let memory = Memory {
+    let memory = RoadsideMemory {
         parameters: PARAMETERS.take(),
         state: STATE.take(),
         map: MAP.take(),
@@ -151,9 +151,9 @@ async fn main(_spawner: Spawner) {
         serial: SERIAL.init(None),
     };
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
-    let start = Start { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
-    let mut ports = Ports { radar, broadcast, serial, slots };
-    let decoder = Radar::new(ars408::Config::sensor(SENSOR));
+    let start = RoadsideStart { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
+    let mut ports = RoadsidePorts { radar, broadcast, serial, slots };
+    let decoder = Radar::new(Ars408Config::sensor(SENSOR));
     let mut roadside = Roadside::start(start, memory, decoder, now(), &mut ports);
     unit::run(&mut roadside, &mut ports, Output::new(p.PB0, Level::Low, Speed::Low), watchdog).await
 }

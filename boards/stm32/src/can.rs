@@ -17,10 +17,7 @@ use embassy_futures::poll_once;
 use embassy_stm32::can::config::{FdCanConfig, GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::{CanConfigurator, CanRx, CanTx, OperatingMode, frame};
 use embassy_stm32::pac::can::Fdcan;
-use viewshed::fixed::time::Time;
-use viewshed::unit::can_bus::{BitTiming, CanPort};
-use viewshed::unit::frame_queue::FrameQueue;
-use viewshed::wire::frame::CanFrame;
+use viewshed::{BitTiming, CanFrame, CanPort, FrameQueue, Time};
 
 use crate::now;
 
@@ -93,7 +90,7 @@ pub fn open<const N: usize>(
         FdCanConfig::default()
             .set_nominal_bit_timing(nominal.unwrap_or_default())
             .set_global_filter(filter)
-            // maps are told in order
+            // maps are sent in order
             .set_tx_buffer_mode(TxBufferMode::Fifo)
             // the library decides when, and counts
             .set_automatic_bus_off_recovery(false),

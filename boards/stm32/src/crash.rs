@@ -1,4 +1,4 @@
-//! A panic or a fault ends in a reset that the status then tells of.
+//! A panic or a fault ends in a reset that the status then reports.
 //!
 //! Flash memory that lost its power while it was written faults when it is read. So that the start does not
 //! end there for ever, what is being read is remembered over the reset.

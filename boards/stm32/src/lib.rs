@@ -9,7 +9,7 @@ pub mod dma;
 pub mod serial;
 pub mod unit;
 
-use viewshed::fixed::time::Time;
+use viewshed::Time;
 
 /// The hardware timer's time, in which the loop, the receive queues and the events count.
 pub fn now() -> Time {

@@ -7,8 +7,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
-use viewshed::unit::roadside::SerialPort;
-use viewshed::unit::serial_service;
+use viewshed::{SerialLine, SerialPort};
 
 use crate::dma::SEND;
 
@@ -31,7 +30,7 @@ impl Line {
     }
 }
 
-impl serial_service::Line for Line {
+impl SerialLine for Line {
     fn send(&mut self, bytes: &[u8]) -> bool {
         self.out.free_capacity() >= bytes.len() && self.out.try_write(bytes) == Ok(bytes.len())
     }

@@ -8,13 +8,9 @@ use embassy_stm32::usart::{Uart, UartTx};
 use embassy_stm32::wdg::{IndependentWatchdog, Instance};
 use embassy_time::Timer;
 use embedded_hal::digital::OutputPin;
-use viewshed::inputs::Feed;
-use viewshed::unit::can_bus::CanPort;
-use viewshed::unit::roadside::{Ports, Roadside};
-use viewshed::unit::settings::Slots;
-use viewshed::unit::status_output::StatusOutput;
-use viewshed::unit::{Flow, InUnit, Sender};
-use viewshed::wire::frame::CanFrame;
+use viewshed::{
+    CanFrame, CanPort, Feed, Flow, InUnit, MapSender, Roadside, RoadsidePorts, SettingsSlots, StatusOutput,
+};
 
 use crate::can::{Queue, Receiver, queue};
 use crate::dma::SEND;
@@ -61,26 +57,26 @@ pub fn start(broadcast: Receiver, line: Uart<'static, Async>) -> (Line, SendSpaw
 /// given several times.
 pub async fn run<E, S, F, R, B, P, O, W>(
     unit: &mut Roadside<'static, E, S, F>,
-    ports: &mut Ports<R, B, Line, P>,
+    ports: &mut RoadsidePorts<R, B, Line, P>,
     light: O,
     mut watchdog: IndependentWatchdog<'static, W>,
 ) -> !
 where
     E: InUnit,
-    S: Sender<E::Map>,
+    S: MapSender<E::Map>,
     F: Feed<Piece = CanFrame, Input = E::Input>,
     R: CanPort,
     B: CanPort,
-    P: Slots,
+    P: SettingsSlots,
     O: OutputPin,
     W: Instance,
 {
     let mut light = StatusOutput::new(light);
-    let mut told = None;
+    let mut shown = None;
     loop {
         let step = unit.step(now(), ports);
         let _ = light.show(step.state, now());
-        if told.replace(step.state) != Some(step.state) {
+        if shown.replace(step.state) != Some(step.state) {
             defmt::info!("{}", step.state);
         }
         if step.frame_done {

@@ -10,13 +10,14 @@ pub mod can;
 pub mod stack;
 mod start;
 
+use profile::State;
 #[cfg(not(feature = "small"))]
 pub use viewshed::unit::profile::reference as profile;
 #[cfg(feature = "small")]
 pub use viewshed::unit::profile::small as profile;
 
 /// What a board says of its size: range cells, azimuths, elevations, detections.
-pub const SHAPE: [usize; 4] = [profile::RANGES, profile::AZIMUTHS, profile::ELEVATIONS, profile::DETECTIONS];
+pub const SHAPE: [usize; 4] = [State::RANGES, State::AZIMUTHS, State::ELEVATIONS, State::DETECTIONS];
 
 /// What the bench wants to know of this core, whose instructions the emulator cannot count.
 pub struct Core;

@@ -1,4 +1,4 @@
-//! Telling a sensor what to send, and limits on it.
+//! What a sensor is to send, and limits on it.
 //!
 //! Settings take effect at once and are to be read back from
 //! [`RadarState`](super::state::RadarState). Storing them for good wears the sensor's memory: a few
@@ -95,7 +95,7 @@ pub enum Power {
 /// A change of a sensor's settings; what is `None` stays as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct RadarConfiguration {
+pub struct Ars408Configuration {
     /// Farthest distance, metres, in steps of 2, up to 2046.
     pub max_distance_m: Option<u16>,
     /// New sensor id, 0 to 7.
@@ -118,7 +118,7 @@ pub struct RadarConfiguration {
     pub store: Option<bool>,
 }
 
-impl RadarConfiguration {
+impl Ars408Configuration {
     /// Clusters with their quality, strong ones first, not stored.
     pub const CLUSTERS: Self = Self {
         max_distance_m: None,
@@ -132,6 +132,9 @@ impl RadarConfiguration {
         relay: None,
         store: None,
     };
+
+    /// Objects with their quality, strong ones first, not stored.
+    pub const OBJECTS: Self = Self { output: Some(Output::Objects), ..Self::CLUSTERS };
 
     /// The message's bytes.
     pub fn bytes(&self) -> [u8; 8] {
@@ -167,7 +170,7 @@ mod tests {
 
     #[test]
     fn objects_with_everything_stored_is_the_published_example() {
-        let configuration = RadarConfiguration {
+        let configuration = Ars408Configuration {
             output: Some(Output::Objects),
             quality: Some(true),
             extended: Some(true),
@@ -180,19 +183,19 @@ mod tests {
 
     #[test]
     fn clusters_are_asked_for_without_wearing_the_memory() {
-        assert_eq!(format!("{:?}", RadarConfiguration::CLUSTERS.frame(2).unwrap()), "220#7800000010240000");
+        assert_eq!(format!("{:?}", Ars408Configuration::CLUSTERS.frame(2).unwrap()), "220#7800000010240000");
     }
 
     #[test]
     fn every_field_has_its_place_and_its_bit() {
-        let bytes = |c: RadarConfiguration| c.bytes();
-        let none = RadarConfiguration::default();
+        let bytes = |c: Ars408Configuration| c.bytes();
+        let none = Ars408Configuration::default();
         assert_eq!(bytes(none), [0; 8]);
-        assert_eq!(bytes(RadarConfiguration { max_distance_m: Some(250), ..none }), [1, 0x1F, 0x40, 0, 0, 0, 0, 0]);
-        assert_eq!(bytes(RadarConfiguration { sensor_id: Some(5), ..none }), [2, 0, 0, 0, 5, 0, 0, 0]);
-        assert_eq!(bytes(RadarConfiguration { power: Some(Power::Minus9Db), ..none }), [4, 0, 0, 0, 0x60, 0, 0, 0]);
-        assert_eq!(bytes(RadarConfiguration { relay: Some(true), ..none }), [0, 0, 0, 0, 0, 3, 0, 0]);
-        assert_eq!(bytes(RadarConfiguration { high_sensitivity: Some(true), ..none }), [0, 0, 0, 0, 0, 0, 3, 0]);
-        assert_eq!(bytes(RadarConfiguration { quality: Some(false), ..none }), [0x10, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(bytes(Ars408Configuration { max_distance_m: Some(250), ..none }), [1, 0x1F, 0x40, 0, 0, 0, 0, 0]);
+        assert_eq!(bytes(Ars408Configuration { sensor_id: Some(5), ..none }), [2, 0, 0, 0, 5, 0, 0, 0]);
+        assert_eq!(bytes(Ars408Configuration { power: Some(Power::Minus9Db), ..none }), [4, 0, 0, 0, 0x60, 0, 0, 0]);
+        assert_eq!(bytes(Ars408Configuration { relay: Some(true), ..none }), [0, 0, 0, 0, 0, 3, 0, 0]);
+        assert_eq!(bytes(Ars408Configuration { high_sensitivity: Some(true), ..none }), [0, 0, 0, 0, 0, 0, 3, 0]);
+        assert_eq!(bytes(Ars408Configuration { quality: Some(false), ..none }), [0x10, 0, 0, 0, 0, 0, 0, 0]);
     }
 }

@@ -30,4 +30,4 @@ pub mod receiver;
 pub mod state;
 pub mod upkeep;
 
-pub use receiver::{Ars408, Config, Counters, Outcome, Refusal};
+pub use receiver::{Ars408, Ars408Config, Ars408Counters, Ars408Outcome, Refusal};

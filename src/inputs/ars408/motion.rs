@@ -1,4 +1,4 @@
-//! What a sensor wants to be told about what carries it; a fixed one has to be told that it stands.
+//! The motion of what carries a sensor, which it expects; a fixed one has to receive that it stands.
 //!
 //! Without these messages [`RadarState`](super::state::RadarState) reports them missing and the
 //! sensor's own classes of motion are wrong.
@@ -45,10 +45,10 @@ mod tests {
 
     #[test]
     fn a_standing_sensor_is_told_so() {
-        let told: Vec<_> = standing(0).map(|f| format!("{f:?}")).collect();
-        assert_eq!(told, ["300#0000", "301#8000"]);
-        let told: Vec<_> = standing(3).map(|f| format!("{f:?}")).collect();
-        assert_eq!(told, ["330#0000", "331#8000"]);
+        let sent: Vec<_> = standing(0).map(|f| format!("{f:?}")).collect();
+        assert_eq!(sent, ["300#0000", "301#8000"]);
+        let sent: Vec<_> = standing(3).map(|f| format!("{f:?}")).collect();
+        assert_eq!(sent, ["330#0000", "331#8000"]);
         assert!(standing(0).all(|f| speed_cm_s(f.data()) == 0));
     }
 

@@ -37,7 +37,7 @@ pub struct General {
 
 /// A radar with this interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Profile {
+pub struct Ars408Profile {
     /// Name of the product family.
     pub name: &'static str,
     /// How clusters are announced.
@@ -63,10 +63,6 @@ const CLUSTER: General = General {
 /// The original's objects: the lateral distance has a bit more.
 const OBJECT: General = General { left_cm: Quantity::new(Signal::new(18, 11), 20, -20_460), ..CLUSTER };
 
-/// ARS404, ARS408, SRR308, and clones that copied all of it (Nanoradar MR76).
-pub const ARS408: Profile =
-    Profile { name: "ARS408", clusters: CountRule::NearAndFar, cluster: CLUSTER, object: OBJECT };
-
 /// A clone's clusters: steps of 5 cm and 5 cm/s, and a height in place of the lateral speed.
 const SR75_CLUSTER: General = General {
     front_cm: Quantity::new(Signal::new(15, 13), 5, -10_000),
@@ -77,18 +73,21 @@ const SR75_CLUSTER: General = General {
     ..CLUSTER
 };
 
-/// Nanoradar SR75: the identifiers of the original with scales of its own. Taken from public drivers,
-/// not from the vendor: compare a few distances with the truth before relying on it.
-pub const SR75: Profile =
-    Profile { name: "SR75", clusters: CountRule::Wide, cluster: SR75_CLUSTER, object: SR75_CLUSTER };
+impl Ars408Profile {
+    /// ARS404, ARS408, SRR308, and clones that copied all of it (Nanoradar MR76).
+    pub const ARS408: Self = Self { name: "ARS408", clusters: CountRule::NearAndFar, cluster: CLUSTER, object: OBJECT };
 
-/// All profiles.
-pub const PROFILES: [Profile; 2] = [ARS408, SR75];
+    /// Nanoradar SR75: the identifiers of the original with scales of its own. Taken from public drivers,
+    /// not from the vendor: compare a few distances with the truth before relying on it.
+    pub const SR75: Self =
+        Self { name: "SR75", clusters: CountRule::Wide, cluster: SR75_CLUSTER, object: SR75_CLUSTER };
 
-impl Profile {
+    /// All profiles.
+    pub const ALL: [Self; 2] = [Self::ARS408, Self::SR75];
+
     /// The profile of a name, in any case.
     pub fn named(name: &str) -> Option<&'static Self> {
-        static ALL: [Profile; 2] = PROFILES;
+        static ALL: [Ars408Profile; 2] = Ars408Profile::ALL;
         ALL.iter().find(|p| p.name.eq_ignore_ascii_case(name))
     }
 }

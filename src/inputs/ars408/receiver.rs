@@ -2,7 +2,7 @@
 
 use super::counter::{Advance, MeasurementCounter};
 use super::message::Message;
-use super::profile::{ARS408, CountRule, General, Profile};
+use super::profile::{Ars408Profile, CountRule, General};
 use super::quality::{self, Wanted};
 use super::state::{RadarState, Version};
 use crate::fixed::time::Time;
@@ -39,11 +39,11 @@ pub mod object_status {
 
 /// Which sensor is listened to, and to what of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Config {
+pub struct Ars408Config {
     /// Its id, 0 to 7.
     pub sensor: u8,
     /// Its kind.
-    pub profile: Profile,
+    pub profile: Ars408Profile,
     /// Which entries are wanted, by its own marks.
     pub wanted: Wanted,
     /// A scan is over when nothing of it has come for so long, whatever is missing; shorter than the
@@ -52,16 +52,16 @@ pub struct Config {
     pub timeout_us: u32,
 }
 
-impl Config {
+impl Ars408Config {
     /// An ARS408 of a sensor id: entries it measured, scans over after 30 ms of silence.
     pub const fn sensor(sensor: u8) -> Self {
-        Self { sensor, profile: ARS408, wanted: Wanted::MEASURED, timeout_us: 30_000 }
+        Self { sensor, profile: Ars408Profile::ARS408, wanted: Wanted::MEASURED, timeout_us: 30_000 }
     }
 }
 
 /// What a frame led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome<'a> {
+pub enum Ars408Outcome<'a> {
     /// It is none of this sensor's.
     NotMine,
     /// It was taken, and nothing is complete yet.
@@ -107,7 +107,7 @@ pub enum Refusal {
 /// What was seen and what was wrong, since the start; saturating.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
+pub struct Ars408Counters {
     /// Frames of this sensor.
     pub frames: u32,
     /// Scans given out.
@@ -146,7 +146,7 @@ pub struct Counters {
 /// first of them, or the first state message, scans are given out without waiting for them.
 #[derive(Debug, Clone)]
 pub struct Ars408<const N: usize> {
-    config: Config,
+    config: Ars408Config,
     collected: Collected<N>,
     scan: Option<Scan>,
     /// The last scan has been given out and its entries may go.
@@ -155,7 +155,7 @@ pub struct Ars408<const N: usize> {
     quality: bool,
     counter: MeasurementCounter,
     fault: bool,
-    counters: Counters,
+    counters: Ars408Counters,
 }
 
 /// A scan under way.
@@ -201,7 +201,7 @@ impl Numbers {
 
 impl<const N: usize> Ars408<N> {
     /// Before the first frame.
-    pub const fn new(config: Config) -> Self {
+    pub const fn new(config: Ars408Config) -> Self {
         Self {
             config,
             collected: Collected::new(),
@@ -210,7 +210,7 @@ impl<const N: usize> Ars408<N> {
             quality: false,
             counter: MeasurementCounter::NEW,
             fault: false,
-            counters: Counters {
+            counters: Ars408Counters {
                 frames: 0,
                 scans: 0,
                 incomplete: 0,
@@ -230,16 +230,16 @@ impl<const N: usize> Ars408<N> {
     }
 
     /// Takes a frame, any frame of the bus.
-    pub fn push(&mut self, frame: &CanFrame, now: Time) -> Outcome<'_> {
+    pub fn push(&mut self, frame: &CanFrame, now: Time) -> Ars408Outcome<'_> {
         let message = match Message::of(frame.id) {
             Some((message, sensor)) if sensor == self.config.sensor && message.from_sensor() && !frame.fd => message,
-            _ => return Outcome::NotMine,
+            _ => return Ars408Outcome::NotMine,
         };
         count(&mut self.counters.frames);
         let data = frame.data();
         if data.len() < message.length() {
             count(&mut self.counters.too_short);
-            return Outcome::Refused(Refusal::TooShort { message, length: data.len() });
+            return Ars408Outcome::Refused(Refusal::TooShort { message, length: data.len() });
         }
         let entry = matches!(message, Message::ClusterGeneral | Message::ObjectGeneral);
         if entry || matches!(message, Message::ClusterQuality | Message::ObjectQuality) {
@@ -248,7 +248,7 @@ impl<const N: usize> Ars408<N> {
                 if entry {
                     count(&mut self.counters.no_scan);
                 }
-                return self.end().unwrap_or(Outcome::Taken);
+                return self.end().unwrap_or(Ars408Outcome::Taken);
             }
             if let Some(scan) = &mut self.scan {
                 scan.latest = now;
@@ -266,37 +266,37 @@ impl<const N: usize> Ars408<N> {
                 Some(state) => {
                     self.fault = state.fault();
                     self.quality |= state.quality;
-                    Outcome::State(state)
+                    Ars408Outcome::State(state)
                 }
-                None => Outcome::Taken,
+                None => Ars408Outcome::Taken,
             },
-            Message::Version => Version::read(data).map_or(Outcome::Taken, Outcome::Version),
-            _ => Outcome::Taken,
+            Message::Version => Version::read(data).map_or(Ars408Outcome::Taken, Ars408Outcome::Version),
+            _ => Ars408Outcome::Taken,
         }
     }
 
     /// Gives out a scan that waits for frames no longer; to be called now and then.
-    pub fn poll(&mut self, now: Time) -> Option<Outcome<'_>> {
+    pub fn poll(&mut self, now: Time) -> Option<Ars408Outcome<'_>> {
         let scan = self.scan.as_ref()?;
         if scan.timed_out(now, self.config.timeout_us) || scan.complete(self.quality) { self.end() } else { None }
     }
 
     /// What was seen and what was wrong.
-    pub fn counters(&self) -> &Counters {
+    pub fn counters(&self) -> &Ars408Counters {
         &self.counters
     }
 
     /// Which sensor it listens to.
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &Ars408Config {
         &self.config
     }
 
-    fn begin(&mut self, objects: bool, word: u64, now: Time) -> Outcome<'_> {
+    fn begin(&mut self, objects: bool, word: u64, now: Time) -> Ars408Outcome<'_> {
         let (announced, number) = self.status(objects, word);
         match self.counter.follow(number) {
             Advance::Same if self.scan.as_ref().is_some_and(|s| s.arrived == 0 && s.announced == announced) => {
                 count(&mut self.counters.repeated);
-                return Outcome::Refused(Refusal::Repeated);
+                return Ars408Outcome::Refused(Refusal::Repeated);
             }
             Advance::Lost(scans) => self.counters.lost = self.counters.lost.saturating_add(u32::from(scans)),
             Advance::Restarted => count(&mut self.counters.restarts),
@@ -319,7 +319,7 @@ impl<const N: usize> Ars408<N> {
         if unfinished {
             // the entries of the one before stay until the next frame
             let before = self.scan.replace(next);
-            return before.map_or(Outcome::Taken, |before| self.give_out(before));
+            return before.map_or(Ars408Outcome::Taken, |before| self.give_out(before));
         }
         self.scan = Some(next);
         self.end_if_complete()
@@ -343,21 +343,21 @@ impl<const N: usize> Ars408<N> {
         if objects { &self.config.profile.object } else { &self.config.profile.cluster }
     }
 
-    fn entry(&mut self, objects: bool, word: u64) -> Outcome<'_> {
+    fn entry(&mut self, objects: bool, word: u64) -> Ars408Outcome<'_> {
         self.forget_given_out();
         let (number, detection) = self.general(objects).read(word);
         let Some(scan) = self.scan.as_mut().filter(|s| s.objects == objects) else {
             count(&mut self.counters.no_scan);
-            return Outcome::Refused(Refusal::NoScan);
+            return Ars408Outcome::Refused(Refusal::NoScan);
         };
         if scan.arrived >= scan.announced {
             count(&mut self.counters.surplus);
-            return Outcome::Refused(Refusal::Surplus);
+            return Ars408Outcome::Refused(Refusal::Surplus);
         }
         // of more than 256 entries numbers come twice
         if !scan.entries.insert(number) && scan.announced <= 256 {
             count(&mut self.counters.repeated);
-            return Outcome::Refused(Refusal::Repeated);
+            return Ars408Outcome::Refused(Refusal::Repeated);
         }
         scan.arrived += 1;
         match detection.map(|d| self.collected.add(number, d)) {
@@ -372,7 +372,7 @@ impl<const N: usize> Ars408<N> {
     }
 
     #[allow(clippy::cast_possible_truncation)] // 8 bits
-    fn quality(&mut self, objects: bool, word: u64) -> Outcome<'_> {
+    fn quality(&mut self, objects: bool, word: u64) -> Ars408Outcome<'_> {
         let (number, wanted) = if objects {
             (quality::object::NUMBER.get(word) as u16, self.config.wanted.object(word))
         } else {
@@ -381,16 +381,16 @@ impl<const N: usize> Ars408<N> {
         let Some(scan) = self.scan.as_mut().filter(|s| s.objects == objects) else {
             // of a scan given out without waiting for it; the next one will wait
             self.quality = true;
-            return Outcome::Taken;
+            return Ars408Outcome::Taken;
         };
         self.quality = true;
         if !scan.entries.contains(number) {
             count(&mut self.counters.unknown_entry);
-            return Outcome::Refused(Refusal::UnknownEntry);
+            return Ars408Outcome::Refused(Refusal::UnknownEntry);
         }
         if !scan.qualities.insert(number) && scan.announced <= 256 {
             count(&mut self.counters.repeated);
-            return Outcome::Refused(Refusal::Repeated);
+            return Ars408Outcome::Refused(Refusal::Repeated);
         }
         scan.qualified += 1;
         if let Some(place) = self.collected.place(number, scan.next) {
@@ -409,20 +409,20 @@ impl<const N: usize> Ars408<N> {
         }
     }
 
-    fn end_if_complete(&mut self) -> Outcome<'_> {
+    fn end_if_complete(&mut self) -> Ars408Outcome<'_> {
         if self.scan.as_ref().is_some_and(|s| s.complete(self.quality)) {
-            self.end().unwrap_or(Outcome::Taken)
+            self.end().unwrap_or(Ars408Outcome::Taken)
         } else {
-            Outcome::Taken
+            Ars408Outcome::Taken
         }
     }
 
-    fn end(&mut self) -> Option<Outcome<'_>> {
+    fn end(&mut self) -> Option<Ars408Outcome<'_>> {
         let scan = self.scan.take()?;
         Some(self.give_out(scan))
     }
 
-    fn give_out(&mut self, scan: Scan) -> Outcome<'_> {
+    fn give_out(&mut self, scan: Scan) -> Ars408Outcome<'_> {
         // a scan without entries has none of the scan before
         self.forget_given_out();
         self.given_out = true;
@@ -432,7 +432,7 @@ impl<const N: usize> Ars408<N> {
         }
         if !usable(scan.announced, scan.arrived) {
             count(&mut self.counters.broken);
-            return Outcome::Broken { announced: scan.announced, arrived: scan.arrived };
+            return Ars408Outcome::Broken { announced: scan.announced, arrived: scan.arrived };
         }
         count(&mut self.counters.scans);
         let missing = scan.announced.saturating_sub(scan.arrived);
@@ -440,7 +440,7 @@ impl<const N: usize> Ars408<N> {
             count(&mut self.counters.incomplete);
         }
         self.collected.finish();
-        Outcome::Scan(RadarScan {
+        Ars408Outcome::Scan(RadarScan {
             time: scan.started,
             received: scan.started,
             number: u32::from(scan.number),

@@ -1,6 +1,6 @@
 //! What a sensor says of itself, once a second.
 
-use super::configuration::{Order, Output, Power, RadarConfiguration};
+use super::configuration::{Ars408Configuration, Order, Output, Power};
 use super::message::Message;
 use crate::inputs::signal::{Signal, word};
 
@@ -177,7 +177,7 @@ impl RadarState {
     }
 
     /// The first setting asked for that this state does not have.
-    pub fn disagreement(&self, asked: &RadarConfiguration) -> Option<Disagreement> {
+    pub fn disagreement(&self, asked: &Ars408Configuration) -> Option<Disagreement> {
         let differs = [
             (asked.max_distance_m.is_some_and(|m| m & !1 != self.max_distance_m), Disagreement::MaxDistance),
             (asked.sensor_id.is_some_and(|id| id != self.sensor_id), Disagreement::SensorId),
@@ -252,12 +252,12 @@ mod tests {
     fn what_was_asked_for_is_compared_with_what_is() {
         let state = RadarState::read(&OBJECTS).unwrap();
         let asked =
-            RadarConfiguration { max_distance_m: Some(251), output: Some(Output::Objects), ..Default::default() };
+            Ars408Configuration { max_distance_m: Some(251), output: Some(Output::Objects), ..Default::default() };
         assert_eq!(state.disagreement(&asked), None, "distances come in steps of 2 m");
-        assert_eq!(state.disagreement(&RadarConfiguration::CLUSTERS), Some(Disagreement::Output));
-        let far = RadarConfiguration { max_distance_m: Some(196), ..asked };
+        assert_eq!(state.disagreement(&Ars408Configuration::CLUSTERS), Some(Disagreement::Output));
+        let far = Ars408Configuration { max_distance_m: Some(196), ..asked };
         assert_eq!(state.disagreement(&far), Some(Disagreement::MaxDistance));
-        let other = RadarConfiguration { sensor_id: Some(1), ..Default::default() };
+        let other = Ars408Configuration { sensor_id: Some(1), ..Default::default() };
         assert_eq!(state.disagreement(&other), Some(Disagreement::SensorId));
     }
 

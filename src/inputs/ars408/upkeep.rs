@@ -1,6 +1,7 @@
 //! What a controller has to send to a fixed sensor: its settings until they hold, and that it stands.
 
-use super::configuration::RadarConfiguration;
+use super::configuration::Ars408Configuration;
+use super::message::Message;
 use super::motion::standing;
 use super::state::RadarState;
 use crate::fixed::time::Time;
@@ -15,12 +16,12 @@ pub const SETTINGS_PERIOD_US: u64 = 2_000_000;
 /// Sends what a sensor wants, frame by frame.
 ///
 /// Settings are compared with what the sensor reads back once a second and are sent again where
-/// they differ, as after its restart; with [`store`](RadarConfiguration::store) only the first time,
+/// they differ, as after its restart; with [`store`](Ars408Configuration::store) only the first time,
 /// as storing wears its memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Upkeep {
+pub struct Ars408Upkeep {
     sensor: u8,
-    settings: RadarConfiguration,
+    settings: Ars408Configuration,
     holds: Option<bool>,
     /// When the settings were sent first.
     asked: Option<Time>,
@@ -30,10 +31,19 @@ pub struct Upkeep {
     yaw_rate_due: bool,
 }
 
-impl Upkeep {
+impl Ars408Upkeep {
     /// For the sensor of an id; the settings are not to change that id.
-    pub const fn new(sensor: u8, settings: RadarConfiguration) -> Self {
+    pub const fn new(sensor: u8, settings: Ars408Configuration) -> Self {
         Self { sensor, settings, holds: None, asked: None, motion_at: None, settings_at: None, yaw_rate_due: false }
+    }
+
+    /// Takes a frame of the bus, of which only what the sensor says of itself counts.
+    pub fn take(&mut self, frame: &CanFrame) {
+        if frame.id == Message::RadarState.id(self.sensor)
+            && let Some(state) = RadarState::read(frame.data())
+        {
+            self.state(&state);
+        }
     }
 
     /// Takes note of what the sensor says of itself.
@@ -90,7 +100,7 @@ mod tests {
     use std::string::String;
     use std::vec::Vec;
 
-    fn sent(upkeep: &mut Upkeep, ms: u64) -> Vec<String> {
+    fn sent(upkeep: &mut Ars408Upkeep, ms: u64) -> Vec<String> {
         let now = Time::from_micros(1000 * ms);
         std::iter::from_fn(|| upkeep.poll(now)).map(|f| format!("{f:?}")).collect()
     }
@@ -100,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_sensor_is_told_its_settings_until_they_hold_and_always_that_it_stands() {
-        let mut upkeep = Upkeep::new(2, RadarConfiguration::CLUSTERS);
+        let mut upkeep = Ars408Upkeep::new(2, Ars408Configuration::CLUSTERS);
         assert_eq!(sent(&mut upkeep, 0), ["220#7800000010240000", "320#0000", "321#8000"]);
         assert_eq!(sent(&mut upkeep, 49), [""; 0]);
         assert_eq!(sent(&mut upkeep, 50), ["320#0000", "321#8000"]);
@@ -121,15 +131,15 @@ mod tests {
 
     #[test]
     fn settings_are_stored_once() {
-        let settings = RadarConfiguration { store: Some(true), ..RadarConfiguration::CLUSTERS };
-        let mut upkeep = Upkeep::new(2, settings);
+        let settings = Ars408Configuration { store: Some(true), ..Ars408Configuration::CLUSTERS };
+        let mut upkeep = Ars408Upkeep::new(2, settings);
         assert_eq!(sent(&mut upkeep, 0)[0], "220#F800000010A40000");
         assert_eq!(sent(&mut upkeep, 2000)[0], "220#7800000010240000");
     }
 
     #[test]
     fn a_clock_that_steps_back_stops_nothing() {
-        let mut upkeep = Upkeep::new(0, RadarConfiguration::CLUSTERS);
+        let mut upkeep = Ars408Upkeep::new(0, Ars408Configuration::CLUSTERS);
         sent(&mut upkeep, 9000);
         assert_eq!(sent(&mut upkeep, 100).len(), 3);
     }

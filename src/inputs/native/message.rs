@@ -24,14 +24,14 @@ const NO_SNR: u8 = u8::MAX;
 /// What carries the messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Medium {
+pub enum NativeMedium {
     /// Frames of up to 64 bytes.
     CanFd,
     /// Messages of up to 240 bytes.
     Serial,
 }
 
-impl Medium {
+impl NativeMedium {
     /// Detections a message holds.
     pub const fn detections(self) -> usize {
         match self {
@@ -60,23 +60,23 @@ pub(super) struct Header {
     pub(super) part: u8,
     pub(super) parts: u8,
     pub(super) time: Time,
-    pub(super) medium: Medium,
+    pub(super) medium: NativeMedium,
 }
 
 /// A message, ready to be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Message {
+pub struct NativeMessage {
     bytes: [u8; MOST_BYTES],
     length: usize,
 }
 
-impl Message {
+impl NativeMessage {
     /// Header and records; what does not fit is left out.
     pub(super) fn new(header: &Header, detections: &[Detection], counter: u8) -> Self {
         let medium = header.medium;
         let mut bytes = [0; MOST_BYTES];
         let [t0, t1, t2, t3, t4, t5, ..] = header.time.micros().to_le_bytes();
-        let serial = if medium == Medium::Serial { SERIAL } else { 0 };
+        let serial = if medium == NativeMedium::Serial { SERIAL } else { 0 };
         let kind = VERSION << 4 | serial | if header.fault { FAULT } else { 0 };
         let head = [0, 0, 0, kind, header.sensor, header.scan, header.part, header.parts, t0, t1, t2, t3, t4, t5];
         let detections = detections.get(..medium.detections()).unwrap_or(detections);
@@ -87,8 +87,8 @@ impl Message {
         }
         let wanted = HEADER + RECORD * detections.len();
         let length = match medium {
-            Medium::CanFd => frame::fd_length(wanted).unwrap_or(frame::MOST_BYTES),
-            Medium::Serial => wanted,
+            NativeMedium::CanFd => frame::fd_length(wanted).unwrap_or(frame::MOST_BYTES),
+            NativeMedium::Serial => wanted,
         };
         let mut message = Self { bytes, length };
         if let Some(bytes) = message.bytes.get_mut(..length) {
@@ -130,7 +130,7 @@ pub(super) fn read(bytes: &[u8], sensor: u8) -> Result<(u8, Header), NoMessage> 
         return Err(NoMessage::Version(kind >> 4));
     }
     let time = Time::from_micros(u64::from_le_bytes([t0, t1, t2, t3, t4, t5, 0, 0]));
-    let medium = if kind & SERIAL != 0 { Medium::Serial } else { Medium::CanFd };
+    let medium = if kind & SERIAL != 0 { NativeMedium::Serial } else { NativeMedium::CanFd };
     let header = Header { sensor, fault: kind & FAULT != 0, scan, part, parts, time, medium };
     Ok((counter, header))
 }

@@ -35,10 +35,7 @@
 //!
 //! # Example
 //! ```
-//! use viewshed::fixed::angle::Angle;
-//! use viewshed::frame::detection::Detection;
-//! use viewshed::inputs::native::{Config, Medium, Outcome, Receiver, Sender};
-//! use viewshed::fixed::time::Time;
+//! use viewshed::{Angle, Detection, NativeConfig, NativeMedium, NativeOutcome, NativeReceiver, NativeSender, Time};
 //!
 //! let car = Detection {
 //!     range_cm: 5000,
@@ -48,11 +45,11 @@
 //!     rcs_half_dbsm: Some(20),
 //!     snr_half_db: None,
 //! };
-//! let mut sender = Sender::new(7);
-//! let mut receiver = Receiver::<256>::new(Config::sensor(7));
-//! for message in sender.scan(Time::from_micros(123_456), false, &[car], Medium::CanFd) {
+//! let mut sender = NativeSender::new(7);
+//! let mut receiver = NativeReceiver::<256>::new(NativeConfig::sensor(7));
+//! for message in sender.scan(Time::from_micros(123_456), false, &[car], NativeMedium::CanFd) {
 //!     match receiver.push(message.bytes(), Time::from_micros(9)) {
-//!         Outcome::Scan(scan) => assert_eq!((scan.time.micros(), scan.detections), (123_456, &[car][..])),
+//!         NativeOutcome::Scan(scan) => assert_eq!((scan.time.micros(), scan.detections), (123_456, &[car][..])),
 //!         other => panic!("{other:?}"),
 //!     }
 //! }
@@ -62,6 +59,6 @@ mod message;
 mod receiver;
 mod sender;
 
-pub use message::{MOST_BYTES, Medium, Message, VERSION, data_id, id};
-pub use receiver::{Config, Counters, Outcome, Receiver, Refusal, SerialReceiver};
-pub use sender::{Parts, Sender};
+pub use message::{MOST_BYTES, NativeMedium, NativeMessage, VERSION, data_id, id};
+pub use receiver::{NativeConfig, NativeCounters, NativeOutcome, NativeReceiver, NativeSerialReceiver, Refusal};
+pub use sender::{NativeSender, Parts};

@@ -1,6 +1,6 @@
 //! Messages in, scans out.
 
-use super::message::{self, Header, MOST_BYTES, Medium, NoMessage};
+use super::message::{self, Header, MOST_BYTES, NativeMedium, NoMessage};
 use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
@@ -11,7 +11,7 @@ use crate::wire::serial::Unstuffer;
 
 /// Which sensor is listened to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Config {
+pub struct NativeConfig {
     /// The sensor.
     pub sensor: u8,
     /// Identifier of its CAN FD frames.
@@ -20,7 +20,7 @@ pub struct Config {
     pub timeout_us: u32,
 }
 
-impl Config {
+impl NativeConfig {
     /// A sensor under its usual identifier; scans are over after 100 ms of silence.
     pub const fn sensor(sensor: u8) -> Self {
         Self { sensor, id: message::id(sensor), timeout_us: 100_000 }
@@ -29,7 +29,7 @@ impl Config {
 
 /// What a message led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome<'a> {
+pub enum NativeOutcome<'a> {
     /// It is none of this sensor's.
     NotMine,
     /// It was taken, and nothing is complete yet.
@@ -62,14 +62,14 @@ pub enum Refusal {
     Repeated,
     /// Of a scan that is over.
     Late,
-    /// The scan before was not fetched by [`Receiver::poll`].
+    /// The scan before was not fetched by [`NativeReceiver::poll`].
     NotPolled,
 }
 
 /// What was seen and what was wrong, since the start; saturating.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
+pub struct NativeCounters {
     /// Messages whose check sum fits.
     pub messages: u32,
     /// Scans given out.
@@ -103,8 +103,8 @@ pub struct Counters {
 /// [`poll`](Self::poll) until it returns `None`: a message can end one scan and begin another.
 /// After a restart of the sender up to 8 scans are refused as late.
 #[derive(Debug, Clone)]
-pub struct Receiver<const N: usize> {
-    config: Config,
+pub struct NativeReceiver<const N: usize> {
+    config: NativeConfig,
     collected: Collected<N>,
     /// The last scan has been given out and its detections may go.
     given_out: bool,
@@ -114,7 +114,7 @@ pub struct Receiver<const N: usize> {
     /// A message that ended a scan and is still to be taken.
     waiting: Option<(Time, [u8; MOST_BYTES], usize)>,
     counter: Counter,
-    counters: Counters,
+    counters: NativeCounters,
 }
 
 /// A scan under way.
@@ -128,15 +128,15 @@ struct Scan {
     latest: Time,
     seen: [u32; 8],
     arrived: u16,
-    medium: Medium,
+    medium: NativeMedium,
 }
 
-/// A scan number this far behind the newest is late; farther, the sender started over.
+/// A scan number this far before the newest is late; farther, the sender started over.
 const LATE: u8 = 8;
 
-impl<const N: usize> Receiver<N> {
+impl<const N: usize> NativeReceiver<N> {
     /// Before the first message.
-    pub const fn new(config: Config) -> Self {
+    pub const fn new(config: NativeConfig) -> Self {
         Self {
             config,
             collected: Collected::new(),
@@ -145,7 +145,7 @@ impl<const N: usize> Receiver<N> {
             newest: None,
             waiting: None,
             counter: Counter::NEW,
-            counters: Counters {
+            counters: NativeCounters {
                 messages: 0,
                 scans: 0,
                 incomplete: 0,
@@ -163,15 +163,15 @@ impl<const N: usize> Receiver<N> {
     }
 
     /// Takes a frame, any frame of the bus.
-    pub fn push_frame(&mut self, frame: &CanFrame, now: Time) -> Outcome<'_> {
-        if frame.id == self.config.id { self.push(frame.data(), now) } else { Outcome::NotMine }
+    pub fn push_frame(&mut self, frame: &CanFrame, now: Time) -> NativeOutcome<'_> {
+        if frame.id == self.config.id { self.push(frame.data(), now) } else { NativeOutcome::NotMine }
     }
 
-    /// Takes a message of up to [`MOST_BYTES`] bytes.
-    pub fn push(&mut self, bytes: &[u8], now: Time) -> Outcome<'_> {
+    /// Takes a message of up to 240 bytes.
+    pub fn push(&mut self, bytes: &[u8], now: Time) -> NativeOutcome<'_> {
         if self.waiting.is_some() {
             count(&mut self.counters.not_polled);
-            return Outcome::Refused(Refusal::NotPolled);
+            return NativeOutcome::Refused(Refusal::NotPolled);
         }
         let header = match message::read(bytes, self.config.sensor) {
             Ok((counter, header)) => {
@@ -183,38 +183,38 @@ impl<const N: usize> Receiver<N> {
             }
             Err(NoMessage::E2e(why)) => {
                 count(&mut self.counters.damaged);
-                return Outcome::Refused(Refusal::Check(why));
+                return NativeOutcome::Refused(Refusal::Check(why));
             }
             Err(NoMessage::Version(version)) => {
                 count(&mut self.counters.version);
-                return Outcome::Refused(Refusal::Version(version));
+                return NativeOutcome::Refused(Refusal::Version(version));
             }
         };
         if header.part >= header.parts {
             count(&mut self.counters.inconsistent);
-            return Outcome::Refused(Refusal::Inconsistent);
+            return NativeOutcome::Refused(Refusal::Inconsistent);
         }
         let current = self.scan.as_ref().map(|s| s.number);
         if current != Some(header.scan) {
             if self.newest.is_some_and(|newest| newest.wrapping_sub(header.scan) <= LATE) {
                 count(&mut self.counters.late);
-                return Outcome::Refused(Refusal::Late);
+                return NativeOutcome::Refused(Refusal::Late);
             }
             if current.is_some() {
                 self.wait(bytes, now);
-                return self.end().unwrap_or(Outcome::Taken);
+                return self.end().unwrap_or(NativeOutcome::Taken);
             }
         }
         self.take(&header, bytes, now)
     }
 
     /// Gives out what is over; to be called after each message, until there is nothing more.
-    pub fn poll(&mut self, now: Time) -> Option<Outcome<'_>> {
+    pub fn poll(&mut self, now: Time) -> Option<NativeOutcome<'_>> {
         if let Some((came, bytes, length)) = self.waiting.take() {
             let bytes = bytes.get(..length)?;
             let (_, header) = message::read(bytes, self.config.sensor).ok()?;
             return match self.take(&header, bytes, came) {
-                Outcome::Taken => None,
+                NativeOutcome::Taken => None,
                 outcome => Some(outcome),
             };
         }
@@ -225,12 +225,12 @@ impl<const N: usize> Receiver<N> {
     }
 
     /// What was seen and what was wrong.
-    pub fn counters(&self) -> &Counters {
+    pub fn counters(&self) -> &NativeCounters {
         &self.counters
     }
 
     /// Which sensor it listens to.
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &NativeConfig {
         &self.config
     }
 
@@ -244,7 +244,7 @@ impl<const N: usize> Receiver<N> {
     }
 
     /// Takes a part of the scan under way, or of a new one.
-    fn take(&mut self, header: &Header, bytes: &[u8], now: Time) -> Outcome<'_> {
+    fn take(&mut self, header: &Header, bytes: &[u8], now: Time) -> NativeOutcome<'_> {
         if core::mem::take(&mut self.given_out) {
             self.collected.clear();
         }
@@ -262,14 +262,14 @@ impl<const N: usize> Receiver<N> {
         });
         if scan.parts != header.parts || scan.time != header.time {
             count(&mut self.counters.inconsistent);
-            return Outcome::Refused(Refusal::Inconsistent);
+            return NativeOutcome::Refused(Refusal::Inconsistent);
         }
         let bit = 1 << (header.part & 31);
         match scan.seen.get_mut(usize::from(header.part >> 5)) {
             Some(seen) if *seen & bit == 0 => *seen |= bit,
             _ => {
                 count(&mut self.counters.repeated);
-                return Outcome::Refused(Refusal::Repeated);
+                return NativeOutcome::Refused(Refusal::Repeated);
             }
         }
         scan.latest = now;
@@ -280,16 +280,20 @@ impl<const N: usize> Receiver<N> {
                 count(&mut self.counters.overflow);
             }
         }
-        if scan.arrived == u16::from(scan.parts) { self.end().unwrap_or(Outcome::Taken) } else { Outcome::Taken }
+        if scan.arrived == u16::from(scan.parts) {
+            self.end().unwrap_or(NativeOutcome::Taken)
+        } else {
+            NativeOutcome::Taken
+        }
     }
 
-    fn end(&mut self) -> Option<Outcome<'_>> {
+    fn end(&mut self) -> Option<NativeOutcome<'_>> {
         let scan = self.scan.take()?;
         self.given_out = true;
         let announced = u16::from(scan.parts);
         if !usable(announced, scan.arrived) {
             count(&mut self.counters.broken);
-            return Some(Outcome::Broken { announced, arrived: scan.arrived });
+            return Some(NativeOutcome::Broken { announced, arrived: scan.arrived });
         }
         count(&mut self.counters.scans);
         if scan.arrived < announced {
@@ -297,7 +301,7 @@ impl<const N: usize> Receiver<N> {
         }
         #[allow(clippy::cast_possible_truncation)] // at most 22
         let missing = (announced - scan.arrived).saturating_mul(scan.medium.detections() as u16);
-        Some(Outcome::Scan(RadarScan {
+        Some(NativeOutcome::Scan(RadarScan {
             time: scan.time,
             received: scan.received,
             number: u32::from(scan.number),
@@ -312,31 +316,31 @@ impl<const N: usize> Receiver<N> {
 
 /// Collects the scans of one sensor from a serial line.
 #[derive(Debug, Clone)]
-pub struct SerialReceiver<const N: usize> {
+pub struct NativeSerialReceiver<const N: usize> {
     unstuffer: Unstuffer,
-    receiver: Receiver<N>,
+    receiver: NativeReceiver<N>,
 }
 
-impl<const N: usize> SerialReceiver<N> {
+impl<const N: usize> NativeSerialReceiver<N> {
     /// Before the first byte.
-    pub const fn new(config: Config) -> Self {
-        Self { unstuffer: Unstuffer::new(), receiver: Receiver::new(config) }
+    pub const fn new(config: NativeConfig) -> Self {
+        Self { unstuffer: Unstuffer::new(), receiver: NativeReceiver::new(config) }
     }
 
     /// Takes bytes up to the end of a message and says how many: the rest is to be pushed again, after
     /// [`poll`](Self::poll).
-    pub fn push(&mut self, bytes: &[u8], now: Time) -> (usize, Outcome<'_>) {
+    pub fn push(&mut self, bytes: &[u8], now: Time) -> (usize, NativeOutcome<'_>) {
         let (taken, message) = self.unstuffer.push(bytes);
-        (taken, message.map_or(Outcome::Taken, |message| self.receiver.push(message, now)))
+        (taken, message.map_or(NativeOutcome::Taken, |message| self.receiver.push(message, now)))
     }
 
     /// Gives out what is over; to be called after each push, until there is nothing more.
-    pub fn poll(&mut self, now: Time) -> Option<Outcome<'_>> {
+    pub fn poll(&mut self, now: Time) -> Option<NativeOutcome<'_>> {
         self.receiver.poll(now)
     }
 
     /// What was seen and what was wrong.
-    pub fn counters(&self) -> &Counters {
+    pub fn counters(&self) -> &NativeCounters {
         self.receiver.counters()
     }
 
@@ -346,4 +350,4 @@ impl<const N: usize> SerialReceiver<N> {
     }
 }
 
-const _: () = assert!(Medium::CanFd.detections() == 5 && Medium::Serial.detections() == 22);
+const _: () = assert!(NativeMedium::CanFd.detections() == 5 && NativeMedium::Serial.detections() == 22);

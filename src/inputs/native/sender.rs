@@ -2,20 +2,20 @@
 
 use core::slice::Chunks;
 
-use super::message::{Header, Medium, Message};
+use super::message::{Header, NativeMedium, NativeMessage};
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::wire::e2e::Profile;
 
 /// Numbers the scans and messages of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sender {
+pub struct NativeSender {
     sensor: u8,
     scan: u8,
     counter: u8,
 }
 
-impl Sender {
+impl NativeSender {
     /// Before the first scan.
     pub const fn new(sensor: u8) -> Self {
         Self { sensor, scan: 0, counter: 0 }
@@ -23,7 +23,13 @@ impl Sender {
 
     /// The messages of a scan. They are numbered as they are taken: all of them are to be sent, in order.
     #[allow(clippy::cast_possible_truncation)] // at most 255
-    pub fn scan<'a>(&'a mut self, time: Time, fault: bool, detections: &'a [Detection], medium: Medium) -> Parts<'a> {
+    pub fn scan<'a>(
+        &'a mut self,
+        time: Time,
+        fault: bool,
+        detections: &'a [Detection],
+        medium: NativeMedium,
+    ) -> Parts<'a> {
         let most = medium.detections() * usize::from(u8::MAX);
         let sent = detections.get(..most).unwrap_or(detections);
         let parts = sent.len().div_ceil(medium.detections()).max(1) as u8;
@@ -42,14 +48,14 @@ pub struct Parts<'a> {
 }
 
 impl Iterator for Parts<'_> {
-    type Item = Message;
+    type Item = NativeMessage;
 
-    fn next(&mut self) -> Option<Message> {
+    fn next(&mut self) -> Option<NativeMessage> {
         if self.header.part >= self.header.parts {
             return None;
         }
         let detections = self.detections.next().unwrap_or(&[]);
-        let message = Message::new(&self.header, detections, *self.counter);
+        let message = NativeMessage::new(&self.header, detections, *self.counter);
         *self.counter = Profile::P05.next(*self.counter);
         self.header.part += 1;
         Some(message)

@@ -3,7 +3,7 @@
 /// A kind of header, by its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Family {
+pub enum TiFamily {
     /// 36 bytes: xWR14xx with SDK 1 or 2.
     Bytes36,
     /// 40 bytes: SDK 2 and 3, Radar Toolbox.
@@ -41,7 +41,7 @@ pub(super) struct Header {
     pub(super) total: u32,
     pub(super) items: u32,
     pub(super) number: u32,
-    /// Points announced, where that is told.
+    /// Points announced, where a header has that.
     pub(super) points: Option<u16>,
     pub(super) sub_frame: u32,
     /// Major number of the SDK's version.
@@ -53,7 +53,7 @@ impl Header {
     pub(super) const NONE: Self = Self { total: 0, items: 0, number: 0, points: None, sub_frame: 0, sdk: 0 };
 }
 
-impl Family {
+impl TiFamily {
     /// All families.
     pub const ALL: [Self; 5] = [Self::Bytes36, Self::Bytes40, Self::Bytes44, Self::Bytes48, Self::Bytes52];
 

@@ -1,6 +1,6 @@
 //! Which family it is, from what frames have in common.
 
-use super::family::{Family, Header, ITEM_HEADER, LONGEST, PADDING};
+use super::family::{Header, ITEM_HEADER, LONGEST, PADDING, TiFamily};
 
 /// Frames in a row that have to be consistent.
 const ENOUGH: u8 = 3;
@@ -8,7 +8,7 @@ const ENOUGH: u8 = 3;
 /// Follows a stream as each family would read it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Learning {
-    readings: [Reading; Family::ALL.len()],
+    readings: [Reading; TiFamily::ALL.len()],
 }
 
 /// A frame as one family reads it.
@@ -24,23 +24,23 @@ struct Reading {
 
 impl Learning {
     pub(super) const NEW: Self =
-        Self { readings: [Reading { header: None, next: 0, items_left: 0, consistent: 0 }; Family::ALL.len()] };
+        Self { readings: [Reading { header: None, next: 0, items_left: 0, consistent: 0 }; TiFamily::ALL.len()] };
 
     /// Takes a byte of a frame: its position counted from the magic word, one for the first byte;
     /// `window` has the eight bytes up to it, `head` the frame's first ones.
     pub(super) fn take(&mut self, position: u32, window: u64, head: &[u8; LONGEST]) {
-        for (family, reading) in Family::ALL.into_iter().zip(&mut self.readings) {
+        for (family, reading) in TiFamily::ALL.into_iter().zip(&mut self.readings) {
             reading.take(family, position, window, head);
         }
     }
 
     /// The frame ended at a magic word after so many bytes. The family, if it is certain now.
-    pub(super) fn end(&mut self, length: u32) -> Option<Family> {
-        for (family, reading) in Family::ALL.into_iter().zip(&mut self.readings) {
+    pub(super) fn end(&mut self, length: u32) -> Option<TiFamily> {
+        for (family, reading) in TiFamily::ALL.into_iter().zip(&mut self.readings) {
             reading.end(family, length);
         }
         let mut certain =
-            Family::ALL.into_iter().zip(&self.readings).filter(|(_, r)| r.consistent >= ENOUGH).map(|(f, _)| f);
+            TiFamily::ALL.into_iter().zip(&self.readings).filter(|(_, r)| r.consistent >= ENOUGH).map(|(f, _)| f);
         // two that fit equally well are none
         certain.next().filter(|_| certain.next().is_none())
     }
@@ -48,7 +48,7 @@ impl Learning {
 
 impl Reading {
     #[allow(clippy::cast_possible_truncation)] // the upper half of the window
-    fn take(&mut self, family: Family, position: u32, window: u64, head: &[u8; LONGEST]) {
+    fn take(&mut self, family: TiFamily, position: u32, window: u64, head: &[u8; LONGEST]) {
         if position == family.header() {
             self.header = family.read(head);
             self.next = position;
@@ -65,7 +65,7 @@ impl Reading {
         }
     }
 
-    fn end(&mut self, family: Family, length: u32) {
+    fn end(&mut self, family: TiFamily, length: u32) {
         let items = self.header.map_or(0, |h| h.items);
         let filled = self.header.is_some_and(|h| {
             length > family.header().saturating_sub(1)

@@ -12,7 +12,7 @@
 //! | 48 | 3D people counting of older toolboxes | 12 | 44, 16 bits | yes |
 //! | 52 | people counting and traffic monitoring of older toolboxes | 20 | 48, 16 bits | yes |
 //!
-//! Which one it is cannot be told from a header. It is set, or learnt: the one whose items fill the
+//! Which one it is cannot be seen in a header. It is set, or learnt: the one whose items fill the
 //! frame up to the next magic word, three frames in a row, when no other does. Until then nothing is
 //! given out.
 //!
@@ -22,11 +22,11 @@
 //! | 1 | number, binary point; range and Doppler index, peak, x, y, z, 16 bits each (SDK 1 and 2) | the same |
 //! | 7 | signal-to-noise ratio and noise of each point, 0.1 dB, `i16` | |
 //! | 1000 | range, azimuth, elevation, velocity, `f32` | azimuth + to the right |
-//! | 1020; 6 behind 48 bytes | five units; elevation, azimuth, velocity, range, ratio of signal to noise | azimuth + to the right |
+//! | 1020; 6 after 48 bytes | five units; elevation, azimuth, velocity, range, ratio of signal to noise | azimuth + to the right |
 //! | 301 | four units and two numbers; x, y, z, velocity, 16 bits each, ratio, noise, 8 bits each (L-SDK) | x to the right, y ahead |
-//! | 6 behind 52 bytes | range, azimuth, (elevation,) velocity, ratio, `f32` | azimuth + to the right |
-//! | 308, 1010; 7 behind 48 bytes | number; x, y, z, their velocities, `f32`; 84 bytes more | x to the right, y ahead |
-//! | 7 behind 52 bytes | number; x, y, their velocities, `f32`; 48 bytes more | the same |
+//! | 6 after 52 bytes | range, azimuth, (elevation,) velocity, ratio, `f32` | azimuth + to the right |
+//! | 308, 1010; 7 after 48 bytes | number; x, y, z, their velocities, `f32`; 84 bytes more | x to the right, y ahead |
+//! | 7 after 52 bytes | number; x, y, their velocities, `f32`; 48 bytes more | the same |
 //!
 //! Velocities are + receding in all of them. The last two rows are targets, objects the radar tracks: they were made of the
 //! points and may be predicted, so they are left out, or by [`Entries::Targets`] stand in place of the points. Their radial
@@ -47,6 +47,6 @@ mod learning;
 mod points;
 mod receiver;
 
-pub use family::Family;
-pub use points::{AngleUnit, Dialect, Entries, PolarPoints};
-pub use receiver::{Config, Counters, Flaw, Outcome, Ti};
+pub use family::TiFamily;
+pub use points::{Entries, PolarPoints, TiAngleUnit, TiDialect};
+pub use receiver::{Flaw, Ti, TiConfig, TiCounters, TiOutcome};

@@ -6,20 +6,20 @@ use crate::frame::detection::{Detection, Measurement, NotADetection};
 /// Unit of the angles of spherical points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum AngleUnit {
+pub enum TiAngleUnit {
     /// What TI's own programs take them for.
     Radians,
     /// What the comment in one SDK says.
     Degrees,
 }
 
-/// Points behind a 52-byte header.
+/// Points after a 52-byte header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PolarPoints {
     /// Range, azimuth, velocity, ratio: 16 bytes.
     Flat,
-    /// With an elevation behind the azimuth: 20 bytes.
+    /// With an elevation after the azimuth: 20 bytes.
     Raised,
 }
 
@@ -33,13 +33,13 @@ pub enum Entries {
     Targets,
 }
 
-/// What a firmware's messages do not tell of themselves.
+/// What a firmware's messages do not say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Dialect {
+pub struct TiDialect {
     /// Unit of the angles of spherical points, type 1000.
-    pub angles: AngleUnit,
-    /// Points behind a 52-byte header, type 6.
+    pub angles: TiAngleUnit,
+    /// Points after a 52-byte header, type 6.
     pub polar_points: PolarPoints,
     /// Whether the antenna measures elevation; where it does not, z is sent as zero.
     pub has_elevation: bool,
@@ -50,10 +50,10 @@ pub struct Dialect {
     pub entries: Entries,
 }
 
-impl Dialect {
+impl TiDialect {
     /// Radians, an antenna with elevation, no Doppler step, points.
     pub const USUAL: Self = Self {
-        angles: AngleUnit::Radians,
+        angles: TiAngleUnit::Radians,
         polar_points: PolarPoints::Flat,
         has_elevation: true,
         doppler_step_mps: None,
@@ -80,7 +80,7 @@ pub(super) enum Layout {
     Polar(PolarPoints),
     /// Units and numbers, to come.
     ExtendedHead,
-    /// x, y, z, velocity, ratio, noise: in these units of place, velocity and ratio, and so many; 0 where that is not told.
+    /// x, y, z, velocity, ratio, noise: in these units of place, velocity and ratio, and so many; 0 where it is not announced.
     Extended([f32; 3], u16),
     /// Number, x, y, z, their velocities, and what is of no interest.
     Targets,
@@ -96,7 +96,7 @@ pub(super) const LONGEST_RECORD: usize = 28;
 /// What a record holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Record {
-    /// What the records behind it need.
+    /// What the records after it need.
     Head(Layout),
     Point(Result<Detection, NotADetection>),
     /// Half dB.
@@ -120,7 +120,7 @@ impl Layout {
 
     /// Whether its own count of points is another.
     pub(super) const fn miscounts(self, points: u16) -> bool {
-        matches!(self, Self::Extended(_, told) if told != 0 && told != points)
+        matches!(self, Self::Extended(_, announced) if announced != 0 && announced != points)
     }
 
     /// Whether it makes detections or belongs to them, given what is wanted.
@@ -130,7 +130,7 @@ impl Layout {
     }
 
     /// Reads a record of [`record`](Self::record) bytes.
-    pub(super) fn read(self, bytes: &[u8; LONGEST_RECORD], dialect: &Dialect) -> Record {
+    pub(super) fn read(self, bytes: &[u8; LONGEST_RECORD], dialect: &TiDialect) -> Record {
         let float = |n: usize| f32::from_bits(chunk(bytes, 4 * n).map_or(0, u32::from_le_bytes));
         let short = |at: usize| chunk(bytes, at).map_or(0, u16::from_le_bytes);
         let signed = |at: usize| chunk(bytes, at).map_or(0, i16::from_le_bytes);
@@ -146,8 +146,8 @@ impl Layout {
             }
             Self::Spherical => {
                 let unit = match dialect.angles {
-                    AngleUnit::Radians => 1.0,
-                    AngleUnit::Degrees => core::f32::consts::PI / 180.0,
+                    TiAngleUnit::Radians => 1.0,
+                    TiAngleUnit::Degrees => core::f32::consts::PI / 180.0,
                 };
                 let (azimuth, elevation) = (float(1) * unit, float(2) * unit);
                 Record::Point(spherical(float(0), azimuth, Some(elevation), float(3), None, dialect))
@@ -168,8 +168,8 @@ impl Layout {
                 Record::Point(spherical(float(0), float(1), Some(float(2)), float(3), Some(float(4)), dialect))
             }
             Self::ExtendedHead => {
-                let told = short(16).saturating_add(short(18));
-                Record::Head(Self::Extended([float(0), float(1), float(2)], told))
+                let announced = short(16).saturating_add(short(18));
+                Record::Head(Self::Extended([float(0), float(1), float(2)], announced))
             }
             Self::Extended([place, velocity, ratio], _) => {
                 let metres = |at| f32::from(signed(at)) * place;
@@ -181,7 +181,7 @@ impl Layout {
                 Record::Point(target([float(1), float(2), float(3)], [float(4), float(5), float(6)], dialect))
             }
             Self::FlatTargets => {
-                let flat = Dialect { has_elevation: false, ..*dialect };
+                let flat = TiDialect { has_elevation: false, ..*dialect };
                 Record::Point(target([float(1), float(2), 0.0], [float(3), float(4), 0.0], &flat))
             }
             Self::SideInfo => Record::Snr(halves(signed(0))),
@@ -201,7 +201,7 @@ fn chunk<const N: usize>(bytes: &[u8; LONGEST_RECORD], at: usize) -> Option<[u8;
 }
 
 /// A target's place and velocity, x to the right, y ahead, z up.
-fn target(place: [f32; 3], velocity: [f32; 3], dialect: &Dialect) -> Result<Detection, NotADetection> {
+fn target(place: [f32; 3], velocity: [f32; 3], dialect: &TiDialect) -> Result<Detection, NotADetection> {
     let along = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b);
     let radial = along(velocity, place) / math::sqrt(along(place, place));
     cartesian(place, radial, None, dialect)
@@ -212,7 +212,7 @@ fn cartesian(
     [x, y, z]: [f32; 3],
     velocity: f32,
     snr_db: Option<f32>,
-    dialect: &Dialect,
+    dialect: &TiDialect,
 ) -> Result<Detection, NotADetection> {
     let ground = math::sqrt(x * x + y * y);
     Detection::new(&Measurement {
@@ -232,7 +232,7 @@ fn spherical(
     elevation: Option<f32>,
     velocity: f32,
     ratio: Option<f32>,
-    dialect: &Dialect,
+    dialect: &TiDialect,
 ) -> Result<Detection, NotADetection> {
     Detection::new(&Measurement {
         range_m: range,

@@ -1,8 +1,8 @@
 //! Bytes in, scans out.
 
-use super::family::{Family, Header, ITEM_HEADER, LONGEST, MAGIC, PADDING};
+use super::family::{Header, ITEM_HEADER, LONGEST, MAGIC, PADDING, TiFamily};
 use super::learning::Learning;
-use super::points::{Dialect, Entries, LONGEST_RECORD, Layout, Record};
+use super::points::{Entries, LONGEST_RECORD, Layout, Record, TiDialect};
 use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
@@ -10,25 +10,25 @@ use crate::inputs::{RadarScan, count, usable};
 /// What is known of the radar's firmware.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Config {
+pub struct TiConfig {
     /// Its kind of header; `None`: to be learnt.
-    pub family: Option<Family>,
-    /// What its messages do not tell of themselves.
-    pub dialect: Dialect,
+    pub family: Option<TiFamily>,
+    /// What its messages do not say.
+    pub dialect: TiDialect,
 }
 
-impl Config {
+impl TiConfig {
     /// The family is learnt, the dialect the usual one.
-    pub const LEARN: Self = Self { family: None, dialect: Dialect::USUAL };
+    pub const LEARN: Self = Self { family: None, dialect: TiDialect::USUAL };
 }
 
 /// What bytes led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome<'a> {
+pub enum TiOutcome<'a> {
     /// They were taken, and nothing is complete yet.
     Taken,
     /// The kind of header is known now; scans come from the next frame on.
-    Learnt(Family),
+    Learnt(TiFamily),
     /// A frame is complete.
     Scan(RadarScan<'a>),
     /// A frame is dropped.
@@ -54,7 +54,7 @@ pub enum Flaw {
 /// What was seen and what was wrong, since the start; saturating.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Counters {
+pub struct TiCounters {
     /// Magic words.
     pub frames: u32,
     /// Scans given out.
@@ -82,8 +82,8 @@ pub struct Counters {
 /// Collects scans from a serial line.
 #[derive(Debug, Clone)]
 pub struct Ti<const N: usize> {
-    config: Config,
-    family: Option<Family>,
+    config: TiConfig,
+    family: Option<TiFamily>,
     learning: Learning,
     /// Frames broken in a row.
     broken_in_a_row: u8,
@@ -110,7 +110,7 @@ pub struct Ti<const N: usize> {
     ratios: u16,
     collected: Collected<N>,
     last: Option<(u32, u32)>,
-    counters: Counters,
+    counters: TiCounters,
 }
 
 /// What the next bytes are.
@@ -138,7 +138,7 @@ const FARTHEST: u32 = 10_000;
 
 impl<const N: usize> Ti<N> {
     /// Before the first byte.
-    pub const fn new(config: Config) -> Self {
+    pub const fn new(config: TiConfig) -> Self {
         Self {
             config,
             family: config.family,
@@ -161,7 +161,7 @@ impl<const N: usize> Ti<N> {
             ratios: 0,
             collected: Collected::new(),
             last: None,
-            counters: Counters {
+            counters: TiCounters {
                 frames: 0,
                 scans: 0,
                 learning: 0,
@@ -179,25 +179,25 @@ impl<const N: usize> Ti<N> {
 
     /// Takes bytes, up to the first that something comes of, and says how many; the rest is to be
     /// pushed again.
-    pub fn push(&mut self, bytes: &[u8], now: Time) -> (usize, Outcome<'_>) {
+    pub fn push(&mut self, bytes: &[u8], now: Time) -> (usize, TiOutcome<'_>) {
         for (i, byte) in bytes.iter().enumerate() {
             match self.take(*byte, now) {
                 None => {}
-                Some(Event::Learnt(family)) => return (i + 1, Outcome::Learnt(family)),
-                Some(Event::Broken(flaw)) => return (i + 1, Outcome::Broken(flaw)),
+                Some(Event::Learnt(family)) => return (i + 1, TiOutcome::Learnt(family)),
+                Some(Event::Broken(flaw)) => return (i + 1, TiOutcome::Broken(flaw)),
                 Some(Event::Complete) => return (i + 1, self.complete()),
             }
         }
-        (bytes.len(), Outcome::Taken)
+        (bytes.len(), TiOutcome::Taken)
     }
 
     /// The kind of header, once known.
-    pub fn family(&self) -> Option<Family> {
+    pub fn family(&self) -> Option<TiFamily> {
         self.family
     }
 
     /// What was seen and what was wrong.
-    pub fn counters(&self) -> &Counters {
+    pub fn counters(&self) -> &TiCounters {
         &self.counters
     }
 
@@ -254,7 +254,7 @@ impl<const N: usize> Ti<N> {
         self.head = [0; LONGEST];
         self.position = ITEM_HEADER;
         self.stage = Stage::Header;
-        self.end = self.family.map_or(0, Family::header);
+        self.end = self.family.map_or(0, TiFamily::header);
         self.started = now;
         (self.points, self.refused, self.ratios) = (0, 0, 0);
         self.collected.clear();
@@ -277,7 +277,7 @@ impl<const N: usize> Ti<N> {
 
     /// The stage is at its end: goes to the next.
     #[allow(clippy::cast_possible_truncation)] // halves of the window
-    fn step(&mut self, family: Family) -> Result<(), Flaw> {
+    fn step(&mut self, family: TiFamily) -> Result<(), Flaw> {
         match self.stage {
             Stage::Header => {
                 self.header = family.read(&self.head).ok_or(Flaw::Header)?;
@@ -314,7 +314,7 @@ impl<const N: usize> Ti<N> {
         self.next()
     }
 
-    /// The stage behind an item or the header.
+    /// The stage after an item or the header.
     fn next(&mut self) -> Result<(), Flaw> {
         let rest = self.header.total.checked_sub(self.position).ok_or(Flaw::Items)?;
         (self.stage, self.end) = match self.left {
@@ -339,13 +339,13 @@ impl<const N: usize> Ti<N> {
     }
 
     /// How an item is laid out; `None` if it is of no interest.
-    fn layout(&self, family: Family, kind: u32) -> Option<Layout> {
+    fn layout(&self, family: TiFamily, kind: u32) -> Option<Layout> {
         let layout = match (family, kind) {
-            (Family::Bytes48, 6) => Some(Layout::CompressedHead),
-            (Family::Bytes48, 7) => Some(Layout::Targets),
-            (Family::Bytes52, 6) => Some(Layout::Polar(self.config.dialect.polar_points)),
-            (Family::Bytes52, 7) => Some(Layout::FlatTargets),
-            (Family::Bytes48 | Family::Bytes52, _) => None,
+            (TiFamily::Bytes48, 6) => Some(Layout::CompressedHead),
+            (TiFamily::Bytes48, 7) => Some(Layout::Targets),
+            (TiFamily::Bytes52, 6) => Some(Layout::Polar(self.config.dialect.polar_points)),
+            (TiFamily::Bytes52, 7) => Some(Layout::FlatTargets),
+            (TiFamily::Bytes48 | TiFamily::Bytes52, _) => None,
             (_, 1) if self.header.sdk <= 2 => Some(Layout::IndexedHead),
             (_, 1) => Some(Layout::Cartesian),
             (_, 7) => Some(Layout::SideInfo),
@@ -361,7 +361,7 @@ impl<const N: usize> Ti<N> {
     /// Takes a whole record.
     fn take_record(&mut self) {
         match self.layout.read(&self.record, &self.config.dialect) {
-            Record::Head(behind) => self.layout = behind,
+            Record::Head(after) => self.layout = after,
             Record::Point(point) => {
                 match point.map(|point| self.collected.add(self.points, point)) {
                     Err(_) => {
@@ -383,19 +383,19 @@ impl<const N: usize> Ti<N> {
         }
     }
 
-    fn complete(&mut self) -> Outcome<'_> {
+    fn complete(&mut self) -> TiOutcome<'_> {
         let header = self.header;
         // points, not targets, are announced
-        let told = header.points.filter(|_| self.config.dialect.entries == Entries::Points);
-        let announced = told.unwrap_or(self.points);
+        let of_header = header.points.filter(|_| self.config.dialect.entries == Entries::Points);
+        let announced = of_header.unwrap_or(self.points);
         if !usable(announced, self.points) {
             count(&mut self.counters.broken);
-            return Outcome::Broken(Flaw::Points);
+            return TiOutcome::Broken(Flaw::Points);
         }
         self.broken_in_a_row = 0;
         self.follow(&header);
         count(&mut self.counters.scans);
-        Outcome::Scan(RadarScan {
+        TiOutcome::Scan(RadarScan {
             time: self.started,
             received: self.started,
             number: header.number,
@@ -419,7 +419,7 @@ impl<const N: usize> Ti<N> {
 
 /// What a byte led to.
 enum Event {
-    Learnt(Family),
+    Learnt(TiFamily),
     Complete,
     Broken(Flaw),
 }

@@ -20,7 +20,7 @@
 //! | 130 | a part of the block in use | n | its bytes 4 n to 4 n + 3 |
 //! | 131 | the unit starts | slot; 255 without a block | the block's sequence, big-endian |
 //! | 132 | a block was refused | reason | see below |
-//! | 133 | letters of the refused parameter's name | n | letters 4 n to 4 n + 3; zeros behind the last |
+//! | 133 | letters of the refused parameter's name | n | letters 4 n to 4 n + 3; zeros after the last |
 //!
 //! Reasons are those of [`BlockError::code`](crate::unit::settings::BlockError::code), with the layout that was
 //! found (2 bytes, big-endian) or the parameter's value (`f32`, big-endian), and
@@ -38,7 +38,7 @@
 mod tool;
 mod unit;
 
-pub use tool::{Answers, Refusal, Told, Tool};
+pub use tool::{Answers, Refusal, Said, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
 use crate::unit::settings::BLOCK_LEN;

@@ -89,7 +89,7 @@ impl Refusal {
 /// What a unit says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(clippy::large_enum_variant)] // no allocator here
-pub enum Told {
+pub enum Said {
     /// A block was written, with this sequence.
     Written(u32),
     /// The block in use, every part of it; its own check sum is still to be looked at.
@@ -118,18 +118,18 @@ impl Answers {
     }
 
     /// Takes a frame; what the unit said, once it is complete.
-    pub fn take(&mut self, frame: &CanFrame) -> Option<Told> {
+    pub fn take(&mut self, frame: &CanFrame) -> Option<Said> {
         let own = received(frame, &self.medium, self.sensor, ANSWER)?;
         match Answer::read(own)? {
-            Answer::Written { sequence } => Some(Told::Written(sequence)),
+            Answer::Written { sequence } => Some(Said::Written(sequence)),
             Answer::Started { slot, sequence } => {
                 self.came = 0;
-                Some(Told::Started((slot != u8::MAX).then_some((slot, sequence))))
+                Some(Said::Started((slot != u8::MAX).then_some((slot, sequence))))
             }
             Answer::Refused { reason, detail } => {
                 let refusal = Refusal { reason, detail, name: [0; Refusal::MOST_LETTERS] };
                 self.refusal = (reason == Refusal::PARAMETER).then_some(refusal);
-                self.refusal.is_none().then_some(Told::Refused(refusal))
+                self.refusal.is_none().then_some(Said::Refused(refusal))
             }
             Answer::Name { number, letters } => {
                 let refusal = self.refusal.as_mut()?;
@@ -137,13 +137,13 @@ impl Answers {
                 if let Some(place) = refusal.name.get_mut(at..at + 4) {
                     place.copy_from_slice(&letters);
                 }
-                if letters.contains(&0) { self.refusal.take().map(Told::Refused) } else { None }
+                if letters.contains(&0) { self.refusal.take().map(Said::Refused) } else { None }
             }
             Answer::Part { number, bytes } => self.part(number, bytes),
         }
     }
 
-    fn part(&mut self, number: u8, bytes: [u8; 4]) -> Option<Told> {
+    fn part(&mut self, number: u8, bytes: [u8; 4]) -> Option<Said> {
         let at = 4 * usize::from(number);
         if number == 0 {
             // a block is read from its beginning on
@@ -153,7 +153,7 @@ impl Answers {
         self.came |= 1 << number;
         if self.came.count_ones() as usize == PARTS {
             self.came = 0;
-            return Some(Told::Block(self.block));
+            return Some(Said::Block(self.block));
         }
         None
     }

@@ -1,10 +1,10 @@
-//! The unit's end: takes a block, keeps it, tells what it runs with, and what it says without one.
+//! The unit's end: takes a block, keeps it, answers what it runs with, and what it sends without one.
 
 use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
 use crate::fixed::time::Time;
 use crate::unit::Flow;
 use crate::unit::safe_state::SafeState;
-use crate::unit::settings::{BLOCK_LEN, BlockError, Settings, Slots, Stored};
+use crate::unit::settings::{BLOCK_LEN, BlockError, Settings, SettingsSlots, StoredSettings};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -34,19 +34,13 @@ impl CanServiceConfig {
 /// # Example
 /// A block is sent in parts, written, and read by the next start:
 /// ```
-/// # use viewshed::unit::can_service::{Answers, CanService, CanServiceConfig, Told, Tool};
-/// # use viewshed::sensor::field_of_view::FieldOfView;
-/// # use viewshed::sensor::mount::Mount;
-/// # use viewshed::sensor::noise::NoiseConfig;
-/// # use viewshed::sensor::Sensor;
-/// # use viewshed::unit::Flow;
-/// # use viewshed::unit::profile::small;
-/// # use viewshed::unit::settings::{BLOCK_LEN, Settings, Slots, Stored};
-/// # use viewshed::fixed::time::Time;
-/// # use viewshed::wire::broadcast::Medium;
-/// # use viewshed::wire::message::{Addresses, Epoch};
+/// # use viewshed::unit::can_service::{Answers, Said, Tool};
+/// # use viewshed::{
+/// #     Addresses, BLOCK_LEN, CanService, CanServiceConfig, Epoch, FieldOfView, Flow, Medium, Mount, NoiseConfig, Sensor,
+/// #     Settings, SettingsSlots, StoredSettings, Time, small,
+/// # };
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);
-/// # impl Slots for InRam {
+/// # impl SettingsSlots for InRam {
 /// #     fn slot(&self, slot: usize) -> &[u8] { &self.0[slot] }
 /// #     fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) { self.0[slot] = *block }
 /// # }
@@ -65,25 +59,25 @@ impl CanServiceConfig {
 ///
 /// let check = small::CHECK;
 ///
-/// let mut unit = CanService::start(config, Epoch::new(1), now, Stored::read(&slots, check));
+/// let mut unit = CanService::start(config, Epoch::new(1), now, StoredSettings::read(&slots, check));
 /// assert!(unit.settings().is_none());
 /// let (mut tool, mut answers) = (Tool::new(3, medium), Answers::new(3, medium));
 /// for frame in tool.write(&settings.to_block(0)) {
 ///     unit.take(&frame, &mut slots);
 /// }
-/// let mut told = std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|f| answers.take(&f));
-/// assert!(told.any(|told| told == Told::Written(1)));
+/// let mut reported = std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|f| answers.take(&f));
+/// assert!(reported.any(|report| report == Said::Written(1)));
 /// let restart = tool.restart().unwrap();
 /// assert_eq!(unit.take(&restart, &mut slots), Some(Flow::Restart));
 ///
-/// let unit = CanService::start(config, Epoch::new(2), now, Stored::read(&slots, check));
+/// let unit = CanService::start(config, Epoch::new(2), now, StoredSettings::read(&slots, check));
 /// assert_eq!(unit.settings(), Some(&settings));
 /// ```
 #[derive(Debug, Clone)]
 pub struct CanService {
     config: CanServiceConfig,
     epoch: Epoch,
-    stored: Stored,
+    stored: StoredSettings,
     safe: SafeState,
     incoming: Incoming,
     outgoing: Outgoing,
@@ -94,7 +88,7 @@ pub struct CanService {
 
 impl CanService {
     /// Starts with a block, or without.
-    pub fn start(config: CanServiceConfig, epoch: Epoch, now: Time, stored: Stored) -> Self {
+    pub fn start(config: CanServiceConfig, epoch: Epoch, now: Time, stored: StoredSettings) -> Self {
         let refused = stored.place().err().map(|error| Refused { what: What::Block(error), next: 0 });
         Self {
             config,
@@ -119,7 +113,7 @@ impl CanService {
     }
 
     /// Takes a frame of the bus; `None` if it is none of the integrator's.
-    pub fn take(&mut self, frame: &CanFrame, slots: &mut impl Slots) -> Option<Flow> {
+    pub fn take(&mut self, frame: &CanFrame, slots: &mut impl SettingsSlots) -> Option<Flow> {
         let own = received(frame, &self.config.medium, self.config.sensor, REQUEST)?;
         match Request::read(own)? {
             Request::Begin { length } => self.incoming.begin(length),
@@ -138,7 +132,7 @@ impl CanService {
     }
 
     /// The next answer, if one is due.
-    pub fn next_frame(&mut self, now: Time, slots: &impl Slots) -> Option<CanFrame> {
+    pub fn next_frame(&mut self, now: Time, slots: &impl SettingsSlots) -> Option<CanFrame> {
         let gap_us = u64::from(self.config.gap_us);
         // a clock that stepped back does not put it off
         if self.next.since(now).is_some_and(|wait| wait > 0 && wait <= gap_us) {
@@ -151,9 +145,9 @@ impl CanService {
     }
 
     /// The next status of a unit in its safe state, where nothing else of it is sent; versions and counters as
-    /// in `told`.
-    pub fn next_status(&mut self, now: Time, told: Status) -> Option<CanFrame> {
-        self.safe.next_frame(now, told)
+    /// in `base`.
+    pub fn next_status(&mut self, now: Time, base: Status) -> Option<CanFrame> {
+        self.safe.next_frame(now, base)
     }
 }
 
@@ -173,7 +167,7 @@ impl Incoming {
     const NONE: Self = Self { bytes: [0; BLOCK_LEN], came: 0, length: None, written: None };
 
     fn begin(&mut self, length: u16) {
-        // what is longer is of another layout, which its first bytes tell
+        // what is longer is of another layout, as its first bytes say
         (self.came, self.length) = (0, Some(usize::from(length).min(BLOCK_LEN)));
     }
 
@@ -186,7 +180,12 @@ impl Incoming {
     }
 
     /// Checks the block and writes it; its sequence.
-    fn complete(&mut self, last: [u8; 4], stored: &Stored, slots: &mut impl Slots) -> Result<u32, What> {
+    fn complete(
+        &mut self,
+        last: [u8; 4],
+        stored: &StoredSettings,
+        slots: &mut impl SettingsSlots,
+    ) -> Result<u32, What> {
         let Some(length) = self.length else {
             // the answer may have been lost
             let again = self.written.filter(|(sum, _)| *sum == last);
@@ -233,7 +232,7 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    fn next(&mut self, stored: &Stored, slots: &impl Slots) -> Option<Answer> {
+    fn next(&mut self, stored: &StoredSettings, slots: &impl SettingsSlots) -> Option<Answer> {
         if core::mem::take(&mut self.started) {
             let (slot, sequence) = stored.place().unwrap_or((u8::MAX, 0));
             return Some(Answer::Started { slot, sequence });

@@ -2,7 +2,7 @@
 //!
 //! This is the loop of such a board without its drivers. A `main` sets up clocks and pins, calls
 //! [`Roadside::step`] a thousand times a second with a hardware timer's time, feeds the watchdog where
-//! [`Step::frame_done`] says so, and resets the controller where the flow says restart.
+//! [`RoadsideStep::frame_done`] says so, and resets the controller where the flow says restart.
 //!
 //! # Model
 //! ```text
@@ -30,14 +30,14 @@ use crate::fixed::time::Time;
 use crate::inputs::Feed;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
-use crate::unit::serial_service::{Asked, Line, SerialService};
-use crate::unit::settings::{Settings, Slots, Stored};
-use crate::unit::{Flow, InUnit, Sender, Unit, build};
+use crate::unit::serial_service::{Asked, SerialLine, SerialService};
+use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
+use crate::unit::{Flow, InUnit, MapSender, Unit};
 use crate::wire::broadcast::{BroadcastConfig, Medium};
 use crate::wire::frame::CanFrame;
 use crate::wire::message::{Addresses, Epoch};
 use crate::wire::serial::{MOST_STUFFED, Unstuffer};
-use crate::wire::status::{Reason, ResetCause, State, Status};
+use crate::wire::status::{Reason, ResetCause, Status, UnitState};
 
 use outbox::Outbox;
 pub use reset::ResetFlags;
@@ -55,14 +55,14 @@ const IDLE_US: u64 = 50_000;
 const STALE_MS: u16 = 80;
 
 /// The serial line, as a board offers it; no call waits.
-pub trait SerialPort: Line {
+pub trait SerialPort: SerialLine {
     /// Takes bytes that came; how many.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;
 }
 
 /// The drivers.
 #[derive(Debug)]
-pub struct Ports<R, B, L, S> {
+pub struct RoadsidePorts<R, B, L, S> {
     /// The radar's bus.
     pub radar: R,
     /// The bus maps go out on.
@@ -73,15 +73,15 @@ pub struct Ports<R, B, L, S> {
     pub slots: S,
 }
 
-/// What a start is told.
+/// What a start needs to know.
 #[derive(Debug, Clone, Copy)]
-pub struct Start {
+pub struct RoadsideStart {
     /// The sensor's number, on its own bus as on the broadcast's.
     pub sensor: u8,
     /// One that was not used lately.
     pub epoch: Epoch,
     /// The block to run with, or why there is none.
-    pub stored: Stored,
+    pub stored: StoredSettings,
     /// Why the controller started.
     pub reset_cause: ResetCause,
 }
@@ -104,7 +104,7 @@ const fn number(digits: &str) -> u8 {
 
 /// The pieces of memory a unit works in.
 #[derive(Debug)]
-pub struct Memory<'u, E: InUnit, S> {
+pub struct RoadsideMemory<'u, E: InUnit, S> {
     /// The estimator's tables.
     pub parameters: &'u mut Option<E::Parameters>,
     /// The estimator's state.
@@ -119,13 +119,13 @@ pub struct Memory<'u, E: InUnit, S> {
 
 /// What a step led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Step {
+pub struct RoadsideStep {
     /// Whether a frame was done: the only thing that feeds the watchdog.
     pub frame_done: bool,
     /// Whether the controller is to be reset.
     pub flow: Flow,
     /// What a status output shows.
-    pub state: State,
+    pub state: UnitState,
 }
 
 /// A unit and its second sender.
@@ -155,14 +155,14 @@ pub struct Roadside<'u, E: InUnit, S, F> {
     lost: u32,
 }
 
-impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Input>> Roadside<'u, E, S, F> {
+impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Input>> Roadside<'u, E, S, F> {
     /// Starts, and puts both controllers on their buses.
-    pub fn start<R: CanPort, B: CanPort, L: SerialPort, P: Slots>(
-        start: Start,
-        memory: Memory<'u, E, S>,
+    pub fn start<R: CanPort, B: CanPort, L: SerialPort, P: SettingsSlots>(
+        start: RoadsideStart,
+        memory: RoadsideMemory<'u, E, S>,
         radar: F,
         now: Time,
-        ports: &mut Ports<R, B, L, P>,
+        ports: &mut RoadsidePorts<R, B, L, P>,
     ) -> Self {
         let service = SerialService::start(start.sensor, start.epoch, now, start.stored, &mut ports.serial);
         let asked = CanServiceConfig::new(start.sensor, Medium::Can(Addresses::STANDARD));
@@ -186,11 +186,11 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
     }
 
     /// Takes what came, and sends what is due.
-    pub fn step<R: CanPort, B: CanPort, L: SerialPort, P: Slots>(
+    pub fn step<R: CanPort, B: CanPort, L: SerialPort, P: SettingsSlots>(
         &mut self,
         now: Time,
-        ports: &mut Ports<R, B, L, P>,
-    ) -> Step {
+        ports: &mut RoadsidePorts<R, B, L, P>,
+    ) -> RoadsideStep {
         let mut flow = self.serve(&mut ports.serial, &mut ports.slots);
         self.radar_bus.poll(now, &mut ports.radar);
         self.broadcast_bus.poll(now, &mut ports.broadcast);
@@ -208,15 +208,15 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
                 maps.unit.broadcast().status_mut().state
             }
             None => {
-                self.service.say_safe(now, self.told(), &mut ports.serial);
-                State::Fault
+                self.service.say_safe(now, self.safe_status(), &mut ports.serial);
+                UnitState::Fault
             }
         };
-        Step { frame_done, flow, state }
+        RoadsideStep { frame_done, flow, state }
     }
 
     /// Takes the integrator's requests on the serial line. The time is the controller's own here, nobody sets it.
-    fn serve(&mut self, line: &mut impl SerialPort, slots: &mut impl Slots) -> Flow {
+    fn serve(&mut self, line: &mut impl SerialPort, slots: &mut impl SettingsSlots) -> Flow {
         let mut buffer = [0; MOST_BYTES];
         let came = line.receive(&mut buffer);
         let mut rest = buffer.get(..came).unwrap_or(&[]);
@@ -261,13 +261,13 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
             if !scanned {
                 maps.unit.wait(&mut self.radar, now);
             }
-            self.tell(now);
+            self.complete_status(now);
         }
         true
     }
 
     /// Offers the map to the second sender and completes the status of both.
-    fn tell(&mut self, now: Time) {
+    fn complete_status(&mut self, now: Time) {
         let bus_off = self.bus_off();
         let off = [&self.radar_bus, &self.broadcast_bus].iter().any(|k| matches!(k.state(), BusState::Off(_)));
         let radar_lost = self.radar.lost().saturating_add(self.lost);
@@ -284,9 +284,9 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
         status.firmware = VERSION;
         status.bus_off = bus_off;
         status.radar_lost = u16::try_from(radar_lost).unwrap_or(u16::MAX);
-        let told = *status;
+        let first = *status;
         let second = maps.serial.status_mut();
-        *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..told };
+        *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..first };
         if let Some(measured) = maps.unit.offered() {
             // the same one again is refused
             maps.serial.offer(measured, maps.unit.map());
@@ -294,7 +294,7 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
     }
 
     /// Hands the driver what is due on the broadcast bus.
-    fn transmit<R, B: CanPort, L, P: Slots>(&mut self, now: Time, ports: &mut Ports<R, B, L, P>) {
+    fn transmit<R, B: CanPort, L, P: SettingsSlots>(&mut self, now: Time, ports: &mut RoadsidePorts<R, B, L, P>) {
         // nothing is taken from a unit that cannot be sent
         if self.broadcast_bus.state() != BusState::Active {
             return;
@@ -304,7 +304,7 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
         if !self.outbox.flush(now, &mut self.broadcast_bus, port) {
             return;
         }
-        let told = self.told();
+        let safe = self.safe_status();
         let answer = self.can_service.next_frame(now, &ports.slots);
         let (frame, deadline) = match &mut self.maps {
             Some(maps) => {
@@ -312,15 +312,15 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
                 sender.count_dropped(late);
                 (answer.or_else(|| sender.next_frame(now)), sender.deadline())
             }
-            None => (answer.or_else(|| self.can_service.next_status(now, told)), None),
+            None => (answer.or_else(|| self.can_service.next_status(now, safe)), None),
         };
         if let Some(frame) = frame {
             self.outbox.send(frame, deadline, now, &mut self.broadcast_bus, port);
         }
     }
 
-    /// What both lines are told of the controller in the safe state.
-    fn told(&self) -> Status {
+    /// The controller's part of the status in the safe state.
+    fn safe_status(&self) -> Status {
         let reset_cause = self.reset_cause;
         Status { reset_cause, firmware: VERSION, bus_off: self.bus_off(), ..Status::starting(0) }
     }
@@ -333,13 +333,13 @@ impl<'u, E: InUnit, S: Sender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Inpu
 /// Makes the unit and its senders in the memory there is; none where a setting cannot be worked with. Apart,
 /// so that what this takes of the stack is free again before the first scan.
 #[inline(never)]
-fn maps<'u, E: InUnit, S: Sender<E::Map>>(
-    start: &Start,
+fn maps<'u, E: InUnit, S: MapSender<E::Map>>(
+    start: &RoadsideStart,
     settings: &Settings,
-    memory: Memory<'u, E, S>,
+    memory: RoadsideMemory<'u, E, S>,
     now: Time,
 ) -> Option<Maps<'u, E, S>> {
-    let header = build::<E>(settings, memory.parameters).ok()?;
+    let header = settings.build::<E>(memory.parameters).ok()?;
     let parameters = memory.parameters.as_ref()?;
     let sender = |medium| {
         let config = BroadcastConfig { stale_ms: STALE_MS, ..BroadcastConfig::new(start.sensor, medium) };
@@ -352,7 +352,7 @@ fn maps<'u, E: InUnit, S: Sender<E::Map>>(
 }
 
 /// Hands the driver what is due on the serial line.
-fn talk<E: InUnit, S: Sender<E::Map>>(now: Time, maps: &mut Maps<'_, E, S>, line: &mut impl Line) {
+fn talk<E: InUnit, S: MapSender<E::Map>>(now: Time, maps: &mut Maps<'_, E, S>, line: &mut impl SerialLine) {
     let mut stuffed = [0; MOST_STUFFED];
     for _ in 0..MOST_MESSAGES {
         let Some(message) = maps.serial.next_line(now, &mut stuffed).and_then(|n| stuffed.get(..n)) else { return };

@@ -21,7 +21,7 @@ pub struct ResetFlags {
 }
 
 impl From<ResetFlags> for ResetCause {
-    /// The most telling of them.
+    /// The one that says most.
     fn from(flags: ResetFlags) -> Self {
         // memory says anything when power comes, so the mark of a crash counts only with a reset by software
         match flags {
@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_most_telling_flag_names_the_cause() {
+    fn the_flag_that_says_most_names_the_cause() {
         let none = ResetFlags::default();
         let pin = ResetFlags { pin: true, ..none };
         for (flags, cause) in [

@@ -10,7 +10,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::{BLOCK_LEN, Slots};
+use super::{BLOCK_LEN, SettingsSlots};
 
 /// A block up to the next whole word of any flash memory, which has at most 32 bytes.
 const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
@@ -53,7 +53,7 @@ fn read<F: NorFlash>(flash: &mut F, place: u32) -> [u8; BLOCK_LEN] {
     copy
 }
 
-impl<F: NorFlash> Slots for FlashSlots<F> {
+impl<F: NorFlash> SettingsSlots for FlashSlots<F> {
     fn slot(&self, slot: usize) -> &[u8] {
         self.copies.get(slot).map_or(&[], |copy| copy)
     }
@@ -172,7 +172,7 @@ mod tests {
         settings
     }
 
-    fn newest(slots: &impl Slots) -> Option<u16> {
+    fn newest(slots: &impl SettingsSlots) -> Option<u16> {
         Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).ok().map(|n| n.settings.gate.max_detections)
     }
 

@@ -21,7 +21,7 @@ mod flash;
 mod stored;
 
 pub use flash::FlashSlots;
-pub use stored::{Check, Slots, Stored};
+pub use stored::{SettingsCheck, SettingsSlots, StoredSettings};
 
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
@@ -158,7 +158,7 @@ impl Settings {
     }
 
     /// Reads a block with its sequence; bytes after it do not matter. Its parameters may be anything: whether
-    /// a unit can run with them is [`Check`]'s to say.
+    /// a unit can run with them is [`SettingsCheck`]'s to say.
     ///
     /// # Errors
     /// The first thing that does not hold.

@@ -10,7 +10,7 @@ use crate::sensor::config::ConfigError;
 use crate::unit::can_bus::BusConfig;
 
 /// Where configuration blocks are kept.
-pub trait Slots {
+pub trait SettingsSlots {
     /// The bytes of a slot, 0 or 1.
     fn slot(&self, slot: usize) -> &[u8];
     /// Writes a slot.
@@ -19,14 +19,14 @@ pub trait Slots {
 
 /// Whether a unit can be built with settings: with its grid, its senders and its controller's clock.
 #[derive(Debug, Clone, Copy)]
-pub struct Check {
+pub struct SettingsCheck {
     build: fn(&Settings) -> Result<(), ConfigError>,
     /// Clock of the CAN controllers this program sets the bit rate of.
     can_clock_hz: Option<u32>,
 }
 
-impl Check {
-    /// By this function; [`Check::of`] is the one for an estimator and a sender.
+impl SettingsCheck {
+    /// By this function; [`SettingsCheck::of`] is the one for an estimator and a sender.
     pub const fn by(build: fn(&Settings) -> Result<(), ConfigError>) -> Self {
         Self { build, can_clock_hz: None }
     }
@@ -51,14 +51,14 @@ impl Check {
 
 /// The block a unit runs with, or why there is none.
 #[derive(Debug, Clone, Copy)]
-pub struct Stored {
+pub struct StoredSettings {
     found: Result<Newest, BlockError>,
-    check: Check,
+    check: SettingsCheck,
 }
 
-impl Stored {
+impl StoredSettings {
     /// The newest block that the unit can run with.
-    pub fn read(slots: &impl Slots, check: Check) -> Self {
+    pub fn read(slots: &impl SettingsSlots, check: SettingsCheck) -> Self {
         Self { found: newest(slots, check).map_err(worst), check }
     }
 
@@ -77,7 +77,7 @@ impl Stored {
     }
 
     /// The block in use, as it is stored; empty without one.
-    pub fn block<'s>(&self, slots: &'s impl Slots) -> &'s [u8] {
+    pub fn block<'s>(&self, slots: &'s impl SettingsSlots) -> &'s [u8] {
         self.found.as_ref().map_or(&[], |newest| slots.slot(newest.slot))
     }
 
@@ -91,7 +91,7 @@ impl Stored {
     ///
     /// # Errors
     /// Why the unit could not start with it; nothing is written then.
-    pub fn write(&self, block: &[u8], slots: &mut impl Slots) -> Result<u32, BlockError> {
+    pub fn write(&self, block: &[u8], slots: &mut impl SettingsSlots) -> Result<u32, BlockError> {
         let (_, settings) = Settings::from_block(block)?;
         self.check.settings(&settings).map_err(BlockError::Parameter)?;
         let (slot, sequence) = newest(slots, self.check).map_or((0, 1), |n| (n.next_slot, n.next_sequence));
@@ -101,7 +101,7 @@ impl Stored {
     }
 }
 
-fn newest(slots: &impl Slots, check: Check) -> Result<Newest, [BlockError; 2]> {
+fn newest(slots: &impl SettingsSlots, check: SettingsCheck) -> Result<Newest, [BlockError; 2]> {
     Settings::newest([slots.slot(0), slots.slot(1)], |settings| check.settings(settings))
 }
 

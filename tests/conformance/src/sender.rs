@@ -94,7 +94,7 @@ pub fn send(maps: &Maps, bus: Bus, plan: &Plan) -> Result<(Vec<Sent>, Life)> {
     let begin = Time::from_micros(plan.from + plan.ahead);
     let mut broadcaster =
         Broadcaster::new(config, maps.header, plan.epoch, begin).map_err(|error| anyhow!("the sender: {error}"))?;
-    broadcaster.status_mut().state = viewshed::wire::status::State::Ok;
+    broadcaster.status_mut().state = viewshed::wire::status::UnitState::Ok;
     let slots = plan.mailboxes.map_or(0, |mailboxes| mailboxes.count);
     let mut sender = Sender {
         bus,

@@ -4,14 +4,17 @@
 
 use viewshed::fixed::time::Time;
 use viewshed::inputs::ars408::message::Message;
-use viewshed::inputs::ars408::profile::PROFILES;
-use viewshed::inputs::ars408::{Ars408, Config, Outcome};
+use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Outcome};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 /// One input.
 pub fn run(bytes: &[u8]) {
     let Some((profile, bytes)) = bytes.split_first() else { return };
-    let config = Config { profile: PROFILES[usize::from(*profile) % PROFILES.len()], ..Config::sensor(0) };
+    let config = Ars408Config {
+        profile: Ars408Profile::ALL[usize::from(*profile) % Ars408Profile::ALL.len()],
+        ..Ars408Config::sensor(0)
+    };
     let mut radar = Ars408::<16>::new(config);
     let (mut micros, mut scans, mut broken) = (0_u64, 0, 0);
     for twelve in bytes.chunks_exact(12) {
@@ -24,12 +27,12 @@ pub fn run(bytes: &[u8]) {
         micros = if twelve[2] == 255 { micros / 2 } else { micros + 1000 * u64::from(twelve[2] >> 1) };
         let now = Time::from_micros(micros);
         let Some(frame) = CanFrame::classic(id, &twelve[4..4 + length]) else { continue };
-        let mut see = |outcome: Outcome<'_>| match outcome {
-            Outcome::Scan(scan) => {
+        let mut see = |outcome: Ars408Outcome<'_>| match outcome {
+            Ars408Outcome::Scan(scan) => {
                 scans += 1;
                 assert!(scan.detections.len() <= 16 && scan.detections.iter().all(|d| d.range_cm > 0));
             }
-            Outcome::Broken { announced, arrived } => {
+            Ars408Outcome::Broken { announced, arrived } => {
                 broken += 1;
                 assert!(arrived < announced);
             }

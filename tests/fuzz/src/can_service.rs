@@ -4,17 +4,17 @@ use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, REQUEST};
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{BlockError, Settings, Slots, Stored};
+use viewshed::unit::settings::{BlockError, Settings, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};
 
-/// A unit without settings and a tool, both told the same.
+/// A unit without settings and a tool, both given the same.
 pub fn run(bytes: &[u8]) {
     let medium = Medium::Can(Addresses::STANDARD);
     let mut flash = Flash::ERASED;
     let check = small::CHECK;
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(0, medium) };
-    let mut unit = CanService::start(config, Epoch::new(0), Time::from_micros(0), Stored::read(&flash, check));
+    let mut unit = CanService::start(config, Epoch::new(0), Time::from_micros(0), StoredSettings::read(&flash, check));
     let mut answers = Answers::new(0, medium);
     for own in bytes.chunks(6) {
         for message in [REQUEST, ANSWER] {

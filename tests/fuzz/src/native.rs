@@ -3,7 +3,9 @@
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::inputs::native::{Config, Medium, Outcome, Receiver, Sender, SerialReceiver, id};
+use viewshed::inputs::native::{
+    NativeConfig, NativeMedium, NativeOutcome, NativeReceiver, NativeSender, NativeSerialReceiver, id,
+};
 use viewshed::wire::e2e::Profile;
 
 /// A detection of ten bytes, by a layout of this file's own.
@@ -22,7 +24,7 @@ fn detection(b: &[u8]) -> Detection {
 /// One input.
 pub fn run(bytes: &[u8]) {
     // anything on the line
-    let mut line = SerialReceiver::<16>::new(Config::sensor(1));
+    let mut line = NativeSerialReceiver::<16>::new(NativeConfig::sensor(1));
     let mut rest = bytes;
     while !rest.is_empty() {
         let (taken, _) = line.push(rest, Time::from_micros(1));
@@ -31,7 +33,7 @@ pub fn run(bytes: &[u8]) {
         while line.poll(Time::from_micros(1)).is_some() {}
     }
     // anything that passes the check sum: of every 32 bytes, 28 are content
-    let mut receiver = Receiver::<16>::new(Config::sensor(1));
+    let mut receiver = NativeReceiver::<16>::new(NativeConfig::sensor(1));
     for (i, message) in bytes.chunks_exact(34).enumerate() {
         let mut message = message.to_vec();
         // version, sensor, and scan numbers and parts near each other, so that much fits
@@ -39,8 +41,8 @@ pub fn run(bytes: &[u8]) {
         (message[5], message[6], message[7]) = (message[5] & 3, message[6] & 3, message[7] & 3);
         message[8..14].fill(0);
         Profile::P05.protect(&mut message, 0x4001, i as u8);
-        let see = |outcome: Outcome<'_>| {
-            if let Outcome::Scan(scan) = outcome {
+        let see = |outcome: NativeOutcome<'_>| {
+            if let NativeOutcome::Scan(scan) = outcome {
                 assert!(scan.detections.len() <= 16 && scan.detections.iter().all(|d| d.range_cm > 0));
             }
         };
@@ -55,16 +57,16 @@ pub fn run(bytes: &[u8]) {
     }
     // there and back
     let sent: Vec<Detection> = bytes.chunks_exact(10).take(300).map(detection).collect();
-    for medium in [Medium::CanFd, Medium::Serial] {
-        let mut sender = Sender::new(1);
-        let mut receiver = Receiver::<300>::new(Config::sensor(1));
+    for medium in [NativeMedium::CanFd, NativeMedium::Serial] {
+        let mut sender = NativeSender::new(1);
+        let mut receiver = NativeReceiver::<300>::new(NativeConfig::sensor(1));
         let mut got = None;
         for message in sender.scan(Time::from_micros(77), false, &sent, medium) {
             let outcome = match medium {
-                Medium::CanFd => receiver.push_frame(&message.frame(id(1)).unwrap(), Time::from_micros(0)),
-                Medium::Serial => receiver.push(message.bytes(), Time::from_micros(0)),
+                NativeMedium::CanFd => receiver.push_frame(&message.frame(id(1)).unwrap(), Time::from_micros(0)),
+                NativeMedium::Serial => receiver.push(message.bytes(), Time::from_micros(0)),
             };
-            if let Outcome::Scan(scan) = outcome {
+            if let NativeOutcome::Scan(scan) = outcome {
                 got = Some((scan.time.micros(), scan.detections.to_vec()));
             }
         }

@@ -4,7 +4,7 @@
 //! magic word, 0xB6 for a header that announces a frame of the length and items behind it.
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ti::{AngleUnit, Config, Dialect, Entries, Family, Outcome, PolarPoints, Ti};
+use viewshed::inputs::ti::{Entries, PolarPoints, Ti, TiAngleUnit, TiConfig, TiDialect, TiFamily, TiOutcome};
 
 const MAGIC: [u8; 8] = [2, 1, 4, 3, 6, 5, 8, 7];
 
@@ -27,7 +27,7 @@ fn stream(bytes: &[u8]) -> Vec<u8> {
     stream
 }
 
-fn outcomes(config: Config, bytes: &[u8], chunk: usize) -> Vec<String> {
+fn outcomes(config: TiConfig, bytes: &[u8], chunk: usize) -> Vec<String> {
     let mut radar = Ti::<8>::new(config);
     let mut got = Vec::new();
     for mut rest in bytes.chunks(chunk) {
@@ -35,10 +35,10 @@ fn outcomes(config: Config, bytes: &[u8], chunk: usize) -> Vec<String> {
             let (taken, outcome) = radar.push(rest, Time::from_micros(5));
             assert!(taken > 0);
             rest = &rest[taken..];
-            if let Outcome::Scan(scan) = outcome {
+            if let TiOutcome::Scan(scan) = outcome {
                 assert!(scan.detections.len() <= 8 && scan.detections.iter().all(|d| d.range_cm > 0));
             }
-            if outcome != Outcome::Taken {
+            if outcome != TiOutcome::Taken {
                 got.push(format!("{outcome:?}"));
             }
         }
@@ -50,13 +50,13 @@ fn outcomes(config: Config, bytes: &[u8], chunk: usize) -> Vec<String> {
 pub fn run(bytes: &[u8]) {
     let Some((how, bytes)) = bytes.split_first() else { return };
     let bytes = stream(bytes);
-    let dialect = Dialect {
-        angles: if how & 8 == 0 { AngleUnit::Radians } else { AngleUnit::Degrees },
+    let dialect = TiDialect {
+        angles: if how & 8 == 0 { TiAngleUnit::Radians } else { TiAngleUnit::Degrees },
         polar_points: if how & 16 == 0 { PolarPoints::Flat } else { PolarPoints::Raised },
         has_elevation: how & 32 == 0,
         doppler_step_mps: (how & 64 == 0).then_some(0.1),
         entries: if how & 128 == 0 { Entries::Points } else { Entries::Targets },
     };
-    let config = Config { family: Family::ALL.get(usize::from(how & 7)).copied(), dialect };
+    let config = TiConfig { family: TiFamily::ALL.get(usize::from(how & 7)).copied(), dialect };
     assert_eq!(outcomes(config, &bytes, 1), outcomes(config, &bytes, 61));
 }

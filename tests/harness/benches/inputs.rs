@@ -66,32 +66,35 @@ fn detections() -> Vec<Detection> {
 /// Decodes one scan; this is what runs under callgrind.
 fn work(input: &str) {
     let detections = detections();
-    let mut sender = native::Sender::new(1);
+    let mut sender = native::NativeSender::new(1);
     let (bytes, found) = match input {
         "ars408" => {
             let frames = clusters();
-            let mut radar = ars408::Ars408::new(ars408::Config::sensor(0));
+            let mut radar = ars408::Ars408::new(ars408::Ars408Config::sensor(0));
             (frames.iter().map(|f| f.data().len()).sum(), measured_ars408(&mut radar, &frames))
         }
         "native-can-fd" => {
-            let messages = sender.scan(NOW, false, &detections, native::Medium::CanFd);
+            let messages = sender.scan(NOW, false, &detections, native::NativeMedium::CanFd);
             let frames: Vec<CanFrame> = messages.filter_map(|m| m.frame(native::id(1))).collect();
-            let mut receiver = native::Receiver::new(native::Config::sensor(1));
+            let mut receiver = native::NativeReceiver::new(native::NativeConfig::sensor(1));
             (frames.iter().map(|f| f.data().len()).sum(), measured_can_fd(&mut receiver, &frames))
         }
         "native-serial" => {
             let mut line = Vec::new();
-            for message in sender.scan(NOW, false, &detections, native::Medium::Serial) {
+            for message in sender.scan(NOW, false, &detections, native::NativeMedium::Serial) {
                 let mut stuffed = [0; 300];
                 let n = message.stuff(&mut stuffed).expect("room");
                 line.extend(&stuffed[..n]);
             }
-            (line.len(), measured_serial(&mut native::SerialReceiver::new(native::Config::sensor(1)), &line))
+            (
+                line.len(),
+                measured_serial(&mut native::NativeSerialReceiver::new(native::NativeConfig::sensor(1)), &line),
+            )
         }
         "native-sender" => (measured_sender(&mut sender, &detections), usize::from(DETECTIONS)),
         _ => {
             let frame = ti_frame();
-            let config = ti::Config { family: Some(ti::Family::Bytes40), ..ti::Config::LEARN };
+            let config = ti::TiConfig { family: Some(ti::TiFamily::Bytes40), ..ti::TiConfig::LEARN };
             (frame.len(), measured_ti(&mut ti::Ti::new(config), &frame))
         }
     };
@@ -128,7 +131,7 @@ fn ti_frame() -> Vec<u8> {
 fn measured_ars408(radar: &mut ars408::Ars408<256>, frames: &[CanFrame]) -> usize {
     let mut found = 0;
     for frame in frames {
-        if let ars408::Outcome::Scan(scan) = radar.push(black_box(frame), NOW) {
+        if let ars408::Ars408Outcome::Scan(scan) = radar.push(black_box(frame), NOW) {
             found += scan.detections.len();
         }
     }
@@ -138,10 +141,10 @@ fn measured_ars408(radar: &mut ars408::Ars408<256>, frames: &[CanFrame]) -> usiz
 }
 
 #[inline(never)]
-fn measured_can_fd(receiver: &mut native::Receiver<256>, frames: &[CanFrame]) -> usize {
+fn measured_can_fd(receiver: &mut native::NativeReceiver<256>, frames: &[CanFrame]) -> usize {
     let mut found = 0;
     for frame in frames {
-        if let native::Outcome::Scan(scan) = receiver.push_frame(black_box(frame), NOW) {
+        if let native::NativeOutcome::Scan(scan) = receiver.push_frame(black_box(frame), NOW) {
             found += scan.detections.len();
         }
     }
@@ -149,12 +152,12 @@ fn measured_can_fd(receiver: &mut native::Receiver<256>, frames: &[CanFrame]) ->
 }
 
 #[inline(never)]
-fn measured_serial(receiver: &mut native::SerialReceiver<256>, mut bytes: &[u8]) -> usize {
+fn measured_serial(receiver: &mut native::NativeSerialReceiver<256>, mut bytes: &[u8]) -> usize {
     let mut found = 0;
     while !bytes.is_empty() {
         let (taken, outcome) = receiver.push(black_box(bytes), NOW);
         bytes = &bytes[taken..];
-        if let native::Outcome::Scan(scan) = outcome {
+        if let native::NativeOutcome::Scan(scan) = outcome {
             found += scan.detections.len();
         }
     }
@@ -162,8 +165,11 @@ fn measured_serial(receiver: &mut native::SerialReceiver<256>, mut bytes: &[u8])
 }
 
 #[inline(never)]
-fn measured_sender(sender: &mut native::Sender, detections: &[Detection]) -> usize {
-    sender.scan(NOW, false, black_box(detections), native::Medium::Serial).map(|m| black_box(m).bytes().len()).sum()
+fn measured_sender(sender: &mut native::NativeSender, detections: &[Detection]) -> usize {
+    sender
+        .scan(NOW, false, black_box(detections), native::NativeMedium::Serial)
+        .map(|m| black_box(m).bytes().len())
+        .sum()
 }
 
 #[inline(never)]
@@ -172,7 +178,7 @@ fn measured_ti(radar: &mut ti::Ti<256>, mut bytes: &[u8]) -> usize {
     while !bytes.is_empty() {
         let (taken, outcome) = radar.push(black_box(bytes), NOW);
         bytes = &bytes[taken..];
-        if let ti::Outcome::Scan(scan) = outcome {
+        if let ti::TiOutcome::Scan(scan) = outcome {
             found += scan.detections.len();
         }
     }

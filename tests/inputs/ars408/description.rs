@@ -5,7 +5,7 @@ use viewshed::inputs::ars408::configuration::field as set;
 use viewshed::inputs::ars408::filter::field as filter;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::motion;
-use viewshed::inputs::ars408::profile::{ARS408, General};
+use viewshed::inputs::ars408::profile::{Ars408Profile, General};
 use viewshed::inputs::ars408::quality::{cluster, object};
 use viewshed::inputs::ars408::receiver::{cluster_status, object_status};
 use viewshed::inputs::ars408::state::{field as state, version};
@@ -83,8 +83,8 @@ fn fields(message: Message) -> Vec<(&'static str, Signal)> {
             ("MeasCounter", object_status::COUNTER),
             ("InterfaceVersion", object_status::VERSION),
         ],
-        Message::ObjectGeneral => general(&ARS408.object),
-        Message::ClusterGeneral => general(&ARS408.cluster),
+        Message::ObjectGeneral => general(&Ars408Profile::ARS408.object),
+        Message::ClusterGeneral => general(&Ars408Profile::ARS408.cluster),
         Message::ObjectQuality => vec![
             ("ID", object::NUMBER),
             ("DistLong_rms", object::FRONT_RMS),
@@ -161,7 +161,9 @@ fn every_field_has_the_bits_described() {
 
 #[test]
 fn every_quantity_has_the_scale_described() {
-    for (profile, name) in [(&ARS408.cluster, "Cluster_1_General"), (&ARS408.object, "Obj_1_General")] {
+    for (profile, name) in
+        [(&Ars408Profile::ARS408.cluster, "Cluster_1_General"), (&Ars408Profile::ARS408.object, "Obj_1_General")]
+    {
         let message = described().into_iter().find(|m| m.name == name).unwrap();
         let quantities = [
             ("DistLong", profile.front_cm, 100.0),

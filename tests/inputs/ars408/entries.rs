@@ -2,17 +2,17 @@
 
 use viewshed::fixed::angle::Angle;
 use viewshed::frame::detection::Detection;
-use viewshed::inputs::ars408::profile::SR75;
+use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ars408::quality::Wanted;
-use viewshed::inputs::ars408::{Ars408, Config, Outcome};
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Outcome};
 
 use super::{at, frame, radar};
 
 /// The detections of a scan with one entry.
 fn single(radar: &mut Ars408<64>, status: &str, general: &str) -> Vec<Detection> {
-    assert_eq!(radar.push(&frame(status), at(0)), Outcome::Taken);
+    assert_eq!(radar.push(&frame(status), at(0)), Ars408Outcome::Taken);
     match radar.push(&frame(general), at(1)) {
-        Outcome::Scan(scan) => {
+        Ars408Outcome::Scan(scan) => {
             assert_eq!((scan.time, scan.received), (at(0), at(0)));
             scan.detections.to_vec()
         }
@@ -67,14 +67,14 @@ fn the_limits_of_every_field_are_those_of_the_description() {
 fn near_and_far_clusters_are_added() {
     let mut radar = radar();
     let frames = ["600#0102000010", "701#014E23FE80200080", "701#0255F1CD6C200294"];
-    assert!(frames.iter().all(|f| radar.push(&frame(f), at(0)) == Outcome::Taken));
-    let Outcome::Scan(scan) = radar.push(&frame("701#0355F1CD6C200294"), at(1)) else { panic!() };
+    assert!(frames.iter().all(|f| radar.push(&frame(f), at(0)) == Ars408Outcome::Taken));
+    let Ars408Outcome::Scan(scan) = radar.push(&frame("701#0355F1CD6C200294"), at(1)) else { panic!() };
     assert_eq!((scan.detections.len(), scan.missing), (3, 0));
 }
 
 #[test]
 fn a_clone_has_scales_and_a_height_of_its_own() {
-    let mut radar = Ars408::<64>::new(Config { profile: SR75, ..Config::sensor(0) });
+    let mut radar = Ars408::<64>::new(Ars408Config { profile: Ars408Profile::SR75, ..Ars408Config::sensor(0) });
     // 40.0 m ahead, 30.0 m to the left, 12.0 m up, 5 m/s away: 2800, 1600, 304, 420
     let detections = single(&mut radar, "600#0001000010", "701#0157864069260094");
     let [d] = detections[..] else { panic!("{detections:?}") };
@@ -85,7 +85,7 @@ fn a_clone_has_scales_and_a_height_of_its_own() {
     let mut frames = vec!["600#0102000110".to_owned()];
     frames.extend((0..258).map(|n| format!("701#{:02X}57864069260094", n % 256)));
     let outcomes: Vec<bool> =
-        frames.iter().map(|f| matches!(radar.push(&frame(f), at(70)), Outcome::Scan(_))).collect();
+        frames.iter().map(|f| matches!(radar.push(&frame(f), at(70)), Ars408Outcome::Scan(_))).collect();
     assert_eq!(outcomes.iter().position(|complete| *complete), Some(258));
     assert_eq!(radar.counters().overflow, 258 - 64, "this one has room for 64");
 }
@@ -100,19 +100,19 @@ fn the_radars_own_marks_sort_out() {
     frames.extend((1..=4).map(general));
     // before the first quality message scans do not wait
     for f in &frames[..4] {
-        assert_eq!(radar.push(&frame(f), at(0)), Outcome::Taken);
+        assert_eq!(radar.push(&frame(f), at(0)), Ars408Outcome::Taken);
     }
-    assert!(matches!(radar.push(&frame(&frames[4]), at(0)), Outcome::Scan(s) if s.detections.len() == 4));
-    assert_eq!(radar.push(&frame(&quality(1, 0x03)), at(1)), Outcome::Taken);
+    assert!(matches!(radar.push(&frame(&frames[4]), at(0)), Ars408Outcome::Scan(s) if s.detections.len() == 4));
+    assert_eq!(radar.push(&frame(&quality(1, 0x03)), at(1)), Ars408Outcome::Taken);
     // from then on they do
     frames[0] = "600#0400000210".into();
     frames.extend([quality(1, 0x03), quality(2, 0x04), quality(3, 0x01)]);
     for f in &frames {
-        assert_eq!(radar.push(&frame(f), at(70)), Outcome::Taken, "{f}");
+        assert_eq!(radar.push(&frame(f), at(70)), Ars408Outcome::Taken, "{f}");
     }
-    let Outcome::Scan(scan) = radar.push(&frame(&quality(4, 0x0B)), at(71)) else { panic!() };
+    let Ars408Outcome::Scan(scan) = radar.push(&frame(&quality(4, 0x0B)), at(71)) else { panic!() };
     assert_eq!(scan.detections.len(), 2, "the ambiguous and the invalid one are gone");
     assert_eq!((radar.counters().unwanted, radar.counters().incomplete), (2, 0));
-    let all = Config { wanted: Wanted::ALL, ..Config::sensor(0) };
+    let all = Ars408Config { wanted: Wanted::ALL, ..Ars408Config::sensor(0) };
     assert_eq!(Ars408::<64>::new(all).config().wanted, Wanted::ALL);
 }

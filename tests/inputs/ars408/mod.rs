@@ -6,7 +6,7 @@ mod random;
 mod scans;
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ars408::{Ars408, Config, Outcome};
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Outcome};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 /// A frame as `candump` writes it, `701#0755F1CD6C200294`.
@@ -37,9 +37,9 @@ pub struct Got {
 }
 
 /// The scan an outcome holds.
-pub fn got(outcome: Outcome<'_>) -> Option<Got> {
+pub fn got(outcome: Ars408Outcome<'_>) -> Option<Got> {
     match outcome {
-        Outcome::Scan(scan) => Some(Got {
+        Ars408Outcome::Scan(scan) => Some(Got {
             number: scan.number,
             detections: scan.detections.iter().map(|d| (d.range_cm, d.radial_velocity_cm_s)).collect(),
             missing: scan.missing,
@@ -56,5 +56,5 @@ pub fn scans(radar: &mut Ars408<64>, frames: &[&str]) -> Vec<Got> {
 
 /// Sensor 0 with room for 64.
 pub fn radar() -> Ars408<64> {
-    Ars408::new(Config::sensor(0))
+    Ars408::new(Ars408Config::sensor(0))
 }

@@ -1,7 +1,7 @@
 //! Whatever comes, and whatever is lost.
 
 use proptest::prelude::*;
-use viewshed::inputs::ars408::{Ars408, Config, Outcome};
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Outcome};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::at;
@@ -31,18 +31,18 @@ proptest! {
     fn any_frames_are_taken(
         frames in prop::collection::vec((any_frame(), 0_u64..300), 0..400),
     ) {
-        let mut radar = Ars408::<16>::new(Config::sensor(0));
+        let mut radar = Ars408::<16>::new(Ars408Config::sensor(0));
         let (mut scans, mut refused) = (0, 0);
         for (i, (frame, ms)) in frames.iter().enumerate() {
             match radar.push(frame, at(*ms)) {
-                Outcome::Scan(scan) => {
+                Ars408Outcome::Scan(scan) => {
                     prop_assert!(scan.detections.len() <= 16 && scan.detections.iter().all(|d| d.range_cm > 0));
                     scans += 1;
                 }
-                Outcome::Refused(_) => refused += 1,
+                Ars408Outcome::Refused(_) => refused += 1,
                 _ => {}
             }
-            if i % 7 == 0 && matches!(radar.poll(at(*ms)), Some(Outcome::Scan(_))) {
+            if i % 7 == 0 && matches!(radar.poll(at(*ms)), Some(Ars408Outcome::Scan(_))) {
                 scans += 1;
             }
         }
@@ -62,7 +62,7 @@ proptest! {
         losses in prop::collection::vec(prop::bool::weighted(0.1), 1..97),
         quality: bool,
     ) {
-        let mut radar = Ars408::<64>::new(Config::sensor(0));
+        let mut radar = Ars408::<64>::new(Ars408Config::sensor(0));
         let mut lost = losses.iter().cycle();
         let mut statuses = 0;
         for (scan, size) in sizes.iter().enumerate() {
@@ -82,7 +82,7 @@ proptest! {
                     continue;
                 }
                 statuses += usize::from(i == 0);
-                if let Outcome::Scan(s) = radar.push(frame, at(70 * scan as u64)) {
+                if let Ars408Outcome::Scan(s) = radar.push(frame, at(70 * scan as u64)) {
                     let sent = sizes[s.number as usize / 2];
                     // 511 * 0.2 - 102.3 = -0.1 m to the side does not show in the range
                     let range = 200 * (s.number as u16 / 2 + 1);

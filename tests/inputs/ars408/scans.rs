@@ -1,6 +1,6 @@
 //! Scans as a whole: when they are over, and what becomes of frames that are lost, repeated or odd.
 
-use viewshed::inputs::ars408::{Ars408, Config, Outcome, Refusal};
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Outcome, Refusal};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::{Got, at, frame, got, radar, scans};
@@ -40,8 +40,8 @@ fn a_scan_of_which_most_is_missing_is_no_free_road() {
     for f in ["60A#03000110", NEAR] {
         radar.push(&frame(f), at(0));
     }
-    assert_eq!(radar.push(&frame("60A#03000310"), at(70)), Outcome::Broken { announced: 3, arrived: 1 });
-    assert_eq!(radar.poll(at(101)), Some(Outcome::Broken { announced: 3, arrived: 0 }));
+    assert_eq!(radar.push(&frame("60A#03000310"), at(70)), Ars408Outcome::Broken { announced: 3, arrived: 1 });
+    assert_eq!(radar.poll(at(101)), Some(Ars408Outcome::Broken { announced: 3, arrived: 0 }));
     assert_eq!(radar.poll(at(102)), None);
     assert_eq!((radar.counters().broken, radar.counters().scans), (2, 0));
 }
@@ -50,7 +50,7 @@ fn a_scan_of_which_most_is_missing_is_no_free_road() {
 fn a_scan_does_not_wait_for_ever() {
     let mut radar = radar();
     for f in ["60A#02000110", NEAR] {
-        assert_eq!(radar.push(&frame(f), at(10)), Outcome::Taken);
+        assert_eq!(radar.push(&frame(f), at(10)), Ars408Outcome::Taken);
     }
     assert_eq!(radar.poll(at(40)), None);
     assert_eq!(radar.poll(at(41)).and_then(got), Some(Got { missing: 1, ..whole(1, &[2000]) }));
@@ -65,11 +65,11 @@ fn a_scan_does_not_wait_for_ever() {
 fn entries_of_a_lost_status_message_do_not_fill_the_scan_before() {
     let mut radar = radar();
     for f in ["60A#02000110", NEAR] {
-        assert_eq!(radar.push(&frame(f), at(10)), Outcome::Taken);
+        assert_eq!(radar.push(&frame(f), at(10)), Ars408Outcome::Taken);
     }
     let before = got(radar.push(&frame(FAR), at(80)));
     assert_eq!(before, Some(Got { missing: 1, ..whole(1, &[2000]) }));
-    assert_eq!(radar.push(&frame(NEAR), at(81)), Outcome::Refused(Refusal::NoScan));
+    assert_eq!(radar.push(&frame(NEAR), at(81)), Ars408Outcome::Refused(Refusal::NoScan));
     assert_eq!(radar.counters().no_scan, 2);
 }
 
@@ -112,7 +112,7 @@ fn extended_messages_are_taken_and_not_waited_for() {
 
 #[test]
 fn sensors_on_one_bus_do_not_disturb_each_other() {
-    let mut radars = [0, 3].map(|sensor| Ars408::<8>::new(Config::sensor(sensor)));
+    let mut radars = [0, 3].map(|sensor| Ars408::<8>::new(Ars408Config::sensor(sensor)));
     let frames =
         ["60A#01000110", "63A#02000910", "63B#015143FF80200080", NEAR, "65B#0152D3FF80200080", "63B#0252D3FF80200080"];
     let mut all = Vec::new();
@@ -132,17 +132,20 @@ fn longer_frames_are_taken_and_shorter_ones_are_not() {
     let frames = ["60A#0100011000000000", "60B#015143FF802000", NEAR];
     assert_eq!(scans(&mut radar, &frames), [whole(1, &[2000])]);
     assert_eq!(radar.counters().too_short, 1);
-    assert!(matches!(radar.push(&frame("60A#010001"), at(9)), Outcome::Refused(Refusal::TooShort { length: 3, .. })));
+    assert!(matches!(
+        radar.push(&frame("60A#010001"), at(9)),
+        Ars408Outcome::Refused(Refusal::TooShort { length: 3, .. })
+    ));
 }
 
 #[test]
 fn frames_of_others_are_not_mine() {
     let mut radar = radar();
     for text in ["123#00", "300#0000", "301#8000000000000000", "200#F8000000089C0000", "61A#01000110", "405#0102"] {
-        assert_eq!(radar.push(&frame(text), at(0)), Outcome::NotMine, "{text}");
+        assert_eq!(radar.push(&frame(text), at(0)), Ars408Outcome::NotMine, "{text}");
     }
     let long = CanFrame::fd(CanId::Standard(0x60A), &[1, 0, 1, 0x10]).unwrap();
-    assert_eq!(radar.push(&long, at(0)), Outcome::NotMine);
+    assert_eq!(radar.push(&long, at(0)), Ars408Outcome::NotMine);
     assert_eq!(radar.counters().frames, 0);
 }
 
@@ -150,7 +153,7 @@ fn frames_of_others_are_not_mine() {
 fn entries_out_of_place_are_refused_by_reason() {
     let mut radar = radar();
     let mut refused = |text: &str| match radar.push(&frame(text), at(0)) {
-        Outcome::Refused(why) => Some(why),
+        Ars408Outcome::Refused(why) => Some(why),
         _ => None,
     };
     // a log that begins within a scan
@@ -202,7 +205,7 @@ fn faults_are_passed_on_until_they_pass() {
 
 #[test]
 fn a_full_list_keeps_the_strongest_and_the_scan_is_complete_all_the_same() {
-    let mut radar = Ars408::<2>::new(Config::sensor(0));
+    let mut radar = Ars408::<2>::new(Ars408Config::sensor(0));
     let frames = ["60A#03000110", "60B#015143FF80200080", "60B#0252D3FF80200090", "60B#035463FF80200085"];
     let mut last = None;
     for f in frames {

@@ -1,13 +1,13 @@
 //! Frames as the radars would send them.
 
-use viewshed::inputs::ti::Family;
+use viewshed::inputs::ti::TiFamily;
 
 pub const MAGIC: [u8; 8] = [2, 1, 4, 3, 6, 5, 8, 7];
 
 /// A frame to be written.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    pub family: Family,
+    pub family: TiFamily,
     /// Version of the SDK, major number on top.
     pub version: u32,
     pub number: u32,
@@ -17,8 +17,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    pub fn new(family: Family, number: u32) -> Self {
-        let version = if family == Family::Bytes36 { 0x0101_0000 } else { 0x0305_0004 };
+    pub fn new(family: TiFamily, number: u32) -> Self {
+        let version = if family == TiFamily::Bytes36 { 0x0101_0000 } else { 0x0305_0004 };
         Self { family, version, number, sub_frame: 0, points: 0, items: Vec::new() }
     }
 
@@ -35,7 +35,7 @@ impl Frame {
     }
 
     pub fn bytes(&self) -> Vec<u8> {
-        let own = if matches!(self.family, Family::Bytes48 | Family::Bytes52) { 8 } else { 0 };
+        let own = if matches!(self.family, TiFamily::Bytes48 | TiFamily::Bytes52) { 8 } else { 0 };
         let items: Vec<u8> = self
             .items
             .iter()
@@ -44,13 +44,13 @@ impl Frame {
         let length = self.family.header() as usize + items.len();
         let total = length.next_multiple_of(32);
         let header = match self.family {
-            Family::Bytes48 => [
+            TiFamily::Bytes48 => [
                 words(&[self.version, total as u32, 0xA6843, self.number, self.sub_frame, 0, 0, 0, 0]),
                 (self.items.len() as u16).to_le_bytes().to_vec(),
                 vec![0xAB, 0xCD],
             ]
             .concat(),
-            Family::Bytes52 => [
+            TiFamily::Bytes52 => [
                 words(&[self.version, 0xA6843, 0, total as u32, self.number, self.sub_frame, 0, 0, 0, 0]),
                 (self.items.len() as u16).to_le_bytes().to_vec(),
                 vec![0, 0],

@@ -1,19 +1,19 @@
 //! Frames as a whole: headers, learning, resynchronisation, numbers.
 
-use viewshed::inputs::ti::{Config, Family, Flaw, Ti};
+use viewshed::inputs::ti::{Flaw, Ti, TiConfig, TiFamily};
 
 use super::frames::{Frame, MAGIC, floats, shorts};
 use super::{Got, feed, radar};
 
-/// A usual frame of a family, with a few points at distances that tell its number.
-fn usual(family: Family, number: u32) -> Frame {
+/// A usual frame of a family, with a few points at distances that contain its number.
+fn usual(family: TiFamily, number: u32) -> Frame {
     let y = 10.0 + number as f32;
     match family {
-        Family::Bytes52 => Frame::new(family, number)
+        TiFamily::Bytes52 => Frame::new(family, number)
             .item(6, 2, floats(&[[y, 0.1, 1.0, 100.0], [y, -0.1, 1.0, 100.0]]))
             .item(7, 0, vec![1; 68])
             .item(8, 0, vec![0; 2]),
-        Family::Bytes48 => Frame::new(family, number)
+        TiFamily::Bytes48 => Frame::new(family, number)
             .item(
                 6,
                 2,
@@ -21,7 +21,7 @@ fn usual(family: Family, number: u32) -> Frame {
             )
             .item(7, 0, vec![1; 112])
             .item(8, 0, vec![0; 2]),
-        Family::Bytes36 => {
+        TiFamily::Bytes36 => {
             Frame::new(family, number).item(1, 1, shorts(&[1, 0, 5, 1, 9, 0, y as i16, 0])).item(2, 0, vec![9; 512])
         }
         _ => Frame::new(family, number)
@@ -36,13 +36,13 @@ fn scans(got: &[Got]) -> Vec<u32> {
     got.iter().filter_map(number).collect()
 }
 
-fn stream(family: Family, numbers: std::ops::Range<u32>) -> Vec<u8> {
+fn stream(family: TiFamily, numbers: std::ops::Range<u32>) -> Vec<u8> {
     numbers.flat_map(|n| usual(family, n).bytes()).collect()
 }
 
 #[test]
 fn a_family_that_is_set_gives_scans_at_once() {
-    for family in Family::ALL {
+    for family in TiFamily::ALL {
         let mut radar = radar(family);
         assert_eq!(scans(&feed(&mut radar, &stream(family, 1..6), 1000)), [1, 2, 3, 4, 5], "{family:?}");
         let c = radar.counters();
@@ -52,8 +52,8 @@ fn a_family_that_is_set_gives_scans_at_once() {
 
 #[test]
 fn a_family_is_learnt_from_three_consistent_frames() {
-    for family in Family::ALL {
-        let mut radar = Ti::<64>::new(Config::LEARN);
+    for family in TiFamily::ALL {
+        let mut radar = Ti::<64>::new(TiConfig::LEARN);
         // the fourth magic word ends the third frame
         let got = feed(&mut radar, &stream(family, 1..8), 1000);
         assert_eq!(got[0], Got::Learnt(family));
@@ -64,11 +64,11 @@ fn a_family_is_learnt_from_three_consistent_frames() {
 
 #[test]
 fn nothing_is_given_out_before_it_is_learnt() {
-    for family in Family::ALL {
-        let mut radar = Ti::<64>::new(Config::LEARN);
+    for family in TiFamily::ALL {
+        let mut radar = Ti::<64>::new(TiConfig::LEARN);
         assert!(feed(&mut radar, &stream(family, 1..4), 1000).is_empty());
         // a frame cut short begins the count anew
-        let mut radar = Ti::<64>::new(Config::LEARN);
+        let mut radar = Ti::<64>::new(TiConfig::LEARN);
         let mut bytes = stream(family, 1..3);
         bytes.extend(&usual(family, 3).bytes()[..60]);
         bytes.extend(stream(family, 4..9));
@@ -78,8 +78,8 @@ fn nothing_is_given_out_before_it_is_learnt() {
 
 #[test]
 fn frames_without_items_are_empty_scans_and_teach_nothing() {
-    for family in Family::ALL {
-        let mut radar = Ti::<64>::new(Config::LEARN);
+    for family in TiFamily::ALL {
+        let mut radar = Ti::<64>::new(TiConfig::LEARN);
         let empty = |n| Frame::new(family, n).bytes();
         let bytes: Vec<u8> = (1..10).flat_map(empty).collect();
         assert!(
@@ -100,8 +100,8 @@ fn frames_without_items_are_empty_scans_and_teach_nothing() {
 
 #[test]
 fn the_wrong_family_gives_no_scans() {
-    for family in Family::ALL {
-        for other in Family::ALL.into_iter().filter(|f| *f != family) {
+    for family in TiFamily::ALL {
+        for other in TiFamily::ALL.into_iter().filter(|f| *f != family) {
             let mut radar = radar(other);
             assert_eq!(scans(&feed(&mut radar, &stream(family, 1..9), 1000)), [0; 0], "{family:?} as {other:?}");
             assert!(radar.counters().broken > 0);
@@ -111,21 +111,21 @@ fn the_wrong_family_gives_no_scans() {
 
 #[test]
 fn another_firmware_is_learnt_anew() {
-    let mut radar = Ti::<64>::new(Config::LEARN);
-    feed(&mut radar, &stream(Family::Bytes40, 1..6), 1000);
-    let got = feed(&mut radar, &stream(Family::Bytes52, 1..20), 1000);
-    assert!(got.contains(&Got::Learnt(Family::Bytes52)));
+    let mut radar = Ti::<64>::new(TiConfig::LEARN);
+    feed(&mut radar, &stream(TiFamily::Bytes40, 1..6), 1000);
+    let got = feed(&mut radar, &stream(TiFamily::Bytes52, 1..20), 1000);
+    assert!(got.contains(&Got::Learnt(TiFamily::Bytes52)));
     assert_eq!((radar.counters().relearnt, scans(&got).last()), (1, Some(&19)));
 }
 
 #[test]
 fn a_frame_cut_short_costs_only_itself() {
-    let mut radar = radar(Family::Bytes40);
+    let mut radar = radar(TiFamily::Bytes40);
     let mut bytes = vec![0xAA; 5];
-    let whole = usual(Family::Bytes40, 1).bytes();
+    let whole = usual(TiFamily::Bytes40, 1).bytes();
     for cut in [9, 30, 41, 50, 60, 90] {
         bytes.extend(&whole[..cut]);
-        bytes.extend(usual(Family::Bytes40, 2).bytes());
+        bytes.extend(usual(TiFamily::Bytes40, 2).bytes());
     }
     let got = feed(&mut radar, &bytes, 1000);
     assert_eq!(scans(&got), [2; 6]);
@@ -136,11 +136,11 @@ fn a_frame_cut_short_costs_only_itself() {
 
 #[test]
 fn a_magic_word_within_a_frame_begins_a_frame() {
-    let mut radar = radar(Family::Bytes40);
+    let mut radar = radar(TiFamily::Bytes40);
     let mut payload = vec![0; 40];
     payload[16..24].copy_from_slice(&MAGIC);
     let bytes =
-        [Frame::new(Family::Bytes40, 1).item(9, 0, payload).bytes(), usual(Family::Bytes40, 2).bytes()].concat();
+        [Frame::new(TiFamily::Bytes40, 1).item(9, 0, payload).bytes(), usual(TiFamily::Bytes40, 2).bytes()].concat();
     let got = feed(&mut radar, &bytes, 1000);
     assert_eq!(got[0], Got::Broken(Flaw::Cut));
     assert_eq!(scans(&got), [2]);
@@ -148,17 +148,20 @@ fn a_magic_word_within_a_frame_begins_a_frame() {
 
 #[test]
 fn lengths_that_do_not_fit_are_broken_frames() {
-    let mut radar = radar(Family::Bytes40);
+    let mut radar = radar(TiFamily::Bytes40);
     let mut flaw = |frame: &Frame, at: usize, value: u32| {
         let mut bytes = frame.bytes();
         bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
-        bytes.extend(usual(Family::Bytes40, 9).bytes());
+        bytes.extend(usual(TiFamily::Bytes40, 9).bytes());
         let got = feed(&mut radar, &bytes, 1000);
-        assert_eq!(got.last(), feed(&mut super::radar(Family::Bytes40), &usual(Family::Bytes40, 9).bytes(), 99).last());
+        assert_eq!(
+            got.last(),
+            feed(&mut super::radar(TiFamily::Bytes40), &usual(TiFamily::Bytes40, 9).bytes(), 99).last()
+        );
         let Got::Broken(flaw) = got[0] else { panic!("{got:?}") };
         flaw
     };
-    let frame = usual(Family::Bytes40, 1);
+    let frame = usual(TiFamily::Bytes40, 1);
     assert_eq!(flaw(&frame, 12, 39), Flaw::Header, "shorter than its header");
     assert_eq!(flaw(&frame, 12, 1 << 20), Flaw::Header, "absurdly long");
     assert_eq!(flaw(&frame, 32, 65), Flaw::Header, "absurdly many items");
@@ -171,24 +174,24 @@ fn lengths_that_do_not_fit_are_broken_frames() {
 
 #[test]
 fn lost_frames_are_counted_by_their_numbers() {
-    let mut radar = radar(Family::Bytes40);
+    let mut radar = radar(TiFamily::Bytes40);
     for number in [5, 6, 9, 10, 1, 2] {
-        feed(&mut radar, &usual(Family::Bytes40, number).bytes(), 1000);
+        feed(&mut radar, &usual(TiFamily::Bytes40, number).bytes(), 1000);
     }
     assert_eq!((radar.counters().lost, radar.counters().restarts), (2, 1));
-    let mut radar = super::radar(Family::Bytes40);
+    let mut radar = super::radar(TiFamily::Bytes40);
     for (number, sub_frame) in [(1, 0), (1, 1), (2, 0), (2, 1)] {
-        feed(&mut radar, &Frame { sub_frame, ..usual(Family::Bytes40, number) }.bytes(), 1000);
+        feed(&mut radar, &Frame { sub_frame, ..usual(TiFamily::Bytes40, number) }.bytes(), 1000);
     }
     assert_eq!((radar.counters().lost, radar.counters().restarts, radar.counters().scans), (0, 0, 4));
 }
 
 #[test]
 fn a_frame_needs_no_padding() {
-    let mut bytes = usual(Family::Bytes40, 1).bytes();
+    let mut bytes = usual(TiFamily::Bytes40, 1).bytes();
     // header, two points, two ratios, statistics
     let length = 40 + (8 + 32) + (8 + 8) + (8 + 24);
     bytes.truncate(length);
     bytes[12..16].copy_from_slice(&(length as u32).to_le_bytes());
-    assert_eq!(scans(&feed(&mut radar(Family::Bytes40), &bytes, 1000)), [1]);
+    assert_eq!(scans(&feed(&mut radar(TiFamily::Bytes40), &bytes, 1000)), [1]);
 }

@@ -8,12 +8,12 @@ mod session;
 
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::inputs::ti::{Config, Dialect, Family, Flaw, Outcome, Ti};
+use viewshed::inputs::ti::{Flaw, Ti, TiConfig, TiDialect, TiFamily, TiOutcome};
 
 /// What came out, in short.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Got {
-    Learnt(Family),
+    Learnt(TiFamily),
     /// Number, detections, missing.
     Scan(u32, Vec<Detection>, u16),
     Broken(Flaw),
@@ -28,16 +28,16 @@ pub fn feed<const N: usize>(radar: &mut Ti<N>, bytes: &[u8], chunk: usize) -> Ve
             assert!(taken > 0);
             rest = &rest[taken..];
             got.extend(match outcome {
-                Outcome::Taken => None,
-                Outcome::Learnt(family) => Some(Got::Learnt(family)),
-                Outcome::Scan(s) => Some(Got::Scan(s.number, s.detections.to_vec(), s.missing)),
-                Outcome::Broken(flaw) => Some(Got::Broken(flaw)),
+                TiOutcome::Taken => None,
+                TiOutcome::Learnt(family) => Some(Got::Learnt(family)),
+                TiOutcome::Scan(s) => Some(Got::Scan(s.number, s.detections.to_vec(), s.missing)),
+                TiOutcome::Broken(flaw) => Some(Got::Broken(flaw)),
             });
         }
     }
     got
 }
 
-pub fn radar(family: Family) -> Ti<64> {
-    Ti::new(Config { family: Some(family), dialect: Dialect::USUAL })
+pub fn radar(family: TiFamily) -> Ti<64> {
+    Ti::new(TiConfig { family: Some(family), dialect: TiDialect::USUAL })
 }

@@ -1,13 +1,13 @@
 //! Whatever comes, and however it is cut.
 
 use proptest::prelude::*;
-use viewshed::inputs::ti::{Config, Family, Ti};
+use viewshed::inputs::ti::{Ti, TiConfig, TiFamily};
 
 use super::frames::{Frame, MAGIC};
 use super::{Got, feed, radar};
 
-fn family() -> impl Strategy<Value = Family> {
-    prop::sample::select(&Family::ALL[..])
+fn family() -> impl Strategy<Value = TiFamily> {
+    prop::sample::select(&TiFamily::ALL[..])
 }
 
 /// Points ahead, some to each side.
@@ -25,9 +25,9 @@ proptest! {
     ) {
         let mut bytes = rubbish;
         for (i, points) in frames.iter().enumerate() {
-            bytes.extend(Frame::new(Family::Bytes40, i as u32).cartesian(points).bytes());
+            bytes.extend(Frame::new(TiFamily::Bytes40, i as u32).cartesian(points).bytes());
         }
-        let mut radar = radar(Family::Bytes40);
+        let mut radar = radar(TiFamily::Bytes40);
         let got = feed(&mut radar, &bytes, chunk);
         prop_assert_eq!(got.len(), frames.len());
         for (points, got) in frames.iter().zip(got) {
@@ -52,22 +52,22 @@ proptest! {
         family in prop::option::of(family()),
     ) {
         let bytes = bytes.concat();
-        let mut radar = Ti::<8>::new(Config { family, ..Config::LEARN });
+        let mut radar = Ti::<8>::new(TiConfig { family, ..TiConfig::LEARN });
         let got = feed(&mut radar, &bytes, 64);
-        let whole = feed(&mut Ti::<8>::new(Config { family, ..Config::LEARN }), &bytes, 1);
+        let whole = feed(&mut Ti::<8>::new(TiConfig { family, ..TiConfig::LEARN }), &bytes, 1);
         prop_assert_eq!(got, whole, "chunks make no difference");
         prop_assert!(radar.counters().frames as usize * 8 + radar.counters().stray_bytes as usize <= bytes.len() + 7);
     }
 
-    /// Bytes flipped, lost and inserted: a frame without a fault right behind one comes through.
+    /// Bytes flipped, lost and inserted: a frame without a fault right after one comes through.
     #[test]
     fn a_damaged_stream_recovers(
         damage in prop::collection::vec((0_usize..3000, 0_u8..3, any::<u8>()), 0..20),
         family in family(),
     ) {
         let frame = |n: u32| match family {
-            Family::Bytes52 => Frame::new(family, n).item(6, 1, super::frames::floats(&[[9.0, 0.0, 0.0, 9.0]])),
-            Family::Bytes48 => {
+            TiFamily::Bytes52 => Frame::new(family, n).item(6, 1, super::frames::floats(&[[9.0, 0.0, 0.0, 9.0]])),
+            TiFamily::Bytes48 => {
                 let point = [super::frames::floats(&[[0.0, 0.0, 0.0, 0.01, 1.0]]), vec![0, 0, 0, 0, 3, 3, 9, 9]].concat();
                 Frame::new(family, n).item(6, 1, point)
             }

@@ -2,11 +2,11 @@
 
 use crc::Crc;
 use proptest::prelude::*;
-use viewshed::unit::can_service::{Refusal, Told, Tool};
+use viewshed::unit::can_service::{Refusal, Said, Tool};
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, Slots};
+use viewshed::unit::settings::{BLOCK_LEN, SettingsSlots};
 use viewshed::wire::broadcast::Medium;
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 
 use super::{ADDRESSES, SENSOR, World, settings};
 
@@ -102,9 +102,9 @@ enum Came {
 
 impl World {
     fn refusals(&self) -> Vec<Refusal> {
-        self.told
+        self.said
             .iter()
-            .filter_map(|told| if let Told::Refused(refusal) = told { Some(*refusal) } else { None })
+            .filter_map(|said| if let Said::Refused(refusal) = said { Some(*refusal) } else { None })
             .collect()
     }
 
@@ -112,7 +112,7 @@ impl World {
     fn came_up(&mut self) -> Came {
         self.run(700);
         let started =
-            self.told.iter().find_map(|told| if let Told::Started(place) = told { Some(*place) } else { None });
+            self.said.iter().find_map(|said| if let Said::Started(place) = said { Some(*place) } else { None });
         let started = started.expect("says on the bus that it starts");
         self.ports.broadcast.incoming.extend(tool().read());
         self.ask(Request::Read);
@@ -126,18 +126,18 @@ impl World {
             Some((slot, sequence)) => {
                 let stored = self.ports.slots.slot(slot.into()).to_vec();
                 assert_eq!(read, stored);
-                assert!(self.told.contains(&Told::Block(stored.try_into().unwrap())), "{:?}", self.told);
+                assert!(self.said.contains(&Said::Block(stored.try_into().unwrap())), "{:?}", self.said);
                 assert!(
-                    state != State::Fault && status.iter().all(|s| s.reason != Reason::Configuration),
+                    state != UnitState::Fault && status.iter().all(|s| s.reason != Reason::Configuration),
                     "{status:?}"
                 );
                 assert!(self.bus.sensor(SENSOR).unwrap().header().is_some(), "it has a map to send");
                 Came::Up(sequence)
             }
             None => {
-                assert!(read.is_empty() && state == State::Fault, "{state:?}");
+                assert!(read.is_empty() && state == UnitState::Fault, "{state:?}");
                 assert!(
-                    status.iter().all(|s| (s.state, s.reason) == (State::Fault, Reason::Configuration)),
+                    status.iter().all(|s| (s.state, s.reason) == (UnitState::Fault, Reason::Configuration)),
                     "{status:?}"
                 );
                 Came::Safe(self.refusals().last().expect("says why").parameter().to_owned())
@@ -162,7 +162,7 @@ proptest! {
         }
         world.run(200);
         let written = if over_can {
-            let (written, refusals) = (world.told.contains(&Told::Written(2)), world.refusals());
+            let (written, refusals) = (world.said.contains(&Said::Written(2)), world.refusals());
             prop_assert!(written != refusals.last().is_some_and(|r| r.parameter().contains('.')), "{refusals:?}");
             written
         } else {

@@ -5,21 +5,23 @@ mod blocks;
 use std::collections::VecDeque;
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ars408::{Ars408, Config};
+use viewshed::inputs::ars408::{Ars408, Ars408Config};
 use viewshed::map::polar::PolarMap;
 use viewshed::unit::Flow;
 use viewshed::unit::can_bus::CanPort;
-use viewshed::unit::can_service::{Answers, Told, Tool};
-use viewshed::unit::roadside::{Memory, Ports, Roadside, SerialPort, Start, Step, VERSION};
+use viewshed::unit::can_service::{Answers, Said, Tool};
+use viewshed::unit::roadside::{
+    Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, RoadsideStep, SerialPort, VERSION,
+};
 use viewshed::unit::serial_service;
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, Check, Settings, Slots, Stored};
+use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
-use viewshed::wire::status::{Reason, ResetCause, State, Status};
+use viewshed::wire::status::{Reason, ResetCause, Status, UnitState};
 
 use crate::common::{SmallSender, SmallState, gantry};
 
@@ -95,7 +97,7 @@ impl SerialPort for Line {
     }
 }
 
-impl serial_service::Line for Line {
+impl serial_service::SerialLine for Line {
     fn send(&mut self, bytes: &[u8]) -> bool {
         self.sent.extend_from_slice(bytes);
         true
@@ -104,7 +106,7 @@ impl serial_service::Line for Line {
 
 struct InRam([[u8; BLOCK_LEN]; 2]);
 
-impl Slots for InRam {
+impl SettingsSlots for InRam {
     fn slot(&self, slot: usize) -> &[u8] {
         &self.0[slot]
     }
@@ -118,7 +120,7 @@ type Unit = Roadside<'static, SmallState, SmallSender, Ars408<64>>;
 
 /// A board, the radar and the receivers at the far ends of its lines.
 struct World {
-    ports: Ports<Bus, Bus, Line, InRam>,
+    ports: RoadsidePorts<Bus, Bus, Line, InRam>,
     unit: Unit,
     /// Milliseconds since the start.
     ms: u64,
@@ -127,10 +129,10 @@ struct World {
     line: Far,
     unstuffer: Unstuffer,
     answers: Answers,
-    told: Vec<Told>,
+    said: Vec<Said>,
     /// When a status came: bus, serial line.
     statuses: [Vec<u64>; 2],
-    last: Option<Step>,
+    last: Option<RoadsideStep>,
     frames_done: usize,
     serial_bytes: usize,
     replies: Vec<Vec<u8>>,
@@ -150,18 +152,23 @@ fn settings() -> Settings {
 impl World {
     fn new(blocks: [[u8; BLOCK_LEN]; 2]) -> Self {
         // a program's statics
-        let memory = Memory {
+        let memory = RoadsideMemory {
             parameters: Box::leak(Box::new(None)),
             state: Box::leak(Box::new(SmallState::new())),
             map: Box::leak(Box::new(PolarMap::NOWHERE)),
             broadcast: Box::leak(Box::new(None::<SmallSender>)),
             serial: Box::leak(Box::new(None)),
         };
-        let mut ports =
-            Ports { radar: Bus::default(), broadcast: Bus::default(), serial: Line::default(), slots: InRam(blocks) };
-        let stored = Stored::read(&ports.slots, Check::of::<SmallState, SmallSender>().on_can(CAN_CLOCK_HZ));
-        let start = Start { sensor: SENSOR, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
-        let unit = Unit::start(start, memory, Ars408::new(Config::sensor(SENSOR)), at(0), &mut ports);
+        let mut ports = RoadsidePorts {
+            radar: Bus::default(),
+            broadcast: Bus::default(),
+            serial: Line::default(),
+            slots: InRam(blocks),
+        };
+        let stored =
+            StoredSettings::read(&ports.slots, SettingsCheck::of::<SmallState, SmallSender>().on_can(CAN_CLOCK_HZ));
+        let start = RoadsideStart { sensor: SENSOR, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
+        let unit = Unit::start(start, memory, Ars408::new(Ars408Config::sensor(SENSOR)), at(0), &mut ports);
         assert!(ports.radar.silent && ports.broadcast.silent, "until the bit rate is proven");
         let far = || Far::new([SENSOR], ADDRESSES, Limits::DEFAULT);
         Self {
@@ -173,7 +180,7 @@ impl World {
             line: far(),
             unstuffer: Unstuffer::new(),
             answers: Answers::new(SENSOR, Medium::Can(ADDRESSES)),
-            told: Vec::new(),
+            said: Vec::new(),
             statuses: [Vec::new(), Vec::new()],
             last: None,
             frames_done: 0,
@@ -189,7 +196,7 @@ impl World {
     }
 
     /// A millisecond.
-    fn step(&mut self) -> Step {
+    fn step(&mut self) -> RoadsideStep {
         let before = self.ms;
         self.ms += 1 + std::mem::take(&mut self.busy_ms);
         for ms in (before + 1..=self.ms).filter(|ms| ms.is_multiple_of(SCAN_MS)) {
@@ -220,7 +227,7 @@ impl World {
         if !self.ports.broadcast.stuck
             && let Some(frame) = self.ports.broadcast.mailboxes.pop_front()
         {
-            self.told.extend(self.answers.take(&frame));
+            self.said.extend(self.answers.take(&frame));
             let message = Received::from_frame(&frame, &ADDRESSES).unwrap().message;
             self.statuses[0].extend((message == Message::Status).then_some(self.ms));
             let _ = self.bus.frame(now, &frame);
@@ -249,7 +256,7 @@ impl World {
         self.statuses.each_ref().map(|all| all.iter().copied().filter(|ms| *ms > from).collect())
     }
 
-    /// What the receivers were told of the sender: bus, serial line.
+    /// What the receivers got of the sender's status: bus, serial line.
     fn status(&self) -> [Status; 2] {
         [&self.bus, &self.line].map(|far| *far.sensor(SENSOR).unwrap().status().unwrap())
     }
@@ -276,12 +283,12 @@ fn scans_in_are_the_same_map_out_on_both_lines() {
     let [bus, line] = world.visible();
     assert!(bus > 1000 && bus == line, "{bus} {line}");
     for status in world.status() {
-        assert_eq!((status.state, status.reason), (State::Ok, Reason::None));
+        assert_eq!((status.state, status.reason), (UnitState::Ok, Reason::None));
         assert_eq!((status.reset_cause, status.firmware), (ResetCause::Watchdog, VERSION));
         assert_eq!((status.radar_lost, status.bus_off, status.dropped), (0, 0, 0));
         assert!((2..=3).contains(&status.uptime_s));
     }
-    assert_eq!(world.last.unwrap().state, State::Ok);
+    assert_eq!(world.last.unwrap().state, UnitState::Ok);
     println!("serial line: {} bytes a second", world.serial_bytes / 3);
     assert!(world.serial_bytes / 3 < 9000, "within 115 200 baud: {}", world.serial_bytes / 3);
 }
@@ -310,7 +317,7 @@ fn a_radar_that_stops_ends_the_map_and_the_status_goes_on() {
     world.run(1000);
     assert_eq!(world.visible(), [0, 0]);
     for status in world.status() {
-        assert_eq!((status.state, status.reason), (State::Blind, Reason::RadarSilent));
+        assert_eq!((status.state, status.reason), (UnitState::Blind, Reason::RadarSilent));
     }
     world.run(2000);
     for times in world.statuses_since(3000) {
@@ -347,7 +354,7 @@ fn a_bus_off_is_told_on_the_other_line_and_ends() {
     assert!(world.ports.broadcast.silent, "back after 100 ms, listening first");
     world.ports.broadcast.incoming.extend([CanFrame::classic(CanId::Standard(0x100), &[]).unwrap(); 8]);
     world.run(2000);
-    assert_eq!(world.status().map(|s| (s.state, s.bus_off)), [(State::Ok, 1); 2]);
+    assert_eq!(world.status().map(|s| (s.state, s.bus_off)), [(UnitState::Ok, 1); 2]);
     assert!(world.visible()[0] > 1000);
     // twice more: now it stays away for 400 ms
     for _ in 0..2 {
@@ -356,7 +363,7 @@ fn a_bus_off_is_told_on_the_other_line_and_ends() {
     }
     world.run(150);
     let status = world.status()[1];
-    assert_eq!((status.state, status.reason, status.bus_off), (State::Degraded, Reason::BusOff, 3));
+    assert_eq!((status.state, status.reason, status.bus_off), (UnitState::Degraded, Reason::BusOff, 3));
 }
 
 #[test]
@@ -367,7 +374,7 @@ fn what_nobody_acknowledges_is_taken_back_and_never_sent_late() {
     world.run(400);
     assert!(world.ports.broadcast.aborted >= 3, "{}", world.ports.broadcast.aborted);
     let status = world.status()[1];
-    assert_eq!((status.state, status.reason), (State::Degraded, Reason::BusOverload), "told on the other line");
+    assert_eq!((status.state, status.reason), (UnitState::Degraded, Reason::BusOverload), "reported on the other line");
     assert!(world.visible()[1] > 1000, "which is not held up");
     world.ports.broadcast.stuck = false;
     world.run(1000);
@@ -382,16 +389,16 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
     for over_can in [false, true] {
         let mut world = World::new([broken, [0xFF; BLOCK_LEN]]);
         world.run(2000);
-        assert_eq!(world.last.unwrap().state, State::Fault);
+        assert_eq!(world.last.unwrap().state, UnitState::Fault);
         for times in world.statuses_since(0) {
             assert!(times.len() >= 4 && times.windows(2).all(|w| w[1] - w[0] <= 500), "{times:?}");
         }
-        assert_eq!(world.status().map(|s| (s.state, s.reason)), [(State::Fault, Reason::Configuration); 2]);
+        assert_eq!(world.status().map(|s| (s.state, s.reason)), [(UnitState::Fault, Reason::Configuration); 2]);
         assert_eq!(world.visible(), [0, 0]);
         assert_eq!(world.frames_done, 40, "the safe state is no reason for a reset");
         // said once the bus was proven, not into the void before
-        assert!(world.told.contains(&Told::Started(None)), "{:?}", world.told);
-        assert!(world.told.iter().any(|told| matches!(told, Told::Refused(r) if r.reason == 4)), "{:?}", world.told);
+        assert!(world.said.contains(&Said::Started(None)), "{:?}", world.said);
+        assert!(world.said.iter().any(|said| matches!(said, Said::Refused(r) if r.reason == 4)), "{:?}", world.said);
 
         let block = settings().to_block(0);
         let mut tool = Tool::new(SENSOR, Medium::Can(ADDRESSES));
@@ -401,7 +408,7 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
             world.ask(Request::Write(&block));
         }
         world.run(200);
-        assert_eq!(over_can, world.told.contains(&Told::Written(1)), "{:?}", world.told);
+        assert_eq!(over_can, world.said.contains(&Said::Written(1)), "{:?}", world.said);
         let newest = Settings::newest([world.ports.slots.slot(0), world.ports.slots.slot(1)], |_| Ok(()));
         assert_eq!(newest.map(|n| n.settings), Ok(settings()));
         if over_can {
@@ -419,16 +426,16 @@ fn without_settings_both_lines_say_so_and_take_a_block() {
 
 #[test]
 fn work_that_takes_longer_than_the_time_between_scans_is_told() {
-    for (work_ms, told) in [(60, false), (70, true)] {
+    for (work_ms, reported) in [(60, false), (70, true)] {
         let mut world = World::with_settings();
         world.run(1000);
         world.work_ms = work_ms;
         world.run(300);
-        let overrun = world.status().iter().all(|s| (s.state, s.reason) == (State::Degraded, Reason::Overrun));
-        assert_eq!(overrun, told, "{work_ms} ms: {:?}", world.status());
+        let overrun = world.status().iter().all(|s| (s.state, s.reason) == (UnitState::Degraded, Reason::Overrun));
+        assert_eq!(overrun, reported, "{work_ms} ms: {:?}", world.status());
         world.work_ms = 0;
         world.run(2500);
-        assert_eq!(world.last.unwrap().state, State::Ok);
+        assert_eq!(world.last.unwrap().state, UnitState::Ok);
     }
 }
 
@@ -440,8 +447,12 @@ fn a_bus_too_narrow_is_told_on_both_lines_and_ends() {
     world.run(400);
     world.ports.broadcast.stuck = false;
     world.run(500);
-    let overloaded = (State::Degraded, Reason::BusOverload);
+    let overloaded = (UnitState::Degraded, Reason::BusOverload);
     assert!(world.status().iter().all(|s| (s.state, s.reason) == overloaded), "{:?}", world.status());
     world.run(2000);
-    assert!(world.status().iter().all(|s| (s.state, s.reason) == (State::Ok, Reason::None)), "{:?}", world.status());
+    assert!(
+        world.status().iter().all(|s| (s.state, s.reason) == (UnitState::Ok, Reason::None)),
+        "{:?}",
+        world.status()
+    );
 }

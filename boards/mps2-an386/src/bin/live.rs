@@ -4,7 +4,7 @@
 
 use cortex_m_rt::entry;
 use mps2_an386::SHAPE;
-use mps2_an386::profile::{CHECK, DETECTIONS, Map, Parameters, Sender, State};
+use mps2_an386::profile::{CHECK, Map, Parameters, Sender, State};
 use mps2_an386::stack;
 use mps2_an386::timer::{TICKS_PER_256, Timer};
 use mps2_an386::uart::{PATIENCE, Uart};
@@ -12,9 +12,9 @@ use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::bench::flash::Flash;
 use viewshed::bench::record::{Closing, Opening, Record, Tracer};
 use viewshed::bench::start;
-use viewshed::unit::serial_service::Line;
-use viewshed::unit::session::Session;
-use viewshed::unit::settings::Stored;
+use viewshed::unit::serial_service::SerialLine;
+use viewshed::unit::session::SerialSession;
+use viewshed::unit::settings::StoredSettings;
 use viewshed::unit::transmitter::Transmitter;
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
@@ -39,7 +39,7 @@ impl Lines {
     }
 }
 
-impl Line for Lines {
+impl SerialLine for Lines {
     fn send(&mut self, bytes: &[u8]) -> bool {
         let (transmitter, uart) = &mut self.maps;
         transmitter.send(uart, bytes)
@@ -48,8 +48,8 @@ impl Line for Lines {
 
 /// Apart, so that what this takes of the stack is free again.
 #[inline(never)]
-fn session(epoch: Epoch, flash: &Flash, lines: &mut Lines) -> Session<DETECTIONS> {
-    Session::start(SENSOR, epoch, Stored::read(flash, CHECK), lines)
+fn session(epoch: Epoch, flash: &Flash, lines: &mut Lines) -> SerialSession<{ State::DETECTIONS }> {
+    SerialSession::start(SENSOR, epoch, StoredSettings::read(flash, CHECK), lines)
 }
 
 #[entry]

@@ -9,10 +9,10 @@ use viewshed::bench::can::CanBench;
 use viewshed::bench::files::{FlashFile, answer};
 use viewshed::bench::record::{Closing, Record};
 use viewshed::bench::start;
-use viewshed::inputs::ars408::Config;
+use viewshed::inputs::ars408::Ars408Config;
 use viewshed::unit::can_bus::BusKeeper;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
-use viewshed::unit::settings::Stored;
+use viewshed::unit::settings::StoredSettings;
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Addresses;
@@ -38,19 +38,19 @@ extern "C" fn main() -> ! {
     let mut flash = FlashFile::<HostFile>::open();
     // answers without a gap: time comes in steps here
     let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
-    let mut session = CanBench::new(Radar::new(Config::sensor(SENSOR)));
-    let (mut starts, mut told) = (0, false);
+    let mut session = CanBench::new(Radar::new(Ars408Config::sensor(SENSOR)));
+    let (mut starts, mut has_time) = (0, false);
 
     loop {
         let epoch = flash.start();
         starts += 1;
-        let stored = Stored::read(&flash, CHECK.on_can(CAN_CLOCK_HZ));
+        let stored = StoredSettings::read(&flash, CHECK.on_can(CAN_CLOCK_HZ));
         let [bus, _] = stored.buses();
         let Some(timing) = bus.timing(CAN_CLOCK_HZ) else { exit(1) };
         let mut can = Can::new(timing);
         let mut keeper = BusKeeper::start(&bus, &mut can);
-        while !told {
-            told = session.clock(&mut keeper, &mut can);
+        while !has_time {
+            has_time = session.clock(&mut keeper, &mut can);
         }
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;

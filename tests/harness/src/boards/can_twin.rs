@@ -8,11 +8,11 @@ use viewshed::bench::flash::Flash;
 use viewshed::bench::start;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::inputs::ars408::Config;
+use viewshed::inputs::ars408::Ars408Config;
 use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::profile::reference::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
-use viewshed::unit::settings::{Settings, Stored};
+use viewshed::unit::settings::{Settings, StoredSettings};
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::frame::{CanFrame, CanId};
 
@@ -92,7 +92,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
     let mut sender: Box<Option<Sender>> = Box::new(None);
-    let mut session = CanBench::new(Radar::new(Config::sensor(SENSOR)));
+    let mut session = CanBench::new(Radar::new(Ars408Config::sensor(SENSOR)));
     let frames = steps.iter().enumerate().flat_map(|(k, step)| step.all().map(move |frame| (k, frame))).peekable();
     let mut port = Scripted { frames, step: 0, quiet: false, sent: Vec::new(), starts: 0 };
     let empty = |step: &Step| Sent { time: step.time, frames: Vec::new(), maps: Vec::new(), starts_over: false };
@@ -100,7 +100,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut ticked = false;
     'start: loop {
         let epoch = flash.start();
-        let stored = Stored::read(flash, CHECK);
+        let stored = StoredSettings::read(flash, CHECK);
         let [bus, _] = stored.buses();
         let mut keeper = BusKeeper::start(&bus, &mut port);
         while !ticked && port.frames.peek().is_some() {

@@ -7,7 +7,8 @@ use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarGeometry;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::unit::Unit;
-use viewshed::unit::settings::{Check, Settings};
+use viewshed::unit::profile::{reference, small};
+use viewshed::unit::settings::{Settings, SettingsCheck};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 
@@ -30,23 +31,24 @@ pub fn answer(
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     let mut memory = InMemory { job: job(settings, scans, dump), read: 0, answer: Vec::new() };
     let geometry = match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(&mut memory)?,
-        Profile::Small => work::<100, 64, 8, 4, 28, 176>(&mut memory)?,
+        Profile::Reference => work(Box::new(reference::State::new()), &mut memory)?,
+        Profile::Small => work(Box::new(small::State::new()), &mut memory)?,
     };
     Ok((memory.answer, geometry))
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+    mut state: Box<Radar3d<R, A, E, W, N, D>>,
     bench: &mut InMemory,
 ) -> Result<PolarGeometry> {
     let job = Job::read(bench).map_err(|e| anyhow::anyhow!("{e:?}"))?;
-    Check::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>().settings(&job.settings)?;
+    SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>().settings(&job.settings)?;
     let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     let (settings, epoch, now) = (Some(&job.settings), Epoch::new(0), Time::from_micros(0));
     start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
     let (parameters, sender) = parameters.as_ref().zip((*sender).as_mut()).context("a unit that was checked")?;
-    let (mut state, mut map) = (Box::new(Radar3d::<R, A, E, W, N, D>::new()), Box::new(parameters.map()));
+    let mut map = Box::new(parameters.map());
     let geometry = *map.geometry();
     let mut unit = Unit::new(parameters, &mut *state, &mut *map, sender);
     let mut scan = Box::new(ScanBuffer::<MOST_DETECTIONS>::new());

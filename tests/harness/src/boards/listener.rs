@@ -6,7 +6,7 @@ use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
 use viewshed::unit::Unit;
-use viewshed::unit::profile::reference::{AZIMUTHS, WORDS};
+use viewshed::unit::profile::reference::State;
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
@@ -19,6 +19,8 @@ use viewshed::wire::scan_number::ScanNumber;
 pub const SENSOR: u8 = 0;
 pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
+const AZIMUTHS: usize = State::AZIMUTHS;
+const WORDS: usize = State::WORDS;
 const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
 

@@ -7,13 +7,14 @@ use std::{iter, mem};
 use viewshed::bench::flash::Flash;
 use viewshed::bench::start;
 use viewshed::fixed::time::Time;
-use viewshed::inputs::native::{Medium as Native, Sender};
+use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::unit::serial_service::Line;
+use viewshed::unit::profile::{reference, small};
+use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
-use viewshed::unit::session::Session;
-use viewshed::unit::settings::{Check, Settings, Stored};
+use viewshed::unit::session::SerialSession;
+use viewshed::unit::settings::{Settings, SettingsCheck, StoredSettings};
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
@@ -72,25 +73,25 @@ type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
 
 fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
     match profile {
-        Profile::Reference => work::<200, 120, 16, 7, 96, 256>(bytes, send, after),
-        Profile::Small => work::<100, 64, 8, 4, 28, 176>(bytes, send, after),
+        Profile::Reference => work(Box::new(reference::State::new()), bytes, send, after),
+        Profile::Small => work(Box::new(small::State::new()), bytes, send, after),
     }
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
+    mut state: Box<Radar3d<R, A, E, W, N, D>>,
     bytes: &mut dyn Iterator<Item = u8>,
     send: &mut dyn FnMut(&[u8]),
     after: After<'_>,
 ) {
     let mut flash = Flash::ERASED;
     let mut line = Answer(send);
-    let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
     let mut map = Box::new(PolarMap::<R, A>::NOWHERE);
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     'start: loop {
         let epoch = flash.start();
-        let stored = Stored::read(&flash, Check::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>());
-        let mut session = Session::<D>::start(SENSOR, epoch, stored, &mut line);
+        let stored = StoredSettings::read(&flash, SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>());
+        let mut session = SerialSession::<D>::start(SENSOR, epoch, stored, &mut line);
         let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
         let (settings, now) = (session.settings(), session.now());
         start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
@@ -115,7 +116,7 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
 
 struct Answer<'a>(&'a mut dyn FnMut(&[u8]));
 
-impl Line for Answer<'_> {
+impl SerialLine for Answer<'_> {
     fn send(&mut self, bytes: &[u8]) -> bool {
         (self.0)(bytes);
         true
@@ -124,7 +125,7 @@ impl Line for Answer<'_> {
 
 /// Bytes for the board's line, message by message.
 pub struct Script {
-    radar: Sender,
+    radar: NativeSender,
     counter: u8,
     pub bytes: Vec<u8>,
     /// Where scans end, and their times.
@@ -133,7 +134,7 @@ pub struct Script {
 
 impl Default for Script {
     fn default() -> Self {
-        Self { radar: Sender::new(SENSOR), counter: 0, bytes: Vec::new(), marks: Vec::new() }
+        Self { radar: NativeSender::new(SENSOR), counter: 0, bytes: Vec::new(), marks: Vec::new() }
     }
 }
 
@@ -153,7 +154,7 @@ impl Script {
     /// A scan; its time is from the first one of the recording.
     pub fn scan(&mut self, scan: &Scan, first: Time) {
         let time = on_the_line(scan.time, first);
-        let messages: Vec<_> = self.radar.scan(time, false, &scan.detections, Native::Serial).collect();
+        let messages: Vec<_> = self.radar.scan(time, false, &scan.detections, NativeMedium::Serial).collect();
         messages.iter().for_each(|m| self.stuffed(m.bytes()));
         self.marks.push((self.bytes.len(), time));
     }

@@ -140,7 +140,7 @@ impl Traffic {
         let config = BroadcastConfig { visible_range_ms, secured, ..BroadcastConfig::new(sensor, bus.medium) };
         let mut sender = Broadcaster::<A, W>::new(config, maps.header, Epoch::new(1), begin)
             .map_err(|error| anyhow!("{}: {error}", bus.name))?;
-        sender.status_mut().state = viewshed::wire::status::State::Ok;
+        sender.status_mut().state = viewshed::wire::status::UnitState::Ok;
         // a clock in microseconds runs ahead of any number of messages
         let mut sealer = key.map(|key| Sealer::new(*key, begin.micros()));
         let (mut sent, mut scans) = (Vec::new(), 0);

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use serde::Deserialize;
-use viewshed::inputs::ars408::profile::{PROFILES, Profile};
-use viewshed::inputs::ti::{AngleUnit, Dialect, Entries, Family, PolarPoints};
+use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
 use crate::estimators;
 use crate::evaluation::{self, Grid, Settings};
@@ -98,10 +98,10 @@ struct ReadingArgs {
 pub struct KindArgs {
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
     #[arg(long, value_name = "NAME", value_parser = profile)]
-    pub radar: Option<&'static Profile>,
+    pub radar: Option<&'static Ars408Profile>,
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
-    pub ti_header: Option<Family>,
+    pub ti_header: Option<TiFamily>,
     /// What a TI mmWave capture does not say of its firmware, between commas [default: none of it]
     ///
     /// degrees       angles of spherical points (type 1000) are in degrees, not radians
@@ -110,7 +110,7 @@ pub struct KindArgs {
     /// targets       take the tracked targets in place of the points
     /// doppler=M/S   velocity of a Doppler step, without which SDK 1 and 2 have none
     #[arg(long, value_name = "LIST", value_parser = ti_dialect, verbatim_doc_comment)]
-    pub ti_dialect: Option<Dialect>,
+    pub ti_dialect: Option<TiDialect>,
 }
 
 /// The rules by which objects and cells are counted.
@@ -266,20 +266,23 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     values.try_into().map_err(|_| format!("{found} values, {N} are needed"))
 }
 
-fn profile(text: &str) -> Result<&'static Profile, String> {
-    let names = || PROFILES.map(|p| p.name).join(", ");
-    Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
+fn profile(text: &str) -> Result<&'static Ars408Profile, String> {
+    let names = || Ars408Profile::ALL.map(|p| p.name).join(", ");
+    Ars408Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
 }
 
-fn ti_header(text: &str) -> Result<Family, String> {
+fn ti_header(text: &str) -> Result<TiFamily, String> {
     let bytes = text.trim().parse().unwrap_or(0);
-    Family::ALL.into_iter().find(|f| f.header() == bytes).ok_or_else(|| format!("`{text}` is not 36, 40, 44, 48 or 52"))
+    TiFamily::ALL
+        .into_iter()
+        .find(|f| f.header() == bytes)
+        .ok_or_else(|| format!("`{text}` is not 36, 40, 44, 48 or 52"))
 }
 
-fn ti_dialect(text: &str) -> Result<Dialect, String> {
-    text.split(',').map(str::trim).try_fold(Dialect::USUAL, |mut dialect, word| {
+fn ti_dialect(text: &str) -> Result<TiDialect, String> {
+    text.split(',').map(str::trim).try_fold(TiDialect::USUAL, |mut dialect, word| {
         match (word, word.strip_prefix("doppler=").map(finite)) {
-            ("degrees", _) => dialect.angles = AngleUnit::Degrees,
+            ("degrees", _) => dialect.angles = TiAngleUnit::Degrees,
             ("raised", _) => dialect.polar_points = PolarPoints::Raised,
             ("no-elevation", _) => dialect.has_elevation = false,
             ("targets", _) => dialect.entries = Entries::Targets,
@@ -356,15 +359,15 @@ mod tests {
     fn a_dialect_is_a_list() {
         let dialect = |text: &str| parse(&["--ti-dialect", text]).map(|s| s.reading.ti_dialect.unwrap());
         let all = dialect("degrees,raised, no-elevation,targets,doppler=0.12").unwrap();
-        let expected = Dialect {
-            angles: AngleUnit::Degrees,
+        let expected = TiDialect {
+            angles: TiAngleUnit::Degrees,
             polar_points: PolarPoints::Raised,
             has_elevation: false,
             doppler_step_mps: Some(0.12),
             entries: Entries::Targets,
         };
         assert_eq!(all, expected);
-        assert_eq!(dialect("targets").unwrap(), Dialect { entries: Entries::Targets, ..Dialect::USUAL });
+        assert_eq!(dialect("targets").unwrap(), TiDialect { entries: Entries::Targets, ..TiDialect::USUAL });
         assert!(dialect("radians").unwrap_err().to_string().contains("there are degrees"));
         assert!(dialect("doppler=0").is_err() && dialect("doppler=x").is_err() && dialect("").is_err());
     }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
-use viewshed::inputs::ars408::configuration::RadarConfiguration;
+use viewshed::inputs::ars408::configuration::Ars408Configuration;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::motion::{self, standing};
 use viewshed::wire::frame::{CanFrame, CanId};
@@ -310,7 +310,7 @@ fn lengths(found: &mut Findings, report: &Report) {
 
 /// The frame that switches clusters on.
 fn clusters(sensor: &Sensor) -> String {
-    RadarConfiguration::CLUSTERS.frame(sensor.sensor).map_or_else(String::new, |f: CanFrame| format!("{f:?}"))
+    Ars408Configuration::CLUSTERS.frame(sensor.sensor).map_or_else(String::new, |f: CanFrame| format!("{f:?}"))
 }
 
 fn of(sensor: &Sensor) -> String {

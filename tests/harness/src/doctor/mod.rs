@@ -11,7 +11,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use serde::Serialize;
-use viewshed::inputs::ars408::profile::ARS408;
+use viewshed::inputs::ars408::profile::Ars408Profile;
 
 use crate::recording::ars408::lines;
 use crate::recording::candump;
@@ -92,7 +92,7 @@ pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
 fn can(log: String, bytes: &[u8], known: &ReadOptions) -> Examined {
     let mut problems = Problems::default();
     let lines = lines(bytes, &mut problems);
-    let sensors = sensor::all(&lines, known.profile.unwrap_or(&ARS408));
+    let sensors = sensor::all(&lines, known.profile.unwrap_or(&Ars408Profile::ARS408));
     let native = recording::native::of_log(&lines);
     if sensors.is_empty() && !native.is_empty() {
         return Examined::Native(native::examine(log, &native, 0));

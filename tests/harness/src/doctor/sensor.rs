@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use viewshed::inputs::ars408::message::Message;
-use viewshed::inputs::ars408::profile::Profile;
+use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ars408::quality::Wanted;
 use viewshed::inputs::ars408::receiver::{cluster_status, object_status};
 use viewshed::inputs::ars408::state::{RadarState, Version};
-use viewshed::inputs::ars408::{Ars408, Config, Counters};
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters};
 use viewshed::inputs::signal::word;
 
 use crate::recording::ars408::scans;
@@ -46,7 +46,7 @@ pub struct Sensor {
     /// State messages that report each fault.
     pub faults: BTreeMap<&'static str, usize>,
     #[serde(serialize_with = "counters")]
-    pub counters: Counters,
+    pub counters: Ars408Counters,
 }
 
 /// Least, middle and greatest.
@@ -65,7 +65,7 @@ impl Spread {
 }
 
 /// Every sensor that sent something.
-pub fn all(lines: &[Line], profile: &Profile) -> Vec<Sensor> {
+pub fn all(lines: &[Line], profile: &Ars408Profile) -> Vec<Sensor> {
     let mut of_sensor: BTreeMap<(&str, u8), Vec<&Line>> = BTreeMap::new();
     for line in lines {
         let Some(frame) = line.frame().filter(|f| !f.fd) else { continue };
@@ -78,8 +78,9 @@ pub fn all(lines: &[Line], profile: &Profile) -> Vec<Sensor> {
     of_sensor.into_iter().map(|((interface, sensor), lines)| examine(interface, sensor, &lines, profile)).collect()
 }
 
-fn examine(interface: &str, sensor: u8, lines: &[&Line], profile: &Profile) -> Sensor {
-    let mut radar = Ars408::<1024>::new(Config { wanted: Wanted::ALL, profile: *profile, ..Config::sensor(sensor) });
+fn examine(interface: &str, sensor: u8, lines: &[&Line], profile: &Ars408Profile) -> Sensor {
+    let mut radar =
+        Ars408::<1024>::new(Ars408Config { wanted: Wanted::ALL, profile: *profile, ..Ars408Config::sensor(sensor) });
     let (mut times, mut entries, mut odd) = (Vec::new(), 0, 0);
     scans(&mut radar, lines, |scan| {
         times.push(scan.time.micros());
@@ -162,12 +163,12 @@ fn state<S: serde::Serializer>(state: &Option<RadarState>, serializer: S) -> Res
     value.serialize(serializer)
 }
 
-fn counters<S: serde::Serializer>(c: &Counters, serializer: S) -> Result<S::Ok, S::Error> {
+fn counters<S: serde::Serializer>(c: &Ars408Counters, serializer: S) -> Result<S::Ok, S::Error> {
     named(c).into_iter().collect::<BTreeMap<_, _>>().serialize(serializer)
 }
 
 /// The decoder's counters by name.
-pub fn named(c: &Counters) -> [(&'static str, u32); 13] {
+pub fn named(c: &Ars408Counters) -> [(&'static str, u32); 13] {
     [
         ("frames", c.frames),
         ("scans", c.scans),

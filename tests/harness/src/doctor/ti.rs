@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use viewshed::inputs::ti::{Config, Dialect, Entries, Family, Outcome, Ti};
+use viewshed::inputs::ti::{Entries, Ti, TiConfig, TiDialect, TiFamily, TiOutcome};
 
 use super::findings::{Finding, Severity};
 use crate::recording::ReadOptions;
@@ -34,12 +34,12 @@ pub struct Report {
 /// Judges a capture, by the header and the dialect that are known or else by what can be learnt.
 pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
     let family = known.ti_header.or_else(|| learn(bytes));
-    let dialect = known.ti_dialect.unwrap_or(Dialect::USUAL);
+    let dialect = known.ti_dialect.unwrap_or(TiDialect::USUAL);
     let mut report = Report {
         log,
         kind: "ti",
         bytes: bytes.len(),
-        header: family.map(Family::header),
+        header: family.map(TiFamily::header),
         frames: bytes.windows(MAGIC.len()).filter(|w| *w == MAGIC).count(),
         scans: 0,
         empty_scans: 0,
@@ -51,15 +51,15 @@ pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
         findings: Vec::new(),
     };
     if let Some(family) = family {
-        let mut radar = Ti::<1024>::new(Config { family: Some(family), dialect });
+        let mut radar = Ti::<1024>::new(TiConfig { family: Some(family), dialect });
         feed(&mut radar, bytes, |outcome| match outcome {
-            Outcome::Scan(s) => {
+            TiOutcome::Scan(s) => {
                 report.scans += 1;
                 report.empty_scans += usize::from(s.detections.is_empty());
                 report.points += s.detections.len();
                 report.points_with_snr += s.detections.iter().filter(|d| d.snr_half_db.is_some()).count();
             }
-            Outcome::Broken(why) => *report.broken.entry(flaw(why)).or_default() += 1,
+            TiOutcome::Broken(why) => *report.broken.entry(flaw(why)).or_default() += 1,
             _ => {}
         });
         report.counters = flaws(radar.counters()).into_iter().collect();
@@ -69,14 +69,14 @@ pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
 }
 
 /// Types of the items, as far as the frames hold together.
-fn items(bytes: &[u8], family: Family) -> BTreeMap<u32, usize> {
+fn items(bytes: &[u8], family: TiFamily) -> BTreeMap<u32, usize> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
     let mut found = BTreeMap::new();
     let starts = bytes.windows(MAGIC.len()).enumerate().filter(|(_, w)| *w == MAGIC).map(|(at, _)| at);
     for start in starts {
         let (own, count) = match family {
-            Family::Bytes48 => (0, word(start + 44).map(|n| n & 0xFFFF)),
-            Family::Bytes52 => (0, word(start + 48).map(|n| n & 0xFFFF)),
+            TiFamily::Bytes48 => (0, word(start + 44).map(|n| n & 0xFFFF)),
+            TiFamily::Bytes52 => (0, word(start + 48).map(|n| n & 0xFFFF)),
             _ => (8, word(start + 32)),
         };
         let mut at = start + family.header() as usize;
@@ -93,11 +93,11 @@ fn items(bytes: &[u8], family: Family) -> BTreeMap<u32, usize> {
 }
 
 /// What items of a type are, where that helps to say what is missing.
-fn is_targets(kind: u32, family: Option<Family>) -> bool {
-    matches!((kind, family), (308 | 1010, _) | (7, Some(Family::Bytes48 | Family::Bytes52)))
+fn is_targets(kind: u32, family: Option<TiFamily>) -> bool {
+    matches!((kind, family), (308 | 1010, _) | (7, Some(TiFamily::Bytes48 | TiFamily::Bytes52)))
 }
 
-fn judge(report: &Report, family: Option<Family>, entries: Entries) -> Vec<Finding> {
+fn judge(report: &Report, family: Option<TiFamily>, entries: Entries) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut add = |severity, what: String, remedy: &str| found.push(Finding { severity, what, remedy: remedy.into() });
     let counted = |what: &str| report.counters.get(what).copied().unwrap_or(0);

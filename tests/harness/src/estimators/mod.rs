@@ -12,7 +12,7 @@ use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::polar::PolarMap;
 use viewshed::map::{CellState, VisibilityMap};
-use viewshed::radar_2d::{Radar2dConfig, Reading};
+use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
 use viewshed::sensor::field_of_view::FieldOfView;
@@ -109,8 +109,8 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     let mut radar_3d = options.radar_3d;
     radar_3d.gate.max_detections = max_detections;
     let mut estimators = vec![
-        radar_2d::new("radar-2d", Reading::Last, &sensor, &radar_2d)?,
-        radar_2d::new("radar-2d-first", Reading::First, &sensor, &radar_2d)?,
+        radar_2d::new("radar-2d", Radar2dReading::Last, &sensor, &radar_2d)?,
+        radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
         radar_3d::new(&sensor, &radar_3d)?,
     ];
     if let Some(truth) = &recording.truth {

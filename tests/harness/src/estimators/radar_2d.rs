@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use viewshed::map::{CellState, VisibilityMap};
-use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Reading};
+use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::road::RoadPoint;
 
@@ -18,7 +18,7 @@ const RAYS: usize = 320;
 
 struct Driver<const D: usize> {
     name: &'static str,
-    reading: Reading,
+    reading: Radar2dReading,
     parameters: Radar2dParameters,
     state: Box<Radar2d<CELLS, WORDS, RAYS, D>>,
     intake: Intake,
@@ -27,7 +27,7 @@ struct Driver<const D: usize> {
 /// The estimator; storage for 256 detections unless more are asked for.
 pub fn new(
     name: &'static str,
-    reading: Reading,
+    reading: Radar2dReading,
     sensor: &Sensor,
     config: &Radar2dConfig,
 ) -> Result<Box<dyn Estimator>> {

@@ -6,19 +6,20 @@ use viewshed::map::VisibilityMap;
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
+use viewshed::unit::profile::reference::State;
 
 use super::{Estimator, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};
 use crate::recording::Frame;
 
 /// Range cells, azimuths and elevations of the reference grid.
-pub const RANGES: usize = 200;
-pub const AZIMUTHS: usize = 120;
-pub const ELEVATIONS: usize = 16;
+pub const RANGES: usize = State::RANGES;
+pub const AZIMUTHS: usize = State::AZIMUTHS;
+pub const ELEVATIONS: usize = State::ELEVATIONS;
 
 struct Driver<const D: usize> {
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
-    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, 7, 96, D>>,
+    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
     intake: Intake,
 }

@@ -6,8 +6,8 @@ use anyhow::{Result, bail};
 use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
-use viewshed::inputs::ars408::profile;
-use viewshed::inputs::ars408::{Ars408, Config, Counters, Outcome};
+use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters, Ars408Outcome};
 
 use super::candump::Line;
 use super::capture::{self, Kind};
@@ -38,8 +38,8 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
         start,
         elsewhere as u64,
     );
-    let profile = *options.profile.unwrap_or(&profile::ARS408);
-    let mut radar = Ars408::<MOST_ENTRIES>::new(Config { profile, ..Config::sensor(sensor) });
+    let profile = *options.profile.unwrap_or(&Ars408Profile::ARS408);
+    let mut radar = Ars408::<MOST_ENTRIES>::new(Ars408Config { profile, ..Ars408Config::sensor(sensor) });
     let mut frames = Vec::new();
     scans(&mut radar, &mine, |scan| {
         if scan.fault {
@@ -90,8 +90,8 @@ fn kind_of(why: &str) -> String {
 
 /// Feeds a radar with frames; `scan` is given every scan that comes of them, to the last.
 pub fn scans<const N: usize>(radar: &mut Ars408<N>, lines: &[&Line], mut scan: impl FnMut(&RadarScan<'_>)) {
-    let mut give = |outcome: Outcome<'_>| {
-        if let Outcome::Scan(s) = outcome {
+    let mut give = |outcome: Ars408Outcome<'_>| {
+        if let Ars408Outcome::Scan(s) = outcome {
             scan(&s);
         }
     };
@@ -145,7 +145,7 @@ fn choose(name: &str, lines: &[Line], options: &ReadOptions) -> Result<(String, 
 }
 
 /// What the decoder counted, as problems of the input.
-fn report(problems: &mut Problems, interface: &str, start: i64, c: &Counters) {
+fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counters) {
     let counted = [
         ("scan of which entries or qualities are missing", c.incomplete),
         ("scan of which most is missing, dropped", c.broken),

@@ -128,11 +128,11 @@ pub struct ReadOptions {
     /// Which sensor of a bus with several.
     pub sensor_id: Option<u8>,
     /// Which kind of radar a CAN log is of.
-    pub profile: Option<&'static viewshed::inputs::ars408::profile::Profile>,
+    pub profile: Option<&'static viewshed::inputs::ars408::profile::Ars408Profile>,
     /// Kind of header of a TI capture.
-    pub ti_header: Option<viewshed::inputs::ti::Family>,
+    pub ti_header: Option<viewshed::inputs::ti::TiFamily>,
     /// What a TI capture does not say of its firmware.
-    pub ti_dialect: Option<viewshed::inputs::ti::Dialect>,
+    pub ti_dialect: Option<viewshed::inputs::ti::TiDialect>,
     /// Time between frames of a TI capture.
     pub frame_period_s: Option<f64>,
 }

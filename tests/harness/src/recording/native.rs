@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail};
 use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
-use viewshed::inputs::native::{Config, Counters, Outcome, Receiver, VERSION, data_id, id};
+use viewshed::inputs::native::{NativeConfig, NativeCounters, NativeOutcome, NativeReceiver, VERSION, data_id, id};
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::serial::Unstuffer;
 
@@ -115,10 +115,10 @@ pub fn read(name: String, messages: &Messages, broken: u32, options: &ReadOption
 }
 
 /// Feeds a receiver with messages; `scan` is given every scan that comes of them.
-pub fn scans(sensor: u8, messages: &Messages, mut scan: impl FnMut(&RadarScan<'_>)) -> Counters {
-    let mut receiver = Receiver::<MOST_DETECTIONS>::new(Config::sensor(sensor));
-    let mut give = |outcome: Outcome<'_>| {
-        if let Outcome::Scan(s) = outcome {
+pub fn scans(sensor: u8, messages: &Messages, mut scan: impl FnMut(&RadarScan<'_>)) -> NativeCounters {
+    let mut receiver = NativeReceiver::<MOST_DETECTIONS>::new(NativeConfig::sensor(sensor));
+    let mut give = |outcome: NativeOutcome<'_>| {
+        if let NativeOutcome::Scan(s) = outcome {
             scan(&s);
         }
     };
@@ -141,7 +141,7 @@ pub fn scans(sensor: u8, messages: &Messages, mut scan: impl FnMut(&RadarScan<'_
 }
 
 /// What the decoder counted, in words; messages of other sensors are no damage.
-pub fn flaws(c: &Counters, others: usize) -> [(&'static str, u32); 8] {
+pub fn flaws(c: &NativeCounters, others: usize) -> [(&'static str, u32); 8] {
     [
         ("scan of which parts are missing", c.incomplete),
         ("scan of which most is missing, dropped", c.broken),

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
-use viewshed::inputs::ti::{Config, Counters, Dialect, Family, Flaw, Outcome, Ti};
+use viewshed::inputs::ti::{Flaw, Ti, TiConfig, TiCounters, TiDialect, TiFamily, TiOutcome};
 
 use super::capture::{self, Kind};
 use super::problems::Problems;
@@ -37,7 +37,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
             "{name}: the kind of header cannot be learnt: that takes three frames with items in a row. Name it with --ti-header 36, 40, 44, 48 or 52; `viewshed doctor` says what there is"
         ),
     };
-    let dialect = options.ti_dialect.unwrap_or(Dialect::USUAL);
+    let dialect = options.ti_dialect.unwrap_or(TiDialect::USUAL);
     let mut problems = Problems::default();
     let period_s = options.frame_period_s.unwrap_or(PERIOD_S);
     if options.frame_period_s.is_none() {
@@ -45,7 +45,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
             format!("a TI capture holds no times: frames {PERIOD_S} s apart assumed; give it with --frame-period");
         problems.add("capture", what, 0);
     }
-    let mut radar = Ti::<MOST_POINTS>::new(Config { family: Some(family), dialect });
+    let mut radar = Ti::<MOST_POINTS>::new(TiConfig { family: Some(family), dialect });
     let mut frames: Vec<Frame> = Vec::new();
     let mut clock = Clock::new(period_s);
     scans(&mut radar, bytes, |scan| {
@@ -78,8 +78,8 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
 }
 
 /// The family, if three frames in a row agree on it.
-pub fn learn(bytes: &[u8]) -> Option<Family> {
-    let mut radar = Ti::<1>::new(Config::LEARN);
+pub fn learn(bytes: &[u8]) -> Option<TiFamily> {
+    let mut radar = Ti::<1>::new(TiConfig::LEARN);
     feed(&mut radar, bytes, |_| {});
     radar.family()
 }
@@ -87,14 +87,14 @@ pub fn learn(bytes: &[u8]) -> Option<Family> {
 /// Feeds a radar with bytes; `scan` is given every scan that comes of them.
 pub fn scans<const N: usize>(radar: &mut Ti<N>, bytes: &[u8], mut scan: impl FnMut(&RadarScan<'_>)) {
     feed(radar, bytes, |outcome| {
-        if let Outcome::Scan(s) = outcome {
+        if let TiOutcome::Scan(s) = outcome {
             scan(&s);
         }
     });
 }
 
 /// Feeds a radar with bytes; `see` is given whatever comes of them.
-pub fn feed<const N: usize>(radar: &mut Ti<N>, mut bytes: &[u8], mut see: impl FnMut(Outcome<'_>)) {
+pub fn feed<const N: usize>(radar: &mut Ti<N>, mut bytes: &[u8], mut see: impl FnMut(TiOutcome<'_>)) {
     while !bytes.is_empty() {
         let (taken, outcome) = radar.push(bytes, Time::from_micros(0));
         see(outcome);
@@ -103,7 +103,7 @@ pub fn feed<const N: usize>(radar: &mut Ti<N>, mut bytes: &[u8], mut see: impl F
 }
 
 /// What the decoder counted, in words.
-pub fn flaws(c: &Counters) -> [(&'static str, u32); 6] {
+pub fn flaws(c: &TiCounters) -> [(&'static str, u32); 6] {
     [
         ("frame cut short or damaged, dropped", c.broken),
         ("frame that never came, by its number", c.lost),

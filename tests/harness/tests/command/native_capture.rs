@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::inputs::native::{Medium, Sender, id};
+use viewshed::inputs::native::{NativeMedium, NativeSender, id};
 use viewshed_harness::recording::candump::{Content, Line};
 use viewshed_harness::recording::{ReadOptions, read};
 
@@ -31,10 +31,10 @@ fn time(i: u64) -> Time {
 
 /// Thirty scans of sensor 200 on a serial line; a byte is damaged in one of them.
 fn line() -> Vec<u8> {
-    let mut sender = Sender::new(200);
+    let mut sender = NativeSender::new(200);
     let mut line = Vec::new();
     for i in 0..30 {
-        for message in sender.scan(time(i), false, &scan(i), Medium::Serial) {
+        for message in sender.scan(time(i), false, &scan(i), NativeMedium::Serial) {
             let mut stuffed = [0; 300];
             let n = message.stuff(&mut stuffed).unwrap();
             stuffed[20] ^= u8::from(i == 17);
@@ -46,10 +46,10 @@ fn line() -> Vec<u8> {
 
 /// The same as CAN FD frames of sensor 3, one of them lost.
 fn log() -> String {
-    let mut sender = Sender::new(3);
+    let mut sender = NativeSender::new(3);
     let mut text = String::new();
     for i in 0..30 {
-        for (part, message) in sender.scan(time(i), false, &scan(i), Medium::CanFd).enumerate() {
+        for (part, message) in sender.scan(time(i), false, &scan(i), NativeMedium::CanFd).enumerate() {
             let line = Line {
                 time_ns: (time(i).micros() as i64 + 400 * part as i64) * 1000,
                 interface: "can1".into(),

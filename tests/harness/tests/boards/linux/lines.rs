@@ -4,14 +4,14 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ti::Family;
+use viewshed::inputs::ti::TiFamily;
 use viewshed::map::Visibility;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::message::{Addresses, Message, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::Unstuffer;
-use viewshed::wire::status::{Reason, State, Status};
+use viewshed::wire::status::{Reason, Status, UnitState};
 use viewshed_harness::boards::Profile;
 use viewshed_harness::boards::live::{Answered, SENSOR, Script, answer};
 use viewshed_harness::boards::machine::Folder;
@@ -153,7 +153,7 @@ impl Heard {
         }
     }
 
-    fn is(&self, state: State, reason: Reason) -> bool {
+    fn is(&self, state: UnitState, reason: Reason) -> bool {
         self.status.is_some_and(|s| (s.state, s.reason) == (state, reason))
     }
 
@@ -214,7 +214,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     // maps are those of the library, whatever noise comes between the scans
     let (mut script, mut far) = (Script::default(), Heard::new());
     let sent = stream(&mut radar, &mut script, &scans[..30], begin, true);
-    assert!(far.until(&ear, |far| far.visible() > 5000 && far.is(State::Ok, Reason::None)), "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.visible() > 5000 && far.is(UnitState::Ok, Reason::None)), "{:?}", far.status);
     let should = maps(&messages(&expected(&settings, &sent).bytes));
     assert!(should.len() >= 30, "{}", should.len());
     let got = || {
@@ -228,7 +228,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     println!("{} map messages the same, with noise between the scans", should.len());
 
     // silence
-    let blind = |far: &Heard| far.is(State::Blind, Reason::RadarSilent) && far.visible() == 0;
+    let blind = |far: &Heard| far.is(UnitState::Blind, Reason::RadarSilent) && far.visible() == 0;
     assert!(far.until(&ear, blind), "{:?}, {} visible", far.status, far.visible());
 
     // the radar's cable is pulled and plugged in again
@@ -244,7 +244,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     }
     assert!(twin.visible() > 5000, "{}", twin.visible());
     assert!(far.until(&ear, |far| far.cells() == twin.cells()), "{} and {}", far.visible(), twin.visible());
-    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None)), "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.is(UnitState::Ok, Reason::None)), "{:?}", far.status);
 
     // and the other one
     drop(ear);
@@ -259,7 +259,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
     // stopped: the last map says unknown, the last status that there is none
     daemon.terminate();
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
-    let gone = |far: &Heard| far.is(State::Starting, Reason::None) && far.visible() == 0;
+    let gone = |far: &Heard| far.is(UnitState::Starting, Reason::None) && far.visible() == 0;
     assert!(far.until(&ear, gone), "{:?}, {} visible", far.status, far.visible());
     assert!(daemon.log().contains("stopping"), "{}", daemon.log());
 }
@@ -267,7 +267,7 @@ fn linux_cables_are_pulled_and_the_daemon_goes_on() {
 /// Frames of a TI radar at 20 Hz, each of these points.
 fn stream_ti(radar: &mut Terminal, numbers: std::ops::Range<u32>, points: &[[f32; 4]]) {
     for number in numbers {
-        radar.send(&Frame::new(Family::Bytes40, number).cartesian(points).bytes());
+        radar.send(&Frame::new(TiFamily::Bytes40, number).cartesian(points).bytes());
         sleep(Duration::from_millis(50));
     }
 }
@@ -286,18 +286,18 @@ fn linux_a_radar_that_sends_nan_is_blind_until_its_first_good_point() {
     daemon.wait_for("radar: open");
     let mut far = Heard::new();
     stream_ti(&mut radar, 0..40, &[[f32::NAN; 4]; 20]);
-    let blind = |far: &Heard| far.is(State::Blind, Reason::UnusablePoints) && far.visible() == 0;
+    let blind = |far: &Heard| far.is(UnitState::Blind, Reason::UnusablePoints) && far.visible() == 0;
     assert!(far.until(&ear, blind), "{:?}", far.status);
     // and stays so
     stream_ti(&mut radar, 40..60, &[[f32::NAN; 4]; 20]);
-    let seen = |far: &Heard| far.visible() > 0 || far.is(State::Ok, Reason::None);
+    let seen = |far: &Heard| far.visible() > 0 || far.is(UnitState::Ok, Reason::None);
     let heard = ear.heard().len();
     far.until(&ear, |far| seen(far) || far.taken == heard);
     assert!(!seen(&far), "{:?}, {} visible", far.status, far.visible());
     // one point on the road among them is a radar that sees
     let good = [1.0, 30.0, -5.0, -12.0];
     stream_ti(&mut radar, 60..80, &[[f32::NAN; 4], good]);
-    assert!(far.until(&ear, |far| far.is(State::Ok, Reason::None) && far.visible() > 5000), "{:?}", far.status);
+    assert!(far.until(&ear, |far| far.is(UnitState::Ok, Reason::None) && far.visible() > 5000), "{:?}", far.status);
     daemon.terminate();
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
 }

@@ -4,10 +4,10 @@ use std::path::Path;
 use std::process::Command;
 
 use viewshed::fixed::time::Time;
-use viewshed::inputs::ars408::Config;
+use viewshed::inputs::ars408::Ars408Config;
 use viewshed::map::polar::PolarMap;
-use viewshed::unit::build;
-use viewshed::unit::profile::reference::{Parameters, Radar, Sender, State, Unit};
+use viewshed::unit::Unit;
+use viewshed::unit::profile::reference::{Parameters, Radar, Sender, State};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
@@ -28,7 +28,7 @@ type Sent = Vec<(u64, CanFrame)>;
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second after the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
     let mut parameters: Option<Parameters> = None;
-    let header = build::<State>(settings, &mut parameters).unwrap();
+    let header = settings.build::<State>(&mut parameters).unwrap();
     let parameters = parameters.unwrap();
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
@@ -38,9 +38,9 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     let mut sender = Box::new(Sender::new(config, header, EPOCH, at(first)).unwrap());
     let mut unit = Unit::new(&parameters, &mut *state, &mut *map, &mut *sender);
     unit.broadcast().status_mut().firmware = [0, 1, 0];
-    let mut decoder = Radar::new(Config::sensor(radar));
+    let mut decoder = Radar::new(Ars408Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
-    let flush = |unit: &mut Unit<'_>, now: u64, sent: &mut Sent| {
+    let flush = |unit: &mut Unit<'_, State, Sender>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
     };
     loop {

@@ -10,7 +10,7 @@ use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::message::{Addresses, Received};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed::wire::serial::Unstuffer;
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::listener::Listener;
 use viewshed_harness::boards::live::{Answered, SENSOR, Script, answer, on_the_line};
 use viewshed_harness::boards::machine::{Emulator, Folder, Lines};
@@ -170,7 +170,7 @@ fn a_radar_that_stops_makes_the_map_unknown_and_the_status_blind() {
     let map = far.map(SENSOR, now);
     assert!((0..120 * 200).all(|k| map.cell(k / 200, k % 200).visibility == Visibility::Unknown));
     let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
-    assert_eq!((status.state, status.reason), (State::Blind, Reason::RadarSilent));
+    assert_eq!((status.state, status.reason), (UnitState::Blind, Reason::RadarSilent));
 }
 
 #[test]
@@ -196,7 +196,7 @@ fn a_corrupted_configuration_is_refused_with_its_reason_and_nothing_is_sent_but_
     assert!(refusals.iter().any(|r| r[0] == 5 && &r[5..] == b"mount.height_m"), "the parameter by name");
     let far = listen(board.expected.as_ref().unwrap());
     let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
-    assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+    assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
     assert!(far.sensor(SENSOR).unwrap().header().is_none(), "no header, no map");
 }
 

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
-use viewshed::unit::can_service::{Answers, Told, Tool};
+use viewshed::unit::can_service::{Answers, Said, Tool};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::status::{Reason, State};
+use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::can::CanBoard;
 use viewshed_harness::boards::can_twin::{Sent, Step, clusters, flashed, log};
 use viewshed_harness::boards::listener::{Listener, Telling};
@@ -65,7 +65,7 @@ fn every_map_of_two_hundred_scans_arrives_cell_by_cell() {
     let visible = told.last().unwrap().visible_cells;
     assert!((5_000..24_000).contains(&visible), "{visible} cells are visible in the end");
     let status = listener.receiver().sensor(SENSOR).and_then(|s| s.status().copied());
-    assert_eq!(status.map(|s| s.state), Some(State::Ok));
+    assert_eq!(status.map(|s| s.state), Some(UnitState::Ok));
 }
 
 #[test]
@@ -117,23 +117,23 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
     let mut flash = Flash::ERASED;
     let mut board = CanBoard::start(&image, &flash).unwrap();
     let sent = board.run(&mut flash, &steps).unwrap();
-    let said = |sent: &[Sent]| -> Vec<Told> {
+    let said = |sent: &[Sent]| -> Vec<Said> {
         let mut answers = Answers::new(SENSOR, MEDIUM);
         sent.iter().flat_map(|step| &step.frames).filter_map(|frame| answers.take(frame)).collect()
     };
     let all = said(&sent);
-    let refused = |told: &Told| match told {
-        Told::Refused(r) => Some((r.reason, r.parameter().to_owned())),
+    let refused = |told: &Said| match told {
+        Said::Refused(r) => Some((r.reason, r.parameter().to_owned())),
         _ => None,
     };
     let refused: Vec<(u8, String)> = all.iter().filter_map(refused).collect();
     assert_eq!(refused, [(1, String::new()), (4, String::new()), (5, "mount.height_m".to_owned())]);
-    assert!(all.contains(&Told::Written(1)) && all.contains(&Told::Started(Some((0, 1)))), "{all:?}");
-    let read = all.iter().find_map(|told| if let Told::Block(block) = told { Some(block) } else { None });
+    assert!(all.contains(&Said::Written(1)) && all.contains(&Said::Started(Some((0, 1)))), "{all:?}");
+    let read = all.iter().find_map(|told| if let Said::Block(block) = told { Some(block) } else { None });
     assert_eq!(Settings::from_block(read.unwrap()), Ok((1, settings)));
     let (listener, told) = heard(&sent[..20]);
     let status = listener.receiver().sensor(SENSOR).and_then(|s| s.status().copied()).unwrap();
-    assert_eq!((status.state, status.reason), (State::Fault, Reason::Configuration));
+    assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
     assert!(
         told.iter().all(|told| told.azimuths == 0) && listener.receiver().sensor(SENSOR).unwrap().header().is_none()
     );
@@ -146,12 +146,12 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
 
     // it is kept without power, and refused when it rots
     let mut board = board.restart(&image).unwrap();
-    assert_eq!(said(&board.run(&mut flash, &traffic).unwrap()), [Told::Started(Some((0, 1)))]);
+    assert_eq!(said(&board.run(&mut flash, &traffic).unwrap()), [Said::Started(Some((0, 1)))]);
     let mut rotten = flash.clone();
     rotten.slot_mut(0)[30] ^= 4;
     let mut board = CanBoard::start(&image, &rotten).unwrap();
     let sent = board.run(&mut rotten, &traffic).unwrap();
-    assert!(matches!(said(&sent)[..], [Told::Started(None), Told::Refused(r)] if r.reason == 4));
+    assert!(matches!(said(&sent)[..], [Said::Started(None), Said::Refused(r)] if r.reason == 4));
     assert!(sent.iter().all(|step| step.maps.is_empty()), "no map in the safe state");
 }
 

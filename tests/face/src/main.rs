@@ -1,0 +1,192 @@
+//! A user of the library, who has the product's public names and no others.
+//!
+//! Built and run by `tests/architecture`, without the feature `bench`.
+
+use std::error::Error;
+
+use viewshed::query::{self, Answer, Footprint};
+use viewshed::small::{CHECK, Map, Parameters, Sender, State};
+use viewshed::{
+    Addresses, Angle, Ars408, Ars408Config, BLOCK_LEN, BroadcastConfig, CanFrame, CanId, Condition, Detection, Epoch,
+    Estimator, Feed, FieldOfView, Flow, Frame, Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver,
+    NativeSender, NoiseConfig, PolarMap, Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading, Radar3dConfig,
+    Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, SerialLine, SerialSession, Settings,
+    SettingsSlots, StoredSettings, Ti, TiConfig, Time, Unit, UnitState, Visibility, VisibilityMap,
+};
+
+/// Range cells and azimuths of the small size, and a receiver of its maps.
+const RANGES: usize = State::RANGES;
+const AZIMUTHS: usize = State::AZIMUTHS;
+type Far = Receiver<1, AZIMUTHS, { State::WORDS }>;
+
+const FRAMES: u64 = 40;
+const PERIOD_US: u64 = 66_667;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let settings = Settings::of(gantry());
+    estimators_and_questions(&settings)?;
+    a_unit_and_its_receiver(&settings)?;
+    a_session_from_start_to_restart(&settings);
+    decoders();
+    println!("the face is enough");
+    Ok(())
+}
+
+/// 6 m above the road, looking 4 degrees down.
+fn gantry() -> Sensor {
+    Sensor {
+        mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 4.0, roll_deg: 0.0 },
+        field_of_view: FieldOfView {
+            azimuth_min_deg: -60.0,
+            azimuth_max_deg: 60.0,
+            elevation_min_deg: -16.0,
+            elevation_max_deg: 16.0,
+            range_min_m: 3.0,
+            range_max_m: 100.0,
+        },
+        noise: NoiseConfig::default(),
+    }
+}
+
+fn at(frame: u64) -> Time {
+    Time::from_micros(1_000_000 + frame * PERIOD_US)
+}
+
+/// A parked truck's rear, 40 m ahead.
+fn truck() -> Result<Vec<Detection>, Box<dyn Error>> {
+    let reflection = |y_m: f32| Measurement {
+        range_m: 40.0,
+        azimuth_rad: y_m / 40.0,
+        elevation_rad: Some(-0.05),
+        radial_velocity_mps: 0.0,
+        rcs_dbsm: Some(20.0),
+        snr_db: Some(25.0),
+    };
+    Ok([-1.0, 0.0, 1.0].iter().map(|y| Detection::new(&reflection(*y))).collect::<Result<_, _>>()?)
+}
+
+/// Both estimators, their maps, and what may be asked of any map.
+fn estimators_and_questions(settings: &Settings) -> Result<(), Box<dyn Error>> {
+    let config = Radar3dConfig { gate: settings.gate, ..Radar3dConfig::default() };
+    let parameters: Parameters = Radar3dParameters::new(&settings.sensor, &config)?;
+    let (mut radar, mut map) = (Box::new(State::new()), parameters.map());
+    let flat = Radar2dParameters::new::<208, 26, 360>(&settings.sensor, &Radar2dConfig::default())?;
+    let mut baseline = Box::new(Radar2d::<208, 26, 360, 256>::new());
+    let detections = truck()?;
+    for frame in 0..FRAMES {
+        let report = radar.process(&parameters, at(frame), &detections, false, &mut map);
+        assert_eq!(report.condition, Condition::Healthy);
+        baseline.process(&flat, at(frame), &detections, false);
+    }
+    let ahead = RoadPoint::from_metres(20.0, 0.0)?;
+    assert_eq!(query::point(&map, ahead), Answer::VisibleFree);
+    assert_eq!(baseline.map(&flat, Radar2dReading::Last).at(ahead).visibility, Visibility::Visible);
+    let car = Footprint::new(RoadPoint::from_metres(30.0, 3.5)?, 0.0, 4.6, 1.8)?;
+    assert_eq!(query::area(&map, &car), Answer::VisibleFree);
+    let mut grid = Box::new(RoadGrid::<100, 40>::unknown(0, -20));
+    grid.resample(&map);
+    assert_eq!(grid.cell(20, 0).visibility, Visibility::Visible);
+    assert_eq!(State::expire(&radar, &parameters, at(10 * FRAMES), &mut map), Condition::Stale);
+    assert_eq!(query::point(&map, ahead), Answer::Unknown);
+    Ok(())
+}
+
+/// A unit fed with an integrator's own format, its broadcast on CAN, and a receiver's map.
+fn a_unit_and_its_receiver(settings: &Settings) -> Result<(), Box<dyn Error>> {
+    let mut parameters = None;
+    let header = settings.build::<State>(&mut parameters)?;
+    let parameters = parameters.ok_or("just built")?;
+    let medium = Medium::Can(Addresses::STANDARD);
+    let mut sender = Box::new(Sender::new(BroadcastConfig::new(0, medium), header, Epoch::new(7), at(0))?);
+    let (mut state, mut map) = (Box::new(State::new()), Box::new(Map::NOWHERE));
+    let mut unit = Unit::new(&parameters, &mut *state, &mut *map, &mut *sender);
+    let mut receiver = Box::new(Far::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));
+    let (mut radar, mut feed) = (NativeSender::new(0), NativeReceiver::<256>::new(NativeConfig::sensor(0)));
+    let detections = truck()?;
+    for frame in 0..FRAMES {
+        for message in radar.scan(at(frame), false, &detections, NativeMedium::Serial) {
+            unit.take(&mut feed, message.bytes(), at(frame));
+        }
+        for ms in 0..60 {
+            let now = Time::from_micros(at(frame).micros() + 1000 * ms);
+            if let Some(frame) = unit.next_frame(now) {
+                // the first of an epoch is not believed alone
+                let _ = receiver.frame(now, &frame);
+            }
+        }
+    }
+    assert_eq!(unit.broadcast().status_mut().state, UnitState::Ok);
+    let now = at(FRAMES);
+    let received = receiver.map(0, now);
+    let equal = |a: usize, r: usize| received.cell(a, r).visible() == unit.map().cell(a, r).visible();
+    assert!((0..AZIMUTHS).all(|a| (0..RANGES).all(|r| equal(a, r))), "every cell arrives");
+    assert!(received.at(RoadPoint::from_metres(20.0, 0.0)?).visible());
+    Ok(())
+}
+
+/// Where blocks are kept.
+struct InRam([[u8; BLOCK_LEN]; 2]);
+
+impl SettingsSlots for InRam {
+    fn slot(&self, slot: usize) -> &[u8] {
+        &self.0[slot]
+    }
+    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+        self.0[slot] = *block;
+    }
+}
+
+/// What was sent.
+struct Line(usize);
+
+impl SerialLine for Line {
+    fn send(&mut self, bytes: &[u8]) -> bool {
+        self.0 += bytes.len();
+        true
+    }
+}
+
+/// A unit without settings says so; one with a block takes its line's bytes.
+fn a_session_from_start_to_restart(settings: &Settings) {
+    let (mut slots, mut line) = (InRam([[0xFF; BLOCK_LEN]; 2]), Line(0));
+    let stored = StoredSettings::read(&slots, CHECK);
+    assert!(stored.settings().is_none() && stored.write(&settings.to_block(0), &mut slots).is_ok());
+    let stored = StoredSettings::read(&slots, CHECK);
+    let mut session = SerialSession::<256>::start(0, Epoch::new(1), stored, &mut line);
+    let started = line.0;
+    let mut unit = None::<Unit<'_, State, Sender>>;
+    let flow = session.take(&[0, 1, 2, 0], &mut unit, &mut slots, &mut line, &mut |_, _| {});
+    assert!(started > 0 && flow == Flow::Continue && session.settings() == Some(settings));
+}
+
+/// A sensor that is none of the library's.
+struct Loop;
+
+impl Feed for Loop {
+    type Piece = bool;
+    type Input = [Detection];
+
+    fn take(&mut self, piece: &bool, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+        each(&Frame { measured: now, input: &[], incomplete: !piece, status: false.into() });
+    }
+    fn wait(&mut self, _: Time, _: &mut impl FnMut(&Frame<'_, [Detection]>)) {}
+    fn lost(&self) -> u32 {
+        0
+    }
+}
+
+/// How many frames a feed gives out of a piece.
+fn frames<F: Feed>(feed: &mut F, piece: &F::Piece) -> usize {
+    let mut frames = 0;
+    feed.take(piece, at(0), &mut |_| frames += 1);
+    frames
+}
+
+fn decoders() {
+    let none = CanFrame::classic(CanId::Standard(0x60B), &[0; 8]).expect("8 bytes fit");
+    assert_eq!(frames(&mut Ars408::<64>::new(Ars408Config::sensor(0)), &none), 0);
+    assert_eq!(frames(&mut Ti::<64>::new(TiConfig::LEARN), &[1, 2, 3]), 0);
+    assert_eq!(frames(&mut Loop, &true), 1);
+    assert_eq!(Angle::from_degrees(90.0), Angle::QUARTER);
+    let _: fn(&<State as Estimator>::Parameters) -> PolarMap<RANGES, AZIMUTHS> = Parameters::map;
+}
