@@ -28,8 +28,8 @@ static int bytes_in(const char *digits, uint8_t *bytes, int most) {
 }
 
 /* Answers `look`; with `cells` cell by cell. */
-static void answer(const sensor_t *s, uint64_t now, bool cells) {
-    watch(now);
+static void answer(const sensor_t *s, uint64_t asked, bool cells) {
+    uint64_t now = watch(asked);
     static char rows[AZIMUTHS * (CELLS + 1) + 1];
     int count[3] = {0, 0, 0}, azimuths = trusted(s, now) ? s->azimuths : 0, n = 0;
     uint32_t sum = 0xFFFFFFFF;
@@ -45,9 +45,9 @@ static void answer(const sensor_t *s, uint64_t now, bool cells) {
     bool nothing = count[1] + count[2] == 0;
     rows[nothing ? 0 : n] = 0;
     if (cells)
-        printf("%" PRIu64 "%s\n", now, rows);
+        printf("%" PRIu64 "%s\n", asked, rows);
     else
-        printf("%" PRIu64 " %d %d %08" PRIx32 "\n", now, count[2], count[1], nothing ? 0 : ~sum);
+        printf("%" PRIu64 " %d %d %08" PRIx32 "\n", asked, count[2], count[1], nothing ? 0 : ~sum);
 }
 
 int main(void) {

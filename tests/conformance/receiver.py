@@ -568,6 +568,12 @@ class Sensor:
 
     # Rule 3
 
+    def settled(self, t):
+        return t - self.begun >= A + D and self.count >= 8
+
+    def fits(self, t):
+        return (self.smallest_lag(t) + D - self.clock_lag(t)) % P <= 2 * D + 25_000
+
     def smallest_lag(self, t):
         """m(t)"""
         return (self.lag + (t - self.at >> 11)) % P
@@ -576,8 +582,9 @@ class Sensor:
         """True if a dated message is accepted."""
         of = lag(t, scan)
         x = (self.clock_lag(t) - of) % P if self.has_clock else 0                                        # b
-        ahead = D < x <= 1_500_000
-        refused = 1_500_000 < x <= P // 2
+        sure = self.has_measure and self.has_clock and self.confirmed and self.settled(t) and self.fits(t)
+        ahead = D < x <= 1_500_000 and not sure
+        refused = (D if sure else 1_500_000) < x <= P // 2
         late = (of - self.smallest_lag(t)) % P if self.has_measure else 0
         if D < late <= P // 2:                                                                           # d
             refused = True
@@ -599,6 +606,8 @@ class Sensor:
             if self.sunk > D:
                 return self.measure_anew(t, of)
             self.at, self.lag = t, of
+        if t - self.last_in_time > A and not self.settled(self.last_in_time):
+            self.begun, self.count = t, 0
         self.count += 1
         if t - self.last_in_time > 1_000_000:
             self.empty_maps()
@@ -734,10 +743,10 @@ class Sensor:
         if self.session is None or self.header is None or not self.has_measure or not self.has_clock:
             return None
         smallest = self.smallest_lag(t)
-        if (t - self.begun < A + D or self.count < 8
+        if (not self.settled(t)
                 or t - self.last_in_time > A
                 or self.in_doubt and not self.confirmed
-                or (smallest + D - self.clock_lag(t)) % P > 2 * D + 25_000
+                or not self.fits(t)
                 or self.signed(self.conflict, t) or self.signed(self.other_version, t)):
             return None
         rays = [held[1] if held and (lag(t, held[0]) - smallest) % P + 25_000 <= A else NO_CELLS

@@ -417,6 +417,16 @@ static void hear_clock(sensor_t *s, uint64_t now, const uint8_t *group) {
     }
 }
 
+/* Whether the measure was old enough and of enough frames at a time. */
+static bool settled(const sensor_t *s, uint64_t at) {
+    return at - s->measure.begun >= A_US + D_US && s->measure.count >= 8;
+}
+
+/* Whether by the sender's clock the fastest map frame was in time. */
+static bool fits(const sensor_t *s, uint64_t now) {
+    return behind((uint64_t)least(s, now) + D_US, clock_lag(s, now)) <= 2 * D_US + MARGIN_US;
+}
+
 /* Whether nothing fitted measure and clock for a period: the clocks are not what they were. */
 static bool misfits(sensor_t *s, uint64_t now) {
     if (s->misfit_since == NEVER) s->misfit_since = now;
@@ -452,7 +462,8 @@ static bool refuse(sensor_t *s, uint64_t now, uint32_t lag) {
 /* Rules 2 and 3: whether a frame with a scan number is in time. */
 static bool hear(sensor_t *s, uint64_t now, int scan) {
     uint32_t lag = lag_of(now, scan), ahead = s->clock.there ? ahead_of(clock_lag(s, now), lag) : 0;
-    if (ahead > 1500000) return refuse(s, now, lag);
+    bool sure = s->measure.there && s->clock.there && s->clock.confirmed && settled(s, now) && fits(s, now);
+    if (ahead > 1500000 || (ahead && sure)) return refuse(s, now, lag);
     if (!s->measure.there) return measure_anew(s, now, lag, ahead);
     uint32_t late = behind(lag, least(s, now));
     if (late > D_US && late <= PERIOD / 2) return refuse(s, now, lag);
@@ -462,6 +473,10 @@ static bool hear(sensor_t *s, uint64_t now, int scan) {
         if (s->measure.sunk > D_US) return measure_anew(s, now, lag, ahead);
         s->measure.at = now;
         s->measure.lag = lag;
+    }
+    if (now - s->map_heard > A_US && !settled(s, s->map_heard)) {
+        s->measure.begun = now;
+        s->measure.count = 0;
     }
     if (s->measure.count < 255) s->measure.count++;
     if (now - s->map_heard > 1000000) forget_maps(s);
@@ -482,9 +497,8 @@ static void purge(sensor_t *s, uint64_t now) {
 
 /* Rule 5. */
 static bool trusted(const sensor_t *s, uint64_t now) {
-    return s->epoch >= 0 && s->complete && s->measure.there && s->clock.there && now - s->measure.begun >= A_US + D_US &&
-           s->measure.count >= 8 && now - s->map_heard <= A_US && (s->clock.confirmed || !s->doubt) &&
-           behind((uint64_t)least(s, now) + D_US, clock_lag(s, now)) <= 2 * D_US + MARGIN_US &&
+    return s->epoch >= 0 && s->complete && s->measure.there && s->clock.there && settled(s, now) &&
+           now - s->map_heard <= A_US && (s->clock.confirmed || !s->doubt) && fits(s, now) &&
            !lasts(s->conflict, now) && !lasts(s->other_version, now);
 }
 

@@ -172,15 +172,18 @@ fn the_example_reads_as_the_pictures() {
     for (kind, scans) in [("frames", [0x21, 0x24]), ("further", [0xFE, 0x01])] {
         let mut receiver = Receiver::<1, AZIMUTHS, 1>::new([0], Addresses::STANDARD, limits);
         let start = Time::from_micros(measured(scans[0]).micros() - 80_000);
-        let mut send = |message: Message, own: &[u8]| {
+        let halfway = Time::from_micros(start.micros() + 40_000);
+        let mut send = |at: Time, message: Message, own: &[u8]| {
             let packet = Packet::new(Packing::Classic, 0, message, EPOCH, own).protect(0, None);
-            let _ = receiver.frame(start, &packet.frame(&Addresses::STANDARD).unwrap());
+            let _ = receiver.frame(at, &packet.frame(&Addresses::STANDARD).unwrap());
         };
         // the example's clock is another one; two messages begin a session, eight dated ones are enough
         let clock = header().emit_group(&Clock { time_ms: start.micros() / 1000, synchronised: true }, 0);
-        (0..2).for_each(|_| send(Message::Header, &clock));
-        (0..8).for_each(|_| send(Message::VisibleRange, &[ScanNumber::at(start).byte(), 0, 0, 0, 0, 0]));
-        page_frames("frames")[1..7].iter().for_each(|frame| _ = receiver.frame(start, &parsed(frame)).unwrap());
+        (0..2).for_each(|_| send(start, Message::Header, &clock));
+        for at in [start, start, start, start, halfway, halfway, halfway, halfway] {
+            send(at, Message::VisibleRange, &[ScanNumber::at(at).byte(), 0, 0, 0, 0, 0]);
+        }
+        page_frames("frames")[1..7].iter().for_each(|frame| _ = receiver.frame(halfway, &parsed(frame)).unwrap());
         for scan in scans {
             let frames = page_frames(kind).iter().map(|frame| parsed(frame)).collect::<Vec<_>>();
             let of_scan = frames.iter().filter(|frame| frame.id.raw() & 31 >= 6 && frame.data()[2] == scan);

@@ -17,24 +17,12 @@
 use super::edges::{EdgeList, Hints};
 use super::expectation::{EdgeTables, Last, Progress, distance_table, first_table, shift, stop_table};
 use super::interval::{Coder, Encoder, Form, Words};
+pub use super::kind::Kind;
 use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH, STOPS_BELOW, TOLD};
 use super::ray::{Known, Ray};
 
 /// Bits that tell how many ticks older a delta's refresh is, less one.
 pub const AGE_BITS: u32 = 4;
-
-/// What a block is built on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Kind {
-    /// Decodes alone.
-    Refresh,
-    /// On the refresh this many ticks older, 1 to 16.
-    Delta {
-        /// Its age before this scan.
-        ticks: u8,
-    },
-}
 
 /// What sender and receiver of a block agree on beforehand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,7 +152,7 @@ fn tell<const W: usize>(
         }
         let tables = EdgeTables::of(progress.kind);
         let (hints, edges) = progress.edges();
-        edges.read(ray);
+        edges.read(ray.edges());
         encode_edges(coder, tables, (ray, edges), (&expected, hints))?;
     }
     progress.advance(ray, was, as_expected);

@@ -1,6 +1,6 @@
 //! Where the bits of a ray turn over, and which of these places are expected next.
 
-use super::ray::Ray;
+use super::known::Known;
 
 /// The edges of a ray, one after another.
 #[derive(Debug, Clone, Copy)]
@@ -17,15 +17,15 @@ pub struct Edges<'a, const W: usize> {
 }
 
 impl<'a, const W: usize> Edges<'a, W> {
-    /// Of a ray from a cell on.
+    /// Of a ray's bits and known cells, from a cell on.
     #[inline]
-    pub fn new(ray: &'a Ray<W>, from: usize) -> Self {
-        let before = from.saturating_sub(1).max(ray.known.near());
-        let (words, word) = (ray.bits().words(), before / 32);
+    pub fn new(words: &'a [u32; W], known: Known, from: usize) -> Self {
+        let before = from.saturating_sub(1).max(known.near());
+        let word = before / 32;
         let at_hand = words.get(word).copied().unwrap_or(0);
         let bit = if at_hand >> (before % 32) & 1 == 1 { u32::MAX } else { 0 };
         let differ = (at_hand ^ bit) & (u32::MAX << (before % 32));
-        Self { words, word, differ, before: bit, end: ray.known.end() }
+        Self { words, word, differ, before: bit, end: known.end() }
     }
 }
 
@@ -58,11 +58,11 @@ pub(super) struct EdgeList {
 impl EdgeList {
     pub const NONE: Self = Self { cells: [0; 255], count: 0 };
 
-    /// Becomes that of a ray.
+    /// Becomes that of a ray with these edges.
     #[allow(clippy::cast_possible_truncation)] // a cell of 256
-    pub fn read<const W: usize>(&mut self, ray: &Ray<W>) {
+    pub fn read<const W: usize>(&mut self, edges: Edges<'_, W>) {
         let mut count = 0;
-        for (cell, edge) in self.cells.iter_mut().zip(Edges::new(ray, 0)) {
+        for (cell, edge) in self.cells.iter_mut().zip(edges) {
             *cell = edge as u8;
             count += 1;
         }

@@ -1,7 +1,7 @@
 //! What both sides of a block know before each symbol: what is expected, and how frequent what is.
 
-use super::block::Kind;
 use super::edges::EdgeList;
+use super::kind::Kind;
 use super::model::{BELOW, STOP_CLASSES, STOPS_BELOW};
 use super::ray::{Known, Ray};
 
@@ -125,7 +125,7 @@ impl<const W: usize> Progress<W> {
     /// Behind an azimuth.
     pub fn behind(kind: Kind, before: Before, neighbour: Ray<W>, neighbour_was: Ray<W>) -> Self {
         let mut lists = [EdgeList::NONE; 2];
-        lists[0].read(&neighbour);
+        lists[0].read(neighbour.edges());
         Self { kind, before, neighbour, neighbour_was, lists, swapped: false }
     }
 
@@ -155,7 +155,7 @@ impl<const W: usize> Progress<W> {
             Kind::Delta { .. } if self.before.still => *was,
             Kind::Delta { .. } => was.expected(&self.neighbour, &self.neighbour_was),
         };
-        self.hints().read(&expected);
+        self.hints().read(expected.edges());
         expected
     }
 

@@ -4,6 +4,8 @@ pub mod block;
 pub mod edges;
 mod expectation;
 pub mod interval;
+mod kind;
+mod known;
 pub mod model;
 pub mod ray;
 pub mod reading;

@@ -23,9 +23,12 @@
 //!   took longer. Either they are the sender's only ones: a delay that all frames have no receiver sees, and
 //!   the integrator guarantees that there is none. Or a queue drains, and each frame is faster than the one
 //!   before: a measure is trusted when it is `A + D` old, and begins anew when its smallest lag has sunk by
-//!   more than `D`, less 1 in 1024 of the time, which is what it crept up and what clocks drift. So nothing
+//!   more than `D`, less 1 in 1024 of the time, which is what it crept up and what clocks drift; and it is `A + D`
+//!   old only if its frames came without a pause of more than `A` meanwhile. So nothing
 //!   is told out of a queue that shortens by more than `D` in `A + D`. Or faster frames were refused, because
-//!   the sender's clock had not come so far: then the header it is known by was late, too. A session that
+//!   the sender's clock had not come so far: then the header it is known by was late, too. Those that are faster
+//!   by less than 1.5 s are refused only after two headers `A + D` apart and a measure that is trusted agreed,
+//!   which a queue that shortens like that does not let them. A session that
 //!   refused any frame waits for a second header that agrees `A + D` later; headers come every 0.5 s, so the
 //!   first that was in time lies between, and after it the maps' fastest frame would be more than `D` behind
 //!   the sender's clock, which is not trusted either.

@@ -9,13 +9,17 @@
 //! *Sender's clock* (rule 2). The header carries the full clock. The headers heard so far bound it from
 //! below: what the fastest of them said, and the time passed since, less 2^-11 for drift. A map frame of a
 //! scan after that by more than 1.5 s is of another period of the scan numbers, and is refused; one by more
-//! than `D` shows that the headers were late, and nothing is told before the next one. To refuse those, too, would
-//! hide what a queue that drains shows.
+//! than `D` shows that the headers were late, and nothing is told before the next one; to refuse those would
+//! hide what a queue that drains shows. Where headers `A + D` apart agree with one another and with a settled
+//! measure, they were not late, and such a frame is refused, too.
 //!
 //! *Measure* (rule 3). A frame's scan number is the sender's clock at the measurement. The receiver's
 //! clock less that is the delay plus an unknown constant; the smallest seen stands for no delay. What lags
 //! more than `D` behind it is refused. A smallest that sinks by more than `D`, at once or little by
 //! little, was a late one: the measure begins anew. It creeps up by 2^-11, so that clocks may drift.
+//!
+//! A measure that was not yet trusted when frames in time paused for longer than `A` settles anew: meanwhile a
+//! queue may have drained down to it.
 //!
 //! *Trust* (rule 5). Nothing is told before the measure is `A + D` old and of [`ENOUGH`] frames, nor
 //! while it does not fit the sender's clock.
@@ -141,6 +145,11 @@ struct Measure {
 }
 
 impl Measure {
+    /// Whether it is old enough and of enough frames.
+    fn is_settled(&self, now: Time, limits: &Limits) -> bool {
+        now.since(self.begun).is_some_and(|since| since >= limits.sum_us()) && self.count >= ENOUGH
+    }
+
     fn least(&self, now: Time) -> u32 {
         modulo(u64::from(self.lag) + (now.since(self.at).unwrap_or(0) >> CREEP))
     }
@@ -358,7 +367,7 @@ impl Session {
     pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Hearing {
         let lag = scan.lag(now);
         let ahead = self.clock.map_or(0, |clock| ahead_of(clock.lag(now), lag, limits));
-        if ahead > MOST_AHEAD_US {
+        if ahead > MOST_AHEAD_US || (ahead > 0 && self.is_sure(now, limits)) {
             return self.refuse(now, lag, Hearing::Beyond);
         }
         let Some(mut measure) = self.measure else { return self.measure_anew(now, lag, ahead) };
@@ -374,11 +383,22 @@ impl Session {
             }
             (measure.at, measure.lag, measure.sunk) = (now, lag, modulo(sunk));
         }
+        let pause = now.since(self.map_heard).unwrap_or(0);
+        if pause > u64::from(limits.max_age_us) && !measure.is_settled(self.map_heard, limits) {
+            // a queue may have drained down to it meanwhile
+            (measure.begun, measure.count) = (now, 0);
+        }
         measure.count = measure.count.saturating_add(1);
         self.measure = Some(measure);
-        let pause = now.since(self.map_heard).unwrap_or(0);
         self.in_time(now, ahead);
         if pause > GAP_US { Hearing::Anew } else { Hearing::InTime }
+    }
+
+    /// Whether headers `A + D` apart and the maps' measure agree on the sender's clock, so that a frame from
+    /// after it was late by almost a period.
+    fn is_sure(&self, now: Time, limits: &Limits) -> bool {
+        let (Some(measure), Some(clock)) = (self.measure, self.clock) else { return false };
+        clock.confirmed && measure.is_settled(now, limits) && fits(&measure, &clock, now, limits)
     }
 
     fn measure_anew(&mut self, now: Time, lag: u32, ahead: u32) -> Hearing {
@@ -436,12 +456,10 @@ impl Session {
     /// Whether anything may be told now.
     pub fn trusted(&self, now: Time, limits: &Limits) -> bool {
         let (Some(measure), Some(clock), false) = (self.measure, self.clock, self.void.get()) else { return false };
-        let settled = now.since(measure.begun).is_some_and(|t| t >= limits.sum_us()) && measure.count >= ENOUGH;
+        let settled = measure.is_settled(now, limits);
         // later than this every map has aged, and before it no number comes again
         let current = now.since(self.map_heard).is_some_and(|t| t <= u64::from(limits.max_age_us));
-        // by the header's clock the fastest map frame was in time
-        let over = difference(measure.least(now) + limits.max_delay_us, clock.lag(now));
-        let fits = over <= 2 * limits.max_delay_us + MARGIN_US;
+        let fits = fits(&measure, &clock, now, limits);
         let sure = clock.confirmed || !self.doubt;
         settled && current && fits && sure && !self.conflicting(now) && !self.speaks_otherwise(now)
     }
@@ -450,6 +468,12 @@ impl Session {
     pub fn fresh(&self, now: Time, scan: ScanNumber, limits: &Limits) -> bool {
         self.age_us(now, scan).saturating_add(MARGIN_US) <= limits.max_age_us
     }
+}
+
+/// Whether by the header's clock the fastest map frame was in time.
+fn fits(measure: &Measure, clock: &SenderClock, now: Time, limits: &Limits) -> bool {
+    let over = difference(measure.least(now) + limits.max_delay_us, clock.lag(now));
+    over <= 2 * limits.max_delay_us + MARGIN_US
 }
 
 /// Whether a sign still counts.
@@ -595,6 +619,48 @@ mod tests {
         assert!(!s.trusted(ms(1560), &LIMITS));
         assert!(!s.hear_clock(ms(1560), &clock(1550), &LIMITS), "the header's");
         assert!(s.trusted(ms(1560), &LIMITS));
+    }
+
+    #[test]
+    fn a_frame_ahead_of_a_clock_that_is_confirmed_is_an_echo_and_changes_nothing() {
+        let mut s = trusting();
+        s.hear_clock(ms(430), &clock(410), &LIMITS);
+        // 4.5 s late, which looks like 0.6 s fast
+        assert_eq!(s.hear(ms(500), scan(500 + 5120 - 4500), &LIMITS), Hearing::Beyond);
+        assert!(s.trusted(ms(500), &LIMITS));
+        assert_eq!(s.hear(ms(510), scan(480), &LIMITS), Hearing::InTime);
+        // a sender whose clock was set forward by 0.6 s is heard from its next header on
+        assert_eq!(s.hear(ms(520), scan(1100), &LIMITS), Hearing::Beyond);
+        assert!(!s.hear_clock(ms(530), &clock(1110), &LIMITS));
+        assert_eq!(s.hear(ms(540), scan(1120), &LIMITS), Hearing::Anew);
+    }
+
+    #[test]
+    fn a_queue_that_drains_down_to_a_measure_of_one_frame_is_not_trusted() {
+        let mut s = begun(0, 3);
+        s.hear_clock(ms(900), &clock(0), &LIMITS);
+        // a frame 900 ms late; then others, later still, which shorten
+        assert_eq!(s.hear(ms(910), scan(0), &LIMITS), Hearing::Anew);
+        assert_eq!(s.hear(ms(2000), scan(400), &LIMITS), Hearing::Late);
+        for k in 0..20 {
+            let hearing = s.hear(ms(2500 + k), scan(1580 + 4 * k), &LIMITS);
+            assert_eq!(hearing, if k == 0 { Hearing::Anew } else { Hearing::InTime }, "{k}");
+            // by then also the clock agrees
+            s.hear_clock(ms(2500 + k), &clock(1600 + k), &LIMITS);
+            assert!(!s.trusted(ms(2500 + k), &LIMITS), "{k}");
+        }
+        // frames that go on to come are enough after A + D
+        for k in 1..10 {
+            assert_eq!(s.hear(ms(2500 + 50 * k), scan(1650 + 50 * k), &LIMITS), Hearing::InTime);
+        }
+        assert!(s.trusted(ms(2950), &LIMITS), "a delay that stays");
+    }
+
+    #[test]
+    fn a_pause_after_which_a_settled_measure_goes_on_costs_nothing() {
+        let mut s = trusting();
+        assert_eq!(s.hear(ms(1400), scan(1370), &LIMITS), Hearing::InTime);
+        assert!(s.trusted(ms(1400), &LIMITS));
     }
 
     #[test]

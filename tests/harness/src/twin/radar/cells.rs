@@ -13,7 +13,7 @@
 use std::collections::BTreeMap;
 
 use super::Radar;
-use super::echoes::Echo;
+use super::echo::Echo;
 use crate::twin::random::Dice;
 
 /// Range, Doppler and azimuth bin.

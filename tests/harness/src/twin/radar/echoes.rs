@@ -13,49 +13,16 @@
 //! - A. Locatelli et al., "Multipath Model Improvement for Automotive Radar Application", EuCAP 2024.
 
 use super::Radar;
+use super::echo::{Echo, Seen, fading, radial};
 use super::mirrors;
-use crate::geometry::pose::Spherical;
 use crate::twin::random::Dice;
 use crate::twin::scatter::Scatterer;
 use crate::twin::world::World;
-
-/// Power from one place, before the sensor resolves anything.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Echo {
-    pub range_m: f64,
-    pub azimuth_rad: f64,
-    pub elevation_rad: f64,
-    /// Receding, m/s.
-    pub velocity_mps: f64,
-    /// Field in units of the noise: real and imaginary part.
-    pub amplitude: [f64; 2],
-}
-
-impl Echo {
-    pub fn power(&self) -> f64 {
-        self.amplitude[0].powi(2) + self.amplitude[1].powi(2)
-    }
-}
 
 /// Echoes weaker than this are not followed, of the noise's power: nothing is detected at a tenth of it.
 const FAINTEST: f64 = 0.1;
 /// Farthest the measured elevation swings beyond target or image, in their distance.
 const GLINT: f64 = 1.0;
-
-/// A scatterer under way: where it is seen and how strongly.
-#[derive(Debug, Clone, Copy)]
-pub struct Seen {
-    pub place: [f64; 3],
-    pub seen: Spherical,
-    /// Road frame, m/s.
-    pub velocity: [f64; 2],
-    /// Mean RCS towards the sensor, dBsm.
-    pub rcs_dbsm: f64,
-    /// One-way gain of its direction, dB.
-    pub gain_db: f64,
-    /// Behind its own vehicle's glass.
-    pub inside: bool,
-}
 
 /// All echoes of one instant; `noise` is the noise's power, 1 where nothing disturbs.
 pub fn collect(radar: &Radar, world: &World, returns: &[&[Scatterer]], noise: f64, dice: &mut Dice) -> Vec<Echo> {
@@ -87,11 +54,6 @@ pub fn collect(radar: &Radar, world: &World, returns: &[&[Scatterer]], noise: f6
     mirrors::ghosts(radar, world, &strong, noise, dice, &mut echoes);
     echoes.retain(|e| e.power() >= FAINTEST);
     echoes
-}
-
-/// A gamma-distributed factor of mean 1.
-pub fn fading(shape: u32, dice: &mut Dice) -> f64 {
-    if shape == 0 { 1.0 } else { (0..shape).map(|_| dice.exponential()).sum::<f64>() / f64::from(shape) }
 }
 
 /// A scatterer as the sensor would see it with nothing in between; `None` outside of the field of view and
@@ -178,12 +140,6 @@ fn ways(
     let pull = (thrown[0] * sum[0] + thrown[1] * sum[1]) / (sum[0].powi(2) + sum[1].powi(2)).max(1e-6);
     let pull = pull.clamp(-GLINT, 1.0 + GLINT);
     add(seen.seen.range_m, seen.seen.elevation_rad + pull * apart_rad, square(sum));
-}
-
-/// Radial velocity of a place that moves, + receding.
-pub fn radial(place: [f64; 3], velocity: [f64; 2], eye: [f64; 3]) -> f64 {
-    let d = [place[0] - eye[0], place[1] - eye[1], place[2] - eye[2]];
-    (d[0] * velocity[0] + d[1] * velocity[1]) / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
 }
 
 #[cfg(test)]

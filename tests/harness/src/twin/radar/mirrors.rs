@@ -7,7 +7,7 @@
 //! Faces are the long sides of trucks and buses and of structures that state a loss.
 
 use super::Radar;
-use super::echoes::{Echo, Seen, fading, radial};
+use super::echo::{Echo, Seen, fading, radial};
 use crate::twin::random::Dice;
 use crate::twin::world::{Face, World};
 

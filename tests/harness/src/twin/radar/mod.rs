@@ -9,6 +9,7 @@ pub mod antenna;
 pub mod cells;
 pub mod detector;
 pub mod disturbance;
+pub mod echo;
 pub mod echoes;
 pub mod measure;
 pub mod mirrors;
