@@ -24,121 +24,26 @@
 //! # Limits
 //! 50 scans a second. Two maps of `A` rays for each of `P` planes.
 
-use super::code::block::Kind;
+mod config;
+mod messages;
+mod pace;
+
+pub use config::{BroadcastConfig, Medium};
+
+use self::config::within;
+use self::pace::Every;
 use super::frame::{CanFrame, fd_length};
-use super::header::{Clock, GROUPS, Header};
-use super::layer::{Layer, Next, Telling};
+use super::header::{GROUPS, Header};
+use super::layer::{Layer, Next};
 use super::layers::Layers;
-use super::map_message::{self, LIMITS, SEGMENTS};
-use super::message::{Addresses, Epoch, Message, Packet, Packing, Part, Plane, Word};
+use super::message::{Epoch, Message, Packet, Packing, Plane};
 use super::scan_number::ScanNumber;
 #[cfg(feature = "secoc")]
 use super::secoc::{Key, Sealer};
 use super::serial;
-use super::status::{PAGES, Status};
-use super::visible_range;
+use super::status::Status;
 use crate::fixed::time::Time;
-use crate::sensor::config::{ConfigError, Problem};
-
-/// What messages travel on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Medium {
-    /// Classic CAN: frames of 8 bytes.
-    Can(Addresses),
-    /// CAN FD: frames of up to 64 bytes.
-    CanFd(Addresses),
-    /// A serial line.
-    Serial,
-}
-
-impl Medium {
-    /// How messages are packed for it.
-    pub const fn packing(&self, secured: bool) -> Packing {
-        match self {
-            Self::Can(_) => Packing::Classic,
-            Self::CanFd(_) | Self::Serial if secured => Packing::Secured,
-            Self::CanFd(_) | Self::Serial => Packing::Long,
-        }
-    }
-}
-
-/// How a sender behaves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct BroadcastConfig {
-    /// The sensor's number, 0 to 7 with 11-bit identifiers.
-    pub sensor: u8,
-    /// What messages travel on.
-    pub medium: Medium,
-    /// Least time between two frames, microseconds.
-    pub gap_us: u32,
-    /// Age at which a map is not sent any more, milliseconds.
-    pub stale_ms: u16,
-    /// Greatest age of a map at its receivers, milliseconds.
-    pub max_age_ms: u16,
-    /// Greatest delay from measurement to reception, milliseconds.
-    pub max_delay_ms: u16,
-    /// Time between two status messages, milliseconds; at most 500.
-    pub status_ms: u16,
-    /// Time in which the whole header, and the freshness value, is sent once, milliseconds.
-    pub header_ms: u16,
-    /// Whether messages carry an authenticator; they are then taken by `Broadcaster::next_sealed`. Not on
-    /// classic CAN, whose frames have no room for it.
-    pub secured: bool,
-    /// Time in which the visible range of all azimuths is sent once, milliseconds; `None` for never.
-    pub visible_range_ms: Option<u16>,
-}
-
-impl BroadcastConfig {
-    /// The defaults for a sensor.
-    pub const fn new(sensor: u8, medium: Medium) -> Self {
-        Self {
-            sensor,
-            medium,
-            gap_us: 1000,
-            stale_ms: 100,
-            max_age_ms: 300,
-            max_delay_ms: 100,
-            status_ms: 250,
-            header_ms: 490,
-            secured: false,
-            visible_range_ms: None,
-        }
-    }
-
-    /// Checks it.
-    ///
-    /// # Errors
-    /// Names the first parameter outside its limits.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        let most_sensor = match self.medium {
-            Medium::Can(addresses) | Medium::CanFd(addresses) => addresses.most_sensor(),
-            Medium::Serial => u8::MAX,
-        };
-        within("broadcast.sensor", u32::from(self.sensor), 0, u32::from(most_sensor))?;
-        let most_secured = u32::from(!matches!(self.medium, Medium::Can(_)));
-        within("broadcast.secured", u32::from(self.secured), 0, most_secured)?;
-        within("broadcast.gap_us", self.gap_us, 0, 20_000)?;
-        within("broadcast.stale_ms", u32::from(self.stale_ms), 10, u32::from(self.max_delay_ms))?;
-        // half a period of the scan numbers is more than both together
-        within("broadcast.max_age_ms", u32::from(self.max_age_ms), 50, 1000)?;
-        within("broadcast.max_delay_ms", u32::from(self.max_delay_ms), 10, 500)?;
-        within("broadcast.status_ms", u32::from(self.status_ms), 10, 500)?;
-        within("broadcast.header_ms", u32::from(self.header_ms), 10, 500)?;
-        within("broadcast.visible_range_ms", u32::from(self.visible_range_ms.unwrap_or(100)), 10, 60_000)
-    }
-}
-
-#[allow(clippy::cast_precision_loss)] // for the message only
-#[inline(never)]
-fn within(parameter: &'static str, value: u32, min: u32, max: u32) -> Result<(), ConfigError> {
-    if (min..=max).contains(&value) {
-        return Ok(());
-    }
-    let problem = Problem::OutOfLimits { min: min as f32, max: max as f32 };
-    Err(ConfigError { parameter, value: value as f32, problem })
-}
+use crate::sensor::config::ConfigError;
 
 /// Age of the last whole refresh at which the next is due, ticks of 20 ms.
 const REFRESH_TICKS: u8 = 9;
@@ -151,30 +56,6 @@ pub enum NotSent {
     TooSoon,
     /// The epoch is new and nothing of the old one may be under way.
     Quiet,
-}
-
-/// A moment that comes again and again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Every {
-    next: Time,
-    period_us: u64,
-}
-
-impl Every {
-    fn new(now: Time, period_us: u64) -> Self {
-        Self { next: now, period_us }
-    }
-
-    /// Whether it has come; a clock that stepped back does not put it off by more than a period.
-    fn due(&self, now: Time) -> bool {
-        self.next.since(now).is_none_or(|wait| wait == 0 || wait > self.period_us)
-    }
-
-    fn done(&mut self, now: Time) {
-        let late = now.since(self.next).unwrap_or(u64::MAX);
-        let from = if late < self.period_us { self.next } else { now };
-        self.next = Time::from_micros(from.micros() + self.period_us);
-    }
 }
 
 /// A block or a ray on its way, message by message.
@@ -482,139 +363,6 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     fn packet(&self, message: Message, own: &[u8]) -> Packet {
         Packet::new(self.packing(), self.config.sensor, message, self.epoch, own)
-    }
-
-    fn status_packet(&mut self, now: Time) -> Option<Packet> {
-        if !self.status_due.due(now) {
-            return None;
-        }
-        self.status_due.done(now);
-        let uptime_s = now.since(self.started).unwrap_or(0) / 1_000_000;
-        self.status.uptime_s = u32::try_from(uptime_s).unwrap_or(u32::MAX);
-        self.status.wire_version = super::message::WIRE_VERSION;
-        if !self.packing().is_classic() {
-            return Some(self.packet(Message::Status, &self.status.emit()));
-        }
-        let own = self.status.emit_page(self.page);
-        self.page = (self.page + 1) % PAGES;
-        Some(self.packet(Message::Status, &own))
-    }
-
-    fn header_packet(&mut self, now: Time) -> Option<Packet> {
-        if self.groups_first > 0 {
-            self.groups_first -= 1;
-            self.header_due.next = Time::from_micros(now.micros() + self.header_due.period_us);
-        } else if self.header_due.due(now) {
-            self.header_due.done(now);
-        } else {
-            return None;
-        }
-        let clock = Clock { time_ms: now.micros() / 1000, synchronised: self.synchronised };
-        if !self.packing().is_classic() {
-            return Some(self.packet(Message::Header, &self.header.emit(&clock)));
-        }
-        let own = self.header.emit_group(&clock, self.group);
-        self.group = (self.group + 1) % GROUPS;
-        Some(self.packet(Message::Header, &own))
-    }
-
-    /// Room for the freshness value.
-    fn freshness_packet(&mut self, now: Time) -> Option<Packet> {
-        if !self.config.secured || !self.freshness_due.due(now) {
-            return None;
-        }
-        self.freshness_due.done(now);
-        Some(self.packet(Message::Freshness, &[0; 8]))
-    }
-
-    fn map_packet(&mut self, now: Time) -> Option<Packet> {
-        let scan = self.scan.as_ref()?;
-        if now.since(scan.measured).is_none_or(|age| age > u64::from(self.config.stale_ms) * 1000) {
-            self.drop_scan();
-            return None;
-        }
-        if scan.running.is_none() {
-            let running = self.next_running(scan.all)?;
-            self.scan.as_mut()?.running = Some(running);
-        }
-        let scan = self.scan.as_ref()?;
-        let (running, number) = (scan.running.as_ref()?, scan.number);
-        let (packet, last) = self.message(number, running)?;
-        if !last {
-            self.scan.as_mut()?.running.as_mut()?.sent += 1;
-            return Some(packet);
-        }
-        let (kind, start, end) = match running.next {
-            Next::Block { kind, start, ref block } => (Some(kind), start, block.end),
-            Next::Plain { azimuth } => (None, azimuth, azimuth + 1),
-        };
-        self.layers.get_mut(running.plane)?.told(kind, start, end, number);
-        self.from = end;
-        self.scan.as_mut()?.running = None;
-        if self.layers.iter().all(|layer| layer.pending() == 0) {
-            // complete: the next one begins at the right edge again
-            (self.scan, self.from) = (None, 0);
-        }
-        Some(packet)
-    }
-
-    fn next_running(&mut self, all: bool) -> Option<Running> {
-        let telling = Telling { context: self.header.context(self.packing().form()), all };
-        let from = self.from;
-        let mut layers = self.layers.iter_mut().enumerate();
-        layers.find_map(|(plane, layer)| layer.next(&telling, from).map(|next| Running { plane, next, sent: 0 }))
-    }
-
-    /// The message that is next of a block or a ray, and whether it is the last.
-    fn message(&self, scan: ScanNumber, running: &Running) -> Option<(Packet, bool)> {
-        let sent = usize::from(running.sent);
-        let long = !self.packing().is_classic();
-        let plane = Plane::ALL.get(running.plane).copied()?;
-        let packet = |part, own: &[u8]| self.packet(Message::Map(plane, part), own);
-        match running.next {
-            Next::Block { kind, start, ref block } => {
-                let first = if kind == Kind::Refresh { Part::Refresh } else { Part::Delta };
-                if long {
-                    let (own, length) = map_message::words(scan, start, block.words());
-                    return Some((packet(first, own.get(..length)?), true));
-                }
-                let part = Word::at(sent).map_or(first, Part::More);
-                let own = map_message::word(scan, start, *block.words().get(sent)?);
-                Some((packet(part, &own), sent + 1 == block.words().len()))
-            }
-            Next::Plain { azimuth } => {
-                let ray = self.layers.get(running.plane)?.now(azimuth);
-                if long {
-                    let (own, length) = map_message::plain(scan, azimuth, ray);
-                    return Some((packet(Part::Plain, own.get(..length)?), true));
-                }
-                let mut segments = [LIMITS]
-                    .into_iter()
-                    .chain(0..SEGMENTS)
-                    .filter(|s| map_message::has_segment(ray.known, *s))
-                    .skip(sent);
-                let own = map_message::segment(scan, azimuth, ray, segments.next()?);
-                Some((packet(Part::Plain, &own), segments.next().is_none()))
-            }
-        }
-    }
-
-    fn range_packet(&mut self, now: Time) -> Option<Packet> {
-        let mut due = self.range_due.filter(|due| due.due(now))?;
-        let measured = self
-            .last
-            .filter(|last| now.since(*last).is_some_and(|age| age <= u64::from(self.config.stale_ms) * 1000))?;
-        due.done(now);
-        self.range_due = Some(due);
-        let azimuths = usize::from(self.header.azimuths);
-        let most = self.packing().most_own() - 2;
-        let first = self.range_from;
-        self.range_from = if first + most < azimuths { first + most } else { 0 };
-        let layer = self.layers.first()?;
-        let steps =
-            (first..(first + most).min(azimuths)).map(|a| visible_range::steps(layer.now(a), self.header.cell_cm));
-        let (own, length) = visible_range::emit(ScanNumber::at(measured), first, steps);
-        Some(self.packet(Message::VisibleRange, own.get(..length)?))
     }
 }
 
