@@ -1,8 +1,8 @@
-//! One plane of a map on its way out: which azimuths are still to be told, and on what they build.
+//! One plane of a map on its way out: which azimuths are still to be encoded, and on what they build.
 //!
 //! # Model
-//! Azimuths are told in runs of the same kind. One that was refreshed not long ago, whose known cells
-//! are as they were, is told against that refresh; any other is refreshed. An azimuth that no block
+//! Azimuths are encoded in runs of the same kind. One that was refreshed not long ago, whose known cells
+//! are as they were, is encoded against that refresh; any other is refreshed. An azimuth that no block
 //! can hold goes out in plain bits. Only what was handed out whole is built upon.
 
 use super::code::block::{Block, Context, Kind, Rays};
@@ -16,9 +16,9 @@ pub(super) type Azimuths = Bits<4>;
 /// Most ticks between a refresh and a delta on it.
 pub const MOST_TICKS: u8 = 16;
 
-/// How a scan is told.
+/// How a scan is encoded.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Telling {
+pub(super) struct Encoding {
     pub context: Context,
     /// Whether everything is refreshed.
     pub all: bool,
@@ -36,7 +36,7 @@ pub(super) enum Next {
 /// A plane as it is sent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layer<const A: usize, const W: usize> {
-    /// The scan being told.
+    /// The scan being encoded.
     now: [Ray<W>; A],
     pending: Azimuths,
     /// The refresh of each azimuth, and its scan.
@@ -44,20 +44,20 @@ pub(super) struct Layer<const A: usize, const W: usize> {
     was_scan: [ScanNumber; A],
     /// Which azimuths have one to build on.
     refreshed: Azimuths,
-    /// How many ticks older it is than the scan being told, where it may be built on; else 0.
+    /// How many ticks older it is than the scan being encoded, where it may be built on; else 0.
     ticks: [u8; A],
 }
 
-/// The azimuths of a layer that are told in one way, from a start on.
+/// The azimuths of a layer that are encoded in one way, from a start on.
 struct Run<'a, const A: usize, const W: usize> {
     layer: &'a Layer<A, W>,
     kind: Kind,
-    telling: &'a Telling,
+    encoding: &'a Encoding,
 }
 
 impl<const A: usize, const W: usize> Rays<W> for Run<'_, A, W> {
     fn now(&self, azimuth: usize) -> Option<&Ray<W>> {
-        let pending = self.layer.pending.get(azimuth) && self.layer.kind(azimuth, self.telling) == self.kind;
+        let pending = self.layer.pending.get(azimuth) && self.layer.kind(azimuth, self.encoding) == self.kind;
         self.layer.now.get(azimuth).filter(|_| pending)
     }
 
@@ -67,7 +67,7 @@ impl<const A: usize, const W: usize> Rays<W> for Run<'_, A, W> {
 }
 
 impl<const A: usize, const W: usize> Layer<A, W> {
-    /// Nothing to tell. All bits are 0, so that no image holds a copy.
+    /// Nothing to encode. All bits are 0, so that no image holds a copy.
     pub const fn new() -> Self {
         Self {
             now: [Ray::UNKNOWN; A],
@@ -79,7 +79,7 @@ impl<const A: usize, const W: usize> Layer<A, W> {
         }
     }
 
-    /// Takes a scan; what was still to be told of the one before is not told any more.
+    /// Takes a scan; what was still to be encoded of the one before is not encoded any more.
     pub fn offer(&mut self, scan: ScanNumber, azimuths: usize, ray: impl Fn(usize) -> Ray<W>) {
         self.pending = Azimuths::span(0, azimuths.min(A));
         let was = self.was.iter().zip(&self.was_scan);
@@ -102,29 +102,29 @@ impl<const A: usize, const W: usize> Layer<A, W> {
         self.pending = Azimuths::NONE;
     }
 
-    /// Azimuths still to be told.
+    /// Azimuths still to be encoded.
     pub fn pending(&self) -> u32 {
         self.pending.count()
     }
 
-    /// Tells no more of this scan.
+    /// Encodes no more of this scan.
     pub fn give_up(&mut self) {
         self.pending = Azimuths::NONE;
     }
 
-    /// How an azimuth is told.
-    fn kind(&self, azimuth: usize, telling: &Telling) -> Kind {
+    /// How an azimuth is encoded.
+    fn kind(&self, azimuth: usize, encoding: &Encoding) -> Kind {
         match self.ticks.get(azimuth) {
-            Some(&ticks @ 1..) if !telling.all => Kind::Delta { ticks },
+            Some(&ticks @ 1..) if !encoding.all => Kind::Delta { ticks },
             _ => Kind::Refresh,
         }
     }
 
     /// What goes out next, looking from an azimuth on and then from the first.
-    pub fn next(&mut self, telling: &Telling, from: usize) -> Option<Next> {
+    pub fn next(&mut self, encoding: &Encoding, from: usize) -> Option<Next> {
         let start = self.pending.next(from).or_else(|| self.pending.next(0))?;
-        let mut kind = self.kind(start, telling);
-        let mut block = self.block(telling, kind, start);
+        let mut kind = self.kind(start, encoding);
+        let mut block = self.block(encoding, kind, start);
         if block.end == start && kind != Kind::Refresh {
             // against its refresh it does not fit
             self.refreshed.clear(start);
@@ -132,7 +132,7 @@ impl<const A: usize, const W: usize> Layer<A, W> {
                 *ticks = 0;
             }
             kind = Kind::Refresh;
-            block = self.block(telling, kind, start);
+            block = self.block(encoding, kind, start);
         }
         if kind == Kind::Refresh {
             // receivers may take any part of it
@@ -141,13 +141,13 @@ impl<const A: usize, const W: usize> Layer<A, W> {
         Some(if block.end == start { Next::Plain { azimuth: start } } else { Next::Block { kind, start, block } })
     }
 
-    fn block(&self, telling: &Telling, kind: Kind, start: usize) -> Block {
-        let run = Run { layer: self, kind, telling };
-        Block::new(&telling.context, kind, start, &run)
+    fn block(&self, encoding: &Encoding, kind: Kind, start: usize) -> Block {
+        let run = Run { layer: self, kind, encoding };
+        Block::new(&encoding.context, kind, start, &run)
     }
 
-    /// What was handed out whole is told.
-    pub fn told(&mut self, kind: Option<Kind>, start: usize, end: usize, scan: ScanNumber) {
+    /// What was handed out whole is encoded.
+    pub fn encoded(&mut self, kind: Option<Kind>, start: usize, end: usize, scan: ScanNumber) {
         for azimuth in start..end.min(A) {
             self.pending.clear(azimuth);
             if kind == Some(Kind::Refresh) {
@@ -162,7 +162,7 @@ impl<const A: usize, const W: usize> Layer<A, W> {
         }
     }
 
-    /// An azimuth of the scan being told.
+    /// An azimuth of the scan being encoded.
     pub fn now(&self, azimuth: usize) -> &Ray<W> {
         self.now.get(azimuth).unwrap_or(&Ray::UNKNOWN)
     }

@@ -23,7 +23,7 @@ pub const WIRE_VERSION: u8 = 1;
 /// Message numbers of a sensor.
 pub const MESSAGES: usize = 32;
 
-/// Bytes of an authenticator, behind the own bytes of a secured message.
+/// Bytes of an authenticator, after the own bytes of a secured message.
 pub const SEAL_BYTES: usize = 8;
 
 /// In a long message's byte 5: it is secured.
@@ -213,7 +213,7 @@ impl Addresses {
     #[allow(clippy::cast_possible_truncation)] // at most 255
     pub const fn most_sensor(&self) -> u8 {
         let (most, sensors) = match self.base {
-            // eight sensors on 11 bits leave the identifiers behind them alone
+            // eight sensors on 11 bits leave the identifiers after them alone
             CanId::Standard(_) => (0x7FF, 7),
             CanId::Extended(_) => (0x1FFF_FFFF, 255),
         };
@@ -452,7 +452,7 @@ pub struct Received<'a> {
     pub epoch: Epoch,
     /// The protection's counter.
     pub counter: u8,
-    /// The message's own bytes; in a sealed message with the authenticator behind them.
+    /// The message's own bytes; in a sealed message with the authenticator after them.
     pub own: &'a [u8],
     /// Whether it is secured and nobody has looked at the authenticator yet.
     pub sealed: bool,

@@ -1,6 +1,6 @@
 //! The number of a scan: when it was measured, in ticks of 20 ms of the sender's clock, modulo 256.
 //!
-//! One byte orders the scans of the last 2.5 s, tells a delta its refresh, and lets a receiver see how
+//! One byte orders the scans of the last 2.5 s, gives a delta its refresh, and lets a receiver see how
 //! late a frame is and how old a map has become, without any set clock: the frame that was fastest
 //! shows how the two clocks lie to each other.
 //!

@@ -8,7 +8,7 @@
 //!
 //! # Limits
 //! A forged message passes once in 2^48. More than 65 535 messages lost in a row are made up for by the
-//! next freshness message. A receiver that keeps no value over its restarts can be told an old one by
+//! next freshness message. A receiver that keeps no value over its restarts can be shown an old one by
 //! repeated messages, until the first freshness message of the real sender; hand the last value to
 //! [`Opener::resume`].
 //!
@@ -72,7 +72,7 @@ impl<K: Key> Sealer<K> {
         self.freshness
     }
 
-    /// Puts the authenticator behind a message's own bytes; filled up first to a length CAN FD has.
+    /// Puts the authenticator after a message's own bytes; filled up first to a length CAN FD has.
     #[must_use]
     pub(super) fn seal(&mut self, mut packet: Packet, can_fd: bool) -> Packet {
         self.freshness = self.freshness.saturating_add(1);

@@ -113,7 +113,7 @@ impl Reason {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetCause {
-    /// Not told.
+    /// Not given.
     #[default]
     Unknown,
     /// Power came.

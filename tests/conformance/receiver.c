@@ -17,7 +17,7 @@ static void make_table(void) {
 
 /* 0 unknown, 1 not visible, 2 visible. */
 static int state_of(const sensor_t *s, uint64_t now, int a, int c) {
-    return told(s, now, a) && c >= s->now[a].near && c < s->now[a].end ? 1 + s->now[a].bit[c] : 0;
+    return shown(s, now, a) && c >= s->now[a].near && c < s->now[a].end ? 1 + s->now[a].bit[c] : 0;
 }
 
 /* Bytes of hexadecimal digits; how many, at most `most`. */

@@ -422,7 +422,7 @@ class Receiver:
         self.stuffed += rest
 
     def look(self, t):
-        """What `states_of` says of each azimuth, azimuth 0 first; None if nothing is told."""
+        """What `states_of` says of each azimuth, azimuth 0 first; None if nothing is shown."""
         return self.sensor.look(self.time(t))
 
 

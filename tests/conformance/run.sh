@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs a receiver, any program with its arguments, over the logs beside this and says what it tells differently.
+# Runs a receiver, any program with its arguments, over the logs beside this and says what it shows differently.
 # Exit status: 0 nothing, 1 something, 2 the receiver cannot be run. See README.md.
 set -u
 here=$(CDPATH='' cd -- "$(dirname "$0")" && pwd)
@@ -59,7 +59,7 @@ for log in "$here/logs/$only"*.in.gz; do
     if reference <"$scratch/asked" 2>/dev/null | tail -n 1 >"$scratch/expected-cells" && [ -s "$scratch/expected-cells" ]; then
         awk 'NR == 1 { rows = NF - 1; for (i = 1; i <= rows; i++) expected[i] = $(i + 1); next }
             {
-                if (rows == 0 || NF == 1) { print "  cells: " (rows ? "told are expected, none are" : "none are expected, some are told"); exit }
+                if (rows == 0 || NF == 1) { print "  cells: " (rows ? "shown are expected, none are" : "none are expected, some are shown"); exit }
                 for (i = 1; i <= rows || i < NF; i++) for (c = 1; c <= length(expected[i]) || c <= length($(i + 1)); c++)
                     if (substr(expected[i], c, 1) != substr($(i + 1), c, 1)) {
                         printf "  cell: azimuth %d, range %d: expected `%s`, got `%s`\n", i - 1, c - 1, substr(expected[i], c, 1), substr($(i + 1), c, 1)

@@ -3,7 +3,7 @@
  *     cc -O2 -o receiver receiver.c && ./receiver LOG [KEY]
  *
  * Reads a log of `candump -L` (classic CAN and CAN FD, sensors 0 to 7 from 0x400 on, the visibility plane), or of a serial line, chunk by
- * chunk: `(seconds) device bytes`. With a key, 32 hexadecimal digits, it takes authenticated messages and no others. Prints, whenever 100 ms of the log are over, for every sensor whose map is told:
+ * chunk: `(seconds) device bytes`. With a key, 32 hexadecimal digits, it takes authenticated messages and no others. Prints, whenever 100 ms of the log are over, for every sensor whose map is shown:
  *
  *     microseconds sensor visible invisible hash
  *
@@ -284,15 +284,15 @@ static bool block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
             expected = before;
         }
         int row = delta ? (first ? 3 : 4 + (unchanged ? 0 : 2) + (as_expected ? 0 : 1)) : (first ? 0 : as_expected ? 1 : 2);
-        int told = symbol(&n, RAY[row][edge_from(&expected, 0) >= 0], 3);
-        if (told < 0) return false;
-        if (told == 0) {
+        int way = symbol(&n, RAY[row][edge_from(&expected, 0) >= 0], 3);
+        if (way < 0) return false;
+        if (way == 0) {
             ray = expected;
         } else {
             ray = NOTHING;
             ray.near = expected.near;
             ray.end = expected.end;
-            if (told == 2) {
+            if (way == 2) {
                 if (delta) return true;
                 int near = limit(&n, expected.near);
                 int end = n.out || near < 0 ? -1 : limit(&n, expected.end);
@@ -502,7 +502,7 @@ static bool trusted(const sensor_t *s, uint64_t now) {
            !lasts(s->conflict, now) && !lasts(s->other_version, now);
 }
 
-static bool told(const sensor_t *s, uint64_t now, int a) {
+static bool shown(const sensor_t *s, uint64_t now, int a) {
     return s->there[a] && behind(lag_of(now, s->now_scan[a]), least(s, now)) + MARGIN_US <= A_US;
 }
 
@@ -753,7 +753,7 @@ static void print_maps(uint64_t now) {
         uint64_t hash = UINT64_C(14695981039346656037);
         for (int a = 0; a < s->azimuths; a++)
             for (int c = 0; c < s->ranges; c++) {
-                bool is_known = told(s, now, a) && c >= s->now[a].near && c < s->now[a].end;
+                bool is_known = shown(s, now, a) && c >= s->now[a].near && c < s->now[a].end;
                 int state = is_known ? 1 + s->now[a].bit[c] : 0;
                 visible += state == 2;
                 invisible += state == 1;

@@ -73,9 +73,9 @@ fn every_authenticated_message_reads_as_it_was_sent() {
             Message::Map(..) => assert_eq!(got["Azimuth"], f64::from(opened.own[1])),
             Message::VisibleRange => {
                 let ranges = Ranges::parse(opened.own).unwrap();
-                let told = (0..128).filter_map(|a| Some((a, got.get(&format!("Visible_Range_{a:03}"))?)));
-                assert!(told.clone().count() >= 1);
-                told.for_each(|(a, metres)| assert_eq!(ranges.metres(a).map(f64::from).unwrap_or(0.0), *metres));
+                let shown = (0..128).filter_map(|a| Some((a, got.get(&format!("Visible_Range_{a:03}"))?)));
+                assert!(shown.clone().count() >= 1);
+                shown.for_each(|(a, metres)| assert_eq!(ranges.metres(a).map(f64::from).unwrap_or(0.0), *metres));
             }
             _ => {
                 assert_eq!((got["Freshness_Lowest"], got["Code"]), ((fresh & 0xFFFF) as f64, code as f64), "{name}");

@@ -271,10 +271,10 @@ fn a_receiver_written_from_the_specification_makes_the_same_maps() {
     for (name, scans, faults) in [("clean", 150, NONE), ("faulty", 1500, ALL)] {
         let sent = traffic(&[CLASSIC, FD, SERIAL], scans, faults, 5);
         let bare = Ours::Bare(Box::new(Receiver::new(ALL_SENSORS, Addresses::STANDARD, Limits::DEFAULT)));
-        let Some(told) = compare(name, bare, None, &sent) else { return };
+        let Some(shown) = compare(name, bare, None, &sent) else { return };
         // most of the 100 ms there are
         for sensor in [1, 6, 3] {
-            assert!(told[sensor] > scans * 67 / 100 * 4 / 10, "{name}: {} maps of sensor {sensor}", told[sensor]);
+            assert!(shown[sensor] > scans * 67 / 100 * 4 / 10, "{name}: {} maps of sensor {sensor}", shown[sensor]);
         }
     }
 }
@@ -295,18 +295,18 @@ fn with_a_key_it_makes_the_same_maps_of_authenticated_messages_and_of_no_others(
             let receiver = SecuredReceiver::new(ALL_SENSORS, Addresses::STANDARD, Limits::DEFAULT, &key);
             Ours::Secured(Box::new(receiver))
         };
-        let Some(told) = compare(name, secured(), Some(digits), &sent) else { return };
+        let Some(shown) = compare(name, secured(), Some(digits), &sent) else { return };
         for sensor in [6, 3] {
-            assert!(told[sensor] > scans * 67 / 100 * 4 / 10, "{name}: {} maps of sensor {sensor}", told[sensor]);
+            assert!(shown[sensor] > scans * 67 / 100 * 4 / 10, "{name}: {} maps of sensor {sensor}", shown[sensor]);
         }
-        assert_eq!([told[0], told[1], told[2]], [0; 3], "{name}");
+        assert_eq!([shown[0], shown[1], shown[2]], [0; 3], "{name}");
         // the receiver starts anew in the middle; and the keyless one hears the others only
         let begun = sent.len() / 2;
-        let told = compare(name, secured(), Some(digits), &sent[begun..]).unwrap();
-        assert!(told[6] > scans * 67 / 100 * 4 / 10 / 2 - 20, "{told:?}");
+        let shown = compare(name, secured(), Some(digits), &sent[begun..]).unwrap();
+        assert!(shown[6] > scans * 67 / 100 * 4 / 10 / 2 - 20, "{shown:?}");
         let bare = Ours::Bare(Box::new(Receiver::new(ALL_SENSORS, Addresses::STANDARD, Limits::DEFAULT)));
-        let told = compare(name, bare, None, &sent).unwrap();
-        assert!(told[1] > 0 && told[0] > 0 && told[2] + told[3] + told[6] == 0, "{told:?}");
+        let shown = compare(name, bare, None, &sent).unwrap();
+        assert!(shown[1] > 0 && shown[0] > 0 && shown[2] + shown[3] + shown[6] == 0, "{shown:?}");
     }
 }
 

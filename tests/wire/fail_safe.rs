@@ -2,8 +2,8 @@
 //!
 //! A bus that loses, truncates, delays, repeats and reorders frames, senders and receivers that start
 //! anew, queues that stand still and drain, clocks that drift, maps in which more than 5 % of the cells change per scan. Whenever the
-//! receiver tells an azimuth, the test looks for the scan it tells: of the receiver's epoch, measured
-//! at most A + D ago, with the same cells visible; never older than what was told or taken before.
+//! receiver shows an azimuth, the test looks for the scan it shows: of the receiver's epoch, measured
+//! at most A + D ago, with the same cells visible; never older than what was shown or taken before.
 //!
 //! A hundredth of a million scans by default, all of them with
 //! `cargo test --release --test wire fail_safe -- --include-ignored`.
@@ -28,7 +28,7 @@ const LIMITS: Limits = Limits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
 const DELAY_US: u64 = 100_000;
 /// Frames are displaced by so much; in every fifth world by almost the period of the scan numbers, less D, which
-/// is as safe, but tells little.
+/// is as safe, but shows little.
 const MOST_DISPLACED_US: [u64; 5] = [3_500_000, 3_500_000, 2_450_000, 3_500_000, 4_900_000];
 /// A bus or gateway stands still for at most as long.
 const MOST_STANDSTILL_US: u64 = 3_000_000;
@@ -39,7 +39,7 @@ type OnItsWay = Reverse<(u64, u64, Vec<u8>, u32)>;
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     scans: u64,
-    told: u64,
+    shown: u64,
     cells: u64,
     changed_up: u64,
     changed_down: u64,
@@ -65,7 +65,7 @@ struct World {
     queue_us: u64,
     drained: u64,
     loss: f64,
-    /// The newest scan of each azimuth that was told, or taken from a refresh that decodes alone; with
+    /// The newest scan of each azimuth that was shown, or taken from a refresh that decodes alone; with
     /// its epoch.
     newest: Vec<Option<(Epoch, u64)>>,
     tally: Tally,
@@ -162,7 +162,7 @@ impl World {
             let long = self.medium.packing(false) == Packing::Long;
             let frame = if long { CanFrame::fd(id, &data) } else { CanFrame::classic(id, &data) }.unwrap();
             let outcome = self.receiver.frame(Self::receiver_time(at), &frame);
-            // what decodes alone and was taken must not be told older afterwards
+            // what decodes alone and was taken must not be shown older afterwards
             if let (true, Ok(Accepted::Map { scan })) = (long, outcome) {
                 self.note_refresh(&frame, scan);
             }
@@ -206,28 +206,28 @@ impl World {
         let now = Self::receiver_time(us);
         let map = self.receiver.map(SENSOR, now);
         let Some(epoch) = self.receiver.sensor(SENSOR).unwrap().epoch() else { return };
-        let mut told_azimuths = 0;
+        let mut shown_azimuths = 0;
         for azimuth in 0..A {
             let Some(scan) = map.scan(azimuth) else { continue };
-            let told = map.ray(Plane::Visibility, azimuth);
+            let shown = map.ray(Plane::Visibility, azimuth);
             let Some((measured, sent)) = self.find(epoch, scan) else {
-                panic!("azimuth {azimuth} tells {scan:?}, which {epoch:?} never sent in the last seconds")
+                panic!("azimuth {azimuth} shows {scan:?}, which {epoch:?} never sent in the last seconds")
             };
             let sent = &sent.0[azimuth];
-            told_azimuths += 1;
+            shown_azimuths += 1;
             assert!(
                 us - measured <= AGE_AND_DELAY_US,
                 "azimuth {azimuth} is {} us old in world {}",
                 us - measured,
                 self.seed
             );
-            assert_eq!(told.bits().and(sent.bits()), *told.bits(), "visible what was not");
+            assert_eq!(shown.bits().and(sent.bits()), *shown.bits(), "visible what was not");
             if let Some((e, newest)) = self.newest[azimuth] {
                 assert!(e != epoch || newest <= measured, "azimuth {azimuth} went back by {} us", newest - measured);
             }
             self.newest[azimuth] = Some((epoch, measured));
         }
-        self.tally.told += told_azimuths;
+        self.tally.shown += shown_azimuths;
     }
 
     /// How much of the newest map is there.
@@ -332,7 +332,7 @@ fn worlds(count: u64) {
             world.run(1000);
             let t = world.tally;
             all.scans += t.scans;
-            all.told += t.told;
+            all.shown += t.shown;
             all.cells += t.cells;
             all.changed_up += t.changed_up;
             all.changed_down += t.changed_down;
@@ -349,7 +349,7 @@ fn worlds(count: u64) {
             100.0 * loss,
             all.scans,
             arrived,
-            all.told
+            all.shown
         );
         assert!(drained > 10 * count, "{drained} frames out of queues");
         assert!(up + down >= 5.0 && up > 2.0 && down > 2.0);

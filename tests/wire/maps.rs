@@ -212,8 +212,8 @@ fn stale_frames_are_dropped_and_every_azimuth_has_its_turn() {
     assert!(line.sender.idle() && line.sender.status_mut().dropped > 0);
 }
 
-/// Scan numbers come again after 5.12 s. Were late frames enough to keep a session's maps told, the last map
-/// that came in time would be told once more then.
+/// Scan numbers come again after 5.12 s. Were late frames enough to keep a session's maps shown, the last map
+/// that came in time would be shown once more then.
 #[test]
 fn late_frames_keep_no_map_until_its_number_comes_again() {
     let medium = Medium::Can(Addresses::STANDARD);
@@ -239,8 +239,8 @@ fn late_frames_keep_no_map_until_its_number_comes_again() {
             under_way.pop_front();
             late += u32::from(line.receiver.frame(ms(now), &frame) == Err(Refused::Late));
         }
-        let told = visible(&line, ms(now));
-        assert!(if now == 2000 { told > 1000 } else { now < 2300 || told == 0 }, "{told} cells at {now} ms");
+        let shown = visible(&line, ms(now));
+        assert!(if now == 2000 { shown > 1000 } else { now < 2300 || shown == 0 }, "{shown} cells at {now} ms");
     }
     assert!(late > 500, "{late}");
 }
@@ -288,10 +288,10 @@ fn a_clock_that_steps_back_between_looks_tells_nothing_until_a_new_session() {
         }
         line.pass(ms(now));
     }
-    let told = |line: &Line<1>, now| line.received(Plane::Visibility, ms(now)).iter().any(|ray| !ray.known.is_empty());
-    assert!(told(&line, 2000) && told(&line, 1985), "a look may be handed in a little later than it was");
+    let shown = |line: &Line<1>, now| line.received(Plane::Visibility, ms(now)).iter().any(|ray| !ray.known.is_empty());
+    assert!(shown(&line, 2000) && shown(&line, 1985), "a look may be handed in a little later than it was");
     // the cable is pulled, the clock is set back, and its old time comes once more
-    assert!(!told(&line, 1500) && !told(&line, 2001));
+    assert!(!shown(&line, 1500) && !shown(&line, 2001));
     assert_eq!(line.receiver.sensor(SENSOR).unwrap().condition(ms(2001), &Limits::DEFAULT), Condition::Waiting);
 }
 

@@ -71,8 +71,8 @@ fn equal(receiver: &Secured, sender: &Sender, now: u64) -> bool {
     map.header().is_some() && (0..A).all(|a| map.ray(Plane::Visibility, a) == sender.map.0[a])
 }
 
-/// Whether anything is told.
-fn tells(receiver: &Secured, now: u64) -> bool {
+/// Whether anything is shown.
+fn shows(receiver: &Secured, now: u64) -> bool {
     receiver.receiver().map(SENSOR, ms(now)).header().is_some()
 }
 
@@ -105,7 +105,7 @@ fn another_key_brings_nothing_and_every_message_is_counted() {
             sent += 1;
             let refused = deliver(&mut receiver, medium, now, &packet);
             assert_eq!(refused, Some(Refused::NotAuthentic(NotAuthentic::Code)));
-            assert!(!tells(&receiver, now));
+            assert!(!shows(&receiver, now));
         }
         assert_eq!((counters(&receiver).not_authentic, counters(&receiver).accepted), (sent, 0));
         assert_eq!(receiver.receiver().sensor(SENSOR).unwrap().epoch(), None, "not even its epoch");
@@ -129,7 +129,7 @@ fn without_an_authenticator_nothing_is_taken() {
             sent += 1;
             assert_eq!(receiver.frame(ms(now), &frame), Err(Refused::NotAuthentic(NotAuthentic::Bare)));
         }
-        assert!(sent > 50 && !tells(&receiver, 2999));
+        assert!(sent > 50 && !shows(&receiver, 2999));
     }
     // and who has no key leaves authenticated ones alone
     let mut keyless = Receiver::<1, A, W>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
@@ -168,7 +168,7 @@ fn repeated_messages_are_counted_and_do_nothing() {
     }
 }
 
-/// Milliseconds from a restart until maps are told again and equal.
+/// Milliseconds from a restart until maps are shown again and equal.
 fn until_equal(
     medium: Medium,
     sender: &mut Sender,
@@ -213,7 +213,7 @@ fn a_restarted_sender_is_understood_again_within_a_second() {
                 assert!(deliver(&mut receiver, medium, now, &packet).is_some());
             }
         }
-        assert!(!tells(&receiver, 64_999));
+        assert!(!shows(&receiver, 64_999));
     }
 }
 

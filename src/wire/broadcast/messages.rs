@@ -4,7 +4,7 @@ use super::{Broadcaster, Running};
 use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
 use crate::wire::header::{Clock, GROUPS};
-use crate::wire::layer::{Next, Telling};
+use crate::wire::layer::{Encoding, Next};
 use crate::wire::map_message::{self, LIMITS, SEGMENTS};
 use crate::wire::message::{Message, Packet, Part, Plane, WIRE_VERSION, Word};
 use crate::wire::scan_number::ScanNumber;
@@ -76,7 +76,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             Next::Block { kind, start, ref block } => (Some(kind), start, block.end),
             Next::Plain { azimuth } => (None, azimuth, azimuth + 1),
         };
-        self.layers.get_mut(running.plane)?.told(kind, start, end, number);
+        self.layers.get_mut(running.plane)?.encoded(kind, start, end, number);
         self.from = end;
         self.scan.as_mut()?.running = None;
         if self.layers.iter().all(|layer| layer.pending() == 0) {
@@ -87,10 +87,10 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     fn next_running(&mut self, all: bool) -> Option<Running> {
-        let telling = Telling { context: self.header.context(self.packing().form()), all };
+        let encoding = Encoding { context: self.header.context(self.packing().form()), all };
         let from = self.from;
         let mut layers = self.layers.iter_mut().enumerate();
-        layers.find_map(|(plane, layer)| layer.next(&telling, from).map(|next| Running { plane, next, sent: 0 }))
+        layers.find_map(|(plane, layer)| layer.next(&encoding, from).map(|next| Running { plane, next, sent: 0 }))
     }
 
     /// The message that is next of a block or a ray, and whether it is the last.

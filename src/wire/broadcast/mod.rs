@@ -1,13 +1,13 @@
 //! Maps in, messages out, one at a time and never too late: the sender.
 //!
 //! # Model
-//! [`Broadcaster::scan`] takes a map, [`Broadcaster::status_mut`] what is to be told of the sender;
+//! [`Broadcaster::scan`] takes a map, [`Broadcaster::status_mut`] what is to be said of the sender;
 //! [`Broadcaster::next_frame`] (CAN, CAN FD) or [`Broadcaster::next_line`] (serial) gives the next frame
 //! that is due, or none yet. It never waits. A caller asks after every frame and once a millisecond.
 //!
 //! What goes first: freshness value, status, header, map, visible range. Between two frames lies the minimum gap.
 //!
-//! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are told
+//! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are encoded
 //! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
 //! round all the time, so who joins late has everything within a second.
 //!
@@ -203,7 +203,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.config.medium.packing(self.config.secured)
     }
 
-    /// What is told of the sender. Uptime, versions, fingerprint and dropped azimuths are filled in.
+    /// What is said of the sender. Uptime, versions, fingerprint and dropped azimuths are filled in.
     pub fn status_mut(&mut self) -> &mut Status {
         &mut self.status
     }
@@ -266,7 +266,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         }
         self.drop_scan();
         if since.is_none_or(|us| us > 300_000) {
-            // scan numbers are told apart for as long as this
+            // scan numbers are distinguished for as long as this
             self.layers.iter_mut().for_each(Layer::forget);
             self.refreshed = None;
         }

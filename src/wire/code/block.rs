@@ -1,10 +1,10 @@
 //! Rays in, the words of one block out, and back: the code of the map.
 //!
 //! # Model
-//! A block tells consecutive azimuths from a start on. A *refresh* decodes alone: a ray is expected
+//! A block encodes consecutive azimuths from a start on. A *refresh* decodes alone: a ray is expected
 //! to be like the one before it in the block, the first like the usual one of the header. A *delta*
-//! is told against the refresh it names: the first ray is expected to be as it was, every other as
-//! [`Ray::expected`] has it. What differs is told edge by edge: the next edge lies a few cells from
+//! is encoded against the refresh it names: the first ray is expected to be as it was, every other as
+//! [`Ray::expected`] has it. What differs is encoded edge by edge: the next edge lies a few cells from
 //! the expected one, or the expected one is gone, or there is a new one at a distance. Blocked and
 //! clear stretches are long, so most rays take less than a bit.
 //!
@@ -18,10 +18,10 @@ use super::edges::{EdgeList, Hints};
 use super::expectation::{EdgeTables, Last, Progress, distance_table, first_table, shift, stop_table};
 use super::interval::{Coder, Encoder, Form, Words};
 pub use super::kind::Kind;
-use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH, STOPS_BELOW, TOLD};
+use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, IN_FULL, KNOWN, NEW, REACH, STOPS_BELOW};
 use super::ray::{Known, Ray};
 
-/// Bits that tell how many ticks older a delta's refresh is, less one.
+/// Bits that say how many ticks older a delta's refresh is, less one.
 pub const AGE_BITS: u32 = 4;
 
 /// What sender and receiver of a block agree on beforehand.
@@ -39,7 +39,7 @@ pub struct Context {
 
 /// The rays a block is made of or built on.
 pub trait Rays<const W: usize> {
-    /// The ray of an azimuth as it is now, if it is to be told in this block.
+    /// The ray of an azimuth as it is now, if it is to be encoded in this block.
     fn now(&self, azimuth: usize) -> Option<&Ray<W>>;
 
     /// The ray of an azimuth in the refresh a delta names, if it is at hand.
@@ -51,12 +51,12 @@ pub trait Rays<const W: usize> {
 pub struct Block {
     words: Words,
     room: u32,
-    /// First azimuth behind the block; the start itself if nothing fitted.
+    /// First azimuth after the block; the start itself if nothing fitted.
     pub end: usize,
 }
 
 impl Block {
-    /// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray.
+    /// Encodes as many azimuths from `start` on as fit, up to the first for which there is no ray.
     pub fn new<const W: usize>(context: &Context, kind: Kind, start: usize, rays: &impl Rays<W>) -> Self {
         let mut words = Words::NONE;
         let mut encoder = Encoder::new(&mut words, context.form);
@@ -77,8 +77,8 @@ impl Block {
     }
 }
 
-/// Tells as many azimuths from `start` on as fit, up to the first for which there is no ray; returns
-/// the first azimuth behind them.
+/// Encodes as many azimuths from `start` on as fit, up to the first for which there is no ray; returns
+/// the first azimuth after them.
 pub fn encode<const W: usize>(
     coder: &mut impl Coder,
     context: &Context,
@@ -94,8 +94,8 @@ pub fn encode<const W: usize>(
     let mut progress = Progress::new(kind, context.usual);
     for azimuth in start..azimuths {
         let before = coder.mark();
-        let told = tell(&mut progress, coder, azimuth, rays);
-        if told.is_none() || (azimuth + 1 < azimuths && !can_stop(coder)) {
+        let encoded = encode_ray(&mut progress, coder, azimuth, rays);
+        if encoded.is_none() || (azimuth + 1 < azimuths && !can_stop(coder)) {
             coder.rewind(before);
             if azimuth > start {
                 let _ = stop(coder);
@@ -122,8 +122,8 @@ fn stop(coder: &mut impl Coder) -> Option<()> {
     stop_table(coder.room()).map_or(Some(()), |table| coder.symbol(table, 1))
 }
 
-/// Tells an azimuth; `None` if it does not fit.
-fn tell<const W: usize>(
+/// Encodes an azimuth; `None` if it does not fit.
+fn encode_ray<const W: usize>(
     progress: &mut Progress<W>,
     coder: &mut impl Coder,
     azimuth: usize,
@@ -159,7 +159,7 @@ fn tell<const W: usize>(
     Some(())
 }
 
-/// Tells the edges of a ray; `None` if they do not fit.
+/// Encodes the edges of a ray; `None` if they do not fit.
 fn encode_edges<const W: usize>(
     coder: &mut impl Coder,
     tables: EdgeTables,
@@ -173,9 +173,9 @@ fn encode_edges<const W: usize>(
     coder.symbol(first_table(expected_bit), usize::from(bit != expected_bit))?;
     let (mut place, mut last) = (ray.known.near(), Last::None);
     let mut hints = Hints::new(hints, expected_bit, place + 1, ray.known.end());
-    let mut told = 0;
+    let mut encoded = 0;
     loop {
-        let edge = edges.get(told);
+        let edge = edges.get(encoded);
         if let Some(hint) = hints.next(bit) {
             let table = tables.edge(bit, last);
             match edge {
@@ -205,7 +205,7 @@ fn encode_edges<const W: usize>(
             last = Last::Other;
             place = edge;
         }
-        told += 1;
+        encoded += 1;
         bit = !bit;
         hints.pass(place + 1);
     }
@@ -221,7 +221,7 @@ fn encode_distance(coder: &mut impl Coder, bit: bool, distance: usize) -> Option
 #[inline(never)]
 fn encode_limit(coder: &mut impl Coder, limit: usize, expected: usize) -> Option<()> {
     let near = [expected, expected.wrapping_sub(1), expected + 1];
-    let symbol = near.iter().position(|n| *n == limit).unwrap_or(TOLD);
+    let symbol = near.iter().position(|n| *n == limit).unwrap_or(IN_FULL);
     coder.symbol(&BELOW.limit, symbol)?;
-    if symbol == TOLD { coder.plain(9, limit) } else { Some(()) }
+    if symbol == IN_FULL { coder.plain(9, limit) } else { Some(()) }
 }

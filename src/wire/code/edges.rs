@@ -90,11 +90,11 @@ impl EdgeList {
     }
 }
 
-/// Follows the expected edges of a ray while its edges are told.
+/// Follows the expected edges of a ray while its edges are encoded.
 pub(super) struct Hints<'a> {
     edges: &'a EdgeList,
-    /// Edges that are behind.
-    behind: usize,
+    /// Edges that are passed.
+    passed: usize,
     /// The bit the first of the others turns to; edges alternate.
     bit: bool,
     /// Edges from here on say nothing.
@@ -104,17 +104,17 @@ pub(super) struct Hints<'a> {
 impl<'a> Hints<'a> {
     /// The edges of an expected ray that begins with this bit, from a cell on and before another one.
     pub fn new(edges: &'a EdgeList, first: bool, from: usize, end: usize) -> Self {
-        let mut hints = Self { edges, behind: 0, bit: !first, end };
+        let mut hints = Self { edges, passed: 0, bit: !first, end };
         hints.pass(from);
         hints
     }
 
-    /// Leaves edges before this cell behind.
+    /// Passes the edges before this cell.
     #[inline]
     pub fn pass(&mut self, from: usize) {
         // bounded by the number of edges
-        while self.edges.get(self.behind).is_some_and(|edge| edge < from) {
-            self.behind += 1;
+        while self.edges.get(self.passed).is_some_and(|edge| edge < from) {
+            self.passed += 1;
             self.bit = !self.bit;
         }
     }
@@ -122,7 +122,7 @@ impl<'a> Hints<'a> {
     /// The first expected edge that turns `bit` over.
     #[inline]
     pub fn next(&self, bit: bool) -> Option<usize> {
-        let edge = self.edges.get(self.behind + usize::from(self.bit == bit));
+        let edge = self.edges.get(self.passed + usize::from(self.bit == bit));
         edge.filter(|edge| *edge < self.end)
     }
 }

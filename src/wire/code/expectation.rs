@@ -5,7 +5,7 @@ use super::kind::Kind;
 use super::model::{BELOW, STOP_CLASSES, STOPS_BELOW};
 use super::ray::{Known, Ray};
 
-/// What went before a ray, and how a ray is told by it: the index into the tables.
+/// What went before a ray, and how a ray is encoded by it: the index into the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Before {
     pub first: bool,
@@ -27,7 +27,7 @@ impl Before {
     }
 }
 
-/// How the edge before was told.
+/// How the edge before was encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Last {
     None,
@@ -102,7 +102,7 @@ pub(super) fn shift(edge: usize, hint: usize) -> Last {
     }
 }
 
-/// What the rays told so far say of the next.
+/// What the rays encoded so far say of the next.
 #[derive(Debug, Clone)]
 pub(super) struct Progress<const W: usize> {
     pub kind: Kind,
@@ -111,7 +111,7 @@ pub(super) struct Progress<const W: usize> {
     neighbour: Ray<W>,
     /// What it was in the refresh.
     neighbour_was: Ray<W>,
-    /// The expected edges of the next ray, and those of the ray at hand, where they are told.
+    /// The expected edges of the next ray, and those of the ray at hand, where they are encoded.
     lists: [EdgeList; 2],
     swapped: bool,
 }
@@ -119,11 +119,11 @@ pub(super) struct Progress<const W: usize> {
 impl<const W: usize> Progress<W> {
     /// At a block's start.
     pub fn new(kind: Kind, usual: Known) -> Self {
-        Self::behind(kind, Before::START, Ray::clear(usual), Ray::UNKNOWN)
+        Self::after(kind, Before::START, Ray::clear(usual), Ray::UNKNOWN)
     }
 
-    /// Behind an azimuth.
-    pub fn behind(kind: Kind, before: Before, neighbour: Ray<W>, neighbour_was: Ray<W>) -> Self {
+    /// After an azimuth.
+    pub fn after(kind: Kind, before: Before, neighbour: Ray<W>, neighbour_was: Ray<W>) -> Self {
         let mut lists = [EdgeList::NONE; 2];
         lists[0].read(neighbour.edges());
         Self { kind, before, neighbour, neighbour_was, lists, swapped: false }
@@ -140,7 +140,7 @@ impl<const W: usize> Progress<W> {
         if self.swapped { b } else { a }
     }
 
-    /// The frequencies of how the next ray is told.
+    /// The frequencies of how the next ray is encoded.
     pub fn table(&mut self) -> &'static [u8; 3] {
         let [without, with] = BELOW.ray.get(self.before.index(self.kind)).unwrap_or(&BELOW.ray[0]);
         if self.hints().is_empty() { without } else { with }
@@ -159,7 +159,7 @@ impl<const W: usize> Progress<W> {
         expected
     }
 
-    /// Goes on behind a ray; unless it is as expected, its edges were noted.
+    /// Goes on after a ray; unless it is as expected, its edges were noted.
     pub fn advance(&mut self, ray: &Ray<W>, was: &Ray<W>, as_expected: bool) {
         self.swapped ^= !as_expected;
         self.before = Before { first: false, as_expected, still: ray == was };

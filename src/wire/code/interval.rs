@@ -7,7 +7,7 @@
 //! and that word's bits are joined on. A symbol with the cumulative frequencies `c .. c + f` of 256
 //! keeps the part `[w c / 256, w (c + f) / 256)`, divisions rounded down. A plain bit keeps the
 //! lower or the upper half, the lower being `w / 2` rounded down. The message is the lower end of
-//! what is left, so it decodes to the same symbols, and behind the last of them the decoder holds 0.
+//! what is left, so it decodes to the same symbols, and after the last of them the decoder holds 0.
 //!
 //! No division, no renormalisation, no table but the frequencies; 64-bit products of a width below
 //! 2^49 and 256.
@@ -47,7 +47,7 @@ pub trait Coder {
     /// A point to come back to.
     type Mark: Copy;
 
-    /// A symbol of a table, which tells for each symbol the frequencies below it, of 256; `None` if it
+    /// A symbol of a table, which gives for each symbol the frequencies below it, of 256; `None` if it
     /// does not fit.
     fn symbol<const N: usize>(&mut self, below: &'static [u8; N], symbol: usize) -> Option<()>;
 
@@ -251,7 +251,7 @@ impl<'a> Decoder<'a> {
         room(self.width, self.used, self.form)
     }
 
-    /// What is left of the number; 0 behind the last symbol of an intact message.
+    /// What is left of the number; 0 after the last symbol of an intact message.
     pub fn rest(&self) -> u64 {
         self.value
     }
@@ -269,7 +269,7 @@ impl<'a> Decoder<'a> {
         Ok(())
     }
 
-    /// The next symbol of a table, which tells for each symbol the frequencies below it, of 256.
+    /// The next symbol of a table, which gives for each symbol the frequencies below it, of 256.
     ///
     /// # Errors
     /// A word is needed that is not there.

@@ -3,7 +3,7 @@
 //! Counted on radar-3d's maps of the training recordings; `viewshed bus --count-symbols` prints
 //! them anew. Other maps decode just as exactly and take a little more room.
 
-/// How far an edge may lie from the expected one to be told as a shift.
+/// How far an edge may lie from the expected one to be encoded as a shift.
 pub const REACH: usize = 5;
 
 /// Symbols of [`Model::edge`]: shifts of -5 to 5 cells, then these two.
@@ -13,13 +13,13 @@ pub const NEW: usize = 2 * REACH + 2;
 
 /// Symbols of [`Model::ray`].
 pub const AS_EXPECTED: usize = 0;
-/// Known cells as expected, edges told.
+/// Known cells as expected, edges encoded.
 pub const EDGES: usize = 1;
-/// Known cells told, then edges.
+/// Known cells encoded, then edges.
 pub const KNOWN: usize = 2;
 
-/// Symbols of [`Model::limit`]: the limit is as expected, one cell nearer, one farther, or told.
-pub const TOLD: usize = 3;
+/// Symbols of [`Model::limit`]: the limit is as expected, one cell nearer, one farther, or encoded.
+pub const IN_FULL: usize = 3;
 
 /// Room from which on each of the [`Model::stop`] tables but the first holds.
 pub const STOP_CLASSES: [u32; 7] = [8, 12, 16, 20, 26, 34, 48];
@@ -30,7 +30,7 @@ pub const STOPS_BELOW: u32 = 4;
 /// All tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Model {
-    /// How a ray is told, by what went before (see `Before`) and whether edges are expected.
+    /// How a ray is encoded, by what went before (see `Before`) and whether edges are expected.
     pub ray: [[[u8; 3]; 2]; 8],
     /// Whether the first known cell's bit is the expected one (0) or not, by the expected bit.
     pub first: [[u8; 2]; 2],
@@ -92,7 +92,7 @@ mod tests {
 
     fn sums_to_256(table: &[u8]) {
         assert_eq!(table.iter().map(|f| u32::from(*f)).sum::<u32>(), 256, "{table:?}");
-        assert!(table.iter().all(|f| *f > 0), "every symbol can be told: {table:?}");
+        assert!(table.iter().all(|f| *f > 0), "every symbol can be encoded: {table:?}");
     }
 
     #[test]

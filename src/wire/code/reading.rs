@@ -71,7 +71,7 @@ impl Place {
 
     /// What went before the azimuth to go on with: the ray, and what it was in the refresh. `None` at the
     /// start, or if it is not at hand any more.
-    fn behind<const W: usize>(&self, kind: Kind, reader: &impl Reader<W>) -> Option<(Ray<W>, Ray<W>)> {
+    fn after<const W: usize>(&self, kind: Kind, reader: &impl Reader<W>) -> Option<(Ray<W>, Ray<W>)> {
         let before = usize::from(self.azimuth).checked_sub(1)?;
         let neighbour = reader.taken(before)?;
         Some((neighbour, if kind == Kind::Refresh { Ray::UNKNOWN } else { reader.was(before)? }))
@@ -89,12 +89,12 @@ pub fn decode<const W: usize>(
 ) -> Ending {
     let Ok(mut decoder) = Decoder::new(words, context.form) else { return Ending::OutOfWords };
     let (mut before, mut from) = (Before::START, start);
-    let (neighbour, neighbour_was) = match place.behind(kind, reader) {
-        Some(behind) => {
+    let (neighbour, neighbour_was) = match place.after(kind, reader) {
+        Some(after) => {
             from = usize::from(place.azimuth);
             before = Before { first: false, as_expected: place.as_expected, still: place.still };
             decoder = Decoder::resume(words, context.form, (usize::from(place.used), place.value, place.width));
-            behind
+            after
         }
         None => {
             if kind != Kind::Refresh && decoder.plain(AGE_BITS).is_err() {
@@ -103,7 +103,7 @@ pub fn decode<const W: usize>(
             (Ray::clear(context.usual), Ray::UNKNOWN)
         }
     };
-    let mut progress = Progress::behind(kind, before, neighbour, neighbour_was);
+    let mut progress = Progress::after(kind, before, neighbour, neighbour_was);
     let (ending, (azimuth, before, state)) =
         go(&mut decoder, &mut progress, (from..context.azimuths, context.ranges), reader);
     *place = Place::of(azimuth, before, state);
@@ -150,12 +150,12 @@ fn go<const W: usize>(
     (complete(decoder), at)
 }
 
-/// Behind an intact block nothing is left of the number.
+/// After an intact block nothing is left of the number.
 fn complete(decoder: &Decoder<'_>) -> Ending {
     if decoder.rest() == 0 { Ending::Complete } else { Ending::Malformed }
 }
 
-/// The words do not tell a ray.
+/// The words do not encode a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 enum NotARay {
@@ -171,7 +171,7 @@ impl From<OutOfWords> for NotARay {
     }
 }
 
-/// Makes the expected ray the one that is told; whether it is as expected.
+/// Makes the expected ray the one that is encoded; whether it is as expected.
 fn decode_ray<const W: usize>(
     decoder: &mut Decoder<'_>,
     progress: &mut Progress<W>,
@@ -190,13 +190,13 @@ fn decode_ray<const W: usize>(
     };
     let tables = EdgeTables::of(progress.kind);
     let (hints, edges) = progress.edges();
-    let told = decode_edges(decoder, tables, known, (ray, hints), edges)?;
-    let as_expected = *ray == told;
-    *ray = told;
+    let encoded = decode_edges(decoder, tables, known, (ray, hints), edges)?;
+    let as_expected = *ray == encoded;
+    *ray = encoded;
     Ok(as_expected)
 }
 
-/// Known cells as told: nothing, or within the row.
+/// Known cells as encoded: nothing, or within the row.
 fn limits<const W: usize>(near: usize, end: usize, ranges: usize) -> Result<Known, NotARay> {
     let known = Known::new(near, end);
     let none = near == Known::NONE.near() && end == Known::NONE.end();
@@ -228,7 +228,7 @@ fn decode_edges<const W: usize>(
         painted.turn(place);
     }
     let mut hints = Hints::new(hints, expected_bit, place + 1, known.end());
-    // each turn leaves an expected or a told edge behind
+    // each turn leaves an expected or an encoded edge behind
     for _ in 0..2 * Bits::<W>::CAPACITY {
         if let Some(hint) = hints.next(bit) {
             match decoder.symbol(tables.edge(bit, last))? {
@@ -241,8 +241,8 @@ fn decode_edges<const W: usize>(
                     place += decode_distance(decoder, bit)?;
                     last = Last::Other;
                 }
-                told => {
-                    let edge = (hint + told).checked_sub(REACH).filter(|e| *e > place).ok_or(NotARay::Malformed)?;
+                encoded => {
+                    let edge = (hint + encoded).checked_sub(REACH).filter(|e| *e > place).ok_or(NotARay::Malformed)?;
                     last = shift(edge, hint);
                     place = edge;
                 }
@@ -353,7 +353,7 @@ mod tests {
             self.was.get(azimuth).copied()
         }
         fn take(&mut self, azimuth: usize, ray: &Ray<2>) {
-            assert!(self.taken[azimuth].is_none(), "told twice");
+            assert!(self.taken[azimuth].is_none(), "encoded twice");
             self.taken[azimuth] = Some(*ray);
         }
         fn taken(&self, azimuth: usize) -> Option<Ray<2>> {
@@ -421,10 +421,10 @@ mod tests {
                 kind,
                 at,
                 &mut { Place::START },
-                &mut Closures(was, |a, told| {
+                &mut Closures(was, |a, encoded| {
                     assert_eq!(a, next);
                     next += 1;
-                    got[a] = told;
+                    got[a] = encoded;
                 }),
             );
             assert_eq!((ending, next), (Ending::Complete, block.end));

@@ -17,8 +17,8 @@ use crate::wire::scan_number::ScanNumber;
 /// its plane; without it nothing is said to be free.
 #[derive(Debug, Clone, Copy)]
 pub struct ReceivedMap<'a, const A: usize, const W: usize, const P: usize> {
-    /// Sensor, header and geometry, where there is something to tell.
-    told: Option<(&'a SensorReceiver<A, W, P>, &'a Header, PolarGeometry)>,
+    /// Sensor, header and geometry, where there is something to show.
+    shown: Option<(&'a SensorReceiver<A, W, P>, &'a Header, PolarGeometry)>,
     now: Time,
     limits: Limits,
 }
@@ -29,24 +29,24 @@ const NOT_SENT: u8 = 128;
 impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P> {
     pub(super) fn new(sensor: Option<&'a SensorReceiver<A, W, P>>, now: Time, limits: Limits) -> Self {
         let trusted = sensor.filter(|sensor| sensor.trusted(now, &limits));
-        let told = trusted.and_then(|sensor| sensor.header().map(|header| (sensor, header, header.geometry())));
-        Self { told, now, limits }
+        let shown = trusted.and_then(|sensor| sensor.header().map(|header| (sensor, header, header.geometry())));
+        Self { shown, now, limits }
     }
 
     /// What the map is of; `None` where everything is unknown.
     pub fn header(&self) -> Option<&'a Header> {
-        self.told.as_ref().map(|(_, header, _)| *header)
+        self.shown.as_ref().map(|(_, header, _)| *header)
     }
 
     /// An azimuth of a plane; unknown where it is not sent or not current.
     pub fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
-        let ray = self.told.as_ref().and_then(|(sensor, ..)| sensor.current(plane, azimuth, self.now, &self.limits));
+        let ray = self.shown.as_ref().and_then(|(sensor, ..)| sensor.current(plane, azimuth, self.now, &self.limits));
         ray.map_or(Ray::UNKNOWN, |(ray, _)| ray)
     }
 
     /// The scan an azimuth's visibility is of; `None` where it is unknown.
     pub fn scan(&self, azimuth: usize) -> Option<ScanNumber> {
-        let (sensor, ..) = self.told.as_ref()?;
+        let (sensor, ..) = self.shown.as_ref()?;
         sensor.current(Plane::Visibility, azimuth, self.now, &self.limits).map(|(_, scan)| scan)
     }
 
@@ -84,7 +84,7 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
 
 impl<const A: usize, const W: usize, const P: usize> VisibilityMap for ReceivedMap<'_, A, W, P> {
     fn at(&self, point: RoadPoint) -> CellState {
-        let Some((_, header, geometry)) = &self.told else { return CellState::UNKNOWN };
+        let Some((_, header, geometry)) = &self.shown else { return CellState::UNKNOWN };
         let (x, y) = geometry.levelling.place(point);
         let cell = geometry.locate(x, y, usize::from(header.ranges), usize::from(header.azimuths));
         cell.map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))

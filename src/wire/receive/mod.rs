@@ -10,14 +10,14 @@
 //!
 //! - *The cell was visible in the scan the sector is marked with.* A refresh decodes alone. A delta
 //!   decodes only against the refresh of exactly the scan it names, azimuth by azimuth. Words are joined
-//!   only within one plane, scan and start, where a sender tells one block; words missing end the
+//!   only within one plane, scan and start, where a sender encodes one block; words missing end the
 //!   decoding before the first ray that needs them.
 //! - *The scan is the one its number says.* Numbers come again after 5.12 s. What is accepted was
 //!   measured at most `2 D` before it came: the measure refuses what is later by less than half a
 //!   period, the sender's clock in the header what is later by more. Sectors, refreshes and words are
 //!   dropped long before 5.12 s: a second after their scan while frames come, all of them after a second
 //!   without any.
-//! - *The scan was measured at most `A + D` ago.* A sector is told while its number is at most `A` (less
+//! - *The scan was measured at most `A + D` ago.* A sector is shown while its number is at most `A` (less
 //!   25 ms for a tick and for drifting clocks) behind the clocks' difference as the fastest frame of
 //!   the measure showed it. So it is enough that this frame took at most `D`. Suppose all frames of a measure
 //!   took longer. Either they are the sender's only ones: a delay that all frames have no receiver sees, and
@@ -25,7 +25,7 @@
 //!   before: a measure is trusted when it is `A + D` old, and begins anew when its smallest lag has sunk by
 //!   more than `D`, less 1 in 1024 of the time, which is what it crept up and what clocks drift; and it is `A + D`
 //!   old only if its frames came without a pause of more than `A` meanwhile. So nothing
-//!   is told out of a queue that shortens by more than `D` in `A + D`. Or faster frames were refused, because
+//!   is shown out of a queue that shortens by more than `D` in `A + D`. Or faster frames were refused, because
 //!   the sender's clock had not come so far: then the header it is known by was late, too. Those that are faster
 //!   by less than 1.5 s are refused only after two headers `A + D` apart and a measure that is trusted agreed,
 //!   which a queue that shortens like that does not let them. A session that
@@ -147,7 +147,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
     }
 
     /// Follows the receiver's clock, at frames and at looks; the time to count with. A little before the latest
-    /// counts as the latest. Where it steps back, nothing is told before each sensor's next session: no age is
+    /// counts as the latest. Where it steps back, nothing is shown before each sensor's next session: no age is
     /// known any more.
     fn watch(&self, now: Time) -> Time {
         let latest = self.latest.get();

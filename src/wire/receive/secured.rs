@@ -6,7 +6,7 @@
 //! it off would be all a forger had to do.
 //!
 //! # Limits
-//! See [`secoc`](crate::wire::secoc): a receiver that starts without a kept freshness value can be told a recorded past
+//! See [`secoc`](crate::wire::secoc): a receiver that starts without a kept freshness value can be shown a recorded past
 //! until the sender's next freshness message.
 
 use super::{Accepted, Limits, Receiver, Refused};

@@ -78,7 +78,7 @@ pub struct Counters {
     pub lost: u32,
     /// Came with the counter of the one before.
     pub repeated: u32,
-    /// Came out of sequence, by more than the counter can tell.
+    /// Came out of sequence, by more than the counter can show.
     pub out_of_sequence: u32,
     /// Refused as late, by the measure or by the sender's clock.
     pub late: u32,
@@ -102,7 +102,7 @@ pub enum Condition {
     Unusable,
     /// Two senders use its number.
     Conflict,
-    /// Maps are told.
+    /// Maps are shown.
     Ok,
 }
 
@@ -172,7 +172,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         self.clock.as_ref()
     }
 
-    /// The receiver's clock stepped back: nothing is told before a new session.
+    /// The receiver's clock stepped back: nothing is shown before a new session.
     pub(super) fn step_back(&self) {
         self.session.step_back();
     }

@@ -9,7 +9,7 @@
 //! *Sender's clock* (rule 2). The header carries the full clock. The headers heard so far bound it from
 //! below: what the fastest of them said, and the time passed since, less 2^-11 for drift. A map frame of a
 //! scan after that by more than 1.5 s is of another period of the scan numbers, and is refused; one by more
-//! than `D` shows that the headers were late, and nothing is told before the next one; to refuse those would
+//! than `D` shows that the headers were late, and nothing is shown before the next one; to refuse those would
 //! hide what a queue that drains shows. Where headers `A + D` apart agree with one another and with a settled
 //! measure, they were not late, and such a frame is refused, too.
 //!
@@ -21,7 +21,7 @@
 //! A measure that was not yet trusted when frames in time paused for longer than `A` settles anew: meanwhile a
 //! queue may have drained down to it.
 //!
-//! *Trust* (rule 5). Nothing is told before the measure is `A + D` old and of [`ENOUGH`] frames, nor
+//! *Trust* (rule 5). Nothing is shown before the measure is `A + D` old and of [`ENOUGH`] frames, nor
 //! while it does not fit the sender's clock.
 
 use core::cell::Cell;
@@ -63,7 +63,7 @@ const NEVER: Time = Time::from_micros(u64::MAX);
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Limits {
-    /// Greatest age of what is told, microseconds: A.
+    /// Greatest age of what is shown, microseconds: A.
     pub max_age_us: u32,
     /// Greatest delay from measurement to reception, microseconds: D.
     pub max_delay_us: u32,
@@ -453,7 +453,7 @@ impl Session {
         move |scan| any || ScanNumber::from_byte(ticks).ticks_after(scan) > most_ticks
     }
 
-    /// Whether anything may be told now.
+    /// Whether anything may be shown now.
     pub fn trusted(&self, now: Time, limits: &Limits) -> bool {
         let (Some(measure), Some(clock), false) = (self.measure, self.clock, self.void.get()) else { return false };
         let settled = measure.is_settled(now, limits);
@@ -464,7 +464,7 @@ impl Session {
         settled && current && fits && sure && !self.conflicting(now) && !self.speaks_otherwise(now)
     }
 
-    /// Whether a scan may be told now, given that the session is trusted.
+    /// Whether a scan may be shown now, given that the session is trusted.
     pub fn fresh(&self, now: Time, scan: ScanNumber, limits: &Limits) -> bool {
         self.age_us(now, scan).saturating_add(MARGIN_US) <= limits.max_age_us
     }
@@ -737,7 +737,7 @@ mod tests {
         assert_eq!(enter(901, 3, Some(scan(450))), Entry::OldEpoch, "a late one");
         assert_eq!(enter(901, 3, None), Entry::OldEpoch, "of no known time");
         assert_eq!(enter(901, 3, Some(scan(800))), Entry::Conflict);
-        assert_eq!(enter(902, 4, None), Entry::Taken, "but nothing is told");
+        assert_eq!(enter(902, 4, None), Entry::Taken, "but nothing is shown");
         assert_eq!(enter(1000, 9, Some(scan(0))), Entry::Conflict, "a third one either");
         assert!(s.conflicting(ms(1999)) && !s.conflicting(ms(2001)));
         let mut enter = |at: u64, epoch| s.enter(ms(at), Epoch::new(epoch), None, &LIMITS);

@@ -121,7 +121,7 @@ impl Class {
         }
     }
 
-    /// Share of the newest map's visible cells that is told over 30 s from the start, in percent: at least this
+    /// Share of the newest map's visible cells that is shown over 30 s from the start, in percent: at least this
     /// in the mean of many runs.
     pub fn least(self, bus: Bus) -> f64 {
         let [can, canfd, serial] = match self {
@@ -132,7 +132,7 @@ impl Class {
             Reordered => [60.0, 96.0, 95.3],
             Jitter | Flips => [96.7, 97.7, 97.7],
             LateAndRepeated => [94.0, 97.5, 97.5],
-            // nothing is told while a queue drains, nor before the next header
+            // nothing is shown while a queue drains, nor before the next header
             DrainAtStart => [92.0, 91.5, 92.0],
             DrainAfterStall => [65.5, 61.0, 61.0],
             Cuts => [60.0; 3],

@@ -65,7 +65,7 @@ impl Library {
         }
     }
 
-    /// Ranges and rays; none where nothing is told.
+    /// Ranges and rays; none where nothing is shown.
     fn rays(&self, time: u64) -> (usize, Vec<Ray<W>>) {
         let map = self.receiver.map(self.sensor, Time::from_micros(time));
         let Some(header) = map.header() else { return (0, Vec::new()) };

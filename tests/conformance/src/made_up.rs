@@ -143,7 +143,7 @@ fn ray(before: &Ray<W>, ranges: usize, random: &mut Random) -> Ray<W> {
     };
     let mut bits = *before.bits();
     match random.below(4) {
-        // noise, which is told in plain cells
+        // noise, which is sent in plain cells
         0 => bits = Bits::from_words(std::array::from_fn(|_| random.below(1 << 32) as u32)),
         1 => bits = Bits::span(0, any(random)),
         2 => bits = Bits::span(any(random), ranges),

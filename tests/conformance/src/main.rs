@@ -53,7 +53,7 @@ struct TableArgs {
     /// Another receiver than the library's: a program and its arguments
     #[arg(long)]
     receiver: Option<String>,
-    /// Name every run in which something was wrongly visible, or told otherwise than by the library
+    /// Name every run in which something was wrongly visible, or shown otherwise than by the library
     #[arg(long)]
     wrong: bool,
 }
@@ -110,7 +110,7 @@ fn table(args: &TableArgs) -> Result<()> {
     let maps = viewshed_conformance::maps()?;
     let program = args.receiver.as_deref().map(Program::new);
     println!(
-        "| fault | bus | looks | wrong looks | wrong cells | otherwise than the library | arrived % | least of a run % | told again s |"
+        "| fault | bus | looks | wrong looks | wrong cells | otherwise than the library | arrived % | least of a run % | shown again s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for class in Class::ALL.into_iter().filter(|class| class.name().starts_with(&args.only)) {

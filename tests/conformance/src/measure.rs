@@ -9,29 +9,29 @@ use crate::world::{START, World};
 /// A + D, microseconds.
 const AGE_AND_DELAY_US: u64 = 400_000;
 
-/// Share of the newest map's visible cells that counts as told again.
+/// Share of the newest map's visible cells that counts as shown again.
 const AGAIN: f64 = 0.9;
 
 /// Figures of one run or of several.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Figures {
     pub looks: u64,
-    /// Looks with a cell told visible that was visible in no map of the last A + D of the same sender.
+    /// Looks with a cell shown visible that was visible in no map of the last A + D of the same sender.
     pub wrong_looks: u64,
     pub wrong_cells: u64,
-    /// Visible cells of the newest map, and those of them that were told.
+    /// Visible cells of the newest map, and those of them that were shown.
     pub newest: u64,
-    pub told: u64,
+    pub shown: u64,
     /// Looks at which another receiver answered otherwise than the library's.
     pub differ: u64,
-    /// The longest it took until a map was told again after a queue had drained and a header had come.
+    /// The longest it took until a map was shown again after a queue had drained and a header had come.
     pub again_us: u64,
 }
 
 impl Figures {
-    /// Share of the newest map's visible cells that was told.
+    /// Share of the newest map's visible cells that was shown.
     pub fn arrived(&self) -> f64 {
-        self.told as f64 / self.newest.max(1) as f64
+        self.shown as f64 / self.newest.max(1) as f64
     }
 
     #[must_use]
@@ -41,21 +41,21 @@ impl Figures {
             wrong_looks: self.wrong_looks + other.wrong_looks,
             wrong_cells: self.wrong_cells + other.wrong_cells,
             newest: self.newest + other.newest,
-            told: self.told + other.told,
+            shown: self.shown + other.shown,
             differ: self.differ + other.differ,
             again_us: self.again_us.max(other.again_us),
         }
     }
 }
 
-/// Compares what is told with what was measured.
+/// Compares what is shown with what was measured.
 pub struct Measure<'a> {
     maps: &'a Maps,
     world: &'a World,
     figures: Figures,
-    /// Moments from which on a map is to be told again.
+    /// Moments from which on a map is to be shown again.
     waiting: Vec<u64>,
-    /// The first look that told what it must not: time since the start, cells.
+    /// The first look that shown what it must not: time since the start, cells.
     pub first_wrong: Option<(u64, u64)>,
 }
 
@@ -65,17 +65,17 @@ impl<'a> Measure<'a> {
         Self { maps, world, figures: Figures::default(), waiting: world.drained.clone(), first_wrong: None }
     }
 
-    /// What a receiver tells at a true time.
-    pub fn look(&mut self, at: u64, told: &Visible) {
+    /// What a receiver shows at a true time.
+    pub fn look(&mut self, at: u64, shown: &Visible) {
         let count = |row: &[u32]| row.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
         self.figures.looks += 1;
         let wrong = self.world.lives.iter().map(|life| {
             let end = life.scans.partition_point(|(measured, _)| *measured <= at);
             let lately =
                 || life.scans[..end].iter().rev().take_while(|(measured, _)| measured + AGE_AND_DELAY_US >= at);
-            let rows = told.iter().enumerate();
-            rows.map(|(azimuth, told)| {
-                let mut left = *told;
+            let rows = shown.iter().enumerate();
+            rows.map(|(azimuth, shown)| {
+                let mut left = *shown;
                 for (_, map) in lately() {
                     let words = self.maps.scans[*map].rays.get(azimuth).map(|ray| ray.bits().words());
                     left.iter_mut().zip(words.into_iter().flatten()).for_each(|(left, was)| *left &= !was);
@@ -99,13 +99,13 @@ impl<'a> Measure<'a> {
         for (azimuth, ray) in self.maps.scans[map].rays.iter().enumerate() {
             let words = ray.bits().words();
             all += count(words);
-            let told = told.get(azimuth).map_or(0, |told| {
-                told.iter().zip(words).map(|(told, was)| u64::from((told & was).count_ones())).sum::<u64>()
+            let shown = shown.get(azimuth).map_or(0, |shown| {
+                shown.iter().zip(words).map(|(shown, was)| u64::from((shown & was).count_ones())).sum::<u64>()
             });
-            arrived += told;
+            arrived += shown;
         }
         self.figures.newest += all;
-        self.figures.told += arrived;
+        self.figures.shown += arrived;
         for since in self.waiting.extract_if(.., |since| arrived as f64 >= AGAIN * all as f64 && *since <= at) {
             self.figures.again_us = self.figures.again_us.max(at - since);
         }
@@ -113,7 +113,7 @@ impl<'a> Measure<'a> {
 
     /// The figures of the whole run.
     pub fn figures(mut self) -> Figures {
-        // what was never told again
+        // what was never shown again
         let end = self.world.inputs.last().map_or(START, |(at, _)| *at);
         let longest = self.waiting.iter().map(|since| end.saturating_sub(*since)).max().unwrap_or(0);
         self.figures.again_us = self.figures.again_us.max(longest);

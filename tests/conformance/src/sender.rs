@@ -31,7 +31,7 @@ pub struct Sent {
     /// `None` on a serial line.
     pub id: Option<CanId>,
     pub data: Vec<u8>,
-    /// Whether it tells the sender's clock.
+    /// Whether it carries the sender's clock.
     pub clock: bool,
 }
 

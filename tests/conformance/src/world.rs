@@ -41,7 +41,7 @@ pub struct World {
     pub lives: Vec<Life>,
     /// True time, and what the receiver is fed then.
     pub inputs: Vec<(u64, Input)>,
-    /// From these moments on a map is to be told again: a queue is drained and a header has come since.
+    /// From these moments on a map is to be shown again: a queue is drained and a header has come since.
     pub drained: Vec<u64>,
     /// After this moment a delay has stayed for so long that it is taken for none.
     pub strict_to: u64,

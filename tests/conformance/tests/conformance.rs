@@ -105,18 +105,18 @@ fn maps_told_for_too_long_are_found_out() {
     let maps = maps().expect("the shipped recording");
     let world = World::new(&maps, Bus::CanFd, Class::Lossless, 1, 5 * SECOND, Looks::Often).expect("a world");
     let [life] = &world.lives[..] else { panic!("one sender") };
-    // a receiver that tells, of what is at least so old, the newest
+    // a receiver that shows, of what is at least so old, the newest
     let wrong_looks = |age_us: u64| {
         let mut measure = Measure::new(&maps, &world);
         for (at, _) in world.inputs.iter().filter(|(_, input)| matches!(input, Input::Look { .. })) {
             let old = life.scans.iter().rev().find(|(measured, _)| measured + age_us <= *at);
             let rays = old.map_or(&[][..], |(_, map)| &maps.scans[*map].rays);
-            let told = rays.iter().map(|ray| {
+            let shown = rays.iter().map(|ray| {
                 let mut words = [0; library::W];
                 words.iter_mut().zip(ray.bits().words()).for_each(|(to, from)| *to = *from);
                 words
             });
-            measure.look(*at, &told.collect());
+            measure.look(*at, &shown.collect());
         }
         measure.figures().wrong_looks
     };
@@ -179,7 +179,7 @@ fn runs(
             wrong.push(format!("{name}: {cells} cells wrongly visible at {:.3} s", us as f64 / 1e6));
         }
         if figures.again_us > 600_000 {
-            wrong.push(format!("{name}: {} us after a drain and a header nothing was told", figures.again_us));
+            wrong.push(format!("{name}: {} us after a drain and a header nothing was shown", figures.again_us));
         }
         for other in others.iter().filter(|other| seed <= other.runs) {
             let text = world.text(other.length_us);

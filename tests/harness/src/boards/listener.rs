@@ -1,4 +1,4 @@
-//! A receiver beside a board's bus, and whether what it tells is what was sent.
+//! A receiver beside a board's bus, and whether what it shows is what was sent.
 
 use std::collections::VecDeque;
 
@@ -55,13 +55,13 @@ impl Map {
 pub struct Listener {
     receiver: Box<Receiver<1, AZIMUTHS, WORDS>>,
     sent: VecDeque<Map>,
-    /// What each azimuth told last.
+    /// What each azimuth showed last.
     newest: Vec<Option<(Epoch, Time)>>,
 }
 
-/// What a receiver tells at a moment.
+/// What a receiver shows at a moment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Telling {
+pub struct Look {
     pub azimuths: usize,
     pub visible_cells: u32,
     /// Every cell is that of the map sent last.
@@ -112,32 +112,32 @@ impl Listener {
         &self.receiver
     }
 
-    /// What it tells, and whether it may: visible is only what the sender's map of the scan that is told
-    /// had visible, measured at most A + D ago and not before what was told already.
+    /// What it shows, and whether it may: visible is only what the sender's map of the scan that is shown
+    /// had visible, measured at most A + D ago and not before what was shown already.
     ///
     /// # Errors
     /// It may not: why.
-    pub fn tell(&mut self, now: Time) -> Result<Telling, String> {
+    pub fn look(&mut self, now: Time) -> Result<Look, String> {
         let map = self.receiver.map(SENSOR, now);
         let epoch = self.receiver.sensor(SENSOR).and_then(|s| s.epoch());
         let last = self.sent.back();
-        let mut told = Telling { equal: last.is_some(), ..Telling::default() };
+        let mut look = Look { equal: last.is_some(), ..Look::default() };
         for azimuth in 0..AZIMUTHS {
             let ray = map.ray(Plane::Visibility, azimuth);
-            told.equal &= last.is_some_and(|last| last.rays.get(azimuth) == Some(&ray));
+            look.equal &= last.is_some_and(|last| last.rays.get(azimuth) == Some(&ray));
             let Some((scan, epoch)) = map.scan(azimuth).zip(epoch) else { continue };
-            told.azimuths += 1;
-            told.visible_cells += ray.bits().count();
+            look.azimuths += 1;
+            look.visible_cells += ray.bits().count();
             let is_it = |map: &&Map| map.epoch == epoch && ScanNumber::at(map.measured) == scan;
             let Some(sent) = self.sent.iter().rev().find(is_it) else {
-                return Err(format!("azimuth {azimuth} tells {scan:?} of {epoch:?}, which was not sent lately"));
+                return Err(format!("azimuth {azimuth} shows {scan:?} of {epoch:?}, which was not sent lately"));
             };
             let age = now.since(sent.measured).unwrap_or(u64::MAX);
             if age > AGE_AND_DELAY_US {
                 return Err(format!("azimuth {azimuth} is {age} us old"));
             }
             if sent.rays.get(azimuth).is_none_or(|sent| ray.bits().and(sent.bits()) != *ray.bits()) {
-                return Err(format!("azimuth {azimuth} is told visible where it was not at {:?}", sent.measured));
+                return Err(format!("azimuth {azimuth} is shown visible where it was not at {:?}", sent.measured));
             }
             let before = self.newest.get(azimuth).copied().flatten().filter(|(e, _)| *e == epoch);
             if let Some((_, newest)) = before.filter(|(_, newest)| sent.measured < *newest) {
@@ -145,6 +145,6 @@ impl Listener {
             }
             self.newest[azimuth] = Some((epoch, sent.measured));
         }
-        Ok(told)
+        Ok(look)
     }
 }

@@ -237,7 +237,7 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
     // nobody reads the maps for two seconds
     let deaf = 30..60;
     let (mut from, mut heard, mut offered) = (0, 0, 0);
-    let (mut unequal_us, mut told_while_deaf, mut unknown_while_deaf) = (0, 0, 0);
+    let (mut unequal_us, mut shown_while_deaf, mut unknown_while_deaf) = (0, 0, 0);
     for (k, (to, now)) in std::mem::take(&mut script.marks).into_iter().enumerate() {
         board.line.deaf = deaf.contains(&k);
         board.line.send(&script.bytes[from..to]).unwrap();
@@ -262,9 +262,9 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
                 listener.message(now, message);
             }
         }
-        let told = listener.tell(now).unwrap_or_else(|why| panic!("scan {k}: {why}"));
+        let told = listener.look(now).unwrap_or_else(|why| panic!("scan {k}: {why}"));
         if deaf.contains(&k) {
-            told_while_deaf += usize::from(told.azimuths > 0);
+            shown_while_deaf += usize::from(told.azimuths > 0);
             unknown_while_deaf += usize::from(told.azimuths == 0);
         } else if k >= deaf.end && !told.equal {
             unequal_us = now.since(on_the_line(scans[deaf.end].time, scans[0].time)).unwrap();
@@ -274,10 +274,10 @@ fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
     }
     let dropped = listener.receiver().sensor(SENSOR).and_then(|s| s.status()).map(|s| s.dropped).unwrap();
     println!(
-        "deaf for {} scans: {dropped} messages dropped, told for {told_while_deaf} scans more, the last map that differs {} ms afterwards",
+        "deaf for {} scans: {dropped} messages dropped, shown for {shown_while_deaf} scans more, the last map that differs {} ms afterwards",
         deaf.len(),
         unequal_us / 1000
     );
-    assert!((1..=5).contains(&told_while_deaf) && unknown_while_deaf >= deaf.len() - 5, "maps age to unknown");
+    assert!((1..=5).contains(&shown_while_deaf) && unknown_while_deaf >= deaf.len() - 5, "maps age to unknown");
     assert!(dropped > 30 && unequal_us < 1_000_000, "{dropped} dropped, {unequal_us} us");
 }

@@ -11,7 +11,7 @@ use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::can::CanBoard;
 use viewshed_harness::boards::can_twin::{Sent, Step, clusters, flashed, log};
-use viewshed_harness::boards::listener::{Listener, Telling};
+use viewshed_harness::boards::listener::{Listener, Look};
 use viewshed_harness::boards::listener::{MEDIUM, SENSOR};
 use viewshed_harness::boards::{Board, Profile, firmware};
 use viewshed_harness::recording::{self, ReadOptions};
@@ -23,23 +23,23 @@ fn image() -> PathBuf {
 }
 
 /// A receiver that hears everything: what it tells after each step.
-fn heard(sent: &[Sent]) -> (Listener, Vec<Telling>) {
+fn heard(sent: &[Sent]) -> (Listener, Vec<Look>) {
     let mut listener = Listener::default();
     let told = sent.iter().map(|step| {
         step.maps.iter().for_each(|map| listener.sent(map));
         step.frames.iter().for_each(|frame| listener.frame(step.time, frame));
-        listener.tell(step.time).unwrap()
+        listener.look(step.time).unwrap()
     });
     let told = told.collect();
     (listener, told)
 }
 
 /// Every map in every cell, from when the receiver trusts its sender: 0.4 s and 8 frames.
-fn every_cell_is_the_same(sent: &[Sent], told: &[Telling]) {
-    let first = told.iter().position(|told| told.azimuths > 0).expect("maps are told");
+fn every_cell_is_the_same(sent: &[Sent], told: &[Look]) {
+    let first = told.iter().position(|told| told.azimuths > 0).expect("maps are shown");
     let began = sent.iter().position(|step| !step.maps.is_empty()).expect("maps are sent");
     let settling = sent[first].time.since(sent[began].time).unwrap();
-    assert!(settling <= 600_000, "{settling} us until maps are told");
+    assert!(settling <= 600_000, "{settling} us until maps are shown");
     for (step, told) in sent.iter().zip(told).skip(first).filter(|(step, _)| !step.maps.is_empty()) {
         assert!(told.equal, "at {:?}: {told:?}", step.time);
     }
@@ -265,7 +265,7 @@ fn loss_repetition_garbage_and_restarts_never_make_visible_and_are_over_within_a
     }
 
     let mut listener = Listener::default();
-    let (mut told_at, mut last_bad, mut moments, mut told_meanwhile) = (Vec::new(), 0, 0, 0);
+    let (mut shown_at, mut last_bad, mut moments, mut shown_meanwhile) = (Vec::new(), 0, 0, 0);
     let mut worst = 0;
     for (k, step) in sent.iter().enumerate() {
         let us = step.time.micros();
@@ -286,24 +286,24 @@ fn loss_repetition_garbage_and_restarts_never_make_visible_and_are_over_within_a
         // whatever moment one asks at
         for later in [0, 9_000, 30_000, 66_000] {
             bus.deliver(us + later, &mut listener);
-            let told = listener.tell(Time::from_micros(us + later)).unwrap_or_else(|why| panic!("step {k}: {why}"));
+            let told = listener.look(Time::from_micros(us + later)).unwrap_or_else(|why| panic!("step {k}: {why}"));
             moments += 1;
             if later == 9_000 && bad == 0 && !step.maps.is_empty() {
                 worst = if told.equal { worst } else { worst.max(us - last_bad) };
-                told_at.push((us - last_bad, told.equal));
+                shown_at.push((us - last_bad, told.equal));
             }
             if later == 66_000 && bad > 0 {
-                told_meanwhile += told.azimuths;
+                shown_meanwhile += told.azimuths;
             }
         }
     }
-    assert!(told_meanwhile > 2000, "a bad bus does not silence the receiver: {told_meanwhile} azimuths told");
+    assert!(shown_meanwhile > 2000, "a bad bus does not silence the receiver: {shown_meanwhile} azimuths shown");
     println!(
-        "{moments} moments, {told_meanwhile} azimuths told in bad ones; maps differ for {} ms at most afterwards",
+        "{moments} moments, {shown_meanwhile} azimuths shown in bad ones; maps differ for {} ms at most afterwards",
         worst / 1000
     );
-    let late: Vec<_> = told_at.iter().filter(|(since, equal)| *since > 1_000_000 && !equal).collect();
+    let late: Vec<_> = shown_at.iter().filter(|(since, equal)| *since > 1_000_000 && !equal).collect();
     assert!(late.is_empty(), "{late:?}");
-    let after: Vec<bool> = told_at.iter().filter(|(since, _)| *since > 1_000_000).map(|(_, equal)| *equal).collect();
+    let after: Vec<bool> = shown_at.iter().filter(|(since, _)| *since > 1_000_000).map(|(_, equal)| *equal).collect();
     assert!(after.len() >= 30, "{} maps looked at after a second", after.len());
 }
