@@ -168,7 +168,7 @@ fn rejected_is_not_empty() {
     // the gate takes; a mount that looks 30 degrees farther down, so that the map ends at 20 m
     let degrees: Vec<Detection> = row(&right)
         .iter()
-        .filter(|d| d.azimuth.radians().to_degrees().abs() < 3.14)
+        .filter(|d| d.azimuth.radians().to_degrees().abs() < std::f32::consts::PI)
         .map(|d| Detection { azimuth: Angle::from_radians(d.azimuth.radians().to_degrees()), ..*d })
         .collect();
     let refused = (row(&right).len() - degrees.len()) as u16;

@@ -15,7 +15,7 @@ impl Random {
     /// Uniform in `0..below`; 0 for 0.
     pub fn below(&mut self, below: u64) -> u64 {
         // the bias of a few billionths is of no concern here
-        (u128::from(self.0.next_u64()) * u128::from(below) >> 64) as u64
+        ((u128::from(self.0.next_u64()) * u128::from(below)) >> 64) as u64
     }
 
     /// Uniform in `low..high`.

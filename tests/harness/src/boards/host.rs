@@ -31,14 +31,14 @@ pub fn answer(
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     let mut memory = InMemory { job: job(settings, scans, dump), read: 0, answer: Vec::new() };
     let geometry = match profile {
-        Profile::Reference => work(Box::new(reference::State::new()), &mut memory)?,
-        Profile::Small => work(Box::new(small::State::new()), &mut memory)?,
+        Profile::Reference => work(&mut *Box::new(reference::State::new()), &mut memory)?,
+        Profile::Small => work(&mut *Box::new(small::State::new()), &mut memory)?,
     };
     Ok((memory.answer, geometry))
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    mut state: Box<Radar3d<R, A, E, W, N, D>>,
+    state: &mut Radar3d<R, A, E, W, N, D>,
     bench: &mut InMemory,
 ) -> Result<PolarGeometry> {
     let job = Job::read(bench).map_err(|e| anyhow::anyhow!("{e:?}"))?;

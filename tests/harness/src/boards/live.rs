@@ -73,13 +73,13 @@ type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
 
 fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
     match profile {
-        Profile::Reference => work(Box::new(reference::State::new()), bytes, send, after),
-        Profile::Small => work(Box::new(small::State::new()), bytes, send, after),
+        Profile::Reference => work(&mut *Box::new(reference::State::new()), bytes, send, after),
+        Profile::Small => work(&mut *Box::new(small::State::new()), bytes, send, after),
     }
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    mut state: Box<Radar3d<R, A, E, W, N, D>>,
+    state: &mut Radar3d<R, A, E, W, N, D>,
     bytes: &mut dyn Iterator<Item = u8>,
     send: &mut dyn FnMut(&[u8]),
     after: After<'_>,
