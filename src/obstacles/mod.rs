@@ -255,7 +255,8 @@ impl<const N: usize> Obstacles<N> {
     }
 
     /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
-    /// which is left without evidence and so dropped. So is what lies within a vehicle.
+    /// which is left without evidence and so dropped. So is what lies within a vehicle, unless that stands and
+    /// is not seen: then it is that vehicle itself, which leaves.
     fn join_parts(&mut self, t: &Tracking) {
         let mut rest = self.list.as_mut_slice();
         while let Some((a, others)) = rest.split_first_mut() {
@@ -270,6 +271,11 @@ impl<const N: usize> Obstacles<N> {
                 if elder.is_one_with(younger, t) {
                     elder.join(younger, t);
                     younger.existence = 0;
+                } else if elder.may_be_leaving_as(younger, t) {
+                    if younger.existence >= t.confirmed {
+                        younger.inherit(elder);
+                        elder.existence = 0;
+                    }
                 } else if elder.hits / 2 >= younger.hits && elder.encloses(younger, t) {
                     younger.existence = 0;
                 }
