@@ -56,6 +56,23 @@ impl Obstacle {
         left.abs() <= t.merge_lateral_cm && self.extent.beyond_cm(along) == 0
     }
 
+    /// Whether what moves within this one can be itself, which leaves: it stands, and nothing of it is seen
+    /// standing any more.
+    pub fn may_be_leaving_as(&self, mover: &Self, t: &Tracking) -> bool {
+        self.is_standing(t)
+            && !self.seen()
+            && mover.seen()
+            && mover.speed() > t.standing_speed
+            && self.encloses(mover, t)
+    }
+
+    /// Takes over what was known of the vehicle before it left: way, length and height.
+    pub fn inherit(&mut self, before: &Self) {
+        self.travelled_cm = self.travelled_cm.max(before.travelled_cm);
+        self.shown_length = self.shown_length.max(before.shown_length);
+        self.tallness.join(&before.tallness);
+    }
+
     /// Standard deviation of the lateral place, centimetres.
     fn lateral_sigma(&self) -> i32 {
         sigma_of_weight(self.lateral_weight)

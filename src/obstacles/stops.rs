@@ -103,3 +103,52 @@ fn a_slow_lorry_half_hidden_for_seconds_stays_a_lorry() {
     let rear = f64::from(half_hidden.x_cm - half_hidden.half_length_cm) / 100.0;
     assert!((rear - (lorry[0].at[0] - 3.0)).abs() < 1.5, "{rear}");
 }
+
+#[test]
+fn what_starts_to_move_in_a_standing_box_is_its_departure_and_no_second_vehicle() {
+    let (mut list, found) = stopped();
+    follow(&mut list, &mut [], 10.0, false);
+    // it comes out of the shadow with 5 m/s, a metre from where it stood
+    let at = [f64::from(found.x_cm) / 100.0 + 1.0, f64::from(found.y_cm) / 100.0];
+    let mut cars = [car(at, [1.0, 0.0], 5.0)];
+    follow(&mut list, &mut cars, 1.0, false);
+    let after = boxes(&list);
+    assert_eq!(after.len(), 1, "{after:?}");
+    assert!((f64::from(after[0].x_cm) / 100.0 - cars[0].at[0]).abs() < 1.5, "{after:?}, it is at {:?}", cars[0].at);
+}
+
+#[test]
+fn one_stray_reflection_that_moves_takes_no_standing_box_away() {
+    let (mut list, found) = stopped();
+    let place = [f64::from(found.x_cm) / 100.0, f64::from(found.y_cm) / 100.0];
+    for _ in 0..20 {
+        list.step::<256>(&[reflection(place, [6.0, 0.0])], Step::from_micros(67_000), &rules(), |_, _| false);
+        follow(&mut list, &mut [], 2.0, false);
+    }
+    let after = boxes(&list);
+    assert_eq!(after.len(), 1, "{after:?}");
+    assert!((after[0].x_cm - found.x_cm).abs() < 100, "{after:?}");
+}
+
+#[test]
+fn a_scene_and_its_mirror_image_give_boxes_that_are_mirror_images() {
+    let side = |mirrored: f64| {
+        let mut list = Obstacles::<16>::new();
+        // both directions of the road, and one that crosses it
+        let mut cars = [
+            car([20.0, 4.0 * mirrored], [1.0, 0.0], 12.0),
+            car([80.0, 9.0 * mirrored], [-1.0, 0.0], 12.0),
+            car([45.0, -14.0 * mirrored], [0.0, mirrored], 8.0),
+        ];
+        follow(&mut list, &mut cars, 2.5, true);
+        let mut found = boxes(&list);
+        found.sort_by_key(|s| s.x_cm);
+        found
+    };
+    let (right, left) = (side(1.0), side(-1.0));
+    assert_eq!((right.len(), left.len()), (3, 3), "{right:?} {left:?}");
+    for (a, b) in right.iter().zip(&left) {
+        assert!((a.x_cm - b.x_cm).abs() <= 30 && (a.y_cm + b.y_cm).abs() <= 30, "{a:?} {b:?}");
+        assert!((a.half_length_cm - b.half_length_cm).abs() <= 30 && a.height_cm == b.height_cm, "{a:?} {b:?}");
+    }
+}

@@ -70,7 +70,8 @@ impl Tallness {
     /// Adds what a reflection says of tall and low.
     fn weigh(&mut self, height_cm: i32, sigma_cm: i32) {
         let (height, sigma) = (height_cm.clamp(-5000, 5000), sigma_cm.clamp(0, 5000));
-        let quarters = (height - BETWEEN_CM) * APART_CM * 4 / (CAR_VARIANCE + sigma * sigma).max(1);
+        let eighths = (height - BETWEEN_CM) * APART_CM * 8 / (CAR_VARIANCE + sigma * sigma).max(1);
+        let quarters = (eighths + 1) >> 1;
         let place = usize::try_from(quarters + 16).unwrap_or(0).min(LIKELIER.len() - 1);
         self.tall = (self.tall + LIKELIER.get(place).copied().unwrap_or(0)).clamp(-MOST, MOST);
     }

@@ -105,6 +105,33 @@ fn a_vehicle_that_stops_stays_an_obstacle() {
 }
 
 #[test]
+fn around_a_lorry_that_has_stood_for_an_hour_the_map_is_what_it_was_when_it_stopped() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let mut truck = Vehicle::truck(80.0, 4.0, -10.0);
+    let mut frames = |rig: &mut Rig, n: u32| {
+        for _ in 0..n {
+            let speed = (-truck.speed - FRAME_US as f64 * 1e-6).max(0.0);
+            truck.x -= speed * FRAME_US as f64 * 1e-6;
+            truck.speed = -speed;
+            let d = truck.detections(&rig.sensor, true);
+            rig.frame(&d);
+        }
+    };
+    frames(&mut rig, 300);
+    let stopped = rig.draw(5..150, -5..15);
+    frames(&mut rig, 15 * 3600);
+    let after = rig.draw(5..150, -5..15);
+    let differ = stopped.chars().zip(after.chars()).filter(|(a, b)| a != b).count();
+    assert!(stopped.matches('#').count() > 10, "{stopped}");
+    assert!(differ <= 2, "{stopped}{after}");
+    // it leaves, and so does its shadow
+    for _ in 0..150 {
+        rig.frame(&[]);
+    }
+    assert_eq!(rig.draw(5..150, -5..15).matches('#').count(), 0);
+}
+
+#[test]
 fn a_guard_rail_hides_nothing() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
     for frame in 0..60 {

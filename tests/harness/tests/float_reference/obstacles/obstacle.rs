@@ -313,6 +313,22 @@ impl Obstacle {
         left.abs() <= rules.merge_lateral && self.extent.beyond(ahead) <= 0.0
     }
 
+    /// Whether what moves within this one can be itself, which leaves.
+    pub fn may_be_leaving_as(&self, mover: &Self, rules: &Rules) -> bool {
+        self.is_standing(rules)
+            && !self.seen()
+            && mover.seen()
+            && length(mover.velocity) > rules.standing_speed
+            && self.encloses(mover, rules)
+    }
+
+    /// Takes over what was known of the vehicle before it left.
+    pub fn inherit(&mut self, before: &Self) {
+        self.travelled = self.travelled.max(before.travelled);
+        self.shown_length = self.shown_length.max(before.shown_length);
+        self.tallness.join(&before.tallness);
+    }
+
     fn lateral_sigma(&self) -> f64 {
         self.lateral_weight.sqrt().recip().min(10.0)
     }

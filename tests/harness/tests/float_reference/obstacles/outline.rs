@@ -229,8 +229,8 @@ mod tests {
                 integer.add(height, sigma);
                 // no reflection lies on a level
                 exact.add(f64::from(height) / 100.0 - 1e-9, f64::from(sigma) / 100.0);
-                // a sum of logarithms in steps of 2^-8 passes the bound a reflection earlier or later
-                if (exact.tall.abs() - SURE).abs() < 0.25 {
+                // a sum of logarithms from a table passes the bound a reflection earlier or later
+                if (exact.tall.abs() - SURE).abs() < 1.0 {
                     continue;
                 }
                 assert!((f64::from(integer.floor_cm()) / 100.0 - exact.floor()).abs() < 1e-9);
