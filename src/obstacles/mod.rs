@@ -28,7 +28,7 @@
 //! | length remembered for 10 s at any speed | 23.8 / 18.0 | 18.8 / 13.2 | 20.0 / 16.8 | no |
 //! | [shadows](crate::grid::shadow) with exact ends, not through cells | 25.1 / 14.2 | 19.4 / 12.7 | 19.1 / 15.9 | yes |
 //! | place of every detection shown | 26.8 / 14.6 | 22.7 / 12.9 | 21.2 / 15.3 | no |
-//! | middle of what is seen shown: objects' FIR 14.0 to 7.5 and 12.5 to 5.8 | 25.4 / 14.1 | 19.9 / 12.6 | 19.3 / 15.8 | yes |
+//! | middle of what is seen shown: objects' FIR 14.0 to 7.5 and 12.5 to 5.8 | 25.4 / 14.1 | 19.9 / 12.6 | 19.3 / 15.8 | no: right of what is detected by construction |
 //! | length remembered for 3 s below 4 m/s | 24.8 / 15.0 | 19.3 / 12.8 | same | yes |
 //! | low or tall by [all heights](tallness), low at any length | 28.1 / 10.6 | 37.2 / 8.8 | 23.7 / 13.0 | no |
 //! | the same, low only below 9 m | 24.4 / 14.0 | 19.7 / 12.2 | 17.8 / 14.6 | yes |
