@@ -73,9 +73,10 @@ fn columns<const R: usize, const A: usize, const E: usize>(
     let (low, high) = outline(solid, axes);
     let first = (low >> 8).clamp(0, A as i32);
     let last = (high >> 8).clamp(-1, A as i32 - 1);
-    let cell_cm = axes.cell_cm.max(1);
-    let farthest = R as i32 * cell_cm;
+    let farthest = R as i32 * axes.cell_cm;
     (first..=last).filter_map(move |a| {
+        // here, where the divisions below show that they cannot be by nothing
+        let cell_cm = axes.cell_cm.max(1);
         let centre = a * 256 + 128;
         let (from, to) = (low.max(centre - WINDOW), high.min(centre + WINDOW));
         if from >= to {
