@@ -71,6 +71,7 @@
 //! | [`grid`] | range x azimuth x slope: boxes and [evidence](grid::evidence) in, [lines of sight](grid::raycast) and a polar map out |
 //! | [`radar_3d`] | the estimator: all stages above, in order |
 //! | [`radar_2d`] | the flat baseline, as an estimator of its own |
+//! | [`camera`] | boxes of a camera's detector in, lifted onto the road, into voxels and lines of sight; the same maps out |
 //! | [`wire`] | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
 //! | [`inputs`] | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
 //! | [`mod@unit`] | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
@@ -131,6 +132,7 @@ extern crate std;
 #[cfg(doc)]
 #[doc = include_str!("EXTENDING.md")]
 pub mod extending {}
+pub mod camera;
 pub mod fixed;
 pub mod frame;
 pub mod grid;
