@@ -31,13 +31,8 @@ pub(crate) struct ClassSize {
 impl VehicleClass {
     /// Typical sizes; lengths from the shortest to the longest that is allowed on European roads, or is sold.
     pub(crate) fn size(self) -> ClassSize {
-        let of = |length, width, height, lengths, height_spread| ClassSize {
-            length,
-            width,
-            height,
-            lengths,
-            height_spread,
-        };
+        let of =
+            |length, width, height, lengths, height_spread| ClassSize { length, width, height, lengths, height_spread };
         match self {
             Self::Car => of(460, 180, 150, [350, 520], 15),
             Self::Van => of(600, 205, 260, [480, 740], 30),

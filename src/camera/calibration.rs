@@ -336,8 +336,7 @@ mod tests {
     const INTRINSICS: Intrinsics =
         Intrinsics { size_px: [1920, 1080], focal_px: [1663.0, 1663.0], center_px: [960.0, 540.0] };
 
-    const MOUNT: Mount =
-        Mount { x_m: 10.0, y_m: -3.0, height_m: 6.5, yaw_deg: 12.0, pitch_deg: 7.0, roll_deg: -2.0 };
+    const MOUNT: Mount = Mount { x_m: 10.0, y_m: -3.0, height_m: 6.5, yaw_deg: 12.0, pitch_deg: 7.0, roll_deg: -2.0 };
 
     /// Points as a camera sees them.
     fn points(calibration: &Calibration, road: &[[f32; 2]]) -> Vec<PointPair> {
@@ -389,7 +388,8 @@ mod tests {
     #[test]
     fn a_camera_that_looks_straight_down_has_no_focal_length() {
         let road = [[-4.0, -3.0], [5.0, -2.0], [4.0, 4.0], [-3.0, 2.0]];
-        let pairs = road.map(|[x, y]: [f32; 2]| PointPair { road_m: [x, y], image_px: [960.0 - 90.0 * y, 540.0 - 90.0 * x] });
+        let pairs =
+            road.map(|[x, y]: [f32; 2]| PointPair { road_m: [x, y], image_px: [960.0 - 90.0 * y, 540.0 - 90.0 * x] });
         let error = Calibration::from_points_alone([1920, 1080], &pairs).unwrap_err();
         assert_eq!(error, CalibrationError::FocalLengthOpen);
     }
@@ -398,7 +398,11 @@ mod tests {
     fn a_level_plane_below_is_a_level_camera() {
         // y = 6.5 below; pitched 7 degrees down the road rises ahead in optical coordinates
         let level = Calibration::from_ground_plane(&INTRINSICS, [0.0, 2.0, 0.0, -13.0], [10.0, -3.0], 12.0).unwrap();
-        close(&level, &Calibration { intrinsics: INTRINSICS, mount: Mount { pitch_deg: 0.0, roll_deg: 0.0, ..MOUNT } }, 1e-3);
+        close(
+            &level,
+            &Calibration { intrinsics: INTRINSICS, mount: Mount { pitch_deg: 0.0, roll_deg: 0.0, ..MOUNT } },
+            1e-3,
+        );
         let (s, c) = 7.0_f32.to_radians().sin_cos();
         for sign in [1.0, -1.0] {
             let plane = [0.0, -c, -s, 6.5].map(|v| sign * v);

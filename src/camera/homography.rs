@@ -38,8 +38,7 @@ impl Normal {
         let sum = points.clone().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
         let center = sum.map(|s| s / count);
         let offsets = points.map(|[x, y]| [x - center[0], y - center[1]]);
-        let [xx, xy, yy] =
-            offsets.clone().fold([0.0; 3], |[xx, xy, yy], [x, y]| [xx + x * x, xy + x * y, yy + y * y]);
+        let [xx, xy, yy] = offsets.clone().fold([0.0; 3], |[xx, xy, yy], [x, y]| [xx + x * x, xy + x * y, yy + y * y]);
         let distance: f64 = offsets.map(|[x, y]| math::sqrt_double(x * x + y * y)).sum::<f64>() / count;
         let spread = (xx + yy) * (xx + yy) / 4.0;
         let flat = xx * yy - xy * xy <= LINE * spread;

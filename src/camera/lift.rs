@@ -207,20 +207,21 @@ impl Lifting {
             let scale = math::ratio::<12>(own, wide).clamp(1 << 11, 1 << 13);
             let [x, y] = placed.at.map(|v| (v * scale) >> 12);
             // across the line of sight as in every other case
-            let (aim, now) = (column(&seen.edges, free), column(&self.outline(&Placed { at: [x, y], ..*placed }, p)?, free));
+            let (aim, now) =
+                (column(&seen.edges, free), column(&self.outline(&Placed { at: [x, y], ..*placed }, p)?, free));
             let distance = math::length(x, y);
             let aside = math::mul_shift(distance, aim - now, 16);
             let sight = Direction::of(x, y).left();
             placed.at = [x + ((aside * i32::from(sight.x)) >> 14), y + ((aside * i32::from(sight.y)) >> 14)];
-            if math::length(placed.at[0], placed.at[1]) > FARTHEST_CM {
-                return None;
-            }
         }
         Some(())
     }
 
     /// The box a camera would see a vehicle in: left, top, right, bottom.
     fn outline(&self, placed: &Placed, p: &Projection) -> Option<[i32; 4]> {
+        if placed.at.iter().any(|v| v.abs() > FARTHEST_CM) {
+            return None;
+        }
         let (hx, hy) = (i32::from(self.heading.x), i32::from(self.heading.y));
         let (l, w) = (placed.length / 2, placed.width / 2);
         let along = [(l * hx) >> 14, (l * hy) >> 14];
@@ -428,7 +429,8 @@ mod tests {
         let at = Vehicle(60.0, 76.5, 2.0, 2.55, 4.0);
         let mut own = seen(&c, at, VehicleClass::Truck);
         own.edges[3] -= (own.edges[3] - own.edges[1]) / 4;
-        let nearer = ImageBox { edges: [own.edges[0] - 99, own.edges[3], own.edges[2] + 99, 9000], class: VehicleClass::Car };
+        let nearer =
+            ImageBox { edges: [own.edges[0] - 99, own.edges[3], own.edges[2] + 99, 9000], class: VehicleClass::Car };
         let got = lifted(&c, &own, &[nearer]);
         let [along, across] = error(&got, at);
         assert!(along.abs() < 3.0 && across.abs() < 0.3, "{along} {across}");

@@ -86,6 +86,12 @@ impl Projection {
         })
     }
 
+    /// A vector's components ahead, left and up as levelled ones, for start-up tables.
+    pub(crate) fn level(&self, [ahead, left, up]: [f32; 3]) -> [f32; 3] {
+        self.rotation
+            .map(|[a, l, u]| (a as f32 * ahead + l as f32 * left + u as f32 * up) / (1 << ROTATION_BITS) as f32)
+    }
+
     /// Where an image point lies if it is this high above the road; `None` at and beyond the horizon.
     pub(crate) fn on_plane(&self, [left, up]: [i32; 2], height_cm: i32) -> Option<[i32; 2]> {
         let [x, y, z] = self.ray(left, up);
@@ -136,8 +142,7 @@ pub(crate) mod exact {
         let (sy, cy) = f64::from(m.yaw_deg).to_radians().sin_cos();
         let (sp, cp) = f64::from(m.pitch_deg).to_radians().sin_cos();
         let (sr, cr) = f64::from(m.roll_deg).to_radians().sin_cos();
-        let [x, y, z] =
-            [point[0] - f64::from(m.x_m), point[1] - f64::from(m.y_m), point[2] - f64::from(m.height_m)];
+        let [x, y, z] = [point[0] - f64::from(m.x_m), point[1] - f64::from(m.y_m), point[2] - f64::from(m.height_m)];
         // undo yaw, then pitch, then roll
         let (x, y) = (cy * x + sy * y, cy * y - sy * x);
         let (x, z) = (cp * x - sp * z, sp * x + cp * z);
