@@ -10,7 +10,7 @@
 //!
 //! # Model
 //! A box and its class become an upright box on the road ([`lift`]), that fills voxels of 1 x 1 x 0.5 m ahead of
-//! the camera ([`voxels`]). Lines of sight are cast through them, and a cell is visible where the mean visibility of
+//! the camera. Lines of sight are cast through them, and a cell is visible where the mean visibility of
 //! the voxels 0 to 4 m above it reaches [`Camera3dConfig::visible_share`]. Whoever wants to see cars, 1.5 m high,
 //! when their upper third shows needs three quarters of the 4 m; half of them is enough for trucks.
 //!
@@ -18,7 +18,7 @@
 //! unknown ([`crate::frame::health`]). So are cells outside of the image and beyond the grid.
 //!
 //! # Limits
-//! 200 x 60 cells: 59 kB of state and parameters, 24 kB a map. [`MOST_BOXES`] boxes a frame. The road is flat, and
+//! 200 x 60 cells: 62 kB of state and parameters, 24 kB a map. [`MOST_BOXES`] boxes a frame. The road is flat, and
 //! the traffic has one heading: a vehicle that turns is placed right and filled along the road.
 //!
 //! # References
@@ -66,7 +66,7 @@ pub mod lift;
 pub mod map;
 mod projection;
 mod sight;
-pub mod voxels;
+mod voxels;
 
 use crate::camera::boxes::{BoxRejection, BoxRejections, ImageBox};
 use crate::camera::calibration::Calibration;

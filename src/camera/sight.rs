@@ -3,12 +3,14 @@
 //! # Model
 //! Rows are walked away from the camera. What is occupied stands on the road, so in one direction the voxels that
 //! are hidden are those below one line, and all lines of a direction are cast together: the highest slope that an
-//! occupied column met so far has blocked, a running maximum, as in the radar's grid. Directions are fine steps of
+//! occupied column met so far has blocked, a running maximum, as in the grid of the radar. Directions are fine steps of
 //! y / x, for which a line in space is straight in (x, height); a column that lies below the camera blocks up to
 //! the line over its far upper edge, a higher one up to that over its near upper edge.
 //!
-//! A column is judged before its own row blocks: a thing never hides its own front. The mean visibility of its
-//! voxels, 0 to 4 m above the road, is the part of that height which is above the line and in the image.
+//! A thing never hides itself, as in the grid of the radar: an occupied run blocks behind its end only, so that the
+//! columns of a vehicle, and the trail of what fades before it, keep what is seen of its front. The mean visibility
+//! of a column's voxels, 0 to 4 m above the road, is the part of that height which is above the line and in the
+//! image.
 //!
 //! # Limits
 //! One step of direction is 1/1024 of the view: 0.24 m at 200 m and 60 degrees.
@@ -51,14 +53,43 @@ pub(crate) struct View<const NX: usize> {
     lower: Option<Border>,
 }
 
-/// The highest slope blocked in each direction, 2^-16.
+/// The highest slope blocked in each direction.
 #[derive(Debug, Clone)]
 pub(crate) struct Skyline {
-    slopes: [i32; STEPS],
+    directions: [Blocked; STEPS],
+}
+
+/// What is blocked in a direction, slopes in 2^-16.
+#[derive(Debug, Clone, Copy)]
+struct Blocked {
+    /// By all runs but the last.
+    before: i32,
+    /// By the last run of occupied columns.
+    last: i32,
+    /// The row behind the last run's end.
+    end: u16,
 }
 
 impl Skyline {
-    pub(crate) const OPEN: Self = Self { slopes: [OPEN; STEPS] };
+    pub(crate) const OPEN: Self = Self { directions: [Blocked { before: OPEN, last: OPEN, end: 0 }; STEPS] };
+}
+
+impl Blocked {
+    /// The slope below which a column of this row is hidden; where it is occupied and the last run reaches it, it
+    /// is a part of that.
+    fn slope(&self, row: u16, occupied: bool) -> i32 {
+        if occupied && self.end == row { self.before } else { self.before.max(self.last) }
+    }
+
+    /// Adds an occupied column of this row.
+    fn add(&mut self, row: u16, slope: i32) {
+        if self.end < row {
+            self.before = self.before.max(self.last);
+            self.last = slope;
+        }
+        self.last = self.last.max(slope);
+        self.end = row + 1;
+    }
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)] // cell indices
@@ -103,14 +134,17 @@ impl<const NX: usize> View<NX> {
         skyline: &mut Skyline,
         mut tell: impl FnMut(usize, usize, u8),
     ) {
-        skyline.slopes = [OPEN; STEPS];
+        *skyline = Skyline::OPEN;
         for (i, &(first, end)) in self.rows.iter().enumerate() {
             let near = (i as i32 * CELL_CM).max(NEAREST_CM);
             let (x, far) = (i as i32 * CELL_CM + CELL_CM / 2, (i as i32 + 1) * CELL_CM);
             let per_cm = self.per_cm(x);
+            let (row, columns) = (i as u16, voxels.row(i));
             for j in usize::from(first)..usize::from(end) {
                 let y = middle_of(j, NY);
-                let slope = skyline.slopes.get(self.step(y, per_cm) as usize).copied().unwrap_or(OPEN);
+                let occupied = columns.and_then(|c| c.get(j)).is_some_and(|c| top_of(*c) > 0);
+                let blocked = skyline.directions.get(self.step(y, per_cm) as usize);
+                let slope = blocked.map_or(OPEN, |b| b.slope(row, occupied));
                 let (mut low, mut high) = (0, JUDGED_CM);
                 if let Some(border) = self.upper {
                     high = high.min(border.height(x, y) + self.height_cm);
@@ -124,9 +158,9 @@ impl<const NX: usize> View<NX> {
                 // 254 / 400, 2^-8 rounded up
                 tell(i, j, (((high - low).max(0) * 163) >> 8) as u8);
             }
-            let Some(row) = voxels.row(i) else { continue };
+            let Some(columns) = columns else { continue };
             let (at_near, at_far) = (self.per_cm(near), self.per_cm(far));
-            for (j, column) in row.iter().enumerate() {
+            for (j, column) in columns.iter().enumerate() {
                 let top = top_of(*column);
                 if top == 0 {
                     continue;
@@ -137,8 +171,8 @@ impl<const NX: usize> View<NX> {
                 // the widest that it is seen
                 let from = self.edge(right, if right > 0 { at_far } else { at_near });
                 let to = self.edge(left, if left > 0 { at_near } else { at_far });
-                for blocked in skyline.slopes.get_mut(from..to.max(from)).into_iter().flatten() {
-                    *blocked = (*blocked).max(slope);
+                for blocked in skyline.directions.get_mut(from..to.max(from)).into_iter().flatten() {
+                    blocked.add(row, slope);
                 }
             }
         }
@@ -223,7 +257,7 @@ mod tests {
         let shares = shares(&projection(6.0, 4.0), &[TRUCK]);
         // column 20 lies from 0 to 1 m to the left
         assert_eq!(shares[30][20], Some(254), "before it");
-        assert_eq!(shares[40][20], Some(254), "its own front");
+        assert_eq!((shares[40][20], shares[51][20]), (Some(254), Some(254)), "all of it is seen as its front is");
         // behind its far end at 52 m the line over the top falls 2 m in 52
         for x in [55, 70, 100, 140] {
             let line: f64 = 6.0 - 2.0 * (f64::from(x) + 0.5) / 52.0;
@@ -257,6 +291,19 @@ mod tests {
         assert_eq!(low[60][20], Some(254), "seen over");
         let bumper = shares(&projection(2.0, 0.0), &[[30.0, 40.0, -2.0, 2.0, 4.0]]);
         assert_eq!((bumper[45][20], bumper[149][20]), (Some(0), Some(0)), "no line passes over it");
+    }
+
+    #[test]
+    fn what_stands_behind_a_gap_is_hidden_by_what_stands_before_it() {
+        let car = [56.0, 60.0, 0.0, 2.0, 1.5];
+        let both = shares(&projection(6.0, 4.0), &[TRUCK, car]);
+        let line = 6.0 - 2.0 * 58.5 / 52.0;
+        let expected = (254.0 * (4.0 - line) / 4.0) as i32;
+        let got = i32::from(both[58][20].unwrap());
+        assert!((got - expected).abs() < 4, "{got} for {expected}: no lower than the truck leaves it, and no higher");
+        // the run that began again blocks no less than the first
+        let alone = shares(&projection(6.0, 4.0), &[TRUCK]);
+        assert!((60..150).all(|x| both[x][20] <= alone[x][20]));
     }
 
     #[test]

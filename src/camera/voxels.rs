@@ -12,13 +12,13 @@ use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
 
 /// Side of a column, centimetres.
-pub const CELL_CM: i32 = 100;
+pub(crate) const CELL_CM: i32 = 100;
 
 /// Height of a voxel, centimetres.
-pub const VOXEL_CM: i32 = 50;
+pub(crate) const VOXEL_CM: i32 = 50;
 
 /// Voxels of a column.
-pub const LEVELS: i32 = 8;
+pub(crate) const LEVELS: i32 = 8;
 
 /// Evidence of a voxel that is covered.
 pub(crate) const FULL: u8 = 15;
