@@ -24,23 +24,30 @@ pub(crate) struct ClassSize {
     pub(crate) height: i32,
     /// Least and greatest length: what the far end of a box can make of it.
     pub(crate) lengths: [i32; 2],
-    /// How much the height spreads.
+    /// How much height and width spread.
     pub(crate) height_spread: i32,
+    pub(crate) width_spread: i32,
 }
 
 impl VehicleClass {
     /// Typical sizes; lengths from the shortest to the longest that is allowed on European roads, or is sold.
     pub(crate) fn size(self) -> ClassSize {
-        let of =
-            |length, width, height, lengths, height_spread| ClassSize { length, width, height, lengths, height_spread };
+        let of = |[length, width, height]: [i32; 3], lengths, [height_spread, width_spread]: [i32; 2]| ClassSize {
+            length,
+            width,
+            height,
+            lengths,
+            height_spread,
+            width_spread,
+        };
         match self {
-            Self::Car => of(460, 180, 150, [350, 520], 15),
-            Self::Van => of(600, 205, 260, [480, 740], 30),
-            Self::Truck => of(1650, 255, 400, [600, 1875], 40),
-            Self::Bus => of(1300, 255, 360, [900, 1875], 40),
-            Self::Motorcycle => of(220, 80, 150, [220, 220], 20),
-            Self::Bicycle => of(180, 60, 170, [180, 180], 20),
-            Self::Pedestrian => of(60, 60, 175, [60, 60], 15),
+            Self::Car => of([460, 180, 150], [350, 520], [15, 8]),
+            Self::Van => of([600, 205, 260], [480, 740], [30, 8]),
+            Self::Truck => of([1650, 255, 400], [600, 1875], [40, 5]),
+            Self::Bus => of([1300, 255, 360], [900, 1875], [40, 5]),
+            Self::Motorcycle => of([220, 80, 150], [220, 220], [20, 10]),
+            Self::Bicycle => of([180, 60, 170], [180, 180], [20, 10]),
+            Self::Pedestrian => of([60, 60, 175], [60, 60], [15, 10]),
         }
     }
 

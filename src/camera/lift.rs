@@ -8,8 +8,8 @@
 //! camera, gives the length within the limits of the class.
 //!
 //! A detector draws its box around what is visible. Where a nearer box covers the bottom edge, or the image ends
-//! there, the top edge and the class's height place the vehicle; where the roof is as high as the camera or the top
-//! is outside too, its width does. A side that a nearer box covers, or that lies at the image's border, is not
+//! there, the top edge and the class's height place the vehicle, or its width, whichever is surer: a roof nearly as
+//! high as the camera says little, and a side that is covered nothing of the width. A side that a nearer box covers, or that lies at the image's border, is not
 //! used, the other one then is. All of that makes the uncertainty larger.
 //!
 //! # Limits
@@ -133,7 +133,7 @@ impl Lifting {
         let mut placed = Placed { at: [0; 2], length: size.length, width: size.width, height: size.height };
         let [_, top_free, _, bottom_free] = free;
         let roof_below = p.height_cm - size.height >= ABOVE_ROOF_CM;
-        let by_top = !bottom_free && top_free && roof_below;
+        let by_top = !bottom_free && top_free && roof_below && self.surer_by_top(&seen, free, p);
         let off = BoxRejection::AboveHorizon;
         placed.at = self.start(&seen, by_top, p).ok_or(off)?;
         if bottom_free || by_top {
@@ -145,6 +145,38 @@ impl Lifting {
             self.by_width(&mut placed, &seen, free, p).ok_or(off)?;
         }
         Ok(self.told(&placed, &seen, free, by_top, p))
+    }
+
+    /// Whether the top edge places a vehicle better than its width does.
+    fn surer_by_top(&self, seen: &Seen, free: Free, p: &Projection) -> bool {
+        let [left, top, right, _] = seen.edges;
+        let place = p.on_plane([(left + right) / 2, top], seen.class.size().height);
+        place.is_none_or(|[x, y]| {
+            let distance = math::length(x, y);
+            self.along_by_top(seen, distance, p) <= self.along_by_width(seen, free, distance)
+        })
+    }
+
+    /// Standard deviation along the line of sight by the top edge: an edge moves the roof by the height above it
+    /// over the distance, and height and length are not known.
+    fn along_by_top(&self, seen: &Seen, distance: i32, p: &Projection) -> i32 {
+        let size = seen.class.size();
+        let above = (p.height_cm - size.height).max(1);
+        let noise = math::mul_shift(distance, self.edge_noise, 16);
+        math::mul_shift(noise + size.height_spread, math::ratio::<8>(distance, above), 8)
+            + (size.lengths[1] - size.lengths[0]) / 4
+    }
+
+    /// The same by the width, of which a covered side leaves nothing but a guess.
+    fn along_by_width(&self, seen: &Seen, free: Free, distance: i32) -> i32 {
+        if !(free[0] && free[2]) {
+            return distance / 2;
+        }
+        let size = seen.class.size();
+        let wide = (seen.edges[0] - seen.edges[2]).max(1);
+        let of_size = math::ratio::<12>(size.width_spread, size.width);
+        let of_edges = math::ratio::<12>(self.edge_noise.min(wide), wide);
+        math::mul_shift(distance, of_size + of_edges, 12)
     }
 
     /// Where the middle of the edge that is used lies, half the length farther.
@@ -252,12 +284,9 @@ impl Lifting {
         let along = if bottom_free {
             math::mul_shift(noise, math::ratio::<8>(distance, p.height_cm.max(1)), 8)
         } else if by_top {
-            let above = (p.height_cm - size.height).max(1);
-            let moved = math::mul_shift(noise, math::ratio::<8>(distance, above), 8);
-            // and with what is not known of the height and the length
-            moved + size.height_spread * (distance / above) + (size.lengths[1] - size.lengths[0]) / 4
+            self.along_by_top(seen, distance, p)
         } else {
-            distance / 4
+            self.along_by_width(seen, free, distance)
         };
         let covered = if left_free && right_free { 0 } else { size.width / 6 };
         let (hx, hy) = p.levelling.unturn(i32::from(self.heading.x), i32::from(self.heading.y));
@@ -434,7 +463,21 @@ mod tests {
         let got = lifted(&c, &own, &[nearer]);
         let [along, across] = error(&got, at);
         assert!(along.abs() < 3.0 && across.abs() < 0.3, "{along} {across}");
-        assert!(got.along_cm > 1000);
+        // 2 % of the width, and two pixels of seventy
+        assert!((200..500).contains(&got.along_cm), "{}", got.along_cm);
+    }
+
+    #[test]
+    fn of_a_truck_behind_a_truck_the_width_tells_more_than_the_roof() {
+        let c = calibration(0.0);
+        // shorter and lower than its class is taken to be
+        let at = Vehicle(80.0, 89.2, 0.0, 2.5, 3.6);
+        let mut own = seen(&c, at, VehicleClass::Truck);
+        own.edges[3] -= (own.edges[3] - own.edges[1]) / 2;
+        let nearer =
+            ImageBox { edges: [own.edges[0] - 99, own.edges[3], own.edges[2] + 99, 9000], class: VehicleClass::Truck };
+        let [along, _] = error(&lifted(&c, &own, &[nearer]), at);
+        assert!(along.abs() < 5.0, "{along}");
     }
 
     #[test]

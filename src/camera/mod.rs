@@ -11,8 +11,8 @@
 //! # Model
 //! A box and its class become an upright box on the road ([`lift`]), that fills voxels of 1 x 1 x 0.5 m ahead of
 //! the camera. Lines of sight are cast through them, and a cell is visible where the mean visibility of
-//! the voxels 0 to 4 m above it reaches [`Camera3dConfig::visible_share`]. Whoever wants to see cars, 1.5 m high,
-//! when their upper third shows needs three quarters of the 4 m; half of them is enough for trucks.
+//! the voxels 0 to 4 m above it reaches [`Camera3dConfig::visible_share`]. That is a choice between trucks and cars:
+//! of a car, 1.5 m high, nothing shows while 62 % of the column does, and a truck shows enough of itself long before.
 //!
 //! A camera that is silent, says that it is faulty, or finds nothing at all any more is no evidence, and the map is
 //! unknown ([`crate::frame::health`]). So are cells outside of the image and beyond the grid.
@@ -114,7 +114,7 @@ impl Default for Camera3dConfig {
             range_max_m: 200.0,
             memory_s: 0.2,
             slice_height_m: 1.0,
-            visible_share: 0.75,
+            visible_share: 0.6,
             health: HealthConfig::default(),
         }
     }
