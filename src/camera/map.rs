@@ -39,14 +39,9 @@ impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
         self.occupancy = [[0; NY]; NX];
     }
 
-    pub(crate) fn set(&mut self, row: usize, column: usize, grade: u8, occupancy: u8) {
-        let at = |rows: &mut [[u8; NY]; NX], value: u8| {
-            if let Some(cell) = rows.get_mut(row).and_then(|row| row.get_mut(column)) {
-                *cell = value;
-            }
-        };
-        at(&mut self.grades, grade);
-        at(&mut self.occupancy, occupancy);
+    /// Grades (1 to 255, 0 = unknown) and occupancy, to be written by the ray caster.
+    pub(crate) fn rows_mut(&mut self) -> (&mut [[u8; NY]; NX], &mut [[u8; NY]; NX]) {
+        (&mut self.grades, &mut self.occupancy)
     }
 
     /// What is known of a cell: metres ahead, and the column from right to left; unknown outside of the map.
@@ -84,20 +79,33 @@ impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
     }
 
     /// Takes the map over into a polar one made by [`polar`](Self::polar): each of its cells is what the nearest
-    /// cell is, the one its middle lies in, never better.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 2^16 turn and 200 m
+    /// cell is, the one its middle lies in, never better. One with other cells is made unknown.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 2^16 turn
     pub fn to_polar<const R: usize, const A: usize>(&self, polar: &mut PolarMap<R, A>) {
         let geometry = *polar.geometry();
+        polar.forget();
+        if geometry.cell_cm != CELL_CM {
+            return;
+        }
         let span = u32::from(geometry.azimuth_span);
         for a in 0..A {
             let middle = (span * (2 * a as u32 + 1)) / (2 * A as u32).max(1);
             let ray = trig::direction(geometry.azimuth_origin + Angle::from_raw(middle as i16));
             let Some((grades, occupancy)) = polar.rows_mut(a) else { continue };
-            for (r, (grade, occupied)) in grades.iter_mut().zip(occupancy).enumerate() {
-                let range = r as i32 * geometry.cell_cm + geometry.cell_cm / 2;
-                let (x, y) = ((range * i32::from(ray.x)) >> 14, (range * i32::from(ray.y)) >> 14);
-                let state = Self::locate(x, y).map_or(CellState::UNKNOWN, |(row, column)| self.cell(row, column));
-                (*grade, *occupied) = (state.grade, state.occupancy);
+            // cells, 2^-15: half a cell and then whole ones along the ray
+            let (dx, dy) = (i32::from(ray.x), i32::from(ray.y));
+            let (mut x, mut y) = (dx, dy + ((NY as i32) << 14));
+            for (grade, occupied) in grades.iter_mut().zip(occupancy) {
+                let at = |rows: &[[u8; NY]; NX]| {
+                    rows.get(usize::try_from(x >> 15).ok()?)?.get(usize::try_from(y >> 15).ok()?).copied()
+                };
+                // beyond the cells there are no more of them along the ray
+                let Some(own) = at(&self.grades) else { break };
+                if own != UNKNOWN {
+                    (*grade, *occupied) = (own, at(&self.occupancy).unwrap_or(0));
+                }
+                x += 2 * dx;
+                y += 2 * dy;
             }
         }
     }
@@ -122,15 +130,20 @@ mod tests {
         CameraMap::new(mount.levelling().unwrap(), azimuth, 128, 128)
     }
 
+    fn set(map: &mut CameraMap<20, 10>, row: usize, column: usize, grade: u8, occupancy: u8) {
+        let (grades, occupied) = map.rows_mut();
+        (grades[row][column], occupied[row][column]) = (grade, occupancy);
+    }
+
     #[test]
     fn a_cell_lies_ahead_and_to_the_left_of_where_the_camera_hangs() {
         let mut m = map();
         // 12 to 13 m ahead is +y of the road, the second column from the left is 3 to 4 m to -x
-        m.set(12, 8, 200, 255);
+        set(&mut m, 12, 8, 200, 255);
         assert!(m.at(RoadPoint::new(300 - 350, 100 + 1250)).visible());
         assert_eq!(m.at(RoadPoint::new(300 + 350, 100 + 1250)), CellState::UNKNOWN);
         assert_eq!(m.at(RoadPoint::new(300 - 350, 100 - 1250)), CellState::UNKNOWN);
-        m.set(12, 8, 127, 127);
+        set(&mut m, 12, 8, 127, 127);
         let state = m.at(RoadPoint::new(300 - 350, 100 + 1250));
         assert!(state.visibility == Visibility::Invisible && !state.occupied);
         m.forget();
@@ -142,10 +155,10 @@ mod tests {
         let mut m = map();
         for row in 0..20 {
             for column in 0..10 {
-                m.set(row, column, (1 + row * 10 + column) as u8, column as u8);
+                set(&mut m, row, column, (1 + row * 10 + column) as u8, column as u8);
             }
         }
-        m.set(9, 4, 0, 0);
+        set(&mut m, 9, 4, 0, 0);
         let mut polar = m.polar::<25, 12>();
         m.to_polar(&mut polar);
         let levelling = map().levelling;
@@ -161,6 +174,9 @@ mod tests {
                 known += usize::from(polar.cell(a, r) != CellState::UNKNOWN);
             }
         }
+        let mut coarse = PolarMap::<25, 12>::unknown(PolarGeometry { cell_cm: 200, ..*polar.geometry() }, 128, 128);
+        m.to_polar(&mut coarse);
+        assert_eq!(coarse.cell(6, 5), CellState::UNKNOWN, "of other cells");
         assert!(known > 150 && polar.cell(6, 22) == CellState::UNKNOWN, "{known}");
     }
 }

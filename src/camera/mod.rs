@@ -314,9 +314,8 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
         let condition = self.health.condition(now, &p.health);
         if condition == Condition::Healthy {
             let Self { voxels, skyline, .. } = self;
-            p.view.cast(voxels, skyline, |row, column, share| {
-                map.set(row, column, share.saturating_add(1), voxels.evidence(row, column));
-            });
+            let (grades, occupancy) = map.rows_mut();
+            p.view.cast(voxels, skyline, grades, occupancy);
         } else {
             map.forget();
         }

@@ -16,7 +16,7 @@
 //! One step of direction is 1/1024 of the view: 0.24 m at 200 m and 60 degrees.
 
 use crate::camera::projection::Projection;
-use crate::camera::voxels::{CELL_CM, LEVELS, VOXEL_CM, Voxels, middle_of, top_of};
+use crate::camera::voxels::{CELL_CM, FULL, LEVELS, TOPS, VOXEL_CM, Voxels, middle_of, top_of};
 use crate::fixed::math;
 
 /// Steps of direction.
@@ -127,36 +127,53 @@ impl<const NX: usize> View<NX> {
         })
     }
 
-    /// Tells the share of each column in view that is seen, 0 to 254, row by row.
+    /// Writes how much of each column in view is seen, 1 to 255, and its evidence at the road.
     pub(crate) fn cast<const NY: usize>(
         &self,
         voxels: &Voxels<NX, NY>,
         skyline: &mut Skyline,
-        mut tell: impl FnMut(usize, usize, u8),
+        grades: &mut [[u8; NY]; NX],
+        occupancy: &mut [[u8; NY]; NX],
     ) {
         *skyline = Skyline::OPEN;
-        for (i, &(first, end)) in self.rows.iter().enumerate() {
+        let mut open = true;
+        for (i, ((&(first, end), grades), occupancy)) in self.rows.iter().zip(grades).zip(occupancy).enumerate() {
             let near = (i as i32 * CELL_CM).max(NEAREST_CM);
             let (x, far) = (i as i32 * CELL_CM + CELL_CM / 2, (i as i32 + 1) * CELL_CM);
-            let per_cm = self.per_cm(x);
             let (row, columns) = (i as u16, voxels.row(i));
-            for j in usize::from(first)..usize::from(end) {
-                let y = middle_of(j, NY);
-                let occupied = columns.and_then(|c| c.get(j)).is_some_and(|c| top_of(*c) > 0);
-                let blocked = skyline.directions.get(self.step(y, per_cm) as usize);
-                let slope = blocked.map_or(OPEN, |b| b.slope(row, occupied));
-                let (mut low, mut high) = (0, JUDGED_CM);
-                if let Some(border) = self.upper {
-                    high = high.min(border.height(x, y) + self.height_cm);
+            let view = usize::from(first)..usize::from(end);
+            let (y, last) = (middle_of(view.start, NY), middle_of(view.end, NY) - CELL_CM);
+            let upper = Limit::of(self.upper, x, y, self.height_cm, JUDGED_CM);
+            let lower = Limit::of(self.lower, x, y, self.height_cm, 0);
+            // a border is straight: where it is beyond the column at both ends of the row it is so between
+            let whole = upper.at(last - y).min(upper.at(0)) >= JUDGED_CM && lower.at(last - y).max(lower.at(0)) <= 0;
+            if let (Some(grades), Some(occupancy)) = (grades.get_mut(view.clone()), occupancy.get_mut(view.clone())) {
+                if whole && open && columns.is_none() {
+                    grades.fill(u8::MAX);
+                    occupancy.fill(0);
+                } else {
+                    let columns = columns.and_then(|c| c.get(view)).unwrap_or(&[]);
+                    let columns = columns.iter().copied().chain(core::iter::repeat(0));
+                    let per_cell = self.per_cm(x) * i64::from(CELL_CM);
+                    let mut at = (i64::from(self.ahead) << 12) + self.per_cm(x) * i64::from(y);
+                    let mut aside = 0;
+                    for ((grade, occupied), column) in grades.iter_mut().zip(occupancy).zip(columns) {
+                        let blocked = skyline.directions.get((at >> 20) as usize);
+                        let slope = blocked.map_or(OPEN, |b| b.slope(row, column & TOPS != 0));
+                        let (mut low, mut high) = (0, JUDGED_CM);
+                        if !whole {
+                            (low, high) = (lower.at(aside).max(0), upper.at(aside).min(JUDGED_CM));
+                        }
+                        if slope != OPEN {
+                            low = low.max(self.height_cm + math::mul_shift(slope, x, 16));
+                        }
+                        // 254 / 400, 2^-8 rounded up
+                        *grade = (((high - low).max(0) * 163) >> 8) as u8 + 1;
+                        *occupied = (column & u32::from(FULL)) as u8 * (u8::MAX / FULL);
+                        at += per_cell;
+                        aside += CELL_CM;
+                    }
                 }
-                if let Some(border) = self.lower {
-                    low = low.max(border.height(x, y) + self.height_cm);
-                }
-                if slope != OPEN {
-                    low = low.max(self.height_cm + math::mul_shift(slope, x, 16));
-                }
-                // 254 / 400, 2^-8 rounded up
-                tell(i, j, (((high - low).max(0) * 163) >> 8) as u8);
             }
             let Some(columns) = columns else { continue };
             let (at_near, at_far) = (self.per_cm(near), self.per_cm(far));
@@ -165,6 +182,7 @@ impl<const NX: usize> View<NX> {
                 if top == 0 {
                     continue;
                 }
+                open = false;
                 let above = top - self.height_cm;
                 let slope = (above << 16) / if above < 0 { far } else { near };
                 let (right, left) = (middle_of(j, NY) - CELL_CM / 2, middle_of(j, NY) + CELL_CM / 2);
@@ -183,11 +201,6 @@ impl<const NX: usize> View<NX> {
         (i64::from(self.steps) << 12) / i64::from(x.max(1))
     }
 
-    /// The step of direction a place lies in.
-    fn step(&self, y: i32, per_cm: i64) -> i64 {
-        (i64::from(self.ahead) + ((i64::from(y) * per_cm) >> 12)) >> 8
-    }
-
     /// The first step of direction whose middle lies to the left of a place.
     fn edge(&self, y: i32, per_cm: i64) -> usize {
         let at = (i64::from(self.ahead) + ((i64::from(y) * per_cm) >> 12) + 127) >> 8;
@@ -203,10 +216,29 @@ impl Border {
         let slope = |v: f32| math::round_i32(-v / z * 65_536.0);
         (z < -UPRIGHT || z > UPRIGHT).then(|| Self { x: slope(x), y: slope(y) })
     }
+}
 
-    /// Height above the camera at a place.
-    fn height(self, x: i32, y: i32) -> i32 {
-        math::mul_shift(self.x, x, 16) + math::mul_shift(self.y, y, 16)
+/// A border along a row: its height above the road.
+#[derive(Debug, Clone, Copy)]
+struct Limit {
+    base: i32,
+    /// Where the row's first column lies, 2^-16, and what a centimetre across adds.
+    start: i64,
+    slope: i32,
+}
+
+impl Limit {
+    /// Of a row at `x` whose first column is at `y`; without a border, one that is everywhere at `none`.
+    fn of(border: Option<Border>, x: i32, y: i32, height_cm: i32, none: i32) -> Self {
+        let Some(Border { x: along, y: across }) = border else { return Self { base: none, start: 0, slope: 0 } };
+        let base = height_cm + math::mul_shift(along, x, 16);
+        Self { base, start: i64::from(across) * i64::from(y), slope: across }
+    }
+
+    /// So far to the left of the first column.
+    #[allow(clippy::cast_possible_truncation)] // a slope below 20 over at most 100 m
+    fn at(&self, aside: i32) -> i32 {
+        self.base + ((self.start + i64::from(self.slope) * i64::from(aside)) >> 16) as i32
     }
 }
 
@@ -243,11 +275,10 @@ mod tests {
                 height: cm(*height),
             });
         }
-        let mut shares = std::vec![[None; 40]; 150];
         let view = View::<150>::new::<40>(p, 100, 20_000).unwrap();
-        let mut skyline = Skyline::OPEN;
-        view.cast(&grid, &mut skyline, |i, j, share| shares[i][j] = Some(share));
-        shares
+        let (mut skyline, mut grades, mut occupancy) = (Skyline::OPEN, [[0_u8; 40]; 150], [[0; 40]; 150]);
+        view.cast(&grid, &mut skyline, &mut grades, &mut occupancy);
+        grades.iter().map(|row| row.map(|grade| grade.checked_sub(1))).collect()
     }
 
     const TRUCK: [f64; 5] = [40.0, 52.0, -1.0, 2.0, 4.0];

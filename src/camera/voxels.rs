@@ -24,7 +24,7 @@ pub(crate) const LEVELS: i32 = 8;
 pub(crate) const FULL: u8 = 15;
 
 /// The top bit of every voxel: occupied.
-const TOPS: u32 = 0x8888_8888;
+pub(crate) const TOPS: u32 = 0x8888_8888;
 
 /// A box in the levelled frame, centimetres.
 #[derive(Debug, Clone, Copy)]
@@ -131,12 +131,6 @@ impl<const NX: usize, const NY: usize> Voxels<NX, NY> {
         any
     }
 
-    /// Evidence of a cell at the road, 0 to 255.
-    #[allow(clippy::cast_possible_truncation)] // four bits
-    pub(crate) fn evidence(&self, row: usize, column: usize) -> u8 {
-        self.columns.get(row).and_then(|row| row.get(column)).map_or(0, |c| (c & 15) as u8 * 17)
-    }
-
     /// A row's columns; `None` where nothing is in it.
     pub(crate) fn row(&self, row: usize) -> Option<&[u32; NY]> {
         self.used.get(row).filter(|used| **used).and(self.columns.get(row))
@@ -240,8 +234,5 @@ mod tests {
             (top_of(0x7777_7777), top_of(0x0000_0008), top_of(0x0000_8000), top_of(u32::MAX)),
             (0, 50, 200, 400)
         );
-        let mut grid = Grid::EMPTY;
-        grid.fill(&standing(450, 0, 60, 60, 150, 0.0));
-        assert_eq!((grid.evidence(4, 4), grid.evidence(4, 5), grid.evidence(99, 4)), (255, 0, 0));
     }
 }
