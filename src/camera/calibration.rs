@@ -315,7 +315,8 @@ fn pose([a, b, c]: &Homography) -> Result<Pose, CalibrationError> {
     let up = cross(x, y);
     let t = origin.map(|v| v / unit);
     let place_m = [-dot(x, t), -dot(y, t), -dot(up, t)];
-    if !(place_m[2] > 0.0) {
+    let above_road = place_m[2] > 0.0;
+    if !above_road {
         return Err(CalibrationError::Mirrored);
     }
     let [r, d, h] = core::array::from_fn(|k| [at(&x, k), at(&y, k), at(&up, k)]);

@@ -108,7 +108,8 @@ fn solve<const N: usize>(matrix: [[f64; N]; N], right: [f64; N]) -> Option<[f64;
         let known: f64 = (0..i).map(|k| lower[i][k] * lower[i][k] * pivots[k]).sum();
         pivots[i] = matrix[i][i] - known;
         // a NaN is refused as well
-        if !(pivots[i] > SINGULAR * matrix[i][i]) {
+        let determined = pivots[i] > SINGULAR * matrix[i][i];
+        if !determined {
             return None;
         }
     }

@@ -214,7 +214,7 @@ impl Border {
         /// A plane nearer to upright than this is none.
         const UPRIGHT: f32 = 0.05;
         let slope = |v: f32| math::round_i32(-v / z * 65_536.0);
-        (z < -UPRIGHT || z > UPRIGHT).then(|| Self { x: slope(x), y: slope(y) })
+        (z.abs() > UPRIGHT).then(|| Self { x: slope(x), y: slope(y) })
     }
 }
 
