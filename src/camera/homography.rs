@@ -9,14 +9,11 @@
 //! # References
 //! R. Hartley, A. Zisserman, "Multiple View Geometry in Computer Vision", 2nd edition, section 4.4.
 
-use crate::camera::calibration::{CalibrationError, PointPair};
+use crate::camera::points::{CalibrationError, LEAST_PAIRS, PointPair};
 use crate::fixed::math;
 
 /// Road plane (metres) to image (pixels).
 pub(crate) type Homography = [[f64; 3]; 3];
-
-/// Fewest pairs.
-pub(crate) const LEAST_PAIRS: usize = 4;
 
 /// Smallest over mean spread of points that do not lie on a line: 1 cm beside a line of 10 m.
 const LINE: f64 = 1e-6;

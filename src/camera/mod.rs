@@ -64,6 +64,7 @@ pub mod calibration;
 mod homography;
 pub mod lift;
 pub mod map;
+mod points;
 mod projection;
 mod sight;
 mod voxels;
