@@ -85,6 +85,7 @@
 //! | `estimator` | what a unit asks of an estimator, whatever its sensor and its map |
 //! | `radar_3d` | the estimator: all stages above, in order |
 //! | `radar_2d` | the flat baseline, as an estimator of its own |
+//! | `camera` | boxes of a camera's detector in, lifted onto the road, into voxels and lines of sight; the same maps out. No unit runs it yet: with feature `bench` only |
 //! | `wire` | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
 //! | `inputs` | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
 //! | `unit` | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
@@ -157,6 +158,10 @@ pub mod extending {}
 pub mod specification {}
 
 // What is public of the rooms stands below; benches and tests go into them.
+#[cfg(not(feature = "bench"))]
+mod camera;
+#[cfg(feature = "bench")]
+pub mod camera;
 #[cfg(not(feature = "bench"))]
 mod estimator;
 #[cfg(feature = "bench")]

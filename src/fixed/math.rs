@@ -44,6 +44,11 @@ pub(crate) fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
 
+/// Square root in double precision, for start-up computations that single precision is too coarse for.
+pub(crate) fn sqrt_double(x: f64) -> f64 {
+    libm::sqrt(x)
+}
+
 /// Decimal logarithm.
 pub(crate) fn log10(x: f32) -> f32 {
     libm::log10f(x)

@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod camera_3d;
 mod obstacles;
 mod radar_2d;
 mod radar_3d;

@@ -9,6 +9,9 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
+use viewshed::camera::boxes::ImageBox;
+use viewshed::camera::map::CameraMap;
+use viewshed::camera::{Camera3dConfig, Camera3dParameters, CameraProfile, MOST_BOXES};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement};
 use viewshed::map::polar::PolarMap;
@@ -22,12 +25,17 @@ use viewshed::wire::header::Header;
 use viewshed::wire::message::{Addresses, Epoch, Packet};
 use viewshed::wire::receive::{Limits, Receiver};
 use viewshed_harness::boards::stress;
-use viewshed_harness::estimators;
+use viewshed_harness::estimators::{self, camera_3d};
+use viewshed_harness::recording::Recording;
 use viewshed_harness::recording::mcap::read;
 
 /// `radar-3d-blurred` is radar-3d with the largest range noise that may be set: evidence spreads widest.
 const ESTIMATORS: [&str; 4] = ["radar-3d", "radar-3d-small", "radar-3d-blurred", "radar-2d"];
 const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
+
+/// The camera: the recording's boxes, and as many as a frame may have.
+const CAMERA: [(&str, &str); 2] = [("camera-3d", SCENES[0]), ("camera-3d", CROWDED)];
+const CROWDED: &str = "crowded";
 
 /// What is measured on the recording's maps only.
 const WIRE: [&str; 6] = ["send-can", "receive-can", "send-fd", "receive-fd", "send-long", "receive-long"];
@@ -39,6 +47,7 @@ const WIRE_BUDGET: u64 = 150_000;
 fn measured(estimator: &str) -> &'static str {
     match estimator {
         "radar-2d" => "instructions::measured_frame_2d",
+        "camera-3d" => "instructions::measured_frame_camera",
         "send-can" | "send-fd" | "send-long" => "instructions::measured_send",
         "receive-can" | "receive-fd" | "receive-long" => "instructions::measured_receive",
         _ => "instructions::measured_frame_3d",
@@ -64,7 +73,7 @@ fn main() -> ExitCode {
     println!("{:<16} {:<12} {:>9} {:>12} {:>12} {:>12}", "estimator", "scene", "frames", "mean", "median", "worst");
     let estimators = ESTIMATORS.iter().flat_map(|e| SCENES.map(|scene| (*e, scene)));
     let asked: Vec<&String> = args.iter().skip(1).filter(|a| !a.starts_with("--")).collect();
-    for (estimator, scene) in estimators.chain(WIRE.map(|w| (w, SCENES[0]))) {
+    for (estimator, scene) in estimators.chain(CAMERA).chain(WIRE.map(|w| (w, SCENES[0]))) {
         if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
             continue;
         }
@@ -118,6 +127,9 @@ fn totals(path: &Path) -> Option<u64> {
 /// Runs an estimator over a scene; this is what runs under callgrind.
 fn work(estimator: &str, scene: &str, recording: &Path) {
     let recording = read(recording, &Default::default()).expect("the recording");
+    if estimator == "camera-3d" {
+        return run_camera(&recording, scene == CROWDED);
+    }
     let sensor = estimators::sensor(&recording, &Default::default());
     let frames: Vec<(Time, Vec<Detection>)> = if scene == "recording" {
         let time = |ns: i64| Time::from_micros(u64::try_from(ns / 1000).unwrap_or(0));
@@ -220,6 +232,42 @@ fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Pa
             }
         });
     }
+}
+
+/// Boxes to a map, and that to a polar one for the wire; crowded, with the boxes of some frames together.
+fn run_camera(recording: &Recording, crowded: bool) {
+    let camera = recording.camera.as_ref().expect("a camera in the recording");
+    let calibration = camera_3d::calibration(camera);
+    let parameters = Camera3dParameters::<200, 60>::new(&calibration, &Camera3dConfig::default()).expect("valid");
+    let mut state = Box::new(CameraProfile::new());
+    let mut map = Box::new(parameters.map());
+    let mut polar = Box::new(map.polar::<200, 120>());
+    let frames: Vec<(i64, Vec<ImageBox>)> =
+        camera.frames.iter().map(|f| (f.time_ns, camera_3d::vehicles(f).0)).collect();
+    for (k, (time_ns, boxes)) in frames.iter().enumerate() {
+        let now = Time::from_micros(u64::try_from(time_ns / 1000).unwrap_or(0));
+        if crowded {
+            let all: Vec<ImageBox> =
+                frames[k..].iter().flat_map(|f| &f.1).chain(boxes).copied().take(MOST_BOXES).collect();
+            measured_frame_camera(&mut state, &parameters, now, &all, &mut map, &mut polar);
+        } else {
+            measured_frame_camera(&mut state, &parameters, now, boxes, &mut map, &mut polar);
+        }
+    }
+    black_box(&polar);
+}
+
+#[inline(never)]
+fn measured_frame_camera(
+    state: &mut CameraProfile,
+    parameters: &Camera3dParameters<200, 60>,
+    now: Time,
+    boxes: &[ImageBox],
+    map: &mut CameraMap<200, 60>,
+    polar: &mut PolarMap<200, 120>,
+) {
+    black_box(state.process(parameters, now, boxes, false, map));
+    map.to_polar(polar);
 }
 
 fn run_2d(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {

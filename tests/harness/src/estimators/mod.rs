@@ -1,11 +1,13 @@
 //! The library's estimators, driven by recordings.
 
+pub mod camera_3d;
 mod radar_2d;
 pub mod radar_3d;
 mod reference;
 
 use anyhow::{Result, bail};
 use serde::{Deserialize, Serialize};
+use viewshed::camera::Camera3dConfig;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement, NotADetection};
 use viewshed::frame::gate::{Rejection, Rejections};
@@ -69,6 +71,7 @@ pub struct Options {
     pub noise: NoiseConfig,
     pub radar_2d: Radar2dConfig,
     pub radar_3d: Radar3dConfig,
+    pub camera_3d: Camera3dConfig,
 }
 
 impl Default for Options {
@@ -79,6 +82,7 @@ impl Default for Options {
             noise: NoiseConfig::default(),
             radar_2d: Radar2dConfig::default(),
             radar_3d: Radar3dConfig::default(),
+            camera_3d: Camera3dConfig::default(),
         }
     }
 }
@@ -88,6 +92,8 @@ impl Options {
     pub fn judge_at(&mut self, slice_height_m: f64) {
         self.radar_2d.slice_height_m = slice_height_m as f32;
         self.radar_3d.visibility.slice_height_m = slice_height_m as f32;
+        // columns that cameras judge end at 4 m
+        self.camera_3d.slice_height_m = slice_height_m.min(4.0) as f32;
     }
 }
 

@@ -4,11 +4,12 @@
 //! them ([`bounds`] are scores too), and [`summary`] makes rates ([`counts`], [`cells`]), intervals
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
 //! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
-//! [`pool`] joins several, and [`examples`] picks what is worth a picture.
+//! [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, and [`examples`] picks what is worth a picture.
 
 pub mod bootstrap;
 pub mod bounds;
 pub mod breakdown;
+pub mod camera;
 pub mod cells;
 pub mod comparison;
 pub mod counts;

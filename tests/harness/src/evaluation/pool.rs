@@ -117,11 +117,12 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
         frames,
         truth: Some(Truth { tracks }),
         occlusion: Default::default(),
+        camera: None,
         problems: Problems::default(),
     };
     let mut summary = Summary::new(&recording, &samples, &scores, options);
     summary.frames = counted;
-    Some(Replay { recording, samples, scores, summary })
+    Some(Replay { recording, samples, scores, summary, camera: None })
 }
 
 #[cfg(test)]

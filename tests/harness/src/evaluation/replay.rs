@@ -3,12 +3,14 @@
 use rayon::prelude::*;
 
 use super::Options;
+use super::camera;
 use super::rejected;
 use super::samples::{self, FrameSamples};
 use super::score::{Score, score};
 use super::summary::Summary;
-use crate::estimators::Estimator;
+use crate::estimators::{self, Estimator, camera_3d};
 use crate::recording::Recording;
+use crate::recording::camera::INFO_TOPIC;
 
 /// Everything that replaying a recording gives; what pictures, tables and files are made of.
 #[derive(Debug)]
@@ -18,6 +20,8 @@ pub struct Replay {
     /// The estimators' scores, in the order of the table, without the bounds.
     pub scores: Vec<Score>,
     pub summary: Summary,
+    /// The same of a camera beside the radar.
+    pub camera: Option<Box<Replay>>,
 }
 
 impl Replay {
@@ -35,7 +39,30 @@ impl Replay {
             .collect();
         rejected::report(&mut recording, &scores);
         let summary = Summary::new(&recording, &samples, &scores, options);
-        Self { recording, samples, scores, summary }
+        Self { recording, samples, scores, summary, camera: None }
+    }
+
+    /// Adds the recording's camera, if it has one. A camera that cannot be worked with is told as a problem of the
+    /// input. `progress` is told each of [`camera_steps`] done.
+    pub fn add_camera(&mut self, estimators: &estimators::Options, options: &Options, progress: &(dyn Fn() + Sync)) {
+        let config = &estimators.camera_3d;
+        let Some(recording) = camera::recording(&self.recording, f64::from(config.range_max_m)) else { return };
+        let Some(own) = recording.camera.as_ref() else { return };
+        let mut running = match camera_3d::all(own, recording.truth.as_ref(), config) {
+            Ok(running) => running,
+            Err(error) => {
+                let first = recording.frames.first().map_or(0, |f| f.time_ns);
+                self.recording.problems.add(INFO_TOPIC, format!("boxes left out: {error:#}"), first);
+                return;
+            }
+        };
+        let samples = camera::samples(&recording, f64::from(config.visible_share), options, progress);
+        let scores: Vec<Score> = running
+            .par_iter_mut()
+            .map(|e| score(e.as_mut(), &recording, &samples, options.grid, &|| progress()))
+            .collect();
+        let summary = Summary::new(&recording, &samples, &scores, options);
+        self.camera = Some(Box::new(Self { recording, samples, scores, summary, camera: None }));
     }
 
     pub fn score(&self, name: &str) -> Option<&Score> {
@@ -47,6 +74,13 @@ impl Replay {
 pub fn steps(recording: &Recording, estimators: usize) -> u64 {
     let passes = estimators + usize::from(recording.truth.is_some());
     (recording.frames.len() * passes) as u64
+}
+
+/// Steps that [`Replay::add_camera`] is told of: each of the camera's frames for the samples, and for each of its
+/// two estimators.
+pub fn camera_steps(recording: &Recording) -> u64 {
+    let passes = if recording.truth.is_some() { 3 } else { 1 };
+    recording.camera.as_ref().map_or(0, |camera| camera.frames.len() as u64 * passes)
 }
 
 /// Runs a fresh estimator up to the last of `frames`, and shows it to `visit` at each of them.

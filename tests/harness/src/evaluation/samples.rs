@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Options;
 use crate::geometry::polygon::{Bounds, Convex};
 use crate::geometry::pose::{SensorPose, direction};
-use crate::geometry::sight::{box_in_sight, footprint_in_sight, shadow};
+use crate::geometry::sight::{box_in_sight, column_in_sight, footprint_in_sight, shadow};
 use crate::geometry::solid::Solid;
 use crate::recording::truth::Object;
 use crate::recording::{Frame, RadarDetection, Recording};
@@ -57,6 +57,30 @@ pub fn collect_every(
     every: usize,
     progress: &(dyn Fn() + Sync),
 ) -> Vec<FrameSamples> {
+    let detections = |k: usize, objects: &[Object]| {
+        let detections = recording.frames.get(k).map_or(&[][..], |frame| &frame.detections);
+        associate(recording, objects, detections, options)
+    };
+    collect_judged(recording, options, every, &Judge { detections: &detections, column: None }, progress)
+}
+
+/// How a kind of sensor tells what it detected, and what is in sight of a cell.
+pub struct Judge<'a> {
+    /// Detections that belong to each object of a frame.
+    pub detections: &'a (dyn Fn(usize, &[Object]) -> Vec<u32> + Sync),
+    /// Height of the column above a cell, metres, and the share of it that has to be in sight; without, the cell's
+    /// centre at slice height has to.
+    pub column: Option<(f64, f64)>,
+}
+
+/// The same for any kind of sensor.
+pub fn collect_judged(
+    recording: &Recording,
+    options: &Options,
+    every: usize,
+    judge: &Judge,
+    progress: &(dyn Fn() + Sync),
+) -> Vec<FrameSamples> {
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let warm_up = if recording.sensor.frames_independent { 0.0 } else { options.warm_up_s };
     let counted =
@@ -75,7 +99,8 @@ pub fn collect_every(
             if !counted(k, frame) {
                 return FrameSamples::default();
             }
-            frame_samples(recording, &truth.at(frame.time_ns), &frame.detections, &road, options)
+            let objects = truth.at(frame.time_ns);
+            frame_samples(recording, &objects, &(judge.detections)(k, &objects), judge.column, &road, options)
         })
         .collect()
 }
@@ -101,14 +126,14 @@ pub fn detect_again(recording: &Recording, samples: &mut [FrameSamples], options
 fn frame_samples(
     recording: &Recording,
     objects: &[Object],
-    detections: &[RadarDetection],
+    associated: &[u32],
+    column: Option<(f64, f64)>,
     road: &[Cell],
     options: &Options,
 ) -> FrameSamples {
     let pose = &recording.pose;
     let sensor = pose.position;
     let height = options.slice_height_m;
-    let associated = associate(recording, objects, detections, options);
     let shadows: Vec<Option<Convex>> = objects.iter().map(|o| shadow(sensor, &o.solid, height)).collect();
     let mut samples = Vec::new();
     for (k, object) in objects.iter().enumerate() {
@@ -136,7 +161,13 @@ fn frame_samples(
         .filter(|c| !taken.contains(c))
         .map(|&(i, j)| {
             let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5];
-            ((i, j), !bounded.iter().any(|(b, s)| b.contains(centre) && s.contains(centre)))
+            let in_sight = match column {
+                Some((height_m, share)) => {
+                    column_in_sight(sensor, centre, height_m, objects.iter().map(|o| &o.solid)) >= share
+                }
+                None => !bounded.iter().any(|(b, s)| b.contains(centre) && s.contains(centre)),
+            };
+            ((i, j), in_sight)
         })
         .collect();
     FrameSamples { counted: true, objects: samples, cells }
@@ -321,6 +352,7 @@ pub mod by_hand {
                 .collect(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),
             occlusion: Default::default(),
+            camera: None,
             problems: Problems::default(),
         }
     }

@@ -3,7 +3,7 @@
 //! Both bounds are analytic: the part of a convex target that convex shadows leave uncovered.
 //! A target never hides itself.
 
-use super::polygon::{Convex, Point, uncovered_area};
+use super::polygon::{Convex, Point, uncovered, uncovered_area};
 use super::pose::SensorPose;
 use super::solid::Solid;
 
@@ -92,6 +92,76 @@ pub fn outline(toward: &SensorPose, solid: &Solid) -> Option<Convex> {
     (points.len() >= 3).then(|| Convex::hull(points))
 }
 
+/// What is seen of one object on the image plane at unit distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncovered {
+    /// Index of the object.
+    pub object: usize,
+    /// Least and greatest left and up of what is seen.
+    pub low: Point,
+    pub high: Point,
+    /// Seen share of its outline, what lies outside of the frame included.
+    pub share: f64,
+}
+
+/// What is seen of each object past all others and past `screens`, within a frame of the image plane.
+pub fn uncovered_outlines(toward: &SensorPose, objects: &[Solid], screens: &[Solid], frame: &Convex) -> Vec<Uncovered> {
+    let all: Vec<(Solid, Option<Convex>)> = objects.iter().chain(screens).map(|s| (*s, outline(toward, s))).collect();
+    let seen = |object: usize| {
+        let (solid, outline) = &all[object];
+        let outline = outline.clone()?;
+        let whole = outline.area();
+        let covers = all.iter().enumerate().filter_map(|(i, (other, cover))| {
+            (i != object && cover.is_some() && in_front(toward.position, other, solid)).then_some(cover.as_ref()?)
+        });
+        let pieces: Vec<Convex> =
+            uncovered(outline, covers).iter().map(|p| p.within(frame)).filter(|p| p.area() > 0.0).collect();
+        let visible: f64 = pieces.iter().map(Convex::area).sum();
+        let none = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let (low, high) = pieces
+            .iter()
+            .flat_map(Convex::corners)
+            .fold(none, |(low, high), [x, y]| ([low[0].min(*x), low[1].min(*y)], [high[0].max(*x), high[1].max(*y)]));
+        (visible > 1e-9).then(|| Uncovered { object, low, high, share: (visible / whole).min(1.0) })
+    };
+    (0..objects.len()).filter_map(seen).collect()
+}
+
+/// Share of an upright column from the road to `height_m` that is in sight past boxes that stand on the road.
+pub fn column_in_sight<'a>(
+    sensor: [f64; 3],
+    at: Point,
+    height_m: f64,
+    solids: impl IntoIterator<Item = &'a Solid>,
+) -> f64 {
+    let hidden = solids.into_iter().filter_map(|solid| {
+        let (near, far) = crossing(solid, [sensor[0], sensor[1]], at)?;
+        let above = solid.top() - sensor[2];
+        // the highest line to the column that the box still stops
+        Some(sensor[2] + (above / near.max(1e-6)).max(above / far.max(1e-6)))
+    });
+    1.0 - hidden.fold(0.0, f64::max).clamp(0.0, height_m) / height_m
+}
+
+/// Parts of the way from one place to another at which a footprint is entered and left.
+fn crossing(solid: &Solid, from: Point, to: Point) -> Option<(f64, f64)> {
+    let (a, b) = (solid.local(from), solid.local(to));
+    let (mut t0, mut t1) = (0.0_f64, 1.0_f64);
+    for k in 0..2 {
+        let (start, delta, limit) = (a[k], b[k] - a[k], solid.size[k] / 2.0);
+        if delta.abs() < 1e-12 {
+            if start.abs() > limit {
+                return None;
+            }
+            continue;
+        }
+        let (u, v) = ((-limit - start) / delta, (limit - start) / delta);
+        t0 = t0.max(u.min(v));
+        t1 = t1.min(u.max(v));
+    }
+    (t0 < t1).then_some((t0, t1))
+}
+
 /// Whether `a` lies before `b` as seen from the sensor: the sensor is on `a`'s side of a plane
 /// that parts the two. Boxes that overlap (labels do) are ordered by distance.
 pub fn in_front(sensor: [f64; 3], a: &Solid, b: &Solid) -> bool {
@@ -164,6 +234,17 @@ mod tests {
         assert!(car.contains([90.0, 0.0]), "the car reaches above the line");
         // a 0.5 m kerb stays below every rising line
         assert!(shadow(bumper, &solid(20.0, 0.0, 4.0, 2.0, 0.5), 1.0).is_none());
+    }
+
+    #[test]
+    fn a_column_shows_what_is_above_the_line_over_a_truck() {
+        let truck = solid(55.0, 0.0, 10.0, 2.5, 4.0);
+        let share = |x, y| column_in_sight(GANTRY, [x, y], 4.0, [&truck]);
+        // the line over the top at 60 m falls 2 m in 60: at 90 m it is at 3 m, at 150 m at 1 m
+        assert!((share(90.0, 0.0) - 0.25).abs() < 1e-9 && (share(150.0, 0.0) - 0.75).abs() < 1e-9);
+        assert_eq!((share(49.0, 0.0), share(200.0, 0.0), share(90.0, 3.0)), (1.0, 1.0, 1.0));
+        let low = column_in_sight([0.0, 0.0, 2.0], [90.0, 0.0], 4.0, [&truck]);
+        assert_eq!(low, 0.0, "from below its top nothing is seen behind");
     }
 
     #[test]

@@ -56,7 +56,7 @@ pub fn recording(
         platform_moving: false,
         licence: None,
     };
-    Recording { name, sensor, pose, frames, truth: None, occlusion: BTreeMap::new(), problems }
+    Recording { name, sensor, pose, frames, truth: None, occlusion: BTreeMap::new(), camera: None, problems }
 }
 
 /// The library's detection as recordings have it.

@@ -7,9 +7,10 @@ use anyhow::{Context, Result, anyhow, bail};
 use mcap::records::{MessageHeader, Record};
 
 use super::beside;
+use super::camera::{CameraReader, INFO_TOPIC, OBJECTS_TOPIC};
 use super::points::{self, NOT_A_RANGE, NOT_FINITE, Points};
 use super::problems::Problems;
-use super::ros::{self, Detection3DArray, PointCloud2, RadarScan, TfMessage};
+use super::ros::{self, CameraInfo, Detection2DArray, Detection3DArray, PointCloud2, RadarScan, TfMessage};
 use super::transforms::Transforms;
 use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
 use crate::geometry::pose::SensorPose;
@@ -24,6 +25,8 @@ pub const SENSOR_METADATA: &str = "viewshed.sensor";
 const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
 const DETECTIONS: &str = "vision_msgs/msg/Detection3DArray";
+const BOXES: &str = "vision_msgs/msg/Detection2DArray";
+const CAMERA_INFO: &str = "sensor_msgs/msg/CameraInfo";
 const TF: &str = "tf2_msgs/msg/TFMessage";
 
 /// Sides an object may have.
@@ -50,6 +53,7 @@ struct Reader {
     frames: Vec<Frame>,
     labels: Vec<Label>,
     labelled: bool,
+    camera: CameraReader,
     problems: Problems,
 }
 
@@ -139,6 +143,10 @@ impl Reader {
             POINT_CLOUD if is_radar => self.cloud(&name, header, data),
             RADAR_SCAN if is_radar => self.scan(&name, header, data),
             DETECTIONS if is_truth => self.objects(&name, data),
+            BOXES if name == OBJECTS_TOPIC => {
+                ros::decode::<Detection2DArray>(data).map(|m| self.camera.boxes(m, &mut self.problems))
+            }
+            CAMERA_INFO if name == INFO_TOPIC => ros::decode::<CameraInfo>(data).map(|m| self.camera.info(m)),
             TF if name.ends_with("tf_static") => ros::decode::<TfMessage>(data).map(|m| self.transforms.add(m)),
             _ if is_radar || is_truth => Err(format!("schema {schema} is none this reader knows")),
             _ => Ok(()),
@@ -215,7 +223,7 @@ impl Reader {
         found.join(", ")
     }
 
-    fn finish(self, name: String, options: &ReadOptions) -> Result<Recording> {
+    fn finish(mut self, name: String, options: &ReadOptions) -> Result<Recording> {
         let topic = options.radar_topic.as_deref().unwrap_or(POINTS_TOPIC);
         if self.frames.is_empty() {
             let skipped: String = self.problems.iter().map(|p| format!("\n  {p}")).collect();
@@ -242,6 +250,7 @@ impl Reader {
         }
         let sensor = self.sensor(&name, options)?;
         let truth = self.labelled.then(|| Truth::new(self.labels));
+        let camera = self.camera.finish(&self.transforms, ROAD_FRAME, &mut self.problems);
         Ok(Recording {
             name,
             sensor,
@@ -249,6 +258,7 @@ impl Reader {
             frames: self.frames,
             truth,
             occlusion: BTreeMap::new(),
+            camera,
             problems: self.problems,
         })
     }

@@ -24,6 +24,7 @@ use anyhow::{Context, Result};
 
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
+use camera::RecordedCamera;
 use problems::Problems;
 
 /// One low-level radar measurement, as recorded.
@@ -101,6 +102,8 @@ pub struct Recording {
     pub truth: Option<Truth>,
     /// Human occlusion grade (0 = free, 2 = mostly hidden) by object id.
     pub occlusion: BTreeMap<String, u8>,
+    /// A camera beside the radar, with the boxes of its detector.
+    pub camera: Option<RecordedCamera>,
     /// What was wrong with the input, counted.
     pub problems: Problems,
 }

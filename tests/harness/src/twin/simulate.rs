@@ -182,7 +182,7 @@ impl Simulation {
         let targets: Vec<Target> =
             labels.iter().filter(is_vehicle).map(|l| Target { class: &l.class, solid: l.solid }).collect();
         let screens: Vec<Solid> = labels.iter().filter(|l| !is_vehicle(l)).map(|l| l.solid).collect();
-        Ok(CameraFrame { time_ns, boxes: camera.detect(&targets, &screens, self.scene.seed, number) })
+        Ok(CameraFrame { time_ns, boxes: camera.detect(&targets, &screens, self.scene.seed, number), refused: 0 })
     }
 
     /// Boxes of everything at an instant, whatever looks at it.

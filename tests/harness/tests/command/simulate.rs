@@ -115,6 +115,26 @@ fn a_recording_keeps_to_the_contract_and_can_be_replayed() {
 }
 
 #[test]
+fn a_camera_beside_the_radar_has_rows_of_its_own() {
+    let folder = prepared("camera-rows", ["", ""], ["", ""]);
+    assert!(simulate(&folder, "2", "r.mcap", &[]).status.success());
+    let output = replay(&folder, &["r.mcap", "--bootstrap", "0", "--json", "r.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report = json(&folder.join("r.json"));
+    let camera = &report["camera"];
+    let rows = camera["estimators"].as_array().unwrap();
+    let names: Vec<&str> = rows.iter().map(|e| e["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["camera-3d", "camera-reference", "geometry-slice", "geometry-box"]);
+    // 5 Hz after the first second
+    assert_eq!((camera["frames"].as_u64(), camera["objects"].as_u64()), (Some(10), Some(2)));
+    assert!(camera["coverage_rate"].as_f64().unwrap() > 0.7, "{}", camera["coverage_rate"]);
+    assert!(rows[0]["tvr"].as_f64().unwrap() > 0.7 && rows[1]["tvr"].as_f64().unwrap() > 0.9, "{rows:#?}");
+    assert!(rows[0]["curve"].as_array().unwrap().len() > 1, "over the threshold of the mean");
+    assert_eq!(camera["sensor"]["mount"]["pitch_deg"].as_f64().map(f64::round), Some(6.0));
+    assert!(stdout(&output).contains("r, camera (sensor camera): 10 frames"), "{}", stdout(&output));
+}
+
+#[test]
 fn what_cannot_be_simulated_is_told_with_its_place_and_leaves_no_recording() {
     let none = ["", ""];
     let car = "id=\"car.0\" x=\"20.00\" y=\"3.75\"";

@@ -16,7 +16,7 @@ use crate::command::options::SettingsArgs;
 use crate::evaluation::Settings;
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
-use crate::evaluation::replay::{Replay, steps};
+use crate::evaluation::replay::{Replay, camera_steps, steps};
 use crate::results::files::{OutputArgs, Target};
 use crate::results::foxglove;
 use crate::results::report::csv::SampleWriter;
@@ -155,8 +155,9 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
     let recording = recording::read(path, &settings.reading).map_err(|error| named(error, path))?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
-    let replaying = bar(&format!("replaying {name}"), passes);
-    let replay = Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step());
+    let replaying = bar(&format!("replaying {name}"), passes + camera_steps(&recording));
+    let mut replay = Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step());
+    replay.add_camera(&settings.estimators, &settings.evaluation, &|| replaying.step());
     drop(replaying);
 
     if let Some(target) = mcap {
@@ -196,6 +197,7 @@ impl Replayed {
         let mut text = table::text(&self.replay, &settings.evaluation);
         if args.breakdown {
             text += &table::breakdown(&self.replay.summary);
+            text += &self.replay.camera.as_ref().map(|c| table::breakdown(&c.summary)).unwrap_or_default();
         }
         if let Some(sensitivities) = &self.mount_error {
             text += &table::mount_error(sensitivities);

@@ -33,6 +33,9 @@ pub struct Report {
     pub objects: usize,
     pub coverage_rate: Option<f64>,
     pub estimators: Vec<Estimator>,
+    /// The same of a camera beside the radar, judged in its own field of view.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
     coverage_interval: Option<Value>,
     comparisons: Vec<Comparison>,
     mount_error: Option<Vec<Sensitivity>>,
@@ -42,6 +45,17 @@ pub struct Report {
     input: Input,
     options: Value,
     origin: &'static str,
+}
+
+/// The camera of a recording.
+#[derive(Serialize)]
+pub struct Camera {
+    frames: usize,
+    objects: usize,
+    coverage_rate: Option<f64>,
+    pub estimators: Vec<Estimator>,
+    resampling: Resampling,
+    sensor: Value,
 }
 
 /// One row of the table.
@@ -115,6 +129,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
         objects: summary.objects,
         coverage_rate: summary.coverage_rate,
         estimators: summary.rows.iter().map(estimator).collect(),
+        camera: replay.camera.as_deref().map(camera),
         coverage_interval: summary.coverage_interval.map(|i| json!(i)),
         comparisons: summary.comparisons.clone(),
         mount_error: mount_error.map(<[_]>::to_vec),
@@ -134,6 +149,18 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
             "estimators": options.estimators,
         }),
         origin: ORIGIN,
+    }
+}
+
+fn camera(replay: &Replay) -> Camera {
+    let summary = &replay.summary;
+    Camera {
+        frames: summary.frames,
+        objects: summary.objects,
+        coverage_rate: summary.coverage_rate,
+        estimators: summary.rows.iter().map(estimator).collect(),
+        resampling: resampling(summary),
+        sensor: sensor(&replay.recording),
     }
 }
 

@@ -61,6 +61,13 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines
 }
 
+/// What has to be known to read the table of a camera, beside what stands below the radar's.
+pub fn of_camera(replay: &Replay) -> Vec<String> {
+    let rule = "Detected: a box of the camera's own, assigned one to one to the visible outline (overlap from 0.3). \
+                Cells: the share of 0 to 4 m above them that is in sight.";
+    [rule.to_owned()].into_iter().chain(counters(&replay.summary.rows)).collect()
+}
+
 fn comparison(c: &Comparison) -> String {
     let spread =
         c.difference_interval.map(|Interval(low, high)| format!(" ({low:+.1}…{high:+.1})")).unwrap_or_default();

@@ -23,6 +23,13 @@ pub fn text(replay: &Replay, options: &Options) -> String {
         text += &by_occlusion(&replay.summary);
         text.push('\n');
     }
+    if let Some(camera) = &replay.camera {
+        text += &format!("\n{}\n{}\n", notes::heading(camera), rates(&camera.summary));
+        for line in notes::of_camera(camera) {
+            text += &line;
+            text.push('\n');
+        }
+    }
     text
 }
 

@@ -300,6 +300,7 @@ fn blank(simulation: &Simulation, mount: &Mount) -> Recording {
         frames: Vec::new(),
         truth: None,
         occlusion: BTreeMap::new(),
+        camera: None,
         problems: Problems::default(),
     }
 }

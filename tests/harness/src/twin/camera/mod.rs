@@ -8,9 +8,9 @@ pub mod detector;
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::polygon::{Convex, uncovered};
+use crate::geometry::polygon::Convex;
 use crate::geometry::pose::SensorPose;
-use crate::geometry::sight::{in_front, outline};
+use crate::geometry::sight::{Uncovered, uncovered_outlines};
 use crate::geometry::solid::Solid;
 use crate::recording::camera::{Box2d, Intrinsics};
 use detector::DetectorModel;
@@ -37,28 +37,12 @@ pub struct Sighting {
 impl Camera {
     /// What is visible of each object past all others (and past `screens`, which are not objects).
     pub fn view(&self, objects: &[Solid], screens: &[Solid]) -> Vec<Sighting> {
-        let eye = self.pose.position;
-        let all: Vec<(Solid, Option<Convex>)> =
-            objects.iter().chain(screens).map(|s| (*s, outline(&self.pose, s))).collect();
-        let frame = self.frame();
-        let sighting = |object: usize| {
-            let (solid, outline) = &all[object];
-            let outline = outline.clone()?;
-            let whole = outline.area();
-            let covers = all.iter().enumerate().filter_map(|(i, (other, cover))| {
-                (i != object && cover.is_some() && in_front(eye, other, solid)).then_some(cover.as_ref()?)
-            });
-            let pieces: Vec<Convex> =
-                uncovered(outline, covers).iter().map(|p| p.within(&frame)).filter(|p| p.area() > 0.0).collect();
-            let visible: f64 = pieces.iter().map(Convex::area).sum();
-            let none = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-            let edges = pieces.iter().flat_map(Convex::corners).fold(none, |[l, t, r, b], corner| {
-                let [u, v] = self.pixel(*corner);
-                [l.min(u), t.min(v), r.max(u), b.max(v)]
-            });
-            (visible > 1e-9).then(|| Sighting { object, edges, share: (visible / whole).min(1.0) })
+        let seen = uncovered_outlines(&self.pose, objects, screens, &self.frame());
+        let sighting = |s: &Uncovered| {
+            let ([l, t], [r, b]) = (self.pixel(s.high), self.pixel(s.low));
+            Sighting { object: s.object, edges: [l, t, r, b], share: s.share }
         };
-        (0..objects.len()).filter_map(sighting).collect()
+        seen.iter().map(sighting).collect()
     }
 
     /// Pixel of a point of the image plane at unit distance (left and up).
