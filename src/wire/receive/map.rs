@@ -1,7 +1,7 @@
 //! A received map, as consumers ask it.
 
+use super::measure::Limits;
 use super::sensor::SensorReceiver;
-use super::session::Limits;
 use crate::fixed::time::Time;
 use crate::map::polar::PolarGeometry;
 use crate::map::{CellState, Visibility, VisibilityMap};

@@ -54,7 +54,9 @@
 //! For 120 azimuths by 200 ranges below 8 kB a sensor, ages included.
 
 mod assembly;
+mod epochs;
 mod map;
+mod measure;
 mod sectors;
 #[cfg(feature = "secoc")]
 mod secured;
@@ -62,10 +64,10 @@ mod sensor;
 mod session;
 
 pub use map::{ReceivedMap, Together};
+pub use measure::{ENOUGH, Limits};
 #[cfg(feature = "secoc")]
 pub use secured::SecuredReceiver;
 pub use sensor::{Accepted, Condition, Counters, Refused, SensorReceiver};
-pub use session::{ENOUGH, Limits};
 
 use core::cell::Cell;
 

@@ -1,8 +1,9 @@
 //! Everything a receiver knows of one sensor.
 
 use super::assembly::{Assembly, Begun, Place};
+use super::measure::Limits;
 use super::sectors::Sectors;
-use super::session::{Entry, Hearing, Limits, Session};
+use super::session::{Entry, Hearing, Session};
 use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
 use crate::wire::code::ray::Ray;

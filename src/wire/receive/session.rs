@@ -21,27 +21,23 @@
 //! A measure that was not yet trusted when frames in time paused for longer than `A` settles anew: meanwhile a
 //! queue may have drained down to it.
 //!
-//! *Trust* (rule 5). Nothing is shown before the measure is `A + D` old and of [`ENOUGH`] frames, nor
+//! *Trust* (rule 5). Nothing is shown before the measure is `A + D` old and of [`ENOUGH`](super::ENOUGH) frames, nor
 //! while it does not fit the sender's clock.
 
 use core::cell::Cell;
 
+use super::epochs::{Epochs, Mark};
+use super::measure::{Limits, MARGIN_US, Measure, SenderClock, ahead_of, difference, fits, modulo};
 use crate::fixed::time::Time;
 use crate::wire::header::Clock;
 use crate::wire::message::Epoch;
 use crate::wire::scan_number::{CLOCK_US, PERIOD_US, ScanNumber, TICK_US};
-
-/// Map frames a measure must be of before it is trusted.
-pub const ENOUGH: u8 = 8;
 
 /// Silence of a session's epoch after which another may begin one, microseconds.
 const SILENCE_US: u64 = PERIOD_US as u64 / 2;
 
 /// A conflict, and another wire version, last this long after their last sign, microseconds.
 const SIGN_US: u64 = 1_000_000;
-
-/// What the smallest lag may be off by: a tick's rounding, and its creeping up over ten seconds.
-const MARGIN_US: u32 = TICK_US + 5000;
 
 /// A map frame further ahead of the sender's clock was late by more than half a period, microseconds; one nearer
 /// shows that the clock is late: three headers were lost.
@@ -50,33 +46,11 @@ const MOST_AHEAD_US: u32 = 1_500_000;
 /// Without a map frame in time for longer than this, what is held is dropped, microseconds.
 const GAP_US: u64 = 1_000_000;
 
-/// The smallest lag, and the bound of the sender's clock, give way by 2^-11 of the time passed.
-const CREEP: u32 = 11;
-
 /// The smallest lag may sink by 2^-10 of the time passed: what it crept up and what clocks drift.
 const LEAK: u32 = 10;
 
 /// What did not happen yet.
 const NEVER: Time = Time::from_micros(u64::MAX);
-
-/// Age and delay a receiver works with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Limits {
-    /// Greatest age of what is shown, microseconds: A.
-    pub max_age_us: u32,
-    /// Greatest delay from measurement to reception, microseconds: D.
-    pub max_delay_us: u32,
-}
-
-impl Limits {
-    /// 300 ms and 100 ms.
-    pub const DEFAULT: Self = Self { max_age_us: 300_000, max_delay_us: 100_000 };
-
-    fn sum_us(&self) -> u64 {
-        u64::from(self.max_age_us) + u64::from(self.max_delay_us)
-    }
-}
 
 /// What an epoch says of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,116 +78,6 @@ pub(super) enum Hearing {
     Late,
     /// Of a scan that the sender's clock had not reached.
     Beyond,
-}
-
-/// The sender's clock, as the fastest header had it.
-#[derive(Debug, Clone, Copy)]
-struct SenderClock {
-    /// When that came, and what it said: microseconds, modulo [`CLOCK_US`].
-    at: Time,
-    us: u64,
-    /// The first one, or the first after one faster by more than `D`.
-    begun: Time,
-    /// Whether a header `A + D` later agreed.
-    confirmed: bool,
-}
-
-impl SenderClock {
-    /// What it has reached by now, at least.
-    fn now_us(&self, now: Time) -> u64 {
-        let passed = now.since(self.at).unwrap_or(0);
-        (self.us + passed - (passed >> CREEP)) % CLOCK_US
-    }
-
-    /// The lag that a scan measured now would have.
-    fn lag(&self, now: Time) -> u32 {
-        difference(modulo(now.micros()), modulo(self.now_us(now)))
-    }
-}
-
-/// The smallest lag.
-#[derive(Debug, Clone, Copy)]
-struct Measure {
-    begun: Time,
-    /// The fastest frame: when it came, and its lag.
-    at: Time,
-    lag: u32,
-    /// By how much the smallest sank since the measure began, less what is allowed.
-    sunk: u32,
-    /// Map frames in time.
-    count: u8,
-}
-
-impl Measure {
-    /// Whether it is old enough and of enough frames.
-    fn is_settled(&self, now: Time, limits: &Limits) -> bool {
-        now.since(self.begun).is_some_and(|since| since >= limits.sum_us()) && self.count >= ENOUGH
-    }
-
-    fn least(&self, now: Time) -> u32 {
-        modulo(u64::from(self.lag) + (now.since(self.at).unwrap_or(0) >> CREEP))
-    }
-}
-
-/// What is remembered of an epoch without a session.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Mark {
-    None,
-    /// A frame of it was heard.
-    Heard,
-    /// It had a session.
-    Left,
-}
-
-/// Whole milliseconds at which each epoch was heard or left.
-#[derive(Debug, Clone, Copy)]
-struct Epochs {
-    at_ms: [u32; 16],
-    heard: u16,
-    left: u16,
-}
-
-impl Epochs {
-    const NONE: Self = Self { at_ms: [0; 16], heard: 0, left: 0 };
-
-    fn mark(&mut self, epoch: Epoch, mark: Mark, now: Time) {
-        let bit = 1 << epoch.number();
-        (self.heard, self.left) = (self.heard & !bit, self.left & !bit);
-        match mark {
-            Mark::None => return,
-            Mark::Heard => self.heard |= bit,
-            Mark::Left => self.left |= bit,
-        }
-        if let Some(at) = self.at_ms.get_mut(usize::from(epoch.number())) {
-            *at = milliseconds(now);
-        }
-    }
-
-    fn since_ms(&self, epoch: Epoch, now: Time) -> u32 {
-        let at = self.at_ms.get(usize::from(epoch.number())).copied().unwrap_or(0);
-        milliseconds(now).wrapping_sub(at)
-    }
-
-    fn is_left(&self, epoch: Epoch) -> bool {
-        self.left >> epoch.number() & 1 == 1
-    }
-
-    /// Milliseconds since an epoch was left, if that is not a period ago.
-    fn since_left(&mut self, epoch: Epoch, now: Time) -> Option<u32> {
-        let since = Some(self.since_ms(epoch, now)).filter(|_| self.is_left(epoch))?;
-        if since > PERIOD_US / 1000 {
-            self.mark(epoch, Mark::None, now);
-            return None;
-        }
-        Some(since)
-    }
-
-    /// Notes a frame; whether the one before it came within this time.
-    fn again(&mut self, epoch: Epoch, now: Time, within_ms: u64) -> bool {
-        let again = self.heard >> epoch.number() & 1 == 1 && u64::from(self.since_ms(epoch, now)) <= within_ms;
-        self.mark(epoch, Mark::Heard, now);
-        again
-    }
 }
 
 /// Who is listened to.
@@ -470,36 +334,9 @@ impl Session {
     }
 }
 
-/// Whether by the header's clock the fastest map frame was in time.
-fn fits(measure: &Measure, clock: &SenderClock, now: Time, limits: &Limits) -> bool {
-    let over = difference(measure.least(now) + limits.max_delay_us, clock.lag(now));
-    over <= 2 * limits.max_delay_us + MARGIN_US
-}
-
 /// Whether a sign still counts.
 fn lasts(sign: Time, now: Time) -> bool {
     now.since(sign).is_some_and(|since| since < SIGN_US)
-}
-
-/// How much a lag is more than another, modulo the period.
-fn difference(lag: u32, least: u32) -> u32 {
-    modulo(u64::from(lag) + u64::from(PERIOD_US) - u64::from(least))
-}
-
-/// By how much a lag is smaller than the sender's clock allows; 0 if it is not.
-fn ahead_of(clock: u32, lag: u32, limits: &Limits) -> u32 {
-    let ahead = difference(clock, lag);
-    if ahead > limits.max_delay_us && ahead <= PERIOD_US / 2 { ahead } else { 0 }
-}
-
-#[allow(clippy::cast_possible_truncation)] // modulo
-fn modulo(us: u64) -> u32 {
-    (us % u64::from(PERIOD_US)) as u32
-}
-
-#[allow(clippy::cast_possible_truncation)] // modulo 49 days
-fn milliseconds(now: Time) -> u32 {
-    (now.micros() / 1000) as u32
 }
 
 #[cfg(test)]
