@@ -170,11 +170,13 @@ pub struct FrameReport {
     pub rejections: Rejections,
     /// Obstacles followed, confirmed or not.
     pub obstacles: u16,
+    /// New obstacles that found the list full, since the start: vehicles beyond are not followed and hide nothing.
+    pub obstacles_dropped: u32,
 }
 
 #[cfg(feature = "defmt")]
 impl FrameReport {
-    /// Tells what an engineer at the unit should know, and all of it at trace level.
+    /// Says what an engineer at the unit should know, and all of it at trace level.
     fn log(&self) {
         if self.continuity.resets() {
             defmt::warn!("grids start over: {}", self.continuity);
@@ -285,6 +287,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             used: self.scan.reflections().len() as u16,
             rejections: *self.scan.rejections(),
             obstacles: self.obstacles.iter().count() as u16,
+            obstacles_dropped: self.obstacles.dropped(),
         };
         #[cfg(feature = "defmt")]
         report.log();

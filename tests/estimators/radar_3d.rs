@@ -132,6 +132,24 @@ fn around_a_lorry_that_has_stood_for_an_hour_the_map_is_what_it_was_when_it_stop
 }
 
 #[test]
+fn more_vehicles_than_the_list_holds_are_counted() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    // 13 lanes of vehicles 8 m apart, all moving
+    let places = |t: f64| {
+        (0..17)
+            .flat_map(move |i| (-6..7).map(move |lane| [20.0 + 8.0 * f64::from(i) + 10.0 * t, 4.0 * f64::from(lane)]))
+    };
+    let mut report = rig.frame(&[]);
+    assert_eq!((report.obstacles, report.obstacles_dropped), (0, 0));
+    for _ in 0..5 {
+        let moving = places(rig.seconds());
+        let all: Vec<_> = moving.filter_map(|[x, y]| detection(&rig.sensor, [x, y, 0.7], [10.0, 0.0], true)).collect();
+        report = rig.frame(&all);
+    }
+    assert!(report.obstacles_dropped > 50, "{} followed, {} not", report.obstacles, report.obstacles_dropped);
+}
+
+#[test]
 fn a_guard_rail_hides_nothing() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
     for frame in 0..60 {
