@@ -129,7 +129,7 @@
 //! - **A thing never hides itself.** Along a row only cells behind the *end* of an occupied run are
 //!   hidden by it, and a box shades only what lies behind it.
 //! - **Elevation says how high, within what length allows.** A reflection well above a level proves it; many
-//!   together tell a car from a van or a lorry where none alone does; and what is as long as a lorry is never
+//!   together distinguish a car from a van or a lorry where none alone does; and what is as long as a lorry is never
 //!   called low. Seeing reflections *past* an obstacle was tried as a ceiling on its height and left out: road
 //!   bounce under trucks makes it lie, and each lie is a false "visible".
 //! - **No floats after start-up**: angles are binary (2^16 a turn), lengths centimetres; `libm` makes

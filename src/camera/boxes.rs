@@ -1,4 +1,4 @@
-//! What a detector tells of one vehicle: a box in the image and its class.
+//! What a detector gives of one vehicle: a box in the image and its class.
 
 use crate::camera::projection::SUBPIXELS;
 use crate::fixed::math;
@@ -75,7 +75,7 @@ pub struct ImageBox {
     pub(crate) class: VehicleClass,
 }
 
-/// Farthest from the image's corner that an edge is told, pixels.
+/// Farthest from the image's corner that an edge may lie, pixels.
 const FARTHEST_PX: f32 = 32_000.0;
 
 impl ImageBox {
@@ -83,8 +83,8 @@ impl ImageBox {
     /// whoever decodes a frame drops such a box and counts it as refused. A box that is inverted or outside of the
     /// image is one: the estimator counts it with its reason.
     pub fn from_pixels(edges: [f32; 4], class: VehicleClass) -> Option<Self> {
-        let told = edges.iter().all(|v| v.is_finite() && v.abs() <= FARTHEST_PX);
-        told.then(|| Self { edges: edges.map(|v| math::round_i32(v * SUBPIXELS as f32)), class })
+        let near = edges.iter().all(|v| v.is_finite() && v.abs() <= FARTHEST_PX);
+        near.then(|| Self { edges: edges.map(|v| math::round_i32(v * SUBPIXELS as f32)), class })
     }
 }
 

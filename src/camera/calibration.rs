@@ -81,7 +81,7 @@ impl Calibration {
 
     /// From intrinsics and the road plane `a x + b y + c z + d = 0` in optical coordinates (x right, y down, z
     /// ahead), of any scale and sign. A plane gives height, pitch and roll; where on the road the camera hangs and
-    /// which way it looks has to be told, in metres and degrees.
+    /// which way it looks has to be given, in metres and degrees.
     ///
     /// # Errors
     /// A plane without a normal or through the camera, and a mount outside its limits.

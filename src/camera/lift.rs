@@ -144,7 +144,7 @@ impl Lifting {
         } else {
             self.by_width(&mut placed, &seen, free, p).ok_or(off)?;
         }
-        Ok(self.told(&placed, &seen, free, by_top, p))
+        Ok(self.lifted(&placed, &seen, free, by_top, p))
     }
 
     /// Whether the top edge places a vehicle better than its width does.
@@ -215,7 +215,7 @@ impl Lifting {
         }
         let expected = self.outline(placed, p)?;
         let middle = (seen.edges[0] + seen.edges[2]) / 2;
-        // a top at the horizon is too far to tell: the class's length stays
+        // a top at the horizon is too far to measure: the class's length stays
         let Some(far) = p.on_plane([middle, seen.edges[1]], placed.height) else { return Some(false) };
         let now = p.on_plane([(expected[0] + expected[2]) / 2, expected[1]], placed.height)?;
         let farther = sight.along(far[0] - now[0], far[1] - now[1]);
@@ -274,7 +274,7 @@ impl Lifting {
     }
 
     /// In the road frame, with its uncertainty.
-    fn told(&self, placed: &Placed, seen: &Seen, free: Free, by_top: bool, p: &Projection) -> LiftedBox {
+    fn lifted(&self, placed: &Placed, seen: &Seen, free: Free, by_top: bool, p: &Projection) -> LiftedBox {
         let size = seen.class.size();
         let [x, y] = placed.at;
         let distance = math::length(x, y).max(1);
@@ -401,8 +401,8 @@ mod tests {
         for length in [8.0, 12.0, 16.5] {
             let truck = Vehicle(40.0, 40.0 + length, -3.0, 2.55, 4.0);
             let got = lifted(&c, &seen(&c, truck, VehicleClass::Truck), &[]);
-            let told = f64::from(got.footprint.half_length_cm) / 50.0;
-            assert!((told - length).abs() < 0.5, "{length}: {told}");
+            let lifted = f64::from(got.footprint.half_length_cm) / 50.0;
+            assert!((lifted - length).abs() < 0.5, "{length}: {lifted}");
             let [along, across] = error(&got, truck);
             assert!(along.abs() < 0.3 && across.abs() < 0.15, "{along} {across}");
         }

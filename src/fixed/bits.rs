@@ -15,7 +15,7 @@ impl<const W: usize> Default for Bits<W> {
 }
 
 impl<const W: usize> Bits<W> {
-    /// Most cells a row can tell apart.
+    /// Most cells a row can hold.
     pub const CAPACITY: usize = 32 * W;
 
     /// No bit set.

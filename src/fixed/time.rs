@@ -1,4 +1,4 @@
-//! Time as the caller tells it; nothing in this library reads a clock.
+//! Time as the caller gives it; nothing in this library reads a clock.
 
 /// A moment on the radar's clock.
 ///

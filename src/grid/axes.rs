@@ -2,7 +2,7 @@
 //!
 //! # Model
 //! All three are taken in the levelled frame, so that a line of sight is one column and one row.
-//! Range runs along the ground. Elevation is told by *slope*, height over ground range, which is
+//! Range runs along the ground. Elevation is given as *slope*, height over ground range, which is
 //! what similar triangles need. Rows are laid where the slice plane needs them: their edges are the
 //! slopes under which the plane at slice height is seen at ground distances
 //! `(sqrt(near) + k (sqrt(far) - sqrt(near)) / E)^2`. Uniform rows would spend most of their number
@@ -31,7 +31,7 @@ const ON_THE_LIMIT_DEG: f32 = 0.01;
 /// The view of a column the slice plane never enters.
 const NOTHING: (u8, u8) = (1, 0);
 
-/// A sensor closer to the slice plane than this has no slopes to tell distances by, centimetres.
+/// A sensor closer to the slice plane than this has no slopes to measure distances by, centimetres.
 const LEAST_DROP_CM: i32 = 10;
 
 /// Geometry of a grid of `R` range cells, `A` azimuth columns and `E` elevation rows.

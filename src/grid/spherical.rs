@@ -8,7 +8,7 @@
 use crate::fixed::bits::Bits;
 use crate::grid::stack;
 
-/// Occupancy around one sensor: `R` ranges, `A` azimuths, `E` elevations; `W` words of 32 bits tell
+/// Occupancy around one sensor: `R` ranges, `A` azimuths, `E` elevations; `W` words of 32 bits say
 /// which of the `R` stacks of an azimuth hold something.
 ///
 /// # Limits

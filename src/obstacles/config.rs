@@ -65,7 +65,7 @@ pub struct ObstacleConfig {
     pub half_width_m: f32,
     /// Way after which an obstacle is a mover, and stays one when it stops, metres.
     pub mover_way_m: f32,
-    /// Speed above which motion tells the heading, m/s.
+    /// Speed above which motion gives the heading, m/s.
     pub turning_speed_mps: f32,
     /// Standard deviations of azimuth noise taken off either end of an outline.
     pub outline_sigmas: f32,
@@ -86,7 +86,7 @@ pub struct ObstacleConfig {
     pub length_memory_s: f32,
     /// Speed below which the box does so, m/s.
     pub slow_mps: f32,
-    /// Standard deviations a speed must have to tell the heading of what goes its own way.
+    /// Standard deviations a speed must have to give the heading of what goes its own way.
     pub heading_sigmas: f32,
     /// Speed below which a mover has come to a stop, m/s.
     pub standing_speed_mps: f32,

@@ -1,8 +1,8 @@
 //! Moving obstacles: detections that move together, followed from frame to frame.
 //!
 //! A grid alone smears what moves 1.7 m a frame, and shows neither how long nor how high a thing
-//! is. Doppler tells how each detection moves, so those of one vehicle can be gathered in its own
-//! moving frame, where a second of them draws its outline. The outline's length tells the class,
+//! is. Doppler shows how each detection moves, so those of one vehicle can be gathered in its own
+//! moving frame, where a second of them draws its outline. The outline's length gives the class,
 //! the class the height, and the box goes into the grid as solid evidence.
 //!
 //! # Limits
@@ -128,7 +128,7 @@ impl<const N: usize> Obstacles<N> {
 
     /// Takes one frame's detections: moves every obstacle on, gives each detection to the obstacle
     /// it fits best, starts new ones from the rest, joins parts of one vehicle and drops what is no
-    /// longer believed in. `in_view` tells whether a place is in plain view (by the previous map).
+    /// longer believed in. `in_view` says whether a place is in plain view (by the previous map).
     pub fn step<const D: usize>(
         &mut self,
         reflections: &[Reflection],

@@ -29,7 +29,7 @@ pub struct FreeMotion {
     variance: [i32; 3],
 }
 
-/// What one frame tells of a motion.
+/// What one frame says of a motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
     /// Detections.
@@ -72,7 +72,7 @@ impl FreeMotion {
         ];
     }
 
-    /// Takes what a frame tells.
+    /// Takes what a frame says.
     pub fn update(&mut self, seen: &Seen) {
         let sight = seen.sight;
         let off = (seen.centre.0 - self.place.0, seen.centre.1 - self.place.1);

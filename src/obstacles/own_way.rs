@@ -1,6 +1,6 @@
 //! Obstacles that go their own way: across the road, or around a corner.
 //!
-//! Most traffic follows the road, and its axis tells a heading that Doppler alone cannot. Beside that,
+//! Most traffic follows the road, and its axis gives a heading that Doppler alone cannot. Beside that,
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
 //! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
 

@@ -4,14 +4,14 @@
 //! A reflection that lies two standard deviations above a level proves something there, once it has company:
 //! a floor under the height.
 //!
-//! Farther away hardly any does, but all together they still tell. A car reflects around 0.7 m above the
+//! Farther away hardly any does, but all together they still decide. A car reflects around 0.7 m above the
 //! road; of something tall one reflection in twelve comes from around 2.6 m, the others from where a car's do.
 //! With reflections of a car spread by 0.35 m and the standard deviation `s` of elevation beside that, a
 //! height `h` is `1 - w + w exp((h - 1.65 m) 1.9 m / (s^2 + (0.35 m)^2))` times as likely of something tall
 //! (`w` = 0.08). The logarithms are added up. Some lorries show nothing high for long, so what is as long
 //! as one is never called low.
 
-/// Heights that are told apart, centimetres.
+/// Heights that are distinguished, centimetres.
 const LEVELS_CM: [i32; 5] = [180, 220, 260, 310, 360];
 /// Standard deviations a reflection must lie above a level.
 const SIGMAS: i32 = 2;
