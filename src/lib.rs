@@ -159,57 +159,26 @@ pub mod specification {}
 
 // What is public of the rooms stands below; benches and tests go into them.
 #[cfg(not(feature = "bench"))]
-mod camera;
+use rooms::*;
 #[cfg(feature = "bench")]
-pub mod camera;
-#[cfg(not(feature = "bench"))]
-mod estimator;
-#[cfg(feature = "bench")]
-pub mod estimator;
-#[cfg(not(feature = "bench"))]
-mod fixed;
-#[cfg(feature = "bench")]
-pub mod fixed;
-#[cfg(not(feature = "bench"))]
-mod frame;
-#[cfg(feature = "bench")]
-pub mod frame;
-#[cfg(not(feature = "bench"))]
-mod grid;
-#[cfg(feature = "bench")]
-pub mod grid;
-#[cfg(not(feature = "bench"))]
-mod inputs;
-#[cfg(feature = "bench")]
-pub mod inputs;
-#[cfg(not(feature = "bench"))]
-mod map;
-#[cfg(feature = "bench")]
-pub mod map;
-#[cfg(not(feature = "bench"))]
-mod obstacles;
-#[cfg(feature = "bench")]
-pub mod obstacles;
-#[cfg(not(feature = "bench"))]
-mod radar_2d;
-#[cfg(feature = "bench")]
-pub mod radar_2d;
-#[cfg(not(feature = "bench"))]
-mod radar_3d;
-#[cfg(feature = "bench")]
-pub mod radar_3d;
-#[cfg(not(feature = "bench"))]
-mod sensor;
-#[cfg(feature = "bench")]
-pub mod sensor;
-#[cfg(not(feature = "bench"))]
-mod unit;
-#[cfg(feature = "bench")]
-pub mod unit;
-#[cfg(not(feature = "bench"))]
-mod wire;
-#[cfg(feature = "bench")]
-pub mod wire;
+pub use rooms::*;
+
+#[path = "."]
+mod rooms {
+    pub mod camera;
+    pub mod estimator;
+    pub mod fixed;
+    pub mod frame;
+    pub mod grid;
+    pub mod inputs;
+    pub mod map;
+    pub mod obstacles;
+    pub mod radar_2d;
+    pub mod radar_3d;
+    pub mod sensor;
+    pub mod unit;
+    pub mod wire;
+}
 
 // A sensor and one frame of it.
 pub use fixed::angle::Angle;
