@@ -163,7 +163,8 @@ use rooms::*;
 #[cfg(feature = "bench")]
 pub use rooms::*;
 
-#[path = "."]
+// in the folders beside this file
+#[path = ""]
 mod rooms {
     pub mod camera;
     pub mod estimator;

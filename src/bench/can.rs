@@ -7,7 +7,7 @@
 use crate::estimator::Estimator;
 use crate::fixed::time::Time;
 use crate::inputs::Feed;
-use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
+use crate::unit::can_bus::{BusKeeper, CanPort};
 use crate::unit::can_service::CanService;
 use crate::unit::settings::SettingsSlots;
 use crate::unit::{Flow, MapSender, Unit};
@@ -59,7 +59,7 @@ impl<F: Feed<Piece = CanFrame>> CanBench<F> {
             }
         }
         // nothing is taken from a unit that cannot be sent
-        while keeper.state() == BusState::Active {
+        while keeper.is_active() {
             let answer = service.next_frame(self.now, slots);
             let frame = answer.or_else(|| match unit {
                 Some(unit) => unit.next_frame(self.now),

@@ -4,12 +4,9 @@ use crate::camera::voxels::{CELL_CM, middle_of};
 use crate::fixed::angle::Angle;
 use crate::fixed::trig;
 use crate::map::polar::{PolarGeometry, PolarMap};
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
-
-/// Grade of a cell nobody has evidence for.
-const UNKNOWN: u8 = 0;
 
 /// `NX` rows of 1 m from the camera away, in each `NY` cells of 1 m from right to left, in the levelled frame.
 ///
@@ -48,12 +45,9 @@ impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
     pub fn cell(&self, row: usize, column: usize) -> CellState {
         let pick = |rows: &[[u8; NY]; NX]| rows.get(row).and_then(|row| row.get(column)).copied();
         match (pick(&self.grades), pick(&self.occupancy)) {
-            (Some(grade), Some(occupancy)) if grade != UNKNOWN => CellState {
-                visibility: if grade >= self.visible_from { Visibility::Visible } else { Visibility::Invisible },
-                grade,
-                occupancy,
-                occupied: occupancy >= self.occupied_from,
-            },
+            (Some(grade), Some(occupancy)) => {
+                CellState::judged(grade, occupancy, self.visible_from, self.occupied_from)
+            }
             _ => CellState::UNKNOWN,
         }
     }
@@ -121,6 +115,7 @@ impl<const NX: usize, const NY: usize> VisibilityMap for CameraMap<NX, NY> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::Visibility;
     use crate::sensor::mount::Mount;
 
     /// 20 m ahead, 5 m to each side, turned 90 degrees to the left, at (3, 1).

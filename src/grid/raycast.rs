@@ -67,7 +67,7 @@ fn cast_column<const R: usize, const A: usize, const E: usize, const W: usize>(
             shadow.leave_run();
         }
         if let (Some(g), Some(o)) = (grades.get_mut(r), occupancy.get_mut(r)) {
-            *g = (255 - pair(&shadow.blocked, row).at(share)).max(BLOCKED);
+            *g = (CLEAR - pair(&shadow.blocked, row).at(share)).max(BLOCKED);
             *o = here;
         }
         shadow.pass(stack, here >= OCCUPIED);
@@ -123,7 +123,7 @@ impl<const E: usize> Shadow<E> {
     ) {
         if stack::is_empty(&self.blocked) {
             if let Some(clear) = grades.get_mut(from..to) {
-                clear.fill(255);
+                clear.fill(CLEAR);
             }
             return;
         }
@@ -136,10 +136,10 @@ impl<const E: usize> Shadow<E> {
                 return;
             };
             if pair.low == pair.high {
-                cells.fill((255 - pair.low).max(BLOCKED));
+                cells.fill((CLEAR - pair.low).max(BLOCKED));
             } else {
                 for (g, &share) in cells.iter_mut().zip(shares) {
-                    *g = (255 - pair.at(share)).max(BLOCKED);
+                    *g = (CLEAR - pair.at(share)).max(BLOCKED);
                 }
             }
             start = end;

@@ -22,6 +22,9 @@ pub enum Visibility {
     Visible,
 }
 
+/// Grade of a cell nobody has evidence for.
+pub(crate) const UNKNOWN: u8 = 0;
+
 /// What a map knows of one place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -39,6 +42,15 @@ pub struct CellState {
 impl CellState {
     /// A place nobody has current evidence for.
     pub const UNKNOWN: Self = Self { visibility: Visibility::Unknown, grade: 0, occupancy: 0, occupied: false };
+
+    /// What a grade (0 = unknown) and an occupancy say by a map's thresholds.
+    pub(crate) const fn judged(grade: u8, occupancy: u8, visible_from: u8, occupied_from: u8) -> Self {
+        if grade == UNKNOWN {
+            return Self::UNKNOWN;
+        }
+        let visibility = if grade >= visible_from { Visibility::Visible } else { Visibility::Invisible };
+        Self { visibility, grade, occupancy, occupied: occupancy >= occupied_from }
+    }
 
     /// Whether it can be seen; unknown is not visible.
     pub const fn visible(&self) -> bool {

@@ -3,12 +3,9 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig;
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
-
-/// Grade of a cell nobody has evidence for.
-const UNKNOWN: u8 = 0;
 
 /// Where the cells of a polar map lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,12 +90,9 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
     pub fn cell(&self, azimuth: usize, range: usize) -> CellState {
         let pick = |rows: &[[u8; R]; A]| rows.get(azimuth).and_then(|row| row.get(range)).copied();
         match (pick(&self.grades), pick(&self.occupancy)) {
-            (Some(grade), Some(occupancy)) if grade != UNKNOWN => CellState {
-                visibility: if grade >= self.visible_from { Visibility::Visible } else { Visibility::Invisible },
-                grade,
-                occupancy,
-                occupied: occupancy >= self.occupied_from,
-            },
+            (Some(grade), Some(occupancy)) => {
+                CellState::judged(grade, occupancy, self.visible_from, self.occupied_from)
+            }
             _ => CellState::UNKNOWN,
         }
     }
@@ -145,6 +139,7 @@ impl<const R: usize, const A: usize> VisibilityMap for PolarMap<R, A> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::Visibility;
     use crate::sensor::mount::Mount;
 
     /// 10 azimuths of 9 degrees from 45 degrees to the right on, 20 ranges of 2 m; a sensor at (5, -3) m.

@@ -72,11 +72,11 @@ pub fn all(camera: &RecordedCamera, truth: Option<&Truth>, config: &Camera3dConf
     Ok(all)
 }
 
-/// The boxes of a frame as the library takes them, and how many of vehicles were told: more, where some are no boxes.
+/// The boxes of a frame as the library takes them, and how many are of vehicles: more, where some are no boxes.
 pub fn vehicles(frame: &CameraFrame) -> (Vec<ImageBox>, usize) {
-    let told = frame.boxes.iter().filter_map(|b| Some((b, VehicleClass::named(&b.class)?)));
-    let boxes = told.clone().filter_map(|(b, class)| ImageBox::from_pixels(b.edges.map(|v| v as f32), class));
-    (boxes.collect(), told.count())
+    let named = frame.boxes.iter().filter_map(|b| Some((b, VehicleClass::named(&b.class)?)));
+    let boxes = named.clone().filter_map(|(b, class)| ImageBox::from_pixels(b.edges.map(|v| v as f32), class));
+    (boxes.collect(), named.count())
 }
 
 fn time(time_ns: i64) -> Time {
@@ -96,9 +96,9 @@ impl Estimator for Driver {
     fn step(&mut self, frame: &Frame) {
         let Ok(own) = self.frames.binary_search_by_key(&frame.time_ns, |f| f.time_ns) else { return };
         let own = &self.frames[own];
-        let (boxes, told) = vehicles(own);
-        self.no_vehicle += (own.boxes.len() - told) as u64;
-        let refused = own.refused + (told - boxes.len()) as u64;
+        let (boxes, named) = vehicles(own);
+        self.no_vehicle += (own.boxes.len() - named) as u64;
+        let refused = own.refused + (named - boxes.len()) as u64;
         let status = FrameStatus { fault: false, refused: u16::try_from(refused).unwrap_or(u16::MAX) };
         self.state.process(&self.parameters, time(frame.time_ns), &boxes, status, &mut self.map);
     }

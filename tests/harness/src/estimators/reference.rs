@@ -16,7 +16,7 @@ use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
 use super::{Estimator, PolarCells};
 use super::{Options, polar_cells};
 use crate::geometry::pose::SensorPose;
-use crate::geometry::solid::Solid;
+use crate::geometry::solid::{Solid, clipped};
 use crate::recording::truth::Truth;
 use crate::recording::{Frame, Recording};
 
@@ -152,17 +152,6 @@ fn near(solid: &Solid, from: [f64; 2], azimuth_rad: f64, half_rad: f64) -> bool 
 fn crossing(solid: &Solid, from: [f64; 2], azimuth_rad: f64) -> Option<(f64, f64)> {
     let start = solid.local(from);
     let (s, c) = (azimuth_rad - solid.yaw_rad).sin_cos();
-    let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
-    for (start, step, half) in [(start[0], c, solid.size[0] / 2.0), (start[1], s, solid.size[1] / 2.0)] {
-        if step.abs() < 1e-12 {
-            if start.abs() > half {
-                return None;
-            }
-            continue;
-        }
-        let (a, b) = ((-half - start) / step, (half - start) / step);
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
-    }
-    (enter < leave).then_some((enter, leave))
+    let ends = clipped(start, [c, s], [solid.size[0] / 2.0, solid.size[1] / 2.0], [0.0, f64::INFINITY]);
+    ends.filter(|(enter, leave)| enter < leave)
 }

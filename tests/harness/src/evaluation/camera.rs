@@ -87,7 +87,7 @@ fn is_vehicle(recording: &Recording, object: &Object) -> bool {
     track.is_some_and(|t| VehicleClass::named(&t.class).is_some())
 }
 
-/// How many boxes each object was assigned, none or one; `boxed` tells which may have any.
+/// How many boxes each object was assigned, none or one; `boxed` says which may have any.
 fn assigned(camera: &RecordedCamera, objects: &[Solid], boxes: &[Box2d], boxed: impl Fn(usize) -> bool) -> Vec<u32> {
     let mut outlines = visible_outlines(&camera.pose, &camera.intrinsics, objects);
     let eye = camera.pose.position;

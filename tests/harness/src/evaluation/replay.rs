@@ -42,8 +42,8 @@ impl Replay {
         Self { recording, samples, scores, summary, camera: None }
     }
 
-    /// Adds the recording's camera, if it has one. A camera that cannot be worked with is told as a problem of the
-    /// input. `progress` is told each of [`camera_steps`] done.
+    /// Adds the recording's camera, if it has one. A camera that cannot be worked with is reported as a problem of the
+    /// input. `progress` is called after each of [`camera_steps`].
     pub fn add_camera(&mut self, estimators: &estimators::Options, options: &Options, progress: &(dyn Fn() + Sync)) {
         let config = &estimators.camera_3d;
         let Some(recording) = camera::recording(&self.recording, f64::from(config.range_max_m)) else { return };
@@ -76,7 +76,7 @@ pub fn steps(recording: &Recording, estimators: usize) -> u64 {
     (recording.frames.len() * passes) as u64
 }
 
-/// Steps that [`Replay::add_camera`] is told of: each of the camera's frames for the samples, and for each of its
+/// Calls of `progress` by [`Replay::add_camera`]: each of the camera's frames for the samples, and for each of its
 /// two estimators.
 pub fn camera_steps(recording: &Recording) -> u64 {
     let passes = if recording.truth.is_some() { 3 } else { 1 };

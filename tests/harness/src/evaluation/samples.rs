@@ -8,7 +8,7 @@ use super::Options;
 use crate::geometry::polygon::{Bounds, Convex};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::geometry::sight::{box_in_sight, column_in_sight, footprint_in_sight, shadow};
-use crate::geometry::solid::Solid;
+use crate::geometry::solid::{Solid, clipped};
 use crate::recording::truth::Object;
 use crate::recording::{Frame, RadarDetection, Recording};
 
@@ -64,7 +64,7 @@ pub fn collect_every(
     collect_judged(recording, options, every, &Judge { detections: &detections, column: None }, progress)
 }
 
-/// How a kind of sensor tells what it detected, and what is in sight of a cell.
+/// What a kind of sensor detected, and what is in sight of a cell.
 pub struct Judge<'a> {
     /// Detections that belong to each object of a frame.
     pub detections: &'a (dyn Fn(usize, &[Object]) -> Vec<u32> + Sync),
@@ -279,20 +279,7 @@ fn in_grown_footprint(solid: &Solid, pose: &SensorPose, p: [f64; 3], options: &O
     let (l, w) = (solid.size[0] / 2.0 + options.growth_m, solid.size[1] / 2.0 + options.growth_m);
     let a = solid.local([p[0] - across[0], p[1] - across[1]]);
     let b = solid.local([p[0] + across[0], p[1] + across[1]]);
-    // Liang-Barsky: segment a-b against the rectangle |x| <= l, |y| <= w
-    let (mut t0, mut t1) = (0.0_f64, 1.0_f64);
-    for (start, delta, limit) in [(a[0], b[0] - a[0], l), (a[1], b[1] - a[1], w)] {
-        if delta.abs() < 1e-12 {
-            if start.abs() > limit {
-                return false;
-            }
-            continue;
-        }
-        let (u, v) = ((-limit - start) / delta, (limit - start) / delta);
-        t0 = t0.max(u.min(v));
-        t1 = t1.min(u.max(v));
-    }
-    t0 <= t1
+    clipped(a, [b[0] - a[0], b[1] - a[1]], [l, w], [0.0, 1.0]).is_some_and(|(enter, leave)| enter <= leave)
 }
 
 /// Samples and recordings put together by hand, for the tests of what is made of them.

@@ -5,7 +5,7 @@
 
 use super::polygon::{Convex, Point, uncovered, uncovered_area};
 use super::pose::SensorPose;
-use super::solid::Solid;
+use super::solid::{Solid, clipped};
 
 /// Uncovered area from which a target counts as in sight: 1 mm x 1 mm.
 const VISIBLE_AREA: f64 = 1e-6;
@@ -146,20 +146,9 @@ pub fn column_in_sight<'a>(
 /// Parts of the way from one place to another at which a footprint is entered and left.
 fn crossing(solid: &Solid, from: Point, to: Point) -> Option<(f64, f64)> {
     let (a, b) = (solid.local(from), solid.local(to));
-    let (mut t0, mut t1) = (0.0_f64, 1.0_f64);
-    for k in 0..2 {
-        let (start, delta, limit) = (a[k], b[k] - a[k], solid.size[k] / 2.0);
-        if delta.abs() < 1e-12 {
-            if start.abs() > limit {
-                return None;
-            }
-            continue;
-        }
-        let (u, v) = ((-limit - start) / delta, (limit - start) / delta);
-        t0 = t0.max(u.min(v));
-        t1 = t1.min(u.max(v));
-    }
-    (t0 < t1).then_some((t0, t1))
+    let way = [b[0] - a[0], b[1] - a[1]];
+    let ends = clipped(a, way, [solid.size[0] / 2.0, solid.size[1] / 2.0], [0.0, 1.0]);
+    ends.filter(|(enter, leave)| enter < leave)
 }
 
 /// Whether `a` lies before `b` as seen from the sensor: the sensor is on `a`'s side of a plane

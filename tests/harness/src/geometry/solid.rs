@@ -12,6 +12,24 @@ pub struct Solid {
     pub size: [f64; 3],
 }
 
+/// Which part of the line `start + t step`, `t` between `from` and `to`, lies within `half` of the origin on both axes
+/// (Liang-Barsky). The ends are the wrong way round where none does; `None` beside an axis it is parallel to.
+pub fn clipped(start: Point, step: Point, half: Point, [from, to]: [f64; 2]) -> Option<(f64, f64)> {
+    let (mut enter, mut leave) = (from, to);
+    for k in 0..2 {
+        if step[k].abs() < 1e-12 {
+            if start[k].abs() > half[k] {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((-half[k] - start[k]) / step[k], (half[k] - start[k]) / step[k]);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    Some((enter, leave))
+}
+
 impl Solid {
     /// Road-frame point in the box's own axes: along its heading, to its left.
     pub fn local(&self, p: Point) -> Point {
