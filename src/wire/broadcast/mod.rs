@@ -309,7 +309,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     /// Writes the next message as it goes on a serial line, if one is due; how many bytes it takes. The
-    /// buffer holds [`serial::MOST_STUFFED`] bytes. None comes of a sender for a CAN bus.
+    /// buffer holds [`MOST_STUFFED`](crate::MOST_STUFFED) bytes. None comes of a sender for a CAN bus.
     pub fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize> {
         if self.config.medium != Medium::Serial {
             return None;
