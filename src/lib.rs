@@ -219,7 +219,7 @@ pub use wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 pub use wire::frame::{CanFrame, CanId};
 pub use wire::header::Header;
 pub use wire::message::{Addresses, Epoch};
-pub use wire::receive::{Limits as ReceiverLimits, Receiver};
+pub use wire::receive::{Receiver, ReceiverLimits};
 pub use wire::serial::{MOST_STUFFED, Unstuffer};
 pub use wire::status::{Reason, ResetCause, Status, UnitState};
 #[cfg(feature = "secoc")]

@@ -69,7 +69,7 @@ struct Running {
 
 /// The scan being sent.
 #[derive(Debug, Clone, Copy)]
-struct Scan {
+struct Outgoing {
     number: ScanNumber,
     measured: Time,
     /// Whether it refreshes everything.
@@ -88,7 +88,7 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     /// Whether something was dropped for want of time since that was last asked.
     overloaded: bool,
     layers: [Layer<A, W>; P],
-    scan: Option<Scan>,
+    scan: Option<Outgoing>,
     /// The scan before, and when it was measured.
     last: Option<Time>,
     /// The last scan that began to refresh everything.
@@ -280,7 +280,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             self.refreshed = Some(measured);
         }
         self.last = Some(measured);
-        self.scan = Some(Scan { number, measured, all, running: None });
+        self.scan = Some(Outgoing { number, measured, all, running: None });
         Ok(())
     }
 

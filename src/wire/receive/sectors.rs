@@ -8,7 +8,7 @@ use crate::wire::scan_number::ScanNumber;
 
 /// Azimuths by ranges, the newest and its refresh.
 ///
-/// # Limits
+/// # ReceiverLimits
 /// `8 W + 4` bytes an azimuth: the known cells are those of both.
 #[derive(Debug, Clone)]
 pub(super) struct Sectors<const A: usize, const W: usize> {

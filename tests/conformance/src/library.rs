@@ -6,7 +6,7 @@ use flate2::Crc;
 use viewshed::fixed::time::Time;
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::message::{Addresses, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 
 use crate::input::{Bus, Input};
@@ -34,7 +34,7 @@ impl Default for Library {
 
 impl Library {
     pub fn new(bus: Bus, sensor: u8) -> Self {
-        let receiver = Box::new(Receiver::new([sensor], Addresses::STANDARD, Limits::DEFAULT));
+        let receiver = Box::new(Receiver::new([sensor], Addresses::STANDARD, ReceiverLimits::DEFAULT));
         Self { bus, sensor, receiver, line: Unstuffer::new() }
     }
 
