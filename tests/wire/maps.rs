@@ -10,8 +10,8 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Plane, Received};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Accepted, Receiver, ReceiverLimits, Refused, SenderCondition};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer};
 use viewshed::wire::status::{Reason, UnitState};
@@ -398,7 +398,7 @@ fn conflict(others: Epoch) {
 /// All cells are known, and none is visible.
 struct Dark;
 
-impl Layers<W> for Dark {
+impl Planes<W> for Dark {
     fn ray(&self, _: Plane, _: usize) -> Ray<W> {
         Ray::new(Known::new(0, R), Bits::NONE)
     }

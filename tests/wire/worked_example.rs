@@ -11,9 +11,9 @@ use viewshed::wire::code::model::{MODEL, STOP_CLASSES};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::{CanFrame, CanId, fd_length};
 use viewshed::wire::header::{Clock, Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::map_message;
 use viewshed::wire::message::{Addresses, Message, Packet, Packing, Part, Plane};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::scan_number::ScanNumber;
 
@@ -45,7 +45,7 @@ pub fn header() -> Header {
 /// A picture: `.` visible, `#` not visible, blanks unknown.
 struct Picture(Vec<Ray<1>>);
 
-impl Layers<1> for Picture {
+impl Planes<1> for Picture {
     fn ray(&self, _: Plane, azimuth: usize) -> Ray<1> {
         self.0[azimuth]
     }

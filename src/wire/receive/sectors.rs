@@ -2,8 +2,8 @@
 
 use crate::fixed::bits::Bits;
 use crate::wire::code::ray::{Known, Ray};
-use crate::wire::layer::Azimuths;
 use crate::wire::map_message::Plain;
+use crate::wire::message::Azimuths;
 use crate::wire::scan_number::ScanNumber;
 
 /// Azimuths by ranges, the newest and its refresh.

@@ -7,8 +7,8 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 
 const A: usize = 9;
@@ -16,7 +16,7 @@ const W: usize = 2;
 
 struct Map([Ray<W>; A]);
 
-impl Layers<W> for Map {
+impl Planes<W> for Map {
     fn ray(&self, _: Plane, azimuth: usize) -> Ray<W> {
         self.0.get(azimuth).copied().unwrap_or(Ray::UNKNOWN)
     }

@@ -11,8 +11,8 @@ use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::header::{Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Message, NotAuthentic, Plane, data_id};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{ReceiverLimits, Refused, SecuredReceiver};
 use viewshed::wire::secoc::Sealer;
 
@@ -21,7 +21,7 @@ const KEY: [u8; 16] = [0x5A; 16];
 
 struct Map(u32);
 
-impl Layers<1> for Map {
+impl Planes<1> for Map {
     fn ray(&self, _: Plane, azimuth: usize) -> Ray<1> {
         Ray::new(Known::new(2, 30), Bits::from_words([self.0.rotate_left(azimuth as u32)]))
     }

@@ -10,8 +10,8 @@ use viewshed::unit::profile::reference::State;
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::scan_number::ScanNumber;
 
