@@ -127,6 +127,13 @@ impl<const NX: usize> View<NX> {
         })
     }
 
+    /// Rows of the view straight ahead, from and to.
+    pub(crate) fn ahead<const NY: usize>(&self) -> [usize; 2] {
+        let seen = |(first, end): &(u16, u16)| (usize::from(*first)..usize::from(*end)).contains(&(NY / 2));
+        let from = self.rows.iter().position(seen).unwrap_or(0);
+        [from, self.rows.iter().rposition(seen).map_or(from, |last| last + 1)]
+    }
+
     /// Writes how much of each column in view is seen, 1 to 255, and its evidence at the road.
     pub(crate) fn cast<const NY: usize>(
         &self,

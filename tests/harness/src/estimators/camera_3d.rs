@@ -79,7 +79,8 @@ pub fn vehicles(frame: &CameraFrame) -> (Vec<ImageBox>, usize) {
     (boxes.collect(), named.count())
 }
 
-fn time(time_ns: i64) -> Time {
+/// As the library takes it.
+pub fn time(time_ns: i64) -> Time {
     Time::from_micros(u64::try_from(time_ns / 1000).unwrap_or(0))
 }
 
