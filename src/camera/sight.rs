@@ -191,7 +191,7 @@ impl<const NX: usize> View<NX> {
                 }
                 open = false;
                 let above = top - self.height_cm;
-                let slope = (above << 16) / if above < 0 { far } else { near };
+                let slope = (above << 16) / if above < 0 { far.max(NEAREST_CM) } else { near };
                 let (right, left) = (middle_of(j, NY) - CELL_CM / 2, middle_of(j, NY) + CELL_CM / 2);
                 // the widest that it is seen
                 let from = self.edge(right, if right > 0 { at_far } else { at_near });

@@ -36,7 +36,7 @@ pub fn of(recording: &Recording) -> Vec<Scan> {
 
 /// Every picture of a camera; boxes of what is no vehicle are left out, as in a replay.
 pub fn of_camera(camera: &RecordedCamera) -> Vec<Scan<ImageBox>> {
-    let size_px = camera.intrinsics.size_px;
+    let size_px = camera.intrinsics.for_library().size_px;
     let boxed = |b: &Box2d| ImageBox::of_picture(b.edges.map(|v| v as f32), size_px, VehicleClass::named(&b.class)?);
     let scan = |f: &CameraFrame| Scan {
         time: camera_3d::time(f.time_ns),
@@ -49,13 +49,13 @@ pub fn of_camera(camera: &RecordedCamera) -> Vec<Scan<ImageBox>> {
 /// What an integrator would set for a camera: its mount, and where its picture ends.
 pub fn camera_settings(camera: &RecordedCamera) -> Settings {
     let i = &camera.intrinsics;
-    let border = |k: usize, pixel: f32| ((i.center_px[k] - pixel) / i.focal_px[k]).atan().to_degrees();
-    let [width, height] = i.size_px.map(f32::from);
+    let degrees = |pixel| i.tangents(pixel).map(|tangent| tangent.atan().to_degrees() as f32);
+    let ([left, up], [right, down]) = (degrees([0.0; 2]), degrees(i.size_px.map(f64::from)));
     let field_of_view = FieldOfView {
-        azimuth_min_deg: border(0, width),
-        azimuth_max_deg: border(0, 0.0),
-        elevation_min_deg: border(1, height),
-        elevation_max_deg: border(1, 0.0),
+        azimuth_min_deg: right,
+        azimuth_max_deg: left,
+        elevation_min_deg: down,
+        elevation_max_deg: up,
         range_min_m: 0.0,
         range_max_m: 200.0,
     };
