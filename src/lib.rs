@@ -60,9 +60,10 @@
 //! | a sensor as it is installed, in SI units, checked once | [`Sensor`], [`Mount`], [`FieldOfView`], [`NoiseConfig`], [`RoadPoint`]; errors name the parameter: [`ConfigError`] |
 //! | a frame of it | [`Detection`], [`Measurement`], [`Angle`], [`Time`], [`FrameStatus`] |
 //! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`] |
+//! | a camera: its calibration, boxes of its pictures | [`Camera3d`], [`Camera3dConfig`], [`Camera3dParameters`], [`Calibration`], [`Intrinsics`], [`PointPair`], [`ImageBox`], [`VehicleClass`] |
 //! | what is known of the road | [`PolarMap`], [`RoadGrid`]; every map answers [`VisibilityMap`] and the [questions](query) |
 //! | maps on CAN, CAN FD and serial lines | [`Broadcaster`], [`BroadcastConfig`], [`Medium`]; a [`Receiver`] gives maps back |
-//! | radars that are decoded | [`Ars408`], [`Ti`], [`NativeReceiver`]; each is a [`Feed`] |
+//! | radars that are decoded, and boxes of a camera | [`Ars408`], [`Ti`], [`NativeReceiver`]; each is a [`Feed`] |
 //! | a unit: radar in, maps out | [`Unit`] joins [`Estimator`], [`Feed`] and [`MapSender`], by [`Settings`] |
 //!
 //! # Features
@@ -73,7 +74,7 @@
 //! | `defmt` | who reads a controller's log | `Format` on public types, and events |
 //! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
-//! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, the camera, and the loops that compare boards with a PC |
+//! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!
 //! `cargo doc --features board` (or `bench`) shows what each adds.
 //!
@@ -92,9 +93,9 @@
 //! | `estimator` | what a unit asks of an estimator, whatever its sensor and its map |
 //! | `radar_3d` | the estimator: all stages above, in order |
 //! | `radar_2d` | the flat baseline, as an estimator of its own |
-//! | `camera` | boxes of a camera's detector in, lifted onto the road, into voxels and lines of sight; the same maps out. No unit runs it yet: with feature `bench` only |
+//! | `camera` | boxes of a camera's detector in, lifted onto the road, into voxels and lines of sight; the same maps out |
 //! | `wire` | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
-//! | `inputs` | a radar's bytes to scans: ARS408 family, TI mmWave, the native format |
+//! | `inputs` | a radar's bytes to scans: ARS408 family, TI mmWave, the native format; that for a camera's boxes too |
 //! | `unit` | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
 //! | `bench` | the same scans on a controller and on a PC, compared, stage by stage |
 //!
@@ -200,7 +201,10 @@ pub use sensor::mount::Mount;
 pub use sensor::noise::NoiseConfig;
 pub use sensor::road::RoadPoint;
 
-// The estimator and what can be set of it.
+// Estimators and what can be set of them.
+pub use camera::boxes::{ImageBox, VehicleClass};
+pub use camera::calibration::{Calibration, Intrinsics, PointPair};
+pub use camera::{Camera3d, Camera3dConfig, Camera3dParameters};
 pub use estimator::{Estimator, Progress};
 pub use frame::gate::GateConfig;
 pub use frame::health::HealthConfig;

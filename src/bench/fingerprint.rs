@@ -1,6 +1,42 @@
 //! A number that differs when any cell of a map does.
 
+use crate::camera::map::CameraMap;
 use crate::map::polar::PolarMap;
+
+/// A map as rows of cells: what is compared, and sent cell by cell where it differs.
+pub trait Rows {
+    /// Cells of a row, and rows.
+    const SHAPE: [usize; 2];
+    /// Grades and occupancy of a row.
+    fn row(&self, row: usize) -> Option<(&[u8], &[u8])>;
+    /// Least grade that counts as visible.
+    fn visible_from(&self) -> u8;
+}
+
+impl<const R: usize, const A: usize> Rows for PolarMap<R, A> {
+    const SHAPE: [usize; 2] = [R, A];
+
+    fn row(&self, azimuth: usize) -> Option<(&[u8], &[u8])> {
+        Some((self.grades(azimuth)?, self.occupancy(azimuth)?))
+    }
+
+    fn visible_from(&self) -> u8 {
+        Self::visible_from(self)
+    }
+}
+
+impl<const NX: usize, const NY: usize> Rows for CameraMap<NX, NY> {
+    const SHAPE: [usize; 2] = [NY, NX];
+
+    fn row(&self, row: usize) -> Option<(&[u8], &[u8])> {
+        let (grades, occupancy) = Self::row(self, row)?;
+        Some((grades, occupancy))
+    }
+
+    fn visible_from(&self) -> u8 {
+        self.thresholds()[0]
+    }
+}
 
 /// FNV-1a in 64 bits, fed with words of four bytes.
 ///
@@ -20,10 +56,11 @@ impl Default for Fingerprint {
 
 impl Fingerprint {
     /// Of all grades, occupancies and bits of a map.
-    pub fn of_map<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> Self {
+    pub fn of_map<M: Rows>(map: &M) -> Self {
         let mut fingerprint = Self::default();
-        for a in 0..A {
-            if let (Some(grades), Some(occupancy)) = (map.grades(a), map.occupancy(a)) {
+        let [_, rows] = M::SHAPE;
+        for row in 0..rows {
+            if let Some((grades, occupancy)) = map.row(row) {
                 fingerprint.bytes(grades);
                 fingerprint.bytes(occupancy);
                 fingerprint.bits(grades, map.visible_from());

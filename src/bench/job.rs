@@ -18,10 +18,13 @@
 //! | 2 | detections that follow |
 //! | 2 | bit 0: the radar reports a fault; bit 1: forget everything first |
 //! | 12 each | range (cm), azimuth, elevation (2^-16 turn), radial velocity (cm/s), RCS, SNR (half dB); -32768 = not measured |
+//!
+//! or, for a camera, boxes: left, upper, right and lower edge (2^-14 of the picture), class, 0.
 
 use heapless::Vec;
 
 use super::Bench;
+use crate::camera::boxes::{ImageBox, VehicleClass};
 use crate::fixed::angle::Angle;
 use crate::fixed::bytes::{Reader, Writer};
 use crate::fixed::time::Time;
@@ -142,55 +145,82 @@ impl ScanHead {
     }
 }
 
-/// Writes a detection.
-#[allow(clippy::cast_possible_wrap)]
-pub fn detection_to_bytes(d: &Detection) -> [u8; DETECTION_LEN] {
-    let mut bytes = [0; DETECTION_LEN];
-    let mut w = Writer(&mut bytes);
-    w.put(d.range_cm.to_le_bytes());
-    for v in [
-        d.azimuth.raw(),
-        d.elevation.map_or(ABSENT, Angle::raw),
-        d.radial_velocity_cm_s,
-        d.rcs_half_dbsm.unwrap_or(ABSENT),
-        d.snr_half_db.unwrap_or(ABSENT),
-    ] {
-        w.put(v.to_le_bytes());
+/// What scans hold.
+pub trait JobEntry: Sized {
+    /// Writes it.
+    fn to_bytes(&self) -> [u8; DETECTION_LEN];
+    /// Reads it; `None` for anything else.
+    fn from_bytes(bytes: &[u8]) -> Option<Self>;
+}
+
+impl JobEntry for Detection {
+    fn to_bytes(&self) -> [u8; DETECTION_LEN] {
+        let mut bytes = [0; DETECTION_LEN];
+        let mut w = Writer(&mut bytes);
+        w.put(self.range_cm.to_le_bytes());
+        for v in [
+            self.azimuth.raw(),
+            self.elevation.map_or(ABSENT, Angle::raw),
+            self.radial_velocity_cm_s,
+            self.rcs_half_dbsm.unwrap_or(ABSENT),
+            self.snr_half_db.unwrap_or(ABSENT),
+        ] {
+            w.put(v.to_le_bytes());
+        }
+        bytes
     }
-    bytes
+
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut r = Reader(bytes);
+        let range_cm = r.u16()?;
+        let mut next = || r.i16();
+        let measured = |v: i16| (v != ABSENT).then_some(v);
+        Some(Self {
+            range_cm,
+            azimuth: Angle::from_raw(next()?),
+            elevation: measured(next()?).map(Angle::from_raw),
+            radial_velocity_cm_s: next()?,
+            rcs_half_dbsm: measured(next()?),
+            snr_half_db: measured(next()?),
+        })
+    }
 }
 
-fn detection(bytes: &[u8]) -> Option<Detection> {
-    let mut r = Reader(bytes);
-    let range_cm = r.u16()?;
-    let mut next = || r.i16();
-    let measured = |v: i16| (v != ABSENT).then_some(v);
-    Some(Detection {
-        range_cm,
-        azimuth: Angle::from_raw(next()?),
-        elevation: measured(next()?).map(Angle::from_raw),
-        radial_velocity_cm_s: next()?,
-        rcs_half_dbsm: measured(next()?),
-        snr_half_db: measured(next()?),
-    })
+impl JobEntry for ImageBox {
+    fn to_bytes(&self) -> [u8; DETECTION_LEN] {
+        let mut bytes = [0; DETECTION_LEN];
+        let mut w = Writer(&mut bytes);
+        self.shares().iter().for_each(|share| w.put(share.to_le_bytes()));
+        w.put([self.class().number(), 0]);
+        bytes
+    }
+
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut r = Reader(bytes);
+        let shares = [r.i16()?, r.i16()?, r.i16()?, r.i16()?];
+        let [class, _] = r.take()?;
+        Some(Self::of_shares(shares, VehicleClass::numbered(class)?))
+    }
 }
 
-/// Detections of the scan at hand, up to `N`.
+/// Detections or boxes of the scan at hand, up to `N`.
 #[derive(Debug, Clone)]
-pub struct ScanBuffer<const N: usize>(Vec<Detection, N>);
+pub struct ScanBuffer<const N: usize, T = Detection>(Vec<T, N>);
 
-impl<const N: usize> Default for ScanBuffer<N> {
+impl<const N: usize, T> Default for ScanBuffer<N, T> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const N: usize> ScanBuffer<N> {
+impl<const N: usize, T> ScanBuffer<N, T> {
     /// No detections.
     pub const fn new() -> Self {
         Self(Vec::new())
     }
+}
 
+impl<const N: usize, T: JobEntry> ScanBuffer<N, T> {
     /// Reads the next scan; `None` at the end of the stream.
     ///
     /// # Errors
@@ -214,7 +244,7 @@ impl<const N: usize> ScanBuffer<N> {
                 return Err(JobError::Cut);
             }
             for d in bytes.chunks(DETECTION_LEN) {
-                let _ = self.0.push(detection(d).ok_or(JobError::Cut)?);
+                let _ = self.0.push(T::from_bytes(d).ok_or(JobError::Cut)?);
             }
             left -= some;
         }
@@ -222,7 +252,7 @@ impl<const N: usize> ScanBuffer<N> {
     }
 
     /// The scan's detections.
-    pub fn detections(&self) -> &[Detection] {
+    pub fn detections(&self) -> &[T] {
         &self.0
     }
 }

@@ -11,7 +11,7 @@
 //! | 4 | ticks to 256 instructions, 0 = not counted | fingerprint, high | 0 | stack |
 //! | 4 x 8 | state, parameters, map, 5 zeros | ticks of each stage | zeros | zeros |
 //!
-//! A map record is followed by its grades, then its occupancies, azimuth by azimuth.
+//! A map record is followed by its grades, then its occupancies, azimuth by azimuth, of a camera row by row.
 
 use super::stage::Stage;
 use crate::estimator::Estimator;

@@ -1,13 +1,11 @@
 //! The controller's side: scans in, estimator, records out.
 
-use super::fingerprint::Fingerprint;
-use super::job::{Job, JobError, ScanBuffer};
+use super::fingerprint::{Fingerprint, Rows};
+use super::job::{Job, JobEntry, JobError, ScanBuffer};
 use super::record::{Closing, Opening, Record, Tracer};
 use super::stage::Stage;
 use crate::estimator::Estimator;
-use crate::frame::detection::Detection;
 use crate::inputs::Frame;
-use crate::map::polar::PolarMap;
 use crate::unit::{MapSender, Unit};
 use crate::wire::serial::MOST_STUFFED;
 
@@ -32,16 +30,17 @@ const MOST_MESSAGES: usize = 400;
 ///
 /// # Errors
 /// A stream that breaks off or holds a scan that does not fit.
-pub fn run<E, S, const R: usize, const A: usize, const B: usize>(
+pub fn run<E, S, T, const B: usize>(
     bench: &mut impl Bench,
     job: &Job,
     shape: [usize; 4],
     unit: &mut Unit<'_, E, S>,
-    scan: &mut ScanBuffer<B>,
+    scan: &mut ScanBuffer<B, T>,
 ) -> Result<(), JobError>
 where
-    E: Estimator<Input = [Detection], Map = PolarMap<R, A>>,
+    E: Estimator<Input = [T], Map: Rows>,
     S: MapSender<E::Map>,
+    T: JobEntry,
 {
     bench.write(&Record::Opening(Opening::of::<E>(shape, bench.ticks_per_256())).to_bytes());
     let mut line = [0; MOST_STUFFED];
@@ -88,13 +87,13 @@ where
 }
 
 #[allow(clippy::cast_possible_truncation)] // maps that fit a controller
-fn dump<const R: usize, const A: usize>(bench: &mut impl Bench, frame: u32, map: &PolarMap<R, A>) {
-    bench.write(&Record::Map { frame, cells: [R as u16, A as u16] }.to_bytes());
-    for rows in [PolarMap::grades, PolarMap::occupancy] {
-        for a in 0..A {
-            if let Some(row) = rows(map, a) {
-                bench.write(row);
-            }
-        }
+fn dump<M: Rows>(bench: &mut impl Bench, frame: u32, map: &M) {
+    let [_, rows] = M::SHAPE;
+    bench.write(&Record::Map { frame, cells: M::SHAPE.map(|cells| cells as u16) }.to_bytes());
+    for row in 0..rows {
+        bench.write(map.row(row).map_or(&[], |(grades, _)| grades));
+    }
+    for row in 0..rows {
+        bench.write(map.row(row).map_or(&[], |(_, occupancy)| occupancy));
     }
 }

@@ -51,6 +51,20 @@ impl VehicleClass {
         }
     }
 
+    /// Every class, by its number on the wire from 1.
+    const NUMBERED: [Self; 7] =
+        [Self::Car, Self::Van, Self::Truck, Self::Bus, Self::Motorcycle, Self::Bicycle, Self::Pedestrian];
+
+    /// Its number on the wire, from 1.
+    pub(crate) const fn number(self) -> u8 {
+        self as u8 + 1
+    }
+
+    /// From its number on the wire.
+    pub(crate) fn numbered(number: u8) -> Option<Self> {
+        Self::NUMBERED.get(usize::from(number.checked_sub(1)?)).copied()
+    }
+
     /// From the name detectors and recordings use: those of COCO, and `van` and `pedestrian`.
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
@@ -75,6 +89,9 @@ pub struct ImageBox {
     pub(crate) class: VehicleClass,
 }
 
+/// Sides of a normalised picture, pixels: a sixteenth of one is 2^-14 of it.
+pub(crate) const NORMAL_PX: u16 = 1024;
+
 /// Farthest from the image's corner that an edge may lie, pixels.
 const FARTHEST_PX: f32 = 32_000.0;
 
@@ -85,6 +102,37 @@ impl ImageBox {
     pub fn from_pixels(edges: [f32; 4], class: VehicleClass) -> Option<Self> {
         let near = edges.iter().all(|v| v.is_finite() && v.abs() <= FARTHEST_PX);
         near.then(|| Self { edges: edges.map(|v| math::round_i32(v * SUBPIXELS as f32)), class })
+    }
+
+    /// The same as shares of a picture of this size, width and height in pixels, as the native format sends it. It
+    /// goes with a [normalised](crate::camera::calibration::Calibration::normalised) calibration. `None` for a
+    /// picture without pixels too.
+    pub fn of_picture([l, t, r, b]: [f32; 4], size_px: [u16; 2], class: VehicleClass) -> Option<Self> {
+        let [width, height] = size_px.map(|side| f32::from(NORMAL_PX) / f32::from(side));
+        Self::from_pixels([l * width, t * height, r * width, b * height], class)
+    }
+
+    /// From edges in 2^-14 of the picture.
+    pub(crate) fn of_shares(shares: [i16; 4], class: VehicleClass) -> Self {
+        Self { edges: shares.map(i32::from), class }
+    }
+
+    /// Edges in 2^-14 of a normalised picture; beyond two of its sides cut off.
+    #[allow(clippy::cast_possible_truncation)] // cut
+    pub(crate) fn shares(&self) -> [i16; 4] {
+        self.edges.map(|edge| edge.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16)
+    }
+
+    /// What the detector takes it for.
+    pub fn class(&self) -> VehicleClass {
+        self.class
+    }
+
+    /// Its area in pixels, saturating.
+    pub(crate) fn area(&self) -> i32 {
+        let [l, t, r, b] = self.edges;
+        let side = |from: i32, to: i32| (to.saturating_sub(from) / SUBPIXELS).max(0);
+        side(l, r).saturating_mul(side(t, b))
     }
 }
 
@@ -161,6 +209,30 @@ mod tests {
         assert_eq!(b.edges, [16, 36, 56, -64]);
         assert_eq!(ImageBox::from_pixels([1.0, 2.0, f32::NAN, 4.0], VehicleClass::Car), None);
         assert_eq!(ImageBox::from_pixels([1.0, 2.0, 1e9, 4.0], VehicleClass::Car), None);
+    }
+
+    #[test]
+    fn a_share_of_the_picture_does_not_depend_on_its_size() {
+        let of = |scale: f32, size| {
+            ImageBox::of_picture([480.0, 270.0, 960.0, 1080.0].map(|v| v * scale), size, VehicleClass::Bus)
+        };
+        let whole = of(1.0, [1920, 1080]).unwrap();
+        assert_eq!(whole.edges, [4096, 4096, 8192, 16384], "a quarter, a quarter, a half, all");
+        assert_eq!(of(1.0 / 3.0, [640, 360]), Some(whole));
+        assert_eq!(ImageBox::of_shares(whole.shares(), whole.class), whole);
+        assert_eq!(of(1.0, [0, 1080]), None);
+        let far = ImageBox::of_picture([-9000.0, 0.0, 9000.0, 1.0], [1920, 1080], VehicleClass::Car).unwrap();
+        assert_eq!(far.shares(), [i16::MIN, 0, i16::MAX, 15]);
+    }
+
+    #[test]
+    fn classes_have_the_numbers_of_the_wire() {
+        let all: std::vec::Vec<Option<VehicleClass>> = (0..=8).map(VehicleClass::numbered).collect();
+        assert_eq!(
+            (all[0], all[1], all[7], all[8]),
+            (None, Some(VehicleClass::Car), Some(VehicleClass::Pedestrian), None)
+        );
+        assert!((1..=7).all(|n| VehicleClass::numbered(n).map(VehicleClass::number) == Some(n)));
     }
 
     #[test]

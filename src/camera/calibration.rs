@@ -9,6 +9,7 @@
 //! u to the right, v down. As every sensor here it looks along its x axis, with y left and z up; the optical frame
 //! of other software (x right, y down, z ahead) appears in the ground plane only.
 
+use crate::camera::boxes::NORMAL_PX;
 use crate::camera::homography::{self, Homography};
 pub use crate::camera::points::{CalibrationError, PointPair};
 use crate::fixed::math;
@@ -115,6 +116,31 @@ impl Calibration {
         };
         calibration.mount.levelling()?;
         Ok(calibration)
+    }
+
+    /// The same camera with a picture of 1024 x 1024 pixels, in which an edge is a share of the picture, whatever
+    /// the size a detector is given: for boxes by [`ImageBox::of_picture`](crate::camera::boxes::ImageBox::of_picture),
+    /// and for those of the native format.
+    pub fn normalised(&self) -> Self {
+        let Intrinsics { size_px, focal_px, center_px } = self.intrinsics;
+        let [width, height] = size_px.map(|side| f32::from(NORMAL_PX) / f32::from(side));
+        let scaled = |[u, v]: [f32; 2]| [u * width, v * height];
+        let intrinsics =
+            Intrinsics { size_px: [NORMAL_PX; 2], focal_px: scaled(focal_px), center_px: scaled(center_px) };
+        Self { intrinsics, mount: self.mount }
+    }
+
+    /// From a mount and the angles at which the picture ends, right and left in its middle row, below and above in
+    /// its middle column: normalised.
+    pub(crate) fn of_view(mount: &Mount, view: &FieldOfView) -> Self {
+        let tangent = |degrees: f32| math::sin(degrees.to_radians()) / math::cos(degrees.to_radians());
+        let (left, right) = (tangent(view.azimuth_max_deg), tangent(-view.azimuth_min_deg));
+        let (up, down) = (tangent(view.elevation_max_deg), tangent(-view.elevation_min_deg));
+        let side = f32::from(NORMAL_PX);
+        let focal_px = [side / (left + right), side / (up + down)];
+        let intrinsics =
+            Intrinsics { size_px: [NORMAL_PX; 2], focal_px, center_px: [focal_px[0] * left, focal_px[1] * up] };
+        Self { intrinsics, mount: *mount }
     }
 
     /// The field of view of the image up to a range, metres: everything inside of it is in the image. The corners

@@ -93,31 +93,36 @@ fn add(row: [f64; 8], value: f64, matrix: &mut [[f64; 8]; 8], right: &mut [f64; 
 }
 
 /// Solves symmetric positive equations (Cholesky without roots); `None` where they leave something open.
-#[allow(clippy::indexing_slicing)] // every loop ends at the arrays' constant length
 fn solve<const N: usize>(matrix: [[f64; N]; N], right: [f64; N]) -> Option<[f64; N]> {
     let mut lower = [[0.0; N]; N];
     let mut pivots = [0.0; N];
-    for i in 0..N {
-        for j in 0..i {
-            let known: f64 = (0..j).map(|k| lower[i][k] * lower[j][k] * pivots[k]).sum();
-            lower[i][j] = (matrix[i][j] - known) / pivots[j];
+    for (i, row) in matrix.iter().enumerate() {
+        let mut own = [0.0; N];
+        for (j, ((value, other), pivot)) in row.iter().zip(&lower).zip(&pivots).enumerate().take(i) {
+            let known: f64 = own.iter().zip(other).zip(&pivots).take(j).map(|((a, b), pivot)| a * b * pivot).sum();
+            *own.get_mut(j)? = (value - known) / pivot;
         }
-        let known: f64 = (0..i).map(|k| lower[i][k] * lower[i][k] * pivots[k]).sum();
-        pivots[i] = matrix[i][i] - known;
+        let known: f64 = own.iter().zip(&pivots).take(i).map(|(a, pivot)| a * a * pivot).sum();
+        let all = *row.get(i)?;
+        let left = all - known;
         // a NaN is refused as well
-        let determined = pivots[i] > SINGULAR * matrix[i][i];
+        let determined = left > SINGULAR * all;
         if !determined {
             return None;
         }
+        *pivots.get_mut(i)? = left;
+        *lower.get_mut(i)? = own;
     }
     let mut x = right;
-    for i in 0..N {
-        let known: f64 = (0..i).map(|k| lower[i][k] * x[k]).sum();
-        x[i] -= known;
+    for (i, row) in lower.iter().enumerate() {
+        let known: f64 = row.iter().zip(&x).take(i).map(|(a, x)| a * x).sum();
+        *x.get_mut(i)? -= known;
     }
-    for i in (0..N).rev() {
-        let known: f64 = (i + 1..N).map(|k| lower[k][i] * x[k]).sum();
-        x[i] = x[i] / pivots[i] - known;
+    for (i, pivot) in pivots.iter().enumerate().rev() {
+        let below = lower.iter().zip(&x).skip(i + 1);
+        let known: f64 = below.map(|(row, x)| row.get(i).copied().unwrap_or(0.0) * x).sum();
+        let own = x.get_mut(i)?;
+        *own = *own / pivot - known;
     }
     Some(x)
 }

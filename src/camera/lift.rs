@@ -4,7 +4,7 @@
 //! A vehicle is an upright box of its class's size that stands on the road, along the traffic's heading. Its place
 //! is the one where the camera would see it with the bottom edge of the image box and between its sides; it is
 //! found by moving the box by the difference between where the road shows the edges that were measured and where it
-//! shows those that are expected, four times. Then the top edge, which shows the far end of a roof below the
+//! shows those that are expected, up to four times. Then the top edge, which shows the far end of a roof below the
 //! camera, gives the length within the limits of the class.
 //!
 //! A detector draws its box around what is visible. Where a nearer box covers the bottom edge, or the image ends
@@ -199,8 +199,13 @@ impl Lifting {
             let edge = |edges: &[i32; 4]| edges.get(row).copied().unwrap_or(0);
             let target = p.on_plane([aim, edge(&seen.edges)], height)?;
             let current = p.on_plane([now, edge(&expected)], height)?;
+            let moved = [target[0] - current[0], target[1] - current[1]];
+            // where the next step would begin it ended already
+            if moved == [0, 0] {
+                break;
+            }
             let [x, y] = placed.at;
-            placed.at = [x + target[0] - current[0], y + target[1] - current[1]];
+            placed.at = [x + moved[0], y + moved[1]];
         }
         Some(())
     }

@@ -1,12 +1,15 @@
-//! A camera's map: 1 m cells ahead of it, and the same as a polar map for the wire.
+//! A camera's map: 1 m cells ahead of it, and the rays that are sent of it.
 
 use crate::camera::voxels::{CELL_CM, middle_of};
 use crate::fixed::angle::Angle;
 use crate::fixed::trig;
-use crate::map::polar::{PolarGeometry, PolarMap};
+use crate::map::polar::PolarGeometry;
 use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
+
+/// Azimuths of the polar map around a camera as which its map is sent.
+pub const AZIMUTHS: usize = 120;
 
 /// `NX` rows of 1 m from the camera away, in each `NY` cells of 1 m from right to left, in the levelled frame.
 ///
@@ -25,9 +28,31 @@ pub struct CameraMap<const NX: usize, const NY: usize> {
 }
 
 impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
-    pub(crate) fn new(levelling: Levelling, azimuth: [Angle; 2], visible_from: u8, occupied_from: u8) -> Self {
+    /// A map of no camera, to be placed in static memory; everything is unknown.
+    pub const NOWHERE: Self = Self::unknown(Levelling::NOWHERE, [Angle::ZERO; 2], 0, 0);
+
+    pub(crate) const fn unknown(
+        levelling: Levelling,
+        azimuth: [Angle; 2],
+        visible_from: u8,
+        occupied_from: u8,
+    ) -> Self {
         let none = [[0; NY]; NX];
         Self { grades: none, occupancy: none, levelling, azimuth, visible_from, occupied_from }
+    }
+
+    /// Makes it a map of a camera, on which everything is unknown.
+    pub(crate) fn prepare(&mut self, levelling: Levelling, azimuth: [Angle; 2], visible_from: u8, occupied_from: u8) {
+        self.forget();
+        self.levelling = levelling;
+        self.azimuth = azimuth;
+        self.visible_from = visible_from;
+        self.occupied_from = occupied_from;
+    }
+
+    /// Grades of a row, 0 = unknown, and occupancy.
+    pub fn row(&self, row: usize) -> Option<(&[u8; NY], &[u8; NY])> {
+        self.grades.get(row).zip(self.occupancy.get(row))
     }
 
     /// Makes everything unknown.
@@ -59,50 +84,58 @@ impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
         (row < NX && column < NY).then_some((row, column))
     }
 
-    /// A polar map around the camera on which everything is unknown: cells of 1 m, all azimuths of the view.
-    #[allow(clippy::cast_sign_loss)] // the left end lies to the left
-    pub fn polar<const R: usize, const A: usize>(&self) -> PolarMap<R, A> {
-        let [right, left] = self.azimuth;
-        let geometry = PolarGeometry {
-            levelling: self.levelling,
-            cell_cm: CELL_CM,
-            azimuth_origin: right,
-            azimuth_span: (left - right).raw().max(0) as u16,
-        };
-        PolarMap::unknown(geometry, self.visible_from, self.occupied_from)
+    /// Where the cells of the polar map around the camera lie, as which this one is sent: cells of 1 m, all azimuths
+    /// of the view.
+    pub(crate) fn geometry(&self) -> PolarGeometry {
+        geometry(&self.levelling, self.azimuth)
     }
 
-    /// Takes the map over into a polar one made by [`polar`](Self::polar): each of its cells is what the nearest
-    /// cell is, the one its middle lies in, never better. One with other cells is made unknown.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 2^16 turn
-    pub fn to_polar<const R: usize, const A: usize>(&self, polar: &mut PolarMap<R, A>) {
-        let geometry = *polar.geometry();
-        polar.forget();
-        if geometry.cell_cm != CELL_CM {
-            return;
-        }
-        let span = u32::from(geometry.azimuth_span);
-        for a in 0..A {
-            let middle = (span * (2 * a as u32 + 1)) / (2 * A as u32).max(1);
-            let ray = trig::direction(geometry.azimuth_origin + Angle::from_raw(middle as i16));
-            let Some((grades, occupancy)) = polar.rows_mut(a) else { continue };
-            // cells, 2^-15: half a cell and then whole ones along the ray
-            let (dx, dy) = (i32::from(ray.x), i32::from(ray.y));
-            let (mut x, mut y) = (dx, dy + ((NY as i32) << 14));
-            for (grade, occupied) in grades.iter_mut().zip(occupancy) {
-                let at = |rows: &[[u8; NY]; NX]| {
-                    rows.get(usize::try_from(x >> 15).ok()?)?.get(usize::try_from(y >> 15).ok()?).copied()
-                };
-                // beyond the cells there are no more of them along the ray
-                let Some(own) = at(&self.grades) else { break };
-                if own != UNKNOWN {
-                    (*grade, *occupied) = (own, at(&self.occupancy).unwrap_or(0));
-                }
-                x += 2 * dx;
-                y += 2 * dy;
-            }
+    /// The cells of an azimuth of that polar map, from near to far: each is what the nearest cell of this one is, the
+    /// one its middle lies in, never better. Those beyond are left as they are.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)] // at most 2^16 turn
+    pub(crate) fn along(&self, azimuth: usize, layer: Layer, cells: &mut [u8]) {
+        let rows = match layer {
+            Layer::Grades => &self.grades,
+            Layer::Occupancy => &self.occupancy,
+        };
+        let geometry = self.geometry();
+        let middle = (u32::from(geometry.azimuth_span) * (2 * azimuth as u32 + 1)) / (2 * AZIMUTHS as u32);
+        let ray = trig::direction(geometry.azimuth_origin + Angle::from_raw(middle as i16));
+        // cells, 2^-15: half a cell and then whole ones along the ray; what lies to the right of the cells wraps to
+        // beyond them, and beyond them there are no more along the ray
+        let (dx, dy) = (i32::from(ray.x), i32::from(ray.y));
+        let (mut x, mut y) = (dx as u32, (dy + ((NY as i32) << 14)) as u32);
+        let (step_x, step_y) = ((2 * dx) as u32, (2 * dy) as u32);
+        for cell in cells {
+            let Some(own) = rows.get((x >> 15) as usize).and_then(|row| row.get((y >> 15) as usize)) else { break };
+            *cell = *own;
+            x = x.wrapping_add(step_x);
+            y = y.wrapping_add(step_y);
         }
     }
+
+    /// Least grade that counts as visible, and least occupancy that counts as occupied.
+    pub(crate) fn thresholds(&self) -> [u8; 2] {
+        [self.visible_from, self.occupied_from]
+    }
+}
+
+/// Where the cells of the polar map lie, by the right and left end of the view.
+#[allow(clippy::cast_sign_loss)] // the left end lies to the left
+pub(crate) fn geometry(levelling: &Levelling, [right, left]: [Angle; 2]) -> PolarGeometry {
+    PolarGeometry {
+        levelling: *levelling,
+        cell_cm: CELL_CM,
+        azimuth_origin: right,
+        azimuth_span: (left - right).raw().max(0) as u16,
+    }
+}
+
+/// What is known of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Layer {
+    Grades,
+    Occupancy,
 }
 
 impl<const NX: usize, const NY: usize> VisibilityMap for CameraMap<NX, NY> {
@@ -122,7 +155,7 @@ mod tests {
     fn map() -> CameraMap<20, 10> {
         let mount = Mount { x_m: 3.0, y_m: 1.0, height_m: 6.0, yaw_deg: 90.0, pitch_deg: 5.0, roll_deg: 0.0 };
         let azimuth = [Angle::from_degrees(-30.0), Angle::from_degrees(30.0)];
-        CameraMap::new(mount.levelling().unwrap(), azimuth, 128, 128)
+        CameraMap::unknown(mount.levelling().unwrap(), azimuth, 128, 128)
     }
 
     fn set(map: &mut CameraMap<20, 10>, row: usize, column: usize, grade: u8, occupancy: u8) {
@@ -146,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_polar_map_says_at_each_middle_what_the_nearest_cell_says() {
+    fn a_ray_says_at_each_middle_what_the_nearest_cell_says() {
         let mut m = map();
         for row in 0..20 {
             for column in 0..10 {
@@ -154,24 +187,25 @@ mod tests {
             }
         }
         set(&mut m, 9, 4, 0, 0);
-        let mut polar = m.polar::<25, 12>();
-        m.to_polar(&mut polar);
-        let levelling = map().levelling;
+        let (levelling, geometry) = (map().levelling, m.geometry());
         let mut known = 0;
-        for a in 0..12 {
+        for a in 0..AZIMUTHS {
+            let (mut grades, mut occupancy) = ([0; 25], [0; 25]);
+            m.along(a, Layer::Grades, &mut grades);
+            m.along(a, Layer::Occupancy, &mut occupancy);
             for r in 0..25 {
-                let azimuth = Angle::from_degrees(-30.0 + 5.0 * a as f32 + 2.5);
+                let azimuth = Angle::from_degrees(-30.0 + 0.5 * a as f32 + 0.25);
                 let (ray, range) = (trig::direction(azimuth), 100 * r as i32 + 50);
                 let (x, y) = ((range * i32::from(ray.x)) >> 14, (range * i32::from(ray.y)) >> 14);
-                let road = levelling.unplace(x, y);
-                assert_eq!(polar.cell(a, r), m.at(road), "{a} {r}");
-                assert_eq!(polar.locate(x, y), Some((a, r)));
-                known += usize::from(polar.cell(a, r) != CellState::UNKNOWN);
+                // a middle within 3 cm of a border may be taken for either side
+                let near = [(-3, -3), (-3, 3), (3, -3), (3, 3), (0, 0)];
+                let mut states = near.map(|(dx, dy)| m.at(levelling.unplace(x + dx, y + dy))).into_iter();
+                assert!(states.any(|s| (s.grade, s.occupancy) == (grades[r], occupancy[r])), "{a} {r}");
+                // nearer than this a centimetre is half an azimuth
+                assert!(r < 3 || geometry.locate(x, y, 25, AZIMUTHS) == Some((a, r)), "{a} {r}");
+                known += usize::from(grades[r] != UNKNOWN);
             }
         }
-        let mut coarse = PolarMap::<25, 12>::unknown(PolarGeometry { cell_cm: 200, ..*polar.geometry() }, 128, 128);
-        m.to_polar(&mut coarse);
-        assert_eq!(coarse.cell(6, 5), CellState::UNKNOWN, "of other cells");
-        assert!(known > 150 && polar.cell(6, 22) == CellState::UNKNOWN, "{known}");
+        assert!(known > 1500, "{known}");
     }
 }

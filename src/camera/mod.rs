@@ -5,7 +5,7 @@
 //! ```text
 //! image boxes -> checked -> lifted onto the road -> voxels, which fade -> lines of sight
 //!                                                                               |
-//!                          polar map for the wire <- map: mean visibility above each cell
+//!                        rays of a polar map, sent <- map: mean visibility above each cell
 //! ```
 //!
 //! # Model
@@ -52,10 +52,6 @@
 //! let ahead = |x_m| RoadPoint::from_metres(x_m, 0.5).map(|point| query::point(&map, point));
 //! assert_eq!(ahead(30.5)?, Answer::VisibleFree);
 //! assert_eq!(ahead(70.5)?, Answer::Invisible);
-//! // the same for a receiver of maps
-//! let mut polar = map.polar::<200, 120>();
-//! map.to_polar(&mut polar);
-//! assert_eq!(query::point(&polar, RoadPoint::from_metres(70.5, 0.5)?), Answer::Invisible);
 //! # Ok::<(), viewshed::sensor::config::ConfigError>(())
 //! ```
 
@@ -76,12 +72,15 @@ use crate::camera::map::CameraMap;
 use crate::camera::projection::{Projection, SUBPIXELS};
 use crate::camera::sight::{Skyline, View};
 use crate::camera::voxels::{FULL, Standing, Voxels};
+use crate::estimator::{Estimator, Progress};
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::time::{Step, Time};
 use crate::fixed::trig::{self, Direction};
 use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits, Points};
+use crate::map::polar::PolarGeometry;
 use crate::sensor::config::{ConfigError, Problem, within};
+use crate::sensor::mount::Levelling;
 
 /// Most boxes of a frame that are used.
 pub const MOST_BOXES: usize = 500;
@@ -168,8 +167,27 @@ impl<const NX: usize, const NY: usize> Camera3dParameters<NX, NY> {
 
     /// An empty map for these parameters.
     pub fn map(&self) -> CameraMap<NX, NY> {
-        let azimuth = self.view.tangents.map(|t| Angle::from_radians(math::atan2(t, 1.0)));
-        CameraMap::new(self.projection.levelling, azimuth, self.visible_from, OCCUPIED_FROM)
+        CameraMap::unknown(*self.levelling(), self.azimuth(), self.visible_from, OCCUPIED_FROM)
+    }
+
+    /// Right and left end of the view, from the boresight's heading.
+    fn azimuth(&self) -> [Angle; 2] {
+        self.view.tangents.map(|t| Angle::from_radians(math::atan2(t, 1.0)))
+    }
+
+    /// The mount.
+    pub(crate) fn levelling(&self) -> &Levelling {
+        &self.projection.levelling
+    }
+
+    /// Where the cells lie of the polar map as which maps are sent.
+    pub(crate) fn geometry(&self) -> PolarGeometry {
+        map::geometry(self.levelling(), self.azimuth())
+    }
+
+    /// Cells in view straight ahead, from and to.
+    pub(crate) fn ahead(&self) -> [usize; 2] {
+        self.view.ahead::<NY>()
     }
 
     /// Lifts the boxes of a frame onto the road; what is not used is counted by reason.
@@ -244,7 +262,6 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
 
     /// Takes a camera frame and brings the map up to its time. `status` is the camera's own fault flag, and where
     /// there can be any with it the number of boxes that were none.
-    #[allow(clippy::cast_possible_truncation)] // bounded lists
     pub fn process(
         &mut self,
         p: &Camera3dParameters<NX, NY>,
@@ -252,6 +269,20 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
         boxes: &[ImageBox],
         status: impl Into<FrameStatus>,
         map: &mut CameraMap<NX, NY>,
+    ) -> CameraReport {
+        self.process_traced(p, now, boxes, status, map, &mut || {})
+    }
+
+    /// [`process`](Self::process) that calls `ended` as each of its two stages ends: boxes into voxels, lines of sight.
+    #[allow(clippy::cast_possible_truncation)] // bounded lists
+    fn process_traced(
+        &mut self,
+        p: &Camera3dParameters<NX, NY>,
+        now: Time,
+        boxes: &[ImageBox],
+        status: impl Into<FrameStatus>,
+        map: &mut CameraMap<NX, NY>,
+        ended: &mut impl FnMut(),
     ) -> CameraReport {
         let status = status.into();
         let used = boxes.get(..MOST_BOXES).unwrap_or(boxes);
@@ -266,7 +297,10 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
         rejections.add(BoxRejection::OffGrid, off_grid);
         rejections.add(BoxRejection::Refused, u32::from(status.refused));
         self.rejections.add_all(&rejections);
-        CameraReport { continuity, condition: self.finish(p, now, map), used: filled, rejections }
+        ended();
+        let condition = self.finish(p, now, map);
+        ended();
+        CameraReport { continuity, condition, used: filled, rejections }
     }
 
     /// The same with vehicles whose place on the road is known already, from another source or from truth. What
@@ -335,5 +369,42 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
     /// Boxes rejected since the start, by reason.
     pub fn rejections(&self) -> &BoxRejections {
         &self.rejections
+    }
+}
+
+impl<const NX: usize, const NY: usize> Estimator for Camera3d<NX, NY> {
+    type Config = (Calibration, Camera3dConfig);
+    type Parameters = Camera3dParameters<NX, NY>;
+    type Input = [ImageBox];
+    type Map = CameraMap<NX, NY>;
+
+    fn parameters((calibration, config): &Self::Config) -> Result<Self::Parameters, ConfigError> {
+        Camera3dParameters::new(calibration, config)
+    }
+
+    fn prepare(parameters: &Self::Parameters, map: &mut Self::Map) {
+        map.prepare(*parameters.levelling(), parameters.azimuth(), parameters.visible_from, OCCUPIED_FROM);
+    }
+
+    fn forget(&mut self, map: &mut Self::Map) {
+        self.reset();
+        map.forget();
+    }
+
+    fn process(
+        &mut self,
+        parameters: &Self::Parameters,
+        measured: Time,
+        input: &[ImageBox],
+        status: FrameStatus,
+        map: &mut Self::Map,
+        ended: &mut impl FnMut(),
+    ) -> Progress {
+        let report = self.process_traced(parameters, measured, input, status, map, ended);
+        Progress { continuity: report.continuity, condition: report.condition, used: report.used }
+    }
+
+    fn expire(&mut self, parameters: &Self::Parameters, now: Time, map: &mut Self::Map) -> Condition {
+        Self::expire(self, parameters, now, map)
     }
 }

@@ -127,6 +127,13 @@ impl<const NX: usize> View<NX> {
         })
     }
 
+    /// Rows of the view straight ahead, from and to.
+    pub(crate) fn ahead<const NY: usize>(&self) -> [usize; 2] {
+        let seen = |(first, end): &(u16, u16)| (usize::from(*first)..usize::from(*end)).contains(&(NY / 2));
+        let from = self.rows.iter().position(seen).unwrap_or(0);
+        [from, self.rows.iter().rposition(seen).map_or(from, |last| last + 1)]
+    }
+
     /// Writes how much of each column in view is seen, 1 to 255, and its evidence at the road.
     pub(crate) fn cast<const NY: usize>(
         &self,
@@ -184,7 +191,7 @@ impl<const NX: usize> View<NX> {
                 }
                 open = false;
                 let above = top - self.height_cm;
-                let slope = (above << 16) / if above < 0 { far } else { near };
+                let slope = (above << 16) / if above < 0 { far.max(NEAREST_CM) } else { near };
                 let (right, left) = (middle_of(j, NY) - CELL_CM / 2, middle_of(j, NY) + CELL_CM / 2);
                 // the widest that it is seen
                 let from = self.edge(right, if right > 0 { at_far } else { at_near });

@@ -1,13 +1,33 @@
-//! The detections of a scan under way, each with the radar's own number for it.
+//! The detections of a scan under way, or the boxes of a picture, each with the sensor's own number for it.
 
 use heapless::Vec;
 
+use crate::camera::boxes::ImageBox;
 use crate::frame::detection::Detection;
 
-/// Up to `N` detections, the strongest of those offered.
+/// What is collected.
+pub trait Entry: Copy {
+    /// The weakest are dropped from a full list.
+    fn strength(&self) -> i32;
+}
+
+impl Entry for Detection {
+    fn strength(&self) -> i32 {
+        i32::from(Detection::strength(self))
+    }
+}
+
+/// Of a picture too full the smallest go: what is small hides little.
+impl Entry for ImageBox {
+    fn strength(&self) -> i32 {
+        self.area()
+    }
+}
+
+/// Up to `N` detections or boxes, the strongest of those offered.
 #[derive(Debug, Clone)]
-pub(crate) struct Collected<const N: usize> {
-    detections: Vec<Detection, N, u16>,
+pub(crate) struct Collected<const N: usize, T = Detection> {
+    detections: Vec<T, N, u16>,
     /// The radar's numbers in the same order; `None` of what is not to be kept.
     numbers: Vec<Option<u16>, N, u16>,
 }
@@ -21,7 +41,7 @@ pub(crate) enum Added {
     Full,
 }
 
-impl<const N: usize> Collected<N> {
+impl<const N: usize, T: Entry> Collected<N, T> {
     pub(crate) const fn new() -> Self {
         Self { detections: Vec::new(), numbers: Vec::new() }
     }
@@ -32,14 +52,14 @@ impl<const N: usize> Collected<N> {
     }
 
     /// Takes a detection; in a full list it replaces the weakest if it is stronger.
-    pub(crate) fn add(&mut self, number: u16, detection: Detection) -> Added {
+    pub(crate) fn add(&mut self, number: u16, detection: T) -> Added {
         if self.detections.push(detection).is_ok() {
             let _ = self.numbers.push(Some(number));
             return Added::Kept;
         }
-        let weakest = self.detections.iter().enumerate().min_by_key(|(_, d)| d.strength());
+        let weakest = self.detections.iter().enumerate().min_by_key(|(_, d)| Entry::strength(*d));
         if let Some((place, weakest)) = weakest
-            && weakest.strength() < detection.strength()
+            && Entry::strength(weakest) < Entry::strength(&detection)
             && let (Some(d), Some(n)) = (self.detections.get_mut(place), self.numbers.get_mut(place))
         {
             (*d, *n) = (detection, Some(number));
@@ -69,11 +89,11 @@ impl<const N: usize> Collected<N> {
         self.numbers.retain(Option::is_some);
     }
 
-    pub(crate) fn get_mut(&mut self, place: usize) -> Option<&mut Detection> {
+    pub(crate) fn get_mut(&mut self, place: usize) -> Option<&mut T> {
         self.detections.get_mut(place)
     }
 
-    pub(crate) fn detections(&self) -> &[Detection] {
+    pub(crate) fn detections(&self) -> &[T] {
         &self.detections
     }
 }

@@ -1,4 +1,4 @@
-//! Radars: bytes or CAN frames in, complete scans in the units of [`Detection`] out.
+//! Radars and cameras: bytes or CAN frames in, complete scans in the units of [`Detection`] or boxes out.
 //!
 //! Every decoder is an accumulator. It is fed with single CAN frames or with chunks of bytes cut
 //! anywhere, gets the time with each, and answers with a named outcome: nothing yet, a
@@ -16,9 +16,9 @@ use crate::frame::detection::Detection;
 use crate::frame::health::FrameStatus;
 use crate::wire::frame::CanFrame;
 
-/// The detections of one scan of a radar.
+/// The detections of one scan of a radar, or the boxes of one picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RadarScan<'a> {
+pub struct RadarScan<'a, T = Detection> {
     /// When it was measured, on the radar's clock; when its first frame came, on the caller's,
     /// where the radar sends no time.
     pub time: Time,
@@ -27,23 +27,23 @@ pub struct RadarScan<'a> {
     /// The radar's own number of the scan.
     pub number: u32,
     /// What was measured and passed the radar's own quality marks.
-    pub detections: &'a [Detection],
+    pub detections: &'a [T],
     /// Announced and not arrived; the most it can be, where that is not known exactly.
     pub missing: u16,
-    /// Points that arrived and are no detections: not finite, at no distance, or absurd.
+    /// Points that arrived and are no detections: not finite, at no distance, or absurd; boxes of no known class.
     pub refused: u16,
     /// Whether the radar says that something is wrong with it.
     pub fault: bool,
 }
 
-impl RadarScan<'_> {
+impl<T> RadarScan<'_, T> {
     /// What the estimators get besides the detections.
     pub fn status(&self) -> FrameStatus {
         FrameStatus { fault: self.fault, refused: self.refused }
     }
 
     /// As a frame for an estimator.
-    pub fn frame(&self) -> Frame<'_, [Detection]> {
+    pub fn frame(&self) -> Frame<'_, [T]> {
         Frame { measured: self.time, input: self.detections, incomplete: self.missing > 0, status: self.status() }
     }
 }
@@ -125,11 +125,11 @@ impl<const N: usize> Feed for ti::Ti<N> {
 }
 
 /// Time on this line is that of its scans: what follows one is looked at by its stamp.
-impl<const N: usize> Feed for native::NativeReceiver<N> {
+impl<const N: usize, T: native::NativeEntry> Feed for native::NativeReceiver<N, T> {
     type Piece = [u8];
-    type Input = [Detection];
+    type Input = [T];
 
-    fn take(&mut self, piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+    fn take(&mut self, piece: &[u8], now: Time, each: &mut impl FnMut(&Frame<'_, [T]>)) {
         let mut now = now;
         if let native::NativeOutcome::Scan(scan) = self.push(piece, now) {
             now = scan.time;
@@ -138,7 +138,7 @@ impl<const N: usize> Feed for native::NativeReceiver<N> {
         self.wait(now, each);
     }
 
-    fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, [Detection]>)) {
+    fn wait(&mut self, now: Time, each: &mut impl FnMut(&Frame<'_, [T]>)) {
         let mut now = now;
         while let Some(outcome) = self.poll(now) {
             if let native::NativeOutcome::Scan(scan) = outcome {

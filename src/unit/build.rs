@@ -1,6 +1,10 @@
 //! What settings make of a unit: the same for a start and for the check of a block that came.
 
+use crate::camera::calibration::Calibration;
+use crate::camera::map::AZIMUTHS;
+use crate::camera::{Camera3d, Camera3dConfig};
 use crate::estimator::Estimator;
+use crate::map::polar::PolarGeometry;
 use crate::radar_3d::Radar3d;
 use crate::sensor::config::{ConfigError, Problem};
 use crate::unit::sender::MapSender;
@@ -12,6 +16,14 @@ use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
 pub trait InUnit: Estimator {
     /// Its configuration by the settings; what an integrator does not set is the library's.
     fn config(settings: &Settings) -> Self::Config;
+
+    /// Whether the configuration can be made, by the names the settings have.
+    ///
+    /// # Errors
+    /// Names the first parameter that cannot be worked with.
+    fn check(_: &Settings) -> Result<(), ConfigError> {
+        Ok(())
+    }
 
     /// What receivers have to know of its maps.
     ///
@@ -31,6 +43,7 @@ impl Settings {
         *parameters = None;
         self.radar_bus.check("radar_bus")?;
         self.broadcast_bus.check("broadcast_bus")?;
+        E::check(self)?;
         // large: moved once
         let made = parameters.insert(E::parameters(&E::config(self))?);
         let header = E::header(self, made);
@@ -65,15 +78,47 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let axes = parameters.axes();
         let view = axes.view(A / 2);
         let geometry = axes.polar(parameters.levelling());
-        let usual = Known::new(view.start, view.end);
-        let block = settings.to_block(0);
-        // the mount was checked with the parameters, so it is the grid
-        #[allow(clippy::cast_precision_loss)]
-        let refused = ConfigError {
-            parameter: "header.azimuths",
-            value: A as f32,
-            problem: Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 },
+        header::<R, A>(settings, &geometry, Known::new(view.start, view.end))
+    }
+}
+
+fn header<const R: usize, const A: usize>(
+    settings: &Settings,
+    geometry: &PolarGeometry,
+    usual: Known,
+) -> Result<Header, ConfigError> {
+    let block = settings.to_block(0);
+    // the mount was checked with the parameters, so it is the grid
+    #[allow(clippy::cast_precision_loss)]
+    let refused = ConfigError {
+        parameter: "header.azimuths",
+        value: A as f32,
+        problem: Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 },
+    };
+    Header::new::<R, A>(&settings.sensor.mount, geometry, usual, 1, fingerprint(&block)).map_err(|_| refused)
+}
+
+/// Of the settings a camera takes the mount, the field of view as the angles at which its picture ends along its
+/// middle row and column, the slice's height and when maps end; its boxes are those of the native format, shares of
+/// the picture. Traffic drives along the road.
+impl<const NX: usize, const NY: usize> InUnit for Camera3d<NX, NY> {
+    fn config(settings: &Settings) -> Self::Config {
+        let view = settings.sensor.field_of_view;
+        let config = Camera3dConfig {
+            range_max_m: view.range_max_m,
+            slice_height_m: settings.visibility.slice_height_m,
+            health: settings.health,
+            ..Camera3dConfig::default()
         };
-        Header::new::<R, A>(&settings.sensor.mount, &geometry, usual, 1, fingerprint(&block)).map_err(|_| refused)
+        (Calibration::of_view(&settings.sensor.mount, &view), config)
+    }
+
+    fn check(settings: &Settings) -> Result<(), ConfigError> {
+        settings.sensor.field_of_view.limits().map(|_| ())
+    }
+
+    fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
+        let [from, to] = parameters.ahead();
+        header::<NX, AZIMUTHS>(settings, &parameters.geometry(), Known::new(from, to))
     }
 }

@@ -1,4 +1,4 @@
-//! The two sizes of radar-3d a unit is built in, so that boards and hosts name one and not its numbers.
+//! The two sizes of radar-3d a unit is built in, and a camera's, so that boards and hosts name one and not its numbers.
 
 macro_rules! size {
     ($(#[$doc:meta])* $name:ident, $ranges:literal, $azimuths:literal, $elevations:literal, $obstacles:literal, $detections:literal) => {
@@ -38,3 +38,26 @@ size!(
     /// 100 x 64 x 8 cells: parts with 128 kB.
     small, 100, 64, 8, 28, 176
 );
+
+/// A camera's unit, 200 m ahead and 30 m to each side.
+pub mod camera {
+    use crate::camera::{CameraProfile, map};
+    use crate::estimator::Estimator;
+    use crate::unit::settings::SettingsCheck;
+    use crate::wire::broadcast::Broadcaster;
+
+    /// The estimator.
+    pub type State = CameraProfile;
+    /// What it works with.
+    pub type Parameters = <State as Estimator>::Parameters;
+    /// Its map.
+    pub type Map = <State as Estimator>::Map;
+    /// Who sends it.
+    pub type Sender = Broadcaster<{ map::AZIMUTHS }, 7>;
+
+    /// Rows ahead, azimuths on the wire, voxels above each other, boxes.
+    pub const SHAPE: [usize; 4] = [200, map::AZIMUTHS, 8, crate::camera::MOST_BOXES];
+
+    /// Whether a camera's unit can run with settings.
+    pub const CHECK: SettingsCheck = SettingsCheck::of::<State, Sender>();
+}

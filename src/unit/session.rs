@@ -1,9 +1,9 @@
-//! A unit on two serial lines: bytes of radar and integrator in, messages out, from start to restart.
+//! A unit on two serial lines: bytes of radar or camera and integrator in, messages out, from start to restart.
 //!
 //! # Model
 //! ```text
 //! bytes -> messages -+-> service: block written into a slot, read, restart, time
-//!                    +-> native scans -> unit -> maps, header, status -> bytes
+//!                    +-> native scans or boxes -> unit -> maps, header, status -> bytes
 //! ```
 //! Without a block that holds there is no unit, only a status that says so: the safe state.
 //!
@@ -14,7 +14,7 @@ use crate::estimator::Estimator;
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::inputs::Feed;
-use crate::inputs::native::{NativeConfig, NativeReceiver};
+use crate::inputs::native::{NativeConfig, NativeEntry, NativeReceiver};
 use crate::unit::serial_service::{Asked, SerialLine, SerialService};
 use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
 use crate::unit::{Event, Flow, MapSender, Unit};
@@ -25,18 +25,18 @@ use crate::wire::status::Status;
 /// Most messages sent in one go.
 const MOST_MESSAGES: usize = 400;
 
-/// What lies between the lines and the unit. `D` detections a scan.
+/// What lies between the lines and the unit. `D` detections a scan, or boxes of a camera, [`ImageBox`](crate::ImageBox).
 #[derive(Debug)]
-pub struct SerialSession<const D: usize> {
+pub struct SerialSession<const D: usize, T = Detection> {
     unstuffer: Unstuffer,
     service: SerialService,
-    radar: NativeReceiver<D>,
+    radar: NativeReceiver<D, T>,
     now: Time,
     /// Messages the line did not take.
     refused: u16,
 }
 
-impl<const D: usize> SerialSession<D> {
+impl<const D: usize, T: NativeEntry> SerialSession<D, T> {
     /// Starts with a block, or without.
     #[inline(never)] // what it takes of the stack is free again afterwards
     pub fn start(sensor: u8, epoch: Epoch, stored: StoredSettings, line: &mut impl SerialLine) -> Self {
@@ -44,7 +44,7 @@ impl<const D: usize> SerialSession<D> {
         Self {
             unstuffer: Unstuffer::new(),
             service: SerialService::start(sensor, epoch, now, stored, line),
-            radar: NativeReceiver::new(NativeConfig::sensor(sensor)),
+            radar: NativeReceiver::empty(NativeConfig::sensor(sensor)),
             now,
             refused: 0,
         }
@@ -62,7 +62,7 @@ impl<const D: usize> SerialSession<D> {
 
     /// Takes bytes as they come, cut anywhere, and sends what follows from them. `event` is called with what the unit
     /// does with each frame.
-    pub fn take<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
+    pub fn take<E: Estimator<Input = [T]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,
         bytes: &[u8],
         unit: &mut Option<Unit<'_, E, S>>,
@@ -95,7 +95,7 @@ impl<const D: usize> SerialSession<D> {
 
     /// What is to be done when no bytes came, where the unit has a clock; it has to be the one its scans
     /// are stamped by, see [`RadarClock`](crate::unit::radar_clock::RadarClock).
-    pub fn idle<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
+    pub fn idle<E: Estimator<Input = [T]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,
         now: Time,
         unit: &mut Option<Unit<'_, E, S>>,
@@ -106,7 +106,7 @@ impl<const D: usize> SerialSession<D> {
     }
 
     /// Time went on.
-    fn wait<E: Estimator<Input = [Detection]>, S: MapSender<E::Map>, L: SerialLine>(
+    fn wait<E: Estimator<Input = [T]>, S: MapSender<E::Map>, L: SerialLine>(
         &mut self,
         now: Time,
         unit: &mut Option<Unit<'_, E, S>>,

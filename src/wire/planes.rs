@@ -2,6 +2,7 @@
 
 use super::code::ray::{Known, Ray};
 use super::message::Plane;
+use crate::camera::map::{CameraMap, Layer};
 use crate::fixed::bits::Bits;
 use crate::map::bitmap::VisibilityBitmap;
 use crate::map::polar::PolarMap;
@@ -23,28 +24,50 @@ impl<const R: usize, const A: usize, const W: usize> Planes<W> for VisibilityBit
 impl<const R: usize, const A: usize, const W: usize> Planes<W> for PolarMap<R, A> {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let Some((grades, occupancy)) = self.grades(azimuth).zip(self.occupancy(azimuth)) else { return Ray::UNKNOWN };
-        let known = match first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0)) {
-            Some((near, last)) => Known::new(near, last + 1),
-            None => return Ray::UNKNOWN,
-        };
-        let visible = self.visible_from();
-        let bits = match plane {
-            // above unknown, so known
-            Plane::Visibility => return Ray::within(known, at_least(grades, visible)),
-            Plane::Grade => {
-                // the upper halves of both classes
-                let (clear, nearly) = (visible.midpoint(u8::MAX), visible.midpoint(1));
-                let (clear, below) = (at_least::<W>(grades, clear), at_least::<W>(grades, nearly));
-                let upper = at_least::<W>(grades, visible);
-                let words = clear.words().iter().zip(below.words()).zip(upper.words());
-                let mut all = [0; W];
-                all.iter_mut().zip(words).for_each(|(to, ((clear, below), upper))| *to = clear | (below & !upper));
-                Bits::from_words(all)
-            }
-            Plane::Occupancy => at_least(occupancy, self.occupied_from()),
-        };
-        Ray::new(known, bits)
+        ray_of(plane, grades, self.visible_from(), || at_least(occupancy, self.occupied_from()))
     }
+}
+
+/// The polar map around the camera: each of its cells is what the camera's nearest one is.
+impl<const NX: usize, const NY: usize, const W: usize> Planes<W> for CameraMap<NX, NY> {
+    fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
+        let [visible_from, occupied_from] = self.thresholds();
+        let along = |layer| {
+            let mut cells = [[0; 32]; W];
+            if let Some(cells) = cells.as_flattened_mut().get_mut(..NX) {
+                self.along(azimuth, layer, cells);
+            }
+            cells
+        };
+        ray_of(plane, along(Layer::Grades).as_flattened(), visible_from, || {
+            at_least(along(Layer::Occupancy).as_flattened(), occupied_from)
+        })
+    }
+}
+
+/// The ray of one azimuth's grades and, where it is asked for, its occupied cells.
+#[inline]
+fn ray_of<const W: usize>(plane: Plane, grades: &[u8], visible: u8, occupied: impl FnOnce() -> Bits<W>) -> Ray<W> {
+    let known = match first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0)) {
+        Some((near, last)) => Known::new(near, last + 1),
+        None => return Ray::UNKNOWN,
+    };
+    let bits = match plane {
+        // above unknown, so known
+        Plane::Visibility => return Ray::within(known, at_least(grades, visible)),
+        Plane::Grade => {
+            // the upper halves of both classes
+            let (clear, nearly) = (visible.midpoint(u8::MAX), visible.midpoint(1));
+            let (clear, below) = (at_least::<W>(grades, clear), at_least::<W>(grades, nearly));
+            let upper = at_least::<W>(grades, visible);
+            let words = clear.words().iter().zip(below.words()).zip(upper.words());
+            let mut all = [0; W];
+            all.iter_mut().zip(words).for_each(|(to, ((clear, below), upper))| *to = clear | (below & !upper));
+            Bits::from_words(all)
+        }
+        Plane::Occupancy => occupied(),
+    };
+    Ray::new(known, bits)
 }
 
 /// The first cell whose value is above 0, eight at a time.

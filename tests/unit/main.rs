@@ -11,6 +11,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod camera;
 mod can_service;
 mod pil;
 mod roadside;

@@ -1,7 +1,7 @@
 //! The loop a controller runs, here on the host: jobs in, records out.
 
 use viewshed::bench::fingerprint::Fingerprint;
-use viewshed::bench::job::{Job, JobError, ScanBuffer, ScanHead, detection_to_bytes};
+use viewshed::bench::job::{Job, JobEntry, JobError, ScanBuffer, ScanHead};
 use viewshed::bench::record::{RECORD_LEN, Record};
 use viewshed::bench::{Bench, run};
 use viewshed::fixed::time::Time;
@@ -68,7 +68,7 @@ fn job(dump: Option<u32>, scans: &[Vec<Detection>]) -> Vec<u8> {
         let time = Time::from_micros(k as u64 * 66_667);
         let head = ScanHead { time, detections: scan.len() as u16, fault: false, reset: k == 5 };
         bytes.extend(head.to_bytes());
-        bytes.extend(scan.iter().flat_map(detection_to_bytes));
+        bytes.extend(scan.iter().flat_map(JobEntry::to_bytes));
     }
     bytes
 }

@@ -1,11 +1,14 @@
 //! Batch mode: the estimator over every scan of a job file, a fingerprint of each map and its messages, and
 //! what it cost where the core counts instructions.
 
-/// Makes the program `batch`, with its memory, for a size of unit and a core.
+/// Makes the program `batch`, with its memory, for a size of unit, what its scans hold, and a core.
 #[macro_export]
 macro_rules! batch {
     ($board:ident, $core:expr) => {
-        use $board::profile::{Map, Parameters, Sender, State};
+        $crate::batch!([$board::profile], $board::SHAPE, $crate::viewshed::Detection, $core);
+    };
+    ([$($profile:ident)::+], $shape:expr, $entry:ty, $core:expr) => {
+        use $($profile)::+::{Map, Parameters, Sender, State};
         use $crate::semihost::HostFile;
         use $crate::semihosting::process::exit;
         use $crate::static_cell::{ConstStaticCell, StaticCell};
@@ -17,7 +20,7 @@ macro_rules! batch {
         use $crate::viewshed::wire::broadcast::Medium;
         use $crate::viewshed::wire::message::Epoch;
 
-        /// Detections of a recorded scan, before the gate.
+        /// Detections or boxes of a recorded scan, before the gate.
         const MOST_DETECTIONS: usize = 16_384;
 
         static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
@@ -25,7 +28,7 @@ macro_rules! batch {
         static PARAMETERS: StaticCell<Option<Parameters>> = StaticCell::new();
         static SENDER: StaticCell<Option<Sender>> = StaticCell::new();
         #[unsafe(link_section = ".bench")]
-        static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS>> = ConstStaticCell::new(ScanBuffer::new());
+        static SCAN: ConstStaticCell<ScanBuffer<MOST_DETECTIONS, $entry>> = ConstStaticCell::new(ScanBuffer::new());
 
         fn batch() -> ! {
             let Some(mut files) = Files::<HostFile, _>::open($core) else { exit(2) };
@@ -38,7 +41,7 @@ macro_rules! batch {
             start::<State, _>(parameters, sender, settings, Medium::Serial, Epoch::new(0), Time::from_micros(0));
             let (Some(parameters), Some(sender)) = (parameters, sender) else { exit(1) };
             let mut unit = Unit::new(parameters, state, map, sender);
-            exit(if run(&mut files, &job, $board::SHAPE, &mut unit, scan).is_ok() { 0 } else { 1 })
+            exit(if run(&mut files, &job, $shape, &mut unit, scan).is_ok() { 0 } else { 1 })
         }
     };
 }

@@ -1,8 +1,10 @@
 //! One message: header and records as bytes.
 
+use crate::camera::boxes::{ImageBox, VehicleClass};
 use crate::fixed::angle::Angle;
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
+use crate::inputs::collected::Entry;
 use crate::wire::e2e::{E2eError, Profile};
 use crate::wire::frame::{self, CanFrame, CanId};
 use crate::wire::serial;
@@ -14,7 +16,8 @@ pub const VERSION: u8 = 1;
 pub const MOST_BYTES: usize = serial::MOST_BYTES;
 
 const HEADER: usize = 14;
-const RECORD: usize = 10;
+/// Bytes of a record.
+pub const RECORD: usize = 10;
 const FAULT: u8 = 1;
 const SERIAL: u8 = 2;
 const NO_ELEVATION: i16 = i16::MIN;
@@ -32,7 +35,7 @@ pub enum NativeMedium {
 }
 
 impl NativeMedium {
-    /// Detections a message holds.
+    /// Detections or boxes a message holds.
     pub const fn detections(self) -> usize {
         match self {
             Self::CanFd => (frame::MOST_BYTES - HEADER) / RECORD,
@@ -41,14 +44,45 @@ impl NativeMedium {
     }
 }
 
-/// The data ID of a sensor's messages.
+/// The data ID of a radar's messages.
 pub const fn data_id(sensor: u8) -> u16 {
     0x4000 | sensor as u16
 }
 
-/// The usual identifier of a sensor's CAN FD frames.
+/// The data ID of a camera's messages: neither passes for the other's.
+pub const fn box_data_id(sensor: u8) -> u16 {
+    0x4100 | sensor as u16
+}
+
+/// The usual identifier of a radar's CAN FD frames.
 pub const fn id(sensor: u8) -> CanId {
     CanId::Standard(0x100 + sensor as u16)
+}
+
+/// The usual identifier of a camera's CAN FD frames.
+pub const fn box_id(sensor: u8) -> CanId {
+    CanId::Extended(0x0100_0100 + sensor as u32)
+}
+
+/// What a record is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Content<T> {
+    /// Padding.
+    None,
+    /// Something this version does not know.
+    Refused,
+    /// A detection, or a box.
+    Entry(T),
+}
+
+/// What messages hold: detections of a radar, or boxes of a camera.
+pub trait NativeEntry: Entry {
+    /// The data ID of a sensor's messages.
+    fn data_id(sensor: u8) -> u16;
+    /// As a record.
+    fn write(&self) -> [u8; RECORD];
+    /// From a record.
+    fn read(record: &[u8; RECORD]) -> Content<Self>;
 }
 
 /// What comes before the records.
@@ -72,7 +106,7 @@ pub struct NativeMessage {
 
 impl NativeMessage {
     /// Header and records; what does not fit is left out.
-    pub(super) fn new(header: &Header, detections: &[Detection], counter: u8) -> Self {
+    pub(super) fn new<T: NativeEntry>(header: &Header, detections: &[T], counter: u8) -> Self {
         let medium = header.medium;
         let mut bytes = [0; MOST_BYTES];
         let [t0, t1, t2, t3, t4, t5, ..] = header.time.micros().to_le_bytes();
@@ -83,7 +117,7 @@ impl NativeMessage {
         let (place, records) = bytes.split_at_mut(HEADER);
         place.copy_from_slice(&head);
         for (detection, record) in detections.iter().zip(records.chunks_exact_mut(RECORD)) {
-            record.copy_from_slice(&write(detection));
+            record.copy_from_slice(&detection.write());
         }
         let wanted = HEADER + RECORD * detections.len();
         let length = match medium {
@@ -92,7 +126,7 @@ impl NativeMessage {
         };
         let mut message = Self { bytes, length };
         if let Some(bytes) = message.bytes.get_mut(..length) {
-            Profile::P05.protect(bytes, data_id(header.sensor), counter);
+            Profile::P05.protect(bytes, T::data_id(header.sensor), counter);
         }
         message
     }
@@ -121,8 +155,8 @@ pub(super) enum NoMessage {
 }
 
 /// Counter and header of a message.
-pub(super) fn read(bytes: &[u8], sensor: u8) -> Result<(u8, Header), NoMessage> {
-    let counter = Profile::P05.check(bytes, data_id(sensor)).map_err(NoMessage::E2e)?;
+pub(super) fn read(bytes: &[u8], data_id: u16) -> Result<(u8, Header), NoMessage> {
+    let counter = Profile::P05.check(bytes, data_id).map_err(NoMessage::E2e)?;
     let short = NoMessage::E2e(E2eError::TooShort { length: bytes.len() });
     let Some((head, _)) = bytes.split_first_chunk::<HEADER>() else { return Err(short) };
     let &[_, _, _, kind, sensor, scan, part, parts, t0, t1, t2, t3, t4, t5] = head;
@@ -135,14 +169,51 @@ pub(super) fn read(bytes: &[u8], sensor: u8) -> Result<(u8, Header), NoMessage> 
     Ok((counter, header))
 }
 
-/// The detections of a message that was read.
-pub(super) fn records(bytes: &[u8]) -> impl Iterator<Item = Detection> {
+/// What a message that was read holds, padding left out.
+pub(super) fn records<T: NativeEntry>(bytes: &[u8]) -> impl Iterator<Item = Option<T>> {
     let (records, _) = bytes.get(HEADER..).unwrap_or(&[]).as_chunks::<RECORD>();
-    records.iter().filter_map(read_record)
+    records.iter().filter_map(|record| match T::read(record) {
+        Content::None => None,
+        Content::Refused => Some(None),
+        Content::Entry(entry) => Some(Some(entry)),
+    })
+}
+
+impl NativeEntry for Detection {
+    fn data_id(sensor: u8) -> u16 {
+        data_id(sensor)
+    }
+
+    fn write(&self) -> [u8; RECORD] {
+        write_detection(self)
+    }
+
+    fn read(record: &[u8; RECORD]) -> Content<Self> {
+        read_detection(record).map_or(Content::None, Content::Entry)
+    }
+}
+
+impl NativeEntry for ImageBox {
+    fn data_id(sensor: u8) -> u16 {
+        box_data_id(sensor)
+    }
+
+    fn write(&self) -> [u8; RECORD] {
+        let [[l0, l1], [t0, t1], [r0, r1], [b0, b1]] = self.shares().map(i16::to_le_bytes);
+        [l0, l1, t0, t1, r0, r1, b0, b1, self.class().number(), 0]
+    }
+
+    fn read(&[l0, l1, t0, t1, r0, r1, b0, b1, class, _]: &[u8; RECORD]) -> Content<Self> {
+        if class == 0 {
+            return Content::None;
+        }
+        let shares = [[l0, l1], [t0, t1], [r0, r1], [b0, b1]].map(i16::from_le_bytes);
+        VehicleClass::numbered(class).map_or(Content::Refused, |class| Content::Entry(Self::of_shares(shares, class)))
+    }
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // limits are within
-fn write(d: &Detection) -> [u8; RECORD] {
+fn write_detection(d: &Detection) -> [u8; RECORD] {
     let [r0, r1] = d.range_cm.to_le_bytes();
     let [a0, a1] = d.azimuth.raw().to_le_bytes();
     let [e0, e1] = d.elevation.map_or(NO_ELEVATION, Angle::raw).to_le_bytes();
@@ -153,7 +224,7 @@ fn write(d: &Detection) -> [u8; RECORD] {
 }
 
 /// The detection of a record; `None` where there is none.
-fn read_record(&[r0, r1, a0, a1, e0, e1, v0, v1, rcs, snr]: &[u8; RECORD]) -> Option<Detection> {
+fn read_detection(&[r0, r1, a0, a1, e0, e1, v0, v1, rcs, snr]: &[u8; RECORD]) -> Option<Detection> {
     let range_cm = u16::from_le_bytes([r0, r1]);
     let elevation = i16::from_le_bytes([e0, e1]);
     let rcs = i8::from_le_bytes([rcs]);

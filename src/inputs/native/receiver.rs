@@ -1,7 +1,9 @@
 //! Messages in, scans out.
 
-use super::message::{self, Header, MOST_BYTES, NativeMedium, NoMessage};
+use super::message::{self, Header, MOST_BYTES, NativeEntry, NativeMedium, NoMessage};
+use crate::camera::boxes::ImageBox;
 use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
 use crate::inputs::collected::{Added, Collected};
 use crate::inputs::{RadarScan, count, usable};
 use crate::wire::e2e::{Counter, E2eError, Profile, Sequence};
@@ -25,17 +27,22 @@ impl NativeConfig {
     pub const fn sensor(sensor: u8) -> Self {
         Self { sensor, id: message::id(sensor), timeout_us: 100_000 }
     }
+
+    /// The same for a camera.
+    pub const fn camera(sensor: u8) -> Self {
+        Self { sensor, id: message::box_id(sensor), timeout_us: 100_000 }
+    }
 }
 
 /// What a message led to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NativeOutcome<'a> {
+pub enum NativeOutcome<'a, T = Detection> {
     /// It is none of this sensor's.
     NotMine,
     /// It was taken, and nothing is complete yet.
     Taken,
     /// A scan is over.
-    Scan(RadarScan<'a>),
+    Scan(RadarScan<'a, T>),
     /// A scan is over of which most did not arrive; it is dropped, as it would be taken for a free road.
     Broken {
         /// Parts announced.
@@ -99,13 +106,13 @@ pub struct NativeCounters {
 /// Collects the scans of one sensor from whole messages.
 ///
 /// # Limits
-/// `N` detections a scan, the strongest of those sent. After [`push`](Self::push), call
+/// `N` detections or boxes a scan, the strongest of those sent, or the largest. After [`push`](Self::push), call
 /// [`poll`](Self::poll) until it returns `None`: a message can end one scan and begin another.
 /// After a restart of the sender up to 8 scans are refused as late.
 #[derive(Debug, Clone)]
-pub struct NativeReceiver<const N: usize> {
+pub struct NativeReceiver<const N: usize, T = Detection> {
     config: NativeConfig,
-    collected: Collected<N>,
+    collected: Collected<N, T>,
     /// The last scan has been given out and its detections may go.
     given_out: bool,
     scan: Option<Scan>,
@@ -128,6 +135,7 @@ struct Scan {
     latest: Time,
     seen: [u32; 8],
     arrived: u16,
+    refused: u16,
     medium: NativeMedium,
 }
 
@@ -135,8 +143,21 @@ struct Scan {
 const LATE: u8 = 8;
 
 impl<const N: usize> NativeReceiver<N> {
-    /// Before the first message.
+    /// Of a radar, before the first message.
     pub const fn new(config: NativeConfig) -> Self {
+        Self::empty(config)
+    }
+}
+
+impl<const N: usize> NativeReceiver<N, ImageBox> {
+    /// Of a camera, before the first message.
+    pub const fn boxes(config: NativeConfig) -> Self {
+        Self::empty(config)
+    }
+}
+
+impl<const N: usize, T: NativeEntry> NativeReceiver<N, T> {
+    pub(crate) const fn empty(config: NativeConfig) -> Self {
         Self {
             config,
             collected: Collected::new(),
@@ -163,17 +184,17 @@ impl<const N: usize> NativeReceiver<N> {
     }
 
     /// Takes a frame, any frame of the bus.
-    pub fn push_frame(&mut self, frame: &CanFrame, now: Time) -> NativeOutcome<'_> {
+    pub fn push_frame(&mut self, frame: &CanFrame, now: Time) -> NativeOutcome<'_, T> {
         if frame.id == self.config.id { self.push(frame.data(), now) } else { NativeOutcome::NotMine }
     }
 
     /// Takes a message of up to 240 bytes.
-    pub fn push(&mut self, bytes: &[u8], now: Time) -> NativeOutcome<'_> {
+    pub fn push(&mut self, bytes: &[u8], now: Time) -> NativeOutcome<'_, T> {
         if self.waiting.is_some() {
             count(&mut self.counters.not_polled);
             return NativeOutcome::Refused(Refusal::NotPolled);
         }
-        let header = match message::read(bytes, self.config.sensor) {
+        let header = match message::read(bytes, T::data_id(self.config.sensor)) {
             Ok((counter, header)) => {
                 count(&mut self.counters.messages);
                 if let Sequence::SomeLost { lost } = self.counter.follow(Profile::P05, counter, 128) {
@@ -209,10 +230,10 @@ impl<const N: usize> NativeReceiver<N> {
     }
 
     /// Gives out what is over; to be called after each message, until there is nothing more.
-    pub fn poll(&mut self, now: Time) -> Option<NativeOutcome<'_>> {
+    pub fn poll(&mut self, now: Time) -> Option<NativeOutcome<'_, T>> {
         if let Some((came, bytes, length)) = self.waiting.take() {
             let bytes = bytes.get(..length)?;
-            let (_, header) = message::read(bytes, self.config.sensor).ok()?;
+            let (_, header) = message::read(bytes, T::data_id(self.config.sensor)).ok()?;
             return match self.take(&header, bytes, came) {
                 NativeOutcome::Taken => None,
                 outcome => Some(outcome),
@@ -244,7 +265,7 @@ impl<const N: usize> NativeReceiver<N> {
     }
 
     /// Takes a part of the scan under way, or of a new one.
-    fn take(&mut self, header: &Header, bytes: &[u8], now: Time) -> NativeOutcome<'_> {
+    fn take(&mut self, header: &Header, bytes: &[u8], now: Time) -> NativeOutcome<'_, T> {
         if core::mem::take(&mut self.given_out) {
             self.collected.clear();
         }
@@ -258,6 +279,7 @@ impl<const N: usize> NativeReceiver<N> {
             latest: now,
             seen: [0; 8],
             arrived: 0,
+            refused: 0,
             medium: header.medium,
         });
         if scan.parts != header.parts || scan.time != header.time {
@@ -275,9 +297,11 @@ impl<const N: usize> NativeReceiver<N> {
         scan.latest = now;
         scan.fault |= header.fault;
         scan.arrived += 1;
-        for detection in message::records(bytes) {
-            if self.collected.add(0, detection) == Added::Full {
-                count(&mut self.counters.overflow);
+        for entry in message::records(bytes) {
+            match entry.map(|entry| self.collected.add(0, entry)) {
+                Some(Added::Kept) => {}
+                Some(Added::Full) => count(&mut self.counters.overflow),
+                None => scan.refused = scan.refused.saturating_add(1),
             }
         }
         if scan.arrived == u16::from(scan.parts) {
@@ -287,7 +311,7 @@ impl<const N: usize> NativeReceiver<N> {
         }
     }
 
-    fn end(&mut self) -> Option<NativeOutcome<'_>> {
+    fn end(&mut self) -> Option<NativeOutcome<'_, T>> {
         let scan = self.scan.take()?;
         self.given_out = true;
         let announced = u16::from(scan.parts);
@@ -307,8 +331,7 @@ impl<const N: usize> NativeReceiver<N> {
             number: u32::from(scan.number),
             detections: self.collected.detections(),
             missing,
-            // the format holds detections only, zeros fill its frames
-            refused: 0,
+            refused: scan.refused,
             fault: scan.fault,
         }))
     }
@@ -316,26 +339,35 @@ impl<const N: usize> NativeReceiver<N> {
 
 /// Collects the scans of one sensor from a serial line.
 #[derive(Debug, Clone)]
-pub struct NativeSerialReceiver<const N: usize> {
+pub struct NativeSerialReceiver<const N: usize, T = Detection> {
     unstuffer: Unstuffer,
-    receiver: NativeReceiver<N>,
+    receiver: NativeReceiver<N, T>,
 }
 
 impl<const N: usize> NativeSerialReceiver<N> {
-    /// Before the first byte.
+    /// Of a radar, before the first byte.
     pub const fn new(config: NativeConfig) -> Self {
         Self { unstuffer: Unstuffer::new(), receiver: NativeReceiver::new(config) }
     }
+}
 
+impl<const N: usize> NativeSerialReceiver<N, ImageBox> {
+    /// Of a camera, before the first byte.
+    pub const fn boxes(config: NativeConfig) -> Self {
+        Self { unstuffer: Unstuffer::new(), receiver: NativeReceiver::boxes(config) }
+    }
+}
+
+impl<const N: usize, T: NativeEntry> NativeSerialReceiver<N, T> {
     /// Takes bytes up to the end of a message and says how many: the rest is to be pushed again, after
     /// [`poll`](Self::poll).
-    pub fn push(&mut self, bytes: &[u8], now: Time) -> (usize, NativeOutcome<'_>) {
+    pub fn push(&mut self, bytes: &[u8], now: Time) -> (usize, NativeOutcome<'_, T>) {
         let (taken, message) = self.unstuffer.push(bytes);
         (taken, message.map_or(NativeOutcome::Taken, |message| self.receiver.push(message, now)))
     }
 
     /// Gives out what is over; to be called after each push, until there is nothing more.
-    pub fn poll(&mut self, now: Time) -> Option<NativeOutcome<'_>> {
+    pub fn poll(&mut self, now: Time) -> Option<NativeOutcome<'_, T>> {
         self.receiver.poll(now)
     }
 

@@ -1,8 +1,9 @@
-//! Detections in, messages out.
+//! Detections or boxes in, messages out.
 
 use core::slice::Chunks;
 
-use super::message::{Header, NativeMedium, NativeMessage};
+use super::message::{Header, NativeEntry, NativeMedium, NativeMessage};
+use crate::camera::boxes::ImageBox;
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::wire::e2e::Profile;
@@ -22,7 +23,6 @@ impl NativeSender {
     }
 
     /// The messages of a scan. They are numbered as they are taken: all of them are to be sent, in order.
-    #[allow(clippy::cast_possible_truncation)] // at most 255
     pub fn scan<'a>(
         &'a mut self,
         time: Time,
@@ -30,6 +30,28 @@ impl NativeSender {
         detections: &'a [Detection],
         medium: NativeMedium,
     ) -> Parts<'a> {
+        self.parts(time, fault, detections, medium)
+    }
+
+    /// The same of the boxes of a camera's picture.
+    pub fn boxes<'a>(
+        &'a mut self,
+        time: Time,
+        fault: bool,
+        boxes: &'a [ImageBox],
+        medium: NativeMedium,
+    ) -> Parts<'a, ImageBox> {
+        self.parts(time, fault, boxes, medium)
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // at most 255
+    fn parts<'a, T: NativeEntry>(
+        &'a mut self,
+        time: Time,
+        fault: bool,
+        detections: &'a [T],
+        medium: NativeMedium,
+    ) -> Parts<'a, T> {
         let most = medium.detections() * usize::from(u8::MAX);
         let sent = detections.get(..most).unwrap_or(detections);
         let parts = sent.len().div_ceil(medium.detections()).max(1) as u8;
@@ -41,13 +63,13 @@ impl NativeSender {
 
 /// The messages of a scan.
 #[derive(Debug)]
-pub struct Parts<'a> {
+pub struct Parts<'a, T = Detection> {
     counter: &'a mut u8,
     header: Header,
-    detections: Chunks<'a, Detection>,
+    detections: Chunks<'a, T>,
 }
 
-impl Iterator for Parts<'_> {
+impl<T: NativeEntry> Iterator for Parts<'_, T> {
     type Item = NativeMessage;
 
     fn next(&mut self) -> Option<NativeMessage> {

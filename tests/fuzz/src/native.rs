@@ -1,11 +1,15 @@
 //! The native format: any bytes on a serial line, and scans that come back as they were sent.
 
+use viewshed::camera::boxes::{BoxRejection, ImageBox};
+use viewshed::camera::calibration::{Calibration, Intrinsics};
+use viewshed::camera::{Camera3d, Camera3dConfig, Camera3dParameters};
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::inputs::native::{
     NativeConfig, NativeMedium, NativeOutcome, NativeReceiver, NativeSender, NativeSerialReceiver, id,
 };
+use viewshed::sensor::mount::Mount;
 use viewshed::wire::e2e::Profile;
 
 /// A detection of ten bytes, by a layout of this file's own.
@@ -55,6 +59,7 @@ pub fn run(bytes: &[u8]) {
             assert!(polled <= 2);
         }
     }
+    pictures(bytes);
     // there and back
     let sent: Vec<Detection> = bytes.chunks_exact(10).take(300).map(detection).collect();
     for medium in [NativeMedium::CanFd, NativeMedium::Serial] {
@@ -71,5 +76,29 @@ pub fn run(bytes: &[u8]) {
             }
         }
         assert_eq!(got, Some((77, sent.clone())));
+    }
+}
+
+/// Any bytes as boxes of a camera, through to a map.
+fn pictures(bytes: &[u8]) {
+    let calibration = Calibration {
+        intrinsics: Intrinsics { size_px: [1920, 1080], focal_px: [1600.0; 2], center_px: [960.0, 540.0] },
+        mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 6.0, roll_deg: 0.0 },
+    };
+    let parameters = Camera3dParameters::<40, 12>::new(&calibration.normalised(), &Camera3dConfig::default()).unwrap();
+    let (mut camera, mut map) = (Camera3d::<40, 12>::new(), parameters.map());
+    let mut receiver = NativeReceiver::<64, ImageBox>::boxes(NativeConfig::camera(1));
+    for (i, records) in bytes.chunks(220).enumerate() {
+        let mut message = vec![0, 0, 0, 0x12, 1, i as u8, 0, 1, i as u8, 0, 0, 0, 0, 0];
+        message.extend(records);
+        Profile::P05.protect(&mut message, 0x4101, i as u8);
+        if let NativeOutcome::Scan(scan) = receiver.push(&message, Time::from_micros(0)) {
+            let classes = records.chunks_exact(10).filter(|r| r[8] != 0);
+            assert_eq!(classes.count(), scan.detections.len() + usize::from(scan.refused));
+            let report = camera.process(&parameters, scan.time, scan.detections, scan.status(), &mut map);
+            let rejected: u32 = BoxRejection::ALL.iter().map(|r| report.rejections.count(*r)).sum();
+            let all = scan.detections.len() + usize::from(scan.refused);
+            assert_eq!(usize::from(report.used) + rejected as usize, all);
+        }
     }
 }

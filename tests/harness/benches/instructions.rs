@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use viewshed::camera::boxes::ImageBox;
-use viewshed::camera::map::CameraMap;
+use viewshed::camera::map::{AZIMUTHS, CameraMap};
 use viewshed::camera::{Camera3dConfig, Camera3dParameters, CameraProfile, MOST_BOXES};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement};
@@ -20,9 +20,10 @@ use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::noise::NoiseConfig;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
-use viewshed::wire::code::ray::Known;
+use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::Header;
-use viewshed::wire::message::{Addresses, Epoch, Packet};
+use viewshed::wire::message::{Addresses, Epoch, Packet, Plane};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed_harness::boards::stress;
 use viewshed_harness::estimators::{self, camera_3d};
@@ -234,14 +235,13 @@ fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Pa
     }
 }
 
-/// Boxes to a map, and that to a polar one for the wire; crowded, with the boxes of some frames together.
+/// Boxes to a map, and that to rays for the wire; crowded, with the boxes of some frames together.
 fn run_camera(recording: &Recording, crowded: bool) {
     let camera = recording.camera.as_ref().expect("a camera in the recording");
     let calibration = camera_3d::calibration(camera);
     let parameters = Camera3dParameters::<200, 60>::new(&calibration, &Camera3dConfig::default()).expect("valid");
     let mut state = Box::new(CameraProfile::new());
     let mut map = Box::new(parameters.map());
-    let mut polar = Box::new(map.polar::<200, 120>());
     let frames: Vec<(i64, Vec<ImageBox>)> =
         camera.frames.iter().map(|f| (f.time_ns, camera_3d::vehicles(f).0)).collect();
     for (k, (time_ns, boxes)) in frames.iter().enumerate() {
@@ -249,12 +249,12 @@ fn run_camera(recording: &Recording, crowded: bool) {
         if crowded {
             let all: Vec<ImageBox> =
                 frames[k..].iter().flat_map(|f| &f.1).chain(boxes).copied().take(MOST_BOXES).collect();
-            measured_frame_camera(&mut state, &parameters, now, &all, &mut map, &mut polar);
+            measured_frame_camera(&mut state, &parameters, now, &all, &mut map);
         } else {
-            measured_frame_camera(&mut state, &parameters, now, boxes, &mut map, &mut polar);
+            measured_frame_camera(&mut state, &parameters, now, boxes, &mut map);
         }
     }
-    black_box(&polar);
+    black_box(&map);
 }
 
 #[inline(never)]
@@ -264,10 +264,13 @@ fn measured_frame_camera(
     now: Time,
     boxes: &[ImageBox],
     map: &mut CameraMap<200, 60>,
-    polar: &mut PolarMap<200, 120>,
 ) {
     black_box(state.process(parameters, now, boxes, false, map));
-    map.to_polar(polar);
+    // every ray as it goes to the sender
+    for azimuth in 0..AZIMUTHS {
+        let ray: Ray<7> = map.ray(Plane::Visibility, azimuth);
+        black_box(&ray);
+    }
 }
 
 fn run_2d(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {

@@ -1,14 +1,17 @@
 //! The controller's program, run here.
 
 use anyhow::{Context, Result};
-use viewshed::bench::job::{Job, ScanBuffer};
+use viewshed::bench::fingerprint::Rows;
+use viewshed::bench::job::{Job, JobEntry, ScanBuffer};
 use viewshed::bench::{Bench, run, start};
+use viewshed::camera::boxes::ImageBox;
+use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
-use viewshed::map::polar::PolarGeometry;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
-use viewshed::unit::Unit;
-use viewshed::unit::profile::{reference, small};
+use viewshed::map::polar::{PolarGeometry, PolarMap};
+use viewshed::radar_3d::Radar3d;
+use viewshed::unit::profile::{camera, reference, small};
 use viewshed::unit::settings::{Settings, SettingsCheck};
+use viewshed::unit::{InUnit, MapSender, Unit};
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::message::Epoch;
 
@@ -29,7 +32,7 @@ pub fn answer(
     dump: Option<usize>,
 ) -> Result<(Vec<u8>, PolarGeometry)> {
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
-    let mut memory = InMemory { job: job(settings, scans, dump), read: 0, answer: Vec::new() };
+    let mut memory = InMemory::new(job(settings, scans, dump));
     let geometry = match profile {
         Profile::Reference => work(&mut *Box::new(reference::State::new()), &mut memory)?,
         Profile::Small => work(&mut *Box::new(small::State::new()), &mut memory)?,
@@ -37,29 +40,53 @@ pub fn answer(
     Ok((memory.answer, geometry))
 }
 
+/// The answer of a camera's program to a job.
+///
+/// # Errors
+/// Settings the library refuses.
+pub fn camera_answer(settings: &Settings, scans: &[Scan<ImageBox>]) -> Result<Vec<u8>> {
+    let mut memory = InMemory::new(job(settings, scans, None));
+    let mut state = Box::new(camera::State::new());
+    process::<_, camera::Sender, _>(&mut *state, &mut Box::new(camera::Map::NOWHERE), camera::SHAPE, &mut memory)?;
+    Ok(memory.answer)
+}
+
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
     state: &mut Radar3d<R, A, E, W, N, D>,
     bench: &mut InMemory,
 ) -> Result<PolarGeometry> {
+    let mut map = Box::new(PolarMap::NOWHERE);
+    process::<_, Broadcaster<A, W>, _>(state, &mut map, [R, A, E, D], bench)?;
+    Ok(*map.geometry())
+}
+
+fn process<E, S, T>(state: &mut E, map: &mut E::Map, shape: [usize; 4], bench: &mut InMemory) -> Result<()>
+where
+    E: InUnit + Estimator<Input = [T], Map: Rows>,
+    S: MapSender<E::Map>,
+    T: JobEntry,
+{
     let job = Job::read(bench).map_err(|e| anyhow::anyhow!("{e:?}"))?;
-    SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>().settings(&job.settings)?;
-    let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
-    let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
+    SettingsCheck::of::<E, S>().settings(&job.settings)?;
+    let (mut parameters, mut sender) = (None, Box::new(None::<S>));
     let (settings, epoch, now) = (Some(&job.settings), Epoch::new(0), Time::from_micros(0));
-    start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
+    start::<E, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
     let (parameters, sender) = parameters.as_ref().zip((*sender).as_mut()).context("a unit that was checked")?;
-    let mut map = Box::new(parameters.map());
-    let geometry = *map.geometry();
-    let mut unit = Unit::new(parameters, &mut *state, &mut *map, sender);
-    let mut scan = Box::new(ScanBuffer::<MOST_DETECTIONS>::new());
-    run(bench, &job, [R, A, E, D], &mut unit, &mut scan).map_err(|e| anyhow::anyhow!("{e:?}"))?;
-    Ok(geometry)
+    let mut unit = Unit::new(parameters, state, map, sender);
+    let mut scan = Box::new(ScanBuffer::<MOST_DETECTIONS, T>::new());
+    run(bench, &job, shape, &mut unit, &mut scan).map_err(|e| anyhow::anyhow!("{e:?}"))
 }
 
 struct InMemory {
     job: Vec<u8>,
     read: usize,
     answer: Vec<u8>,
+}
+
+impl InMemory {
+    fn new(job: Vec<u8>) -> Self {
+        Self { job, read: 0, answer: Vec::new() }
+    }
 }
 
 impl Bench for InMemory {

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+use viewshed::bench::job::JobEntry;
 use viewshed::unit::settings::Settings;
 
 use super::Board;
@@ -18,7 +19,13 @@ const TIME_LIMIT: Duration = Duration::from_secs(900);
 ///
 /// # Errors
 /// No emulator, one that does not end, one that ends without an answer.
-pub fn batch(board: Board, image: &Path, settings: &Settings, scans: &[Scan], dump: Option<usize>) -> Result<Vec<u8>> {
+pub fn batch<T: JobEntry>(
+    board: Board,
+    image: &Path,
+    settings: &Settings,
+    scans: &[Scan<T>],
+    dump: Option<usize>,
+) -> Result<Vec<u8>> {
     let folder = Folder::new()?;
     let dump = dump.and_then(|frame| u32::try_from(frame).ok());
     std::fs::write(folder.0.join("job.bin"), job(settings, scans, dump)).context("cannot write the job")?;

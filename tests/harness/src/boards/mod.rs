@@ -20,6 +20,7 @@ pub mod stress;
 
 use anyhow::Result;
 use clap::ValueEnum;
+use viewshed::camera::boxes::ImageBox;
 use viewshed::unit::settings::Settings;
 
 use check::Checked;
@@ -83,6 +84,19 @@ pub struct Run<'a> {
     pub name: &'a str,
     pub settings: &'a Settings,
     pub scans: &'a [Scan],
+}
+
+/// Runs a camera's boxes here and on a board and compares.
+///
+/// # Errors
+/// Those of [`Run::check`].
+pub fn check_camera(board: Board, settings: &Settings, scans: &[Scan<ImageBox>]) -> Result<Checked> {
+    let image = firmware::build(board, Profile::Reference, "camera")?;
+    let here = host::camera_answer(settings, scans)?;
+    let answer = machine::batch(board, &image, settings, scans, None)?;
+    let mut checked = check::compare(&answer, &here, scans.len())?;
+    checked.image = Some(image::Image::read(&image)?);
+    Ok(checked)
 }
 
 impl Run<'_> {

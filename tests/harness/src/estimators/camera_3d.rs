@@ -39,7 +39,7 @@ struct Driver {
 
 /// The camera as the library takes it.
 pub fn calibration(camera: &RecordedCamera) -> Calibration {
-    Calibration { intrinsics: camera.intrinsics, mount: mount(&camera.pose) }
+    Calibration { intrinsics: camera.intrinsics.for_library(), mount: mount(&camera.pose) }
 }
 
 fn mount(pose: &SensorPose) -> Mount {
@@ -79,7 +79,8 @@ pub fn vehicles(frame: &CameraFrame) -> (Vec<ImageBox>, usize) {
     (boxes.collect(), named.count())
 }
 
-fn time(time_ns: i64) -> Time {
+/// As the library takes it.
+pub fn time(time_ns: i64) -> Time {
     Time::from_micros(u64::try_from(time_ns / 1000).unwrap_or(0))
 }
 
@@ -152,15 +153,15 @@ fn standing(solid: &Solid) -> Option<LiftedBox> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::camera::Box2d;
+    use crate::recording::camera::{Box2d, Intrinsics};
     use crate::recording::truth::Label;
-    use viewshed::camera::calibration::Intrinsics;
 
     fn camera(frames: Vec<CameraFrame>) -> RecordedCamera {
         RecordedCamera {
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
-            intrinsics: Intrinsics { size_px: [1920, 1080], focal_px: [1600.0; 2], center_px: [960.0, 540.0] },
+            intrinsics: Intrinsics::centred([1920, 1080], 1600.0),
             frames,
+            alone: false,
         }
     }
 

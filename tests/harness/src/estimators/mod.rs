@@ -105,6 +105,9 @@ pub const MOST_DETECTIONS: usize = 4096;
 /// # Errors
 /// A parameter the library refuses, by name.
 pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estimator>>> {
+    if let Some(camera) = recording.of_camera() {
+        return camera_3d::all(camera, recording.truth.as_ref(), &options.camera_3d);
+    }
     let max_detections = match u16::try_from(options.max_detections) {
         Ok(n) if n > 0 && options.max_detections <= MOST_DETECTIONS => n,
         _ => bail!("--max-detections {} is outside 1 to {MOST_DETECTIONS}", options.max_detections),

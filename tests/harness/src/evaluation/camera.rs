@@ -8,15 +8,14 @@
 
 use super::Options;
 use super::samples::{FrameSamples, Judge, collect_judged};
-use crate::geometry::polygon::Convex;
 use crate::geometry::pose::SensorPose;
-use crate::geometry::sight::uncovered_outlines;
+use crate::geometry::sight::{Uncovered, uncovered_outlines};
 use crate::geometry::solid::Solid;
-use crate::recording::camera::{Box2d, RecordedCamera};
+use crate::recording::Recording;
+use crate::recording::camera::{Box2d, Intrinsics, RecordedCamera};
 use crate::recording::truth::Object;
-use crate::recording::{FieldOfView, Frame, Recording, Sensor};
+use rayon::prelude::*;
 use viewshed::camera::boxes::VehicleClass;
-use viewshed::camera::calibration::Intrinsics;
 
 /// Least overlap of a box with a visible outline.
 const LEAST_OVERLAP: f64 = 0.3;
@@ -30,55 +29,56 @@ pub fn recording(of: &Recording, range_max_m: f64) -> Option<Recording> {
     let (first, last) = (of.frames.first()?.time_ns, of.frames.last()?.time_ns);
     let mut camera = camera.clone();
     camera.frames.retain(|f| (first..=last).contains(&f.time_ns));
-    let frame = |time_ns| Frame { time_ns, detections: Vec::new(), refused: 0 };
-    Some(Recording {
-        name: format!("{}, camera", of.name),
-        sensor: Sensor {
-            name: "camera".into(),
-            field_of_view: field_of_view(&camera.intrinsics, range_max_m),
-            has_elevation: true,
-            ..of.sensor.clone()
-        },
-        pose: camera.pose,
-        frames: camera.frames.iter().map(|f| frame(f.time_ns)).collect(),
-        truth: of.truth.clone(),
-        occlusion: Default::default(),
-        camera: Some(camera),
-        problems: Default::default(),
-    })
+    Some(camera.alone(format!("{}, camera", of.name), of.sensor.clone(), of.truth.clone(), range_max_m))
 }
 
-/// Limits within which everything is in the image.
-fn field_of_view(i: &Intrinsics, range_max_m: f64) -> FieldOfView {
-    let border = |k: usize| {
-        let [center, focal, size] = [i.center_px[k], i.focal_px[k], f32::from(i.size_px[k])].map(f64::from);
-        [(center - size) / focal, center / focal]
-    };
-    let ([right, left], [down, up]) = (border(0), border(1));
-    let slant = 1.0_f64.hypot(left.max(-right));
-    FieldOfView {
-        azimuth_rad: [right.atan(), left.atan()],
-        elevation_rad: [(down / slant).atan(), (up / slant).atan()],
-        range_m: [0.0, range_max_m],
-    }
-}
-
-/// Samples of every frame of a recording made by [`recording`].
+/// Samples of every `every`-th frame of a camera's own recording.
 pub fn samples(
     recording: &Recording,
     visible_share: f64,
     options: &Options,
+    every: usize,
     progress: &(dyn Fn() + Sync),
 ) -> Vec<FrameSamples> {
-    let detections = |k: usize, objects: &[Object]| {
-        let Some(camera) = &recording.camera else { return vec![0; objects.len()] };
-        let boxes = camera.frames.get(k).map_or(&[][..], |f| &f.boxes);
-        let solids: Vec<Solid> = objects.iter().map(|o| o.solid).collect();
-        let boxed = |k: usize| objects[k].speed() != Some(0.0) || is_vehicle(recording, &objects[k]);
-        assigned(camera, &solids, boxes, boxed)
-    };
+    let detections = |k: usize, objects: &[Object]| found(recording, k, objects);
     let judge = Judge { detections: &detections, column: Some((COLUMN_M, visible_share)) };
-    collect_judged(recording, options, 1, &judge, progress)
+    collect_judged(recording, options, every, &judge, progress)
+}
+
+/// Tells anew which samples were detected, from other boxes of the same truth at the same times.
+pub fn detect_again(recording: &Recording, samples: &mut [FrameSamples], options: &Options) {
+    let Some(truth) = &recording.truth else { return };
+    recording.frames.par_iter().zip(samples).enumerate().for_each(|(k, (frame, samples))| {
+        if samples.objects.is_empty() {
+            return;
+        }
+        let objects = truth.at(frame.time_ns);
+        let found = found(recording, k, &objects);
+        for sample in &mut samples.objects {
+            let own = objects.iter().position(|o| o.track == sample.track);
+            sample.detections = own.map_or(0, |k| found[k]);
+            sample.detected = sample.detections >= options.min_detections;
+        }
+    });
+}
+
+/// How many boxes of a frame each object was assigned.
+fn found(recording: &Recording, frame: usize, objects: &[Object]) -> Vec<u32> {
+    let Some(camera) = &recording.camera else { return vec![0; objects.len()] };
+    let boxes = camera.frames.get(frame).map_or(&[][..], |f| &f.boxes);
+    let solids: Vec<Solid> = objects.iter().map(|o| o.solid).collect();
+    let boxed = |k: usize| objects[k].speed() != Some(0.0) || is_vehicle(recording, &objects[k]);
+    assigned(camera, &solids, boxes, boxed)
+}
+
+/// What shows of each object: the share of its outline that is in the image and that no other covers.
+pub fn visible_shares(camera: &RecordedCamera, objects: &[Object]) -> Vec<f64> {
+    let solids: Vec<Solid> = objects.iter().map(|o| o.solid).collect();
+    let mut shares = vec![0.0; objects.len()];
+    for seen in uncovered_outlines(&camera.pose, &solids, &[], &camera.intrinsics.frame()) {
+        shares[seen.object] = seen.share;
+    }
+    shares
 }
 
 /// What stands still and is no vehicle, a barrier, hides others but has no box.
@@ -108,19 +108,12 @@ fn assigned(camera: &RecordedCamera, objects: &[Solid], boxes: &[Box2d], boxed: 
 
 /// The box around what is visible of each object, in pixels.
 fn visible_outlines(pose: &SensorPose, i: &Intrinsics, objects: &[Solid]) -> Vec<(usize, Box2d)> {
-    let [center, focal] = [i.center_px, i.focal_px].map(|v| v.map(f64::from));
-    let size = i.size_px.map(f64::from);
-    let tangent = |k: usize, pixel: f64| (center[k] - pixel) / focal[k];
-    let (left, right) = (tangent(0, 0.0), tangent(0, size[0]));
-    let (up, down) = (tangent(1, 0.0), tangent(1, size[1]));
-    let frame = Convex::hull(vec![[left, up], [right, up], [right, down], [left, down]]);
-    let pixel = |k: usize, tangent: f64| center[k] - focal[k] * tangent;
-    let seen = uncovered_outlines(pose, objects, &[], &frame);
-    let edges = seen.into_iter().map(|s| {
-        let edges = [pixel(0, s.high[0]), pixel(1, s.high[1]), pixel(0, s.low[0]), pixel(1, s.low[1])];
-        (s.object, Box2d { class: String::new(), score: 1.0, edges })
-    });
-    edges.collect()
+    let seen = uncovered_outlines(pose, objects, &[], &i.frame()).into_iter();
+    let outline = |s: Uncovered| {
+        let ([l, t], [r, b]) = (i.pixel(s.high), i.pixel(s.low));
+        (s.object, Box2d { class: String::new(), score: 1.0, edges: [l, t, r, b] })
+    };
+    seen.map(outline).collect()
 }
 
 #[cfg(test)]
@@ -130,8 +123,9 @@ mod tests {
     fn camera() -> RecordedCamera {
         RecordedCamera {
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
-            intrinsics: Intrinsics { size_px: [1920, 1080], focal_px: [1600.0; 2], center_px: [960.0, 540.0] },
+            intrinsics: Intrinsics::centred([1920, 1080], 1600.0),
             frames: Vec::new(),
+            alone: false,
         }
     }
 
@@ -178,13 +172,5 @@ mod tests {
         assert_eq!(assigned_to(&[far, near], &[both]), [0, 1]);
         let elsewhere = boxes(&[solid(40.0, 6.0, [4.6, 1.8, 1.5])]);
         assert_eq!(assigned_to(&[near], &elsewhere), [0], "beside it");
-    }
-
-    #[test]
-    fn the_field_of_view_is_within_the_image() {
-        let view = field_of_view(&camera().intrinsics, 200.0);
-        assert!((view.azimuth_rad[1].tan() - 0.6).abs() < 1e-9 && view.azimuth_rad[0] == -view.azimuth_rad[1]);
-        let corner = (540.0_f64 / 1600.0 / 1.0_f64.hypot(0.6)).atan();
-        assert!((view.elevation_rad[1] - corner).abs() < 1e-9);
     }
 }

@@ -77,6 +77,9 @@ pub fn misplaced(recording: &Recording, error: Extent) -> Result<Recording> {
     let pitch_rad = pose.pitch_rad() + error.pitch_deg.to_radians();
     let mut altered = recording.clone();
     altered.pose = SensorPose::new(position, pose.yaw_rad(), pitch_rad, pose.roll_rad());
+    if let Some(camera) = altered.camera.as_mut().filter(|camera| camera.alone) {
+        camera.pose = altered.pose;
+    }
     Ok(altered)
 }
 

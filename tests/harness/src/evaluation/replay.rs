@@ -1,5 +1,6 @@
 //! One recording through every estimator: samples, scores and their summary.
 
+use anyhow::Result;
 use rayon::prelude::*;
 
 use super::Options;
@@ -8,7 +9,7 @@ use super::rejected;
 use super::samples::{self, FrameSamples};
 use super::score::{Score, score};
 use super::summary::Summary;
-use crate::estimators::{self, Estimator, camera_3d};
+use crate::estimators::{self, Estimator};
 use crate::recording::Recording;
 use crate::recording::camera::INFO_TOPIC;
 
@@ -47,22 +48,35 @@ impl Replay {
     pub fn add_camera(&mut self, estimators: &estimators::Options, options: &Options, progress: &(dyn Fn() + Sync)) {
         let config = &estimators.camera_3d;
         let Some(recording) = camera::recording(&self.recording, f64::from(config.range_max_m)) else { return };
-        let Some(own) = recording.camera.as_ref() else { return };
-        let mut running = match camera_3d::all(own, recording.truth.as_ref(), config) {
-            Ok(running) => running,
+        match Self::of_camera(recording, estimators, options, progress) {
+            Ok(camera) => self.camera = Some(Box::new(camera)),
             Err(error) => {
-                let first = recording.frames.first().map_or(0, |f| f.time_ns);
+                let first = self.recording.frames.first().map_or(0, |f| f.time_ns);
                 self.recording.problems.add(INFO_TOPIC, format!("boxes left out: {error:#}"), first);
-                return;
             }
-        };
-        let samples = camera::samples(&recording, f64::from(config.visible_share), options, progress);
+        }
+    }
+
+    /// Runs the camera's estimators over its own recording. `progress` is called after each of [`steps`].
+    ///
+    /// # Errors
+    /// A camera that cannot be worked with.
+    pub fn of_camera(
+        mut recording: Recording,
+        estimators: &estimators::Options,
+        options: &Options,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Self> {
+        let config = &estimators.camera_3d;
+        recording.sensor.field_of_view.range_m[1] = f64::from(config.range_max_m);
+        let mut running = estimators::all(&recording, estimators)?;
+        let samples = camera::samples(&recording, f64::from(config.visible_share), options, 1, progress);
         let scores: Vec<Score> = running
             .par_iter_mut()
             .map(|e| score(e.as_mut(), &recording, &samples, options.grid, &|| progress()))
             .collect();
         let summary = Summary::new(&recording, &samples, &scores, options);
-        self.camera = Some(Box::new(Self { recording, samples, scores, summary, camera: None }));
+        Ok(Self { recording, samples, scores, summary, camera: None })
     }
 
     pub fn score(&self, name: &str) -> Option<&Score> {

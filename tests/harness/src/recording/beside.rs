@@ -10,6 +10,8 @@ use crate::recording::truth::Truth;
 /// Labels and occlusion grades beside a recording, there or not.
 pub fn files(path: &Path) -> [PathBuf; 2] {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    // those of NAME.boxes.csv are called after NAME too
+    let name = name.strip_suffix(".boxes").unwrap_or(&name);
     ["labels", "occlusion"].map(|suffix| path.with_file_name(format!("{name}.{suffix}.csv")))
 }
 
@@ -29,7 +31,7 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     }
     restrict(&mut recording, options);
     if recording.frames.is_empty() {
-        bail!("{}: no radar frame between --from and --to", path.display());
+        bail!("{}: no frame between --from and --to", path.display());
     }
     Ok(recording)
 }

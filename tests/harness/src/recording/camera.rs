@@ -8,6 +8,9 @@ use super::ros::{
     Quaternion, RegionOfInterest, Vector3,
 };
 use super::transforms::Transforms;
+use super::truth::Truth;
+use super::{FieldOfView, Frame, Recording, Sensor};
+use crate::geometry::polygon::Convex;
 use crate::geometry::pose::SensorPose;
 
 pub const OBJECTS_TOPIC: &str = "/camera/objects";
@@ -17,12 +20,65 @@ pub const CAMERA_FRAME: &str = "camera";
 /// z ahead, x right, y down (REP-103, suffix `_optical`): the frame pixels are of.
 pub const OPTICAL_FRAME: &str = "camera_optical";
 
-/// A pinhole camera without distortion; the optical axis meets the middle of the image.
+/// A pinhole camera without distortion, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intrinsics {
-    pub width_px: u32,
-    pub height_px: u32,
-    pub focal_px: f64,
+    /// Width and height.
+    pub size_px: [u32; 2],
+    /// Along u and v.
+    pub focal_px: [f64; 2],
+    /// Where the optical axis meets the image.
+    pub center_px: [f64; 2],
+}
+
+impl Intrinsics {
+    /// With square pixels; the optical axis meets the middle of the image.
+    pub fn centred(size_px: [u32; 2], focal_px: f64) -> Self {
+        Self { size_px, focal_px: [focal_px; 2], center_px: size_px.map(|side| f64::from(side) / 2.0) }
+    }
+
+    /// Pixel of a point of the image plane at unit distance, left and up.
+    pub fn pixel(&self, [left, up]: [f64; 2]) -> [f64; 2] {
+        let ([u, v], [fu, fv]) = (self.center_px, self.focal_px);
+        [u - fu * left, v - fv * up]
+    }
+
+    /// The point of the image plane at unit distance, left and up, that a pixel shows.
+    pub fn tangents(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        [(self.center_px[0] - u) / self.focal_px[0], (self.center_px[1] - v) / self.focal_px[1]]
+    }
+
+    /// Pixel of a place; `None` behind the camera.
+    pub fn pixel_of(&self, pose: &SensorPose, place: [f64; 3]) -> Option<[f64; 2]> {
+        let [ahead, left, up] = pose.to_sensor(place);
+        (ahead > 1e-6).then(|| self.pixel([left / ahead, up / ahead]))
+    }
+
+    /// The image's border on the plane at unit distance.
+    pub fn frame(&self) -> Convex {
+        let ([left, up], [right, down]) = (self.tangents([0.0; 2]), self.tangents(self.size_px.map(f64::from)));
+        Convex::hull(vec![[left, up], [right, up], [right, down], [left, down]])
+    }
+
+    /// Limits within which everything is in the image.
+    pub fn field_of_view(&self, range_max_m: f64) -> FieldOfView {
+        let ([left, up], [right, down]) = (self.tangents([0.0; 2]), self.tangents(self.size_px.map(f64::from)));
+        let slant = 1.0_f64.hypot(left.max(-right));
+        FieldOfView {
+            azimuth_rad: [right.atan(), left.atan()],
+            elevation_rad: [(down / slant).atan(), (up / slant).atan()],
+            range_m: [0.0, range_max_m],
+        }
+    }
+
+    /// As the library takes it. A side outside of 16 bits is refused there with its name.
+    pub fn for_library(&self) -> calibration::Intrinsics {
+        calibration::Intrinsics {
+            size_px: self.size_px.map(|side| u16::try_from(side).unwrap_or(u16::MAX)),
+            focal_px: self.focal_px.map(|v| v as f32),
+            center_px: self.center_px.map(|v| v as f32),
+        }
+    }
 }
 
 /// A box around something, in pixels from the upper left corner.
@@ -64,8 +120,33 @@ pub struct CameraFrame {
 pub struct RecordedCamera {
     /// Where it hangs, x ahead.
     pub pose: SensorPose,
-    pub intrinsics: calibration::Intrinsics,
+    pub intrinsics: Intrinsics,
     pub frames: Vec<CameraFrame>,
+    /// Whether the recording is the camera's own: its frames are the recording's.
+    pub alone: bool,
+}
+
+impl RecordedCamera {
+    /// As a recording of its own, its frames without detections; `sensor` says what is known beside the view.
+    pub fn alone(mut self, name: String, sensor: Sensor, truth: Option<Truth>, range_max_m: f64) -> Recording {
+        self.alone = true;
+        let frame = |time_ns| Frame { time_ns, detections: Vec::new(), refused: 0 };
+        Recording {
+            name,
+            sensor: Sensor {
+                name: "camera".into(),
+                field_of_view: self.intrinsics.field_of_view(range_max_m),
+                has_elevation: true,
+                ..sensor
+            },
+            pose: self.pose,
+            frames: self.frames.iter().map(|f| frame(f.time_ns)).collect(),
+            truth,
+            occlusion: Default::default(),
+            camera: Some(self),
+            problems: Problems::default(),
+        }
+    }
 }
 
 /// What a file tells of a camera, gathered while it is read.
@@ -121,15 +202,9 @@ impl CameraReader {
         if info.d.iter().any(|d| *d != 0.0) {
             problems.add(INFO_TOPIC, "lens with distortion: boxes are taken as those of the rectified image", first);
         }
-        // what lies outside of 16 bits is refused with its name later on
-        let side = |v: u32| u16::try_from(v).unwrap_or(u16::MAX);
         let [fx, _, cx, _, fy, cy, ..] = info.k;
-        let intrinsics = calibration::Intrinsics {
-            size_px: [side(info.width), side(info.height)],
-            focal_px: [fx as f32, fy as f32],
-            center_px: [cx as f32, cy as f32],
-        };
-        Some(RecordedCamera { pose, intrinsics, frames: self.frames })
+        let intrinsics = Intrinsics { size_px: [info.width, info.height], focal_px: [fx, fy], center_px: [cx, cy] };
+        Some(RecordedCamera { pose, intrinsics, frames: self.frames, alone: false })
     }
 }
 
@@ -164,16 +239,16 @@ pub fn message(frame: &CameraFrame, header: &Header) -> Detection2DArray {
 
 /// The camera's own message.
 pub fn info(camera: &Intrinsics, header: &Header) -> CameraInfo {
-    let (f, cx, cy) = (camera.focal_px, f64::from(camera.width_px) / 2.0, f64::from(camera.height_px) / 2.0);
+    let ([fx, fy], [cx, cy], [width, height]) = (camera.focal_px, camera.center_px, camera.size_px);
     CameraInfo {
         header: header.clone(),
-        height: camera.height_px,
-        width: camera.width_px,
+        height,
+        width,
         distortion_model: "plumb_bob".into(),
         d: vec![0.0; 5],
-        k: [f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0],
+        k: [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
         r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p: [f, 0.0, cx, 0.0, 0.0, f, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        p: [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
         binning_x: 0,
         binning_y: 0,
         roi: RegionOfInterest::default(),
@@ -197,9 +272,29 @@ mod tests {
         let d = &back.detections[0];
         assert_eq!((d.bbox.center, d.bbox.size), ([20.125, 32.0], [20.25, 24.0]));
         assert_eq!(d.results[0].hypothesis.class_id, "van");
-        let camera = Intrinsics { width_px: 640, height_px: 480, focal_px: 500.0 };
+        let camera = Intrinsics::centred([640, 480], 500.0);
         let back: CameraInfo = decode(&encode(&info(&camera, &header)).unwrap()).unwrap();
         assert_eq!((back.width, back.k[2], back.p[5]), (640, 320.0, 500.0));
+    }
+
+    #[test]
+    fn the_field_of_view_is_within_the_image() {
+        let view = Intrinsics::centred([1920, 1080], 1600.0).field_of_view(200.0);
+        assert!((view.azimuth_rad[1].tan() - 0.6).abs() < 1e-9 && view.azimuth_rad[0] == -view.azimuth_rad[1]);
+        let corner = (540.0_f64 / 1600.0 / 1.0_f64.hypot(0.6)).atan();
+        assert!((view.elevation_rad[1] - corner).abs() < 1e-9);
+    }
+
+    #[test]
+    fn left_and_up_are_small_pixels_and_lead_back() {
+        let camera = Intrinsics { size_px: [1920, 1200], focal_px: [2789.0, 2783.0], center_px: [908.0, 589.0] };
+        let [u, v] = camera.pixel([0.1, 0.05]);
+        assert!(u < 908.0 && v < 589.0);
+        let [left, up] = camera.tangents([u, v]);
+        assert!((left - 0.1).abs() < 1e-12 && (up - 0.05).abs() < 1e-12);
+        let pose = SensorPose::new([0.0, 0.0, 8.0], 0.0, 0.0, 0.0);
+        assert_eq!(camera.pixel_of(&pose, [10.0, 0.0, 8.0]), Some([908.0, 589.0]));
+        assert_eq!(camera.pixel_of(&pose, [-10.0, 0.0, 8.0]), None);
     }
 
     #[test]

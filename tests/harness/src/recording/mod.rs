@@ -2,6 +2,7 @@
 
 pub mod ars408;
 pub mod beside;
+pub mod boxes;
 pub mod camera;
 pub mod candump;
 pub mod capture;
@@ -109,6 +110,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// The camera whose own recording this is.
+    pub fn of_camera(&self) -> Option<&RecordedCamera> {
+        self.camera.as_ref().filter(|camera| camera.alone)
+    }
+
     pub fn duration_s(&self) -> f64 {
         match (self.frames.first(), self.frames.last()) {
             (Some(a), Some(b)) => b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9,
@@ -142,18 +148,20 @@ pub struct ReadOptions {
 
 /// Every file that [`read`] may read for a recording.
 pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
-    [path.to_owned()].into_iter().chain(beside::files(path))
+    [path.to_owned()].into_iter().chain(beside::files(path)).chain(boxes::camera_file(path))
 }
 
 /// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, a capture of a TI mmWave radar or of
-/// the native format.
+/// the native format, boxes of a camera as CSV.
 ///
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let recording = if candump::is_log(&bytes) {
+    let recording = if boxes::is_boxes(path) {
+        boxes::read(path, &bytes, options)?
+    } else if candump::is_log(&bytes) {
         ars408::read(name, &bytes, options)?
     } else if !bytes.starts_with(::mcap::MAGIC) && ti::is_capture(&bytes) {
         ti::read(name, &bytes, options)?

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 
 use super::body::{Block, blocks};
+use super::camera::detector::{self, DetectorModel};
 use super::camera::{Camera, Target};
 use super::radar::Radar;
 use super::radar::disturbance::{Outage, noise_db, outage};
@@ -174,6 +175,21 @@ impl Simulation {
     /// # Errors
     /// A vehicle that drives through a sensor.
     pub fn camera_step(&self, camera: &Camera, rate_hz: f64, number: u64) -> Result<CameraFrame> {
+        let (_, mut frames) = self.camera_views(camera, rate_hz, number, &[camera.model])?;
+        frames.pop().context("a frame of each detector")
+    }
+
+    /// Everything at one of a camera's frames, and what each of several detectors finds of it.
+    ///
+    /// # Errors
+    /// A vehicle that drives through a sensor.
+    pub fn camera_views(
+        &self,
+        camera: &Camera,
+        rate_hz: f64,
+        number: u64,
+        detectors: &[DetectorModel],
+    ) -> Result<(Vec<Label>, Vec<CameraFrame>)> {
         let since_s = number as f64 / rate_hz;
         let time_ns = self.time_ns(since_s);
         let labels = self.instant(since_s, time_ns).labels;
@@ -182,7 +198,15 @@ impl Simulation {
         let targets: Vec<Target> =
             labels.iter().filter(is_vehicle).map(|l| Target { class: &l.class, solid: l.solid }).collect();
         let screens: Vec<Solid> = labels.iter().filter(|l| !is_vehicle(l)).map(|l| l.solid).collect();
-        Ok(CameraFrame { time_ns, boxes: camera.detect(&targets, &screens, self.scene.seed, number), refused: 0 })
+        let solids: Vec<Solid> = targets.iter().map(|t| t.solid).collect();
+        let seen = camera.view(&solids, &screens);
+        let boxes = |model| {
+            let camera = Camera { model, ..camera.clone() };
+            detector::detect(&camera, &seen, &targets, self.scene.seed, number)
+        };
+        let frame = |model: &DetectorModel| CameraFrame { time_ns, boxes: boxes(*model), refused: 0 };
+        let frames = detectors.iter().map(frame).collect();
+        Ok((labels, frames))
     }
 
     /// Boxes of everything at an instant, whatever looks at it.

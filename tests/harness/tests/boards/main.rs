@@ -2,6 +2,7 @@
 //! latter a build of its own, so they are ignored unless asked for: `tests/firmware.sh` and `tests/linux.sh`
 //! see to that.
 
+mod camera;
 #[cfg(target_os = "linux")]
 mod linux;
 #[cfg(unix)]

@@ -27,6 +27,9 @@ use crate::{estimators, recording};
 /// The estimator examples are looked for in.
 const SHOWN: &str = "radar-3d";
 
+/// The same of a camera.
+const SHOWN_OF_CAMERA: &str = "camera-3d";
+
 /// Replay recordings through the estimators and report how far their maps can be trusted
 ///
 /// For every radar frame each estimator says where the sensor can see. Every labelled object inside the
@@ -38,13 +41,14 @@ const SHOWN: &str = "radar-3d";
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// MCAP recordings, CAN logs of `candump -L` (ARS408), captures of a TI mmWave radar's data port or of the
-    /// native format [default: the MCAP files in tests/recordings]
+    /// native format, a camera's boxes (NAME.boxes.csv beside NAME.camera.toml) [default: the MCAP files in tests/recordings]
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// Write everything that was found as JSON: an object, for several recordings an array
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
-    /// Write every object at every counted frame as CSV: V_O and grade of each estimator, D_O, class, range
+    /// Write every object at every counted frame as CSV: V_O and grade of each estimator, D_O, class, range;
+    /// of a camera beside the radar into NAME.camera.csv
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     csv: Option<PathBuf>,
     /// Write the input with an estimator's map beside it, to open in Foxglove or Lichtblick
@@ -104,6 +108,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let mcap = outputs.file("--mcap", args.mcap.as_deref())?;
     let csv = outputs.file("--csv", args.csv.as_deref())?;
+    let camera_csv = args.csv.as_deref().map(of_camera);
+    let camera_csv = outputs.file("--csv", camera_csv.as_deref())?;
+    let mut camera_samples = None;
     let folders = out.map(|out| out::folders(&out, &paths)).transpose()?;
     let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
@@ -122,12 +129,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         if let Some(csv) = &mut samples {
             csv.write(&one.replay)?;
         }
+        if let (Some(camera), Some(file)) = (&one.replay.camera, &camera_csv) {
+            let csv = match &mut camera_samples {
+                Some(csv) => csv,
+                None => camera_samples.insert(SampleWriter::new(file.create()?)),
+            };
+            csv.write(camera)?;
+        }
         if let Some(folder) = folders.as_ref().and_then(|f| f.get(k)) {
             out::write(folder, &text, &one.replay, &one.examples, &settings)?;
         }
         reports.push(one.report(&settings));
     }
-    if let Some(csv) = samples.filter(|_| !reports.is_empty()) {
+    for csv in [samples.filter(|_| !reports.is_empty()), camera_samples].into_iter().flatten() {
         csv.finish()?.finish()?;
     }
     if let Some(file) = json_file {
@@ -156,8 +170,13 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
     let replaying = bar(&format!("replaying {name}"), passes + camera_steps(&recording));
-    let mut replay = Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step());
-    replay.add_camera(&settings.estimators, &settings.evaluation, &|| replaying.step());
+    let replay = if recording.of_camera().is_some() {
+        Replay::of_camera(recording, &settings.estimators, &settings.evaluation, &|| replaying.step())?
+    } else {
+        let mut replay = Replay::new(recording, &mut running, &settings.evaluation, &|| replaying.step());
+        replay.add_camera(&settings.estimators, &settings.evaluation, &|| replaying.step());
+        replay
+    };
     drop(replaying);
 
     if let Some(target) = mcap {
@@ -165,14 +184,26 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
     }
     let wrong = |extent: Extent| {
         let again = bar(&format!("replaying {name} with a wrong mount"), 4 * passes);
-        sensitivity(&replay, extent, &settings.evaluation, &settings.estimators, &|| again.step())
+        let of =
+            |replay: &Replay| sensitivity(replay, extent, &settings.evaluation, &settings.estimators, &|| again.step());
+        let mut all = of(&replay)?;
+        // the camera's own mount, wrong by the same
+        for (radar, camera) in all.iter_mut().zip(replay.camera.as_deref().map(of).transpose()?.into_iter().flatten()) {
+            radar.estimators.extend(camera.estimators);
+        }
+        anyhow::Ok(all)
     };
     // without truth there are no rates that could move
     let labelled = replay.recording.truth.is_some();
     let mount_error = args.mount_error.filter(|_| labelled).map(wrong).transpose()?;
-    let examples =
-        replay.score(SHOWN).map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
+    let shown = replay.score(SHOWN).or(replay.score(SHOWN_OF_CAMERA));
+    let examples = shown.map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
     Ok(Replayed { replay, examples, mount_error })
+}
+
+/// `NAME.camera.csv` beside `NAME.csv`.
+fn of_camera(csv: &Path) -> PathBuf {
+    csv.with_extension("camera.csv")
 }
 
 /// The error with the file's name before it, where it does not say it itself.
@@ -182,10 +213,17 @@ fn named(error: anyhow::Error, path: &Path) -> anyhow::Error {
 }
 
 fn write_mcap(source: &Path, target: &Target, estimator: &str, replay: &Replay, settings: &Settings) -> Result<()> {
-    let recording = &replay.recording;
-    let mut all = estimators::all(recording, &settings.estimators)?;
-    let names: Vec<String> = all.iter().map(|e| e.name().to_owned()).collect();
-    let Some(estimator) = all.iter_mut().find(|e| e.name() == estimator) else {
+    let mut names = Vec::new();
+    let mut found = None;
+    for recording in [Some(&replay.recording), replay.camera.as_deref().map(|c| &c.recording)].into_iter().flatten() {
+        for one in estimators::all(recording, &settings.estimators)? {
+            names.push(one.name().to_owned());
+            if one.name() == estimator {
+                found = Some((recording, one));
+            }
+        }
+    }
+    let Some((recording, mut estimator)) = found else {
         bail!("--mcap-estimator: no estimator `{estimator}`; there are {}", names.join(", "));
     };
     let writing = bar(&format!("writing {}", target.path().display()), recording.frames.len() as u64);

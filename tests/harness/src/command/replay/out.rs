@@ -1,4 +1,4 @@
-//! What `--out` leaves in a folder: the table as text, and pictures.
+//! What `--out` leaves in a folder: the table as text, and pictures; those of a camera in `camera`.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
-use super::{SHOWN, pictures};
+use super::{SHOWN, SHOWN_OF_CAMERA, pictures};
 use crate::evaluation::Settings;
-use crate::evaluation::examples::Example;
+use crate::evaluation::examples::{self, Example};
 use crate::evaluation::replay::Replay;
 use crate::results::files::Folder;
 use crate::results::report::ORIGIN;
@@ -30,7 +30,14 @@ pub fn folders(dir: &Folder, recordings: &[PathBuf]) -> Result<Vec<Folder>> {
 /// Fills one recording's folder.
 pub fn write(folder: &Folder, text: &str, replay: &Replay, examples: &[Example], settings: &Settings) -> Result<()> {
     folder.file("table.txt")?.write(format!("{text}\n{ORIGIN}\n"))?;
-    pictures::write(folder, replay, SHOWN, examples, settings)
+    let shown = if replay.recording.of_camera().is_some() { SHOWN_OF_CAMERA } else { SHOWN };
+    pictures::write(folder, replay, shown, examples, settings)?;
+    if let Some(camera) = &replay.camera {
+        let score = camera.score(SHOWN_OF_CAMERA);
+        let examples = score.map(|s| examples::find(&camera.recording, &camera.samples, s)).unwrap_or_default();
+        pictures::write(&folder.folder("camera"), camera, SHOWN_OF_CAMERA, &examples, settings)?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ use crate::results::pictures::tradeoff::{self, Curve, Marker, MarkerKind, Span, 
 use crate::results::pictures::{canvas::Canvas, palette};
 
 /// Estimators that are drawn from above at the chosen frame, beside the one examples are of.
-const ALSO_DRAWN: [&str; 2] = ["radar-2d", "reference"];
+const ALSO_DRAWN: [&str; 3] = ["radar-2d", "reference", "camera-reference"];
 
 /// Draws everything into a folder.
 pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example], settings: &Settings) -> Result<()> {

@@ -43,6 +43,12 @@ pub fn bytes(path: &Path, recording: &Recording) -> Result<Vec<u8>> {
     }
     let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
     let sink = Cursor::new(Vec::new());
+    if let Some(camera) = recording.of_camera() {
+        let pose = &recording.pose;
+        let mut writer = RecordingWriter::with_camera(sink, &recording.sensor, pose, &camera.pose, start_ns)?;
+        camera.frames.iter().try_for_each(|frame| writer.camera_frame(frame, &camera.intrinsics))?;
+        return Ok(writer.finish()?.into_inner());
+    }
     let mut writer = RecordingWriter::new(sink, &recording.sensor, &recording.pose, start_ns)?;
     recording.frames.iter().try_for_each(|frame| writer.frame(frame))?;
     Ok(writer.finish()?.into_inner())

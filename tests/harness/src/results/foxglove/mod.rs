@@ -1,6 +1,6 @@
 //! A recording with an estimator's map beside it, as an MCAP file for Foxglove.
 //!
-//! Radar points, mount and ground truth are copied as they are; after each radar message comes the
+//! Radar points or a camera's boxes, mount and ground truth are copied as they are; after each radar message comes the
 //! map of that frame as a `foxglove.Grid` (JSON) on `/visibility/ESTIMATOR`. In Foxglove: a 3D panel
 //! with fixed frame `road`, and the topic switched on.
 
@@ -16,6 +16,7 @@ use mcap::{Compression, WriteOptions, Writer};
 
 use crate::estimators::Estimator;
 use crate::geometry::pose::SensorPose;
+use crate::recording::camera::{INFO_TOPIC, OBJECTS_TOPIC};
 use crate::recording::mcap::{POINTS_TOPIC, TRUTH_TOPIC};
 use crate::recording::write::{TF_TOPIC, mount_message, sensor_metadata};
 use crate::recording::{ReadOptions, Recording, Sensor};
@@ -39,7 +40,12 @@ pub fn write(
     progress: &dyn Fn(),
 ) -> Result<()> {
     let extent = grid::Extent::covering(recording)?;
+    let of_camera = recording.of_camera().is_some();
+    // the messages frames are made of
     let is_radar = |topic: &str, schema: &str| {
+        if of_camera {
+            return topic == OBJECTS_TOPIC;
+        }
         options.radar_topic.as_deref().unwrap_or(POINTS_TOPIC) == topic
             || (options.radar_topic.is_none() && schema == RADAR_SCAN)
     };
@@ -47,7 +53,9 @@ pub fn write(
     // a mount given by hand stands in place of the one recorded
     let is_mount = |topic: &str| options.mount.is_none() && topic.ends_with("tf_static");
     let bytes = input::bytes(source, recording)?;
-    let input = input::read(&bytes, |topic, schema| is_radar(topic, schema) || is_truth(topic) || is_mount(topic))?;
+    let input = input::read(&bytes, |topic, schema| {
+        is_radar(topic, schema) || is_truth(topic) || is_mount(topic) || (of_camera && topic == INFO_TOPIC)
+    })?;
     let radar =
         |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_radar(&c.topic, &c.schema_name));
     let mount = |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_mount(&c.topic));

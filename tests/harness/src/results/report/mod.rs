@@ -2,6 +2,7 @@
 
 pub mod csv;
 pub mod experiment;
+pub mod gantry_camera;
 pub mod json;
 pub mod notes;
 pub mod scenes;

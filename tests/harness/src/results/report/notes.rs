@@ -61,11 +61,13 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines
 }
 
+/// How a camera's objects and cells are judged.
+pub const RULE_OF_CAMERA: &str = "Detected: a box of the camera's own, assigned one to one to the visible outline \
+                                  (overlap from 0.3). Cells: the share of 0 to 4 m above them that is in sight.";
+
 /// What has to be known to read the table of a camera, beside what stands below the radar's.
 pub fn of_camera(replay: &Replay) -> Vec<String> {
-    let rule = "Detected: a box of the camera's own, assigned one to one to the visible outline (overlap from 0.3). \
-                Cells: the share of 0 to 4 m above them that is in sight.";
-    [rule.to_owned()].into_iter().chain(counters(&replay.summary.rows)).collect()
+    [RULE_OF_CAMERA.to_owned()].into_iter().chain(counters(&replay.summary.rows)).collect()
 }
 
 fn comparison(c: &Comparison) -> String {

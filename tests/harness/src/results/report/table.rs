@@ -23,6 +23,9 @@ pub fn text(replay: &Replay, options: &Options) -> String {
         text += &by_occlusion(&replay.summary);
         text.push('\n');
     }
+    if replay.recording.of_camera().is_some() {
+        text += &(notes::RULE_OF_CAMERA.to_owned() + "\n");
+    }
     if let Some(camera) = &replay.camera {
         text += &format!("\n{}\n{}\n", notes::heading(camera), rates(&camera.summary));
         for line in notes::of_camera(camera) {

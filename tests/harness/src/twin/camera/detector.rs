@@ -91,7 +91,7 @@ const SMALLEST_PX: f64 = 4.0;
 pub fn detect(camera: &Camera, seen: &[Sighting], targets: &[Target], seed: u64, number: u64) -> Vec<Box2d> {
     let mut dice = Dice::new(seed, Use::CameraFrame, number);
     let (model, image) = (&camera.model, &camera.intrinsics);
-    let limits = [f64::from(image.width_px), f64::from(image.height_px)];
+    let limits = image.size_px.map(f64::from);
     let mut boxes: Vec<Box2d> = Vec::new();
     for sighting in seen {
         // five draws an object, found or not

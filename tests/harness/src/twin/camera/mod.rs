@@ -6,9 +6,9 @@
 
 pub mod detector;
 
+use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::polygon::Convex;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::sight::{Uncovered, uncovered_outlines};
 use crate::geometry::solid::Solid;
@@ -37,25 +37,12 @@ pub struct Sighting {
 impl Camera {
     /// What is visible of each object past all others (and past `screens`, which are not objects).
     pub fn view(&self, objects: &[Solid], screens: &[Solid]) -> Vec<Sighting> {
-        let seen = uncovered_outlines(&self.pose, objects, screens, &self.frame());
+        let seen = uncovered_outlines(&self.pose, objects, screens, &self.intrinsics.frame());
         let sighting = |s: &Uncovered| {
-            let ([l, t], [r, b]) = (self.pixel(s.high), self.pixel(s.low));
+            let ([l, t], [r, b]) = (self.intrinsics.pixel(s.high), self.intrinsics.pixel(s.low));
             Sighting { object: s.object, edges: [l, t, r, b], share: s.share }
         };
         seen.iter().map(sighting).collect()
-    }
-
-    /// Pixel of a point of the image plane at unit distance (left and up).
-    fn pixel(&self, [left, up]: [f64; 2]) -> [f64; 2] {
-        let i = &self.intrinsics;
-        [f64::from(i.width_px) / 2.0 - i.focal_px * left, f64::from(i.height_px) / 2.0 - i.focal_px * up]
-    }
-
-    /// The image's border on the plane at unit distance.
-    fn frame(&self) -> Convex {
-        let i = &self.intrinsics;
-        let (x, y) = (f64::from(i.width_px) / 2.0 / i.focal_px, f64::from(i.height_px) / 2.0 / i.focal_px);
-        Convex::hull(vec![[x, y], [-x, y], [-x, -y], [x, -y]])
     }
 }
 
@@ -72,18 +59,43 @@ pub struct Target<'a> {
 pub struct Image {
     pub width_px: u32,
     pub height_px: u32,
-    /// Horizontal angle of view.
-    pub view_deg: f64,
+    /// Horizontal angle of view of square pixels around the optical axis; or the calibration of a camera there is.
+    pub view_deg: Option<f64>,
+    /// Focal length along u and v, and where the optical axis meets the image.
+    pub focal_px: Option<[f64; 2]>,
+    pub center_px: Option<[f64; 2]>,
 }
 
 impl Image {
-    pub fn intrinsics(&self) -> Intrinsics {
-        let half_rad = (self.view_deg / 2.0).to_radians();
-        Intrinsics {
-            width_px: self.width_px,
-            height_px: self.height_px,
-            focal_px: f64::from(self.width_px) / 2.0 / half_rad.tan(),
+    /// # Errors
+    /// Neither an angle of view nor a calibration, both, or figures no camera has.
+    pub fn check(&self) -> Result<()> {
+        for (name, side) in [("width_px", self.width_px), ("height_px", self.height_px)] {
+            ensure!((16..=20_000).contains(&side), "image.{name} is {side}, it must lie in 16 to 20000");
         }
+        match (self.view_deg, self.focal_px, self.center_px) {
+            (Some(view_deg), None, None) => {
+                ensure!((1.0..=170.0).contains(&view_deg), "image.view_deg is {view_deg}, it must lie in 1 to 170");
+            }
+            (None, Some(focal), Some(center)) => {
+                let within = |v: f64, low: f64, high: f64| (low..=high).contains(&v);
+                ensure!(focal.iter().all(|f| within(*f, 50.0, 20_000.0)), "image.focal_px must lie in 50 to 20000");
+                let inside = within(center[0], 1.0, f64::from(self.width_px))
+                    && within(center[1], 1.0, f64::from(self.height_px));
+                ensure!(inside, "image.center_px lies outside of the image");
+            }
+            _ => bail!("image: give view_deg, or focal_px and center_px of a camera there is"),
+        }
+        Ok(())
+    }
+
+    pub fn intrinsics(&self) -> Intrinsics {
+        let size_px = [self.width_px, self.height_px];
+        if let (Some(focal_px), Some(center_px)) = (self.focal_px, self.center_px) {
+            return Intrinsics { size_px, focal_px, center_px };
+        }
+        let half_rad = (self.view_deg.unwrap_or(90.0) / 2.0).to_radians();
+        Intrinsics::centred(size_px, f64::from(self.width_px) / 2.0 / half_rad.tan())
     }
 }
 
@@ -104,7 +116,7 @@ pub mod by_hand {
     pub fn camera() -> Camera {
         Camera {
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
-            intrinsics: Image { width_px: 1920, height_px: 1080, view_deg: 60.0 }.intrinsics(),
+            intrinsics: Intrinsics::centred([1920, 1080], 960.0 / 30.0_f64.to_radians().tan()),
             model: DetectorModel::default(),
         }
     }
@@ -117,6 +129,22 @@ mod tests {
 
     fn solid(x: f64, y: f64, size: [f64; 3]) -> Solid {
         Solid { center: [x, y, size[2] / 2.0], yaw_rad: 0.0, size }
+    }
+
+    #[test]
+    fn an_image_is_an_angle_of_view_or_a_calibration() {
+        let image = |text: &str| toml::from_str::<Image>(text).map_err(anyhow::Error::from);
+        let size = "width_px = 1920\nheight_px = 1200\n";
+        let checked = |text: &str| image(&format!("{size}{text}")).and_then(|i| i.check().map(|()| i.intrinsics()));
+        assert_eq!(checked("view_deg = 90.0").unwrap().focal_px.map(f64::round), [960.0; 2]);
+        let real = checked("focal_px = [2788.9, 2783.3]\ncenter_px = [907.8, 589.1]").unwrap();
+        assert_eq!((real.focal_px[1], real.center_px[0]), (2783.3, 907.8));
+        let error = |text: &str| format!("{:#}", checked(text).unwrap_err());
+        assert!(error("").contains("give view_deg, or focal_px and center_px"));
+        assert!(error("view_deg = 60.0\nfocal_px = [1000.0, 1000.0]").contains("give view_deg, or"));
+        assert!(error("focal_px = [1.0, 1.0]\ncenter_px = [900.0, 600.0]").contains("50 to 20000"));
+        assert!(error("focal_px = [1e3, 1e3]\ncenter_px = [2000.0, 600.0]").contains("outside of the image"));
+        assert!(error("view_deg = 180.0").contains("image.view_deg is 180, it must lie in 1 to 170"));
     }
 
     #[test]

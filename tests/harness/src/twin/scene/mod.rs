@@ -23,7 +23,7 @@
 //! [camera]                        # may be left out
 //! name = "camera"
 //! mount = { height_m = 6.0, pitch_deg = 6.0 }
-//! image = { width_px = 1920, height_px = 1080, view_deg = 60.0 }
+//! image = { width_px = 1920, height_px = 1080, view_deg = 60.0 }   # or focal_px = [u, v], center_px = [u, v]
 //! rate_hz = 15.0
 //!
 //! [[static]]
@@ -299,12 +299,7 @@ impl CameraSection {
         self.mount.check()?;
         self.detector.check()?;
         check_rate(self.rate_hz)?;
-        let Image { width_px, height_px, view_deg } = self.image;
-        ensure!((1.0..=170.0).contains(&view_deg), "image.view_deg is {view_deg}, it must lie in 1 to 170");
-        for (name, side) in [("width_px", width_px), ("height_px", height_px)] {
-            ensure!((16..=20_000).contains(&side), "image.{name} is {side}, it must lie in 16 to 20000");
-        }
-        Ok(())
+        self.image.check()
     }
 }
 
@@ -364,8 +359,8 @@ impl Scene {
     pub fn looks(&self) -> Vec<Look> {
         let radar = Look::new(&self.radar.mount, self.radar.field_of_view.azimuth_deg);
         let camera = self.camera.as_ref().map(|c| {
-            let half = c.image.view_deg / 2.0;
-            Look::new(&c.mount, [-half, half])
+            let view = c.image.intrinsics().field_of_view(0.0);
+            Look::new(&c.mount, view.azimuth_rad.map(f64::to_degrees))
         });
         std::iter::once(radar).chain(camera).collect()
     }

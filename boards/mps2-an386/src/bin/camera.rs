@@ -1,0 +1,13 @@
+//! Batch mode of a camera: the estimator over the boxes of every picture of a job file.
+#![no_std]
+#![no_main]
+
+use emulated::viewshed::camera::boxes::ImageBox;
+use emulated::viewshed::unit::profile::camera;
+
+emulated::batch!([camera], camera::SHAPE, ImageBox, mps2_an386::Core::start());
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    batch()
+}

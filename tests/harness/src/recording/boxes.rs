@@ -1,0 +1,165 @@
+//! Boxes of a camera's detector as CSV, `NAME.boxes.csv`, with the camera in `NAME.camera.toml` beside it.
+//!
+//! ```text
+//! time_s,class,left_px,top_px,right_px,bottom_px
+//! 12.066,car,801.5,402,858,447.25
+//! 12.133,,,,,
+//! ```
+//!
+//! Rows of one time are a picture; pictures stand in the order of time, and one without boxes has a row without class
+//! and edges. Pixels of the rectified picture, from its upper left corner. The camera's file:
+//!
+//! ```toml
+//! mount = { x_m = 0.0, y_m = 0.0, height_m = 6.0, yaw_deg = 0.0, pitch_deg = 6.0, roll_deg = 0.0 }
+//! intrinsics = { size_px = [1920, 1080], focal_px = [1663.0, 1663.0], center_px = [960.0, 540.0] }
+//! ```
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use serde::Deserialize;
+use viewshed::camera::Camera3dConfig;
+use viewshed::camera::calibration::Calibration;
+
+use super::camera::{Box2d, CameraFrame, Intrinsics, RecordedCamera};
+use super::problems::Problems;
+use super::{FieldOfView, ReadOptions, Recording, Sensor};
+use crate::geometry::pose::SensorPose;
+
+const SUFFIX: &str = ".boxes.csv";
+const PROBLEMS: &str = "boxes";
+
+/// Name before the suffix.
+fn stem(path: &Path) -> Option<String> {
+    path.file_name()?.to_str()?.strip_suffix(SUFFIX).map(str::to_owned)
+}
+
+/// Whether a file is one of boxes, by its name.
+pub fn is_boxes(path: &Path) -> bool {
+    stem(path).is_some()
+}
+
+/// The camera's file beside boxes.
+pub fn camera_file(path: &Path) -> Option<PathBuf> {
+    stem(path).map(|name| path.with_file_name(format!("{name}.camera.toml")))
+}
+
+#[derive(Debug, Deserialize)]
+struct Row {
+    time_s: f64,
+    class: String,
+    left_px: Option<f64>,
+    top_px: Option<f64>,
+    right_px: Option<f64>,
+    bottom_px: Option<f64>,
+    #[serde(default)]
+    score: Option<f64>,
+}
+
+/// Reads boxes and their camera.
+///
+/// # Errors
+/// No camera beside them; file and line of a row that is malformed; no picture at all.
+pub fn read(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    let name = stem(path).unwrap_or_default();
+    let beside = camera_file(path).unwrap_or_default();
+    let place = || beside.display().to_string();
+    let text = std::fs::read_to_string(&beside)
+        .with_context(|| format!("{}: cannot read the camera of these boxes, {}", path.display(), beside.display()))?;
+    let Calibration { intrinsics: i, mount: m } = toml::from_str(&text).with_context(place)?;
+    ensure!(options.field_of_view.is_none(), "--fov does not go with boxes: a camera's view follows from {}", place());
+    let [x, y, z, yaw, pitch, roll] = options.mount.unwrap_or_else(|| {
+        let radians = |degrees: f32| f64::from(degrees).to_radians();
+        let [x, y, z] = [m.x_m, m.y_m, m.height_m].map(f64::from);
+        [x, y, z, radians(m.yaw_deg), radians(m.pitch_deg), radians(m.roll_deg)]
+    });
+    let (frames, problems) = pictures(bytes).with_context(|| path.display().to_string())?;
+    let camera = RecordedCamera {
+        pose: SensorPose::new([x, y, z], yaw, pitch, roll),
+        intrinsics: Intrinsics {
+            size_px: i.size_px.map(u32::from),
+            focal_px: i.focal_px.map(f64::from),
+            center_px: i.center_px.map(f64::from),
+        },
+        frames,
+        alone: true,
+    };
+    let sensor = Sensor {
+        name: "camera".into(),
+        field_of_view: FieldOfView { azimuth_rad: [0.0; 2], elevation_rad: [0.0; 2], range_m: [0.0; 2] },
+        has_elevation: true,
+        frames_independent: false,
+        platform_moving: false,
+        licence: None,
+    };
+    let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
+    Ok(Recording { problems, ..camera.alone(name, sensor, None, range_max_m) })
+}
+
+fn pictures(bytes: &[u8]) -> Result<(Vec<CameraFrame>, Problems)> {
+    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let (mut frames, mut problems) = (Vec::<CameraFrame>::new(), Problems::default());
+    for row in csv.deserialize::<Row>() {
+        let row = row?;
+        ensure!(row.time_s.is_finite() && row.time_s.abs() < 9e9, "a time that is no number of seconds");
+        let time_ns = (row.time_s * 1e9).round() as i64;
+        let last = frames.last().map(|f| f.time_ns);
+        if last.is_some_and(|last| time_ns < last) {
+            problems.add(PROBLEMS, "time goes back, row dropped", time_ns);
+            continue;
+        }
+        if last != Some(time_ns) {
+            frames.push(CameraFrame { time_ns, boxes: Vec::new(), refused: 0 });
+        }
+        let Some(frame) = frames.last_mut() else { continue };
+        match [row.left_px, row.top_px, row.right_px, row.bottom_px] {
+            [None, None, None, None] if row.class.is_empty() => {}
+            [Some(l), Some(t), Some(r), Some(b)] if [l, t, r, b].iter().all(|v| v.is_finite()) => {
+                frame.boxes.push(Box2d { class: row.class, score: row.score.unwrap_or(1.0), edges: [l, t, r, b] });
+            }
+            _ => {
+                frame.refused += 1;
+                problems.add(PROBLEMS, "box without an edge, or with one that is not finite, dropped", time_ns);
+            }
+        }
+    }
+    if frames.is_empty() {
+        bail!("no picture in it");
+    }
+    Ok((frames, problems))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADING: &str = "time_s,class,left_px,top_px,right_px,bottom_px\n";
+
+    fn read(rows: &str) -> Result<(Vec<CameraFrame>, Problems)> {
+        pictures(format!("{HEADING}{rows}").as_bytes())
+    }
+
+    #[test]
+    fn rows_of_one_time_are_a_picture_and_an_empty_row_one_without_boxes() {
+        let (frames, problems) = read("1.5,car,1,2,3,4\n1.5, truck ,5,6,7,8.25\n# a remark\n1.6,,,,,\n").unwrap();
+        assert_eq!(
+            frames.iter().map(|f| (f.time_ns, f.boxes.len())).collect::<Vec<_>>(),
+            [(1_500_000_000, 2), (1_600_000_000, 0)]
+        );
+        assert_eq!((frames[0].boxes[1].class.as_str(), frames[0].boxes[1].edges), ("truck", [5.0, 6.0, 7.0, 8.25]));
+        assert!(problems.is_empty());
+    }
+
+    #[test]
+    fn what_is_no_box_is_counted_and_what_is_no_row_is_named_by_its_line() {
+        let (frames, problems) =
+            read("2,car,1,2,3,4\n1,car,1,2,3,4\n2,car,nan,2,3,4\n2,car,1,,3,4\n2,car,9,2,3,4\n").unwrap();
+        assert_eq!((frames.len(), frames[0].boxes.len(), frames[0].refused), (1, 2, 2), "an inverted box is one");
+        assert_eq!((problems.count("goes back"), problems.count("not finite")), (1, 2));
+        let error = |rows: &str| format!("{:#}", read(rows).unwrap_err());
+        assert!(error("2,car,1,2,3,4\n2,car,x,2,3,4\n").contains("line: 3"), "{}", error("2,car,x,2,3,4\n"));
+        assert!(error("inf,car,1,2,3,4\n").contains("no number of seconds"));
+        assert!(error("").contains("no picture"));
+        assert!(pictures(b"time,class\n1,car\n").unwrap_err().to_string().contains("missing field `time_s`"));
+    }
+}
