@@ -23,6 +23,7 @@
 //! | [`doctor`] | a radar's log in, what is wrong with it and what to do out |
 //! | [`boards`] | the same scans through a controller and through the library here, compared frame by frame |
 //! | [`results`] | figures in; text, JSON, CSV, pictures and recordings for Foxglove out, written whole or not at all |
+//! | `pages` | recordings in; pages in a browser out, and labels a person draws there (feature `pages`) |
 //! | [`command`] | the `viewshed` command: options, and one file for each subcommand |
 //!
 //! No room uses one that uses it (`cargo test --test architecture`).
@@ -35,6 +36,8 @@ pub mod estimators;
 pub mod evaluation;
 pub mod geometry;
 pub mod labels;
+#[cfg(feature = "pages")]
+pub mod pages;
 pub mod recording;
 pub mod results;
 pub mod studies;
