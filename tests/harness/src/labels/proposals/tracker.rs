@@ -151,14 +151,11 @@ impl Running {
         if let Some([c, s]) = self.heading {
             let [x, y] = self.motion.place();
             let along = all.iter().map(|r| (r.place[0] - x) * c + (r.place[1] - y) * s);
-            let [low, high] =
-                along.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+            let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
             // grows soon, shrinks slowly: not every frame shows the whole vehicle
             let follow = |old: f64, new: f64, outwards: bool| old + if outwards { 0.4 } else { 0.02 } * (new - old);
-            self.reach = [
-                follow(self.reach[0], low, low < self.reach[0]),
-                follow(self.reach[1], high, high > self.reach[1]),
-            ];
+            self.reach =
+                [follow(self.reach[0], low, low < self.reach[0]), follow(self.reach[1], high, high > self.reach[1])];
         }
         self.members.extend(own.iter().map(|i| (frame, *i)));
         self.frames += 1;
