@@ -5,18 +5,19 @@
 //! # Model
 //! The person looks at each proposal, the best first. One that lies on a vehicle for most of its time is accepted; one
 //! that continues or precedes an accepted piece of the same vehicle is accepted and joined; one that lies elsewhere, or
-//! on a vehicle that is labelled there already, is rejected. A vehicle seen well that nothing was offered for is drawn.
-//! Accepting, rejecting, joining, correcting a class count one action each, drawing one and one for each point.
+//! on a vehicle that is labelled there already, is rejected. Where a vehicle is seen well for [`SEEN`] and its label is
+//! missing or elsewhere, the person sets points; a vehicle that nothing was offered for is drawn. Accepting, rejecting,
+//! joining and correcting a class count one action each, drawing one, and each point that is set one.
 
 use std::collections::BTreeMap;
 
 use anyhow::Result;
 
 use super::Site;
-use super::near_face::{BoxStep, STEP_S, boxes, nears};
+use super::near_face::{BoxStep, boxes, nears};
 use super::proposals::Proposal;
 use super::simplify::simplify;
-use super::tracks::LabelTrack;
+use super::tracks::{LabelPoint, LabelTrack};
 use crate::estimators;
 use crate::evaluation::Options;
 use crate::evaluation::replay::Replay;
@@ -35,7 +36,7 @@ const ACCEPTED: f64 = 0.7;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
 const SEEN: (u32, f64) = (15, 1.0);
 /// How far a drawn line is from the vehicle, metres.
-const DRAWN_M: f64 = 0.5;
+const DRAWN_M: f64 = 0.8;
 
 /// What the person did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -47,11 +48,13 @@ pub struct Actions {
     pub drawn: u32,
     /// Points of what was drawn.
     pub points: u32,
+    /// Points set to mend what was accepted.
+    pub mended: u32,
 }
 
 impl Actions {
     pub fn all(&self) -> u32 {
-        self.accepted + self.rejected + self.joined + self.reclassed + self.drawn + self.points
+        self.accepted + self.rejected + self.joined + self.reclassed + self.drawn + self.points + self.mended
     }
 }
 
@@ -111,7 +114,7 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
             (vehicle.last, vehicle.detections) = (frame, vehicle.detections + n);
         }
     }
-    let (pieces, mut actions) = work_through(proposals, &instants, truth, &moving, &site);
+    let (pieces, mut actions) = work_through(proposals, &instants, &moving, &site);
     let mut labels: Vec<(usize, LabelTrack)> = Vec::new();
     for (vehicle, mut pieces) in pieces {
         pieces.sort_by(|a, b| a.points[0].time_s.total_cmp(&b.points[0].time_s));
@@ -130,7 +133,10 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
         let class = &truth.tracks[vehicle].class;
         if whole.class != *class {
             actions.reclassed += 1;
-            whole = reclassed(&whole, class, site.sensor);
+            whole.class = class.clone();
+        }
+        if let Some(seen) = vehicles.get(&vehicle) {
+            actions.mended += mend(&mut whole, &instants, vehicle, seen, &site);
         }
         labels.push((vehicle, whole));
     }
@@ -173,13 +179,11 @@ fn instants(recording: &Recording, truth: &Truth, options: &Options) -> Vec<Inst
 fn work_through(
     proposals: &[Proposal],
     instants: &[Instant],
-    truth: &Truth,
     moving: &[bool],
     site: &Site,
 ) -> (BTreeMap<usize, Vec<LabelTrack>>, Actions) {
     let mut pieces: BTreeMap<usize, Vec<LabelTrack>> = BTreeMap::new();
     let mut actions = Actions::default();
-    let _ = truth;
     for proposal in proposals {
         let label = Truth::new(labels(&proposal.track, site));
         let (mut steps, mut hits) = (0_u64, BTreeMap::<usize, u64>::new());
@@ -214,13 +218,41 @@ fn same_time(a: &LabelTrack, b: &LabelTrack) -> bool {
     }
 }
 
-/// The same near face with another class's box.
-fn reclassed(track: &LabelTrack, class: &str, _sensor: [f64; 2]) -> LabelTrack {
-    LabelTrack { class: class.to_owned(), ..track.clone() }
+/// Sets points where the vehicle is seen and the label is missing or elsewhere; how many.
+fn mend(track: &mut LabelTrack, instants: &[Instant], vehicle: usize, seen: &Vehicle, site: &Site) -> u32 {
+    let label = Truth::new(labels(track, site));
+    let Some(first) = seen.first else { return 0 };
+    // runs of frames without a label on the vehicle
+    let mut runs: Vec<(usize, usize, u32)> = Vec::new();
+    let mut open = false;
+    for (frame, instant) in instants.iter().enumerate().take(seen.last + 1).skip(first) {
+        let real = instant.objects.iter().position(|o| o.track == vehicle);
+        let Some((real, n)) = real.map(|k| (&instant.objects[k], instant.detections[k])) else { continue };
+        let good = label.at(instant.time_ns).first().is_some_and(|l| overlaps(&l.solid, &real.solid));
+        match runs.last_mut() {
+            Some(run) if open && !good => *run = (run.0, frame, run.2 + n),
+            _ if !good => runs.push((frame, frame, n)),
+            _ => {}
+        }
+        open = !good;
+    }
+    let mut set = 0;
+    for (begin, end, detections) in runs {
+        let [from_s, to_s] = [begin, end].map(|f| instants[f].time_ns.saturating_sub(site.start_ns) as f64 * 1e-9);
+        if detections < SEEN.0 || to_s - from_s < SEEN.1 {
+            continue;
+        }
+        let points = nears_of(&instants[begin..=end], vehicle, track.size(), site);
+        track.points.retain(|p| p.time_s < from_s || p.time_s > to_s);
+        track.points.extend(&points);
+        track.points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        set += points.len() as u32;
+    }
+    set
 }
 
-/// What a person who sees the vehicle would draw.
-fn drawn(instants: &[Instant], vehicle: usize, truth: &Truth, site: &Site) -> LabelTrack {
+/// The near face of a real vehicle in few points.
+fn nears_of(instants: &[Instant], vehicle: usize, size: [f64; 3], site: &Site) -> Vec<LabelPoint> {
     let steps: Vec<BoxStep> = instants
         .iter()
         .filter_map(|i| {
@@ -229,9 +261,14 @@ fn drawn(instants: &[Instant], vehicle: usize, truth: &Truth, site: &Site) -> La
             Some(BoxStep { time_s, center: [solid.center[0], solid.center[1]], heading_rad: solid.yaw_rad })
         })
         .collect();
+    simplify(&nears(&steps, size, site.sensor), DRAWN_M)
+}
+
+/// What a person who sees the vehicle would draw.
+fn drawn(instants: &[Instant], vehicle: usize, truth: &Truth, site: &Site) -> LabelTrack {
     let track = &truth.tracks[vehicle];
     let size = class_size(&track.class).unwrap_or([4.6, 1.8, 1.5]);
-    let points = simplify(&nears(&steps, size, site.sensor), DRAWN_M);
+    let points = nears_of(instants, vehicle, size, site);
     LabelTrack { id: track.id.clone(), class: track.class.clone(), size_m: None, points }
 }
 
@@ -329,7 +366,7 @@ impl Judged {
         let share = |[all, part]: [u64; 2]| 100.0 * part as f64 / all.max(1) as f64;
         let a = self.actions;
         format!(
-            "{}: {} vehicles, {} proposals; {:.2} actions a vehicle (accept {}, reject {}, join {}, class {}, draw {} with {} points)\n  \
+            "{}: {} vehicles, {} proposals; {:.2} actions a vehicle (accept {}, reject {}, join {}, class {}, mend {} points, draw {} with {} points)\n  \
              labelled {:.1} % of {} steps; {:.1} % of {} without detection are labelled so; {:.1} % of {} labelled steps without a vehicle; off by {:.1} m along, {:.1} m across\n",
             self.name,
             self.vehicles,
@@ -339,6 +376,7 @@ impl Judged {
             a.rejected,
             a.joined,
             a.reclassed,
+            a.mended,
             a.drawn,
             a.points,
             share(self.steps),
@@ -353,5 +391,3 @@ impl Judged {
     }
 }
 
-/// Steps of labels a second, for those who compare figures.
-pub const STEPS_A_SECOND: f64 = 1.0 / STEP_S;

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::path::Path;
+use super::path::{Path, quantile};
 use super::reflections::Instant;
 use super::tracker::{LONGEST_M, Tracklet};
 
@@ -12,6 +12,20 @@ const COMMON: f64 = 0.3;
 const GAP_S: f64 = 10.0;
 /// Longest gap in which something that stands is waited for, seconds.
 const STANDING_GAP_S: f64 = 90.0;
+/// Speed below which vehicles may keep so close together that they look like one, m/s.
+const SLOW_MPS: f64 = 8.0;
+/// Cells along a vehicle in which reflections are counted, metres; how many.
+const BIN_M: f64 = 0.5;
+const BINS: usize = 80;
+/// A void has less than this share of what its cells would have on average, is this long, and has on either side at
+/// least this share of all reflections.
+const THIN: f64 = 0.15;
+const VOID_M: f64 = 2.5;
+const SMALLER: f64 = 0.1;
+/// Cars are not higher than this, metres.
+const LOW_M: f64 = 1.8;
+/// Nor longer than this.
+const CAR_M: f64 = 6.0;
 /// Frames two pieces have to be seen together in.
 const TOGETHER: usize = 8;
 
@@ -133,7 +147,12 @@ fn rigid(a: &Path, b: &Path) -> Option<f64> {
     let wobble = (along.iter().map(|v| (v - shift).powi(2)).sum::<f64>() / n).sqrt();
     let reach = [a.reach[0].min(shift + b.reach[0]), a.reach[1].max(shift + b.reach[1])];
     let apart = (shift + b.reach[0] - a.reach[1]).max(a.reach[0] - shift - b.reach[1]);
-    let one = side.abs() < 1.4 && speed.abs() < 0.6 && wobble < 1.0 && reach[1] - reach[0] < LONGEST_M && apart < 6.0;
+    // two cars, or a truck and a car behind it: one of the two is low
+    let long = reach[1] - reach[0] > CAR_M && a.mean_speed().min(b.mean_speed()) < SLOW_MPS;
+    if long && a.top_m.min(b.top_m) < LOW_M {
+        return None;
+    }
+    let one = side.abs() < if apart < 0.0 { 2.0 } else { 1.4 } && speed.abs() < 0.6 && wobble < 1.0 && reach[1] - reach[0] < LONGEST_M && apart < 6.0;
     one.then_some(side.abs() + speed.abs() + wobble + apart.max(0.0) / 6.0)
 }
 
@@ -168,4 +187,53 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
     let (along, left) =
         (along.abs() / (2.0 + 0.5 * length + 0.08 * speed * wait + 0.3 * wait), left.abs() / (1.2 + 0.3 * wait));
     (along < 1.0 && left < 1.0).then_some(along + left + wait / 5.0)
+}
+
+/// Takes apart paths that hold two vehicles one behind the other: between their reflections is a void.
+pub fn apart(paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
+    paths.into_iter().flat_map(|path| halves(path, instants)).collect()
+}
+
+fn halves(path: Path, instants: &[Instant]) -> Vec<Path> {
+    let along: Vec<Option<f64>> =
+        path.members.iter().zip(path.reflections(instants)).map(|(_, (f, r))| Some(path.local(f, r)?[0])).collect();
+    let mut counts = [0_usize; BINS];
+    let bin = |v: f64| ((v / BIN_M + BINS as f64 / 2.0).floor().max(0.0) as usize).min(BINS - 1);
+    for v in along.iter().flatten() {
+        counts[bin(*v)] += 1;
+    }
+    let total: usize = counts.iter().sum();
+    let (low, high) = (bin(path.reach[0]), bin(path.reach[1]));
+    let thin = (THIN * total as f64 / (high + 1 - low) as f64) as usize;
+    // the longest run of thin bins within the reach
+    let (mut best, mut run) = ((0, 0), 0);
+    for k in low..=high {
+        run = if counts[k] <= thin { run + 1 } else { 0 };
+        if run > best.0 {
+            best = (run, k);
+        }
+    }
+    if path.mean_speed() > SLOW_MPS {
+        return vec![path];
+    }
+    let (length, end) = best;
+    let cut = (end as f64 + 1.0 - length as f64 / 2.0 - BINS as f64 / 2.0) * BIN_M;
+    let behind = along.iter().flatten().filter(|v| **v < cut).count();
+    let smaller = behind.min(total - behind);
+    if (length as f64) * BIN_M < VOID_M || (smaller as f64) < SMALLER * total as f64 {
+        return vec![path];
+    }
+    let top = |front: bool| {
+        let own = path.reflections(instants).zip(&along).filter(|(_, v)| v.is_some_and(|v| (v >= cut) == front));
+        quantile(&own.map(|((_, r), _)| r.height_m).collect::<Vec<_>>(), 0.85)
+    };
+    // one long vehicle is high
+    if [top(false), top(true)].iter().flatten().any(|top| *top > LOW_M) {
+        return vec![path];
+    }
+    let part = |front: bool| {
+        let own = path.members.iter().zip(&along).filter(|(_, v)| v.is_some_and(|v| (v >= cut) == front));
+        Path::new(own.map(|(m, _)| *m).collect(), instants)
+    };
+    [part(false), part(true)].into_iter().flatten().collect()
 }

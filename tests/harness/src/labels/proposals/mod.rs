@@ -14,6 +14,7 @@ mod motion;
 mod path;
 mod reflections;
 mod shape;
+mod standing;
 mod tracker;
 
 use rayon::prelude::*;
@@ -27,6 +28,9 @@ use path::Path;
 const FEWEST: usize = 12;
 /// Shortest way of a proposal: what stands all the time is no label, metres.
 const TRAVEL_M: f64 = 6.0;
+
+/// Lowest score that is worth a look.
+const LEAST: f64 = 0.72;
 
 /// A track that is offered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -51,16 +55,17 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     let tracklets = joining::both_ways(&forward, &backward);
     let paths: Vec<Path> = tracklets.into_par_iter().filter_map(|t| Path::new(t.members, &instants)).collect();
     progress(0.7);
-    let paths = joining::abreast(paths, &instants);
+    let paths = joining::apart(joining::abreast(paths, &instants), &instants);
     progress(0.8);
     let paths = joining::through_gaps(paths, &instants);
-    let paths = joining::abreast(paths, &instants);
+    let paths: Vec<Path> = paths.into_par_iter().map(|path| standing::stood(path, &instants)).collect();
     progress(0.9);
     let [x, y, _] = recording.pose.position;
     let mut scored: Vec<(f64, &Path)> = paths
         .iter()
         .filter(|p| p.members.len() >= FEWEST && p.travel_m() >= TRAVEL_M)
         .map(|p| (score(p, &instants), p))
+        .filter(|(score, _)| *score >= LEAST)
         .collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {

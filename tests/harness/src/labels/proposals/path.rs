@@ -11,6 +11,10 @@ const STOOD_S: f64 = 2.0;
 /// Speed from which on the heading is that of the velocity, m/s.
 const HEADED_MPS: f64 = 3.0;
 
+/// Within this distance heights are trusted, if there are so many, metres.
+const HEIGHT_WITHIN_M: f64 = 80.0;
+const ENOUGH: usize = 10;
+
 /// Reflections of a road user, and where it was from the first to the last of them.
 #[derive(Debug, Clone)]
 pub struct Path {
@@ -23,6 +27,8 @@ pub struct Path {
     pub headings_rad: Vec<f64>,
     /// Where the reflections lie along the heading, from the place on: 5 % and 95 %.
     pub reach: [f64; 2],
+    /// Height of the higher reflections, metres.
+    pub top_m: f64,
 }
 
 impl Path {
@@ -31,13 +37,14 @@ impl Path {
         members.sort_unstable();
         members.dedup();
         let (first, last) = (members.first()?.0, members.last()?.0);
-        let mut path = Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2] };
+        let mut path = Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2], top_m: 0.0 };
         // how long it is tells how much a place can be trusted, and the other way round
         for _ in 0..2 {
             path.motions = smooth(&path.filtered(last, instants)?);
             path.headings_rad = path.headings();
             path.reach = path.reached(instants);
         }
+        path.top_m = path.top(instants)?;
         Some(path)
     }
 
@@ -59,6 +66,11 @@ impl Path {
         let [x, y] = first.place();
         let away = self.motions.iter().map(|(_, m)| (m.place()[0] - x).hypot(m.place()[1] - y));
         away.fold(0.0, f64::max)
+    }
+
+    /// Over all its time, m/s.
+    pub fn mean_speed(&self) -> f64 {
+        self.motions.iter().map(|(_, m)| m.speed()).sum::<f64>() / self.motions.len().max(1) as f64
     }
 
     /// Its reflections with the frame each is of.
@@ -125,6 +137,15 @@ impl Path {
         all.collect()
     }
 
+    /// 85 % of the heights, those nearby where there are enough: farther away they are vague.
+    fn top(&self, instants: &[Instant]) -> Option<f64> {
+        let heights = |within_m: f64| -> Vec<f64> {
+            self.reflections(instants).filter(|(_, r)| r.distance_m < within_m).map(|(_, r)| r.height_m).collect()
+        };
+        let near = heights(HEIGHT_WITHIN_M);
+        quantile(&if near.len() < ENOUGH { heights(f64::INFINITY) } else { near }, 0.85)
+    }
+
     fn reached(&self, instants: &[Instant]) -> [f64; 2] {
         let along: Vec<f64> =
             self.reflections(instants).filter_map(|(frame, r)| Some(self.local(frame, r)?[0])).collect();
@@ -139,7 +160,7 @@ fn beginning(own: &[Reflection]) -> Option<Motion> {
     let direction = r.sight.map(|v| v / ground);
     let radial = r.doppler_mps / ground;
     let velocity = direction.map(|v| v * radial);
-    Some(Motion::new(r.place, velocity, 2.0 * across_m(r.distance_m), direction, [1.0, 8.0]))
+    Some(Motion::new(r.place, velocity, 2.0 * across_m(r.distance_m), direction, [1.0, (0.6 * radial.abs()).clamp(4.0, 15.0)]))
 }
 
 /// The value below which this share lies.

@@ -28,13 +28,12 @@ pub struct Extent {
 
 impl Extent {
     pub fn of(path: &Path, instants: &[Instant]) -> Self {
-        let (mut behind, mut ahead, mut heights) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut behind, mut ahead) = (Vec::new(), Vec::new());
         for (frame, r) in path.reflections(instants) {
             let Some([along, _]) = path.local(frame, r) else { continue };
             let Some(cos) = path.heading_at(frame).map(|h| h.cos() * r.sight[0] + h.sin() * r.sight[1]) else {
                 continue;
             };
-            heights.push(r.height_m);
             if cos > END_COS {
                 behind.push(along);
             } else if cos < -END_COS {
@@ -46,7 +45,7 @@ impl Extent {
             rear: end(&behind, 0.1),
             front: end(&ahead, 0.9),
             reach: path.reach,
-            top_m: quantile(&heights, 0.85).unwrap_or(0.0),
+            top_m: path.top_m,
         }
     }
 
@@ -57,8 +56,8 @@ impl Extent {
             _ => self.reach[1] - self.reach[0],
         };
         match () {
-            () if length_m > 7.5 || (self.top_m > 2.8 && length_m > 5.0) => "truck",
-            () if length_m > 5.0 || self.top_m > 2.2 => "van",
+            () if length_m > 7.2 || (self.top_m > 2.9 && length_m > 5.5) => "truck",
+            () if length_m > 5.5 || self.top_m > 2.4 => "van",
             () => "car",
         }
     }
@@ -78,6 +77,7 @@ impl Extent {
 pub fn track(path: &Path, instants: &[Instant], sensor: [f64; 2], id: String) -> LabelTrack {
     let extent = Extent::of(path, instants);
     let class = extent.class();
+    if std::env::var("DIAG").is_ok() { eprintln!("X {} top {:.2} reach {:.2} rear {:?} front {:?}", id, extent.top_m, extent.reach[1] - extent.reach[0], extent.rear, extent.front); } //DIAG
     let size = class_size(class).unwrap_or([4.6, 1.8, 1.5]);
     let along = extent.center_m(size[0]);
     // of the flank that is seen, reflections come from the side of the sensor
