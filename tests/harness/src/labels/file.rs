@@ -269,7 +269,7 @@ mod tests {
         let path = folder.join("a.labels.csv");
         let good = "time_s,object_id,class,x_m,y_m\n0,1,car,10,0\n# a comment\n1,1,car,20,0\n";
         for (row, line, what) in [
-            ("2,1,car,thirty,0", 5, "x_m"),
+            ("2,1,car,thirty,0", 5, "float"),
             ("2,1,car,30", 5, "fields"),
             ("2,1,ship,30,0", 5, "ship"),
             ("2,1,car,NaN,0", 5, "finite"),

@@ -5,7 +5,9 @@
 //! detections, to be accepted, mended or rejected. [`judged`] plays the person who does that and counts its actions.
 
 pub mod file;
+pub mod judged;
 pub mod near_face;
+pub mod proposals;
 pub mod simplify;
 pub mod tracks;
 

@@ -4,8 +4,11 @@
 //! State x, y, vx, vy; white acceleration; scalar measurements one after another (Kalman). The smoother goes back over
 //! the filtered states (Rauch, Tung, Striebel, *Maximum likelihood estimates of linear dynamic systems*, 1965).
 
-/// Acceleration of road users, m/s² (one standard deviation, white).
-const ACCELERATION_MPS2: f64 = 2.0;
+/// Acceleration of road users along their way, m/s² (one standard deviation, white).
+const ALONG_MPS2: f64 = 2.0;
+/// Across it: at walking speed as much as a turn has, at this speed and above as much as a change of lanes.
+const ACROSS_MPS2: [f64; 2] = [2.0, 0.2];
+const STRAIGHT_MPS: f64 = 20.0;
 
 type Matrix = [[f64; 4]; 4];
 
@@ -64,12 +67,22 @@ impl Motion {
                 self.covariance[row][column] += dt_s * self.covariance[row][column + 2];
             }
         }
-        let q = ACCELERATION_MPS2 * ACCELERATION_MPS2 * dt_s.abs();
-        for k in 0..2 {
-            self.covariance[k][k] += q * dt_s * dt_s / 3.0;
-            self.covariance[k][k + 2] += q * dt_s / 2.0;
-            self.covariance[k + 2][k] += q * dt_s / 2.0;
-            self.covariance[k + 2][k + 2] += q;
+        let speed = self.speed();
+        let fast = (speed / STRAIGHT_MPS).min(1.0);
+        let across = ACROSS_MPS2[0] + fast * (ACROSS_MPS2[1] - ACROSS_MPS2[0]);
+        let [along, across] = [ALONG_MPS2, across].map(|a| a * a * dt_s.abs());
+        let [c, s] = if speed > 0.1 { self.velocity().map(|v| v / speed) } else { [1.0, 0.0] };
+        let q = [
+            [along * c * c + across * s * s, (along - across) * c * s],
+            [(along - across) * c * s, along * s * s + across * c * c],
+        ];
+        for i in 0..2 {
+            for j in 0..2 {
+                self.covariance[i][j] += q[i][j] * dt_s * dt_s / 3.0;
+                self.covariance[i][j + 2] += q[i][j] * dt_s / 2.0;
+                self.covariance[i + 2][j] += q[i][j] * dt_s / 2.0;
+                self.covariance[i + 2][j + 2] += q[i][j];
+            }
         }
     }
 

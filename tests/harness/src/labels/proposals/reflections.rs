@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::geometry::pose::{direction, SensorPose};
+use crate::geometry::pose::{SensorPose, direction};
 use crate::recording::Recording;
 
 /// Height at which a detection without elevation is taken to lie, metres.

@@ -6,7 +6,7 @@
 //! reflections goes on as predicted for [`COAST_S`], then ends.
 
 use super::motion::Motion;
-use super::reflections::{Instant, Reflection};
+use super::reflections::{Instant, Reflection, STANDS_MPS};
 
 /// Doppler from which on a reflection may begin a tracklet, m/s.
 const MOVES_MPS: f64 = 0.6;
@@ -17,6 +17,10 @@ const YOUNG_COAST_S: f64 = 0.35;
 const GROWN_FRAMES: usize = 6;
 /// Speed below which a heading is not read from the velocity, m/s.
 const HEADED_MPS: f64 = 2.0;
+/// Speed below which vehicles may stand in a queue, m/s.
+const SLOW_MPS: f64 = 6.0;
+/// Speed below which something whose Doppler says it stands is taken to stand, m/s.
+const STOPPED_MPS: f64 = 1.0;
 /// Longest vehicle, metres.
 pub const LONGEST_M: f64 = 18.0;
 /// Doppler of one vehicle's reflections differs by about this, m/s.
@@ -40,7 +44,7 @@ struct Running {
 
 /// Spread of a place across the line of sight, metres.
 pub fn across_m(distance_m: f64) -> f64 {
-    0.4 + 0.012 * distance_m
+    0.4 + 0.008 * distance_m
 }
 
 /// Tracklets of all frames, forwards in time or backwards.
@@ -127,7 +131,9 @@ impl Running {
             }
         }
         let side = 0.6 + across_m(r.distance_m) + 0.5 * missed;
-        let ahead = 1.0 + 1.2 * missed;
+        // queues move as one: what is slow may only reach as far as it did
+        let slow = (self.motion.speed() / SLOW_MPS).min(1.0);
+        let ahead = 0.4 + 0.6 * slow + 1.2 * missed * slow;
         if beyond > 2.0 * ahead || left.abs() > 2.0 * side {
             return None;
         }
@@ -140,6 +146,7 @@ impl Running {
         }
         let all: Vec<Reflection> = own.iter().map(|i| reflections[*i]).collect();
         measure(&mut self.motion, &all, sign, self.heading, self.reach[1] - self.reach[0]);
+        let stands = self.motion.speed() < STOPPED_MPS;
         let speed = self.motion.speed();
         if speed > HEADED_MPS && self.frames >= 3 {
             let [vx, vy] = self.motion.velocity();
@@ -148,17 +155,15 @@ impl Running {
             }
             self.heading = Some([vx / speed, vy / speed]);
         }
-        if let Some([c, s]) = self.heading {
+        // around something that stands everything that stands looks like a part of it
+        if let Some([c, s]) = self.heading.filter(|_| !stands) {
             let [x, y] = self.motion.place();
             let along = all.iter().map(|r| (r.place[0] - x) * c + (r.place[1] - y) * s);
-            let [low, high] =
-                along.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+            let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
             // grows soon, shrinks slowly: not every frame shows the whole vehicle
             let follow = |old: f64, new: f64, outwards: bool| old + if outwards { 0.4 } else { 0.02 } * (new - old);
-            self.reach = [
-                follow(self.reach[0], low, low < self.reach[0]),
-                follow(self.reach[1], high, high > self.reach[1]),
-            ];
+            self.reach =
+                [follow(self.reach[0], low, low < self.reach[0]), follow(self.reach[1], high, high > self.reach[1])];
         }
         self.members.extend(own.iter().map(|i| (frame, *i)));
         self.frames += 1;
@@ -184,7 +189,12 @@ pub fn measure(motion: &mut Motion, all: &[Reflection], sign: f64, heading: Opti
     const ALIKE: f64 = 2.0;
     motion.update([c, s, 0.0, 0.0], c * x + s * y, ALIKE * radial);
     motion.update([-s, c, 0.0, 0.0], -s * x + c * y, ALIKE * across);
-    motion.update([0.0, 0.0, ux, uy], mean(&|r| sign * r.doppler_mps), DOPPLER_MPS);
+    let doppler = mean(&|r| sign * r.doppler_mps);
+    motion.update([0.0, 0.0, ux, uy], doppler, DOPPLER_MPS);
+    if doppler.abs() < STANDS_MPS && motion.speed() < STOPPED_MPS {
+        motion.update([0.0, 0.0, 1.0, 0.0], 0.0, DOPPLER_MPS);
+        motion.update([0.0, 0.0, 0.0, 1.0], 0.0, DOPPLER_MPS);
+    }
 }
 
 /// Groups of free reflections that move alike begin tracklets.
@@ -221,7 +231,7 @@ fn births(frame: usize, free: &[usize], reflections: &[Reflection], sign: f64, n
             direction.map(|v| v * radial),
             across_m(members[0].distance_m),
             direction,
-            [1.0, (0.3 * radial.abs()).clamp(2.0, 5.0)],
+            [1.0, (0.5 * radial.abs()).clamp(2.0, 12.0)],
         );
         all.push(Running {
             motion,
