@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let folder = labels.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(".".as_ref());
     let Some(name) = labels.file_name() else { bail!("{} is no file", path.display()) };
     let target = OutputArgs::default().beside([path.clone()]).folder("labels", folder)?.file(name)?;
-    let recording = recording::read(path, &args.reading.options())?;
+    let recording = recording::read(path, &args.reading.options()).with_context(|| path.display().to_string())?;
     let server = Server::bind(args.bind, args.port)?;
     let frames = recording.frames.len();
     let labelling = Labelling::new(path, recording, target, estimators::Options::default())?;

@@ -18,6 +18,7 @@ use super::visibility::Maps;
 use super::{assets, camera};
 use crate::estimators::Options;
 use crate::labels::Site;
+use crate::labels::proposals::propose;
 use crate::labels::tracks::LabelTrack;
 use crate::recording::Recording;
 use crate::results::files::Target;
@@ -55,7 +56,8 @@ impl Labelling {
             Arc::new(Self { recording, labels, maps: Maps::default(), proposals: OnceLock::new(), images });
         let worker = this.clone();
         std::thread::spawn(move || {
-            let _ = worker.proposals.set(b"[]".to_vec());
+            let found = serde_json::to_vec(&propose(&worker.recording, &|_| ()));
+            let _ = worker.proposals.set(found.unwrap_or_else(|_| b"[]".to_vec()));
             if let Err(error) = worker.maps.fill(&worker.recording, &options) {
                 eprintln!("no estimated visibility: {error:#}");
             }

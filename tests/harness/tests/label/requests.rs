@@ -1,11 +1,15 @@
 //! What the server refuses, and what it keeps, asked without a browser.
 
-use std::fs;
+use std::fs::{self, File};
+use std::path::Path;
 use std::process::{Command, Output};
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::server::{Server, folder, recording};
+use viewshed_harness::recording::write::RecordingWriter;
+use viewshed_harness::recording::{ReadOptions, mcap};
+
+use crate::server::{SHIPPED, Server, folder, recording};
 
 /// Two tracks as the page sends them.
 const TWO: &str = r#"[{"id":"1","class":"car","points":[[1,80,3],[4,20,3]]},
@@ -217,13 +221,13 @@ fn tracks_that_are_none_are_refused_by_name() {
 fn a_full_disk_is_said_and_what_was_saved_stays() {
     let folder = folder("full");
     let mount = |arguments: &[&str]| Command::new(arguments[0]).args(&arguments[1..]).arg(&folder).status();
-    // 4 MB hold the recording and little more
+    // it holds the recording and little more
     if !mount(&["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs"]).is_ok_and(|status| status.success()) {
         eprintln!("skipped: labels on a full disk: no small file system can be mounted here");
         return;
     }
     let recording = folder.join("site.mcap");
-    fs::copy(crate::server::SHIPPED, &recording).unwrap();
+    fs::copy(SHIPPED, &recording).unwrap();
     let server = Server::start(&recording);
     let (_, read) = server.own("GET", "labels", &[], "");
     let (_stream, writer) = server.hold().unwrap();
@@ -232,7 +236,7 @@ fn a_full_disk_is_said_and_what_was_saved_stays() {
     let before = fs::read(&server.labels).unwrap();
     let filler = folder.join("filler");
     let _ = fs::write(&filler, vec![0; 4 << 20]);
-    let many = (0..400).map(|k| format!(r#"{{"id":"{k}","class":"car","points":[[1,80,3],[9,20,3]]}}"#));
+    let many = (0..20).map(|k| format!(r#"{{"id":"{k}","class":"car","points":[[1,80,3],[9,20,3]]}}"#));
     let many = format!("[{}]", many.collect::<Vec<_>>().join(","));
     let (status, error) = save(&server, &writer, &version(&answer), &many);
     let kept = fs::read(&server.labels).unwrap();
@@ -252,6 +256,11 @@ fn a_recording_without_radar_is_an_error() {
     fs::write(&file, "nothing").unwrap();
     let (code, error) = run(&[file.to_str().unwrap()]);
     assert!(code == Some(2) && error.contains("empty.mcap"), "{error}");
+    let recording = mcap::read(Path::new(SHIPPED), &ReadOptions::default()).unwrap();
+    let silent = File::create(folder.join("silent.mcap")).unwrap();
+    RecordingWriter::new(silent, &recording.sensor, &recording.pose, 0).unwrap().finish().unwrap();
+    let (code, error) = run(&[folder.join("silent.mcap").to_str().unwrap()]);
+    assert!(code == Some(2) && error.contains("silent.mcap") && error.contains("/radar/points"), "{error}");
     let (code, error) = run(&[folder.join("absent.mcap").to_str().unwrap()]);
     assert!(code == Some(2) && error.contains("absent.mcap"), "{error}");
 }

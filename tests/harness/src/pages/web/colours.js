@@ -10,9 +10,9 @@ export const STRONGEST_DBSM = 35;
 
 export const isDark = () => matchMedia('(prefers-color-scheme: dark)').matches;
 
-// Strong ones stand out from the page, so the scale is turned round on a dark one; yellow on white is hard to see.
+// Strong ones stand out from the page, so the scale is turned round on a dark one; its ends keep clear of the page.
 function scale() {
-  return isDark() ? [...LIGHT].reverse() : [[0xd9, 0xb4, 0x10], ...LIGHT.slice(1)];
+  return isDark() ? [[0x4b, 0x74, 0xc4], ...LIGHT.slice(0, 3).reverse()] : [[0xd9, 0xb4, 0x10], ...LIGHT.slice(1)];
 }
 
 // RGBA in the order of bytes that a canvas has on little-endian machines.
@@ -30,8 +30,8 @@ export function rcsColours() {
 }
 
 export const trackColours = () => Uint32Array.from(TRACKS, (hex) => packed(parsed(hex)));
-export const unlabelled = () => packed(isDark() ? [0x9a, 0xa2, 0xab] : [0x7d, 0x86, 0x90]);
-export const faint = () => packed(isDark() ? [0x3a, 0x41, 0x49] : [0xd8, 0xdd, 0xe2]);
+export const unlabelled = () => packed(isDark() ? [0x6a, 0x72, 0x7b] : [0xa4, 0xab, 0xb3]);
+export const faint = () => packed(isDark() ? [0x30, 0x36, 0x3d] : [0xdf, 0xe3, 0xe7]);
 
 // Ground of the plan: unknown, invisible, visible, visible and occupied.
 export function groundColours() {

@@ -47,7 +47,7 @@ export function table(page) {
     ['0', 'View', 'show everything', () => page.showAll(), false],
     ['f', 'View', 'show the selected track, or the proposal', () => page.fit(), false],
     ['b', 'View', 'brush: only the reflections in this view count (mouse: Shift and drag); again for all', () => page.brush(), false],
-    ['l', 'View', 'only the reflections in the lane of the selected track or proposal; again for all', () => session.lane(), false],
+    ['l', 'View', 'only the reflections in the lane of the selected track or the proposal, or all', () => session.lane(), false],
     ['c', 'View', 'colour by RCS or by track', () => page.colour(), false, 'colour'],
     ['.', 'Time', 'one radar frame on', () => session.step(1), true],
     [',', 'Time', 'one radar frame back', () => session.step(-1), true],

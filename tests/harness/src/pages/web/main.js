@@ -294,9 +294,11 @@ class Page {
   showProposal() {
     const { proposals } = this.session;
     const { current } = proposals;
+    if (!current && this.session.brush?.plot === 'lane') this.session.brushed(null, null);
     // what is being changed is not taken out of sight
     if (!current || this.session.selected !== null) return;
     this.fit(current.track);
+    if (this.session.lanes) this.session.showLane();
     requestAnimationFrame(() => requestAnimationFrame(() => proposals.current === current && proposals.seen()));
   }
 

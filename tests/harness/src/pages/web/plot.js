@@ -40,14 +40,24 @@ export class Plot {
     this.times = { moved: 0, drawn: 0 };
     this.listen();
     new ResizeObserver(() => this.resized()).observe(element);
+    this.watchScale();
+  }
+
+  // Another screen, or another zoom of the browser, has other pixels.
+  watchScale() {
+    const same = matchMedia(`(resolution: ${globalThis.devicePixelRatio}dppx)`);
+    same.addEventListener('change', () => {
+      this.resized();
+      this.watchScale();
+    }, { once: true });
   }
 
   resized() {
     const { width, height } = this.element.getBoundingClientRect();
     const em = parseFloat(getComputedStyle(this.element).fontSize);
-    const [left, bottom, rim] = [3.9 * em, 2.1 * em, 0.5 * em];
+    const [left, bottom, rim, right] = [3.9 * em, 2.1 * em, 0.5 * em, 1.2 * em];
     this.em = em;
-    this.area = { left, top: rim, width: Math.max(width - left - rim - 2, 10), height: Math.max(height - bottom - rim - 2, 10) };
+    this.area = { left, top: rim, width: Math.max(width - left - right - 2, 10), height: Math.max(height - bottom - rim - 2, 10) };
     Object.assign(this.clip.style, { left: `${left}px`, top: `${rim}px`, width: `${this.area.width}px`, height: `${this.area.height}px` });
     this.scale = globalThis.devicePixelRatio || 1;
     this.marks.width = Math.round(width * this.scale);

@@ -26,6 +26,7 @@ export class Session {
     this.now = 0;
     this.window = 0.25;
     this.colouring = 'rcs';
+    this.lanes = true;
     this.brush = null;
     this.chosen = null;
     this.message = '';
@@ -111,6 +112,7 @@ export class Session {
 
   // Begins a track; it exists with its first point.
   begin() {
+    if (this.brush?.plot === 'lane') this.brushed(null, null);
     this.drawing = tracks.newId(this.tracks);
     this.selected = this.drawing;
     this.point = null;
@@ -292,10 +294,16 @@ export class Session {
     this.changed('points');
   }
 
-  // Only reflections in the lane of the selected track or the proposal; again for all.
+  // Only reflections in the lane of the selected track or the proposal; again for all. It stays so for what comes next.
   lane() {
+    this.lanes = this.brush?.plot !== 'lane';
+    if (this.lanes) this.showLane();
+    else this.brushed(null, null);
+  }
+
+  showLane() {
     const track = this.track ?? this.proposals.current?.track;
-    if (this.brush || !track) {
+    if (!track) {
       this.brushed(null, null);
       return;
     }
