@@ -85,7 +85,9 @@ mod tests {
         let mut writer = ::mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
         let schema = writer.add_schema(COMPRESSED, "ros2msg", b"").unwrap();
         let channel = writer.add_channel(schema, "/camera/image/compressed", "cdr", &BTreeMap::new()).unwrap();
-        for (sequence, (time_ns, data)) in [(2_000_000_000, &JPEG[..]), (1_000_000_000, &JPEG[..5]), (3_000_000_000, b"text")].into_iter().enumerate() {
+        for (sequence, (time_ns, data)) in
+            [(2_000_000_000, &JPEG[..]), (1_000_000_000, &JPEG[..5]), (3_000_000_000, b"text")].into_iter().enumerate()
+        {
             let header = Header { stamp: Stamp::from_nanoseconds(time_ns), frame_id: "camera".into() };
             let image = CompressedImage { header, format: "jpeg".into(), data: data.to_vec() };
             let header = ::mcap::records::MessageHeader {
@@ -99,7 +101,10 @@ mod tests {
         writer.finish().unwrap();
         let images = Images(sorted(read(&writer.into_inner().into_inner())));
         let at = |time_s: f64| images.at((time_s * 1e9) as i64).map(|(kind, bytes)| (kind, bytes.len()));
-        assert_eq!((at(1.1), at(2.0), at(2.4)), (Some(("image/jpeg", 5)), Some(("image/jpeg", 6)), Some(("image/jpeg", 6))));
+        assert_eq!(
+            (at(1.1), at(2.0), at(2.4)),
+            (Some(("image/jpeg", 5)), Some(("image/jpeg", 6)), Some(("image/jpeg", 6)))
+        );
         assert_eq!((at(0.9), at(1.6), at(9.0)), (None, None, None), "no picture is near, or none a browser knows");
     }
 }

@@ -57,7 +57,10 @@ pub fn admit(own: SocketAddr, token: &Token, method: &Method, path: &str, header
     }
     let first = path.strip_prefix('/').and_then(|path| path.split('/').next()).unwrap_or_default();
     if !token.is(first) {
-        return Err((StatusCode::FORBIDDEN, "the address lacks the server's token; open the address that it printed\n"));
+        return Err((
+            StatusCode::FORBIDDEN,
+            "the address lacks the server's token; open the address that it printed\n",
+        ));
     }
     Ok(())
 }
@@ -115,7 +118,8 @@ mod tests {
 
     #[test]
     fn without_the_whole_token_nothing_is_answered() {
-        for path in ["/", "", "/labels", &format!("/{}/", &TOKEN[..31]), &format!("/{TOKEN}0/"), &format!("//{TOKEN}/")] {
+        for path in ["/", "", "/labels", &format!("/{}/", &TOKEN[..31]), &format!("/{TOKEN}0/"), &format!("//{TOKEN}/")]
+        {
             assert!(ask(Method::GET, path, &[("host", "127.0.0.1:8000")]).is_err(), "{path}");
         }
         assert!(Token::random().unwrap().0 != Token::random().unwrap().0);

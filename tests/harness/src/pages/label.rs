@@ -52,8 +52,7 @@ impl Labelling {
         let labels = Labels::new(file, labels, Site::of(&recording))?;
         labels.read()?;
         let images = camera::Images::of(file);
-        let this =
-            Arc::new(Self { recording, labels, maps: Maps::default(), proposals: OnceLock::new(), images });
+        let this = Arc::new(Self { recording, labels, maps: Maps::default(), proposals: OnceLock::new(), images });
         let worker = this.clone();
         std::thread::spawn(move || {
             let found = serde_json::to_vec(&propose(&worker.recording, &|_| ()));
@@ -145,7 +144,9 @@ async fn save(State(this): Shared, headers: HeaderMap, body: Bytes) -> Response 
     let number = |name: &HeaderName| headers.get(name).and_then(|value| value.to_str().ok()?.parse().ok()).unwrap_or(0);
     let tracks: Vec<LabelTrack> = match serde_json::from_slice(&body) {
         Ok(tracks) => tracks,
-        Err(error) => return (StatusCode::UNPROCESSABLE_ENTITY, format!("these are no tracks: {error}\n")).into_response(),
+        Err(error) => {
+            return (StatusCode::UNPROCESSABLE_ENTITY, format!("these are no tracks: {error}\n")).into_response();
+        }
     };
     match this.labels.save(number(&WRITER), number(&VERSION), &tracks) {
         Ok(version) => ([(VERSION, version.to_string())], json(&this.labels.boxes(&tracks))).into_response(),

@@ -1,13 +1,13 @@
 //! How the page looks: readable when enlarged, light and dark, every key listed; and its pictures for the README.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::browser::{Browser, Page};
 use crate::server::{Server, folder, recording};
 
-/// Where pictures go: the folder in `VIEWSHED_PICTURES`, to renew those of the README, or one that is thrown away.
-fn pictures() -> PathBuf {
-    std::env::var_os("VIEWSHED_PICTURES").map_or_else(|| folder("pictures"), PathBuf::from)
+/// Where the README's pictures go: the folder in `VIEWSHED_PICTURES`, to renew them, or the one for all others.
+fn readme(others: &Path) -> PathBuf {
+    std::env::var_os("VIEWSHED_PICTURES").map_or_else(|| others.to_owned(), PathBuf::from)
 }
 
 /// Nothing is cut off or hidden to the right, and no text is smaller than it may be.
@@ -48,8 +48,10 @@ fn the_page_is_readable_light_dark_and_enlarged_and_lists_its_keys() {
     page.until_saved();
     page.until("viewshed.session.proposals.shown");
     page.until("viewshed.ground.map !== null");
-    let pictures = pictures();
-    page.picture(&pictures.join("label-proposal.png"));
+    let pictures = folder("pictures");
+    page.size(1120, 820, 1.0);
+    page.rests();
+    page.picture(&readme(&pictures).join("label-proposal.png"));
     for _ in 0..6 {
         page.key("a");
         page.until("viewshed.session.proposals.shown || !viewshed.session.proposals.current");
@@ -59,8 +61,8 @@ fn the_page_is_readable_light_dark_and_enlarged_and_lists_its_keys() {
     page.key("PageDown");
     page.key("f");
     page.until_saved();
-    is_readable(&page, 1400);
-    page.picture(&pictures.join("label-track.png"));
+    is_readable(&page, 1120);
+    page.picture(&readme(&pictures).join("label-track.png"));
     // every key is in the list, and the list closes with Escape
     page.key("?");
     page.until("document.getElementById('help').open");

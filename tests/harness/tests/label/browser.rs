@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use headless_chrome::protocol::cdp::Emulation::{MediaFeature, SetDeviceMetricsOverride, SetEmulatedMedia};
@@ -11,6 +11,7 @@ use headless_chrome::protocol::cdp::Input::{
     DispatchKeyEvent, DispatchKeyEventTypeOption, DispatchMouseEvent, DispatchMouseEventTypeOption, MouseButton,
 };
 use headless_chrome::protocol::cdp::Page::CaptureScreenshotFormatOption;
+use headless_chrome::protocol::cdp::types::Event;
 use headless_chrome::{LaunchOptions, Tab};
 use serde_json::Value;
 
@@ -62,32 +63,52 @@ impl Browser {
     pub fn open(&self, url: &str) -> Page {
         let tab = self.0.new_tab().unwrap();
         tab.set_default_timeout(PATIENCE);
-        let page = Page(tab);
+        let errors = Arc::<Mutex<Vec<String>>>::default();
+        let found = errors.clone();
+        let listener = move |event: &Event| {
+            if let Event::RuntimeExceptionThrown(thrown) = event {
+                found.lock().unwrap().push(format!("{:?}", thrown.params.exception_details));
+            }
+        };
+        tab.add_event_listener(Arc::new(listener)).unwrap();
+        tab.enable_runtime().unwrap();
+        let page = Page { tab, errors };
         page.size(1400, 1000, 1.0);
         page.goes_to(url);
         page
     }
 }
 
-pub struct Page(Arc<Tab>);
+/// A tab; fails the test when it is dropped after an error in a script.
+pub struct Page {
+    tab: Arc<Tab>,
+    errors: Arc<Mutex<Vec<String>>>,
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        let errors = self.errors.lock().unwrap();
+        assert!(errors.is_empty() || std::thread::panicking(), "errors in the page: {errors:#?}");
+    }
+}
 
 impl Page {
     pub fn goes_to(&self, url: &str) {
         // the page keeps a connection, so it is never idle; what was loaded before is not taken for it
-        let _ = self.0.evaluate("delete document.documentElement.dataset.ready", false);
-        self.0.navigate_to(url).unwrap();
+        let _ = self.tab.evaluate("delete document.documentElement.dataset.ready", false);
+        self.tab.navigate_to(url).unwrap();
         self.until("document.documentElement?.dataset.ready === 'true'");
     }
 
     pub fn close(self) {
-        self.0.close(true).unwrap();
+        self.tab.close(true).unwrap();
     }
 
     /// What an expression gives.
     pub fn ask(&self, expression: &str) -> Value {
         // only strings are sure to come back whole
         let asked = format!("(async () => JSON.stringify(await ({expression})) ?? 'null')()");
-        let answer = self.0.evaluate(&asked, true).unwrap_or_else(|e| panic!("{expression}: {e}"));
+        let answer = self.tab.evaluate(&asked, true).unwrap_or_else(|e| panic!("{expression}: {e}"));
         let Some(Value::String(text)) = answer.value else { panic!("{expression}: {answer:?}") };
         serde_json::from_str(&text).unwrap()
     }
@@ -99,7 +120,8 @@ impl Page {
     /// Waits for something.
     pub fn until(&self, expression: &str) {
         let begin = Instant::now();
-        while self.0.evaluate(&format!("Boolean({expression})"), true).ok().and_then(|r| r.value) != Some(true.into()) {
+        while self.tab.evaluate(&format!("Boolean({expression})"), true).ok().and_then(|r| r.value) != Some(true.into())
+        {
             if begin.elapsed() > PATIENCE {
                 let shown = self.ask("[document.getElementById('state')?.textContent, viewshed?.session.message]");
                 panic!("waited in vain for {expression}; the page says {shown}");
@@ -130,12 +152,12 @@ impl Page {
             display_feature: None,
             device_posture: None,
         };
-        self.0.call_method(size).unwrap();
+        self.tab.call_method(size).unwrap();
     }
 
     pub fn dark(&self) {
         let feature = MediaFeature { name: "prefers-color-scheme".into(), value: "dark".into() };
-        self.0.call_method(SetEmulatedMedia { media: None, features: Some(vec![feature]) }).unwrap();
+        self.tab.call_method(SetEmulatedMedia { media: None, features: Some(vec![feature]) }).unwrap();
     }
 
     pub fn key(&self, key: &str) {
@@ -168,7 +190,7 @@ impl Page {
                 location: None,
                 commands: None,
             };
-            self.0.call_method(event).unwrap();
+            self.tab.call_method(event).unwrap();
         }
     }
 
@@ -193,7 +215,7 @@ impl Page {
             delta_y,
             pointer_Type: None,
         };
-        self.0.call_method(event).unwrap();
+        self.tab.call_method(event).unwrap();
     }
 
     pub fn click(&self, at: [f64; 2]) {
@@ -244,7 +266,7 @@ impl Page {
     /// A picture of what is shown.
     pub fn picture(&self, path: &Path) {
         self.rests();
-        let png = self.0.capture_screenshot(CaptureScreenshotFormatOption::Png, None, None, true).unwrap();
+        let png = self.tab.capture_screenshot(CaptureScreenshotFormatOption::Png, None, None, true).unwrap();
         std::fs::write(path, png).unwrap();
     }
 }

@@ -141,6 +141,9 @@ fn a_track_is_drawn_with_the_keyboard_alone_and_in_the_plan() {
     }
     page.key(" ");
     page.key("Enter");
+    page.key("+");
+    page.key("<");
+    page.key_with("ArrowLeft", SHIFT);
     let drawn = points(&tracks(&page)[0]);
     assert!(drawn.len() == 3 && drawn[0][0] < drawn[1][0] && drawn[0][1] > drawn[1][1], "{drawn:?}");
     // from above: a point a time, places as clicked

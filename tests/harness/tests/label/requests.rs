@@ -121,9 +121,13 @@ fn a_crash_while_saving_leaves_whole_labels() {
         // one more, and a crash in its middle
         let mut stream = std::net::TcpStream::connect(server.host()).unwrap();
         let (path, host, body) = (server.path("labels"), server.host(), tracks(8));
-        let head = format!("PUT {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nx-writer: {writer}\r\n{at}\r\n");
-        std::io::Write::write_all(&mut stream, format!("{head}Content-Length: {}\r\n\r\n{body}", body.len()).as_bytes())
-            .unwrap();
+        let head =
+            format!("PUT {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nx-writer: {writer}\r\n{at}\r\n");
+        std::io::Write::write_all(
+            &mut stream,
+            format!("{head}Content-Length: {}\r\n\r\n{body}", body.len()).as_bytes(),
+        )
+        .unwrap();
         sleep(Duration::from_millis(pause_ms));
         server.kill();
         let again = Server::start(&recording);
@@ -205,7 +209,10 @@ fn tracks_that_are_none_are_refused_by_name() {
     let (_, read) = server.own("GET", "labels", &[], "");
     let (_stream, writer) = server.hold().unwrap();
     for (tracks, why) in [
-        (r#"[{"id":"1","class":"car","points":[[1,80,3],[4,20,3]]},{"id":"1","class":"car","points":[[1,0,3],[4,20,3]]}]"#, "two tracks have the id 1"),
+        (
+            r#"[{"id":"1","class":"car","points":[[1,80,3],[4,20,3]]},{"id":"1","class":"car","points":[[1,0,3],[4,20,3]]}]"#,
+            "two tracks have the id 1",
+        ),
         (r#"[{"id":"a","class":"car","points":[[4,80,3],[1,20,3]]}]"#, "track a, point 2"),
         (r#"[{"id":"a","class":"ship","points":[[1,80,3],[4,20,3]]}]"#, "`ship`"),
         (r#"[{"id":"a","class":"car","points":[[1,80,1e999],[4,20,3]]}]"#, "no tracks"),

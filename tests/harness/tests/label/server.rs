@@ -84,7 +84,8 @@ impl Server {
     pub fn hold(&self) -> Option<(TcpStream, String)> {
         let mut stream = TcpStream::connect(self.host()).unwrap();
         let (path, host) = (self.path("writer"), self.host());
-        write!(stream, "POST {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 0\r\n\r\n").unwrap();
+        write!(stream, "POST {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\nContent-Length: 0\r\n\r\n")
+            .unwrap();
         let mut answer = Vec::new();
         while !answer.ends_with(b"\n\r\n") || answer.iter().filter(|b| **b == b'\n').count() < 4 {
             let mut bytes = [0; 1024];

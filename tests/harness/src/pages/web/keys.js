@@ -7,7 +7,8 @@ const SIDES = [['ArrowUp', 0, 1], ['ArrowDown', 0, -1], ['ArrowLeft', -1, 0], ['
 
 // [keys as KeyboardEvent.key, with modifiers before; group; what it does; action; may be held down]
 export function table(page) {
-  const { session, plot } = page;
+  const { session } = page;
+  const plot = () => page.plot();
   const arrows = ([modifier, group, what, run]) =>
     SIDES.map(([key, right, up], k) => [modifier + key, group, k === 0 ? what : null, () => run(right, up), true]);
   return [

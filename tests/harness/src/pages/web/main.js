@@ -153,6 +153,7 @@ class Page {
     this.show('along', { left: t0, right: t1, bottom: x0, top: x1 });
     this.show('plan', { left: x0, right: x1, bottom: y0, top: y1 });
     this.session.goTo((t0 + t1) / 2);
+    if (this.session.brush?.plot === 'lane') this.session.showLane();
   }
 
   choose(id) {

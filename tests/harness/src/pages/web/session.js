@@ -112,15 +112,17 @@ export class Session {
 
   // Begins a track; it exists with its first point.
   begin() {
+    if (!this.canWrite()) return this.say(READ_ONLY);
     if (this.brush?.plot === 'lane') this.brushed(null, null);
     this.drawing = tracks.newId(this.tracks);
     this.selected = this.drawing;
     this.point = null;
     this.say('Drawing: click or press space along the reflections, Enter ends.');
-    this.changed('selection');
+    return this.changed('selection');
   }
 
   extend() {
+    if (!this.canWrite()) return this.say(READ_ONLY);
     if (!this.track) return this.say('Select a track first.');
     this.drawing = this.selected;
     this.say('Drawing on: click or press space for more points, Enter ends.');
