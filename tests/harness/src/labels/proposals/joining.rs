@@ -152,7 +152,11 @@ fn rigid(a: &Path, b: &Path) -> Option<f64> {
     if long && a.top_m.min(b.top_m) < LOW_M {
         return None;
     }
-    let one = side.abs() < if apart < 0.0 { 2.0 } else { 1.4 } && speed.abs() < 0.6 && wobble < 1.0 && reach[1] - reach[0] < LONGEST_M && apart < 6.0;
+    let one = side.abs() < if apart < 0.0 { 2.0 } else { 1.4 }
+        && speed.abs() < 0.6
+        && wobble < 1.0
+        && reach[1] - reach[0] < LONGEST_M
+        && apart < 6.0;
     one.then_some(side.abs() + speed.abs() + wobble + apart.max(0.0) / 6.0)
 }
 

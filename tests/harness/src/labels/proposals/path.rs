@@ -37,7 +37,8 @@ impl Path {
         members.sort_unstable();
         members.dedup();
         let (first, last) = (members.first()?.0, members.last()?.0);
-        let mut path = Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2], top_m: 0.0 };
+        let mut path =
+            Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2], top_m: 0.0 };
         // how long it is tells how much a place can be trusted, and the other way round
         for _ in 0..2 {
             path.motions = smooth(&path.filtered(last, instants)?);
@@ -160,7 +161,13 @@ fn beginning(own: &[Reflection]) -> Option<Motion> {
     let direction = r.sight.map(|v| v / ground);
     let radial = r.doppler_mps / ground;
     let velocity = direction.map(|v| v * radial);
-    Some(Motion::new(r.place, velocity, 2.0 * across_m(r.distance_m), direction, [1.0, (0.6 * radial.abs()).clamp(4.0, 15.0)]))
+    Some(Motion::new(
+        r.place,
+        velocity,
+        2.0 * across_m(r.distance_m),
+        direction,
+        [1.0, (0.6 * radial.abs()).clamp(4.0, 15.0)],
+    ))
 }
 
 /// The value below which this share lies.

@@ -41,12 +41,7 @@ impl Extent {
             }
         }
         let end = |values: &[f64], share: f64| quantile(values, share).filter(|_| values.len() >= FEWEST);
-        Self {
-            rear: end(&behind, 0.1),
-            front: end(&ahead, 0.9),
-            reach: path.reach,
-            top_m: path.top_m,
-        }
+        Self { rear: end(&behind, 0.1), front: end(&ahead, 0.9), reach: path.reach, top_m: path.top_m }
     }
 
     /// The class whose size is nearest to what is seen.
@@ -77,7 +72,6 @@ impl Extent {
 pub fn track(path: &Path, instants: &[Instant], sensor: [f64; 2], id: String) -> LabelTrack {
     let extent = Extent::of(path, instants);
     let class = extent.class();
-    if std::env::var("DIAG").is_ok() { eprintln!("X {} top {:.2} reach {:.2} rear {:?} front {:?}", id, extent.top_m, extent.reach[1] - extent.reach[0], extent.rear, extent.front); } //DIAG
     let size = class_size(class).unwrap_or([4.6, 1.8, 1.5]);
     let along = extent.center_m(size[0]);
     // of the flank that is seen, reflections come from the side of the sensor
