@@ -227,7 +227,7 @@ mod tests {
         let folder = folder("boxes");
         let path = folder.join("a.labels.csv");
         std::fs::write(&path, text(&tracks(), &SITE).unwrap()).unwrap();
-        let truth = Truth::new(read_labels(&path, SITE.start_ns, SITE.end_ns).unwrap());
+        let truth = Truth::new(read_labels(&path, SITE.start_ns, SITE.end_ns).unwrap().0);
         let truck = truth.at(SITE.start_ns + 500_000_000)[0];
         assert_eq!(truth.tracks[truck.track].class, "truck");
         assert_eq!(truck.solid.size, [16.5, 2.55, 4.0]);

@@ -32,7 +32,7 @@ use crate::recording::truth::{Label, Object, Truth};
 /// Share of the smaller footprint that two boxes of one vehicle have in common.
 const OVERLAP: f64 = 0.2;
 /// Share of its time a proposal has to lie on one vehicle to be accepted.
-const ACCEPTED: f64 = 0.7;
+const ACCEPTED: f64 = 0.5;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
 const SEEN: (u32, f64) = (15, 1.0);
 /// How far a drawn line is from the vehicle, metres.

@@ -23,7 +23,7 @@ use super::tracks::{LabelPoint, LabelTrack};
 /// Time between two boxes of a track, seconds.
 pub const STEP_S: f64 = 0.1;
 /// The heading is taken between the places this far behind and ahead, metres.
-const HEADING_BASE_M: f64 = 2.0;
+const HEADING_BASE_M: f64 = 4.0;
 /// A track that nowhere gets this far from its start stands, metres.
 const STANDS_M: f64 = 0.5;
 /// Cosine of the aspect from which on the near face is the rear or the front.

@@ -1,6 +1,6 @@
 //! Labels beside a recording: `NAME.labels.csv` and `NAME.occlusion.csv`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -65,13 +65,17 @@ pub fn at_line(path: &Path, line: u64) -> String {
 }
 
 /// Reads labels in the road frame. Times are seconds on the recording's clock or, where none of
-/// them falls between `start_ns` and `end_ns`, seconds since its start.
+/// them falls between `start_ns` and `end_ns`, seconds since its start. Beside them, how many objects have
+/// the size of their class.
 ///
 /// # Errors
 /// Names file and line of the first row that is malformed or whose class has no known size.
-pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<Vec<Label>> {
-    let mut labels = Vec::new();
+pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label>, usize)> {
+    let (mut labels, mut sized_by_class) = (Vec::new(), BTreeSet::new());
     for (line, row) in read_rows(path)? {
+        if [row.length_m, row.width_m, row.height_m].contains(&None) {
+            sized_by_class.insert(row.object_id.clone());
+        }
         labels.push(label(row).with_context(|| at_line(path, line))?);
     }
     if !labels.iter().any(|l| (start_ns..=end_ns).contains(&l.time_ns)) {
@@ -79,7 +83,7 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<Vec<Label>
             l.time_ns = l.time_ns.saturating_add(start_ns);
         }
     }
-    Ok(labels)
+    Ok((labels, sized_by_class.len()))
 }
 
 /// A row as a label standing on the road; a missing size is that of the class.

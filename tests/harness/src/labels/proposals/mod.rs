@@ -60,7 +60,6 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     let paths = joining::through_gaps(paths, &instants);
     let paths: Vec<Path> = paths.into_par_iter().map(|path| standing::stood(path, &instants)).collect();
     progress(0.9);
-    let [x, y, _] = recording.pose.position;
     let mut scored: Vec<(f64, &Path)> = paths
         .iter()
         .filter(|p| p.members.len() >= FEWEST && p.travel_m() >= TRAVEL_M)
@@ -69,7 +68,7 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         .collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {
-        track: shape::track(path, &instants, [x, y], format!("p{}", k + 1)),
+        track: shape::track(path, &instants, recording, format!("p{}", k + 1)),
         score,
         detections: path.members.len() as u32,
     });

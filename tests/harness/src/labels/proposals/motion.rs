@@ -6,9 +6,12 @@
 
 /// Acceleration of road users along their way, m/s² (one standard deviation, white).
 const ALONG_MPS2: f64 = 2.0;
-/// Across it: at walking speed as much as a turn has, at this speed and above as much as a change of lanes.
-const ACROSS_MPS2: [f64; 2] = [2.0, 0.2];
+/// Across it: a turn of this radius (m) at most, up to as much as along it; straight roads at this speed and above.
+const TURN_M: f64 = 8.0;
 const STRAIGHT_MPS: f64 = 20.0;
+const STRAIGHT_MPS2: f64 = 0.2;
+/// Below this speed the direction of the next move is not known, m/s.
+const UNDIRECTED_MPS: f64 = 1.0;
 
 type Matrix = [[f64; 4]; 4];
 
@@ -68,8 +71,8 @@ impl Motion {
             }
         }
         let speed = self.speed();
-        let fast = (speed / STRAIGHT_MPS).min(1.0);
-        let across = ACROSS_MPS2[0] + fast * (ACROSS_MPS2[1] - ACROSS_MPS2[0]);
+        let turn = (speed * speed / TURN_M).min(ALONG_MPS2) * (1.0 - (speed / STRAIGHT_MPS).min(1.0));
+        let across = if speed < UNDIRECTED_MPS { ALONG_MPS2 } else { turn.max(STRAIGHT_MPS2) };
         let [along, across] = [ALONG_MPS2, across].map(|a| a * a * dt_s.abs());
         let [c, s] = if speed > 0.1 { self.velocity().map(|v| v / speed) } else { [1.0, 0.0] };
         let q = [

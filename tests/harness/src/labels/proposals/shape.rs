@@ -5,12 +5,18 @@ use super::reflections::Instant;
 use crate::labels::near_face::{BoxStep, nears};
 use crate::labels::simplify::simplify;
 use crate::labels::tracks::LabelTrack;
+use crate::recording::Recording;
 use crate::recording::labels::class_size;
 
 /// How far the polyline may be from the path, metres.
 const TOLERANCE_M: f64 = 0.4;
 /// Cosine of the aspect from which on the end that is seen tells where the vehicle is.
 const END_COS: f64 = 0.4;
+/// How long a fast path goes on at both ends, seconds, and in which steps.
+const BEYOND_S: f64 = 3.0;
+const STEP_S: f64 = 0.25;
+/// Speed from which on something is fast, m/s.
+const FAST_MPS: f64 = 10.0;
 /// Fewest reflections an end is told by.
 const FEWEST: usize = 5;
 
@@ -68,20 +74,24 @@ impl Extent {
     }
 }
 
-/// The near face of the vehicle around a path.
-pub fn track(path: &Path, instants: &[Instant], sensor: [f64; 2], id: String) -> LabelTrack {
+/// Mean velocity around a time, if that is fast enough to go on.
+fn speed_near(path: &Path, time_s: f64) -> Option<[f64; 2]> {
+    let near = path.motions.iter().filter(|(t, _)| (t - time_s).abs() <= 1.0);
+    let (n, [x, y]) = near.fold((0.0, [0.0, 0.0]), |(n, [x, y]), (_, m)| {
+        let [vx, vy] = m.velocity();
+        (n + 1.0, [x + vx, y + vy])
+    });
+    let velocity = [x / n, y / n];
+    (n > 0.0 && velocity[0].hypot(velocity[1]) > FAST_MPS).then_some(velocity)
+}
+
+/// The near face of the vehicle around a path. What is fast comes from somewhere and goes somewhere: up to
+/// [`BEYOND_S`] in the field of view are added at both ends.
+pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: String) -> LabelTrack {
+    let [sensor_x, sensor_y, _] = recording.pose.position;
+    let sensor = [sensor_x, sensor_y];
     let extent = Extent::of(path, instants);
     let class = extent.class();
-    if std::env::var("DIAG").is_ok() {
-        eprintln!(
-            "X {} top {:.2} reach {:.2} rear {:?} front {:?}",
-            id,
-            extent.top_m,
-            extent.reach[1] - extent.reach[0],
-            extent.rear,
-            extent.front
-        );
-    } //DIAG
     let size = class_size(class).unwrap_or([4.6, 1.8, 1.5]);
     let along = extent.center_m(size[0]);
     // of the flank that is seen, reflections come from the side of the sensor
@@ -94,7 +104,7 @@ pub fn track(path: &Path, instants: &[Instant], sensor: [f64; 2], id: String) ->
         })
         .collect();
     let left = quantile(&left, 0.5).unwrap_or(0.0);
-    let steps: Vec<BoxStep> = path
+    let mut steps: Vec<BoxStep> = path
         .motions
         .iter()
         .zip(&path.headings_rad)
@@ -107,6 +117,22 @@ pub fn track(path: &Path, instants: &[Instant], sensor: [f64; 2], id: String) ->
             }
         })
         .collect();
+    let latest_s = instants.last().map_or(0.0, |i| i.time_s);
+    let ends = [(steps.first().copied(), -STEP_S), (steps.last().copied(), STEP_S)];
+    for (end, step_s) in ends {
+        let Some(end) = end else { continue };
+        let Some([vx, vy]) = speed_near(path, end.time_s) else { continue };
+        for k in 1..=(BEYOND_S / STEP_S) as u32 {
+            let dt_s = step_s * f64::from(k);
+            let (time_s, center) = (end.time_s + dt_s, [end.center[0] + vx * dt_s, end.center[1] + vy * dt_s]);
+            let seen = recording.pose.to_spherical([center[0], center[1], 1.0]);
+            if !(0.0..=latest_s).contains(&time_s) || !recording.sensor.field_of_view.contains(seen) {
+                break;
+            }
+            steps.push(BoxStep { time_s, center, ..end });
+        }
+    }
+    steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let points = simplify(&nears(&steps, size, sensor), TOLERANCE_M);
     LabelTrack { id, class: class.to_owned(), size_m: None, points }
 }
