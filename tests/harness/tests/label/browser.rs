@@ -1,7 +1,6 @@
 //! A real browser, driven as a person drives it: keys, mouse, and looks at what is shown.
 
 use std::ffi::OsStr;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -14,6 +13,8 @@ use headless_chrome::protocol::cdp::Page::CaptureScreenshotFormatOption;
 use headless_chrome::protocol::cdp::types::Event;
 use headless_chrome::{LaunchOptions, Tab};
 use serde_json::Value;
+
+use crate::server::skipped;
 
 pub const ALT: u32 = 1;
 pub const CTRL: u32 = 2;
@@ -42,9 +43,7 @@ impl Browser {
     /// Starts one; without any on this machine, says so once a test.
     pub fn start(test: &str) -> Option<Self> {
         let Some(program) = program() else {
-            let why = "no Chromium (apt-get install chromium-headless-shell)";
-            // past the capture of the test runner: one line that scripts can find
-            let _ = writeln!(std::io::stderr(), "skipped: the page of viewshed label, {test}: {why}");
+            skipped(&format!("{test}: no Chromium (apt-get install chromium-headless-shell)"));
             return None;
         };
         let flags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"];

@@ -9,7 +9,7 @@ use std::time::Duration;
 use viewshed_harness::recording::write::RecordingWriter;
 use viewshed_harness::recording::{ReadOptions, mcap};
 
-use crate::server::{SHIPPED, Server, folder, recording};
+use crate::server::{SHIPPED, Server, folder, recording, skipped};
 
 /// Two tracks as the page sends them.
 const TWO: &str = r#"[{"id":"1","class":"car","points":[[1,80,3],[4,20,3]]},
@@ -230,7 +230,7 @@ fn a_full_disk_is_said_and_what_was_saved_stays() {
     let mount = |arguments: &[&str]| Command::new(arguments[0]).args(&arguments[1..]).arg(&folder).status();
     // it holds the recording and little more
     if !mount(&["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs"]).is_ok_and(|status| status.success()) {
-        eprintln!("skipped: labels on a full disk: no small file system can be mounted here");
+        skipped("labels on a full disk: no small file system can be mounted here");
         return;
     }
     let recording = folder.join("site.mcap");
