@@ -9,7 +9,7 @@
 //! missing or elsewhere, the person sets points; a vehicle that nothing was offered for is drawn. Accepting, rejecting,
 //! joining and correcting a class count one action each, drawing one, and each point that is set one.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
 
@@ -31,7 +31,7 @@ use crate::recording::truth::{Label, Object, Truth};
 
 /// Share of the smaller footprint that two boxes of one vehicle have in common.
 const OVERLAP: f64 = 0.2;
-/// Share of its time a proposal has to lie on one vehicle to be accepted.
+/// Share of its time a proposal has to lie on one vehicle to be accepted; where it leaves it, it is mended.
 const ACCEPTED: f64 = 0.5;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
 const SEEN: (u32, f64) = (15, 1.0);
@@ -76,6 +76,8 @@ pub struct Judged {
     pub off_m: [f64; 2],
     /// Labels that were made.
     pub tracks: Vec<LabelTrack>,
+    /// Ids of those vehicles.
+    detected: BTreeSet<String>,
 }
 
 impl Judged {
@@ -161,6 +163,7 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
         labelled: [0; 2],
         off_m: [0.0; 2],
         tracks: labels.iter().map(|(_, track)| track.clone()).collect(),
+        detected: vehicles.keys().map(|k| truth.tracks[*k].id.clone()).collect(),
     };
     judged.compare(recording, &instants, &vehicles, &moving, options);
     Some(judged)
@@ -339,7 +342,8 @@ impl Judged {
         self.off_m = off.map(|v| v / compared.max(1) as f64);
     }
 
-    /// The radar rows of the table of `replay`, first with the ground truth, then with these labels.
+    /// The radar rows of the table of `replay`: with the ground truth, with its vehicles that were detected at least
+    /// once, with these labels. Labels cannot hold what nobody saw, so the first two differ as much as the purpose does.
     ///
     /// # Errors
     /// A recording that cannot be replayed.
@@ -348,17 +352,19 @@ impl Judged {
         recording: &Recording,
         options: &Options,
         estimators: &estimators::Options,
-    ) -> Result<[Vec<Row>; 2]> {
+    ) -> Result<[Vec<Row>; 3]> {
         let site = Site::of(recording);
-        let mut labelled = recording.clone();
-        labelled.truth = Some(Truth::new(self.tracks.iter().flat_map(|t| labels(t, &site)).collect()));
-        let rows = |recording: Recording| -> Result<Vec<Row>> {
+        let mut seen = recording.truth.clone().unwrap_or_default();
+        seen.tracks.retain(|t| self.detected.contains(&t.id));
+        let made = Truth::new(self.tracks.iter().flat_map(|t| labels(t, &site)).collect());
+        let rows = |truth: Option<Truth>| -> Result<Vec<Row>> {
+            let recording = Recording { truth, ..recording.clone() };
             let mut radar = estimators::all(&recording, estimators)?;
             radar.retain(|e| e.name().starts_with("radar-"));
             let options = Options { bootstrap: 0, ..options.clone() };
             Ok(Replay::new(recording, &mut radar, &options, &|| ()).summary.rows)
         };
-        Ok([rows(recording.clone())?, rows(labelled)?])
+        Ok([rows(recording.truth.clone())?, rows(Some(seen))?, rows(Some(made))?])
     }
 
     /// The figures as lines of text.
