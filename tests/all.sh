@@ -5,6 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . tests/tools.sh
 need_compilers
+need_browser
 
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT

@@ -6,4 +6,5 @@ here=$(CDPATH='' cd -- "$(dirname "$0")" && pwd)
 . "$here/tools.sh"
 need_compilers
 [ $# -gt 0 ] || set -- --out out
-exec cargo run --release --locked --manifest-path "$here/../Cargo.toml" --package viewshed-harness -- replay "$@"
+exec cargo run --release --locked --manifest-path "$here/../Cargo.toml" --package viewshed-harness \
+    --no-default-features -- replay "$@"

@@ -19,3 +19,10 @@ need_compilers() {
     command -v cargo >/dev/null || { say "cargo is missing: install Rust from https://rustup.rs and run this again"; exit 1; }
     command -v cc >/dev/null || install gcc libc6-dev || { say "a C compiler is missing: apt-get install gcc libc6-dev, and run this again"; exit 1; }
 }
+
+# A Chromium for the tests of pages; without one they say that they skipped
+need_browser() {
+    [ -n "${VIEWSHED_BROWSER:-}" ] || [ -x /usr/lib/chromium/chromium-headless-shell ] ||
+        command -v chromium-headless-shell chromium google-chrome chromium-browser >/dev/null ||
+        install chromium-headless-shell || install chromium || true
+}

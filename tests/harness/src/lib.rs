@@ -17,11 +17,13 @@
 //! | [`twin`] | a scene and traffic in, a recording with ground truth out |
 //! | [`estimators`] | frames in, maps out: the library's estimators, and what perfect occupancy would give |
 //! | [`evaluation`] | maps and truth in; rates, intervals, trade-offs and examples out |
+//! | [`labels`] | lines a person draws, and tracks the machine offers; boxes and `NAME.labels.csv` out |
 //! | [`studies`] | the paper's experiment on the twin, and the search for a mount |
 //! | [`bus`] | maps in, their load on CAN, CAN FD and serial lines out; what a receiver of a log has |
 //! | [`doctor`] | a radar's log in, what is wrong with it and what to do out |
 //! | [`boards`] | the same scans through a controller and through the library here, compared frame by frame |
 //! | [`results`] | figures in; text, JSON, CSV, pictures and recordings for Foxglove out, written whole or not at all |
+//! | `pages` | recordings in; pages in a browser out, and labels a person draws there (feature `pages`) |
 //! | [`command`] | the `viewshed` command: options, and one file for each subcommand |
 //!
 //! No room uses one that uses it (`cargo test --test architecture`).
@@ -33,6 +35,9 @@ pub mod doctor;
 pub mod estimators;
 pub mod evaluation;
 pub mod geometry;
+pub mod labels;
+#[cfg(feature = "pages")]
+pub mod pages;
 pub mod recording;
 pub mod results;
 pub mod studies;

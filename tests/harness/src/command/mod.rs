@@ -5,6 +5,8 @@ pub mod detections;
 pub mod doctor;
 pub mod experiment;
 pub mod key;
+#[cfg(feature = "pages")]
+pub mod label;
 pub mod listen;
 pub mod options;
 pub mod progress;
@@ -39,6 +41,8 @@ enum Command {
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
     Detections(Box<detections::Args>),
+    #[cfg(feature = "pages")]
+    Label(Box<label::Args>),
 }
 
 impl Cli {
@@ -53,6 +57,8 @@ impl Cli {
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
             Command::Detections(args) => detections::run(args),
+            #[cfg(feature = "pages")]
+            Command::Label(args) => label::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

@@ -53,7 +53,7 @@ pub struct JudgingArgs {
 /// What the file does not say, or says wrongly.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Reading")]
-struct ReadingArgs {
+pub struct ReadingArgs {
     /// Topic of the radar's points [default: /radar/points, or whatever carries radar_msgs/msg/RadarScan]
     ///
     /// A PointCloud2 with the fields range, azimuth (or azimuth_angle), radial_velocity (or radial_speed)
@@ -209,7 +209,7 @@ fn read_config(path: &Path) -> Result<Config> {
 }
 
 impl ReadingArgs {
-    fn options(&self) -> ReadOptions {
+    pub fn options(&self) -> ReadOptions {
         ReadOptions {
             radar_topic: self.radar_topic.clone(),
             truth_topic: self.truth_topic.clone(),

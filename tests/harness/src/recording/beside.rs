@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 
 use super::{Frame, ReadOptions, Recording, labels};
-use crate::recording::truth::Truth;
+use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
 pub fn files(path: &Path) -> [PathBuf; 2] {
@@ -24,7 +24,10 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if labels_csv.exists() {
         let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
         let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
-        recording.truth = Some(Truth::new(labels::read_labels(&labels_csv, start_ns, end_ns)?));
+        let (labels, sized_by_class) = labels::read_labels(&labels_csv, start_ns, end_ns)?;
+        let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let beside = Some(LabelsBeside { file, sized_by_class });
+        recording.truth = Some(Truth { beside, ..Truth::new(labels) });
     }
     if occlusion_csv.exists() {
         recording.occlusion = labels::read_occlusion(&occlusion_csv)?;

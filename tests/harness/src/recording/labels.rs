@@ -1,6 +1,6 @@
 //! Labels beside a recording: `NAME.labels.csv` and `NAME.occlusion.csv`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -35,28 +35,55 @@ pub struct LabelRow {
     pub length_m: Option<f64>,
     pub width_m: Option<f64>,
     pub height_m: Option<f64>,
+    /// Point of a drawn line, kept beside the box it means; no part of the box.
+    pub near_x_m: Option<f64>,
+    pub near_y_m: Option<f64>,
 }
 
-/// Reads labels in the road frame. Times are seconds on the recording's clock or, where none of
-/// them falls between `start_ns` and `end_ns`, seconds since its start.
+/// Every row of a file, with its line.
 ///
 /// # Errors
-/// Names file and line of the first row that is malformed or whose class has no known size.
-pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<Vec<Label>> {
+/// Names file and line of the first row that is malformed.
+pub fn read_rows(path: &Path) -> Result<Vec<(u64, LabelRow)>> {
     let place = || path.display().to_string();
     let mut csv =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).with_context(place)?;
-    let mut labels = Vec::new();
-    for (i, row) in csv.deserialize::<LabelRow>().enumerate() {
-        let place = || format!("{}, line {}", place(), i + 2);
-        labels.push(label(row.with_context(place)?).with_context(place)?);
+    let headers = csv.headers().with_context(place)?.clone();
+    let mut rows = Vec::new();
+    for record in csv.records() {
+        // the error of a record that is none has its line in it
+        let record = record.with_context(place)?;
+        let line = record.position().map_or(0, csv::Position::line);
+        rows.push((line, record.deserialize(Some(&headers)).with_context(|| at_line(path, line))?));
+    }
+    Ok(rows)
+}
+
+/// A line of a file, for errors.
+pub fn at_line(path: &Path, line: u64) -> String {
+    format!("{}, line {line}", path.display())
+}
+
+/// Reads labels in the road frame. Times are seconds on the recording's clock or, where none of
+/// them falls between `start_ns` and `end_ns`, seconds since its start. Beside them, how many objects have
+/// the size of their class.
+///
+/// # Errors
+/// Names file and line of the first row that is malformed or whose class has no known size.
+pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label>, usize)> {
+    let (mut labels, mut sized_by_class) = (Vec::new(), BTreeSet::new());
+    for (line, row) in read_rows(path)? {
+        if [row.length_m, row.width_m, row.height_m].contains(&None) {
+            sized_by_class.insert(row.object_id.clone());
+        }
+        labels.push(label(row).with_context(|| at_line(path, line))?);
     }
     if !labels.iter().any(|l| (start_ns..=end_ns).contains(&l.time_ns)) {
         for l in &mut labels {
             l.time_ns = l.time_ns.saturating_add(start_ns);
         }
     }
-    Ok(labels)
+    Ok((labels, sized_by_class.len()))
 }
 
 /// A row as a label standing on the road; a missing size is that of the class.

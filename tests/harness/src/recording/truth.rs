@@ -44,6 +44,16 @@ impl Object {
 #[derive(Debug, Clone, Default)]
 pub struct Truth {
     pub tracks: Vec<Track>,
+    /// Where the labels lie beside the recording, if they do.
+    pub beside: Option<LabelsBeside>,
+}
+
+/// Labels from a file beside a recording: somebody's, so they lack what nobody labelled.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelsBeside {
+    pub file: String,
+    /// Objects that have the size of their class, since the file gives none.
+    pub sized_by_class: usize,
 }
 
 impl Truth {
@@ -67,7 +77,7 @@ impl Truth {
         for t in &mut tracks {
             t.velocities = t.differences();
         }
-        Self { tracks }
+        Self { tracks, beside: None }
     }
 
     /// Every object at an instant, each only between its first and last label.

@@ -113,6 +113,8 @@ fn labels_beside_the_recording_are_taken() {
     let output = replay(&folder, &["scene.mcap", "--json", "r.json"]);
     assert!(output.status.success(), "{}", stderr(&output));
     assert_eq!(json(&folder.join("r.json"))["objects"], json!(3));
+    let said = "Labels of scene.labels.csv: only what was labelled counts";
+    assert!(stdout(&output).contains(said) && stdout(&output).contains("objects have the size of their class"));
 }
 
 #[test]

@@ -6,6 +6,7 @@ use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
+use crate::recording::truth::LabelsBeside;
 
 /// What the table is of.
 pub fn heading(replay: &Replay) -> String {
@@ -44,6 +45,13 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
         lines.push(format!(
             "95 % intervals by {} draws of {} {}{cells}, the same for every row; seed {}.",
             options.bootstrap, summary.drawn_units, summary.drawn, options.seed
+        ));
+    }
+    if let Some(LabelsBeside { file, sized_by_class }) = recording.truth.as_ref().and_then(|t| t.beside.as_ref()) {
+        let objects = recording.truth.as_ref().map_or(0, |t| t.tracks.len());
+        lines.push(format!(
+            "Labels of {file}: only what was labelled counts, usually what moves and was seen at least once; \
+             {sized_by_class} of {objects} objects have the size of their class."
         ));
     }
     let cartesian = summary.rows.iter().filter(|r| !r.curve.is_empty() && r.grid != options.grid);

@@ -1,0 +1,243 @@
+//! Tracklets to paths: what both directions of time found, pieces of one long vehicle, pieces before and after a gap.
+
+use std::collections::HashMap;
+
+use super::path::{Path, quantile};
+use super::reflections::Instant;
+use super::tracker::{LONGEST_M, Tracklet};
+
+/// Share of the smaller tracklet's reflections that two tracklets of one road user have in common.
+const COMMON: f64 = 0.3;
+/// Longest gap in which something that moves is followed, seconds.
+const GAP_S: f64 = 10.0;
+/// Longest gap in which something that stands is waited for, seconds.
+const STANDING_GAP_S: f64 = 90.0;
+/// Speed below which vehicles may keep so close together that they look like one, m/s.
+const SLOW_MPS: f64 = 8.0;
+/// Cells along a vehicle in which reflections are counted, metres; how many.
+const BIN_M: f64 = 0.5;
+const BINS: usize = 80;
+/// A void has less than this share of what its cells would have on average, is this long, and has on either side at
+/// least this share of all reflections.
+const THIN: f64 = 0.15;
+const VOID_M: f64 = 2.5;
+const SMALLER: f64 = 0.1;
+/// Cars are not higher than this, metres.
+const LOW_M: f64 = 1.8;
+/// Nor longer than this.
+const CAR_M: f64 = 6.0;
+/// Frames two pieces have to be seen together in.
+const TOGETHER: usize = 8;
+
+/// Tracklets of both directions: a backward one adds what was before and after the forward one it shares most with.
+pub fn both_ways(forward: &[Tracklet], backward: &[Tracklet]) -> Vec<Tracklet> {
+    let mut owner: HashMap<(usize, usize), usize> = HashMap::new();
+    for (k, t) in forward.iter().enumerate() {
+        owner.extend(t.members.iter().map(|m| (*m, k)));
+    }
+    // pairs by what they share
+    let mut pairs = Vec::new();
+    for (b, t) in backward.iter().enumerate() {
+        let mut shared: HashMap<usize, usize> = HashMap::new();
+        for f in t.members.iter().filter_map(|m| owner.get(m)) {
+            *shared.entry(*f).or_default() += 1;
+        }
+        pairs.extend(shared.into_iter().map(|(f, n)| (n, f, b)));
+    }
+    pairs.sort_unstable_by(|a, b| b.cmp(a));
+    let mut all: Vec<Tracklet> = forward.to_vec();
+    let (mut taken_f, mut taken_b) = (vec![false; forward.len()], vec![false; backward.len()]);
+    for (n, f, b) in pairs {
+        let enough = n as f64 >= COMMON * forward[f].members.len().min(backward[b].members.len()) as f64;
+        if taken_f[f] || taken_b[b] || !enough {
+            continue;
+        }
+        (taken_f[f], taken_b[b]) = (true, true);
+        let frames = forward[f].members.iter().map(|m| m.0);
+        let (Some(first), Some(last)) = (frames.clone().min(), frames.max()) else { continue };
+        let beyond = backward[b].members.iter().filter(|m| m.0 < first || m.0 > last);
+        let beyond: Vec<(usize, usize)> = beyond.copied().filter(|m| !owner.contains_key(m)).collect();
+        owner.extend(beyond.iter().map(|m| (*m, f)));
+        all[f].members.extend(beyond);
+    }
+    // what only the backward direction found
+    for (b, t) in backward.iter().enumerate().filter(|(b, _)| !taken_b[*b]) {
+        let own: Vec<(usize, usize)> = t.members.iter().copied().filter(|m| !owner.contains_key(m)).collect();
+        if own.len() * 2 > backward[b].members.len() {
+            all.push(Tracklet { members: own });
+        }
+    }
+    all
+}
+
+/// Joins pieces of one vehicle that are seen at the same time and move as one.
+pub fn abreast(mut paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
+    loop {
+        let mut pairs = Vec::new();
+        for (a, first) in paths.iter().enumerate() {
+            for (b, second) in paths.iter().enumerate().skip(a + 1) {
+                if let Some(cost) = rigid(first, second) {
+                    pairs.push((cost, a, b));
+                }
+            }
+        }
+        if pairs.is_empty() {
+            return paths;
+        }
+        paths = joined(paths, pairs, instants);
+    }
+}
+
+/// Joins pieces before and after a gap.
+pub fn through_gaps(mut paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
+    loop {
+        let mut pairs = Vec::new();
+        for (a, before) in paths.iter().enumerate() {
+            for (b, after) in paths.iter().enumerate() {
+                if let Some(cost) = follows(before, after) {
+                    pairs.push((cost, a, b));
+                }
+            }
+        }
+        if pairs.is_empty() {
+            return paths;
+        }
+        paths = joined(paths, pairs, instants);
+    }
+}
+
+/// Joins the best pairs, each path once.
+fn joined(paths: Vec<Path>, mut pairs: Vec<(f64, usize, usize)>, instants: &[Instant]) -> Vec<Path> {
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut all: Vec<Option<Path>> = paths.into_iter().map(Some).collect();
+    for (_, a, b) in pairs {
+        if all[a].is_none() || all[b].is_none() {
+            continue;
+        }
+        if let (Some(first), Some(second)) = (all[a].take(), all[b].take()) {
+            let members = [first.members, second.members].concat();
+            all.push(Path::new(members, instants));
+        }
+    }
+    all.into_iter().flatten().collect()
+}
+
+/// How little two paths look like pieces of one vehicle; `None` where they are not.
+fn rigid(a: &Path, b: &Path) -> Option<f64> {
+    let (begin, end) = (a.first.max(b.first), a.last().min(b.last()));
+    let shorter = a.motions.len().min(b.motions.len());
+    if end < begin || end - begin + 1 < TOGETHER.max(shorter / 2) {
+        return None;
+    }
+    let (mut along, mut left, mut speeds) = (Vec::new(), Vec::new(), 0.0_f64);
+    for frame in begin..=end {
+        let (m, n, (s, c)) = (a.at(frame)?, b.at(frame)?, a.heading_at(frame)?.sin_cos());
+        let [dx, dy] = [n.place()[0] - m.place()[0], n.place()[1] - m.place()[1]];
+        if dx.hypot(dy) > LONGEST_M + 5.0 {
+            return None;
+        }
+        along.push(dx * c + dy * s);
+        left.push(-dx * s + dy * c);
+        let [vx, vy] = [n.velocity()[0] - m.velocity()[0], n.velocity()[1] - m.velocity()[1]];
+        speeds += vx * c + vy * s;
+    }
+    let n = along.len() as f64;
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
+    let (shift, side, speed) = (mean(&along), mean(&left), speeds / n);
+    let wobble = (along.iter().map(|v| (v - shift).powi(2)).sum::<f64>() / n).sqrt();
+    let reach = [a.reach[0].min(shift + b.reach[0]), a.reach[1].max(shift + b.reach[1])];
+    let apart = (shift + b.reach[0] - a.reach[1]).max(a.reach[0] - shift - b.reach[1]);
+    // two cars, or a truck and a car behind it: one of the two is low
+    let long = reach[1] - reach[0] > CAR_M && a.mean_speed().min(b.mean_speed()) < SLOW_MPS;
+    if long && a.top_m.min(b.top_m) < LOW_M {
+        return None;
+    }
+    let one = side.abs() < if apart < 0.0 { 2.0 } else { 1.4 }
+        && speed.abs() < 0.6
+        && wobble < 1.0
+        && reach[1] - reach[0] < LONGEST_M
+        && apart < 6.0;
+    one.then_some(side.abs() + speed.abs() + wobble + apart.max(0.0) / 6.0)
+}
+
+/// How badly one path goes on as another; `None` where it does not.
+fn follows(before: &Path, after: &Path) -> Option<f64> {
+    if after.last() <= before.last() || after.first <= before.first {
+        return None;
+    }
+    let (from_s, from) = before.motions.last()?;
+    let (to_s, to) = after.motions.first()?;
+    let gap_s = to_s - from_s;
+    if !(-0.5..=STANDING_GAP_S).contains(&gap_s) {
+        return None;
+    }
+    let way = [0, 1].map(|k| to.place()[k] - from.place()[k]);
+    let (u, v) = (from.velocity(), to.velocity());
+    let mean = [0, 1].map(|k| 0.5 * (u[k] + v[k]));
+    let distance = way[0].hypot(way[1]);
+    if gap_s > 0.7 && distance < 4.0 && from.speed().min(to.speed()) < 2.0 && from.speed().max(to.speed()) < 4.0 {
+        return Some(distance / 2.0 + gap_s / 60.0);
+    }
+    let change = (v[0] - u[0]).hypot(v[1] - u[1]);
+    if gap_s > GAP_S || change > 2.0 + 1.5 * gap_s.max(0.0) {
+        return None;
+    }
+    let speed = mean[0].hypot(mean[1]);
+    let [c, s] = if speed > 1.0 { mean.map(|v| v / speed) } else { [1.0, 0.0] };
+    let rest = [0, 1].map(|k| way[k] - mean[k] * gap_s);
+    let (along, left) = (rest[0] * c + rest[1] * s, -rest[0] * s + rest[1] * c);
+    let wait = gap_s.abs();
+    let length = (before.reach[1] - before.reach[0]).max(after.reach[1] - after.reach[0]).clamp(0.0, 10.0);
+    let (along, left) =
+        (along.abs() / (2.0 + 0.5 * length + 0.08 * speed * wait + 0.3 * wait), left.abs() / (1.2 + 0.3 * wait));
+    (along < 1.0 && left < 1.0).then_some(along + left + wait / 5.0)
+}
+
+/// Takes apart paths that hold two vehicles one behind the other: between their reflections is a void.
+pub fn apart(paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
+    paths.into_iter().flat_map(|path| halves(path, instants)).collect()
+}
+
+fn halves(path: Path, instants: &[Instant]) -> Vec<Path> {
+    let along: Vec<Option<f64>> =
+        path.members.iter().zip(path.reflections(instants)).map(|(_, (f, r))| Some(path.local(f, r)?[0])).collect();
+    let mut counts = [0_usize; BINS];
+    let bin = |v: f64| ((v / BIN_M + BINS as f64 / 2.0).floor().max(0.0) as usize).min(BINS - 1);
+    for v in along.iter().flatten() {
+        counts[bin(*v)] += 1;
+    }
+    let total: usize = counts.iter().sum();
+    let (low, high) = (bin(path.reach[0]), bin(path.reach[1]));
+    let thin = (THIN * total as f64 / (high + 1 - low) as f64) as usize;
+    // the longest run of thin bins within the reach
+    let (mut best, mut run) = ((0, 0), 0);
+    for k in low..=high {
+        run = if counts[k] <= thin { run + 1 } else { 0 };
+        if run > best.0 {
+            best = (run, k);
+        }
+    }
+    if path.mean_speed() > SLOW_MPS {
+        return vec![path];
+    }
+    let (length, end) = best;
+    let cut = (end as f64 + 1.0 - length as f64 / 2.0 - BINS as f64 / 2.0) * BIN_M;
+    let behind = along.iter().flatten().filter(|v| **v < cut).count();
+    let smaller = behind.min(total - behind);
+    if (length as f64) * BIN_M < VOID_M || (smaller as f64) < SMALLER * total as f64 {
+        return vec![path];
+    }
+    let top = |front: bool| {
+        let own = path.reflections(instants).zip(&along).filter(|(_, v)| v.is_some_and(|v| (v >= cut) == front));
+        quantile(&own.map(|((_, r), _)| r.height_m).collect::<Vec<_>>(), 0.85)
+    };
+    // one long vehicle is high
+    if [top(false), top(true)].iter().flatten().any(|top| *top > LOW_M) {
+        return vec![path];
+    }
+    let part = |front: bool| {
+        let own = path.members.iter().zip(&along).filter(|(_, v)| v.is_some_and(|v| (v >= cut) == front));
+        Path::new(own.map(|(m, _)| *m).collect(), instants)
+    };
+    [part(false), part(true)].into_iter().flatten().collect()
+}

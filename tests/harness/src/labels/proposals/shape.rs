@@ -1,0 +1,138 @@
+//! What stands around the reflections of a path: class by extent, and the box centres.
+
+use super::path::{Path, quantile};
+use super::reflections::Instant;
+use crate::labels::near_face::{BoxStep, nears};
+use crate::labels::simplify::simplify;
+use crate::labels::tracks::LabelTrack;
+use crate::recording::Recording;
+use crate::recording::labels::class_size;
+
+/// How far the polyline may be from the path, metres.
+const TOLERANCE_M: f64 = 0.4;
+/// Cosine of the aspect from which on the end that is seen tells where the vehicle is.
+const END_COS: f64 = 0.4;
+/// How long a fast path goes on at both ends, seconds, and in which steps.
+const BEYOND_S: f64 = 3.0;
+const STEP_S: f64 = 0.25;
+/// Speed from which on something is fast, m/s.
+const FAST_MPS: f64 = 10.0;
+/// Fewest reflections an end is told by.
+const FEWEST: usize = 5;
+
+/// What the reflections of a path say of the vehicle, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Rear and front along the heading, from the path on; `None` where that end was not seen.
+    pub rear: Option<f64>,
+    pub front: Option<f64>,
+    /// 5 % to 95 % of all reflections along the heading.
+    pub reach: [f64; 2],
+    /// Height of the higher ones.
+    pub top_m: f64,
+}
+
+impl Extent {
+    pub fn of(path: &Path, instants: &[Instant]) -> Self {
+        let (mut behind, mut ahead) = (Vec::new(), Vec::new());
+        for (frame, r) in path.reflections(instants) {
+            let Some([along, _]) = path.local(frame, r) else { continue };
+            let Some(cos) = path.heading_at(frame).map(|h| h.cos() * r.sight[0] + h.sin() * r.sight[1]) else {
+                continue;
+            };
+            if cos > END_COS {
+                behind.push(along);
+            } else if cos < -END_COS {
+                ahead.push(along);
+            }
+        }
+        let end = |values: &[f64], share: f64| quantile(values, share).filter(|_| values.len() >= FEWEST);
+        Self { rear: end(&behind, 0.1), front: end(&ahead, 0.9), reach: path.reach, top_m: path.top_m }
+    }
+
+    /// The class whose size is nearest to what is seen.
+    pub fn class(&self) -> &'static str {
+        let length_m = match (self.rear, self.front) {
+            (Some(rear), Some(front)) => (front - rear).max(self.reach[1] - self.reach[0]),
+            _ => self.reach[1] - self.reach[0],
+        };
+        match () {
+            () if length_m > 7.2 || (self.top_m > 2.9 && length_m > 5.5) => "truck",
+            () if length_m > 5.5 || self.top_m > 2.4 => "van",
+            () => "car",
+        }
+    }
+
+    /// Where the centre of a vehicle of this length is along the heading, from the path on.
+    fn center_m(&self, length_m: f64) -> f64 {
+        match (self.rear, self.front) {
+            (Some(rear), Some(front)) => 0.5 * (rear + front),
+            (Some(rear), None) => rear + 0.5 * length_m,
+            (None, Some(front)) => front - 0.5 * length_m,
+            (None, None) => 0.5 * (self.reach[0] + self.reach[1]),
+        }
+    }
+}
+
+/// Mean velocity around a time, if that is fast enough to go on.
+fn speed_near(path: &Path, time_s: f64) -> Option<[f64; 2]> {
+    let near = path.motions.iter().filter(|(t, _)| (t - time_s).abs() <= 1.0);
+    let (n, [x, y]) = near.fold((0.0, [0.0, 0.0]), |(n, [x, y]), (_, m)| {
+        let [vx, vy] = m.velocity();
+        (n + 1.0, [x + vx, y + vy])
+    });
+    let velocity = [x / n, y / n];
+    (n > 0.0 && velocity[0].hypot(velocity[1]) > FAST_MPS).then_some(velocity)
+}
+
+/// The near face of the vehicle around a path. What is fast comes from somewhere and goes somewhere: up to
+/// [`BEYOND_S`] in the field of view are added at both ends.
+pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: String) -> LabelTrack {
+    let [sensor_x, sensor_y, _] = recording.pose.position;
+    let sensor = [sensor_x, sensor_y];
+    let extent = Extent::of(path, instants);
+    let class = extent.class();
+    let size = class_size(class).unwrap_or([4.6, 1.8, 1.5]);
+    let along = extent.center_m(size[0]);
+    // of the flank that is seen, reflections come from the side of the sensor
+    let left: Vec<f64> = path
+        .reflections(instants)
+        .filter_map(|(frame, r)| {
+            let (s, c) = path.heading_at(frame)?.sin_cos();
+            let sin = -r.sight[0] * s + r.sight[1] * c;
+            Some(path.local(frame, r)?[1] + 0.6 * 0.5 * size[1] * (sin / 0.7).clamp(-1.0, 1.0))
+        })
+        .collect();
+    let left = quantile(&left, 0.5).unwrap_or(0.0);
+    let mut steps: Vec<BoxStep> = path
+        .motions
+        .iter()
+        .zip(&path.headings_rad)
+        .map(|((time_s, m), heading_rad)| {
+            let ([x, y], (s, c)) = (m.place(), heading_rad.sin_cos());
+            BoxStep {
+                time_s: *time_s,
+                center: [x + along * c - left * s, y + along * s + left * c],
+                heading_rad: *heading_rad,
+            }
+        })
+        .collect();
+    let latest_s = instants.last().map_or(0.0, |i| i.time_s);
+    let ends = [(steps.first().copied(), -STEP_S), (steps.last().copied(), STEP_S)];
+    for (end, step_s) in ends {
+        let Some(end) = end else { continue };
+        let Some([vx, vy]) = speed_near(path, end.time_s) else { continue };
+        for k in 1..=(BEYOND_S / STEP_S) as u32 {
+            let dt_s = step_s * f64::from(k);
+            let (time_s, center) = (end.time_s + dt_s, [end.center[0] + vx * dt_s, end.center[1] + vy * dt_s]);
+            let seen = recording.pose.to_spherical([center[0], center[1], 1.0]);
+            if !(0.0..=latest_s).contains(&time_s) || !recording.sensor.field_of_view.contains(seen) {
+                break;
+            }
+            steps.push(BoxStep { time_s, center, ..end });
+        }
+    }
+    steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let points = simplify(&nears(&steps, size, sensor), TOLERANCE_M);
+    LabelTrack { id, class: class.to_owned(), size_m: None, points }
+}

@@ -1,0 +1,278 @@
+//! The page itself: drawing, changing, saving, and what it says when that fails.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::browser::{ALT, Browser, CTRL, Page, SHIFT};
+use crate::server::{Server, recording};
+
+/// Times and places of a track that is drawn by clicks, along the road.
+const LINE: [[f64; 2]; 3] = [[1.0, 150.0], [3.0, 110.0], [5.0, 60.0]];
+
+fn tracks(page: &Page) -> Vec<Value> {
+    page.ask("viewshed.session.tracks").as_array().unwrap().clone()
+}
+
+fn points(track: &Value) -> Vec<[f64; 3]> {
+    let points = track["points"].as_array().unwrap();
+    points.iter().map(|point| [0, 1, 2].map(|k| point[k].as_f64().unwrap())).collect()
+}
+
+/// Draws a track by clicks along the road.
+fn draw(page: &Page, line: &[[f64; 2]]) {
+    page.key("0");
+    page.key("n");
+    line.iter().for_each(|[time, x]| page.click_plot("along", *time, *x));
+    page.key("Enter");
+}
+
+#[test]
+fn a_track_that_is_drawn_is_saved_and_there_after_a_reload() {
+    let Some(browser) = Browser::start("drawing") else { return };
+    let server = Server::start(&recording("drawing"));
+    let page = browser.open(&server.url);
+    page.until_saved();
+    draw(&page, &LINE);
+    page.key("3");
+    page.until_saved();
+    let drawn = tracks(&page);
+    assert_eq!((&drawn[0]["id"], &drawn[0]["class"]), (&"1".into(), &"truck".into()), "{drawn:?}");
+    for (point, [time, x]) in points(&drawn[0]).iter().zip(LINE) {
+        assert!((point[0] - time).abs() < 0.1 && (point[1] - x).abs() < 2.0, "{drawn:?}");
+    }
+    let file = fs::read_to_string(&server.labels).unwrap();
+    assert!(file.lines().count() > 10 && file.contains(",1,truck,"), "{file}");
+    page.goes_to(&server.url);
+    page.until_saved();
+    let read = tracks(&page);
+    assert_eq!((read.len(), points(&read[0]).len()), (1, 3), "{read:?}");
+    assert_eq!(page.ask("document.querySelectorAll('#tracks button').length"), 1);
+    for (a, b) in points(&read[0]).iter().flatten().zip(points(&drawn[0]).iter().flatten()) {
+        assert!((a - b).abs() < 0.002, "{read:?} {drawn:?}");
+    }
+    // and back
+    page.key("PageDown");
+    page.key("Delete");
+    page.until("viewshed.session.tracks.length === 0");
+    page.key_with("z", CTRL);
+    page.until("viewshed.session.tracks.length === 1");
+    page.key_with("z", CTRL | SHIFT);
+    page.until_saved();
+    assert_eq!((tracks(&page).len(), fs::read_to_string(&server.labels).unwrap().lines().count()), (0, 1));
+}
+
+#[test]
+fn tracks_are_dragged_split_joined_renamed_and_every_step_is_undone() {
+    let Some(browser) = Browser::start("changing") else { return };
+    let server = Server::start(&recording("changing"));
+    let page = browser.open(&server.url);
+    page.until_saved();
+    draw(&page, &LINE);
+    let drawn = points(&tracks(&page)[0]);
+    // a drag is one step; the coordinate that the plot does not show stays
+    let [from, to] = [[drawn[1][0], drawn[1][1]], [3.5, 120.0]].map(|[time, x]| page.screen("along", time, x));
+    let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0];
+    page.drag(&[from, middle, to], 0);
+    let dragged = points(&tracks(&page)[0]);
+    assert!((dragged[1][0] - 3.5).abs() < 0.1 && (dragged[1][1] - 120.0).abs() < 2.0, "{dragged:?}");
+    assert_eq!((dragged[1][2], dragged[0], dragged[2]), (drawn[1][2], drawn[0], drawn[2]));
+    // the same with keys, in the other plot
+    page.focus("across");
+    page.key_with("ArrowUp", ALT);
+    page.key_with("ArrowUp", ALT);
+    let nudged = points(&tracks(&page)[0]);
+    assert!(nudged[1][2] > dragged[1][2] && nudged[1][1] == dragged[1][1], "{nudged:?}");
+    // split at the cursor, then joined again
+    page.click_plot("along", 2.0, 190.0);
+    page.key("PageDown");
+    page.key("s");
+    page.until("viewshed.session.tracks.length === 2");
+    let halves = tracks(&page);
+    let cut = points(&halves[0]).last().unwrap()[0];
+    assert!((cut - 2.0).abs() < 0.1 && points(&halves[1])[0][0] == cut, "{halves:?}");
+    page.key("j");
+    page.key("PageUp");
+    page.key("j");
+    page.until("viewshed.session.tracks.length === 1");
+    assert_eq!(points(&tracks(&page)[0]).len(), 4);
+    // a name in use is refused, another is taken
+    page.key("i");
+    page.ask("(document.getElementById('track-id').value = 'lorry', document.getElementById('track-id').dispatchEvent(new Event('change')), 1)");
+    page.until("viewshed.session.tracks.some((track) => track.id === 'lorry')");
+    page.focus("along");
+    page.until_saved();
+    assert!(fs::read_to_string(&server.labels).unwrap().contains(",lorry,"));
+    // all the way back, and forth again
+    let last = tracks(&page);
+    while page.ask("viewshed.session.history.past.length") != 0 {
+        page.key_with("z", CTRL);
+    }
+    assert!(tracks(&page).is_empty());
+    while page.ask("viewshed.session.history.future.length") != 0 {
+        page.key_with("y", CTRL);
+    }
+    page.until_saved();
+    assert_eq!(tracks(&page), last);
+}
+
+#[test]
+fn a_track_is_drawn_with_the_keyboard_alone_and_in_the_plan() {
+    let Some(browser) = Browser::start("keyboard") else { return };
+    let server = Server::start(&recording("keyboard"));
+    let page = browser.open(&server.url);
+    page.until_saved();
+    // everything can be reached with Tab
+    let mut reached = Vec::new();
+    for _ in 0..40 {
+        page.key("Tab");
+        reached.push(page.ask("document.activeElement.id || document.activeElement.dataset.key || ''"));
+    }
+    for id in ["help-button", "along", "across", "plan", "now", "window", "play", "new"] {
+        assert!(reached.contains(&id.into()), "{id} in {reached:?}");
+    }
+    page.key("0");
+    page.focus("along");
+    page.key("n");
+    for _ in 0..2 {
+        page.key(" ");
+        (0..6).for_each(|_| page.key("ArrowRight"));
+        (0..3).for_each(|_| page.key("ArrowDown"));
+    }
+    page.key(" ");
+    page.key("Enter");
+    page.key("+");
+    page.key("<");
+    page.key_with("ArrowLeft", SHIFT);
+    let drawn = points(&tracks(&page)[0]);
+    assert!(drawn.len() == 3 && drawn[0][0] < drawn[1][0] && drawn[0][1] > drawn[1][1], "{drawn:?}");
+    // from above: a point a time, places as clicked
+    page.key("Escape");
+    page.key("0");
+    page.ask("viewshed.session.goTo(2)");
+    page.key("n");
+    page.click_plot("plan", 60.0, -4.0);
+    (0..10).for_each(|_| page.key("."));
+    page.click_plot("plan", 75.0, -5.0);
+    page.key("Enter");
+    page.until_saved();
+    let from_above = points(&tracks(&page)[1]);
+    assert_eq!(from_above[0][0], 2.0);
+    assert!((from_above[1][0] - 2.0 - 10.0 / 15.0).abs() < 0.05, "{from_above:?}");
+    for (point, [x, y]) in from_above.iter().zip([[60.0, -4.0], [75.0, -5.0]]) {
+        assert!((point[1] - x).abs() < 1.0 && (point[2] - y).abs() < 1.0, "{from_above:?}");
+    }
+    // the box that follows is shown, ahead of the face that is seen of a vehicle that drives away
+    page.until("viewshed.session.boxes.size === 2");
+    let first = page.ask("viewshed.session.boxes.get('2').steps[0]");
+    assert!((first[1].as_f64().unwrap() - from_above[0][1] - 2.3).abs() < 0.3, "{first}");
+}
+
+#[test]
+fn a_second_tab_only_reads_until_the_first_is_closed() {
+    let Some(browser) = Browser::start("two tabs") else { return };
+    let server = Server::start(&recording("tabs"));
+    let first = browser.open(&server.url);
+    first.until_saved();
+    draw(&first, &LINE);
+    first.until_saved();
+    let second = browser.open(&server.url);
+    second.until("document.getElementById('state').dataset.kind === 'read-only'");
+    assert_eq!(tracks(&second).len(), 1);
+    draw(&second, &LINE);
+    assert_eq!(tracks(&second).len(), 1);
+    assert!(second.ask("viewshed.session.message").as_str().unwrap().contains("may only read"));
+    draw(&first, &[[6.0, 50.0], [8.0, 90.0]]);
+    first.until_saved();
+    first.close();
+    second.until_saved();
+    assert_eq!(tracks(&second).len(), 2, "what the first had drawn since");
+    draw(&second, &[[7.0, 20.0], [9.0, 90.0]]);
+    second.until_saved();
+    assert!(fs::read_to_string(&server.labels).unwrap().matches(",3,car,").count() > 2);
+}
+
+#[test]
+fn what_cannot_be_saved_is_said_and_stays_in_the_page() {
+    let Some(browser) = Browser::start("not saved") else { return };
+    let recording = recording("unsaved");
+    let mut server = Server::start(&recording);
+    let page = browser.open(&server.url);
+    page.until_saved();
+    draw(&page, &LINE);
+    page.until_saved();
+    // another program writes
+    let foreign = "time_s,object_id,class,x_m,y_m\n1,z,car,50,0\n2,z,car,70,0\n";
+    fs::write(&server.labels, foreign).unwrap();
+    page.key("5");
+    page.until("document.getElementById('state').dataset.kind === 'conflict'");
+    assert!(page.ask("viewshed.session.message").as_str().unwrap().contains("changed by another"));
+    assert_eq!(fs::read_to_string(&server.labels).unwrap(), foreign);
+    assert_eq!(tracks(&page)[0]["class"], "motorcycle");
+    page.ask("(viewshed.saver.waiting = null, 1)");
+    page.goes_to(&server.url);
+    page.until_saved();
+    assert_eq!(tracks(&page)[0]["id"], "z");
+    // nothing can be written, then it can again
+    let folder = recording.parent().unwrap();
+    let away = folder.with_extension("away");
+    let _ = fs::remove_dir_all(&away);
+    fs::rename(folder, &away).unwrap();
+    page.key("PageDown");
+    page.key("3");
+    page.until("document.getElementById('state').dataset.kind !== 'saved'");
+    page.until("document.getElementById('state').dataset.kind === 'failed' || viewshed.saver.conflict");
+    fs::rename(&away, folder).unwrap();
+    page.ask("(viewshed.saver.conflict = false, viewshed.saver.send(), 1)");
+    page.until_saved();
+    assert!(fs::read_to_string(&server.labels).unwrap().contains(",z,truck,"));
+    // the server is gone
+    server.kill();
+    let kept = fs::read_to_string(&server.labels).unwrap();
+    page.until("document.getElementById('state').dataset.kind === 'failed'");
+    assert!(page.ask("viewshed.session.message").as_str().unwrap().contains("does not answer"));
+    assert_eq!(fs::read_to_string(&server.labels).unwrap(), kept);
+    assert_eq!(tracks(&page).len(), 1);
+    page.ask("(viewshed.saver.waiting = null, 1)");
+}
+
+#[test]
+fn proposals_are_shown_before_one_key_decides() {
+    let Some(browser) = Browser::start("proposals") else { return };
+    let server = Server::start(&recording("proposals"));
+    let page = browser.open(&server.url);
+    page.until_saved();
+    page.until("viewshed.session.proposals.shown");
+    let offered = page.number("viewshed.session.proposals.waiting.length");
+    assert!(offered > 4.0, "{offered}");
+    // before it was drawn, no key takes it
+    page.ask("(viewshed.session.proposals.shown = false, viewshed.session.accept(false), 1)");
+    assert_eq!(tracks(&page).len(), 0);
+    page.ask("(viewshed.session.proposals.shown = true, 1)");
+    let first = page.ask("viewshed.session.proposals.current.track");
+    // it lies within all plots
+    for (plot, [a, b]) in [("along", [0, 1]), ("across", [0, 2]), ("plan", [1, 2])] {
+        let inside = page.ask(&format!(
+            "viewshed.session.proposals.current.track.points.every((p) => {{ const v = viewshed.plots.{plot}.view;
+               return p[{a}] >= v.left && p[{a}] <= v.right && p[{b}] >= v.bottom && p[{b}] <= v.top; }})"
+        ));
+        assert_eq!(inside, true, "{plot}");
+    }
+    page.key("a");
+    page.until("viewshed.session.tracks.length === 1 && viewshed.session.proposals.shown");
+    let taken = &tracks(&page)[0];
+    assert_eq!((&taken["points"], &taken["class"], &taken["id"]), (&first["points"], &first["class"], &"1".into()));
+    page.key("x");
+    page.until("viewshed.session.proposals.decided === 2 && viewshed.session.proposals.shown");
+    page.key("m");
+    page.until("viewshed.session.tracks.length === 2 && viewshed.session.selected === '2'");
+    page.key("]");
+    page.key_with("ArrowUp", ALT);
+    page.until_saved();
+    assert_eq!(page.number("viewshed.session.proposals.waiting.length"), offered - 3.0);
+    // after a reload what is labelled is not offered again
+    page.goes_to(&server.url);
+    page.until("viewshed.session.proposals.ready");
+    assert!(page.number("viewshed.session.proposals.waiting.length") < offered);
+    assert_eq!(tracks(&page).len(), 2);
+}
