@@ -7,11 +7,12 @@ use std::error::Error;
 use viewshed::query::{self, Answer, Footprint};
 use viewshed::small::{CHECK, Map, Parameters, Sender, State};
 use viewshed::{
-    Addresses, Angle, Ars408, Ars408Config, BLOCK_LEN, BroadcastConfig, CanFrame, CanId, Condition, Detection, Epoch,
-    Estimator, Feed, FieldOfView, Flow, Frame, Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver,
-    NativeSender, NoiseConfig, PolarMap, Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading, Radar3dConfig,
+    Addresses, Angle, Ars408, Ars408Config, BLOCK_LEN, BroadcastConfig, Calibration, Camera3d, Camera3dConfig,
+    Camera3dParameters, CanFrame, CanId, Condition, Detection, Epoch, Estimator, Feed, FieldOfView, Flow, Frame,
+    ImageBox, Intrinsics, Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver, NativeSender,
+    NoiseConfig, PointPair, PolarMap, Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading, Radar3dConfig,
     Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, SerialLine, SerialSession, Settings,
-    SettingsSlots, StoredSettings, Ti, TiConfig, Time, Unit, UnitState, Visibility, VisibilityMap,
+    SettingsSlots, StoredSettings, Ti, TiConfig, Time, Unit, UnitState, VehicleClass, Visibility, VisibilityMap,
 };
 
 /// Range cells and azimuths of the small size, and a receiver of its maps.
@@ -27,6 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     estimators_and_questions(&settings)?;
     a_unit_and_its_receiver(&settings)?;
     a_session_from_start_to_restart(&settings);
+    a_camera()?;
     decoders();
     println!("the face is enough");
     Ok(())
@@ -121,6 +123,31 @@ fn a_unit_and_its_receiver(settings: &Settings) -> Result<(), Box<dyn Error>> {
     let equal = |a: usize, r: usize| received.cell(a, r).visible() == unit.map().cell(a, r).visible();
     assert!((0..AZIMUTHS).all(|a| (0..RANGES).all(|r| equal(a, r))), "every cell arrives");
     assert!(received.at(RoadPoint::from_metres(20.0, 0.0)?).visible());
+    Ok(())
+}
+
+/// A camera calibrated by points of the road, its boxes over the native format, its map.
+fn a_camera() -> Result<(), Box<dyn Error>> {
+    // at 6 m, level
+    let seen =
+        |x: f32, y: f32| PointPair { road_m: [x, y], image_px: [960.0 - 1600.0 * y / x, 540.0 + 1600.0 * 6.0 / x] };
+    let points = [seen(20.0, -8.0), seen(20.0, 9.0), seen(90.0, 7.0), seen(110.0, -10.0)];
+    let intrinsics = Intrinsics { size_px: [1920, 1080], focal_px: [1600.0; 2], center_px: [960.0, 540.0] };
+    let (calibration, residual_px) = Calibration::from_points(&intrinsics, &points)?;
+    assert!(residual_px < 0.5 && (calibration.mount.height_m - 6.0).abs() < 0.1);
+    let parameters = Camera3dParameters::<200, 60>::new(&calibration.normalised(), &Camera3dConfig::default())?;
+    let (mut camera, mut map) = (Box::new(Camera3d::<200, 60>::new()), parameters.map());
+    // a truck's rear at 40 m
+    let truck = ImageBox::of_picture([909.0, 602.0, 1011.0, 780.0], [1920, 1080], VehicleClass::Truck);
+    let boxes = [truck.ok_or("edges that are finite")?];
+    let (mut sender, mut feed) = (NativeSender::new(0), NativeReceiver::<64, ImageBox>::boxes(NativeConfig::camera(0)));
+    for message in sender.boxes(at(0), false, &boxes, NativeMedium::CanFd) {
+        feed.take(message.bytes(), at(0), &mut |frame| {
+            camera.process(&parameters, frame.measured, frame.input, frame.status, &mut map);
+        });
+    }
+    assert_eq!(query::point(&map, RoadPoint::from_metres(30.5, 0.5)?), Answer::VisibleFree);
+    assert_eq!(query::point(&map, RoadPoint::from_metres(65.5, 0.5)?), Answer::Invisible);
     Ok(())
 }
 
