@@ -59,17 +59,24 @@
 //! |---|---|
 //! | a sensor as it is installed, in SI units, checked once | [`Sensor`], [`Mount`], [`FieldOfView`], [`NoiseConfig`], [`RoadPoint`]; errors name the parameter: [`ConfigError`] |
 //! | a frame of it | [`Detection`], [`Measurement`], [`Angle`], [`Time`], [`FrameStatus`] |
-//! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`]; the flat baseline [`Radar2d`] |
+//! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`] |
 //! | a camera: its calibration, boxes of its pictures | [`Camera3d`], [`Camera3dConfig`], [`Camera3dParameters`], [`Calibration`], [`Intrinsics`], [`PointPair`], [`ImageBox`], [`VehicleClass`]; how it is installed: [`cameras`] |
 //! | what is known of the road | [`PolarMap`], [`RoadGrid`]; every map answers [`VisibilityMap`] and the [questions](query) |
 //! | maps on CAN, CAN FD and serial lines | [`Broadcaster`], [`BroadcastConfig`], [`Medium`]; a [`Receiver`] gives maps back |
 //! | radars that are decoded, and boxes of a camera | [`Ars408`], [`Ti`], [`NativeReceiver`]; each is a [`Feed`] |
-//! | a unit: radar in, maps out | [`Unit`] joins [`Estimator`], [`Feed`] and [`MapSender`]; [`Settings`] are kept in two slots |
-//! | a unit on hardware of its own | [`Roadside`], with a board's [`CanPort`], [`SerialPort`] and [`SettingsSlots`] |
-//! | a unit on serial lines, or with an operating system | [`SerialSession`], [`CanService`], [`BusKeeper`] |
+//! | a unit: radar in, maps out | [`Unit`] joins [`Estimator`], [`Feed`] and [`MapSender`], by [`Settings`] |
 //!
-//! Feature `bench` makes every room public and adds the loops that compare boards with a PC: for benches, tests and
-//! those who work on the library (`cargo doc --features bench`), not for products.
+//! # Features
+//!
+//! | feature | for | what it adds |
+//! |---|---|---|
+//! | `board` | who builds a unit, on a controller or as a service | module `board`: the loop `Roadside` with a board's `CanPort`, `SerialPort` and `SettingsSlots`; sessions and services on a line or bus; settings that outlast a restart |
+//! | `defmt` | who reads a controller's log | `Format` on public types, and events |
+//! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
+//! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
+//! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
+//!
+//! `cargo doc --features board` (or `bench`) shows what each adds.
 //!
 //! # What is where
 //!
@@ -206,7 +213,6 @@ pub use frame::gate::GateConfig;
 pub use frame::health::HealthConfig;
 pub use grid::evidence::EvidenceConfig;
 pub use obstacles::config::ObstacleConfig;
-pub use radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading};
 pub use radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters, VisibilityConfig};
 
 // Maps and questions to them.
@@ -220,7 +226,7 @@ pub use wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 pub use wire::frame::{CanFrame, CanId};
 pub use wire::header::Header;
 pub use wire::message::{Addresses, Epoch};
-pub use wire::receive::{Limits as ReceiverLimits, Receiver};
+pub use wire::receive::{Receiver, ReceiverLimits};
 pub use wire::serial::{MOST_STUFFED, Unstuffer};
 pub use wire::status::{Reason, ResetCause, Status, UnitState};
 #[cfg(feature = "secoc")]
@@ -230,23 +236,40 @@ pub use wire::{
 };
 
 // Radars.
-pub use inputs::ars408::{
-    Ars408, Ars408Config, Ars408Outcome, configuration::Ars408Configuration, profile::Ars408Profile,
-    upkeep::Ars408Upkeep,
-};
-pub use inputs::native::{NativeConfig, NativeMedium, NativeOutcome, NativeReceiver, NativeSender};
-pub use inputs::ti::{Ti, TiAngleUnit, TiConfig, TiDialect, TiFamily, TiOutcome};
+pub use inputs::ars408::{Ars408, Ars408Config};
+pub use inputs::native::{NativeConfig, NativeMedium, NativeReceiver, NativeSender};
+pub use inputs::ti::{Ti, TiAngleUnit, TiConfig, TiDialect, TiFamily};
 pub use inputs::{Feed, Frame};
 
-// A unit: the loop of a board, its settings, its lines.
-pub use unit::can_bus::{BitTiming, BusConfig, BusKeeper, CanPort};
-pub use unit::can_service::{CanService, CanServiceConfig};
-pub use unit::frame_queue::FrameQueue;
+// A unit: radar in, maps out, as an integrator set it up.
+pub use unit::can_bus::BusConfig;
 pub use unit::profile::{reference, small};
-pub use unit::radar_clock::RadarClock;
-pub use unit::roadside::{ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SerialPort};
-pub use unit::serial_service::SerialLine;
-pub use unit::session::SerialSession;
-pub use unit::settings::{BLOCK_LEN, BlockError, FlashSlots, Settings, SettingsCheck, SettingsSlots, StoredSettings};
-pub use unit::status_output::StatusOutput;
-pub use unit::{Flow, InUnit, MapSender, Unit};
+pub use unit::settings::Settings;
+pub use unit::{InUnit, MapSender, Unit};
+
+/// What it takes to build a unit, on a controller or as a service: its loop, buses, lines and stored settings.
+#[cfg(feature = "board")]
+pub mod board {
+    // a radar's own settings, and what its decoder says of each piece
+    pub use crate::inputs::ars408::{
+        Ars408Outcome, configuration::Ars408Configuration, profile::Ars408Profile, upkeep::Ars408Upkeep,
+    };
+    pub use crate::inputs::native::NativeOutcome;
+    pub use crate::inputs::ti::TiOutcome;
+
+    // buses and lines
+    pub use crate::unit::can_bus::{BitTiming, BusKeeper, CanPort};
+    pub use crate::unit::frame_queue::FrameQueue;
+    pub use crate::unit::serial_service::SerialLine;
+
+    // settings that outlast a restart, and the service that sets them
+    pub use crate::unit::can_service::{CanService, CanServiceConfig};
+    pub use crate::unit::session::SerialSession;
+    pub use crate::unit::settings::{BLOCK_LEN, BlockError, FlashSlots, SettingsCheck, SettingsSlots, StoredSettings};
+
+    // the loop
+    pub use crate::unit::Flow;
+    pub use crate::unit::radar_clock::RadarClock;
+    pub use crate::unit::roadside::{ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SerialPort};
+    pub use crate::unit::status_output::StatusOutput;
+}

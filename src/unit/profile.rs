@@ -5,9 +5,7 @@ macro_rules! size {
         $(#[$doc])*
         pub mod $name {
             use crate::estimator::Estimator;
-            use crate::inputs::ars408::Ars408;
             use crate::radar_3d::Radar3d;
-            use crate::unit::settings::SettingsCheck;
             use crate::wire::broadcast::Broadcaster;
 
             /// Words of 32 range cells.
@@ -22,10 +20,12 @@ macro_rules! size {
             /// Who sends it.
             pub type Sender = Broadcaster<$azimuths, WORDS>;
             /// A radar of the ARS408 family with as many detections.
-            pub type Radar = Ars408<$detections>;
-
+            #[cfg(feature = "board")]
+            pub type Radar = crate::inputs::ars408::Ars408<$detections>;
             /// Whether a unit of this size can run with settings.
-            pub const CHECK: SettingsCheck = SettingsCheck::of::<State, Sender>();
+            #[cfg(feature = "board")]
+            pub const CHECK: crate::unit::settings::SettingsCheck =
+                crate::unit::settings::SettingsCheck::of::<State, Sender>();
         }
     };
 }

@@ -5,8 +5,8 @@ use crate::sensor::config::ConfigError;
 use crate::wire::broadcast::{BroadcastConfig, Broadcaster};
 use crate::wire::frame::CanFrame;
 use crate::wire::header::Header;
-use crate::wire::layers::Layers;
 use crate::wire::message::Epoch;
+use crate::wire::planes::Planes;
 use crate::wire::status::Status;
 
 /// A sender of maps `M`; each method is [`Broadcaster`]'s.
@@ -38,7 +38,7 @@ pub trait MapSender<M>: Sized {
     fn take_overload(&mut self) -> bool;
 }
 
-impl<M: Layers<W>, const A: usize, const W: usize, const P: usize> MapSender<M> for Broadcaster<A, W, P> {
+impl<M: Planes<W>, const A: usize, const W: usize, const P: usize> MapSender<M> for Broadcaster<A, W, P> {
     fn fits(header: &Header) -> Result<(), ConfigError> {
         Self::fits(header)
     }

@@ -16,6 +16,7 @@
 use super::code::interval::Form;
 use super::e2e::{E2eError, Profile};
 use super::frame::{CanFrame, CanId, MOST_BYTES};
+use crate::fixed::bits::Bits;
 
 /// Version of the wire format.
 pub const WIRE_VERSION: u8 = 1;
@@ -43,6 +44,9 @@ const CLASSIC_START: usize = 2;
 
 /// First own byte of a long message.
 const LONG_START: usize = 6;
+
+/// Azimuths of a map, a bit each.
+pub(super) type Azimuths = Bits<4>;
 
 /// What the bits of a map's cells mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

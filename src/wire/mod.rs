@@ -7,10 +7,9 @@ pub mod code;
 pub mod e2e;
 pub mod frame;
 pub mod header;
-mod layer;
-pub mod layers;
 pub mod map_message;
 pub mod message;
+pub mod planes;
 pub mod receive;
 pub mod scan_number;
 #[cfg(feature = "secoc")]

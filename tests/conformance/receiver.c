@@ -5,19 +5,40 @@
 #define RECEIVER_WITHOUT_MAIN
 #include "../receiver/receiver.c"
 
-static uint32_t crc32_table[256];
+/* Of a byte with so many zero bytes after it. */
+static uint32_t crc32_table[8][256];
 
 static void make_table(void) {
     for (uint32_t byte = 0; byte < 256; byte++) {
         uint32_t sum = byte;
         for (int i = 0; i < 8; i++) sum = sum & 1 ? sum >> 1 ^ 0xEDB88320 : sum >> 1;
-        crc32_table[byte] = sum;
+        crc32_table[0][byte] = sum;
     }
+    for (int zeros = 1; zeros < 8; zeros++)
+        for (int byte = 0; byte < 256; byte++) {
+            uint32_t sum = crc32_table[zeros - 1][byte];
+            crc32_table[zeros][byte] = sum >> 8 ^ crc32_table[0][sum & 255];
+        }
 }
 
-/* 0 unknown, 1 not visible, 2 visible. */
-static int state_of(const sensor_t *s, uint64_t now, int a, int c) {
-    return shown(s, now, a) && c >= s->now[a].near && c < s->now[a].end ? 1 + s->now[a].bit[c] : 0;
+/* Eight bytes at a time: cells are most of the work. */
+static uint32_t crc32_of(uint32_t sum, const uint8_t *bytes, int n) {
+    for (; n >= 8; n -= 8, bytes += 8) {
+        uint32_t next = 0;
+        for (int i = 0; i < 8; i++)
+            next ^= crc32_table[7 - i][bytes[i] ^ (i < 4 ? sum >> 8 * i & 255 : 0)];
+        sum = next;
+    }
+    for (; n > 0; n--) sum = crc32_table[0][(sum ^ *bytes++) & 255] ^ sum >> 8;
+    return sum;
+}
+
+/* The states of an azimuth: 0 unknown, 1 not visible, 2 visible. */
+static void states_of(const sensor_t *s, uint64_t now, int a, uint8_t *states) {
+    const ray_t *ray = &s->now[a];
+    memset(states, 0, (size_t)s->ranges);
+    if (shown(s, now, a))
+        for (int c = ray->near; c < ray->end && c < s->ranges; c++) states[c] = 1 + ray->bit[c];
 }
 
 /* Bytes of hexadecimal digits; how many, at most `most`. */
@@ -31,16 +52,16 @@ static int bytes_in(const char *digits, uint8_t *bytes, int most) {
 static void answer(const sensor_t *s, uint64_t asked, bool cells) {
     uint64_t now = watch(asked);
     static char rows[AZIMUTHS * (CELLS + 1) + 1];
+    uint8_t states[CELLS];
     int count[3] = {0, 0, 0}, azimuths = trusted(s, now) ? s->azimuths : 0, n = 0;
     uint32_t sum = 0xFFFFFFFF;
     for (int a = 0; a < azimuths; a++) {
+        states_of(s, now, a, states);
+        for (int c = 0; c < s->ranges; c++) count[states[c]]++;
+        sum = crc32_of(sum, states, s->ranges);
+        if (!cells) continue;
         rows[n++] = ' ';
-        for (int c = 0; c < s->ranges; c++) {
-            int state = state_of(s, now, a, c);
-            count[state]++;
-            sum = crc32_table[(sum ^ (uint32_t)state) & 255] ^ sum >> 8;
-            rows[n++] = "?#."[state];
-        }
+        for (int c = 0; c < s->ranges; c++) rows[n++] = "?#."[states[c]];
     }
     bool nothing = count[1] + count[2] == 0;
     rows[nothing ? 0 : n] = 0;

@@ -8,8 +8,8 @@ use viewshed::fixed::bits::Bits;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::Plane;
+use viewshed::wire::planes::Planes;
 
 pub const A: usize = 40;
 pub const R: usize = 64;
@@ -67,7 +67,7 @@ pub fn header(fingerprint: u32) -> Header {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Map(pub Vec<Ray<W>>);
 
-impl Layers<W> for Map {
+impl Planes<W> for Map {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         // other planes: the same cells, turned over
         let ray = self.0.get(azimuth).copied().unwrap_or(Ray::UNKNOWN);

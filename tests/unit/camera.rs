@@ -16,7 +16,7 @@ use viewshed::unit::session::SerialSession;
 use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::message::{Addresses, Epoch};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 use viewshed::wire::status::{Reason, UnitState};
 
@@ -111,7 +111,7 @@ fn boxes_on_a_serial_line_become_the_map_of_a_receiver_each_cell_as_the_nearest_
         SerialSession::<64, ImageBox>::start(0, Epoch::new(7), StoredSettings::read(&slots, CHECK), &mut line);
     assert_eq!(session.settings(), Some(&settings));
     let mut unit = Some(Unit::new(&parameters, &mut *state, &mut *map, &mut *sender));
-    let mut receiver = Box::new(Receiver::<1, AZIMUTHS, 7>::new([0], Addresses::STANDARD, Limits::DEFAULT));
+    let mut receiver = Box::new(Receiver::<1, AZIMUTHS, 7>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));
     let mut camera = NativeSender::new(0);
     for frame in 0..20 {
         let mut stuffed = [0; 300];

@@ -10,7 +10,7 @@ use viewshed::map::Visibility;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 
 /// What a bus does to frames, shares of them.
@@ -270,7 +270,7 @@ fn compare(name: &str, ours: Ours, key: Option<&str>, sent: &[(u64, Sent)]) -> O
 fn a_receiver_written_from_the_specification_makes_the_same_maps() {
     for (name, scans, faults) in [("clean", 150, NONE), ("faulty", 1500, ALL)] {
         let sent = traffic(&[CLASSIC, FD, SERIAL], scans, faults, 5);
-        let bare = Ours::Bare(Box::new(Receiver::new(ALL_SENSORS, Addresses::STANDARD, Limits::DEFAULT)));
+        let bare = Ours::Bare(Box::new(Receiver::new(ALL_SENSORS, Addresses::STANDARD, ReceiverLimits::DEFAULT)));
         let Some(shown) = compare(name, bare, None, &sent) else { return };
         // most of the 100 ms there are
         for sensor in [1, 6, 3] {
@@ -292,7 +292,7 @@ fn with_a_key_it_makes_the_same_maps_of_authenticated_messages_and_of_no_others(
     for (name, scans, faults) in [("secured-clean", 150, NONE), ("secured-faulty", 1500, ALL)] {
         let sent = traffic(&sensors, scans, faults, 5);
         let secured = || {
-            let receiver = SecuredReceiver::new(ALL_SENSORS, Addresses::STANDARD, Limits::DEFAULT, &key);
+            let receiver = SecuredReceiver::new(ALL_SENSORS, Addresses::STANDARD, ReceiverLimits::DEFAULT, &key);
             Ours::Secured(Box::new(receiver))
         };
         let Some(shown) = compare(name, secured(), Some(digits), &sent) else { return };
@@ -304,7 +304,7 @@ fn with_a_key_it_makes_the_same_maps_of_authenticated_messages_and_of_no_others(
         let begun = sent.len() / 2;
         let shown = compare(name, secured(), Some(digits), &sent[begun..]).unwrap();
         assert!(shown[6] > scans * 67 / 100 * 4 / 10 / 2 - 20, "{shown:?}");
-        let bare = Ours::Bare(Box::new(Receiver::new(ALL_SENSORS, Addresses::STANDARD, Limits::DEFAULT)));
+        let bare = Ours::Bare(Box::new(Receiver::new(ALL_SENSORS, Addresses::STANDARD, ReceiverLimits::DEFAULT)));
         let shown = compare(name, bare, None, &sent).unwrap();
         assert!(shown[1] > 0 && shown[0] > 0 && shown[2] + shown[3] + shown[6] == 0, "{shown:?}");
     }

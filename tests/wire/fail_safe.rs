@@ -20,11 +20,11 @@ use viewshed::wire::code::reading::{self, Reader};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::map_message;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Part, Plane, Received};
-use viewshed::wire::receive::{Accepted, Limits, Receiver};
+use viewshed::wire::receive::{Accepted, Receiver, ReceiverLimits};
 use viewshed::wire::scan_number::ScanNumber;
 
 const SENSOR: u8 = 2;
-const LIMITS: Limits = Limits::DEFAULT;
+const LIMITS: ReceiverLimits = ReceiverLimits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
 const DELAY_US: u64 = 100_000;
 /// Frames are displaced by so much; in every fifth world by almost the period of the scan numbers, less D, which
@@ -184,7 +184,7 @@ impl World {
             &context,
             Kind::Refresh,
             map.start,
-            &mut { reading::Place::START },
+            &mut { reading::Resume::START },
             &mut azimuths,
         );
         for azimuth in azimuths.0 {

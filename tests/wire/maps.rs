@@ -10,9 +10,9 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Plane, Received};
-use viewshed::wire::receive::{Accepted, Condition, Limits, Receiver, Refused};
+use viewshed::wire::planes::Planes;
+use viewshed::wire::receive::{Accepted, Receiver, ReceiverLimits, Refused, SenderCondition};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer};
 use viewshed::wire::status::{Reason, UnitState};
 
@@ -45,7 +45,7 @@ impl<const P: usize> Line<P> {
         Self {
             medium,
             sender: Broadcaster::new(config, header(7), Epoch::new(3), ms(0)).unwrap(),
-            receiver: Receiver::new([1, SENSOR], addresses(medium), Limits::DEFAULT),
+            receiver: Receiver::new([1, SENSOR], addresses(medium), ReceiverLimits::DEFAULT),
             unstuffer: Unstuffer::new(),
             refused: Vec::new(),
             frames: Vec::new(),
@@ -145,7 +145,7 @@ fn who_joins_late_has_everything_within_a_second() {
                     let _ = line.sender.scan(ms(now), &map);
                 }
                 if now == join {
-                    line.receiver = Receiver::new([1, SENSOR], addresses(medium), Limits::DEFAULT);
+                    line.receiver = Receiver::new([1, SENSOR], addresses(medium), ReceiverLimits::DEFAULT);
                 }
                 line.pass(ms(now));
             }
@@ -292,7 +292,10 @@ fn a_clock_that_steps_back_between_looks_tells_nothing_until_a_new_session() {
     assert!(shown(&line, 2000) && shown(&line, 1985), "a look may be handed in a little later than it was");
     // the cable is pulled, the clock is set back, and its old time comes once more
     assert!(!shown(&line, 1500) && !shown(&line, 2001));
-    assert_eq!(line.receiver.sensor(SENSOR).unwrap().condition(ms(2001), &Limits::DEFAULT), Condition::Waiting);
+    assert_eq!(
+        line.receiver.sensor(SENSOR).unwrap().condition(ms(2001), &ReceiverLimits::DEFAULT),
+        SenderCondition::Waiting
+    );
 }
 
 #[test]
@@ -330,7 +333,7 @@ fn a_clock_that_steps_back_while_the_sender_is_quiet_begins_a_new_epoch() {
 #[test]
 fn an_unknown_version_and_a_larger_map_are_reported_and_unknown() {
     let mut line = Line::<1>::new(MEDIA[2], BroadcastConfig::new(SENSOR, MEDIA[2]));
-    let mut small = Receiver::<1, 20, W>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+    let mut small = Receiver::<1, 20, W>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let map = Shadows::new(2).next();
     for now in 0..2000 {
         if now % 67 == 0 {
@@ -348,10 +351,10 @@ fn an_unknown_version_and_a_larger_map_are_reported_and_unknown() {
         let later = later.protect(packet.bytes()[2], None);
         let _ = line.receiver.message(ms(now), later.bytes());
     }
-    let (now, limits) = (ms(2000), Limits::DEFAULT);
-    assert_eq!(small.sensor(SENSOR).unwrap().condition(now, &limits), Condition::Unusable);
-    assert_eq!(line.receiver.sensor(SENSOR).unwrap().condition(now, &limits), Condition::Unusable);
-    assert_eq!(line.receiver.sensor(1).unwrap().condition(now, &limits), Condition::Waiting);
+    let (now, limits) = (ms(2000), ReceiverLimits::DEFAULT);
+    assert_eq!(small.sensor(SENSOR).unwrap().condition(now, &limits), SenderCondition::Unusable);
+    assert_eq!(line.receiver.sensor(SENSOR).unwrap().condition(now, &limits), SenderCondition::Unusable);
+    assert_eq!(line.receiver.sensor(1).unwrap().condition(now, &limits), SenderCondition::Waiting);
     assert_eq!(query::point(&line.receiver.together(now), RoadPoint::new(4100, 10)), Answer::Unknown);
     assert!(line.receiver.sensor(SENSOR).unwrap().counters().malformed > 0);
 }
@@ -382,11 +385,11 @@ fn conflict(others: Epoch) {
         if let Some(frame) = other.next_frame(ms(now)).filter(|_| between) {
             let _ = line.receiver.frame(ms(now), &frame);
         }
-        let condition = line.receiver.sensor(SENSOR).unwrap().condition(ms(now), &Limits::DEFAULT);
+        let condition = line.receiver.sensor(SENSOR).unwrap().condition(ms(now), &ReceiverLimits::DEFAULT);
         let visible = line.received(Plane::Visibility, ms(now)).iter().any(|ray| !ray.known.is_empty());
         match now {
-            1500..2000 | 7500.. => assert!(visible && condition == Condition::Ok, "{now}"),
-            2600..4000 => assert!(!visible && condition == Condition::Conflict, "{now}"),
+            1500..2000 | 7500.. => assert!(visible && condition == SenderCondition::Ok, "{now}"),
+            2600..4000 => assert!(!visible && condition == SenderCondition::Conflict, "{now}"),
             _ => {}
         }
     }
@@ -395,7 +398,7 @@ fn conflict(others: Epoch) {
 /// All cells are known, and none is visible.
 struct Dark;
 
-impl Layers<W> for Dark {
+impl Planes<W> for Dark {
     fn ray(&self, _: Plane, _: usize) -> Ray<W> {
         Ray::new(Known::new(0, R), Bits::NONE)
     }
@@ -424,8 +427,8 @@ fn of_two_senders_with_one_epoch_and_one_header_the_one_whose_clock_is_ahead_is_
             if let Some(frame) = other.next_frame(ms(other_ms + now)).filter(|_| now >= 2000) {
                 let _ = line.receiver.frame(ms(now), &frame);
             }
-            let condition = line.receiver.sensor(SENSOR).unwrap().condition(ms(now), &Limits::DEFAULT);
-            assert!(condition != Condition::Conflict, "nothing contradicts");
+            let condition = line.receiver.sensor(SENSOR).unwrap().condition(ms(now), &ReceiverLimits::DEFAULT);
+            assert!(condition != SenderCondition::Conflict, "nothing contradicts");
             let rays = line.received(Plane::Visibility, ms(now));
             let dark: Ray<W> = Dark.ray(Plane::Visibility, 0);
             let of_other = rays.iter().filter(|ray| **ray == dark).count();
@@ -449,7 +452,7 @@ fn secured_messages_need_their_key_and_bring_the_same_maps() {
         let config = BroadcastConfig { secured: true, ..BroadcastConfig::new(SENSOR, medium) };
         let mut sender = Broadcaster::<A, W>::new(config, header(7), Epoch::new(3), ms(0)).unwrap();
         let (mut sealer, mut opener) = (Sealer::new(KEY, 1000), Opener::new(KEY));
-        let mut receiver = Receiver::<1, A, W>::new([SENSOR], addresses(medium), Limits::DEFAULT);
+        let mut receiver = Receiver::<1, A, W>::new([SENSOR], addresses(medium), ReceiverLimits::DEFAULT);
         let mut keyless = receiver.clone();
         let mut shadows = Shadows::new(4);
         for scan in 0..100 {

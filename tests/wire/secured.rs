@@ -5,7 +5,7 @@ use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::message::{Addresses, Epoch, Message, NotAuthentic, Packet, Plane, data_id};
-use viewshed::wire::receive::{Condition, Counters, Limits, Receiver, Refused, SecuredReceiver};
+use viewshed::wire::receive::{Counters, Receiver, ReceiverLimits, Refused, SecuredReceiver, SenderCondition};
 use viewshed::wire::secoc::Sealer;
 
 type Secured = SecuredReceiver<[u8; 16], 1, A, W>;
@@ -50,7 +50,7 @@ impl Sender {
 }
 
 fn receiver() -> Secured {
-    Secured::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT, &KEY)
+    Secured::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT, &KEY)
 }
 
 /// As the medium carries it.
@@ -132,7 +132,7 @@ fn without_an_authenticator_nothing_is_taken() {
         assert!(sent > 50 && !shows(&receiver, 2999));
     }
     // and who has no key leaves authenticated ones alone
-    let mut keyless = Receiver::<1, A, W>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+    let mut keyless = Receiver::<1, A, W>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let packet = Sender::new(medium, KEY, 9, 3, 0).send(0).unwrap();
     assert_eq!(keyless.message(ms(0), packet.bytes()), Err(Refused::Sealed));
     assert_eq!(keyless.sensor(SENSOR).unwrap().counters().not_authentic, 1);
@@ -164,7 +164,10 @@ fn repeated_messages_are_counted_and_do_nothing() {
         }
         assert!(repeated > 200);
         assert_eq!(counters(&receiver).not_authentic, repeated);
-        assert_eq!(receiver.receiver().sensor(SENSOR).unwrap().condition(ms(15_000), &Limits::DEFAULT), Condition::Ok);
+        assert_eq!(
+            receiver.receiver().sensor(SENSOR).unwrap().condition(ms(15_000), &ReceiverLimits::DEFAULT),
+            SenderCondition::Ok
+        );
     }
 }
 

@@ -11,10 +11,10 @@ use viewshed::wire::code::model::{MODEL, STOP_CLASSES};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::{CanFrame, CanId, fd_length};
 use viewshed::wire::header::{Clock, Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::map_message;
 use viewshed::wire::message::{Addresses, Message, Packet, Packing, Part, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::planes::Planes;
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::scan_number::ScanNumber;
 
 const AZIMUTHS: usize = 4;
@@ -45,7 +45,7 @@ pub fn header() -> Header {
 /// A picture: `.` visible, `#` not visible, blanks unknown.
 struct Picture(Vec<Ray<1>>);
 
-impl Layers<1> for Picture {
+impl Planes<1> for Picture {
     fn ray(&self, _: Plane, azimuth: usize) -> Ray<1> {
         self.0[azimuth]
     }
@@ -168,7 +168,7 @@ fn shows(ray: &Ray<1>, state: impl Fn(usize) -> Option<bool>) -> bool {
 #[test]
 fn the_example_reads_as_the_pictures() {
     // nothing is on its way for long here, so that each map is shown as soon as its frames have come
-    let limits = Limits { max_age_us: 60_000, max_delay_us: 10_000 };
+    let limits = ReceiverLimits { max_age_us: 60_000, max_delay_us: 10_000 };
     for (kind, scans) in [("frames", [0x21, 0x24]), ("further", [0xFE, 0x01])] {
         let mut receiver = Receiver::<1, AZIMUTHS, 1>::new([0], Addresses::STANDARD, limits);
         let start = Time::from_micros(measured(scans[0]).micros() - 80_000);

@@ -7,7 +7,8 @@ use std::time::{Duration, SystemTime};
 use log::{info, warn};
 use rustix::io::Errno;
 use socketcan::{CanAnyFrame, CanFdSocket, ShouldRetry, Socket, SocketOptions};
-use viewshed::{CanFrame, CanPort};
+use viewshed::CanFrame;
+use viewshed::board::CanPort;
 
 use crate::frames::{from_socketcan, to_socketcan};
 

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use viewshed::board::{Ars408Configuration, Ars408Profile};
 use viewshed::{
-    Addresses, Ars408Config, Ars408Configuration, Ars408Profile, BroadcastConfig, CanId, ConfigError, FieldOfView,
-    GateConfig, HealthConfig, Medium, Mount, NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily,
-    VisibilityConfig, reference,
+    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Medium, Mount,
+    NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference,
 };
 
 use crate::locate;

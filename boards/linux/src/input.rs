@@ -8,9 +8,9 @@ use std::os::fd::BorrowedFd;
 use anyhow::{Context, Result, bail};
 use log::{info, warn};
 use socketcan::dump::{ParseError, Reader};
+use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, RadarClock, SerialSession, StoredSettings};
 use viewshed::{
-    Ars408Upkeep, BusConfig, BusKeeper, CanFrame, Epoch, Flow, RadarClock, Reason, SerialSession, StoredSettings, Ti,
-    Time,
+    BusConfig, CanFrame, Epoch, Reason, Ti, Time,
     reference::{Radar as Decoder, State},
 };
 

@@ -6,10 +6,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use log::{error, info};
-use viewshed::{
-    BusConfig, BusKeeper, CanFrame, CanService, CanServiceConfig, Epoch, Flow, MOST_STUFFED, Reason, SerialLine,
-    Status, StoredSettings, Time,
-};
+use viewshed::board::{BusKeeper, CanService, CanServiceConfig, Flow, SerialLine, StoredSettings};
+use viewshed::{BusConfig, CanFrame, Epoch, MOST_STUFFED, Reason, Status, Time};
 
 use crate::can::Interface;
 use crate::config::{ClockSource, Config};

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use viewshed::board::{BlockError, Flow, StoredSettings};
 use viewshed::{
-    BlockError, Flow, PolarMap, Reason, StoredSettings, Time, UnitState,
+    PolarMap, Reason, Time, UnitState,
     reference::{CHECK, Map, Parameters, Sender, State},
 };
 

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use log::{error, warn};
-use viewshed::{BLOCK_LEN, Epoch, Settings, SettingsSlots};
+use viewshed::board::{BLOCK_LEN, SettingsSlots};
+use viewshed::{Epoch, Settings};
 
 /// The files that are kept.
 pub const FILES: [&str; 2] = [EPOCH, SLOTS];
@@ -95,9 +96,8 @@ impl SettingsSlots for FileSlots {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use viewshed::{
-        BlockError, ConfigError, FieldOfView, Mount, NoiseConfig, Sensor, StoredSettings, reference::CHECK,
-    };
+    use viewshed::board::{BlockError, StoredSettings};
+    use viewshed::{ConfigError, FieldOfView, Mount, NoiseConfig, Sensor, reference::CHECK};
 
     fn settings(height_m: f32) -> Settings {
         Settings::of(Sensor {

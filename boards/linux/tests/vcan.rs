@@ -15,7 +15,7 @@ use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{ReceiverLimits, Receiver};
 use viewshed::wire::status::{Reason, UnitState};
 
 const RADAR: &str = "vsradar";
@@ -119,7 +119,7 @@ impl Bench {
             socket.set_nonblocking(true).unwrap();
             socket
         };
-        let receiver = Box::new(Receiver::new([0], Addresses::STANDARD, Limits::DEFAULT));
+        let receiver = Box::new(Receiver::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));
         let (tool, answers) = (Tool::new(0, medium), Answers::new(0, medium));
         let begin = Instant::now();
         Self { radar: open(RADAR), maps: open(MAPS), receiver, begin, heard: 0, tool, answers, said: Vec::new() }

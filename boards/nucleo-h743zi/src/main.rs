@@ -32,15 +32,12 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::usart::{self, Uart};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{bind_interrupts, can, dma, flash, pac, rng};
-use static_cell::{ConstStaticCell, StaticCell};
-use stm32::can::{Queue, Receiver, open, queue};
-use stm32::unit::REQUESTS;
-use stm32::{crash, now, unit};
-use viewshed::{
-    Ars408Config, Epoch, FlashSlots, ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart,
-    StoredSettings,
-    reference::{CHECK, Map, Parameters, Radar, Sender, State},
-};
+use stm32::can::open;
+use stm32::crash;
+use stm32::unit::{REQUESTS, Wiring, run};
+use viewshed::board::{FlashSlots, ResetFlags, RoadsideStart, StoredSettings};
+use viewshed::reference::{CHECK, Radar};
+use viewshed::{Ars408Config, Epoch};
 
 /// The radar's number on its bus and in the broadcast.
 const SENSOR: u8 = 0;
@@ -56,12 +53,7 @@ const SETTINGS_BYTES: u32 = 0x4_0000;
 /// verified against the data sheet.
 const WATCHDOG_US: u32 = 5_000_000;
 
-static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
-static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
-static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(None);
-static BROADCAST: StaticCell<Option<Sender>> = StaticCell::new();
-static SERIAL: StaticCell<Option<Sender>> = StaticCell::new();
-static RADAR_QUEUE: Queue<FRAMES> = queue();
+stm32::memory!(reference, FRAMES);
 
 bind_interrupts!(struct Irqs {
     FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
@@ -73,11 +65,6 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
     RNG => rng::InterruptHandler<RNG>;
 });
-
-#[embassy_executor::task]
-async fn scans(receiver: Receiver) -> ! {
-    receiver.run(&RADAR_QUEUE).await
-}
 
 fn config() -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
@@ -135,25 +122,14 @@ async fn main(_spawner: Spawner) {
     let can = can::CanConfigurator::new(p.FDCAN1, p.PD0, p.PD1, Irqs);
     let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);
     let can = can::CanConfigurator::new(p.FDCAN2, p.PB5, p.PB6, Irqs);
-    let (broadcast_receiver, broadcast) = open(can, pac::FDCAN2, broadcast_timing, &REQUESTS);
+    let broadcast = open(can, pac::FDCAN2, broadcast_timing, &REQUESTS);
 
     let mut line = usart::Config::default();
     line.baudrate = BAUD;
     let line = Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, line).expect("a baud rate it has");
-    let (serial, interrupts) = unit::start(broadcast_receiver, line);
-    interrupts.spawn(scans(radar_receiver).expect("room for one"));
-
-    let memory = RoadsideMemory {
-        parameters: PARAMETERS.take(),
-        state: STATE.take(),
-        map: MAP.take(),
-        broadcast: BROADCAST.init(None),
-        serial: SERIAL.init(None),
-    };
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let start = RoadsideStart { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
-    let mut ports = RoadsidePorts { radar, broadcast, serial, slots };
-    let decoder = Radar::new(Ars408Config::sensor(SENSOR));
-    let mut roadside = Roadside::start(start, memory, decoder, now(), &mut ports);
-    unit::run(&mut roadside, &mut ports, Output::new(p.PB0, Level::Low, Speed::Low), watchdog).await
+    let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PB0, Level::Low, Speed::Low), watchdog };
+    let scans = scans(radar_receiver).expect("room for one");
+    run(start, memory(), || Radar::new(Ars408Config::sensor(SENSOR)), scans, wiring).await
 }

@@ -17,7 +17,8 @@ use embassy_futures::poll_once;
 use embassy_stm32::can::config::{FdCanConfig, GlobalFilter, NominalBitTiming, TxBufferMode};
 use embassy_stm32::can::{CanConfigurator, CanRx, CanTx, OperatingMode, frame};
 use embassy_stm32::pac::can::Fdcan;
-use viewshed::{BitTiming, CanFrame, CanPort, FrameQueue, Time};
+use viewshed::board::{BitTiming, CanPort, FrameQueue};
+use viewshed::{CanFrame, Time};
 
 use crate::now;
 

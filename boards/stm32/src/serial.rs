@@ -7,7 +7,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
-use viewshed::{SerialLine, SerialPort};
+use viewshed::board::{SerialLine, SerialPort};
 
 use crate::dma::SEND;
 

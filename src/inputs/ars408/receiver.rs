@@ -148,7 +148,7 @@ pub struct Ars408Counters {
 pub struct Ars408<const N: usize> {
     config: Ars408Config,
     collected: Collected<N>,
-    scan: Option<Scan>,
+    scan: Option<Gathering>,
     /// The last scan has been given out and its entries may go.
     given_out: bool,
     /// Quality messages follow.
@@ -160,7 +160,7 @@ pub struct Ars408<const N: usize> {
 
 /// A scan under way.
 #[derive(Debug, Clone)]
-struct Scan {
+struct Gathering {
     objects: bool,
     number: u16,
     started: Time,
@@ -303,7 +303,7 @@ impl<const N: usize> Ars408<N> {
             Advance::Same | Advance::Next => {}
         }
         let unfinished = self.scan.is_some();
-        let next = Scan {
+        let next = Gathering {
             objects,
             number,
             started: now,
@@ -422,7 +422,7 @@ impl<const N: usize> Ars408<N> {
         Some(self.give_out(scan))
     }
 
-    fn give_out(&mut self, scan: Scan) -> Ars408Outcome<'_> {
+    fn give_out(&mut self, scan: Gathering) -> Ars408Outcome<'_> {
         // a scan without entries has none of the scan before
         self.forget_given_out();
         self.given_out = true;
@@ -452,7 +452,7 @@ impl<const N: usize> Ars408<N> {
     }
 }
 
-impl Scan {
+impl Gathering {
     fn timed_out(&self, now: Time, timeout_us: u32) -> bool {
         // a clock that stepped back would hold the scan for ever
         now.since(self.latest).is_none_or(|silence| silence > u64::from(timeout_us))

@@ -36,7 +36,7 @@ pub(super) const PADDING: u32 = 32;
 
 /// What a header says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct FrameHeader {
     /// Bytes of the frame, the header's included.
     pub(super) total: u32,
     pub(super) items: u32,
@@ -48,7 +48,7 @@ pub(super) struct Header {
     pub(super) sdk: u8,
 }
 
-impl Header {
+impl FrameHeader {
     /// Before the first.
     pub(super) const NONE: Self = Self { total: 0, items: 0, number: 0, points: None, sub_frame: 0, sdk: 0 };
 }
@@ -70,11 +70,11 @@ impl TiFamily {
 
     /// Reads a header; `None` if it cannot be one.
     #[allow(clippy::cast_possible_truncation)] // a byte of a version
-    pub(super) fn read(self, bytes: &[u8; LONGEST]) -> Option<Header> {
+    pub(super) fn read(self, bytes: &[u8; LONGEST]) -> Option<FrameHeader> {
         let word = |at: usize| bytes.get(at..).and_then(|b| b.first_chunk::<4>()).map_or(0, |b| u32::from_le_bytes(*b));
         let version = (word(8) >> 24) as u8;
         let header = match self {
-            Self::Bytes48 => Header {
+            Self::Bytes48 => FrameHeader {
                 total: word(12),
                 items: word(44) & 0xFFFF,
                 number: word(20),
@@ -82,7 +82,7 @@ impl TiFamily {
                 sub_frame: word(24),
                 sdk: version,
             },
-            Self::Bytes52 => Header {
+            Self::Bytes52 => FrameHeader {
                 total: word(20),
                 items: word(48) & 0xFFFF,
                 number: word(24),
@@ -90,7 +90,7 @@ impl TiFamily {
                 sub_frame: word(28),
                 sdk: version,
             },
-            _ => Header {
+            _ => FrameHeader {
                 total: word(12),
                 items: word(32),
                 number: word(20),

@@ -1,6 +1,6 @@
 //! Which family it is, from what frames have in common.
 
-use super::family::{Header, ITEM_HEADER, LONGEST, PADDING, TiFamily};
+use super::family::{FrameHeader, ITEM_HEADER, LONGEST, PADDING, TiFamily};
 
 /// Frames in a row that have to be consistent.
 const ENOUGH: u8 = 3;
@@ -8,13 +8,13 @@ const ENOUGH: u8 = 3;
 /// Follows a stream as each family would read it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Learning {
-    readings: [Reading; TiFamily::ALL.len()],
+    readings: [Trial; TiFamily::ALL.len()],
 }
 
 /// A frame as one family reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Reading {
-    header: Option<Header>,
+struct Trial {
+    header: Option<FrameHeader>,
     /// Where the next item begins.
     next: u32,
     items_left: u32,
@@ -24,7 +24,7 @@ struct Reading {
 
 impl Learning {
     pub(super) const NEW: Self =
-        Self { readings: [Reading { header: None, next: 0, items_left: 0, consistent: 0 }; TiFamily::ALL.len()] };
+        Self { readings: [Trial { header: None, next: 0, items_left: 0, consistent: 0 }; TiFamily::ALL.len()] };
 
     /// Takes a byte of a frame: its position counted from the magic word, one for the first byte;
     /// `window` has the eight bytes up to it, `head` the frame's first ones.
@@ -46,7 +46,7 @@ impl Learning {
     }
 }
 
-impl Reading {
+impl Trial {
     #[allow(clippy::cast_possible_truncation)] // the upper half of the window
     fn take(&mut self, family: TiFamily, position: u32, window: u64, head: &[u8; LONGEST]) {
         if position == family.header() {

@@ -1,6 +1,6 @@
 //! Bytes in, scans out.
 
-use super::family::{Header, ITEM_HEADER, LONGEST, MAGIC, PADDING, TiFamily};
+use super::family::{FrameHeader, ITEM_HEADER, LONGEST, MAGIC, PADDING, TiFamily};
 use super::learning::Learning;
 use super::points::{Entries, LONGEST_RECORD, Layout, Record, TiDialect};
 use crate::fixed::time::Time;
@@ -95,7 +95,7 @@ pub struct Ti<const N: usize> {
     outside: u32,
     head: [u8; LONGEST],
     stage: Stage,
-    header: Header,
+    header: FrameHeader,
     /// Items left, the current one included.
     left: u32,
     /// Where the current stage ends.
@@ -149,7 +149,7 @@ impl<const N: usize> Ti<N> {
             outside: 0,
             head: [0; LONGEST],
             stage: Stage::Searching,
-            header: Header::NONE,
+            header: FrameHeader::NONE,
             left: 0,
             end: 0,
             layout: Layout::Cartesian,
@@ -406,7 +406,7 @@ impl<const N: usize> Ti<N> {
         })
     }
 
-    fn follow(&mut self, header: &Header) {
+    fn follow(&mut self, header: &FrameHeader) {
         let Some((last, sub_frame)) = self.last.replace((header.number, header.sub_frame)) else { return };
         match header.number.wrapping_sub(last) {
             // sub-frames share a number

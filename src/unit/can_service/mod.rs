@@ -68,7 +68,7 @@ const _: () = assert!(BLOCK_LEN.is_multiple_of(4) && PARTS <= 64);
 type Own = [u8; 6];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Request {
+enum BlockRequest {
     Begin { length: u16 },
     Part { number: u8, bytes: [u8; 4] },
     Complete { last: [u8; 4] },
@@ -76,7 +76,7 @@ enum Request {
     Restart,
 }
 
-impl Request {
+impl BlockRequest {
     fn own(self) -> Own {
         match self {
             Self::Begin { length } => {
@@ -106,7 +106,7 @@ impl Request {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Answer {
+enum BlockAnswer {
     Written { sequence: u32 },
     Part { number: u8, bytes: [u8; 4] },
     Started { slot: u8, sequence: u32 },
@@ -114,7 +114,7 @@ enum Answer {
     Name { number: u8, letters: [u8; 4] },
 }
 
-impl Answer {
+impl BlockAnswer {
     fn own(self) -> Own {
         match self {
             Self::Written { sequence } => own(129, 0, sequence.to_be_bytes()),
@@ -168,25 +168,25 @@ mod tests {
     #[test]
     fn messages_read_back() {
         for request in [
-            Request::Begin { length: 0x0102 },
-            Request::Part { number: 36, bytes: [1, 2, 3, 4] },
-            Request::Complete { last: [5, 6, 7, 8] },
-            Request::Read,
-            Request::Restart,
+            BlockRequest::Begin { length: 0x0102 },
+            BlockRequest::Part { number: 36, bytes: [1, 2, 3, 4] },
+            BlockRequest::Complete { last: [5, 6, 7, 8] },
+            BlockRequest::Read,
+            BlockRequest::Restart,
         ] {
-            assert_eq!(Request::read(&request.own()), Some(request));
+            assert_eq!(BlockRequest::read(&request.own()), Some(request));
         }
         for answer in [
-            Answer::Written { sequence: 0x0102_0304 },
-            Answer::Part { number: 3, bytes: [1, 2, 3, 4] },
-            Answer::Started { slot: 255, sequence: 7 },
-            Answer::Refused { reason: 4, detail: [9; 4] },
-            Answer::Name { number: 1, letters: *b"t.he" },
+            BlockAnswer::Written { sequence: 0x0102_0304 },
+            BlockAnswer::Part { number: 3, bytes: [1, 2, 3, 4] },
+            BlockAnswer::Started { slot: 255, sequence: 7 },
+            BlockAnswer::Refused { reason: 4, detail: [9; 4] },
+            BlockAnswer::Name { number: 1, letters: *b"t.he" },
         ] {
-            assert_eq!(Answer::read(&answer.own()), Some(answer));
+            assert_eq!(BlockAnswer::read(&answer.own()), Some(answer));
         }
-        assert_eq!(Request::read(&own(5, 0, *b"VSCA")), None, "a restart by chance");
-        assert_eq!(Request::read(&own(9, 0, [0; 4])), None);
-        assert_eq!(Request::read(&[1, 0, 0, 148, 0]), None);
+        assert_eq!(BlockRequest::read(&own(5, 0, *b"VSCA")), None, "a restart by chance");
+        assert_eq!(BlockRequest::read(&own(9, 0, [0; 4])), None);
+        assert_eq!(BlockRequest::read(&[1, 0, 0, 148, 0]), None);
     }
 }

@@ -1,6 +1,6 @@
 //! The integrator's end: what to send, and what the answers say.
 
-use super::{ANSWER, Answer, PARTS, REQUEST, Request, frame, received};
+use super::{ANSWER, BlockAnswer, BlockRequest, PARTS, REQUEST, frame, received};
 use crate::unit::settings::BLOCK_LEN;
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
@@ -27,33 +27,33 @@ impl Tool {
         let part = |(number, bytes): (u8, &[u8])| {
             let mut four = [0; 4];
             four.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-            Request::Part { number, bytes: four }
+            BlockRequest::Part { number, bytes: four }
         };
         let parts = (0..u8::MAX).zip(block.chunks(4)).map(part);
         let last = block.last_chunk::<4>().copied().unwrap_or([0; 4]);
-        let all = core::iter::once(Request::Begin { length }).chain(parts);
-        all.chain([Request::Complete { last }]).filter_map(|request| self.frame(request))
+        let all = core::iter::once(BlockRequest::Begin { length }).chain(parts);
+        all.chain([BlockRequest::Complete { last }]).filter_map(|request| self.frame(request))
     }
 
     /// A part of a block again, and its completion: after an answer that it is missing.
     pub fn again(&mut self, block: &[u8], part: u8) -> impl Iterator<Item = CanFrame> {
         let bytes = block.get(4 * usize::from(part)..).and_then(|rest| rest.first_chunk::<4>()).copied();
         let last = block.last_chunk::<4>().copied().unwrap_or([0; 4]);
-        let again = bytes.map(|bytes| Request::Part { number: part, bytes });
-        again.into_iter().chain([Request::Complete { last }]).filter_map(|request| self.frame(request))
+        let again = bytes.map(|bytes| BlockRequest::Part { number: part, bytes });
+        again.into_iter().chain([BlockRequest::Complete { last }]).filter_map(|request| self.frame(request))
     }
 
     /// Asks for the block in use.
     pub fn read(&mut self) -> Option<CanFrame> {
-        self.frame(Request::Read)
+        self.frame(BlockRequest::Read)
     }
 
     /// Asks for a restart with the newest block.
     pub fn restart(&mut self) -> Option<CanFrame> {
-        self.frame(Request::Restart)
+        self.frame(BlockRequest::Restart)
     }
 
-    fn frame(&mut self, request: Request) -> Option<CanFrame> {
+    fn frame(&mut self, request: BlockRequest) -> Option<CanFrame> {
         // requests are of no epoch
         frame(&self.medium, self.sensor, REQUEST, Epoch::new(0), &mut self.counter, request.own())
     }
@@ -120,18 +120,18 @@ impl Answers {
     /// Takes a frame; what the unit said, once it is complete.
     pub fn take(&mut self, frame: &CanFrame) -> Option<Said> {
         let own = received(frame, &self.medium, self.sensor, ANSWER)?;
-        match Answer::read(own)? {
-            Answer::Written { sequence } => Some(Said::Written(sequence)),
-            Answer::Started { slot, sequence } => {
+        match BlockAnswer::read(own)? {
+            BlockAnswer::Written { sequence } => Some(Said::Written(sequence)),
+            BlockAnswer::Started { slot, sequence } => {
                 self.came = 0;
                 Some(Said::Started((slot != u8::MAX).then_some((slot, sequence))))
             }
-            Answer::Refused { reason, detail } => {
+            BlockAnswer::Refused { reason, detail } => {
                 let refusal = Refusal { reason, detail, name: [0; Refusal::MOST_LETTERS] };
                 self.refusal = (reason == Refusal::PARAMETER).then_some(refusal);
                 self.refusal.is_none().then_some(Said::Refused(refusal))
             }
-            Answer::Name { number, letters } => {
+            BlockAnswer::Name { number, letters } => {
                 let refusal = self.refusal.as_mut()?;
                 let at = 4 * usize::from(number);
                 if let Some(place) = refusal.name.get_mut(at..at + 4) {
@@ -139,7 +139,7 @@ impl Answers {
                 }
                 if letters.contains(&0) { self.refusal.take().map(Said::Refused) } else { None }
             }
-            Answer::Part { number, bytes } => self.part(number, bytes),
+            BlockAnswer::Part { number, bytes } => self.part(number, bytes),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The unit's end: takes a block, keeps it, answers what it runs with, and what it sends without one.
 
-use super::{ANSWER, Answer, INCOMPLETE, PARTS, REQUEST, Request, frame, received};
+use super::{ANSWER, BlockAnswer, BlockRequest, INCOMPLETE, PARTS, REQUEST, frame, received};
 use crate::fixed::time::Time;
 use crate::unit::Flow;
 use crate::unit::safe_state::SafeState;
@@ -115,18 +115,18 @@ impl CanService {
     /// Takes a frame of the bus; `None` if it is none of the integrator's.
     pub fn take(&mut self, frame: &CanFrame, slots: &mut impl SettingsSlots) -> Option<Flow> {
         let own = received(frame, &self.config.medium, self.config.sensor, REQUEST)?;
-        match Request::read(own)? {
-            Request::Begin { length } => self.incoming.begin(length),
-            Request::Part { number, bytes } => self.incoming.part(number, bytes),
-            Request::Complete { last } => match self.incoming.complete(last, &self.stored, slots) {
+        match BlockRequest::read(own)? {
+            BlockRequest::Begin { length } => self.incoming.begin(length),
+            BlockRequest::Part { number, bytes } => self.incoming.part(number, bytes),
+            BlockRequest::Complete { last } => match self.incoming.complete(last, &self.stored, slots) {
                 Ok(sequence) => self.outgoing.written = Some(sequence),
                 Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
             },
-            Request::Read => match self.stored.place() {
+            BlockRequest::Read => match self.stored.place() {
                 Ok(_) => self.outgoing.part = Some(0),
                 Err(error) => self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 }),
             },
-            Request::Restart => return Some(Flow::Restart),
+            BlockRequest::Restart => return Some(Flow::Restart),
         }
         Some(Flow::Continue)
     }
@@ -232,13 +232,13 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    fn next(&mut self, stored: &StoredSettings, slots: &impl SettingsSlots) -> Option<Answer> {
+    fn next(&mut self, stored: &StoredSettings, slots: &impl SettingsSlots) -> Option<BlockAnswer> {
         if core::mem::take(&mut self.started) {
             let (slot, sequence) = stored.place().unwrap_or((u8::MAX, 0));
-            return Some(Answer::Started { slot, sequence });
+            return Some(BlockAnswer::Started { slot, sequence });
         }
         if let Some(sequence) = self.written.take() {
-            return Some(Answer::Written { sequence });
+            return Some(BlockAnswer::Written { sequence });
         }
         if let Some(mut refused) = self.refused.take() {
             let answer = refused.answer();
@@ -249,7 +249,7 @@ impl Outgoing {
         let number = self.part.take()?;
         let bytes = *stored.block(slots).get(4 * usize::from(number)..)?.first_chunk::<4>()?;
         self.part = (usize::from(number) + 1 < PARTS).then_some(number + 1);
-        Some(Answer::Part { number, bytes })
+        Some(BlockAnswer::Part { number, bytes })
     }
 }
 
@@ -261,15 +261,15 @@ impl Refused {
         }
     }
 
-    fn answer(&self) -> Answer {
+    fn answer(&self) -> BlockAnswer {
         if let Some(number) = self.next.checked_sub(1) {
             let mut letters = [0; 4];
             let rest = self.name().get(4 * usize::from(number)..).unwrap_or(&[]);
             letters.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
-            return Answer::Name { number, letters };
+            return BlockAnswer::Name { number, letters };
         }
         match &self.what {
-            What::Missing(part) => Answer::Refused { reason: INCOMPLETE, detail: [*part, 0, 0, 0] },
+            What::Missing(part) => BlockAnswer::Refused { reason: INCOMPLETE, detail: [*part, 0, 0, 0] },
             What::Block(error) => {
                 let detail = match error {
                     BlockError::Parameter(error) => error.value.to_be_bytes(),
@@ -279,7 +279,7 @@ impl Refused {
                     }
                     _ => [0; 4],
                 };
-                Answer::Refused { reason: error.code(), detail }
+                BlockAnswer::Refused { reason: error.code(), detail }
             }
         }
     }

@@ -158,7 +158,7 @@ impl Settings {
     }
 
     /// Reads a block with its sequence; bytes after it do not matter. Its parameters may be anything: whether
-    /// a unit can run with them is [`SettingsCheck`]'s to say.
+    /// a unit can run with them is `SettingsCheck`'s to say.
     ///
     /// # Errors
     /// The first thing that does not hold.

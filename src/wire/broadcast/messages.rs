@@ -1,10 +1,10 @@
 //! The messages of a sender, each kind when it is due.
 
+use super::outgoing_plane::{Encoding, Next};
 use super::{Broadcaster, Running};
 use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
 use crate::wire::header::{Clock, GROUPS};
-use crate::wire::layer::{Encoding, Next};
 use crate::wire::map_message::{self, LIMITS, SEGMENTS};
 use crate::wire::message::{Message, Packet, Part, Plane, WIRE_VERSION, Word};
 use crate::wire::scan_number::ScanNumber;
@@ -76,10 +76,10 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             Next::Block { kind, start, ref block } => (Some(kind), start, block.end),
             Next::Plain { azimuth } => (None, azimuth, azimuth + 1),
         };
-        self.layers.get_mut(running.plane)?.encoded(kind, start, end, number);
+        self.planes.get_mut(running.plane)?.encoded(kind, start, end, number);
         self.from = end;
         self.scan.as_mut()?.running = None;
-        if self.layers.iter().all(|layer| layer.pending() == 0) {
+        if self.planes.iter().all(|outgoing| outgoing.pending() == 0) {
             // complete: the next one begins at the right edge again
             (self.scan, self.from) = (None, 0);
         }
@@ -89,8 +89,8 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     fn next_running(&mut self, all: bool) -> Option<Running> {
         let encoding = Encoding { context: self.header.context(self.packing().form()), all };
         let from = self.from;
-        let mut layers = self.layers.iter_mut().enumerate();
-        layers.find_map(|(plane, layer)| layer.next(&encoding, from).map(|next| Running { plane, next, sent: 0 }))
+        let mut planes = self.planes.iter_mut().enumerate();
+        planes.find_map(|(plane, outgoing)| outgoing.next(&encoding, from).map(|next| Running { plane, next, sent: 0 }))
     }
 
     /// The message that is next of a block or a ray, and whether it is the last.
@@ -111,7 +111,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
                 Some((packet(part, &own), sent + 1 == block.words().len()))
             }
             Next::Plain { azimuth } => {
-                let ray = self.layers.get(running.plane)?.now(azimuth);
+                let ray = self.planes.get(running.plane)?.now(azimuth);
                 if long {
                     let (own, length) = map_message::plain(scan, azimuth, ray);
                     return Some((packet(Part::Plain, own.get(..length)?), true));
@@ -138,9 +138,9 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         let most = self.packing().most_own() - 2;
         let first = self.range_from;
         self.range_from = if first + most < azimuths { first + most } else { 0 };
-        let layer = self.layers.first()?;
+        let outgoing = self.planes.first()?;
         let steps =
-            (first..(first + most).min(azimuths)).map(|a| visible_range::steps(layer.now(a), self.header.cell_cm));
+            (first..(first + most).min(azimuths)).map(|a| visible_range::steps(outgoing.now(a), self.header.cell_cm));
         let (own, length) = visible_range::emit(ScanNumber::at(measured), first, steps);
         Some(self.packet(Message::VisibleRange, own.get(..length)?))
     }

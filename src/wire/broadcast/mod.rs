@@ -26,17 +26,18 @@
 
 mod config;
 mod messages;
+mod outgoing_plane;
 mod pace;
 
 pub use config::{BroadcastConfig, Medium};
 
 use self::config::within;
+use self::outgoing_plane::{Next, OutgoingPlane};
 use self::pace::Every;
 use super::frame::{CanFrame, fd_length};
 use super::header::{GROUPS, Header};
-use super::layer::{Layer, Next};
-use super::layers::Layers;
 use super::message::{Epoch, Message, Packet, Packing, Plane};
+use super::planes::Planes;
 use super::scan_number::ScanNumber;
 #[cfg(feature = "secoc")]
 use super::secoc::{Key, Sealer};
@@ -69,7 +70,7 @@ struct Running {
 
 /// The scan being sent.
 #[derive(Debug, Clone, Copy)]
-struct Scan {
+struct Outgoing {
     number: ScanNumber,
     measured: Time,
     /// Whether it refreshes everything.
@@ -87,8 +88,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     status: Status,
     /// Whether something was dropped for want of time since that was last asked.
     overloaded: bool,
-    layers: [Layer<A, W>; P],
-    scan: Option<Scan>,
+    planes: [OutgoingPlane<A, W>; P],
+    scan: Option<Outgoing>,
     /// The scan before, and when it was measured.
     last: Option<Time>,
     /// The last scan that began to refresh everything.
@@ -125,7 +126,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             synchronised: false,
             status: Status::starting(header.fingerprint),
             overloaded: false,
-            layers: [const { Layer::new() }; P],
+            planes: [const { OutgoingPlane::new() }; P],
             scan: None,
             last: None,
             refreshed: None,
@@ -194,7 +195,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         (self.group, self.groups_first) = (0, self.header_messages());
         self.drop_scan();
         self.overloaded = overloaded;
-        self.layers.iter_mut().for_each(Layer::forget);
+        self.planes.iter_mut().for_each(OutgoingPlane::forget);
         (self.last, self.refreshed, self.from) = (None, None, 0);
         self.quiet_until = Time::from_micros(now.micros() + self.quiet_us());
     }
@@ -240,7 +241,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     ///
     /// # Errors
     /// The map is not sent: `NotSent` says why.
-    pub fn scan(&mut self, measured: Time, map: &impl Layers<W>) -> Result<(), NotSent> {
+    pub fn scan(&mut self, measured: Time, map: &impl Planes<W>) -> Result<(), NotSent> {
         let number = ScanNumber::at(measured);
         let since = match self.last.map(|last| measured.since(last)) {
             // the clock stepped back: numbers would come again
@@ -267,12 +268,12 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.drop_scan();
         if since.is_none_or(|us| us > 300_000) {
             // scan numbers are distinguished for as long as this
-            self.layers.iter_mut().for_each(Layer::forget);
+            self.planes.iter_mut().for_each(OutgoingPlane::forget);
             self.refreshed = None;
         }
         let azimuths = usize::from(self.header.azimuths);
-        for (layer, plane) in self.layers.iter_mut().zip(Plane::ALL) {
-            layer.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
+        for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL) {
+            outgoing.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
         }
         let refreshed = self.refreshed.map(ScanNumber::at);
         let all = refreshed.is_none_or(|refreshed| number.ticks_after(refreshed) >= REFRESH_TICKS);
@@ -280,13 +281,13 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             self.refreshed = Some(measured);
         }
         self.last = Some(measured);
-        self.scan = Some(Scan { number, measured, all, running: None });
+        self.scan = Some(Outgoing { number, measured, all, running: None });
         Ok(())
     }
 
     fn drop_scan(&mut self) {
         let Some(scan) = self.scan.take() else { return };
-        let pending: u32 = self.layers.iter().map(Layer::pending).sum();
+        let pending: u32 = self.planes.iter().map(OutgoingPlane::pending).sum();
         self.count_dropped(u16::try_from(pending).unwrap_or(u16::MAX));
         if let Some(running) = scan.running {
             self.from = match running.next {
@@ -294,7 +295,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
                 Next::Plain { azimuth } => azimuth,
             };
         }
-        self.layers.iter_mut().for_each(Layer::give_up);
+        self.planes.iter_mut().for_each(OutgoingPlane::give_up);
     }
 
     /// Whether everything of the last map is handed out or dropped.
@@ -309,7 +310,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     }
 
     /// Writes the next message as it goes on a serial line, if one is due; how many bytes it takes. The
-    /// buffer holds [`serial::MOST_STUFFED`] bytes. None comes of a sender for a CAN bus.
+    /// buffer holds [`MOST_STUFFED`](crate::MOST_STUFFED) bytes. None comes of a sender for a CAN bus.
     pub fn next_line(&mut self, now: Time, line: &mut [u8]) -> Option<usize> {
         if self.config.medium != Medium::Serial {
             return None;

@@ -15,7 +15,7 @@
 //! whatever the words say.
 
 use super::edges::{EdgeList, Hints};
-use super::expectation::{EdgeTables, Last, Progress, distance_table, first_table, shift, stop_table};
+use super::expectation::{EdgeTables, Expectation, Last, distance_table, first_table, shift, stop_table};
 use super::interval::{Coder, Encoder, Form, Words};
 pub use super::kind::Kind;
 use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, IN_FULL, KNOWN, NEW, REACH, STOPS_BELOW};
@@ -91,7 +91,7 @@ pub fn encode<const W: usize>(
         let _ = coder.plain(AGE_BITS, usize::from(ticks.saturating_sub(1)));
     }
     let azimuths = context.azimuths;
-    let mut progress = Progress::new(kind, context.usual);
+    let mut progress = Expectation::new(kind, context.usual);
     for azimuth in start..azimuths {
         let before = coder.mark();
         let encoded = encode_ray(&mut progress, coder, azimuth, rays);
@@ -124,7 +124,7 @@ fn stop(coder: &mut impl Coder) -> Option<()> {
 
 /// Encodes an azimuth; `None` if it does not fit.
 fn encode_ray<const W: usize>(
-    progress: &mut Progress<W>,
+    progress: &mut Expectation<W>,
     coder: &mut impl Coder,
     azimuth: usize,
     rays: &impl Rays<W>,

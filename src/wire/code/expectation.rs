@@ -104,7 +104,7 @@ pub(super) fn shift(edge: usize, hint: usize) -> Last {
 
 /// What the rays encoded so far say of the next.
 #[derive(Debug, Clone)]
-pub(super) struct Progress<const W: usize> {
+pub(super) struct Expectation<const W: usize> {
     pub kind: Kind,
     pub before: Before,
     /// The ray before, or the usual one.
@@ -116,7 +116,7 @@ pub(super) struct Progress<const W: usize> {
     swapped: bool,
 }
 
-impl<const W: usize> Progress<W> {
+impl<const W: usize> Expectation<W> {
     /// At a block's start.
     pub fn new(kind: Kind, usual: Known) -> Self {
         Self::after(kind, Before::START, Ray::clear(usual), Ray::UNKNOWN)

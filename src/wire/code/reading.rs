@@ -2,7 +2,7 @@
 
 use super::block::{AGE_BITS, Context, Kind};
 use super::edges::{EdgeList, Hints};
-use super::expectation::{Before, EdgeTables, Last, Progress, distance_table, first_table, shift, stop_table};
+use super::expectation::{Before, EdgeTables, Expectation, Last, distance_table, first_table, shift, stop_table};
 use super::interval::{Decoder, Form, OutOfWords};
 use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, KNOWN, NEW, REACH};
 use super::ray::{Known, Ray};
@@ -45,8 +45,11 @@ pub trait Reader<const W: usize> {
 }
 
 /// Where reading goes on when a further word comes.
+///
+/// Without it each word has its block read from the start again: a receiver on classic CAN then takes 195 000
+/// instructions a scan in place of 130 000.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub struct Resume {
     /// The azimuth that could not be read; 0 if reading begins at the start.
     azimuth: u8,
     as_expected: bool,
@@ -56,7 +59,7 @@ pub struct Place {
     width: u64,
 }
 
-impl Place {
+impl Resume {
     /// At the block's start.
     pub const START: Self = Self { azimuth: 0, as_expected: true, still: true, used: 0, value: 0, width: 0 };
 
@@ -84,7 +87,7 @@ pub fn decode<const W: usize>(
     context: &Context,
     kind: Kind,
     start: usize,
-    place: &mut Place,
+    place: &mut Resume,
     reader: &mut impl Reader<W>,
 ) -> Ending {
     let Ok(mut decoder) = Decoder::new(words, context.form) else { return Ending::OutOfWords };
@@ -103,10 +106,10 @@ pub fn decode<const W: usize>(
             (Ray::clear(context.usual), Ray::UNKNOWN)
         }
     };
-    let mut progress = Progress::after(kind, before, neighbour, neighbour_was);
+    let mut progress = Expectation::after(kind, before, neighbour, neighbour_was);
     let (ending, (azimuth, before, state)) =
         go(&mut decoder, &mut progress, (from..context.azimuths, context.ranges), reader);
-    *place = Place::of(azimuth, before, state);
+    *place = Resume::of(azimuth, before, state);
     ending
 }
 
@@ -116,7 +119,7 @@ type At = (usize, Before, (usize, u64, u64));
 /// Reads azimuths; also where the last begins that was looked at.
 fn go<const W: usize>(
     decoder: &mut Decoder<'_>,
-    progress: &mut Progress<W>,
+    progress: &mut Expectation<W>,
     (azimuths, ranges): (Range<usize>, usize),
     reader: &mut impl Reader<W>,
 ) -> (Ending, At) {
@@ -174,7 +177,7 @@ impl From<OutOfWords> for NotARay {
 /// Makes the expected ray the one that is encoded; whether it is as expected.
 fn decode_ray<const W: usize>(
     decoder: &mut Decoder<'_>,
-    progress: &mut Progress<W>,
+    progress: &mut Expectation<W>,
     ranges: usize,
     ray: &mut Ray<W>,
 ) -> Result<bool, NotARay> {
@@ -420,7 +423,7 @@ mod tests {
                 &context,
                 kind,
                 at,
-                &mut { Place::START },
+                &mut { Resume::START },
                 &mut Closures(was, |a, encoded| {
                     assert_eq!(a, next);
                     next += 1;
@@ -431,7 +434,7 @@ mod tests {
             words += block.words().len();
             // fewer words give fewer rays, and the same ones; further words go on from there
             let mut resuming = Resuming { was: &map.was, taken: vec![None; count] };
-            let mut place = Place::START;
+            let mut place = Resume::START;
             for n in 1..=block.words().len() {
                 let ending = decode(&block.words()[..n], &context, kind, at, &mut place, &mut resuming);
                 let done = n == block.words().len();
@@ -479,7 +482,7 @@ mod tests {
             let was = |a: usize| (a % 7 != 6).then(|| ray(USUAL, &[a % 50, 55]));
             let usual = Known::new(usual.0, usual.1);
             let context = Context { usual, ..context(Form::CLASSIC, 120) };
-            decode::<2>(&words, &context, kind, start, &mut { Place::START }, &mut Closures(was, |a: usize, _| {
+            decode::<2>(&words, &context, kind, start, &mut { Resume::START }, &mut Closures(was, |a: usize, _| {
                 assert!(a >= start && a < 120);
                 taken += 1;
             }));
@@ -498,7 +501,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delta_without_its_refresh_tells_nothing() {
+    fn a_delta_without_its_refresh_gives_no_ray() {
         let map = Map { now: vec![ray(USUAL, &[9])], was: vec![ray(USUAL, &[])] };
         let kind = Kind::Delta { ticks: 1 };
         let block = Block::new(&context(Form::LONG, 1), kind, 0, &map);
@@ -507,7 +510,7 @@ mod tests {
             &context(Form::LONG, 1),
             kind,
             0,
-            &mut { Place::START },
+            &mut { Resume::START },
             &mut Closures(|_| None, |_, _| panic!("taken")),
         );
         assert_eq!(ending, Ending::NoRefresh);

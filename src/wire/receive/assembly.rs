@@ -5,7 +5,7 @@
 //! comes again moves there. The row is full: its first word makes room. With [`ROOM`] words all first
 //! words of a refresh may come before the second ones, or frames be displaced by 50 ms.
 //!
-//! # Limits
+//! # ReceiverLimits
 //! Eight bytes a word.
 
 use crate::wire::code::reading;
@@ -22,7 +22,7 @@ const WORD_BITS: u32 = 33;
 
 /// Which block of a plane a word belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct BlockKey {
     pub scan: ScanNumber,
     pub start: u8,
 }
@@ -33,7 +33,7 @@ pub(super) struct Place {
 struct Waiting(u64);
 
 impl Waiting {
-    fn new(place: Place, index: usize, delta: bool, word: u64) -> Self {
+    fn new(place: BlockKey, index: usize, delta: bool, word: u64) -> Self {
         let key = u64::from(place.scan.byte()) << 10 | u64::from(place.start) << 2 | (index as u64 & 3);
         Self(u64::from(delta) << 51 | key << WORD_BITS | word & ((1 << WORD_BITS) - 1))
     }
@@ -43,7 +43,7 @@ impl Waiting {
         (self.0 >> WORD_BITS) as u32 & 0x3_FFFF
     }
 
-    fn is_of(self, place: Place) -> bool {
+    fn is_of(self, place: BlockKey) -> bool {
         self.key() >> 2 == Self::new(place, 0, false, 0).key() >> 2
     }
 
@@ -64,7 +64,7 @@ pub(super) struct Assembly {
     words: [Waiting; ROOM],
     count: u8,
     /// Where reading goes on, if nothing else was taken since.
-    read: Option<(Place, reading::Place)>,
+    read: Option<(BlockKey, reading::Resume)>,
 }
 
 /// The words of a block that are there from the first on.
@@ -73,7 +73,7 @@ pub(super) struct Begun {
     /// Whether it is a delta.
     pub delta: bool,
     /// Where reading goes on.
-    pub reading: reading::Place,
+    pub reading: reading::Resume,
     words: [u64; WORDS],
     count: usize,
 }
@@ -105,7 +105,7 @@ impl Assembly {
     }
 
     /// A block was read up to here; if it was read to its end, its words are not needed any more.
-    pub fn read_up_to(&mut self, block: Place, reading: reading::Place, ended: bool) {
+    pub fn read_up_to(&mut self, block: BlockKey, reading: reading::Resume, ended: bool) {
         self.read = Some((block, reading)).filter(|_| !ended);
         if ended {
             self.retain(|word| !word.is_of(block));
@@ -130,7 +130,7 @@ impl Assembly {
 
     /// Takes a word; what can be read now that could not before. Whether the block is a delta comes with the
     /// first word.
-    pub fn take(&mut self, place: Place, index: usize, delta: bool, word: u64) -> Option<Begun> {
+    pub fn take(&mut self, place: BlockKey, index: usize, delta: bool, word: u64) -> Option<Begun> {
         let new = Waiting::new(place, index, delta, word);
         let again = self.waiting().iter().any(|waiting| waiting.key() == new.key());
         if again {
@@ -144,7 +144,7 @@ impl Assembly {
         if again {
             return None;
         }
-        let mut begun = Begun { delta: false, reading: reading::Place::START, words: [0; WORDS], count: 0 };
+        let mut begun = Begun { delta: false, reading: reading::Resume::START, words: [0; WORDS], count: 0 };
         let mut there = 0_u8;
         for waiting in self.waiting().iter().filter(|waiting| waiting.is_of(place)) {
             there |= 1 << waiting.index();
@@ -167,8 +167,8 @@ impl Assembly {
 mod tests {
     use super::*;
 
-    fn place(start: u8) -> Place {
-        Place { scan: ScanNumber::from_byte(9), start }
+    fn place(start: u8) -> BlockKey {
+        BlockKey { scan: ScanNumber::from_byte(9), start }
     }
 
     #[test]
@@ -190,7 +190,7 @@ mod tests {
         }
         for start in 0..35 {
             assert_eq!(a.take(place(start), 1, false, 7).unwrap().words(), [u64::from(start), 7]);
-            a.read_up_to(place(start), reading::Place::START, true);
+            a.read_up_to(place(start), reading::Resume::START, true);
         }
         assert!(a.waiting().is_empty());
     }

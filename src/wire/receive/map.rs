@@ -1,6 +1,6 @@
 //! A received map, as consumers ask it.
 
-use super::measure::Limits;
+use super::measure::ReceiverLimits;
 use super::sensor::SensorReceiver;
 use crate::fixed::time::Time;
 use crate::map::polar::PolarGeometry;
@@ -20,14 +20,14 @@ pub struct ReceivedMap<'a, const A: usize, const W: usize, const P: usize> {
     /// Sensor, header and geometry, where there is something to show.
     shown: Option<(&'a SensorReceiver<A, W, P>, &'a Header, PolarGeometry)>,
     now: Time,
-    limits: Limits,
+    limits: ReceiverLimits,
 }
 
 /// Occupancy where it is not sent.
 const NOT_SENT: u8 = 128;
 
 impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P> {
-    pub(super) fn new(sensor: Option<&'a SensorReceiver<A, W, P>>, now: Time, limits: Limits) -> Self {
+    pub(super) fn new(sensor: Option<&'a SensorReceiver<A, W, P>>, now: Time, limits: ReceiverLimits) -> Self {
         let trusted = sensor.filter(|sensor| sensor.trusted(now, &limits));
         let shown = trusted.and_then(|sensor| sensor.header().map(|header| (sensor, header, header.geometry())));
         Self { shown, now, limits }

@@ -17,14 +17,14 @@ const CREEP: u32 = 11;
 /// Age and delay a receiver works with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Limits {
+pub struct ReceiverLimits {
     /// Greatest age of what is shown, microseconds: A.
     pub max_age_us: u32,
     /// Greatest delay from measurement to reception, microseconds: D.
     pub max_delay_us: u32,
 }
 
-impl Limits {
+impl ReceiverLimits {
     /// 300 ms and 100 ms.
     pub const DEFAULT: Self = Self { max_age_us: 300_000, max_delay_us: 100_000 };
 
@@ -74,7 +74,7 @@ pub(super) struct Measure {
 
 impl Measure {
     /// Whether it is old enough and of enough frames.
-    pub(super) fn is_settled(&self, now: Time, limits: &Limits) -> bool {
+    pub(super) fn is_settled(&self, now: Time, limits: &ReceiverLimits) -> bool {
         now.since(self.begun).is_some_and(|since| since >= limits.sum_us()) && self.count >= ENOUGH
     }
 
@@ -84,7 +84,7 @@ impl Measure {
 }
 
 /// Whether by the header's clock the fastest map frame was in time.
-pub(super) fn fits(measure: &Measure, clock: &SenderClock, now: Time, limits: &Limits) -> bool {
+pub(super) fn fits(measure: &Measure, clock: &SenderClock, now: Time, limits: &ReceiverLimits) -> bool {
     let over = difference(measure.least(now) + limits.max_delay_us, clock.lag(now));
     over <= 2 * limits.max_delay_us + MARGIN_US
 }
@@ -95,7 +95,7 @@ pub(super) fn difference(lag: u32, least: u32) -> u32 {
 }
 
 /// By how much a lag is smaller than the sender's clock allows; 0 if it is not.
-pub(super) fn ahead_of(clock: u32, lag: u32, limits: &Limits) -> u32 {
+pub(super) fn ahead_of(clock: u32, lag: u32, limits: &ReceiverLimits) -> u32 {
     let ahead = difference(clock, lag);
     if ahead > limits.max_delay_us && ahead <= PERIOD_US / 2 { ahead } else { 0 }
 }

@@ -1,8 +1,8 @@
 //! Frames in, maps of several sensors out: the receiver, and why it can be trusted.
 //!
 //! # Fail-safe
-//! Let `A` be the greatest age ([`Limits::max_age_us`]) and `D` the greatest delay between measurement
-//! and reception that the integrator guarantees ([`Limits::max_delay_us`]). *When the receiver answers
+//! Let `A` be the greatest age ([`ReceiverLimits::max_age_us`]) and `D` the greatest delay between measurement
+//! and reception that the integrator guarantees ([`ReceiverLimits::max_delay_us`]). *When the receiver answers
 //! visible, the sender's map of the same sensor, epoch and geometry, measured at most `A + D` ago, had
 //! that cell visible, and no accepted frame of a newer scan says otherwise.* It holds under any loss,
 //! truncation and interleaving, and under repetition and reordering displaced by less than the
@@ -50,7 +50,7 @@
 //! Words of a block may come in any order, between those of other blocks: 36 of them wait for the others, which is
 //! every first word of a map before any second one.
 //!
-//! # Limits
+//! # ReceiverLimits
 //! For 120 azimuths by 200 ranges below 8 kB a sensor, ages included.
 
 mod assembly;
@@ -64,10 +64,10 @@ mod sensor;
 mod session;
 
 pub use map::{ReceivedMap, Together};
-pub use measure::{ENOUGH, Limits};
+pub use measure::{ENOUGH, ReceiverLimits};
 #[cfg(feature = "secoc")]
 pub use secured::SecuredReceiver;
-pub use sensor::{Accepted, Condition, Counters, Refused, SensorReceiver};
+pub use sensor::{Accepted, Counters, Refused, SenderCondition, SensorReceiver};
 
 use core::cell::Cell;
 
@@ -83,7 +83,7 @@ const BACK_US: u64 = 20_000;
 #[derive(Debug, Clone)]
 pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usize = 1> {
     addresses: Addresses,
-    limits: Limits,
+    limits: ReceiverLimits,
     sensors: [(u8, SensorReceiver<A, W, P>); N],
     foreign: u32,
     /// The latest time handed in.
@@ -92,7 +92,7 @@ pub struct Receiver<const N: usize, const A: usize, const W: usize, const P: usi
 
 impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N, A, W, P> {
     /// Of these sensors, and no others.
-    pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits) -> Self {
+    pub fn new(sensors: [u8; N], addresses: Addresses, limits: ReceiverLimits) -> Self {
         Self {
             addresses,
             limits,

@@ -2,13 +2,13 @@
 
 use crate::fixed::bits::Bits;
 use crate::wire::code::ray::{Known, Ray};
-use crate::wire::layer::Azimuths;
 use crate::wire::map_message::Plain;
+use crate::wire::message::Azimuths;
 use crate::wire::scan_number::ScanNumber;
 
 /// Azimuths by ranges, the newest and its refresh.
 ///
-/// # Limits
+/// # ReceiverLimits
 /// `8 W + 4` bytes an azimuth: the known cells are those of both.
 #[derive(Debug, Clone)]
 pub(super) struct Sectors<const A: usize, const W: usize> {

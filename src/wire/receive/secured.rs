@@ -5,11 +5,11 @@
 //! and changes nothing: no map, no epoch, no conflict. One without authenticator is none, or leaving
 //! it off would be all a forger had to do.
 //!
-//! # Limits
+//! # ReceiverLimits
 //! See [`secoc`](crate::wire::secoc): a receiver that starts without a kept freshness value can be shown a recorded past
 //! until the sender's next freshness message.
 
-use super::{Accepted, Limits, Receiver, Refused};
+use super::{Accepted, Receiver, ReceiverLimits, Refused};
 use crate::fixed::time::Time;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::{Addresses, NotAMessage, Received};
@@ -24,7 +24,7 @@ pub struct SecuredReceiver<K, const N: usize, const A: usize, const W: usize, co
 
 impl<K: Key + Clone, const N: usize, const A: usize, const W: usize, const P: usize> SecuredReceiver<K, N, A, W, P> {
     /// Of these sensors, and no others; each waits for its first freshness message.
-    pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits, key: &K) -> Self {
+    pub fn new(sensors: [u8; N], addresses: Addresses, limits: ReceiverLimits, key: &K) -> Self {
         let openers = sensors.map(|number| (number, Opener::new(key.clone())));
         Self { receiver: Receiver::new(sensors, addresses, limits), openers }
     }

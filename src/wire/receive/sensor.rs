@@ -1,7 +1,7 @@
 //! Everything a receiver knows of one sensor.
 
-use super::assembly::{Assembly, Begun, Place};
-use super::measure::Limits;
+use super::assembly::{Assembly, Begun, BlockKey};
+use super::measure::ReceiverLimits;
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Session};
 use crate::fixed::time::Time;
@@ -94,7 +94,7 @@ pub struct Counters {
 /// How a sensor is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Condition {
+pub enum SenderCondition {
     /// Not heard, or not long enough, or not lately, or too late.
     Waiting,
     /// Heard, but its header is not complete.
@@ -189,19 +189,19 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     }
 
     /// How it is doing.
-    pub fn condition(&self, now: Time, limits: &Limits) -> Condition {
+    pub fn condition(&self, now: Time, limits: &ReceiverLimits) -> SenderCondition {
         match () {
-            () if self.session.conflicting(now) => Condition::Conflict,
-            () if !self.fits || self.session.speaks_otherwise(now) => Condition::Unusable,
-            () if self.session.epoch().is_none() => Condition::Waiting,
-            () if self.collector.header().is_none() => Condition::NoHeader,
-            () if self.session.trusted(now, limits) => Condition::Ok,
-            () => Condition::Waiting,
+            () if self.session.conflicting(now) => SenderCondition::Conflict,
+            () if !self.fits || self.session.speaks_otherwise(now) => SenderCondition::Unusable,
+            () if self.session.epoch().is_none() => SenderCondition::Waiting,
+            () if self.collector.header().is_none() => SenderCondition::NoHeader,
+            () if self.session.trusted(now, limits) => SenderCondition::Ok,
+            () => SenderCondition::Waiting,
         }
     }
 
-    pub(super) fn trusted(&self, now: Time, limits: &Limits) -> bool {
-        self.condition(now, limits) == Condition::Ok
+    pub(super) fn trusted(&self, now: Time, limits: &ReceiverLimits) -> bool {
+        self.condition(now, limits) == SenderCondition::Ok
     }
 
     /// A ray and its scan, if that is current.
@@ -210,7 +210,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         plane: Plane,
         azimuth: usize,
         now: Time,
-        limits: &Limits,
+        limits: &ReceiverLimits,
     ) -> Option<(Ray<W>, ScanNumber)> {
         let sector = self.planes.get(plane.index())?.now(azimuth);
         sector.filter(|(_, scan)| self.session.fresh(now, *scan, limits))
@@ -232,7 +232,12 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     }
 
     /// Takes a checked message of this sensor.
-    pub(super) fn take(&mut self, now: Time, message: &Received<'_>, limits: &Limits) -> Result<Accepted, Refused> {
+    pub(super) fn take(
+        &mut self,
+        now: Time,
+        message: &Received<'_>,
+        limits: &ReceiverLimits,
+    ) -> Result<Accepted, Refused> {
         match self.take_checked(now, message, limits) {
             Ok(accepted) => {
                 self.counters.accepted = self.counters.accepted.saturating_add(1);
@@ -242,7 +247,12 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         }
     }
 
-    fn take_checked(&mut self, now: Time, message: &Received<'_>, limits: &Limits) -> Result<Accepted, Refused> {
+    fn take_checked(
+        &mut self,
+        now: Time,
+        message: &Received<'_>,
+        limits: &ReceiverLimits,
+    ) -> Result<Accepted, Refused> {
         if message.sealed {
             return Err(Refused::Sealed);
         }
@@ -305,7 +315,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
         }
     }
 
-    fn take_header(&mut self, now: Time, own: &[u8], limits: &Limits) -> Result<Accepted, Refused> {
+    fn take_header(&mut self, now: Time, own: &[u8], limits: &ReceiverLimits) -> Result<Accepted, Refused> {
         match self.collector.take(own) {
             Ok(Brought::Contradiction) => {
                 self.session.contradiction(now);
@@ -360,9 +370,9 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             Part::More(_) if long => return Err(Refused::Malformed),
             Part::More(word) => word.index(),
         };
-        let block = Place { scan: map.scan, start: u8::try_from(map.start).map_err(|_| Refused::Malformed)? };
+        let block = BlockKey { scan: map.scan, start: u8::try_from(map.start).map_err(|_| Refused::Malformed)? };
         let (words, delta): (&[u64], bool);
-        let mut place = reading::Place::START;
+        let mut place = reading::Resume::START;
         let begun: Begun;
         if long {
             (words, delta) = (map.words(), part == Part::Delta);
@@ -379,7 +389,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             (true, Some(ticks)) => Kind::Delta { ticks },
             (true, None) => return Err(Refused::Malformed),
         };
-        let mut reader = Reading { sectors, kind, scan: map.scan };
+        let mut reader = BlockReader { sectors, kind, scan: map.scan };
         let ending = reading::decode(words, &context, kind, map.start, &mut place, &mut reader);
         if long {
             assembly.interrupt();
@@ -394,7 +404,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     }
 
     /// Looks at the lag of what a scan says.
-    fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Result<(), Refused> {
+    fn hear(&mut self, now: Time, scan: ScanNumber, limits: &ReceiverLimits) -> Result<(), Refused> {
         match self.session.hear(now, scan, limits) {
             Hearing::InTime => {}
             Hearing::Anew => self.forget_maps(),
@@ -406,7 +416,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
     }
 
     /// Once a scan, drops what is so old that its number could come again.
-    fn purge(&mut self, now: Time, scan: ScanNumber, limits: &Limits) {
+    fn purge(&mut self, now: Time, scan: ScanNumber, limits: &ReceiverLimits) {
         if self.purged == Some(scan) {
             return;
         }
@@ -420,13 +430,13 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
 }
 
 /// Reads a block into sectors.
-struct Reading<'a, const A: usize, const W: usize> {
+struct BlockReader<'a, const A: usize, const W: usize> {
     sectors: &'a mut Sectors<A, W>,
     kind: Kind,
     scan: ScanNumber,
 }
 
-impl<const A: usize, const W: usize> Reader<W> for Reading<'_, A, W> {
+impl<const A: usize, const W: usize> Reader<W> for BlockReader<'_, A, W> {
     fn was(&self, azimuth: usize) -> Option<Ray<W>> {
         match self.kind {
             Kind::Refresh => None,

@@ -27,7 +27,7 @@
 use core::cell::Cell;
 
 use super::epochs::{Epochs, Mark};
-use super::measure::{Limits, MARGIN_US, Measure, SenderClock, ahead_of, difference, fits, modulo};
+use super::measure::{MARGIN_US, Measure, ReceiverLimits, SenderClock, ahead_of, difference, fits, modulo};
 use crate::fixed::time::Time;
 use crate::wire::header::Clock;
 use crate::wire::message::Epoch;
@@ -131,7 +131,7 @@ impl Session {
     }
 
     /// A checked frame of any kind, with its scan number if it has one.
-    pub fn enter(&mut self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &Limits) -> Entry {
+    pub fn enter(&mut self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &ReceiverLimits) -> Entry {
         if self.void.get() {
             *self = Self::none();
         }
@@ -160,7 +160,7 @@ impl Session {
 
     /// Whether a frame of another epoch is of a sender that speaks now: not one that is late by the
     /// measure that epoch had.
-    fn speaks_now(&self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &Limits) -> bool {
+    fn speaks_now(&self, now: Time, epoch: Epoch, scan: Option<ScanNumber>, limits: &ReceiverLimits) -> bool {
         match (self.previous.filter(|(previous, _)| *previous == epoch), scan) {
             (Some((_, least)), Some(scan)) => {
                 let behind = difference(scan.lag(now), least);
@@ -203,7 +203,7 @@ impl Session {
     }
 
     /// The clock of a header; whether maps before are void.
-    pub fn hear_clock(&mut self, now: Time, clock: &Clock, limits: &Limits) -> bool {
+    pub fn hear_clock(&mut self, now: Time, clock: &Clock, limits: &ReceiverLimits) -> bool {
         let us = clock.time_ms * 1000 % CLOCK_US;
         let delay_us = u64::from(limits.max_delay_us);
         let mut known = self.clock.unwrap_or(SenderClock { at: now, us, begun: now, confirmed: false });
@@ -228,7 +228,7 @@ impl Session {
     }
 
     /// The scan number of a map frame.
-    pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &Limits) -> Hearing {
+    pub fn hear(&mut self, now: Time, scan: ScanNumber, limits: &ReceiverLimits) -> Hearing {
         let lag = scan.lag(now);
         let ahead = self.clock.map_or(0, |clock| ahead_of(clock.lag(now), lag, limits));
         if ahead > MOST_AHEAD_US || (ahead > 0 && self.is_sure(now, limits)) {
@@ -260,7 +260,7 @@ impl Session {
 
     /// Whether headers `A + D` apart and the maps' measure agree on the sender's clock, so that a frame from
     /// after it was late by almost a period.
-    fn is_sure(&self, now: Time, limits: &Limits) -> bool {
+    fn is_sure(&self, now: Time, limits: &ReceiverLimits) -> bool {
         let (Some(measure), Some(clock)) = (self.measure, self.clock) else { return false };
         clock.confirmed && measure.is_settled(now, limits) && fits(&measure, &clock, now, limits)
     }
@@ -318,7 +318,7 @@ impl Session {
     }
 
     /// Whether anything may be shown now.
-    pub fn trusted(&self, now: Time, limits: &Limits) -> bool {
+    pub fn trusted(&self, now: Time, limits: &ReceiverLimits) -> bool {
         let (Some(measure), Some(clock), false) = (self.measure, self.clock, self.void.get()) else { return false };
         let settled = measure.is_settled(now, limits);
         // later than this every map has aged, and before it no number comes again
@@ -329,7 +329,7 @@ impl Session {
     }
 
     /// Whether a scan may be shown now, given that the session is trusted.
-    pub fn fresh(&self, now: Time, scan: ScanNumber, limits: &Limits) -> bool {
+    pub fn fresh(&self, now: Time, scan: ScanNumber, limits: &ReceiverLimits) -> bool {
         self.age_us(now, scan).saturating_add(MARGIN_US) <= limits.max_age_us
     }
 }
@@ -343,7 +343,7 @@ fn lasts(sign: Time, now: Time) -> bool {
 mod tests {
     use super::*;
 
-    const LIMITS: Limits = Limits::DEFAULT;
+    const LIMITS: ReceiverLimits = ReceiverLimits::DEFAULT;
 
     fn ms(ms: u64) -> Time {
         Time::from_micros(ms * 1000)

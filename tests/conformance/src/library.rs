@@ -6,7 +6,7 @@ use flate2::Crc;
 use viewshed::fixed::time::Time;
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::message::{Addresses, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 
 use crate::input::{Bus, Input};
@@ -34,7 +34,7 @@ impl Default for Library {
 
 impl Library {
     pub fn new(bus: Bus, sensor: u8) -> Self {
-        let receiver = Box::new(Receiver::new([sensor], Addresses::STANDARD, Limits::DEFAULT));
+        let receiver = Box::new(Receiver::new([sensor], Addresses::STANDARD, ReceiverLimits::DEFAULT));
         Self { bus, sensor, receiver, line: Unstuffer::new() }
     }
 
@@ -80,15 +80,19 @@ impl Library {
 
     fn look(&self, time: u64) -> String {
         let (ranges, rays) = self.rays(time);
-        let (mut crc, mut count) = (Crc::new(), [0; 3]);
-        let mut row = Vec::with_capacity(ranges);
+        let (mut crc, mut visible, mut invisible) = (Crc::new(), 0, 0);
+        let mut row = vec![0; ranges];
         for ray in &rays {
-            row.clear();
-            row.extend((0..ranges).map(|cell| state(ray, cell)));
-            row.iter().for_each(|state| count[usize::from(*state)] += 1);
+            row.fill(0);
+            // thousands of cells a look, and a thousand looks a run
+            for cell in ray.known.near()..ray.known.end().min(ranges) {
+                let seen = ray.get(cell);
+                row[cell] = 1 + u8::from(seen);
+                visible += u32::from(seen);
+                invisible += u32::from(!seen);
+            }
             crc.update(&row);
         }
-        let [_, invisible, visible] = count;
         let hash = if visible + invisible == 0 { 0 } else { crc.sum() };
         format!("{time} {visible} {invisible} {hash:08x}")
     }

@@ -5,14 +5,13 @@
 use std::error::Error;
 
 use viewshed::query::{self, Answer, Footprint};
-use viewshed::small::{CHECK, Map, Parameters, Sender, State};
+use viewshed::small::{Map, Parameters, Sender, State};
 use viewshed::{
-    Addresses, Angle, Ars408, Ars408Config, BLOCK_LEN, BroadcastConfig, Calibration, Camera3d, Camera3dConfig,
-    Camera3dParameters, CanFrame, CanId, Condition, Detection, Epoch, Estimator, Feed, FieldOfView, Flow, Frame,
-    ImageBox, Intrinsics, Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver, NativeSender,
-    NoiseConfig, PointPair, PolarMap, Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading, Radar3dConfig,
-    Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, SerialLine, SerialSession, Settings,
-    SettingsSlots, StoredSettings, Ti, TiConfig, Time, Unit, UnitState, VehicleClass, Visibility, VisibilityMap,
+    Addresses, Angle, Ars408, Ars408Config, BroadcastConfig, Calibration, Camera3d, Camera3dConfig, Camera3dParameters,
+    CanFrame, CanId, Condition, Detection, Epoch, Estimator, Feed, FieldOfView, Frame, ImageBox, Intrinsics,
+    Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver, NativeSender, NoiseConfig, PointPair,
+    PolarMap, Radar3dConfig, Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, Settings, Ti,
+    TiConfig, Time, Unit, UnitState, VehicleClass, Visibility, VisibilityMap,
 };
 
 /// Range cells and azimuths of the small size, and a receiver of its maps.
@@ -23,11 +22,15 @@ type Far = Receiver<1, AZIMUTHS, { State::WORDS }>;
 const FRAMES: u64 = 40;
 const PERIOD_US: u64 = 66_667;
 
+#[cfg(feature = "board")]
+mod board;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings::of(gantry());
     estimators_and_questions(&settings)?;
     a_unit_and_its_receiver(&settings)?;
-    a_session_from_start_to_restart(&settings);
+    #[cfg(feature = "board")]
+    board::a_session_from_start_to_restart(&settings);
     a_camera()?;
     decoders();
     println!("the face is enough");
@@ -67,22 +70,18 @@ fn truck() -> Result<Vec<Detection>, Box<dyn Error>> {
     Ok([-1.0, 0.0, 1.0].iter().map(|y| Detection::new(&reflection(*y))).collect::<Result<_, _>>()?)
 }
 
-/// Both estimators, their maps, and what may be asked of any map.
+/// The estimator, its map, and what may be asked of any map.
 fn estimators_and_questions(settings: &Settings) -> Result<(), Box<dyn Error>> {
     let config = Radar3dConfig { gate: settings.gate, ..Radar3dConfig::default() };
     let parameters: Parameters = Radar3dParameters::new(&settings.sensor, &config)?;
     let (mut radar, mut map) = (Box::new(State::new()), parameters.map());
-    let flat = Radar2dParameters::new::<208, 26, 360>(&settings.sensor, &Radar2dConfig::default())?;
-    let mut baseline = Box::new(Radar2d::<208, 26, 360, 256>::new());
     let detections = truck()?;
     for frame in 0..FRAMES {
         let report = radar.process(&parameters, at(frame), &detections, false, &mut map);
         assert_eq!(report.condition, Condition::Healthy);
-        baseline.process(&flat, at(frame), &detections, false);
     }
     let ahead = RoadPoint::from_metres(20.0, 0.0)?;
     assert_eq!(query::point(&map, ahead), Answer::VisibleFree);
-    assert_eq!(baseline.map(&flat, Radar2dReading::Last).at(ahead).visibility, Visibility::Visible);
     let car = Footprint::new(RoadPoint::from_metres(30.0, 3.5)?, 0.0, 4.6, 1.8)?;
     assert_eq!(query::area(&map, &car), Answer::VisibleFree);
     let mut grid = Box::new(RoadGrid::<100, 40>::unknown(0, -20));
@@ -149,41 +148,6 @@ fn a_camera() -> Result<(), Box<dyn Error>> {
     assert_eq!(query::point(&map, RoadPoint::from_metres(30.5, 0.5)?), Answer::VisibleFree);
     assert_eq!(query::point(&map, RoadPoint::from_metres(65.5, 0.5)?), Answer::Invisible);
     Ok(())
-}
-
-/// Where blocks are kept.
-struct InRam([[u8; BLOCK_LEN]; 2]);
-
-impl SettingsSlots for InRam {
-    fn slot(&self, slot: usize) -> &[u8] {
-        &self.0[slot]
-    }
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
-        self.0[slot] = *block;
-    }
-}
-
-/// What was sent.
-struct Line(usize);
-
-impl SerialLine for Line {
-    fn send(&mut self, bytes: &[u8]) -> bool {
-        self.0 += bytes.len();
-        true
-    }
-}
-
-/// A unit without settings says so; one with a block takes its line's bytes.
-fn a_session_from_start_to_restart(settings: &Settings) {
-    let (mut slots, mut line) = (InRam([[0xFF; BLOCK_LEN]; 2]), Line(0));
-    let stored = StoredSettings::read(&slots, CHECK);
-    assert!(stored.settings().is_none() && stored.write(&settings.to_block(0), &mut slots).is_ok());
-    let stored = StoredSettings::read(&slots, CHECK);
-    let mut session = SerialSession::<256>::start(0, Epoch::new(1), stored, &mut line);
-    let started = line.0;
-    let mut unit = None::<Unit<'_, State, Sender>>;
-    let flow = session.take(&[0, 1, 2, 0], &mut unit, &mut slots, &mut line, &mut |_, _| {});
-    assert!(started > 0 && flow == Flow::Continue && session.settings() == Some(settings));
 }
 
 /// A sensor that is none of the library's.

@@ -4,7 +4,7 @@ use viewshed::fixed::bits::Bits;
 use viewshed::wire::code::block::{Context, Kind};
 use viewshed::wire::code::interval::Form;
 use viewshed::wire::code::ray::{Known, Ray};
-use viewshed::wire::code::reading::{Ending, Place, Reader, decode};
+use viewshed::wire::code::reading::{Ending, Reader, Resume, decode};
 
 const AZIMUTHS: usize = 128;
 const RANGES: usize = 224;
@@ -48,8 +48,8 @@ pub fn run(bytes: &[u8]) {
     let start = usize::from(*start) % AZIMUTHS;
     let rays = || Rays { was, taken: vec![None; AZIMUTHS] };
     let (mut at_once, mut step_by_step) = (rays(), rays());
-    let ending = decode(&words, &context, kind, start, &mut { Place::START }, &mut at_once);
-    let mut place = Place::START;
+    let ending = decode(&words, &context, kind, start, &mut { Resume::START }, &mut at_once);
+    let mut place = Resume::START;
     for n in 1..=words.len() {
         let ended = decode(&words[..n], &context, kind, start, &mut place, &mut step_by_step);
         if ended != Ending::OutOfWords {

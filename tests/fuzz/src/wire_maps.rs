@@ -7,16 +7,16 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::planes::Planes;
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 
 const A: usize = 9;
 const W: usize = 2;
 
 struct Map([Ray<W>; A]);
 
-impl Layers<W> for Map {
+impl Planes<W> for Map {
     fn ray(&self, _: Plane, azimuth: usize) -> Ray<W> {
         self.0.get(azimuth).copied().unwrap_or(Ray::UNKNOWN)
     }
@@ -50,7 +50,7 @@ pub fn run(bytes: &[u8]) {
     };
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     let mut sender = Broadcaster::<A, W>::new(config, header, Epoch::new(1), Time::from_micros(0)).unwrap();
-    let mut receiver = Receiver::<1, A, W>::new([0], Addresses::STANDARD, Limits::DEFAULT);
+    let mut receiver = Receiver::<1, A, W>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let mut map = Map([Ray::clear(header.usual); A]);
     let mut changes = changes.chunks_exact(7);
     for scan in 0..50_u64 {

@@ -5,11 +5,11 @@ use viewshed::map::VisibilityMap;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Message, Packing, Plane, data_id};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 
 /// One input.
 pub fn run(bytes: &[u8]) {
-    let mut receiver = Receiver::<2, 32, 4, 2>::new([0, 1], Addresses::STANDARD, Limits::DEFAULT);
+    let mut receiver = Receiver::<2, 32, 4, 2>::new([0, 1], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let mut now_us = 10_000_000_u64;
     let mut rest = bytes;
     while let [kind, wait, length, more @ ..] = rest {

@@ -11,9 +11,9 @@ use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::header::{Header, WireMount};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Message, NotAuthentic, Plane, data_id};
-use viewshed::wire::receive::{Limits, Refused, SecuredReceiver};
+use viewshed::wire::planes::Planes;
+use viewshed::wire::receive::{ReceiverLimits, Refused, SecuredReceiver};
 use viewshed::wire::secoc::Sealer;
 
 const SENSOR: u8 = 1;
@@ -21,7 +21,7 @@ const KEY: [u8; 16] = [0x5A; 16];
 
 struct Map(u32);
 
-impl Layers<1> for Map {
+impl Planes<1> for Map {
     fn ray(&self, _: Plane, azimuth: usize) -> Ray<1> {
         Ray::new(Known::new(2, 30), Bits::from_words([self.0.rotate_left(azimuth as u32)]))
     }
@@ -64,7 +64,8 @@ fn sent() -> &'static [(Vec<u8>, u64)] {
 /// One input: of every four bytes which message, what happens to it, where and how it is changed.
 pub fn run(bytes: &[u8]) {
     let sent = sent();
-    let mut receiver = SecuredReceiver::<[u8; 16], 1, 8, 1>::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT, &KEY);
+    let mut receiver =
+        SecuredReceiver::<[u8; 16], 1, 8, 1>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT, &KEY);
     let (mut next, mut now_ms) = (0, 0);
     for four in bytes.chunks_exact(4) {
         let [step, what, place, change] = [four[0], four[1], four[2], four[3]];
@@ -74,7 +75,7 @@ pub fn run(bytes: &[u8]) {
         now_ms += u64::from(what >> 2);
         let known = receiver.freshness(SENSOR);
         if what & 3 == 3 && change == 0 {
-            receiver = SecuredReceiver::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT, &KEY);
+            receiver = SecuredReceiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT, &KEY);
             known.into_iter().for_each(|last| receiver.resume(SENSOR, last));
         }
         let mut message = message.clone();

@@ -22,9 +22,9 @@ use viewshed::sensor::noise::NoiseConfig;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::Header;
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::planes::Planes;
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed_harness::boards::stress;
 use viewshed_harness::estimators::{self, camera_3d};
 use viewshed_harness::recording::Recording;
@@ -205,7 +205,7 @@ fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) 
     let begin = frames.first().map_or(Time::from_micros(0), |f| f.0);
     let mut sender =
         Box::new(Broadcaster::<120, 7>::new(config, header, Epoch::new(1), begin).expect("defaults are valid"));
-    let mut receiver = Box::new(Receiver::<1, 120, 7>::new([0], Addresses::STANDARD, Limits::DEFAULT));
+    let mut receiver = Box::new(Receiver::<1, 120, 7>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));
     for (now, detections) in frames {
         state.process(&parameters, *now, detections, false, &mut map);
         let mut packets = Vec::with_capacity(1000);

@@ -63,6 +63,22 @@ fn the_limits_of_every_field_are_those_of_the_description() {
     assert!(((d.azimuth - Angle::QUARTER).raw()).abs() <= 2);
 }
 
+/// As an ARS408-21 in cluster mode sent them: a published log of a PIX vehicle.
+#[test]
+fn a_real_scan_of_clusters() {
+    let mut radar = Ars408::<128>::new(Ars408Config::sensor(0));
+    assert_eq!(radar.push(&frame("600#5024581110"), at(0)), Ars408Outcome::Taken);
+    // 80 near and 36 far; here all are the first
+    let cluster = |n: u8| frame(&format!("701#{n:02X}4E81FC80200147"));
+    assert!((0..115).all(|n| radar.push(&cluster(n), at(1)) == Ars408Outcome::Taken));
+    let Ars408Outcome::Scan(scan) = radar.push(&cluster(115), at(2)) else { panic!("115 are not all") };
+    assert_eq!((scan.number, scan.missing, scan.detections.len()), (0x5811, 0, 116));
+    // 2.4 m ahead and 0.7 m to the right, at rest, -28.5 dBsm
+    let d = scan.detections[0];
+    assert_eq!((d.range_cm, d.radial_velocity_cm_s, d.rcs_half_dbsm), (250, 0, Some(-57)));
+    assert!((d.azimuth.radians() + 0.283_79).abs() < 4e-4, "{}", d.azimuth.radians());
+}
+
 #[test]
 fn near_and_far_clusters_are_added() {
     let mut radar = radar();

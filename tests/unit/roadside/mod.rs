@@ -19,7 +19,7 @@ use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, SettingsSlots
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 use viewshed::wire::status::{Reason, ResetCause, Status, UnitState};
 
@@ -170,7 +170,7 @@ impl World {
         let start = RoadsideStart { sensor: SENSOR, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
         let unit = Unit::start(start, memory, Ars408::new(Ars408Config::sensor(SENSOR)), at(0), &mut ports);
         assert!(ports.radar.silent && ports.broadcast.silent, "until the bit rate is proven");
-        let far = || Far::new([SENSOR], ADDRESSES, Limits::DEFAULT);
+        let far = || Far::new([SENSOR], ADDRESSES, ReceiverLimits::DEFAULT);
         Self {
             ports,
             unit,

@@ -10,9 +10,9 @@ use viewshed::unit::profile::reference::State;
 use viewshed::wire::broadcast::{Broadcaster, Medium};
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::planes::Planes;
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::scan_number::ScanNumber;
 
 /// The sensor's number on the bus, and where its messages are.
@@ -21,7 +21,7 @@ pub const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 const AZIMUTHS: usize = State::AZIMUTHS;
 const WORDS: usize = State::WORDS;
-const LIMITS: Limits = Limits::DEFAULT;
+const LIMITS: ReceiverLimits = ReceiverLimits::DEFAULT;
 const AGE_AND_DELAY_US: u64 = 400_000;
 
 /// Age at which a sender sends no map any more.

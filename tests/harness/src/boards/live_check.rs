@@ -11,7 +11,7 @@ use viewshed::map::Visibility;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Message, Received};
-use viewshed::wire::receive::{Limits, ReceivedMap, Receiver};
+use viewshed::wire::receive::{ReceivedMap, Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 
 use super::can::CanBoard;
@@ -210,7 +210,7 @@ impl Ear {
 }
 
 fn judge(turns: &[Turn], name: &str, board: &str, profile: Profile, past: Past) -> Live {
-    let ear = || Ear(Box::new(Receiver::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT)));
+    let ear = || Ear(Box::new(Receiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT)));
     let [mut here, mut there] = [ear(), ear()];
     let mut live = Live {
         recording: name.to_owned(),

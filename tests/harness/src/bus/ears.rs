@@ -3,7 +3,7 @@
 use viewshed::fixed::time::Time;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::Addresses;
-use viewshed::wire::receive::{Accepted, Limits, Receiver, Refused, SecuredReceiver};
+use viewshed::wire::receive::{Accepted, Receiver, ReceiverLimits, Refused, SecuredReceiver};
 
 /// Key of authenticated messages.
 pub type Key = [u8; 16];
@@ -15,7 +15,7 @@ pub enum Ears<const N: usize, const A: usize, const W: usize, const P: usize> {
 }
 
 impl<const N: usize, const A: usize, const W: usize, const P: usize> Ears<N, A, W, P> {
-    pub fn new(sensors: [u8; N], addresses: Addresses, limits: Limits, key: Option<&Key>) -> Self {
+    pub fn new(sensors: [u8; N], addresses: Addresses, limits: ReceiverLimits, key: Option<&Key>) -> Self {
         match key {
             None => Self::Open(Box::new(Receiver::new(sensors, addresses, limits))),
             Some(key) => Self::Secured(Box::new(SecuredReceiver::new(sensors, addresses, limits, key))),

@@ -6,7 +6,7 @@ use serde::Serialize;
 use viewshed::fixed::time::Time;
 use viewshed::map::{CellState, Visibility};
 use viewshed::wire::message::{Addresses, Plane};
-use viewshed::wire::receive::{Condition, Limits, ReceivedMap};
+use viewshed::wire::receive::{ReceivedMap, ReceiverLimits, SenderCondition};
 use viewshed::wire::serial::Unstuffer;
 
 use super::ears::{Ears, Key};
@@ -27,7 +27,7 @@ pub struct Listening {
     ears: Ears<{ SENSORS as usize }, A, W, P>,
     /// Serial lines by their device.
     lines: BTreeMap<String, Unstuffer>,
-    limits: Limits,
+    limits: ReceiverLimits,
     frames: u64,
     last: Time,
 }
@@ -106,7 +106,7 @@ impl Listening {
     /// With a key, to authenticated messages and no others.
     pub fn new(addresses: Addresses, key: Option<&Key>) -> Self {
         let sensors = std::array::from_fn(|number| number as u8);
-        let limits = Limits::DEFAULT;
+        let limits = ReceiverLimits::DEFAULT;
         let ears = Ears::new(sensors, addresses, limits, key);
         Self { ears, lines: BTreeMap::new(), limits, frames: 0, last: Time::from_micros(0) }
     }
@@ -224,11 +224,11 @@ impl Listening {
             malformed: c.malformed,
         };
         let condition = match sensor.condition(self.last, &self.limits) {
-            Condition::Waiting => "waiting",
-            Condition::NoHeader => "no header",
-            Condition::Unusable => "unusable",
-            Condition::Conflict => "conflict",
-            Condition::Ok => "ok",
+            SenderCondition::Waiting => "waiting",
+            SenderCondition::NoHeader => "no header",
+            SenderCondition::Unusable => "unusable",
+            SenderCondition::Conflict => "conflict",
+            SenderCondition::Ok => "ok",
         };
         let epoch = sensor.epoch().map(|epoch| epoch.number());
         Some(Heard { sensor: number, condition: condition.into(), epoch, header, status, counters, maps })

@@ -6,7 +6,7 @@ use serde::Serialize;
 use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Plane};
-use viewshed::wire::receive::Limits;
+use viewshed::wire::receive::ReceiverLimits;
 use viewshed::wire::serial::Unstuffer;
 
 use super::ears::{Ears, Key};
@@ -42,7 +42,7 @@ impl Arrived {
             Medium::Can(addresses) | Medium::CanFd(addresses) => addresses,
             Medium::Serial => Addresses::STANDARD,
         };
-        let mut ears = Ears::<1, A, W, 1>::new([sensor], addresses, Limits::DEFAULT, key);
+        let mut ears = Ears::<1, A, W, 1>::new([sensor], addresses, ReceiverLimits::DEFAULT, key);
         let mut unstuffer = Unstuffer::new();
         let mut random = Pcg64::seed_from_u64(1);
         let (mut shares, mut equal, mut wrongly_visible) = (Vec::new(), 0, 0);

@@ -7,8 +7,8 @@ use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, fingerprint};
-use viewshed::wire::layers::Layers;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
+use viewshed::wire::planes::Planes;
 use viewshed::wire::secoc::Sealer;
 use viewshed::wire::serial::{self, MOST_STUFFED};
 
@@ -119,7 +119,7 @@ pub struct Traffic {
     pub dropped: u16,
 }
 
-impl Layers<W> for Scan {
+impl Planes<W> for Scan {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let ray = self.rays.get(azimuth).filter(|_| plane == Plane::Visibility);
         ray.copied().unwrap_or(Ray::UNKNOWN)

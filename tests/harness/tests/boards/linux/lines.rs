@@ -9,7 +9,7 @@ use viewshed::map::Visibility;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::message::{Addresses, Message, Received};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 use viewshed::wire::status::{Reason, Status, UnitState};
 use viewshed_harness::boards::Profile;
@@ -97,7 +97,7 @@ fn linux_in_a_test_bench_every_message_of_five_seconds_is_the_same() {
 }
 
 /// Generous ones: the machine that runs the tests may be busy.
-const LIMITS: Limits = Limits { max_age_us: 1_000_000, max_delay_us: 500_000 };
+const LIMITS: ReceiverLimits = ReceiverLimits { max_age_us: 1_000_000, max_delay_us: 500_000 };
 const PATIENT: &str = "gap_us = 0\nstale_ms = 500\nmax_age_ms = 1000\nmax_delay_ms = 500\n";
 
 type Far = Receiver<1, 120, 7>;

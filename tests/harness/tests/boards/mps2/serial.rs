@@ -8,7 +8,7 @@ use viewshed::map::Visibility;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
 use viewshed::wire::message::{Addresses, Received};
-use viewshed::wire::receive::{Limits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::listener::Listener;
@@ -64,7 +64,7 @@ type Hearing = Receiver<1, 120, 7>;
 
 /// A receiver that heard everything when it was sent.
 fn listen(answered: &Answered) -> Hearing {
-    let mut receiver = Hearing::new([SENSOR], Addresses::STANDARD, Limits::DEFAULT);
+    let mut receiver = Hearing::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let mut from = 0;
     for (to, now) in &answered.times {
         for message in messages(&answered.bytes[from..*to]) {

@@ -5,13 +5,10 @@
 //! are as they were, is encoded against that refresh; any other is refreshed. An azimuth that no block
 //! can hold goes out in plain bits. Only what was handed out whole is built upon.
 
-use super::code::block::{Block, Context, Kind, Rays};
-use super::code::ray::Ray;
-use super::scan_number::ScanNumber;
-use crate::fixed::bits::Bits;
-
-/// Azimuths, a bit each.
-pub(super) type Azimuths = Bits<4>;
+use crate::wire::code::block::{Block, Context, Kind, Rays};
+use crate::wire::code::ray::Ray;
+use crate::wire::message::Azimuths;
+use crate::wire::scan_number::ScanNumber;
 
 /// Most ticks between a refresh and a delta on it.
 pub const MOST_TICKS: u8 = 16;
@@ -35,7 +32,7 @@ pub(super) enum Next {
 
 /// A plane as it is sent.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Layer<const A: usize, const W: usize> {
+pub(super) struct OutgoingPlane<const A: usize, const W: usize> {
     /// The scan being encoded.
     now: [Ray<W>; A],
     pending: Azimuths,
@@ -48,25 +45,25 @@ pub(super) struct Layer<const A: usize, const W: usize> {
     ticks: [u8; A],
 }
 
-/// The azimuths of a layer that are encoded in one way, from a start on.
+/// The azimuths of a plane that are encoded in one way, from a start on.
 struct Run<'a, const A: usize, const W: usize> {
-    layer: &'a Layer<A, W>,
+    plane: &'a OutgoingPlane<A, W>,
     kind: Kind,
     encoding: &'a Encoding,
 }
 
 impl<const A: usize, const W: usize> Rays<W> for Run<'_, A, W> {
     fn now(&self, azimuth: usize) -> Option<&Ray<W>> {
-        let pending = self.layer.pending.get(azimuth) && self.layer.kind(azimuth, self.encoding) == self.kind;
-        self.layer.now.get(azimuth).filter(|_| pending)
+        let pending = self.plane.pending.get(azimuth) && self.plane.kind(azimuth, self.encoding) == self.kind;
+        self.plane.now.get(azimuth).filter(|_| pending)
     }
 
     fn was(&self, azimuth: usize) -> Option<&Ray<W>> {
-        self.layer.was.get(azimuth)
+        self.plane.was.get(azimuth)
     }
 }
 
-impl<const A: usize, const W: usize> Layer<A, W> {
+impl<const A: usize, const W: usize> OutgoingPlane<A, W> {
     /// Nothing to encode. All bits are 0, so that no image holds a copy.
     pub const fn new() -> Self {
         Self {
@@ -142,7 +139,7 @@ impl<const A: usize, const W: usize> Layer<A, W> {
     }
 
     fn block(&self, encoding: &Encoding, kind: Kind, start: usize) -> Block {
-        let run = Run { layer: self, kind, encoding };
+        let run = Run { plane: self, kind, encoding };
         Block::new(&encoding.context, kind, start, &run)
     }
 

@@ -8,20 +8,20 @@ use crate::map::bitmap::VisibilityBitmap;
 use crate::map::polar::PolarMap;
 
 /// A map of one or more planes.
-pub trait Layers<const W: usize> {
+pub trait Planes<const W: usize> {
     /// The ray of an azimuth; unknown where the map has no such plane. Cells between the first and the
     /// last known one count as known.
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W>;
 }
 
-impl<const R: usize, const A: usize, const W: usize> Layers<W> for VisibilityBitmap<R, A> {
+impl<const R: usize, const A: usize, const W: usize> Planes<W> for VisibilityBitmap<R, A> {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let row = self.rows().get(azimuth).filter(|_| plane == Plane::Visibility);
         row.map_or(Ray::UNKNOWN, |row| Ray::of(row).0)
     }
 }
 
-impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A> {
+impl<const R: usize, const A: usize, const W: usize> Planes<W> for PolarMap<R, A> {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let Some((grades, occupancy)) = self.grades(azimuth).zip(self.occupancy(azimuth)) else { return Ray::UNKNOWN };
         ray_of(plane, grades, self.visible_from(), || at_least(occupancy, self.occupied_from()))
@@ -29,7 +29,7 @@ impl<const R: usize, const A: usize, const W: usize> Layers<W> for PolarMap<R, A
 }
 
 /// The polar map around the camera: each of its cells is what the camera's nearest one is.
-impl<const NX: usize, const NY: usize, const W: usize> Layers<W> for CameraMap<NX, NY> {
+impl<const NX: usize, const NY: usize, const W: usize> Planes<W> for CameraMap<NX, NY> {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let [visible_from, occupied_from] = self.thresholds();
         let along = |layer| {
@@ -152,13 +152,13 @@ mod tests {
 
     #[test]
     fn planes_are_the_bits_of_the_cells() {
-        let cells = |plane| -> std::vec::Vec<usize> { Layers::<2>::ray(&map(), plane, 1).bits().iter().collect() };
+        let cells = |plane| -> std::vec::Vec<usize> { Planes::<2>::ray(&map(), plane, 1).bits().iter().collect() };
         assert_eq!(cells(Plane::Visibility), [6, 7, 33]);
         assert_eq!(cells(Plane::Grade), [4, 5, 7, 33], "nearly visible, and clear");
         assert_eq!(cells(Plane::Occupancy), [5]);
-        assert_eq!(Layers::<2>::ray(&map(), Plane::Visibility, 1).known, Known::new(3, 34));
-        assert_eq!(Layers::<2>::ray(&map(), Plane::Visibility, 0), Ray::UNKNOWN);
-        assert_eq!(Layers::<2>::ray(&map(), Plane::Visibility, 2), Ray::UNKNOWN);
+        assert_eq!(Planes::<2>::ray(&map(), Plane::Visibility, 1).known, Known::new(3, 34));
+        assert_eq!(Planes::<2>::ray(&map(), Plane::Visibility, 0), Ray::UNKNOWN);
+        assert_eq!(Planes::<2>::ray(&map(), Plane::Visibility, 2), Ray::UNKNOWN);
     }
 
     #[test]
@@ -187,6 +187,6 @@ mod tests {
             assert_eq!(of_bitmap, of_map);
         }
         assert_eq!(bitmap.cell(1, 20), Visibility::Unknown, "a hole");
-        assert_eq!(Layers::<2>::ray(&bitmap, Plane::Occupancy, 1), Ray::UNKNOWN);
+        assert_eq!(Planes::<2>::ray(&bitmap, Plane::Occupancy, 1), Ray::UNKNOWN);
     }
 }
