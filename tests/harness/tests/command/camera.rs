@@ -74,9 +74,7 @@ fn boxes_as_csv_are_replayed_into_every_kind_of_result() {
             .ends_with("camera-3d_visible,camera-3d_grade,camera-reference_visible,camera-reference_grade")
     );
     assert_eq!(samples.lines().count(), 41);
-    for picture in
-        ["birdseye-camera-3d.png", "camera-view.png", "birdseye-camera-reference.png", "tradeoff-objects.png"]
-    {
+    for picture in ["birdseye-camera-3d.png", "camera-view.png", "birdseye-camera-reference.png", "table.txt"] {
         assert!(folder.join("o").join(picture).exists(), "{picture}");
     }
     let copy = std::fs::read(folder.join("m.mcap")).unwrap();
