@@ -60,7 +60,7 @@
 //! | a sensor as it is installed, in SI units, checked once | [`Sensor`], [`Mount`], [`FieldOfView`], [`NoiseConfig`], [`RoadPoint`]; errors name the parameter: [`ConfigError`] |
 //! | a frame of it | [`Detection`], [`Measurement`], [`Angle`], [`Time`], [`FrameStatus`] |
 //! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`] |
-//! | a camera: its calibration, boxes of its pictures | [`Camera3d`], [`Camera3dConfig`], [`Camera3dParameters`], [`Calibration`], [`Intrinsics`], [`PointPair`], [`ImageBox`], [`VehicleClass`] |
+//! | a camera: its calibration, boxes of its pictures | [`Camera3d`], [`Camera3dConfig`], [`Camera3dParameters`], [`Calibration`], [`Intrinsics`], [`PointPair`], [`ImageBox`], [`VehicleClass`]; how it is installed: [`cameras`] |
 //! | what is known of the road | [`PolarMap`], [`RoadGrid`]; every map answers [`VisibilityMap`] and the [questions](query) |
 //! | maps on CAN, CAN FD and serial lines | [`Broadcaster`], [`BroadcastConfig`], [`Medium`]; a [`Receiver`] gives maps back |
 //! | radars that are decoded, and boxes of a camera | [`Ars408`], [`Ti`], [`NativeReceiver`]; each is a [`Feed`] |
@@ -161,6 +161,9 @@ pub mod bench;
 #[cfg(doc)]
 #[doc = include_str!("EXTENDING.md")]
 pub mod extending {}
+#[cfg(doc)]
+#[doc = include_str!("camera/CAMERAS.md")]
+pub mod cameras {}
 #[cfg(all(doc, not(feature = "bench")))]
 #[doc = include_str!("wire/SPECIFICATION.md")]
 pub mod specification {}

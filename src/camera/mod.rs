@@ -251,7 +251,7 @@ impl<const NX: usize, const NY: usize> Default for Camera3d<NX, NY> {
 impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
     /// Knows nothing; to be placed in static memory.
     pub const fn new() -> Self {
-        Self { voxels: Voxels::EMPTY, skyline: Skyline::OPEN, health: Health::NEW, rejections: BoxRejections::NONE }
+        Self { voxels: Voxels::EMPTY, skyline: Skyline::NEW, health: Health::NEW, rejections: BoxRejections::NONE }
     }
 
     /// Forgets everything but the counters.

@@ -71,7 +71,13 @@ struct Blocked {
 }
 
 impl Skyline {
-    pub(crate) const OPEN: Self = Self { directions: [Blocked { before: OPEN, last: OPEN, end: 0 }; STEPS] };
+    /// Before the first frame: zeros, so that a static of it takes no flash.
+    pub(crate) const NEW: Self = Self { directions: [Blocked { before: 0, last: 0, end: 0 }; STEPS] };
+
+    /// Nothing is blocked.
+    fn open(&mut self) {
+        self.directions.fill(Blocked { before: OPEN, last: OPEN, end: 0 });
+    }
 }
 
 impl Blocked {
@@ -142,7 +148,7 @@ impl<const NX: usize> View<NX> {
         grades: &mut [[u8; NY]; NX],
         occupancy: &mut [[u8; NY]; NX],
     ) {
-        *skyline = Skyline::OPEN;
+        skyline.open();
         let mut open = true;
         for (i, ((&(first, end), grades), occupancy)) in self.rows.iter().zip(grades).zip(occupancy).enumerate() {
             let near = (i as i32 * CELL_CM).max(NEAREST_CM);
@@ -283,7 +289,7 @@ mod tests {
             });
         }
         let view = View::<150>::new::<40>(p, 100, 20_000).unwrap();
-        let (mut skyline, mut grades, mut occupancy) = (Skyline::OPEN, [[0_u8; 40]; 150], [[0; 40]; 150]);
+        let (mut skyline, mut grades, mut occupancy) = (Skyline::NEW, [[0_u8; 40]; 150], [[0; 40]; 150]);
         view.cast(&grid, &mut skyline, &mut grades, &mut occupancy);
         grades.iter().map(|row| row.map(|grade| grade.checked_sub(1))).collect()
     }

@@ -7,10 +7,11 @@ use std::error::Error;
 use viewshed::query::{self, Answer, Footprint};
 use viewshed::small::{Map, Parameters, Sender, State};
 use viewshed::{
-    Addresses, Angle, Ars408, Ars408Config, BroadcastConfig, CanFrame, CanId, Condition, Detection, Epoch, Estimator,
-    Feed, FieldOfView, Frame, Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver, NativeSender,
-    NoiseConfig, PolarMap, Radar3dConfig, Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor,
-    Settings, Ti, TiConfig, Time, Unit, UnitState, Visibility, VisibilityMap,
+    Addresses, Angle, Ars408, Ars408Config, BroadcastConfig, Calibration, Camera3d, Camera3dConfig, Camera3dParameters,
+    CanFrame, CanId, Condition, Detection, Epoch, Estimator, Feed, FieldOfView, Frame, ImageBox, Intrinsics,
+    Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver, NativeSender, NoiseConfig, PointPair,
+    PolarMap, Radar3dConfig, Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, Settings, Ti,
+    TiConfig, Time, Unit, UnitState, VehicleClass, Visibility, VisibilityMap,
 };
 
 /// Range cells and azimuths of the small size, and a receiver of its maps.
@@ -30,6 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     a_unit_and_its_receiver(&settings)?;
     #[cfg(feature = "board")]
     board::a_session_from_start_to_restart(&settings);
+    a_camera()?;
     decoders();
     println!("the face is enough");
     Ok(())
@@ -120,6 +122,31 @@ fn a_unit_and_its_receiver(settings: &Settings) -> Result<(), Box<dyn Error>> {
     let equal = |a: usize, r: usize| received.cell(a, r).visible() == unit.map().cell(a, r).visible();
     assert!((0..AZIMUTHS).all(|a| (0..RANGES).all(|r| equal(a, r))), "every cell arrives");
     assert!(received.at(RoadPoint::from_metres(20.0, 0.0)?).visible());
+    Ok(())
+}
+
+/// A camera calibrated by points of the road, its boxes over the native format, its map.
+fn a_camera() -> Result<(), Box<dyn Error>> {
+    // at 6 m, level
+    let seen =
+        |x: f32, y: f32| PointPair { road_m: [x, y], image_px: [960.0 - 1600.0 * y / x, 540.0 + 1600.0 * 6.0 / x] };
+    let points = [seen(20.0, -8.0), seen(20.0, 9.0), seen(90.0, 7.0), seen(110.0, -10.0)];
+    let intrinsics = Intrinsics { size_px: [1920, 1080], focal_px: [1600.0; 2], center_px: [960.0, 540.0] };
+    let (calibration, residual_px) = Calibration::from_points(&intrinsics, &points)?;
+    assert!(residual_px < 0.5 && (calibration.mount.height_m - 6.0).abs() < 0.1);
+    let parameters = Camera3dParameters::<200, 60>::new(&calibration.normalised(), &Camera3dConfig::default())?;
+    let (mut camera, mut map) = (Box::new(Camera3d::<200, 60>::new()), parameters.map());
+    // a truck's rear at 40 m
+    let truck = ImageBox::of_picture([909.0, 602.0, 1011.0, 780.0], [1920, 1080], VehicleClass::Truck);
+    let boxes = [truck.ok_or("edges that are finite")?];
+    let (mut sender, mut feed) = (NativeSender::new(0), NativeReceiver::<64, ImageBox>::boxes(NativeConfig::camera(0)));
+    for message in sender.boxes(at(0), false, &boxes, NativeMedium::CanFd) {
+        feed.take(message.bytes(), at(0), &mut |frame| {
+            camera.process(&parameters, frame.measured, frame.input, frame.status, &mut map);
+        });
+    }
+    assert_eq!(query::point(&map, RoadPoint::from_metres(30.5, 0.5)?), Answer::VisibleFree);
+    assert_eq!(query::point(&map, RoadPoint::from_metres(65.5, 0.5)?), Answer::Invisible);
     Ok(())
 }
 

@@ -72,6 +72,25 @@ pub fn all(camera: &RecordedCamera, truth: Option<&Truth>, config: &Camera3dConf
     Ok(all)
 }
 
+/// The boxes of a frame where they are lifted to.
+///
+/// # Errors
+/// A camera that cannot be worked with.
+pub fn lifted(camera: &RecordedCamera, frame: &CameraFrame, config: &Camera3dConfig) -> Result<Vec<Solid>> {
+    let parameters = Camera3dParameters::<ROWS, COLUMNS>::new(&calibration(camera), config).context("the camera")?;
+    let mut solids = Vec::new();
+    parameters.lift(&vehicles(frame).0, |lifted| {
+        let Footprint { centre, heading, half_length_cm, half_width_cm } = lifted.footprint;
+        let metres = |cm: i32| f64::from(cm) / 100.0;
+        solids.push(Solid {
+            center: [metres(centre.x_cm), metres(centre.y_cm), metres(lifted.height_cm) / 2.0],
+            yaw_rad: f64::from(heading.y).atan2(f64::from(heading.x)),
+            size: [metres(2 * half_length_cm), metres(2 * half_width_cm), metres(lifted.height_cm)],
+        });
+    });
+    Ok(solids)
+}
+
 /// The boxes of a frame as the library takes them, and how many are of vehicles: more, where some are no boxes.
 pub fn vehicles(frame: &CameraFrame) -> (Vec<ImageBox>, usize) {
     let named = frame.boxes.iter().filter_map(|b| Some((b, VehicleClass::named(&b.class)?)));

@@ -1,10 +1,10 @@
-//! The pictures of one replay: a frame from above, found examples, the polar grid, the trade-offs.
+//! The pictures of one replay: a frame from above, found examples, the polar grid, the trade-offs, a camera's view.
 
 use anyhow::Result;
 
 use crate::command::progress::bar;
 use crate::estimators;
-use crate::estimators::Estimator;
+use crate::estimators::{Estimator, camera_3d};
 use crate::evaluation::Settings;
 use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
@@ -15,6 +15,7 @@ use crate::evaluation::summary::Row;
 use crate::geometry::solid::Solid;
 use crate::results::files::Folder;
 use crate::results::pictures::birdseye;
+use crate::results::pictures::camera_view::{self, View};
 use crate::results::pictures::polar::{self, PolarGrid};
 use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
 use crate::results::pictures::tradeoff::{self, Curve, Marker, MarkerKind, Span, TradeOff};
@@ -77,6 +78,7 @@ fn shown_frame(
     if chosen {
         save(Some(from_above(replay, estimator, frame, None, settings)), folder, &format!("birdseye-{name}"))?;
         save(polar_grid(replay, estimator, frame), folder, &format!("polar-{name}"))?;
+        save(camera_view(replay, estimator, frame, settings)?, folder, "camera-view")?;
     }
     for example in examples.iter().filter(|e| e.frame == frame) {
         let picture = from_above(replay, estimator, frame, Some(example), settings);
@@ -184,6 +186,27 @@ fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Optio
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),
     }))
+}
+
+/// A camera's picture of a frame, with what the estimator made of it.
+fn camera_view(
+    replay: &Replay,
+    estimator: &dyn Estimator,
+    frame: usize,
+    settings: &Settings,
+) -> Result<Option<Canvas>> {
+    let Some(camera) = replay.recording.of_camera() else { return Ok(None) };
+    let Some(own) = camera.frames.get(frame) else { return Ok(None) };
+    let lifted = camera_3d::lifted(camera, own, &settings.estimators.camera_3d)?;
+    Ok(Some(camera_view::draw(&View {
+        intrinsics: camera.intrinsics,
+        pose: camera.pose,
+        map: estimator.map(),
+        boxes: &own.boxes,
+        lifted: &lifted,
+        title: title(replay, estimator.name(), frame),
+        caption: caption(replay),
+    })))
 }
 
 /// A point with its intervals: FVR, FIR.

@@ -4,6 +4,7 @@
 //! bytes. Text is set in DejaVu Sans from inside the program, so no font has to be installed.
 
 pub mod birdseye;
+pub mod camera_view;
 pub mod canvas;
 mod closeup;
 pub mod heatmap;

@@ -367,12 +367,12 @@ mod tests {
             solid: Solid { center: [x, 0.0, 0.75], yaw_rad: 0.0, size: [4.6, 1.8, 1.5] },
         };
         let wall = |y: f64| Solid { center: [70.0, y, 5.0], yaw_rad: 0.0, size: [1.0, 2.0, 10.0] };
-        let (seen, targets) = (camera.view(&[car(80.0).solid], &[wall(-0.5)]), [car(80.0)]);
+        let (seen, targets) = (camera.view(&[car(80.0).solid], &[wall(-0.75)]), [car(80.0)]);
         assert!(seen[0].share < 0.45 && seen[0].share > IDEAL_SHARE, "{}", seen[0].share);
         for number in 0..50 {
-            let boxes = camera.detect(&targets, &[wall(-0.5)], 3, number);
+            let boxes = camera.detect(&targets, &[wall(-0.75)], 3, number);
             assert_eq!((boxes.len(), boxes[0].edges), (1, seen[0].edges));
-            assert!(camera.detect(&targets, &[wall(-0.25)], 3, number).is_empty());
+            assert!(camera.detect(&targets, &[wall(-0.5)], 3, number).is_empty());
         }
     }
 }
