@@ -127,7 +127,7 @@ impl Default for ObstacleConfig {
             abreast_m: 1.8,
             merge_speed_mps: 2.0,
             half_width_m: 0.8,
-            mover_way_m: 2.0,
+            mover_way_m: 1.0,
             turning_speed_mps: 2.0,
             outline_sigmas: 0.7,
             turning_noise_mps: 1.0,

@@ -56,6 +56,18 @@ fn what_stops_across_the_line_of_sight_stays_where_it_stopped() {
 }
 
 #[test]
+fn what_is_first_seen_as_it_comes_to_a_stop_is_a_vehicle() {
+    let mut list = Obstacles::<16>::new();
+    // from 2.5 m/s it is 1.6 m to where it stands
+    let mut cars = [car([40.0, 3.0], [1.0, 0.0], 2.5)];
+    change_speed(&mut list, &mut cars, 0.0);
+    follow(&mut list, &mut cars, 5.0, true);
+    let found = boxes(&list);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!((f64::from(found[0].x_cm) / 100.0 - cars[0].at[0]).abs() < 1.5, "{found:?}, it is at {:?}", cars[0].at);
+}
+
+#[test]
 fn what_was_moving_is_given_up_in_a_shadow() {
     let mut list = Obstacles::<16>::new();
     follow(&mut list, &mut [car([30.0, 3.0], [1.0, 0.0], 10.0)], 2.0, true);
