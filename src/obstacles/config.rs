@@ -133,7 +133,7 @@ impl Default for ObstacleConfig {
             turning_noise_mps: 1.0,
             own_way_sigmas: 3.0,
             own_way_mps: 2.0,
-            own_way_share: 0.25,
+            own_way_share: 0.2,
             own_way_follow: 0.05,
             length_growth_s: 1.0,
             length_memory_s: 3.0,

@@ -121,6 +121,17 @@ mod tests {
     }
 
     #[test]
+    fn a_car_on_an_arm_14_degrees_off_the_axis_gets_that_heading() {
+        for side in [1.0, -1.0] {
+            let (boxes, at) = boxes([60.0, 10.0 * side], [0.972, -0.233 * side], 11.0, 2.0);
+            assert_eq!(boxes.len(), 1, "{boxes:?}");
+            let [degrees, _, y] = boxes[0];
+            assert!((degrees + 13.5 * side).abs() < 3.0, "{boxes:?}");
+            assert!((y - at[1]).abs() < 0.8, "{boxes:?}, it is at {at:?}");
+        }
+    }
+
+    #[test]
     fn a_car_on_the_road_keeps_the_roads_heading() {
         for (heading, expected) in [([1.0, 0.0], 0.0), ([-1.0, 0.0], 180.0)] {
             let (boxes, _) = boxes([50.0 - 25.0 * heading[0], 6.0], heading, 20.0, 2.0);
