@@ -209,8 +209,12 @@ impl Obstacle {
             self.heading = Direction::of(self.velocity.0, self.velocity.1);
             self.move_left(offset);
         } else {
-            let inertia = if self.age < YOUNG_FRAMES { YOUNG_INERTIA } else { INERTIA };
-            self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
+            if self.free_heading {
+                self.keep_heading();
+            } else {
+                let inertia = if self.age < YOUNG_FRAMES { YOUNG_INERTIA } else { INERTIA };
+                self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
+            }
             self.move_left(offset);
             if self.age >= YOUNG_FRAMES {
                 self.turn(offset, step, t);

@@ -4,8 +4,8 @@
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
 //! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
 
-use super::motion::{FreeMotion, Seen};
-use super::obstacle::{FRACTION, NEWBORN_PLACE, Obstacle};
+use super::motion::Seen;
+use super::obstacle::{FRACTION, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tracking::Tracking;
 use crate::fixed::math::{length, mul_shift};
@@ -13,8 +13,6 @@ use crate::fixed::trig::Direction;
 
 /// Frames in a row in which motion along the heading must fail.
 const OWN_WAY_FRAMES: u8 = 2;
-/// Variance of the speed across the line of sight of what is slow and has a heading, (cm/s)^2.
-const SLOW_SPEED: i32 = 150 * 150;
 /// Least variance of where a frame's detections have their centre, cm^2.
 const LEAST_VARIANCE: i32 = 20 * 20;
 
@@ -52,12 +50,18 @@ impl Obstacle {
         }
     }
 
+    /// Goes on along the heading it has, as fast along it as the free motion is: across the line of sight, Doppler
+    /// says nothing of a speed, and a place that stays does.
+    pub(super) fn keep_heading(&mut self) {
+        let (vx, vy) = self.free.velocity;
+        let speed = self.heading.along(vx, vy);
+        let part = |c: i16| mul_shift(speed, i32::from(c), 14);
+        self.velocity = (part(self.heading.x), part(self.heading.y));
+    }
+
     /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way.
     pub(super) fn question_heading(&mut self, t: &Tracking) {
         if self.free_heading {
-            if self.speed() <= t.turning_speed {
-                self.free = FreeMotion::new(self.position, NEWBORN_PLACE, self.velocity, SLOW_SPEED);
-            }
             return;
         }
         let (fx, fy) = self.free.velocity;
@@ -113,6 +117,17 @@ mod tests {
             let [degrees, x, y] = boxes[0];
             assert!((degrees - expected).abs() < 12.0, "{boxes:?}");
             assert!((x - at[0]).abs() < 1.0 && (y - at[1]).abs() < 1.5, "{boxes:?}, it is at {at:?}");
+        }
+    }
+
+    #[test]
+    fn a_car_on_an_arm_14_degrees_off_the_axis_gets_that_heading() {
+        for side in [1.0, -1.0] {
+            let (boxes, at) = boxes([60.0, 10.0 * side], [0.972, -0.233 * side], 11.0, 2.0);
+            assert_eq!(boxes.len(), 1, "{boxes:?}");
+            let [degrees, _, y] = boxes[0];
+            assert!((degrees + 13.5 * side).abs() < 3.0, "{boxes:?}");
+            assert!((y - at[1]).abs() < 0.8, "{boxes:?}, it is at {at:?}");
         }
     }
 

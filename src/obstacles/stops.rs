@@ -38,6 +38,36 @@ fn what_has_stopped_keeps_its_box_through_a_red_light_in_a_shadow() {
 }
 
 #[test]
+fn what_stops_across_the_line_of_sight_stays_where_it_stopped() {
+    let mut list = Obstacles::<16>::new();
+    let mut cars = [car([40.0, -27.5], [0.0, 1.0], 8.0)];
+    follow(&mut list, &mut cars, 1.5, true);
+    change_speed(&mut list, &mut cars, 0.0);
+    follow(&mut list, &mut cars, 3.0, true);
+    for _ in 0..10 {
+        follow(&mut list, &mut cars, 2.0, true);
+        let found = boxes(&list);
+        assert_eq!(found.len(), 1, "{found:?}");
+        let aside = f64::from(found[0].y_cm) / 100.0 - cars[0].at[1];
+        assert!(aside.abs() < 1.0, "{aside} m from where it stands: {found:?}");
+        let (vx, vy) = list.iter().next().unwrap().velocity();
+        assert!(vx.abs() < 40 && vy.abs() < 40 && found[0].height_cm == 150, "{vx} {vy} cm/s: {found:?}");
+    }
+}
+
+#[test]
+fn what_is_first_seen_as_it_comes_to_a_stop_is_a_vehicle() {
+    let mut list = Obstacles::<16>::new();
+    // from 2.5 m/s it is 1.6 m to where it stands
+    let mut cars = [car([40.0, 3.0], [1.0, 0.0], 2.5)];
+    change_speed(&mut list, &mut cars, 0.0);
+    follow(&mut list, &mut cars, 5.0, true);
+    let found = boxes(&list);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!((f64::from(found[0].x_cm) / 100.0 - cars[0].at[0]).abs() < 1.5, "{found:?}, it is at {:?}", cars[0].at);
+}
+
+#[test]
 fn what_was_moving_is_given_up_in_a_shadow() {
     let mut list = Obstacles::<16>::new();
     follow(&mut list, &mut [car([30.0, 3.0], [1.0, 0.0], 10.0)], 2.0, true);
