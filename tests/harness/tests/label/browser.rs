@@ -21,7 +21,7 @@ pub const CTRL: u32 = 2;
 pub const SHIFT: u32 = 8;
 
 /// How long anything may take on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Where Debian's and other packages put a Chromium. The wrapper in /usr/bin would leave its child behind.
 const PLACES: [&str; 5] = [
