@@ -5,7 +5,7 @@
 //! # Model
 //! The person looks at each proposal, the best first. One that lies on a vehicle for most of its time is accepted; one
 //! that continues or precedes an accepted piece of the same vehicle is accepted and joined; one that lies elsewhere, or
-//! on a vehicle that is labelled there already, is rejected. Where a vehicle is seen well for [`SEEN`] and its label is
+//! on a vehicle that is labelled there already, is rejected. Where a vehicle is seen well for a second and its label is
 //! missing or elsewhere, the person sets points; a vehicle that nothing was offered for is drawn. Accepting, rejecting,
 //! joining and correcting a class count one action each, drawing one, and each point that is set one.
 
@@ -372,8 +372,10 @@ impl Judged {
         let share = |[all, part]: [u64; 2]| 100.0 * part as f64 / all.max(1) as f64;
         let a = self.actions;
         format!(
-            "{}: {} vehicles, {} proposals; {:.2} actions a vehicle (accept {}, reject {}, join {}, class {}, mend {} points, draw {} with {} points)\n  \
-             labelled {:.1} % of {} steps; {:.1} % of {} without detection are labelled so; {:.1} % of {} labelled steps without a vehicle; off by {:.1} m along, {:.1} m across\n",
+            "{}: {} vehicles, {} proposals; {:.2} actions a vehicle \
+             (accept {}, reject {}, join {}, class {}, mend {} points, draw {} with {} points)\n  \
+             labelled {:.1} % of {} steps; {:.1} % of {} without detection are labelled so; \
+             {:.1} % of {} labelled steps without a vehicle; off by {:.1} m along, {:.1} m across\n",
             self.name,
             self.vehicles,
             self.proposals,

@@ -1,4 +1,4 @@
-//! Labels by hand: tracks a person draws, the boxes they mean, the file they are kept in, and tracks the machine offers.
+//! Labels by hand: tracks a person draws, the boxes they mean, their file, and tracks the machine offers.
 //!
 //! In the order of the data: a [`tracks`] polyline says where the near face of a vehicle was, [`near_face`] makes box
 //! centres of it, [`file`](mod@file) keeps both as `NAME.labels.csv`. [`proposals`] offers tracks found in the radar's
