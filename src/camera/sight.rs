@@ -83,11 +83,13 @@ impl Skyline {
 impl Blocked {
     /// The slope below which a column of this row is hidden; where it is occupied and the last run reaches it, it
     /// is a part of that.
+    #[inline] // once a cell
     fn slope(&self, row: u16, occupied: bool) -> i32 {
         if occupied && self.end == row { self.before } else { self.before.max(self.last) }
     }
 
     /// Adds an occupied column of this row.
+    #[inline] // once a direction
     fn add(&mut self, row: u16, slope: i32) {
         if self.end < row {
             self.before = self.before.max(self.last);
