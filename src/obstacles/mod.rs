@@ -13,7 +13,7 @@
 //! Cells FVR / FIR in percent on training scenes of the twin, two crossings and two queues, from their 20th
 //! second on, and on the motorway recording; each line on top of those above that were kept. Synthetic data.
 //! Lines below "middle of what is seen shown" were measured with it. Without it, and counted from the 30th
-//! second on, `viewshed experiment --scene crossing --train` prints 23.4 / 13.6 today, `--scene queue --train`
+//! second on, `viewshed experiment --scene crossing --train` printed 23.4 / 13.6 with the rules of this table, `--scene queue --train`
 //! 19.5 / 11.4, and `viewshed replay` of the motorway 17.6 / 14.7.
 //!
 //! | rule | crossings | queues | motorway | kept |
