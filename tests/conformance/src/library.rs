@@ -85,9 +85,9 @@ impl Library {
         for ray in &rays {
             row.fill(0);
             // thousands of cells a look, and a thousand looks a run
-            for cell in ray.known.near()..ray.known.end().min(ranges) {
+            for (cell, state) in row.iter_mut().enumerate().take(ray.known.end()).skip(ray.known.near()) {
                 let seen = ray.get(cell);
-                row[cell] = 1 + u8::from(seen);
+                *state = 1 + u8::from(seen);
                 visible += u32::from(seen);
                 invisible += u32::from(!seen);
             }

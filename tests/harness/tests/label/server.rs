@@ -101,7 +101,7 @@ impl Server {
             }
         }
         let text = String::from_utf8(answer).unwrap();
-        let number = text.lines().filter(|line| !line.is_empty()).last().unwrap().to_owned();
+        let number = text.lines().rfind(|line| !line.is_empty()).unwrap().to_owned();
         Some((stream, number))
     }
 }

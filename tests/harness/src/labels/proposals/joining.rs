@@ -211,8 +211,8 @@ fn halves(path: Path, instants: &[Instant]) -> Vec<Path> {
     let thin = (THIN * total as f64 / (high + 1 - low) as f64) as usize;
     // the longest run of thin bins within the reach
     let (mut best, mut run) = ((0, 0), 0);
-    for k in low..=high {
-        run = if counts[k] <= thin { run + 1 } else { 0 };
+    for (k, count) in counts.iter().enumerate().take(high + 1).skip(low) {
+        run = if *count <= thin { run + 1 } else { 0 };
         if run > best.0 {
             best = (run, k);
         }

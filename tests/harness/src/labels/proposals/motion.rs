@@ -79,12 +79,12 @@ impl Motion {
             [along * c * c + across * s * s, (along - across) * c * s],
             [(along - across) * c * s, along * s * s + across * c * c],
         ];
-        for i in 0..2 {
-            for j in 0..2 {
-                self.covariance[i][j] += q[i][j] * dt_s * dt_s / 3.0;
-                self.covariance[i][j + 2] += q[i][j] * dt_s / 2.0;
-                self.covariance[i + 2][j] += q[i][j] * dt_s / 2.0;
-                self.covariance[i + 2][j + 2] += q[i][j];
+        for (i, row) in q.iter().enumerate() {
+            for (j, q) in row.iter().enumerate() {
+                self.covariance[i][j] += q * dt_s * dt_s / 3.0;
+                self.covariance[i][j + 2] += q * dt_s / 2.0;
+                self.covariance[i + 2][j] += q * dt_s / 2.0;
+                self.covariance[i + 2][j + 2] += q;
             }
         }
     }
@@ -139,10 +139,9 @@ fn solve(mut m: Matrix, mut v: [f64; 4]) -> Option<[f64; 4]> {
             return None;
         }
         for i in k + 1..4 {
-            let f = m[i][k] / m[k][k];
-            for j in k..4 {
-                m[i][j] -= f * m[k][j];
-            }
+            let pivot = m[k];
+            let f = m[i][k] / pivot[k];
+            m[i].iter_mut().zip(pivot).skip(k).for_each(|(m, p)| *m -= f * p);
             v[i] -= f * v[k];
         }
     }
