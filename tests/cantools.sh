@@ -12,8 +12,9 @@ if ! "$python" -c 'import cantools' 2>/dev/null; then
         "$venv/bin/pip" install -q 'cantools>=41' >/dev/null 2>&1 ||
         { echo "skipped: comparison with cantools, as neither it nor python3-venv can be installed here"; exit 0; }
 fi
-cargo build --release --locked --package viewshed-harness
-viewshed=${CARGO_TARGET_DIR:-target}/release/viewshed
+# VIEWSHED: one that is built already
+viewshed=${VIEWSHED:-${CARGO_TARGET_DIR:-target}/release/viewshed}
+[ -n "${VIEWSHED:-}" ] || cargo build --release --locked --package viewshed-harness
 csv=$(mktemp)
 trap 'rm -f "$csv"' EXIT
 compare() {

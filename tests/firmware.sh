@@ -29,7 +29,7 @@ compiler() {
 cargo_tests() {
     echo "== $2"
     log=$(mktemp)
-    if cargo test --quiet --release -p viewshed-harness --test boards -- --ignored "$1" >"$log" 2>&1; then
+    if cargo test --quiet --release --locked --workspace --test boards -- --ignored "$1" >"$log" 2>&1; then
         # the line ends with the times that differ from run to run
         passed=$((passed + $(sed -n 's/^test result: ok. \([0-9]*\) passed.*/\1/p' "$log")))
         sed -n 's/^test result: \(.*\); finished.*/\1/p' "$log"

@@ -9,8 +9,9 @@ cd "$(dirname "$0")/../.."
 need_compilers
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-cargo run --quiet --release --locked -p viewshed-harness --bin viewshed -- \
-    simulate tests/recordings/motorway.toml --duration 30 --out "$work/motorway.mcap"
+# VIEWSHED: one that is built already
+viewshed=${VIEWSHED:-cargo run --quiet --release --locked -p viewshed-harness --bin viewshed --}
+$viewshed simulate tests/recordings/motorway.toml --duration 30 --out "$work/motorway.mcap"
 if [ "${1:-}" = --check ]; then
     cmp "$work/motorway.mcap" tests/recordings/motorway.mcap
     echo "tests/recordings/motorway.mcap is what the twin makes, bit for bit"
