@@ -1,6 +1,5 @@
 //! What a detector gives of one vehicle: a box in the image and its class.
 
-use crate::camera::projection::SUBPIXELS;
 use crate::fixed::math;
 
 /// What a detector takes something for.
@@ -88,6 +87,9 @@ pub struct ImageBox {
     pub(crate) edges: [i32; 4],
     pub(crate) class: VehicleClass,
 }
+
+/// Sixteenths of a pixel in one.
+pub(crate) const SUBPIXELS: i32 = 16;
 
 /// Sides of a normalised picture, pixels: a sixteenth of one is 2^-14 of it.
 pub(crate) const NORMAL_PX: u16 = 1024;

@@ -65,11 +65,12 @@ mod projection;
 mod sight;
 mod voxels;
 
+use crate::camera::boxes::SUBPIXELS;
 use crate::camera::boxes::{BoxRejection, BoxRejections, ImageBox};
 use crate::camera::calibration::Calibration;
 use crate::camera::lift::{LiftedBox, Lifting};
 use crate::camera::map::CameraMap;
-use crate::camera::projection::{Projection, SUBPIXELS};
+use crate::camera::projection::Projection;
 use crate::camera::sight::{Skyline, View};
 use crate::camera::voxels::{FULL, Standing, Voxels};
 use crate::estimator::{Estimator, Progress};

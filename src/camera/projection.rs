@@ -3,13 +3,11 @@
 //! Image coordinates are tangents from the optical axis, + left and + up, so that a left edge is greater than a
 //! right one. Places are of the levelled frame (see [`crate::sensor::mount`]), centimetres, heights above the road.
 
+use crate::camera::boxes::SUBPIXELS;
 use crate::camera::calibration::Calibration;
 use crate::fixed::math;
 use crate::sensor::config::ConfigError;
 use crate::sensor::mount::Levelling;
-
-/// Sixteenths of a pixel in one.
-pub(crate) const SUBPIXELS: i32 = 16;
 
 /// One, in the scale of tangents.
 const TANGENT: i32 = 1 << 16;

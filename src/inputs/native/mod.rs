@@ -52,7 +52,8 @@
 //!
 //! # Example
 //! ```
-//! use viewshed::{Angle, Detection, NativeConfig, NativeMedium, NativeOutcome, NativeReceiver, NativeSender, Time};
+//! use viewshed::board::NativeOutcome;
+//! use viewshed::{Angle, Detection, NativeConfig, NativeMedium, NativeReceiver, NativeSender, Time};
 //!
 //! let car = Detection {
 //!     range_cm: 5000,

@@ -35,10 +35,8 @@ impl CanServiceConfig {
 /// A block is sent in parts, written, and read by the next start:
 /// ```
 /// # use viewshed::unit::can_service::{Answers, Said, Tool};
-/// # use viewshed::{
-/// #     Addresses, BLOCK_LEN, CanService, CanServiceConfig, Epoch, FieldOfView, Flow, Medium, Mount, NoiseConfig, Sensor,
-/// #     Settings, SettingsSlots, StoredSettings, Time, small,
-/// # };
+/// # use viewshed::board::{BLOCK_LEN, CanService, CanServiceConfig, Flow, SettingsSlots, StoredSettings};
+/// # use viewshed::{Addresses, Epoch, FieldOfView, Medium, Mount, NoiseConfig, Sensor, Settings, Time, small};
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);
 /// # impl SettingsSlots for InRam {
 /// #     fn slot(&self, slot: usize) -> &[u8] { &self.0[slot] }

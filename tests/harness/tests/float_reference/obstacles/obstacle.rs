@@ -250,8 +250,13 @@ impl Obstacle {
     /// Corrects the speed along the heading and the place across it, and lets a lasting drift turn it.
     fn go_along_heading(&mut self, offset: f64, dt: f64, rules: &Rules) {
         let (young, g) = (self.age < rules.young, self.gathered);
-        let inertia = if young { rules.young_inertia } else { rules.inertia };
-        self.velocity = moved(self.velocity, self.heading, g.speed.0 / (g.speed.1 + inertia));
+        if self.free_heading {
+            // across the line of sight Doppler says nothing of a speed, and a place that stays does
+            self.velocity = self.heading.map(|c| c * along(self.heading, self.free.velocity));
+        } else {
+            let inertia = if young { rules.young_inertia } else { rules.inertia };
+            self.velocity = moved(self.velocity, self.heading, g.speed.0 / (g.speed.1 + inertia));
+        }
         self.anchor = moved(self.anchor, left(self.heading), offset);
         if !young {
             let drift = (offset * rules.drift_gain / dt).clamp(-FASTEST_DRIFT, FASTEST_DRIFT);

@@ -7,8 +7,6 @@ use crate::geometry::{Ground, across, along, difference, left, moved};
 
 /// Standard deviations of a newborn's place and of its speed across the line of sight.
 const NEWBORN: [f64; 2] = [1.5, 10.0];
-/// Standard deviation of the speed across of what is slow and has a heading, m/s.
-const SLOW_SPEED: f64 = 1.5;
 /// Where on a vehicle a reflection lies, and least standard deviation of a frame's centre, metres.
 const ON_VEHICLE_SIGMA: f64 = 0.5;
 const LEAST_SIGMA: f64 = 0.2;
@@ -86,10 +84,6 @@ impl Obstacle {
     /// Leaves the heading it has where motion along that does not explain what is seen.
     pub fn question_heading(&mut self, rules: &Rules) {
         if self.free_heading {
-            if length(self.velocity) <= rules.turning_speed {
-                self.free = FreeMotion::newborn(self.anchor, self.velocity);
-                self.free.variance[2] = SLOW_SPEED.powi(2);
-            }
             return;
         }
         let off = difference(self.free.velocity, self.velocity);
