@@ -208,7 +208,11 @@ fn every_class(count: u64, runs_of: impl Fn(&str) -> (u64, u64) + Sync) {
             Other { language, program, runs, length_us }
         })
         .collect();
-    let all: Vec<(Bus, Class)> = logs::names().collect();
+    // `drain`, `canfd cuts`: an hour and more can be cut into parts
+    let only = std::env::var("VIEWSHED_FAULTS").ok().filter(|_| count >= 100).unwrap_or_default();
+    let named = |(bus, class): &(Bus, Class)| format!("{} {}", bus.name(), class.name()).contains(&only);
+    let all: Vec<(Bus, Class)> = logs::names().filter(named).collect();
+    assert!(!all.is_empty(), "VIEWSHED_FAULTS={only} is part of no fault's name, such as `can cuts`");
     let each = |(bus, class): &(Bus, Class)| {
         let (figures, wrong) = runs(*class, *bus, &maps, count, &others);
         if count >= 100 {
@@ -236,7 +240,7 @@ fn receivers_agree_at_every_look_and_are_never_wrongly_visible() {
 }
 
 #[test]
-#[ignore = "takes an hour; three runs of each fault and bus always run"]
+#[ignore = "takes an hour, or less of it with VIEWSHED_FAULTS=`canfd cuts`; three runs of each always run"]
 fn two_hundred_runs_of_each_fault() {
     every_class(200, |language| if language == "C" { (200, 30 * SECOND) } else { (20, 30 * SECOND) });
 }
