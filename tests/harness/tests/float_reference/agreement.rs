@@ -22,8 +22,8 @@ mod tests {
     use crate::scene::{Random, within};
 
     const RECORDING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
-    /// Copies over which rates are averaged.
-    const COPIES: u64 = 16;
+    /// Copies over which rates are averaged: of 16, means of the few that are not detected were 0.5 points apart.
+    const COPIES: u64 = 64;
 
     fn recording() -> Recording {
         mcap::read(Path::new(RECORDING), &ReadOptions::default()).unwrap()
@@ -121,8 +121,8 @@ mod tests {
                     .map(|mut e| rates(&score(e.as_mut(), &copy, &samples, Grid::Cartesian, &|| ()), &samples))
             })
             .collect();
-        // means are less than 0.4 points apart
-        let limits = [("FVR", 0.5), ("FIR", 0.5), ("cell FVR", 0.5), ("cell FIR", 0.5)];
+        // means are less than 0.25 points apart
+        let limits = [("FVR", 0.4), ("FIR", 0.4), ("cell FVR", 0.4), ("cell FIR", 0.4)];
         for (k, (name, limit)) in limits.into_iter().enumerate() {
             let mean = |which: usize| runs.iter().map(|r| r[which][k]).sum::<f64>() / runs.len() as f64;
             println!("{name}: integer {:.2} %, exact {:.2} %", mean(0), mean(1));
