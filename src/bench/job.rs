@@ -19,16 +19,17 @@
 //! | 2 | bit 0: the radar reports a fault; bit 1: forget everything first |
 //! | 12 each | range (cm), azimuth, elevation (2^-16 turn), radial velocity (cm/s), RCS, SNR (half dB); -32768 = not measured |
 //!
-//! or, for a camera, boxes: left, upper, right and lower edge (2^-14 of the picture), class, 0.
+//! or, for a camera, boxes as in the [native format](crate::inputs::native), and two zeros.
 
 use heapless::Vec;
 
 use super::Bench;
-use crate::camera::boxes::{ImageBox, VehicleClass};
+use crate::camera::boxes::ImageBox;
 use crate::fixed::angle::Angle;
 use crate::fixed::bytes::{Reader, Writer};
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
+use crate::inputs::native::{Content, NativeEntry};
 use crate::unit::settings::{BLOCK_LEN, BlockError, Settings};
 
 /// Bytes before the scans.
@@ -190,16 +191,15 @@ impl JobEntry for ImageBox {
     fn to_bytes(&self) -> [u8; DETECTION_LEN] {
         let mut bytes = [0; DETECTION_LEN];
         let mut w = Writer(&mut bytes);
-        self.shares().iter().for_each(|share| w.put(share.to_le_bytes()));
-        w.put([self.class().number(), 0]);
+        w.put(NativeEntry::write(self));
         bytes
     }
 
     fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let mut r = Reader(bytes);
-        let shares = [r.i16()?, r.i16()?, r.i16()?, r.i16()?];
-        let [class, _] = r.take()?;
-        Some(Self::of_shares(shares, VehicleClass::numbered(class)?))
+        match NativeEntry::read(bytes.first_chunk()?) {
+            Content::Entry(entry) => Some(entry),
+            Content::None | Content::Refused => None,
+        }
     }
 }
 

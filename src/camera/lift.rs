@@ -16,8 +16,7 @@
 //! Boxes of the class's size seen without error are placed within 0.3 m along and 0.1 m across the view up to
 //! 100 m. Some 2500 instructions a box, and a comparison with every other box of the frame.
 
-use crate::camera::boxes::SUBPIXELS;
-use crate::camera::boxes::{BoxRejection, ImageBox, VehicleClass};
+use crate::camera::boxes::{BoxRejection, ImageBox, SUBPIXELS, VehicleClass};
 use crate::camera::projection::Projection;
 use crate::fixed::math;
 use crate::fixed::trig::{Direction, ONE};

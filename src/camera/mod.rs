@@ -65,8 +65,7 @@ mod projection;
 mod sight;
 mod voxels;
 
-use crate::camera::boxes::SUBPIXELS;
-use crate::camera::boxes::{BoxRejection, BoxRejections, ImageBox};
+use crate::camera::boxes::{BoxRejection, BoxRejections, ImageBox, SUBPIXELS};
 use crate::camera::calibration::Calibration;
 use crate::camera::lift::{LiftedBox, Lifting};
 use crate::camera::map::CameraMap;

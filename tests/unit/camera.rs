@@ -13,12 +13,14 @@ use viewshed::unit::Unit;
 use viewshed::unit::profile::camera::{CHECK, Map, Parameters, Sender, State};
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::session::SerialSession;
-use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsSlots, StoredSettings};
+use viewshed::unit::settings::{Settings, StoredSettings};
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::message::{Addresses, Epoch};
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 use viewshed::wire::status::{Reason, UnitState};
+
+use crate::block::Block;
 
 const PERIOD_US: u64 = 66_667;
 
@@ -65,18 +67,6 @@ fn parameters_and_sender(settings: &Settings, medium: Medium) -> (Parameters, Bo
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     let sender = Sender::new(config, header, Epoch::new(7), Time::from_micros(0)).unwrap();
     (parameters.unwrap(), Box::new(sender))
-}
-
-struct Block([u8; BLOCK_LEN]);
-
-impl SettingsSlots for Block {
-    fn slot(&self, slot: usize) -> &[u8] {
-        if slot == 0 { &self.0 } else { &[] }
-    }
-
-    fn write(&mut self, _: usize, block: &[u8; BLOCK_LEN]) {
-        self.0 = *block;
-    }
 }
 
 #[derive(Default)]

@@ -11,6 +11,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod block;
 mod camera;
 mod can_service;
 mod pil;

@@ -6,25 +6,14 @@ use viewshed::unit::Unit;
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::SerialSession;
-use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredSettings};
+use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Epoch, Message, Received};
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 use viewshed::wire::status::{Reason, Status, UnitState};
 
+use crate::block::Block;
 use crate::common::{SmallSender, SmallState, Vehicle, gantry, small_unit};
-
-struct Block([u8; BLOCK_LEN]);
-
-impl SettingsSlots for Block {
-    fn slot(&self, slot: usize) -> &[u8] {
-        if slot == 0 { &self.0 } else { &[] }
-    }
-
-    fn write(&mut self, _: usize, block: &[u8; BLOCK_LEN]) {
-        self.0 = *block;
-    }
-}
 
 #[derive(Default)]
 struct Narrow {

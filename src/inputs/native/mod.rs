@@ -77,6 +77,8 @@ mod message;
 mod receiver;
 mod sender;
 
-pub use message::{MOST_BYTES, NativeEntry, NativeMedium, NativeMessage, VERSION, box_data_id, box_id, data_id, id};
+pub use message::{
+    Content, MOST_BYTES, NativeEntry, NativeMedium, NativeMessage, VERSION, box_data_id, box_id, data_id, id,
+};
 pub use receiver::{NativeConfig, NativeCounters, NativeOutcome, NativeReceiver, NativeSerialReceiver, Refusal};
 pub use sender::{NativeSender, Parts};

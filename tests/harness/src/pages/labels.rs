@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::fs::File;
 use std::path::Path;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::{Context as Waker, Poll};
 
 use anyhow::{Context, Result};
@@ -16,6 +16,7 @@ use http_body::Frame;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::locked;
 use crate::labels::near_face::BoxStep;
 use crate::labels::tracks::{LabelTrack, TrackError, check_all};
 use crate::labels::{Site, file, near_face};
@@ -180,8 +181,4 @@ impl Drop for Held {
     fn drop(&mut self) {
         locked(&self.writer.0).0 = None;
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

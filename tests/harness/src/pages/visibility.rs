@@ -10,6 +10,7 @@ use anyhow::Result;
 use serde::Serialize;
 use viewshed::map::Visibility;
 
+use super::locked;
 use crate::estimators::{Options, radar_3d, sensor};
 use crate::recording::Recording;
 
@@ -57,7 +58,7 @@ impl Maps {
             };
             let map = (0..cells.azimuths).flat_map(|a| (0..cells.ranges).map(move |r| (a, r)));
             let map = map.map(|(a, r)| state(a, r)).collect();
-            let mut found = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut found = locked(&self.0);
             found.0 = Some(cells);
             found.1.push(map);
         }
@@ -66,7 +67,7 @@ impl Maps {
 
     /// The map at a frame; `None` while it is not found yet.
     pub fn at(&self, frame: usize) -> Option<(Cells, Vec<u8>)> {
-        let found = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let found = locked(&self.0);
         Some((found.0?, found.1.get(frame)?.clone()))
     }
 }

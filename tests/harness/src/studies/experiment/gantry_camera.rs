@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::plan::Day;
+use super::plan::{self, Day};
 use crate::estimators::{Estimator, camera_3d};
 use crate::evaluation::Settings;
 use crate::evaluation::camera::{self as judged, visible_shares};
@@ -89,13 +89,10 @@ impl Plan {
     /// # Errors
     /// File, line and key of what cannot be read; a set without days, traffic or a seed that is named twice in a set.
     pub fn read(path: &Path) -> Result<Self> {
-        let place = || format!("experiment {}", path.display());
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("cannot read experiment {}", path.display()))?;
-        let mut plan: Self = toml::from_str(&text).with_context(place)?;
-        plan.folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        plan.check().with_context(place)?;
-        Ok(plan)
+        plan::read(path, |plan: &mut Self, folder| {
+            plan.folder = folder;
+            plan.check()
+        })
     }
 
     fn check(&self) -> Result<()> {

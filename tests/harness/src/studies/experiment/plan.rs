@@ -3,10 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
+
+/// Reads the plan of an experiment; `finish` is given the file's folder as well, and checks the plan.
+///
+/// # Errors
+/// File, line and key of what cannot be read, and what `finish` refuses.
+pub fn read<P: DeserializeOwned>(path: &Path, finish: impl FnOnce(&mut P, PathBuf) -> Result<()>) -> Result<P> {
+    let place = || format!("experiment {}", path.display());
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", place()))?;
+    let mut plan = toml::from_str(&text).with_context(place)?;
+    finish(&mut plan, path.parent().unwrap_or(Path::new("")).to_owned()).with_context(place)?;
+    Ok(plan)
+}
 
 /// What is simulated, and what each day is for.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,12 +52,10 @@ impl Plan {
     /// # Errors
     /// File, line and key of what cannot be read; a day that is reported and trained on, or twice in it.
     pub fn read(path: &Path) -> Result<Self> {
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("cannot read experiment {}", path.display()))?;
-        let mut plan: Self = toml::from_str(&text).with_context(|| format!("experiment {}", path.display()))?;
-        plan.folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        plan.check().with_context(|| format!("experiment {}", path.display()))?;
-        Ok(plan)
+        read(path, |plan: &mut Self, folder| {
+            plan.folder = folder;
+            plan.check()
+        })
     }
 
     fn check(&self) -> Result<()> {

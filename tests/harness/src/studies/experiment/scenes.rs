@@ -11,6 +11,7 @@ use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::plan;
 use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::pool::{Seconds, pool};
@@ -63,13 +64,10 @@ impl Plan {
     /// # Errors
     /// File, line and key of what cannot be read; a scene, a seed or traffic that two scenes share.
     pub fn read(path: &Path) -> Result<Self> {
-        let place = || format!("experiment {}", path.display());
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("cannot read experiment {}", path.display()))?;
-        let mut plan: Self = toml::from_str(&text).with_context(place)?;
-        plan.folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        plan.check().with_context(place)?;
-        Ok(plan)
+        plan::read(path, |plan: &mut Self, folder| {
+            plan.folder = folder;
+            plan.check()
+        })
     }
 
     fn check(&self) -> Result<()> {
