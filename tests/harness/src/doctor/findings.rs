@@ -10,7 +10,7 @@ use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::Report;
 use super::sensor::{Output, Sensor};
-use crate::recording::candump::{Content, Line};
+use crate::recording::can_log::{Content, Line};
 
 /// How much it matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -178,6 +178,7 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
         replay
     };
     drop(replaying);
+    judged(&replay, settings)?;
 
     if let Some(target) = mcap {
         write_mcap(path, target, &args.mcap_estimator, &replay, settings)?;
@@ -199,6 +200,28 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
     let shown = replay.score(SHOWN).or(replay.score(SHOWN_OF_CAMERA));
     let examples = shown.map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
     Ok(Replayed { replay, examples, mount_error })
+}
+
+/// Refuses a labelled recording of which nothing could be judged: a table without a number tells nobody anything.
+fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
+    let (recording, summary) = (&replay.recording, &replay.summary);
+    let cells = summary.rows.iter().any(|row| row.cell_fvr().is_some() || row.cell_fir().is_some());
+    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty());
+    let Some(truth) = truth.filter(|_| summary.objects == 0 && !cells) else { return Ok(()) };
+    let (name, frames) = (&recording.name, recording.frames.len());
+    if summary.frames == 0 {
+        bail!(
+            "{name}: nothing can be judged: its {frames} frames, {:.1} s, end within the warm-up of {} s; shorten that with --warm-up",
+            recording.duration_s(),
+            settings.evaluation.warm_up_s
+        );
+    }
+    bail!(
+        "{name}: nothing can be judged: of its {} labelled objects none is faster than {} m/s and in the field of view in one of the {} frames that count; look at times, places and --fov, or set --min-speed",
+        truth.tracks.len(),
+        settings.evaluation.min_speed_mps,
+        summary.frames
+    );
 }
 
 /// `NAME.camera.csv` beside `NAME.csv`.
