@@ -33,7 +33,7 @@ const PITCH_DEG: f64 = 0.8;
 const HEIGHT_M: f64 = 0.6;
 
 /// A direction farther off is another road.
-const MOST_YAW_DEG: f64 = 10.0;
+const MOST_YAW_DEG: f64 = 6.0;
 
 const TOPIC: &str = "mount";
 

@@ -93,7 +93,7 @@ fn without_truth_there_are_no_rates_and_no_error() {
             assert_eq!(estimator[key], Value::Null, "{key} of {}", estimator["name"]);
         }
     }
-    assert!(stdout(&output).contains("no ground truth"));
+    assert!(stdout(&output).contains("No labels, so maps and pictures"));
     assert_eq!(std::fs::read_to_string(folder.join("r.csv")).unwrap().lines().count(), 1);
 }
 

@@ -114,7 +114,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let folders = out.map(|out| out::folders(&out, &paths)).transpose()?;
     let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
-    let mut failed = false;
+    let (mut failed, mut labelled) = (false, false);
     for (k, path) in paths.iter().enumerate() {
         let one = match replay(path, args, mcap.as_ref(), &settings) {
             Ok(one) => one,
@@ -124,6 +124,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 continue;
             }
         };
+        labelled |= one.replay.recording.truth.is_some();
         let text = one.text(args, &settings);
         print(&text)?;
         if let Some(csv) = &mut samples {
@@ -152,10 +153,25 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             (_, several) => file.write(json::array(several)?)?,
         }
     }
-    if !reports.is_empty() {
+    if labelled {
         print(&format!("\n{ORIGIN}\n"))?;
     }
+    if !reports.is_empty() {
+        print(&written(args))?;
+    }
     Ok(if failed { ExitCode::from(BAD_INPUT) } else { ExitCode::SUCCESS })
+}
+
+/// Where everything went.
+fn written(args: &Args) -> String {
+    let all = [
+        ("table and pictures", &args.out),
+        ("results as JSON", &args.json),
+        ("objects as CSV", &args.csv),
+        ("map as MCAP, for Foxglove or Lichtblick", &args.mcap),
+    ];
+    let named = all.into_iter().filter_map(|(what, path)| Some(format!("{what}: {}\n", path.as_ref()?.display())));
+    named.collect()
 }
 
 /// One recording replayed, with what was asked for beside its rates.
