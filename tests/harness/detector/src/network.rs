@@ -4,6 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
 use tract_onnx::prelude::*;
+use tract_onnx::tract_core::internal::DimLike;
+use tract_onnx::tract_hir::infer::Factoid;
 
 use crate::classes::Classes;
 use crate::heads::{Head, Layout, Output, Raw, Shape};
@@ -52,18 +54,18 @@ impl Network {
     ) -> Result<Self> {
         let place = || format!("--model {}", path.display());
         ensure!(path.is_file(), "{}: there is no such file", place());
-        let model = tract_onnx::onnx().model_for_path(path).map_err(plain);
+        let model = tract_onnx::onnx().model_for_path(path);
         let model = model.with_context(|| format!("{}: no ONNX model that can be read", place()))?;
         let (shape, input, planes) = input(&model, size).with_context(place)?;
-        let outlets = model.output_outlets().map_err(plain)?.to_vec();
+        let outlets = model.output_outlets()?.to_vec();
         let named =
             |outlet: &OutletId| model.outlet_label(*outlet).unwrap_or(model.node(outlet.node).name.as_str()).to_owned();
         let names: Vec<String> = outlets.iter().map(named).collect();
-        let fixed = model.with_input_fact(0, f32::fact(shape).into()).and_then(|m| m.into_optimized()).map_err(plain);
+        let fixed = model.with_input_fact(0, f32::fact(shape).into()).and_then(|m| m.into_optimized());
         let fixed = fixed.with_context(|| format!("{}: cannot be run", place()))?;
         let mut shapes = Vec::new();
         for (k, name) in names.iter().enumerate() {
-            let shape = fixed.output_fact(k).map_err(plain)?.shape.as_concrete().map(<[usize]>::to_vec);
+            let shape = fixed.output_fact(k)?.shape.as_concrete().map(<[usize]>::to_vec);
             shapes.push(shape.with_context(|| format!("{}: output `{name}` has no fixed shape", place()))?);
         }
         let pairs: Vec<Shape> = names.iter().zip(&shapes).map(|(n, s)| (n.as_str(), s.as_slice())).collect();
@@ -73,7 +75,7 @@ impl Network {
             Layout::Yolo(_) => Values::Unit,
             Layout::Ssd(_) => Values::Signed,
         });
-        let model = fixed.into_runnable().map_err(plain).with_context(place)?;
+        let model = fixed.into_runnable().with_context(place)?;
         Ok(Self { model, names, layout, input, planes, values })
     }
 
@@ -96,12 +98,11 @@ impl Network {
             let values: Vec<f32> = (0..3 * area).map(|k| of_byte(planes[k % 3 * area + k / 3])).collect();
             Tensor::from_shape(&[1, height, width, 3], &values)
         };
-        let results =
-            self.model.run(tvec!(tensor.map_err(plain)?.into())).map_err(plain).context("the model failed")?;
+        let results = self.model.run(tvec!(tensor?.into())).context("the model failed")?;
         let mut outputs = Vec::with_capacity(results.len());
         for (value, name) in results.iter().zip(&self.names) {
-            let value = value.cast_to::<f32>().map_err(plain).with_context(|| format!("output `{name}`"))?;
-            let view = value.to_plain_array_view::<f32>().map_err(plain)?;
+            let value = value.cast_to::<f32>().with_context(|| format!("output `{name}`"))?;
+            let view = value.to_plain_array_view::<f32>()?;
             let (shape, values) = (view.shape().to_vec(), view.iter().copied().collect());
             outputs.push(Output { name: name.clone(), shape, values });
         }
@@ -111,10 +112,10 @@ impl Network {
 
 /// Shape, width and height, and whether colours are planes.
 fn input(model: &InferenceModel, size: Option<[u32; 2]>) -> Result<(Vec<usize>, [u32; 2], bool)> {
-    let inputs = model.input_outlets().map_err(plain)?.len();
+    let inputs = model.input_outlets()?.len();
     ensure!(inputs == 1, "has {inputs} inputs, and one picture is given");
-    let fact = model.input_fact(0).map_err(plain)?;
-    let shown = format!("{:?}", fact.shape);
+    let fact = model.input_fact(0)?;
+    let shown = format!("[{:?}]", fact.shape);
     let dims: Vec<Option<usize>> = match fact.shape.rank().concretize() {
         Some(4) => {
             (0..4).map(|k| fact.shape.dim(k).and_then(|d| d.concretize()).and_then(|d| d.to_usize().ok())).collect()
@@ -147,9 +148,4 @@ fn input(model: &InferenceModel, size: Option<[u32; 2]>) -> Result<(Vec<usize>, 
     let height = side(rows, size.map(|s| s[1]), "height")?;
     let shape = if planes { vec![1, 3, height, width] } else { vec![1, height, width, 3] };
     Ok((shape, [width as u32, height as u32], planes))
-}
-
-/// Its errors as this crate's.
-fn plain(error: TractError) -> anyhow::Error {
-    anyhow::anyhow!("{error:#}")
 }
