@@ -70,7 +70,7 @@ pub fn detectors() -> [Detector; 4] {
         share: [IDEAL_SHARE - 2e-6, IDEAL_SHARE],
         noise_px: 0.0,
         noise_share: 0.0,
-        same_overlap: 1.0,
+        merge_overlap: 1.0,
         false_boxes: 0.0,
     };
     let missing = |share: f64| DetectorModel {
