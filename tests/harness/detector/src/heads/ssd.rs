@@ -25,12 +25,15 @@ impl Layout {
             let mut found = outputs.iter().enumerate().filter(|(_, o)| wanted(o)).map(|(k, _)| k);
             found.next().filter(|_| found.next().is_none())
         };
-        let boxes = only(&|(_, s)| s.len() == 3 && s[0] == 1 && s[2] == 4)?;
+        let corners = |s: &[usize]| s.len() == 3 && s[0] == 1 && s[2] == 4;
+        // scores of three classes and the background have that shape too
+        let named = |(name, s): &Shape| corners(s) && name.contains("box");
+        let boxes = only(&|(_, s)| corners(s)).or(only(&named))?;
         let (name, shape) = outputs[boxes];
         let count = shape[1];
         let top_first = name.starts_with("detection_boxes");
-        let each = |s: &[usize]| s.len() == 3 && s[0] == 1 && s[1] == count && s[2] != 4 && s[2] > 1;
-        if let Some(scores) = only(&|(_, s)| each(s)) {
+        let each = |s: &[usize]| s.len() == 3 && s[0] == 1 && s[1] == count && s[2] > 1;
+        if let Some(scores) = only(&|(other, s)| each(s) && *other != name) {
             let classes = outputs[scores].1[2] - 1;
             return Some((Self { boxes, scores, classes: None, top_first }, Some(classes)));
         }
