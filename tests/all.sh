@@ -18,6 +18,8 @@ run() {
 run tests/mcap_ros2.sh --install
 python=${CARGO_TARGET_DIR:-$PWD/target}/mcap_ros2/bin/python
 [ ! -x "$python" ] || export VIEWSHED_PYTHON=$python
+run tests/detector.sh --install
+export VIEWSHED_DETECTOR=${CARGO_TARGET_DIR:-$PWD/target}/detector
 run cargo test --release --locked --workspace --no-fail-fast
 # made by it: another selection of packages would build the harness again, with other features of what both use
 export VIEWSHED=${CARGO_TARGET_DIR:-$PWD/target}/release/viewshed

@@ -1,6 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod bus;
+pub mod detect;
 pub mod detections;
 pub mod doctor;
 pub mod experiment;
@@ -40,6 +41,7 @@ enum Command {
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
+    Detect(detect::Args),
     Detections(Box<detections::Args>),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
@@ -56,6 +58,7 @@ impl Cli {
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
+            Command::Detect(args) => detect::run(args),
             Command::Detections(args) => detections::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context, Result, anyhow, bail};
 use mcap::records::{MessageHeader, Record};
+use viewshed::camera::Camera3dConfig;
 
 use super::camera::{CameraReader, INFO_TOPIC, OBJECTS_TOPIC};
 use super::points::{self, NOT_A_RANGE, NOT_FINITE, Points};
@@ -252,6 +253,19 @@ impl Reader {
 
     fn finish(mut self, name: String, options: &ReadOptions) -> Result<Recording> {
         if self.frames.is_empty() {
+            // boxes of a camera without a radar are a recording of their own
+            let camera = match options.radar_topic {
+                None => std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems),
+                Some(_) => None,
+            };
+            if let Some(camera) = camera {
+                let truth = self.labelled.then(|| Truth::new(self.labels));
+                let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
+                return Ok(Recording {
+                    problems: self.problems,
+                    ..camera.alone(name, Sensor::CAMERA, truth, range_max_m)
+                });
+            }
             let skipped: String = self.problems.iter().map(|p| format!("\n  {p}")).collect();
             let radars = self.radar_topics();
             let found = match (&options.radar_topic, &radars[..]) {

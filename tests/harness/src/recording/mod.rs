@@ -94,6 +94,18 @@ pub struct Sensor {
     pub licence: Option<String>,
 }
 
+impl Sensor {
+    /// What is known of a camera without a radar, beside its view.
+    pub const CAMERA: Self = Self {
+        name: String::new(),
+        field_of_view: FieldOfView { azimuth_rad: [0.0; 2], elevation_rad: [0.0; 2], range_m: [0.0; 2] },
+        has_elevation: true,
+        frames_independent: false,
+        platform_moving: false,
+        licence: None,
+    };
+}
+
 /// A whole recording in memory.
 #[derive(Debug, Clone)]
 pub struct Recording {
