@@ -35,6 +35,8 @@ const OVERLAP: f64 = 0.2;
 const ACCEPTED: f64 = 0.5;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
 const SEEN: (u32, f64) = (15, 1.0);
+/// How often the person looks for something to mend.
+const LOOKS: usize = 3;
 /// How far a drawn line is from the vehicle, metres.
 const DRAWN_M: f64 = 0.8;
 
@@ -138,7 +140,14 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
             whole.class = class.clone();
         }
         if let Some(seen) = vehicles.get(&vehicle) {
-            actions.mended += mend(&mut whole, &instants, vehicle, seen, &site);
+            // what was set changes the boxes beside it, so the person looks again
+            for _ in 0..LOOKS {
+                let points = mend(&mut whole, &instants, vehicle, seen, &site);
+                actions.mended += points;
+                if points == 0 {
+                    break;
+                }
+            }
         }
         labels.push((vehicle, whole));
     }
