@@ -44,7 +44,7 @@ const STRAIGHT_SPREAD: f64 = 0.8;
 const SMOOTH: usize = 6;
 
 /// The middle of a lane, in the direction of travel.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Lane {
     points: Vec<[f64; 2]>,
     /// Of a straight lane the place it is known best at, and how well.

@@ -6,7 +6,7 @@
 //! forwards and backwards, `path` smooths (`motion`). What drives shows the `lanes`; known these, all is followed again,
 //! and nobody is mixed up with the vehicle beside. `joining` makes one path of the pieces of a vehicle, `assembly` tells
 //! one long vehicle from two that creep in one lane, `standing` adds the time in which it stood before and after, `shape`
-//! puts a box around it, and of proposals for one place `exclusion` keeps the best.
+//! puts a box around it, and `exclusion` drops mirror images, and of proposals for one place all but the best.
 //!
 //! # Limits
 //! Made for roads with lanes, where it needs few mends. In queues some long vehicles come in pieces and some pairs of
@@ -73,6 +73,7 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     let paths = assembly::assembled(paths, &instants);
     progress(0.8);
     let paths = joining::through_gaps(paths, &instants);
+    let paths = exclusion::without_images(paths);
     let paths: Vec<Path> = paths.into_par_iter().map(|path| standing::stood(path, &instants)).collect();
     progress(0.9);
     let mut scored: Vec<(f64, &Path)> = paths

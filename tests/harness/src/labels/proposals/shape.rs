@@ -18,7 +18,7 @@ const STEP_S: f64 = 0.25;
 /// Speed from which on something is fast, m/s.
 const FAST_MPS: f64 = 10.0;
 /// Extents that only buses have, metres: a truck that is seen well is longer.
-const BUS_M: std::ops::RangeInclusive<f64> = 12.2..=14.3;
+const BUS_M: std::ops::RangeInclusive<f64> = 12.6..=13.8;
 /// Fewest reflections an end is told by.
 const FEWEST: usize = 5;
 
