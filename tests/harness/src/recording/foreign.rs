@@ -30,7 +30,6 @@ const KNOWN: &[(&[u8], &str, &str)] = &[
     (b"\x1F\x8B", "packed twice", "unpack it with `gunzip`"),
     (b"PK\x03\x04", "a zip archive", "unpack it, and name a file of it"),
     (b"\x28\xB5\x2F\xFD", "packed with zstd", "unpack it with `unzstd`"),
-    (b"{", "JSON", "convert it to one of the formats above"),
 ];
 
 /// What a file is that is known and not read, and what to do; `None` where it is not known either.
@@ -39,6 +38,11 @@ pub fn named(bytes: &[u8]) -> Option<String> {
         return Some(format!("it is {what}; {remedy}"));
     }
     let start = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
+    // a capture of bytes may begin with a brace by chance
+    let text = !start.chars().any(|c| c == char::REPLACEMENT_CHARACTER || (c.is_control() && !c.is_whitespace()));
+    if text && start.trim_start().starts_with(['{', '[']) {
+        return Some("it is JSON; export it as MCAP, or as a log of `candump -L`".into());
+    }
     let first: Vec<&str> = start.lines().find(|line| !line.trim().is_empty())?.split_whitespace().collect();
     let length = |word: &str| word.strip_prefix('[').is_some_and(|word| word.ends_with(']'));
     let (interface, rest) = first.split_first()?;
@@ -70,6 +74,7 @@ mod tests {
         ] {
             assert!(named(bytes).is_some_and(|text| text.contains(what)), "{what}: {:?}", named(bytes));
         }
+        assert_eq!(named(b"{\x02\x01\x04\x03\xFF"), None);
         assert_eq!((named(b"time,x,y\n1,2,3\n"), named(b"")), (None, None));
     }
 }

@@ -324,7 +324,7 @@ fn bad() -> Vec<Bad> {
         ("an empty file", "a.mcap", vec![], "", "not an MCAP file"),
         ("a folder", ".", vec![], "", "cannot read ."),
         ("a text", "a.txt", b"hello\n".to_vec(), "", "not an MCAP file"),
-        ("JSON", "a.json", b"{\"a\": 1}".to_vec(), "", "it is JSON; convert it"),
+        ("JSON", "a.json", b"{\"a\": 1}".to_vec(), "", "it is JSON; export it as MCAP"),
         (
             "a bag of ROS 1",
             "a.bag",

@@ -13,7 +13,7 @@
 //! cars as one. At crossings vehicles that turn or stand change places with their neighbours: there expect to draw.
 //!
 //! # Cost
-//! Some six seconds of two cores for a minute of recording with 256 detections a frame.
+//! Two to four seconds of two cores for a minute of recording with 256 detections a frame.
 
 mod assembly;
 mod exclusion;

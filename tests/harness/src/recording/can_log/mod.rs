@@ -74,10 +74,11 @@ impl Format {
         if savvycan::is_log(&start) {
             return Some(Self::SavvyCan);
         }
-        let mut lines = start.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
-        lines.next().and_then(|first| match first {
-            _ if candump::line(first).is_ok() => Some(Self::Candump),
-            _ if candump::is_screen(first) => Some(Self::Screen),
+        // the first line may have been cut
+        let lines = start.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).take(3);
+        lines.into_iter().find_map(|line| match line {
+            _ if candump::line(line).is_ok() => Some(Self::Candump),
+            _ if candump::is_screen(line) => Some(Self::Screen),
             _ => None,
         })
     }
@@ -178,4 +179,33 @@ fn identifier(digits: &str) -> Result<Result<CanId, u32>, String> {
         _ => None,
     };
     id.map(Ok).ok_or_else(|| format!("`{digits}` is no identifier of 3 or 8 digits"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_format_is_known_by_its_begin_and_by_nothing_else() {
+        for (text, format) in [
+            ("(1.0) can0 60A#01\n", Some(Format::Candump)),
+            ("60A#01C24910\n(1.0) can0 60A#01\n", Some(Format::Candump)),
+            (" (1.0)  can0  60A   [1]  01\n", Some(Format::Screen)),
+            ("date today\nbase hex  timestamps absolute\n", Some(Format::Asc)),
+            ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n", Some(Format::SavvyCan)),
+            ("time_s,class\n1,car\n", None),
+            ("(1.0) ttyS0 00FF\n", None),
+            ("", None),
+        ] {
+            assert_eq!(Format::of(text.as_bytes()), format, "{text}");
+        }
+    }
+
+    #[test]
+    fn times_that_run_backwards_and_lines_that_are_none_are_counted() {
+        let mut problems = Problems::default();
+        let log = b"(2.0) can0 60A#01\n(1.0) can0 60A#02\n(3.0) can1 60A#03\nwhat\n(4.0) can0 60A#0\n";
+        let lines = read(log, Format::Candump, Some("can0"), &mut problems).unwrap();
+        assert_eq!((lines.len(), problems.count("runs backwards"), problems.count("line skipped")), (2, 1, 2));
+    }
 }
