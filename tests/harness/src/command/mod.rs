@@ -1,6 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod bus;
+pub mod completions;
 pub mod detect;
 pub mod detections;
 pub mod doctor;
@@ -43,6 +44,7 @@ enum Command {
     Site(Box<site::Args>),
     Detect(detect::Args),
     Detections(Box<detections::Args>),
+    Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
 }
@@ -60,6 +62,7 @@ impl Cli {
             Command::Site(args) => site::run(args),
             Command::Detect(args) => detect::run(args),
             Command::Detections(args) => detections::run(args),
+            Command::Completions(args) => completions::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),
         };
