@@ -114,7 +114,7 @@ fn intrudes(a: &Solid, b: &Solid) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::Lane;
+    use super::super::lane::Lane;
     use super::super::motion::Motion;
     use super::*;
     use crate::labels::tracks::LabelTrack;

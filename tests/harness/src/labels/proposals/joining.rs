@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::lanes::Lane;
+use super::lane::Lane;
 use super::path::Path;
 use super::reflections::Instant;
 use super::tracker::{LONGEST_M, Tracklet};

@@ -18,6 +18,7 @@
 mod assembly;
 mod exclusion;
 mod joining;
+mod lane;
 mod lanes;
 mod motion;
 mod path;
@@ -33,7 +34,7 @@ use serde::Serialize;
 
 use super::tracks::LabelTrack;
 use crate::recording::Recording;
-use lanes::Lane;
+use lane::Lane;
 use path::Path;
 
 /// Fewest reflections of a proposal.

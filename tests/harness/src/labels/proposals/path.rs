@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::lanes::Lane;
+use super::lane::Lane;
 use super::motion::{Motion, smooth};
 use super::reflections::{Instant, Reflection};
 use super::tracker::{across_m, keep_to, measure};

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::lanes::{Lane, nearest};
+use super::lane::{Lane, nearest};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::recording::Recording;
 

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use super::lanes::{Beside, Lane, nearest};
+use super::lane::{Beside, Lane, nearest};
 use super::motion::Motion;
 use super::reflections::{Instant, Reflection, STANDS_MPS};
 
