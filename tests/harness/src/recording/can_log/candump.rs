@@ -8,7 +8,7 @@ use std::fmt;
 
 use viewshed::wire::frame::{CanFrame, CanId};
 
-use super::{Content, ERROR_FLAG, Line, add_up, at, identifier};
+use super::{Content, ERROR_FLAG, Line, add_up, identifier, seconds};
 
 /// Reads a line of `candump -L`; the error says what is wrong with it.
 pub fn line(line: &str) -> Result<Line, String> {
@@ -74,11 +74,7 @@ pub fn is_screen(line: &str) -> bool {
 pub(in crate::recording) fn nanoseconds(text: &str) -> Result<i64, String> {
     let wrong = || format!("`{text}` is not a time in brackets");
     let inside = text.strip_prefix('(').and_then(|t| t.strip_suffix(')')).ok_or_else(wrong)?;
-    let (seconds, fraction) = inside.split_once('.').unwrap_or((inside, "0"));
-    if fraction.is_empty() || !fraction.bytes().chain(seconds.bytes()).all(|b| b.is_ascii_digit()) {
-        return Err(wrong());
-    }
-    at(seconds, fraction).ok_or_else(wrong)
+    seconds(inside).ok_or_else(wrong)
 }
 
 /// `identifier#data`.

@@ -146,18 +146,16 @@ fn kind_of(why: &str) -> String {
     }
 }
 
-/// Seconds and their fraction, of any number of digits each, in nanoseconds.
-fn at(seconds: &str, fraction: &str) -> Option<i64> {
-    let nine: String = fraction.chars().chain("000000000".chars()).take(9).collect();
-    let (seconds, fraction): (i64, i64) = (seconds.parse().ok()?, nine.parse().ok()?);
-    seconds.checked_mul(1_000_000_000)?.checked_add(fraction)
-}
-
-/// Seconds with or without a fraction.
+/// Seconds with or without a fraction, of any number of digits each, in nanoseconds.
 fn seconds(text: &str) -> Option<i64> {
     let (seconds, fraction) = text.split_once('.').unwrap_or((text, "0"));
     let digits = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
-    if digits(seconds) && digits(fraction) { at(seconds, fraction) } else { None }
+    if !digits(seconds) || !digits(fraction) {
+        return None;
+    }
+    let nine: String = fraction.chars().chain("000000000".chars()).take(9).collect();
+    let (seconds, fraction): (i64, i64) = (seconds.parse().ok()?, nine.parse().ok()?);
+    seconds.checked_mul(1_000_000_000)?.checked_add(fraction)
 }
 
 /// Times that count from the line before, counted from the first.
