@@ -120,6 +120,11 @@ impl Listening {
         let _ = self.ears.frame(self.last, frame);
     }
 
+    /// Lets time pass in which nothing came: maps grow old.
+    pub fn pass(&mut self, time_ns: i64) {
+        self.last = Time::from_micros(u64::try_from(time_ns / 1000).unwrap_or(0));
+    }
+
     /// Takes bytes of a serial line.
     pub fn take_bytes(&mut self, chunk: &Chunk) {
         self.last = Time::from_micros(u64::try_from(chunk.time_ns / 1000).unwrap_or(0));

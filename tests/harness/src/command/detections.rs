@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
     let mut outputs = args.outputs.beside(paths.iter().chain(&args.real).flat_map(|path| recording::files(path)));
     outputs.reads(args.settings.files());
-    let picture = outputs.file("--out", args.out.as_deref())?;
+    let picture = outputs.picture("--out", args.out.as_deref())?;
     let json = outputs.file("--json", args.json.as_deref())?;
     let all = paths.iter().chain(&args.real).map(|path| returns(path, &settings)).collect::<Result<Vec<_>>>()?;
     print(&text(&all, args.real.is_some()))?;
@@ -66,6 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let real = args.real.as_ref().and_then(|_| all.last()).map(|r| &r.recording);
         file.write(serde_json::to_string_pretty(&json!({ "recordings": all, "real": real }))? + "\n")?;
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,33 +1,44 @@
 //! The pictures of one replay: a frame from above, found examples, the polar grid, the trade-offs, a camera's view.
 
 use anyhow::Result;
+use viewshed::sensor::road::RoadPoint;
 
 use crate::command::progress::bar;
 use crate::estimators;
 use crate::estimators::{Estimator, camera_3d};
-use crate::evaluation::Settings;
+use crate::evaluation::{Grid, Settings, bounds};
 use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
 use crate::evaluation::examples::Example;
 use crate::evaluation::replay::{Replay, visit};
 use crate::evaluation::score::Score;
 use crate::evaluation::summary::Row;
+use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
+use crate::recording::FieldOfView;
+use crate::recording::truth::Object;
 use crate::results::files::Folder;
 use crate::results::pictures::birdseye;
 use crate::results::pictures::camera_view::{self, View};
 use crate::results::pictures::polar::{self, PolarGrid};
 use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
-use crate::results::pictures::tradeoff::{self, Curve, Marker, MarkerKind, Span, TradeOff};
+use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKind, Span, TradeOff};
 use crate::results::pictures::{canvas::Canvas, palette};
 
 /// Estimators that are drawn from above at the chosen frame, beside the one examples are of.
 const ALSO_DRAWN: [&str; 3] = ["radar-2d", "reference", "camera-reference"];
 
 /// Draws everything into a folder.
-pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example], settings: &Settings) -> Result<()> {
+pub fn write(
+    folder: &Folder,
+    replay: &Replay,
+    shown: &str,
+    examples: &[Example],
+    asked: Option<usize>,
+    settings: &Settings,
+) -> Result<()> {
     let drawing = bar("drawing pictures", 1);
-    let chosen = chosen_frame(replay, examples);
+    let chosen = asked.unwrap_or_else(|| chosen_frame(replay, examples));
     let mut all = estimators::all(&replay.recording, &settings.estimators)?;
     for estimator in &mut all {
         let name = estimator.name().to_owned();
@@ -49,8 +60,8 @@ pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example]
             save(canvas, folder, &format!("birdseye-{name}"))?;
         }
     }
-    save(trade_off(replay, "objects", |row| (&row.curve, rates(row))), folder, "tradeoff-objects")?;
-    save(trade_off(replay, "road cells", |row| (&row.cell_curve, cell_rates(row))), folder, "tradeoff-cells")?;
+    save(trade_off(replay, Counted::Objects, |row| (&row.curve, rates(row))), folder, "tradeoff-objects")?;
+    save(trade_off(replay, Counted::Cells, |row| (&row.cell_curve, cell_rates(row))), folder, "tradeoff-cells")?;
     drawing.step();
     Ok(())
 }
@@ -117,16 +128,25 @@ fn from_above(
         .iter()
         .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
         .collect();
+    let by_cells = settings.evaluation.grid == Grid::Cartesian;
+    let seldom_visible = |o: &Object| {
+        let seen = cells_in_sight(replay, estimator, frame, o.track);
+        seen.is_some_and(|(visible, all)| visible > 0 && 2 * visible <= all)
+    };
+    let any_cell = objects.iter().any(seldom_visible);
     let highlight = example.and_then(|e| {
         let sample = replay.samples.get(frame)?.objects.get(e.object)?;
         let solid = objects.iter().find(|o| o.track == sample.track)?.solid;
+        let cells = cells_in_sight(replay, estimator, frame, sample.track).filter(|_| by_cells);
+        let by = cells.map(|(visible, all)| format!("; {visible} of the {all} cells under it are visible"));
         let note = format!(
-            "{}: {} {} at {:.0} m, lasting {} frames",
+            "{}: {} {} at {:.0} m, lasting {} frames{}",
             e.outcome.name(),
             e.class,
             e.object_id,
             e.distance_m,
-            e.lasts
+            e.lasts,
+            by.unwrap_or_default()
         );
         Some(Highlight::on(solid, &recording.pose, note))
     });
@@ -140,13 +160,24 @@ fn from_above(
         boxes,
         road: &[],
         title: title(replay, estimator.name(), frame),
-        caption: caption(replay),
+        caption: caption(replay).map(|said| if by_cells && any_cell { format!("{said} · {ANY_CELL}") } else { said }),
         highlight,
     };
     birdseye::draw(&scene)
 }
 
-/// Everything labelled inside the field of view, and the sensor; without labels the detections.
+/// Said where a box called visible stands on cells of which most are not.
+const ANY_CELL: &str = "An object is called visible where any of the 1 m cells under it is: a box on orange can be FV or TV.";
+
+/// Visible cells under an object, and all of them.
+fn cells_in_sight(replay: &Replay, estimator: &dyn Estimator, frame: usize, track: usize) -> Option<(usize, usize)> {
+    let sample = replay.samples.get(frame)?.objects.iter().find(|s| s.track == track)?;
+    let visible = |&&(i, j): &&(i32, i32)| estimator.map().at(RoadPoint::cell_centre(i, j)).visible();
+    Some((sample.cells.iter().filter(visible).count(), sample.cells.len()))
+}
+
+/// Everything labelled inside the field of view, and the sensor; without labels the detections, or the whole field of
+/// view where they show little of it.
 fn window(replay: &Replay) -> Window {
     let recording = &replay.recording;
     let inside = |p: [f64; 3]| recording.sensor.field_of_view.contains(recording.pose.to_spherical(p));
@@ -163,7 +194,25 @@ fn window(replay: &Replay) -> Window {
             .collect();
     }
     points.push(sensor);
+    let view = &recording.sensor.field_of_view;
+    let reach = points.iter().map(|p| (p[0] - sensor[0]).hypot(p[1] - sensor[1])).fold(0.0, f64::max);
+    if points.len() < LITTLE || reach < 0.5 * view.range_m[1] {
+        points.extend(corners(&recording.pose, view));
+    }
     Window::around(points, 6.0)
+}
+
+/// Fewer places than this, of a whole recording, do not show where the road is.
+const LITTLE: usize = 100;
+
+/// Ends of the field of view on the road: to the right, ahead and to the left.
+fn corners(pose: &SensorPose, view: &FieldOfView) -> impl Iterator<Item = [f64; 2]> {
+    let [right, left] = view.azimuth_rad;
+    let far = view.range_m[1];
+    (0..=8).map(move |k| right + (left - right) * f64::from(k) / 8.0).map(move |azimuth| {
+        let heading = pose.yaw_rad() + azimuth;
+        [pose.position[0] + far * heading.cos(), pose.position[1] + far * heading.sin()]
+    })
 }
 
 /// How an estimator's verdict on a track compares with its detection; `None` where it is not counted.
@@ -226,10 +275,15 @@ fn cell_rates(row: &Row) -> Rates {
 }
 
 /// The chart, unless there is nothing to draw.
-fn trade_off(replay: &Replay, what: &str, of: impl Fn(&Row) -> (&Vec<CurvePoint>, Rates)) -> Option<Canvas> {
+fn trade_off(replay: &Replay, counted: Counted, of: impl Fn(&Row) -> (&Vec<CurvePoint>, Rates)) -> Option<Canvas> {
+    let what = match counted {
+        Counted::Objects => "objects",
+        Counted::Cells => "road cells",
+    };
     let mut chart = TradeOff {
         curves: Vec::new(),
         markers: Vec::new(),
+        counted,
         span: Span::Full,
         title: format!(
             "{} · {what} · false visible against false invisible, by the threshold on the grade",
@@ -249,7 +303,11 @@ fn trade_off(replay: &Replay, what: &str, of: impl Fn(&Row) -> (&Vec<CurvePoint>
             chart.curves.push(Curve { name: row.name.clone(), points: points.collect() });
         }
         let (Some(fvr), Some(fir)) = (fvr, fir) else { continue };
-        let kind = if points.is_empty() { MarkerKind::Bound } else { MarkerKind::OperatingPoint };
+        let kind = match row.name.as_str() {
+            bounds::SLICE => MarkerKind::Slice,
+            bounds::BOX => MarkerKind::Box,
+            _ => MarkerKind::OperatingPoint,
+        };
         chart.markers.push(Marker { name: row.name.clone(), kind, fvr, fir, fvr_interval, fir_interval });
     }
     (!chart.markers.is_empty()).then(|| tradeoff::draw(&chart))

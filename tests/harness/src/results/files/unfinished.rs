@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 
 use anyhow::{Context, Result};
 
@@ -23,18 +23,20 @@ pub struct Unfinished {
     /// Name until it is whole; `None` for pipes and devices, which are written to as they are.
     part: Option<PathBuf>,
     file: BufWriter<File>,
+    /// Told once it is whole.
+    whole: Box<dyn Fn() + Send>,
 }
 
 impl Unfinished {
     /// Opens the file.
-    pub(super) fn create(target: &Path) -> Result<Self> {
+    pub(super) fn create(target: &Path, whole: impl Fn() + Send + 'static) -> Result<Self> {
         let opened = if super::is_stream(target) {
             OpenOptions::new().write(true).open(target).map(|file| (target.to_owned(), None, file))
         } else {
             open_part(target).map(|(target, part, file)| (target, Some(part), file))
         };
         let (target, part, file) = opened.with_context(|| format!("cannot write {}", target.display()))?;
-        Ok(Self { target, part, file: BufWriter::new(file) })
+        Ok(Self { target, part, file: BufWriter::new(file), whole: Box::new(whole) })
     }
 
     /// Gives the file its name.
@@ -52,6 +54,7 @@ impl Unfinished {
         fs::rename(part, &self.target)?;
         parts.remove(part);
         self.part = None;
+        (self.whole)();
         Ok(())
     }
 }
@@ -83,6 +86,15 @@ impl Seek for Unfinished {
     }
 }
 
+/// Makes a file in a folder and removes it.
+pub(super) fn try_in(folder: &Path) -> io::Result<()> {
+    let (_, part, file) = open_part(&folder.join("try"))?;
+    drop(file);
+    let mut parts = parts();
+    parts.remove(&part);
+    fs::remove_file(part)
+}
+
 /// The target with links resolved, the name it has until it is whole, and the open file.
 fn open_part(target: &Path) -> io::Result<(PathBuf, PathBuf, File)> {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -100,6 +112,23 @@ fn open_part(target: &Path) -> io::Result<(PathBuf, PathBuf, File)> {
     Ok((target, part, file))
 }
 
+/// Whether Ctrl-C is waited for by the command itself.
+static WAITED_FOR: AtomicBool = AtomicBool::new(false);
+
+/// From now on Ctrl-C does not end the program but sets what is returned, once: for commands that go on until then.
+///
+/// # Errors
+/// The system's.
+#[cfg(unix)]
+pub fn until_ctrl_c() -> io::Result<Arc<AtomicBool>> {
+    use signal_hook::consts::SIGINT;
+
+    let stop = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(SIGINT, stop.clone())?;
+    WAITED_FOR.store(true, Ordering::SeqCst);
+    Ok(stop)
+}
+
 /// Removes what is not whole when the program is ended by Ctrl-C or SIGTERM, and lets it end by that.
 #[cfg(unix)]
 fn remove_at_signals() {
@@ -113,6 +142,9 @@ fn remove_at_signals() {
         let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
         std::thread::spawn(move || {
             for signal in signals.forever() {
+                if signal == SIGINT && WAITED_FOR.load(Ordering::SeqCst) {
+                    continue;
+                }
                 // kept to the end: no file becomes whole or begins any more
                 let parts = parts();
                 parts.iter().for_each(|part| drop(fs::remove_file(part)));

@@ -10,10 +10,10 @@ use crate::studies::site::sets::{Rank, Ranked};
 use crate::studies::site::{Search, Site};
 use crate::twin::scene::Mount;
 
-/// `h 6, y -14, yaw 10, pitch 4`, with the place along the road where it is not 0.
+/// `y -14 m, h 6 m, yaw 10°, pitch 4°`, with the place along the road where it is not 0.
 pub fn name(mount: &Mount) -> String {
-    let along = if mount.x_m == 0.0 { String::new() } else { format!("x {}, ", mount.x_m) };
-    format!("{along}y {}, h {}, yaw {}, pitch {}", mount.y_m, mount.height_m, mount.yaw_deg, mount.pitch_deg)
+    let along = if mount.x_m == 0.0 { String::new() } else { format!("x {} m, ", mount.x_m) };
+    format!("{along}y {} m, h {} m, yaw {}°, pitch {}°", mount.y_m, mount.height_m, mount.yaw_deg, mount.pitch_deg)
 }
 
 /// The tables: single mounts, then sets of each size, the first `top` of each.
@@ -41,14 +41,14 @@ pub fn text(site: &Site, ranked: &[Vec<Ranked>], top: usize) -> String {
 fn singles(site: &Site, sets: &[Ranked], top: usize) -> String {
     let heading = [
         "",
-        "height m",
-        "along m",
-        "across m",
-        "yaw °",
-        "pitch °",
+        "height\nm",
+        "along\nm",
+        "across\nm",
+        "yaw\n°",
+        "pitch\n°",
         "vehicles\ndetected %",
         "road in\nsight %",
-        "coverage rate\nin own view %",
+        "coverage in\nown view %",
     ];
     let rows = sets.iter().take(top).enumerate().map(|(k, set)| {
         let candidate = &site.candidates[set.members[0]];
