@@ -4,7 +4,7 @@
 use viewshed::query::{self, Answer, Footprint};
 use viewshed::small::{Map, Parameters, State};
 use viewshed::{Ars408, Ars408Config, CanFrame, ConfigError, Feed, Radar3dConfig, Radar3dParameters, RoadPoint};
-use viewshed::{Estimator, Sensor, Time};
+use viewshed::{Sensor, Time};
 
 /// One radar's unit: 65 kB of state, on a controller in a `static`.
 pub struct Guard {

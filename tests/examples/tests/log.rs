@@ -9,7 +9,8 @@ const LOG: &str = include_str!("../../recordings/ars408-made-up.log");
 fn frame(line: &str) -> Option<(Time, CanFrame)> {
     let (time, rest) = line.strip_prefix('(')?.split_once(") can0 ")?;
     let (id, data) = rest.split_once('#')?;
-    let bytes = (0..data.len() / 2).map(|k| u8::from_str_radix(&data[2 * k..2 * k + 2], 16)).collect::<Result<Vec<_>, _>>();
+    let bytes =
+        (0..data.len() / 2).map(|k| u8::from_str_radix(&data[2 * k..2 * k + 2], 16)).collect::<Result<Vec<_>, _>>();
     let id = CanId::standard(u16::from_str_radix(id, 16).ok()?)?;
     let micros = time.replace('.', "").parse().ok()?;
     Some((Time::from_micros(micros), CanFrame::classic(id, &bytes.ok()?)?))

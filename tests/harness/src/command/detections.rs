@@ -80,8 +80,8 @@ fn returns(path: &Path, settings: &Settings) -> Result<Returns> {
 }
 
 fn text(all: &[Returns], compared: bool) -> String {
-    let mut text = String::from("Median number of detections of an object in sight, by its distance:\n");
-    let headings: Vec<String> = STRETCHES.iter().map(|[from, to]| format!("{from}–{to} m")).collect();
+    let mut text = String::from("Median number of detections of an object in sight, by its distance in metres:\n");
+    let headings: Vec<String> = STRETCHES.iter().map(|[from, to]| format!("{from}–{to}")).collect();
     let heading: Vec<&str> = ["recording", "objects"].into_iter().chain(headings.iter().map(String::as_str)).collect();
     let number = |v: Option<f64>| v.map_or_else(|| "–".into(), |v| format!("{v:.1}"));
     let rows = all.iter().flat_map(|r| {

@@ -11,13 +11,13 @@ use super::print;
 use crate::command::options::{KindArgs, seconds as period};
 #[cfg(target_os = "linux")]
 use crate::command::progress::bar;
+use crate::doctor::findings::Severity;
 #[cfg(target_os = "linux")]
 use crate::doctor::heard;
 use crate::doctor::{Examined, examine};
-use crate::doctor::findings::Severity;
-use crate::recording::{self, ReadOptions};
 #[cfg(target_os = "linux")]
 use crate::recording::can_log::live;
+use crate::recording::{self, ReadOptions};
 #[cfg(target_os = "linux")]
 use crate::results::files::until_ctrl_c;
 use crate::results::files::{OutputArgs, Target};

@@ -316,7 +316,11 @@ fn ti_dialect(text: &str) -> Result<TiDialect, String> {
 /// How long something is to last.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let seconds = finite(text)?;
-    if (0.1..=86_400.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.1 to 86400")) }
+    if (0.1..=86_400.0).contains(&seconds) {
+        Ok(seconds)
+    } else {
+        Err(format!("{seconds} s is not within 0.1 to 86400"))
+    }
 }
 
 fn period(text: &str) -> Result<f64, String> {
@@ -340,7 +344,9 @@ fn field_of_view(text: &str) -> Result<FieldOfView, String> {
         }
     }
     if r1 > MOST_RANGE_M {
-        return Err(format!("range to {r1} m: grids go to {MOST_RANGE_M} m; give that, and what is farther is left out"));
+        return Err(format!(
+            "range to {r1} m: grids go to {MOST_RANGE_M} m; give that, and what is farther is left out"
+        ));
     }
     Ok(FieldOfView {
         azimuth_rad: [az0.to_radians(), az1.to_radians()],

@@ -9,8 +9,8 @@ use viewshed::inputs::ars408::motion::{self, standing};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
 
-use super::{LIVE, Report};
 use super::sensor::{Output, Sensor};
+use super::{LIVE, Report};
 use crate::bus::listening::Listening;
 use crate::recording::can_log::{Content, Line};
 
@@ -79,7 +79,11 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
         found.add(
             Severity::Warning,
             format!("the log lasts {:.1} s, which is too short to say what is missing", report.duration_s),
-            if report.kind == LIVE { "listen for ten seconds or more (--for 10)" } else { "record ten seconds or more" },
+            if report.kind == LIVE {
+                "listen for ten seconds or more (--for 10)"
+            } else {
+                "record ten seconds or more"
+            },
         );
     }
     let problems: u64 = report.problems.iter().filter(|p| p.what.starts_with("line skipped")).map(|p| p.count).sum();

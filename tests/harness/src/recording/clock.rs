@@ -3,8 +3,8 @@
 //! Every frame is judged at the time it bears. Estimators start over where that leaps (more than their reset gap) or runs
 //! backwards, so that no map outlives the recording's own time. What is counted here is told with the results.
 
-use super::problems::Problems;
 use super::Frame;
+use super::problems::Problems;
 
 /// A pause that is no loss of a few frames, seconds.
 const GAP_S: f64 = 10.0;
@@ -19,7 +19,7 @@ pub fn check(frames: &[Frame], problems: &mut Problems) {
     for (k, pair) in frames.windows(2).enumerate() {
         match passed(pair) {
             s if s < 0.0 => back.push((k + 1, -s)),
-            s if s == 0.0 => equal.push(k + 1),
+            0.0 => equal.push(k + 1),
             s if s >= GAP_S => gaps.push((k + 1, s)),
             _ => {}
         }

@@ -84,7 +84,9 @@ pub fn radar_topics(bytes: &[u8]) -> Vec<String> {
             continue;
         }
         let is_radar = match channel.schema.as_ref().map(|schema| schema.name.as_str()) {
-            Some(POINT_CLOUD) => ros::decode::<PointCloud2>(&message.data).is_ok_and(|c| points::from_cloud(&c).is_ok()),
+            Some(POINT_CLOUD) => {
+                ros::decode::<PointCloud2>(&message.data).is_ok_and(|c| points::from_cloud(&c).is_ok())
+            }
             Some(RADAR_SCAN) => ros::decode::<RadarScan>(&message.data).is_ok(),
             _ => false,
         };

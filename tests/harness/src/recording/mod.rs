@@ -195,7 +195,11 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
     }
     let name = file::stem(path);
     if options.mount.is_some() {
-        bail!("{name}: {} radars: {}; --mount is of one: choose it with --radar-topic", topics.len(), topics.join(", "));
+        bail!(
+            "{name}: {} radars: {}; --mount is of one: choose it with --radar-topic",
+            topics.len(),
+            topics.join(", ")
+        );
     }
     let (mut found, mut said, mut all) = (Vec::new(), String::new(), true);
     for topic in &topics {
@@ -214,7 +218,10 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
         }
     }
     if !all {
-        bail!("{name}: {} radars, and not each has mount and field of view; choose one with --radar-topic:{said}", topics.len());
+        bail!(
+            "{name}: {} radars, and not each has mount and field of view; choose one with --radar-topic:{said}",
+            topics.len()
+        );
     }
     Ok(found)
 }

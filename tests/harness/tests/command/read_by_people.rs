@@ -33,7 +33,10 @@ fn tables_fit_a_terminal_and_are_wide_on_demand() {
     let wide = good(&viewshed(&folder, &format!("replay {motorway} --wide")));
     assert!(widest(&wide) > 100 && wide.contains("slice, points") && !narrow.contains("slice, points"));
     for arguments in [
-        format!("bus {} --to 4 --key 000102030405060708090a0b0c0d0e0f --log b.log --bus fd-500k-2M", all("motorway.mcap")),
+        format!(
+            "bus {} --to 4 --key 000102030405060708090a0b0c0d0e0f --log b.log --bus fd-500k-2M",
+            all("motorway.mcap")
+        ),
         format!("doctor {}", all("ars408-made-up.log")),
         format!("detections {}", all("motorway.mcap")),
         format!("site {} --every 10", all("motorway.toml")),
@@ -53,7 +56,10 @@ fn synthetic_is_said_of_synthetic_recordings_only() {
     scene.sensor.synthetic = false;
     scene.save(&folder, "measured");
     for (name, said) in [("simulated", true), ("measured", false)] {
-        let output = replay(&folder, &[&format!("{name}.mcap"), "--bootstrap", "0", "--out", name, "--json", "r.json", "--force"]);
+        let output = replay(
+            &folder,
+            &[&format!("{name}.mcap"), "--bootstrap", "0", "--out", name, "--json", "r.json", "--force"],
+        );
         let table = std::fs::read_to_string(folder.join(name).join("table.txt")).unwrap();
         let report = json(&folder.join("r.json"));
         let places = [good(&output), table, report["origin"].to_string()];
@@ -110,7 +116,8 @@ fn the_columns_of_labels_are_in_the_help_in_the_page_and_in_an_example() {
     // the page shows rows as they can be
     let shown = YOUR_DATA.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
     assert_eq!(shown.lines().next(), example("labels").lines().nth(1));
-    let (labels, by_class) = read_labels(Path::new(&format!("{RECORDINGS}/example.labels.csv")), 0, 2_000_000_000).unwrap();
+    let (labels, by_class) =
+        read_labels(Path::new(&format!("{RECORDINGS}/example.labels.csv")), 0, 2_000_000_000).unwrap();
     assert_eq!((labels.len(), by_class), (5, 2));
     assert_eq!(labels[2].solid.size, [16.5, 2.55, 4.0]);
     let grades = read_occlusion(Path::new(&format!("{RECORDINGS}/example.occlusion.csv"))).unwrap();
@@ -124,7 +131,8 @@ fn traffic_that_ends_early_is_told() {
         let (time, x) = (0.5 * f64::from(k), 60 + 10 * k);
         format!("<timestep time=\"{time}\"><vehicle id=\"a\" x=\"{x}\" y=\"0\" angle=\"90\" type=\"car\"/></timestep>")
     };
-    std::fs::write(folder.join("t.xml"), format!("<fcd-export>{}</fcd-export>", (0..8).map(step).collect::<String>())).unwrap();
+    std::fs::write(folder.join("t.xml"), format!("<fcd-export>{}</fcd-export>", (0..8).map(step).collect::<String>()))
+        .unwrap();
     let scene = "name = \"s\"\nduration_s = 60.0\n[traffic]\nfcd = \"t.xml\"\n[radar]\nname = \"r\"\nrate_hz = 15.0\n\
                  mount = { height_m = 6.0 }\nfield_of_view = { azimuth_deg = [-60.0, 60.0], \
                  elevation_deg = [-16.0, 16.0], range_m = [3.0, 200.0] }\n";

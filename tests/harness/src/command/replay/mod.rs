@@ -17,12 +17,12 @@ use crate::evaluation::Settings;
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, camera_steps, steps};
+use crate::recording::{Frame, ReadOptions, Recording};
 use crate::results::files::{OutputArgs, Target};
 use crate::results::foxglove;
 use crate::results::report::csv::SampleWriter;
 use crate::results::report::json::{self, Report};
 use crate::results::report::{ORIGIN, table};
-use crate::recording::{Frame, ReadOptions, Recording};
 use crate::{estimators, recording};
 
 /// The estimator examples are looked for in.

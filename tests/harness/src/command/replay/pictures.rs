@@ -6,13 +6,13 @@ use viewshed::sensor::road::RoadPoint;
 use crate::command::progress::bar;
 use crate::estimators;
 use crate::estimators::{Estimator, camera_3d};
-use crate::evaluation::{Grid, Settings, bounds};
 use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
 use crate::evaluation::examples::Example;
 use crate::evaluation::replay::{Replay, visit};
 use crate::evaluation::score::Score;
 use crate::evaluation::summary::Row;
+use crate::evaluation::{Grid, Settings, bounds};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::FieldOfView;
@@ -167,7 +167,8 @@ fn from_above(
 }
 
 /// Said where a box called visible stands on cells of which most are not.
-const ANY_CELL: &str = "An object is called visible where any of the 1 m cells under it is: a box on orange can be FV or TV.";
+const ANY_CELL: &str =
+    "An object is called visible where any of the 1 m cells under it is: a box on orange can be FV or TV.";
 
 /// Visible cells under an object, and all of them.
 fn cells_in_sight(replay: &Replay, estimator: &dyn Estimator, frame: usize, track: usize) -> Option<(usize, usize)> {
@@ -311,4 +312,72 @@ fn trade_off(replay: &Replay, counted: Counted, of: impl Fn(&Row) -> (&Vec<Curve
         chart.markers.push(Marker { name: row.name.clone(), kind, fvr, fir, fvr_interval, fir_interval });
     }
     (!chart.markers.is_empty()).then(|| tradeoff::draw(&chart))
+}
+
+#[cfg(test)]
+mod tests {
+    use viewshed::map::{CellState, Visibility, VisibilityMap};
+
+    use super::*;
+    use crate::evaluation::Options;
+    use crate::evaluation::samples::by_hand;
+    use crate::recording::{Frame, RadarDetection};
+
+    /// Visible to the right of the road's axis.
+    struct Half;
+
+    impl VisibilityMap for Half {
+        fn at(&self, point: RoadPoint) -> CellState {
+            let visibility = if point.y_cm < 0 { Visibility::Visible } else { Visibility::Invisible };
+            CellState { visibility, grade: 255, occupancy: 0, occupied: false }
+        }
+    }
+
+    impl Estimator for Half {
+        fn name(&self) -> &str {
+            "half"
+        }
+        fn reset(&mut self) {}
+        fn step(&mut self, _: &Frame) {}
+        fn map(&self) -> &dyn VisibilityMap {
+            self
+        }
+    }
+
+    fn replay(recording: crate::recording::Recording) -> Replay {
+        Replay::new(recording, &mut [], &Options { warm_up_s: 0.0, bootstrap: 0, ..Options::default() }, &|| ())
+    }
+
+    #[test]
+    fn where_little_was_detected_the_whole_field_of_view_is_shown() {
+        let detection = |range_m: f32| RadarDetection {
+            range_m,
+            azimuth_rad: 0.0,
+            elevation_rad: None,
+            radial_velocity_mps: 0.0,
+            rcs_dbsm: None,
+            snr_db: None,
+        };
+        let seen = |detections: Vec<RadarDetection>| {
+            let mut recording = by_hand::recording(1, 0);
+            (recording.truth, recording.frames[0].detections) = (None, detections);
+            window(&replay(recording))
+        };
+        // 1 rad to each side of 200 m
+        for little in [vec![], vec![detection(30.0); 3], vec![detection(30.0); 500]] {
+            let all = seen(little);
+            assert!(all.x_m[1] >= 200.0 && all.y_m[0] <= -168.0 && all.y_m[1] >= 168.0, "{all:?}");
+        }
+        let road = seen((0..500).map(|k| detection(20.0 + 0.3 * k as f32)).collect());
+        assert!(road.x_m[1] < 190.0 && road.y_m[1] <= 10.0, "{road:?}");
+    }
+
+    #[test]
+    fn the_cells_that_make_an_object_visible_are_counted() {
+        // 4.6 x 1.8 m: five or six cells long, y from -0.9 to 0.9
+        let replay = replay(by_hand::recording(2, 1));
+        let (visible, all) = cells_in_sight(&replay, &Half, 0, 0).unwrap();
+        assert!(2 * visible == all && all >= 10, "{visible} of {all}");
+        assert_eq!(cells_in_sight(&replay, &Half, 0, 7), None, "nobody of that name");
+    }
 }

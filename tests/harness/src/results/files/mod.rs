@@ -34,9 +34,12 @@ impl OutputArgs {
     }
 }
 
-/// What was written, in the order it was finished: a file by its path, a folder with the number of its files.
+/// A file by its path, or a folder with the number of its files.
+type Place = (PathBuf, Option<usize>);
+
+/// What was written, in the order it was finished.
 #[derive(Debug, Clone, Default)]
-struct Written(Arc<Mutex<Vec<(PathBuf, Option<usize>)>>>);
+struct Written(Arc<Mutex<Vec<Place>>>);
 
 impl Written {
     fn add(&self, path: &Path, in_folder: bool) {
@@ -99,10 +102,11 @@ impl Outputs {
     /// The picture an option names, if it does.
     ///
     /// # Errors
-    /// Those of [`Outputs::file`], and a name that does not end in `.png`: nothing else is drawn.
+    /// Those of [`Outputs::file`], and a name that ends in that of another kind: nothing but PNG is drawn.
     pub fn picture(&mut self, option: &str, path: Option<&Path>) -> Result<Option<Target>> {
         if let Some(path) = path.filter(|path| !is_stream(path)) {
-            let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+            not_read(option, path, &self.inputs)?;
+            let is_png = path.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("png"));
             let png = path.with_extension("png");
             ensure!(is_png, "{option} {}: pictures are PNG; name it {}", path.display(), png.display());
         }
@@ -125,7 +129,7 @@ impl Outputs {
     /// A line for each file and folder that was written.
     pub fn told(&self) -> String {
         let all = self.written.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let line = |(path, files): &(PathBuf, Option<usize>)| match files {
+        let line = |(path, files): &Place| match files {
             None => format!("wrote {}\n", path.display()),
             Some(1) => format!("wrote 1 file into {}\n", path.display()),
             Some(files) => format!("wrote {files} files into {}\n", path.display()),
@@ -348,8 +352,7 @@ mod tests {
         let picture = |name: &str| outputs(&[], false).picture("--out", Some(Path::new(name)));
         let error = picture("map.jpg").unwrap_err().to_string();
         assert_eq!(error, "--out map.jpg: pictures are PNG; name it map.png");
-        assert!(picture("map").is_err());
-        for name in ["absent.png", "absent.PNG", "/dev/null"] {
+        for name in ["absent", "absent.png", "absent.PNG", "/dev/null"] {
             assert!(picture(name).unwrap().is_some(), "{name}");
         }
     }

@@ -17,7 +17,7 @@ fn parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 }
 
 /// A file that becomes its target when [`Unfinished::finish`] is called, and nothing when it is dropped before,
-/// on Ctrl-C or on SIGTERM.
+/// on Ctrl-C, on SIGTERM or when its terminal closes.
 pub struct Unfinished {
     target: PathBuf,
     /// Name until it is whole; `None` for pipes and devices, which are written to as they are.
@@ -129,17 +129,19 @@ pub fn until_ctrl_c() -> io::Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// Removes what is not whole when the program is ended by Ctrl-C or SIGTERM, and lets it end by that.
+/// Removes what is not whole when the program is ended by Ctrl-C, SIGTERM or a terminal that closes, and lets it end by
+/// that.
 #[cfg(unix)]
 fn remove_at_signals() {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         // without the handler a part may be left, which has another name than the target
-        let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
+        let hangup = if outlasts_its_terminal() { None } else { Some(SIGHUP) };
+        let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(hangup)) else { return };
         std::thread::spawn(move || {
             for signal in signals.forever() {
                 if signal == SIGINT && WAITED_FOR.load(Ordering::SeqCst) {
@@ -152,6 +154,14 @@ fn remove_at_signals() {
             }
         });
     });
+}
+
+/// Whether hang-ups are ignored, as `nohup` has it; that is kept. Where it cannot be known, too.
+#[cfg(unix)]
+fn outlasts_its_terminal() -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_none_or(|mask| mask & 1 != 0)
 }
 
 #[cfg(not(unix))]

@@ -122,9 +122,12 @@ fn in_words(reason: &str) -> Option<&str> {
     })
 }
 
+/// How often each reason came.
+type Counters<'a> = &'a [(String, u64)];
+
 /// What estimators left out, by reason and with the total; estimators that say the same share a line.
 fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
-    let mut said: Vec<(&[(String, u64)], Vec<&str>)> = Vec::new();
+    let mut said: Vec<(Counters, Vec<&str>)> = Vec::new();
     for row in rows.iter().filter(|row| row.counters.iter().any(|(_, n)| *n > 0)) {
         match said.iter_mut().find(|(before, _)| *before == row.counters) {
             Some((_, names)) => names.push(&row.name),
@@ -135,7 +138,7 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
         Some(camera) => (camera.frames.iter().map(|f| f.boxes.len() as u64 + f.refused).sum(), "boxes"),
         None => (recording.frames.iter().map(|f| f.detections.len() as u64 + f.refused).sum::<u64>(), "detections"),
     };
-    let line = |(counters, names): &(&[(String, u64)], Vec<&str>)| {
+    let line = |(counters, names): &(Counters, Vec<&str>)| {
         let named = |(reason, n): &(String, u64)| Some((in_words(reason)?.to_owned(), *n));
         let mut reasons: Vec<(String, u64)> = counters.iter().filter(|(_, n)| *n > 0).filter_map(named).collect();
         reasons.sort_by_key(|(_, n)| std::cmp::Reverse(*n));

@@ -65,12 +65,14 @@ pub(super) fn signed(points: Option<f64>, interval: Option<Interval>) -> String 
 /// A table whose first column is text and whose others are figures.
 pub fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(heading.to_vec());
+    let cell = |(column, text): (usize, String)| {
+        let side = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
+        Cell::new(text).set_alignment(side)
+    };
+    let heading = heading.iter().map(|name| (*name).to_owned()).enumerate().map(cell);
+    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(heading.collect::<Vec<_>>());
     for row in rows {
-        table.add_row(row.into_iter().enumerate().map(|(column, text)| {
-            let side = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
-            Cell::new(text).set_alignment(side)
-        }));
+        table.add_row(row.into_iter().enumerate().map(cell));
     }
     // figures stand away from what is left of them
     table.column_iter_mut().skip(1).for_each(|column| {
@@ -160,12 +162,7 @@ fn by_occlusion(summary: &Summary, extent: Extent) -> String {
     grouped(summary, "occlusion", of_grade, extent)
 }
 
-fn grouped(
-    summary: &Summary,
-    by: &str,
-    groups: impl Fn(&Row) -> Vec<(String, Counts)>,
-    extent: Extent,
-) -> String {
+fn grouped(summary: &Summary, by: &str, groups: impl Fn(&Row) -> Vec<(String, Counts)>, extent: Extent) -> String {
     let names: Vec<&str> = summary.rows.iter().map(|r| r.name.as_str()).collect();
     let heading = [&[by, "samples", "coverage %"], &names[..]].concat();
     let columns: Vec<Vec<(String, Counts)>> = summary.rows.iter().map(groups).collect();
