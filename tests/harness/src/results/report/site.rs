@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::ORIGIN;
 use super::percent;
-use super::table::table;
+use super::table::{Extent, tables};
 use crate::studies::site::sets::{Rank, Ranked};
 use crate::studies::site::{Search, Site};
 use crate::twin::scene::Mount;
@@ -57,17 +57,17 @@ fn singles(site: &Site, sets: &[Ranked], top: usize) -> String {
         let shares = [Some(set.detected[0]), Some(set.road[0]), candidate.coverage_rate()].map(percent);
         std::iter::once((k + 1).to_string()).chain(figures).chain(shares).collect()
     });
-    table(&heading, rows).to_string()
+    tables(&heading, &rows.collect::<Vec<_>>(), 6, Extent::Terminal)
 }
 
 fn several(site: &Site, sets: &[Ranked], top: usize) -> String {
-    let heading = ["", "mounts", "vehicles %\nby one", "vehicles %\nby two", "road %\nby one", "road %\nby two"];
+    let heading = ["", "mounts", "vehicles\nby one %", "vehicles\nby two %", "road\nby one %", "road\nby two %"];
     let rows = sets.iter().take(top).enumerate().map(|(k, set)| {
         let names: Vec<String> = set.members.iter().map(|&m| name(&site.candidates[m].mount)).collect();
         let shares = [set.detected[0], set.detected[1], set.road[0], set.road[1]].map(|v| percent(Some(v)));
         [(k + 1).to_string(), names.join("\n")].into_iter().chain(shares).collect()
     });
-    table(&heading, rows).to_string()
+    tables(&heading, &rows.collect::<Vec<_>>(), 2, Extent::Terminal)
 }
 
 /// The file of `--json`: `candidates` and `sets`, best first.
