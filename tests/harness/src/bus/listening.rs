@@ -140,6 +140,11 @@ impl Listening {
         }
     }
 
+    /// The time of what came last, or of the last look at silence; on the log's clock.
+    pub fn time_s(&self) -> f64 {
+        self.last.micros() as f64 / 1e6
+    }
+
     /// Frames so far.
     pub fn frames(&self) -> u64 {
         self.frames
@@ -171,7 +176,7 @@ impl Listening {
     pub fn moment(&self, sensor: u8) -> Option<Moment> {
         let map = self.map(sensor);
         let header = map.header()?;
-        let mut moment = Moment { time_s: self.last.micros() as f64 / 1e6, visible: 0, invisible: 0, unknown: 0 };
+        let mut moment = Moment { time_s: self.time_s(), visible: 0, invisible: 0, unknown: 0 };
         for azimuth in 0..usize::from(header.azimuths) {
             let ray = map.ray(Plane::Visibility, azimuth);
             let (known, visible) = (ray.known.end().saturating_sub(ray.known.near()), ray.bits().count() as usize);

@@ -170,12 +170,13 @@ impl Session {
         let begin_s = self.begin_ns.unwrap_or(0) as f64 * 1e-9;
         let sensors = self.listening.sensors();
         let mut text = String::new();
+        let passed_s = (self.listening.time_s() - begin_s).max(0.0);
         for sensor in &sensors {
-            let Some(m) = self.maps[usize::from(*sensor)].last() else { continue };
-            let _ = writeln!(text, "{:7.1} s  sensor {sensor}: {}", m.time_s - begin_s, shares(m));
+            // never the map as it was: who is silent shows nothing
+            let now = self.listening.moment(*sensor).map_or_else(|| UNKNOWN.to_owned(), |m| shares(&m));
+            let _ = writeln!(text, "{passed_s:7.1} s  sensor {sensor}: {now}");
         }
         if sensors.is_empty() {
-            let passed_s = (self.next_ns - self.begin_ns.unwrap_or(0)) as f64 * 1e-9;
             let _ = writeln!(text, "{passed_s:7.1} s  no broadcast among {} frames", self.listening.frames());
         }
         print(&text)
@@ -200,6 +201,9 @@ fn live(interface: &str, seconds: Option<f64>, session: &mut Session) -> Result<
 fn live(_: &str, _: Option<f64>, _: &mut Session) -> Result<()> {
     bail!("--can listens to SocketCAN, which Linux has; record the bus and name the log")
 }
+
+/// Said of a sensor that has been silent for too long.
+const UNKNOWN: &str = "silent, so all of its map is unknown";
 
 /// How much of a map is visible.
 fn shares(m: &Moment) -> String {
@@ -334,7 +338,12 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
         }
         let _ = writeln!(text, "  {}", used(&heard.counters));
         if let Some(m) = heard.maps.last() {
-            let _ = writeln!(text, "  {} looks at its map; the last: {}", heard.maps.len(), shares(m));
+            let end = if listening.moment(heard.sensor).is_none() {
+                format!("; in the end {UNKNOWN}")
+            } else {
+                String::new()
+            };
+            let _ = writeln!(text, "  {} looks at its map; the last: {}{end}", heard.maps.len(), shares(m));
         }
     }
     let _ = writeln!(text, "{} frames in all, {} of others", listening.frames(), listening.foreign());

@@ -284,7 +284,7 @@ mod tests {
             let (canvas, (_, plot)) = (draw(&bound), layout(&bound));
             let [x, y] = at(&plot, 0.5, 0.5).map(|v| v as i32);
             // a corner that a square has and a diamond has not
-            ((-7..=-5).any(|d| canvas.pixel(x + d, y + d).red < 90), canvas.png().unwrap())
+            ((-7..=-6).any(|d| canvas.pixel(x + d, y + d).red < 90), canvas.png().unwrap())
         };
         let (slice, slice_picture) = with(MarkerKind::Slice, Counted::Objects);
         let (of_box, _) = with(MarkerKind::Box, Counted::Objects);
