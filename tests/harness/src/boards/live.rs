@@ -10,6 +10,7 @@ use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
@@ -91,7 +92,10 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     'start: loop {
         let epoch = flash.start();
         let stored = StoredSettings::read(&flash, SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>());
-        let mut session = SerialSession::<D>::start(SENSOR, epoch, stored, &mut line);
+        // of this computer: a real board names itself
+        #[allow(clippy::cast_possible_truncation)] // at most 200
+        let identity = Identity { board: "this-computer", chip: 0, is_bench: true, grid: [R as u8, A as u8] };
+        let mut session = SerialSession::<D>::start(stored.unit().sensor, identity, epoch, stored, &mut line);
         let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
         let (settings, now) = (session.settings(), session.now());
         start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
