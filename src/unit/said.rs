@@ -42,7 +42,7 @@ impl Refusal {
 pub enum Said {
     /// A block was written, with this sequence.
     Written(u32),
-    /// The block in use, every byte of it and 0xFF after a shorter layout; its own check sum is still to be looked at.
+    /// The block that was asked for, every byte of it and 0xFF after a shorter layout; its own check sum is still to be looked at.
     Block([u8; BLOCK_LEN]),
     /// The unit starts, with the block of a slot and its sequence or without one.
     Started(Option<(u8, u32)>),

@@ -81,6 +81,11 @@ impl SerialService {
                 let stored = self.stored;
                 self.reply(&Reply::Block(stored.block(slots)), line);
             }
+            Request::ReadNewest => {
+                let slot = self.stored.newest_slot(slots);
+                let block = slot.map_or(&[][..], |slot| StoredSettings::in_slot(slots, slot));
+                self.reply(&Reply::Block(block), line);
+            }
             Request::Identify => {
                 let identity = self.identity;
                 self.reply(&Reply::Identified(&identity, VERSION), line);

@@ -15,7 +15,7 @@
 //! | kind | towards the unit | body |
 //! |---|---|---|
 //! | 1 | write a configuration block into the slot not in use | block ([`settings`](crate::unit::settings)) |
-//! | 2 | read the block in use | |
+//! | 2 | read a block | none: the one in use; 1: the one that counts from the next restart on |
 //! | 3 | restart with the newest block | |
 //! | 4 | the time, where the unit has no clock of its own | microseconds, 8 bytes |
 //! | 5 | say which unit you are | |
@@ -24,7 +24,7 @@
 //! | kind | from the unit | body |
 //! |---|---|---|
 //! | 129 | a block was written; it counts from the next restart on | sequence, 4 bytes |
-//! | 130 | the block in use | block |
+//! | 130 | the block that was asked for | block |
 //! | 131 | the unit starts | slot, 1 byte; 255 without a block; the block's sequence, 4 bytes |
 //! | 132 | a block was refused, the unit stays in its safe state if it has no other | reason, 1 byte; of a parameter: its value as `f32`, 4 bytes, and its name |
 //! | 133 | which unit it is, by [`EVERY_SENSOR`] | sensor; 1 for a test bench, which takes scans on this line, else 0; ranges and azimuths of its grid; major, minor and patch number; the chip's number, 4 bytes; the board's name |
@@ -54,6 +54,8 @@ pub enum Request<'a> {
     Write(&'a [u8]),
     /// Send the block in use.
     Read,
+    /// Send the block that counts from the next restart on.
+    ReadNewest,
     /// Start over.
     Restart,
     /// It is this time.
@@ -69,7 +71,7 @@ pub enum Request<'a> {
 pub enum Reply<'a> {
     /// A block was written, with this sequence.
     Written(u32),
-    /// The block in use.
+    /// The block that was asked for.
     Block(&'a [u8]),
     /// The unit starts with the block of a slot and its sequence.
     Started(Option<(u8, u32)>),
@@ -132,6 +134,11 @@ impl<'a> Request<'a> {
                 message
             }
             Self::Read => ServiceMessage::new(2),
+            Self::ReadNewest => {
+                let mut message = ServiceMessage::new(2);
+                message.put(&[1]);
+                message
+            }
             Self::Restart => ServiceMessage::new(3),
             Self::Time(time) => {
                 let mut message = ServiceMessage::new(4);
@@ -155,7 +162,7 @@ impl<'a> Request<'a> {
         Profile::P05.check(message, data_id(asked)).ok()?;
         match kind {
             1 => Some(Self::Write(body)),
-            2 => Some(Self::Read),
+            2 => Some(if body.first().is_some_and(|which| *which != 0) { Self::ReadNewest } else { Self::Read }),
             3 => Some(Self::Restart),
             4 => Reader(body).u64().map(|t| Self::Time(Time::from_micros(t))),
             5 => Some(Self::Identify),
@@ -254,6 +261,7 @@ mod tests {
             Request::Read,
             Request::Restart,
             Request::Time(Time::from_micros(0x0102_0304_0506_0708)),
+            Request::ReadNewest,
             Request::Clear,
             Request::Identify,
         ] {

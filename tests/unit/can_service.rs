@@ -80,6 +80,9 @@ fn a_block_is_written_read_back_and_counts_from_the_restart_on() {
             }
             sequence += 1;
             assert!(answers(&mut unit, &slots, medium).contains(&Said::Written(sequence)));
+            unit.take(&tool.read_newest().unwrap(), &mut slots);
+            let written = settings(height).to_block(sequence);
+            assert_eq!(answers(&mut unit, &slots, medium), [Said::Block(written)], "what was written reads back");
             assert_eq!(unit.settings().copied(), before, "not before the restart");
             assert_eq!(unit.take(&tool.restart().unwrap(), &mut slots), Some(Flow::Restart));
             unit = start(medium, &slots);

@@ -11,7 +11,7 @@
 //! | 1 | a block begins | 0 | its length (2, big-endian), 0, 0 |
 //! | 2 | a part of it | n | its bytes 4 n to 4 n + 3 |
 //! | 3 | it is complete: check it, write it into the slot not in use | 0 | its last four bytes |
-//! | 4 | read the block in use | 0 | 0 |
+//! | 4 | read a block | 0: the one in use; 1: the one that counts from the next restart on | 0 |
 //! | 5 | restart with the newest block | 0 | `VSCB` |
 //! | 6 | empty both slots; it counts from the next restart on | 0 | `VSCF` |
 //! | 7 | say which unit you are | 0 | 0 |
@@ -20,7 +20,7 @@
 //! | kind | from the unit | number | four bytes |
 //! |---|---|---|---|
 //! | 129 | a block was written; it counts from the next restart on | 0 | its sequence, big-endian |
-//! | 130 | a part of the block in use | n | its bytes 4 n to 4 n + 3 |
+//! | 130 | a part of the block that was asked for | n | its bytes 4 n to 4 n + 3 |
 //! | 131 | the unit starts | slot; 255 without a block | the block's sequence, big-endian |
 //! | 132 | a block was refused | reason | see below |
 //! | 133 | letters of the refused parameter's name | n | letters 4 n to 4 n + 3; zeros after the last |
@@ -84,7 +84,7 @@ enum BlockRequest {
     Begin { length: u16 },
     Part { number: u8, bytes: [u8; 4] },
     Complete { last: [u8; 4] },
-    Read,
+    Read { newest: bool },
     Restart,
     Clear,
     Identify,
@@ -100,7 +100,7 @@ impl BlockRequest {
             }
             Self::Part { number, bytes } => own(2, number, bytes),
             Self::Complete { last } => own(3, 0, last),
-            Self::Read => own(4, 0, [0; 4]),
+            Self::Read { newest } => own(4, u8::from(newest), [0; 4]),
             Self::Restart => own(5, 0, RESTART),
             Self::Clear => own(6, 0, CLEAR),
             Self::Identify => own(7, 0, [0; 4]),
@@ -116,7 +116,7 @@ impl BlockRequest {
             1 => Some(Self::Begin { length: u16::from_be_bytes([a, b]) }),
             2 => Some(Self::Part { number, bytes }),
             3 => Some(Self::Complete { last: bytes }),
-            4 => Some(Self::Read),
+            4 => Some(Self::Read { newest: number != 0 }),
             5 => (bytes == RESTART).then_some(Self::Restart),
             6 => (bytes == CLEAR).then_some(Self::Clear),
             7 => Some(Self::Identify),
@@ -198,7 +198,8 @@ mod tests {
             BlockRequest::Begin { length: 0x0102 },
             BlockRequest::Part { number: 36, bytes: [1, 2, 3, 4] },
             BlockRequest::Complete { last: [5, 6, 7, 8] },
-            BlockRequest::Read,
+            BlockRequest::Read { newest: false },
+            BlockRequest::Read { newest: true },
             BlockRequest::Restart,
             BlockRequest::Clear,
             BlockRequest::Identify,

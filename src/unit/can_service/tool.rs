@@ -47,7 +47,12 @@ impl Tool {
 
     /// Asks for the block in use.
     pub fn read(&mut self) -> Option<CanFrame> {
-        self.frame(BlockRequest::Read)
+        self.frame(BlockRequest::Read { newest: false })
+    }
+
+    /// Asks for the block that counts from the next restart on.
+    pub fn read_newest(&mut self) -> Option<CanFrame> {
+        self.frame(BlockRequest::Read { newest: true })
     }
 
     /// Asks for a restart with the newest block.

@@ -160,12 +160,15 @@ impl CanService {
                 Ok(sequence) => self.outgoing.written = Some(sequence),
                 Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
             },
-            BlockRequest::Read => {
-                let there_is = !self.stored.block(slots).is_empty();
-                let error = self.stored.place().err().unwrap_or(BlockError::Empty);
-                match there_is {
-                    true => self.outgoing.part = Some(0),
-                    false => self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 }),
+            BlockRequest::Read { newest } => {
+                let in_use = || self.stored.place().ok().map(|(slot, _)| usize::from(slot));
+                let slot = if newest { self.stored.newest_slot(slots) } else { in_use() };
+                match slot.filter(|slot| !StoredSettings::in_slot(slots, *slot).is_empty()) {
+                    Some(slot) => self.outgoing.part = Some((slot, 0)),
+                    None => {
+                        let error = self.stored.place().err().unwrap_or(BlockError::Empty);
+                        self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 });
+                    }
                 }
             }
             BlockRequest::Clear => {
@@ -298,8 +301,8 @@ struct Outgoing {
     started: bool,
     refused: Option<Refused>,
     written: Option<u32>,
-    /// Next part of the block in use.
-    part: Option<u8>,
+    /// A block's slot, and its next part.
+    part: Option<(usize, u8)>,
     identified: bool,
     cleared: bool,
 }
@@ -330,10 +333,10 @@ impl Outgoing {
             self.refused = refused.goes_on().then_some(refused);
             return Some(answer);
         }
-        let number = self.part.take()?;
-        let block = stored.block(slots);
+        let (slot, number) = self.part.take()?;
+        let block = StoredSettings::in_slot(slots, slot);
         let bytes = *block.get(4 * usize::from(number)..)?.first_chunk::<4>()?;
-        self.part = (4 * (usize::from(number) + 1) < block.len()).then_some(number + 1);
+        self.part = (4 * (usize::from(number) + 1) < block.len()).then_some((slot, number + 1));
         Some(BlockAnswer::Part { number, bytes })
     }
 }

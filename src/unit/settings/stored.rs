@@ -79,9 +79,20 @@ impl StoredSettings {
 
     /// The block in use, as it is stored; empty without one, or once its slot was emptied.
     pub fn block<'s>(&self, slots: &'s impl SettingsSlots) -> &'s [u8] {
-        let slot = self.found.as_ref().map_or(&[][..], |newest| slots.slot(newest.slot));
-        // a slot is as long as the longest layout, and may have been emptied meanwhile
-        slot.get(..length(slot)).unwrap_or(&[])
+        self.found.as_ref().map_or(&[], |newest| Self::in_slot(slots, newest.slot))
+    }
+
+    /// The slot of the block that counts from the next start on, which is another one after a write; none in empty slots.
+    /// Takes as long as two starts.
+    pub fn newest_slot(&self, slots: &impl SettingsSlots) -> Option<usize> {
+        newest(slots, self.check).ok().map(|newest| newest.slot)
+    }
+
+    /// The block in a slot, as long as its layout; empty without one.
+    pub fn in_slot(slots: &impl SettingsSlots, slot: usize) -> &[u8] {
+        let bytes = slots.slot(slot);
+        // a slot is as long as the longest layout
+        bytes.get(..length(bytes)).unwrap_or(&[])
     }
 
     /// Both buses as the block in use describes them: the radar's, the broadcast's. By default without one.

@@ -18,12 +18,11 @@ use viewshed::unit::{Flow, Unit};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::listener::{MEDIUM, Map, SENSOR};
+use super::scans::Scan;
+use crate::recording::can_log::Line;
 
 /// What the emulated board calls its chip.
 const CHIP: u32 = 0x5A43_5531;
-
-use super::scans::Scan;
-use crate::recording::can_log::Line;
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;
