@@ -197,7 +197,7 @@ fn commands(text: &str) -> Vec<String> {
     let code = text.lines().filter_map(|line| line.strip_prefix("    ")).map(str::to_owned);
     let quoted = text.split('`').skip(1).step_by(2).map(|quoted| quoted.replace('\n', " "));
     let command = |code: String| {
-        let code = code.split(" # ").next().unwrap_or_default().trim();
+        let code = code.split(" # ").next().unwrap_or_default().split(" > ").next().unwrap_or_default().trim();
         let replay = code.strip_prefix("tests/replay.sh ").map(|rest| format!("replay {rest}"));
         // a variable of two words is one word in zsh and fish
         assert!(!code.starts_with('$'), "{code}");

@@ -13,6 +13,7 @@ use super::{Content, Line};
 #[allow(dead_code)]
 #[path = "../../../../../boards/linux/src/frames.rs"]
 mod frames;
+pub use frames::{from_socketcan, to_socketcan};
 
 /// How long a silent bus is waited for at a time.
 const WAIT: Duration = Duration::from_millis(50);
@@ -75,7 +76,7 @@ impl Bus {
             let content = match &frame {
                 CanAnyFrame::Error(error) => Some(Content::Error(error.error_bits())),
                 CanAnyFrame::Remote(remote) => id(remote.id()).map(Content::Remote),
-                data => frames::from_socketcan(data).map(Content::Data),
+                data => from_socketcan(data).map(Content::Data),
             };
             let time_ns = nanoseconds(stamps.socket.unwrap_or_else(SystemTime::now));
             let content = content.context("a frame whose identifier is none")?;
