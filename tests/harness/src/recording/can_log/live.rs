@@ -1,5 +1,6 @@
 //! Frames of a SocketCAN interface as they come, as lines of a log.
 
+use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -67,7 +68,8 @@ impl Bus {
         while !stop.load(Ordering::SeqCst) && longest.is_none_or(|longest| started.elapsed() < longest) {
             let (frame, stamps) = match self.socket.read_frame_with_timestamps() {
                 Ok(read) => read,
-                Err(e) if e.should_retry() => {
+                // by a signal, too
+                Err(e) if e.should_retry() || e.kind() == ErrorKind::Interrupted => {
                     each(Heard::Nothing(nanoseconds(SystemTime::now())))?;
                     continue;
                 }
@@ -125,7 +127,7 @@ fn refused(name: &str, error: &std::io::Error) -> String {
         Some(code) if NO_CAN_IN_KERNEL.contains(&code) => format!(
             "{name}: this kernel has no CAN; load it with `modprobe can-raw` (as root), or record where there is one and name the log"
         ),
-        _ if error.kind() == std::io::ErrorKind::PermissionDenied => {
+        _ if error.kind() == ErrorKind::PermissionDenied => {
             format!("{name}: this user may not open it; run as root, or outside of the container")
         }
         _ => format!("{name} cannot be listened to: {error}"),
