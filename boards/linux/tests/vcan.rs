@@ -16,7 +16,7 @@ use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
-use viewshed::wire::receive::{ReceiverLimits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::status::{Reason, UnitState};
 
 const RADAR: &str = "vsradar";
