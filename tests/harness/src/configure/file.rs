@@ -180,7 +180,7 @@ mod tests {
             assert_eq!(at, line);
             assert!(said.contains(what), "{said}");
         }
-        let (_, said) = wrong("[mount]", "[mounts]");
+        let (_, said) = wrong("\n[mount]", "\n[mounts]");
         assert!(said.contains("mounts"), "{said}");
     }
 
