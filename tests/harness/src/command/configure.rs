@@ -29,6 +29,9 @@ pub struct Args {
     /// CAN interface of the bus the unit broadcasts on
     #[arg(long, value_name = "INTERFACE", conflicts_with = "port")]
     can: Option<String>,
+    /// Its frames are CAN FD's, as a daemon's with medium = "can-fd"
+    #[arg(long, requires = "can")]
+    fd: bool,
     /// Serial port of the unit
     #[arg(long, value_name = "PATH")]
     port: Option<String>,
@@ -148,7 +151,7 @@ fn open(args: &Args) -> Result<Box<dyn Link>> {
         #[cfg(target_os = "linux")]
         (_, Some(name)) => {
             use crate::configure::{can::CanLink, socketcan::Interface};
-            Ok(Box::new(CanLink::new(Interface::open(name)?, name)))
+            Ok(Box::new(CanLink::new(Interface::open(name)?, name, args.fd)))
         }
         (None, None) => {
             bail!("say where the unit is: --port PATH or --can INTERFACE (or only look at the file: --check)")

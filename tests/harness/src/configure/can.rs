@@ -42,10 +42,10 @@ pub struct CanLink<B> {
 const SENSORS: u8 = 8;
 
 impl<B: CanBus> CanLink<B> {
-    /// On classic CAN, with identifiers from 0x400 on.
-    pub fn new(bus: B, name: &str) -> Self {
+    /// On classic CAN or CAN FD, with identifiers from 0x400 on.
+    pub fn new(bus: B, name: &str, fd: bool) -> Self {
         let addresses = Addresses::STANDARD;
-        let medium = Medium::Can(addresses);
+        let medium = if fd { Medium::CanFd(addresses) } else { Medium::Can(addresses) };
         let units = (0..SENSORS).map(|sensor| (Tool::new(sensor, medium), Answers::new(sensor, medium))).collect();
         Self { bus, place: name.to_owned(), medium, addresses, units, only: None, noise: Noise::default() }
     }

@@ -108,7 +108,7 @@ fn nanoseconds(time: SystemTime) -> i64 {
 }
 
 /// Why an interface cannot be listened to, and what to do.
-fn refused(name: &str, error: &std::io::Error) -> String {
+pub fn refused(name: &str, error: &std::io::Error) -> String {
     let kind = |name: &str| std::fs::read_to_string(format!("/sys/class/net/{name}/type")).ok();
     let is_can = |name: &str| kind(name).is_some_and(|kind| kind.trim() == KIND_CAN);
     match error.raw_os_error() {
