@@ -29,6 +29,9 @@ use link::{Ask, Link};
 
 /// Time after which a question is put again.
 const AGAIN: Duration = Duration::from_millis(500);
+/// Time in which an answer is whole: on a bus it comes in forty parts, each after what is more urgent, and a question put
+/// again begins it anew.
+const ANSWER: Duration = Duration::from_secs(2);
 /// Time in which all units of a bus have said which ones they are.
 const ALL: Duration = Duration::from_millis(400);
 /// Time a unit may take to erase and write a slot: parts with large sectors take seconds.
@@ -186,7 +189,7 @@ impl Found<'_> {
         let begun = Instant::now();
         while begun.elapsed() < patience {
             self.link.ask(what)?;
-            let until = Instant::now() + AGAIN;
+            let until = Instant::now() + ANSWER;
             while let Some(said) = self.link.hear(until)? {
                 if let Some(answer) = answer(said) {
                     return Ok(Some(answer));
@@ -197,7 +200,7 @@ impl Found<'_> {
     }
 
     fn read_block(&mut self, what: Ask<'_>) -> Result<Result<Stored, BlockError>> {
-        let heard = self.ask(what, 6 * AGAIN, |said| match said {
+        let heard = self.ask(what, 4 * ANSWER, |said| match said {
             Said::Block(block) => Some(Settings::from_block(&block).map(|block| Stored { block })),
             // there is none
             Said::Refused(_) => Some(Err(BlockError::Empty)),
@@ -310,7 +313,7 @@ impl Found<'_> {
         let place = self.place().to_owned();
         ensure!(!self.link.is_bus(), "{place}: a unit says on its serial line only how long frames take: --port PATH");
         let took =
-            self.ask(Ask::Timing, 3 * AGAIN, |said| if let Said::Took(took) = said { Some(took) } else { None })?;
+            self.ask(Ask::Timing, 2 * ANSWER, |said| if let Said::Took(took) = said { Some(took) } else { None })?;
         took.with_context(|| format!("{place}: {} does not time its frames", self.unit.board()))
     }
 
