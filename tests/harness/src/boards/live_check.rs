@@ -2,12 +2,13 @@
 //! with the same program here.
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
+use viewshed::unit::said::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Message, Received};
@@ -25,6 +26,7 @@ use super::scans::Scan;
 use super::serial::{Far, LINES, Port, Waiting};
 use super::{Board, Profile, firmware};
 use crate::configure;
+use crate::configure::link::{Ask, Link};
 
 /// Scans without an answer after which a board is taken for absent.
 const MOST_SILENT: usize = 5;
@@ -106,8 +108,17 @@ pub fn port(path: &Path, baud: u32, profile: Profile, name: &str, settings: &Set
 /// Asks what is behind a port before anything is sent to it.
 fn is_bench(path: &str, baud: u32, profile: Profile) -> Result<()> {
     let mut link = configure::serial::open(path, Some(baud))?;
-    let found = configure::find(&mut link, configure::Wanted::default(), MOST_TIME)?;
-    let unit = found.unit;
+    // one question: an answer to a second would still be on the line when the scans go out
+    link.to(None);
+    link.ask(Ask::Identify)?;
+    let until = Instant::now() + MOST_TIME;
+    let unit = loop {
+        match link.hear(until)? {
+            Some(Said::Identified(unit)) => break unit,
+            Some(_) => {}
+            None => break configure::find(&mut link, configure::Wanted::default(), Duration::from_millis(100))?.unit,
+        }
+    };
     ensure!(
         unit.is_bench,
         "{path}: {} is no test bench: its image takes no scans on this line, but a radar's on its CAN bus. Nothing was written. \
