@@ -170,22 +170,49 @@ pub fn can(board: Board, name: &str, settings: &Settings, steps: &[Step]) -> Res
 fn exchange(far: &mut impl Far, profile: Profile, settings: &Settings, scans: &[Scan]) -> Result<Vec<Turn>> {
     let mut script = Script::default();
     script.configure(settings);
+    let configured = script.bytes.len();
     let Some(first) = scans.first() else { bail!("the recording has no scans") };
     scans.iter().for_each(|scan| script.scan(scan, first.time));
     let expected = live::answer(profile, &script.bytes);
     let (mut host, mut board) = (Messages::default(), Messages::default());
     let (mut turns, mut from, mut silent) = (Vec::new(), 0, 0);
+    // what both say before their restart may differ: a real board has a past, and was asked for its name
+    far.send(&script.bytes[..configured])?;
+    from += configured;
+    started(far)?;
+    let said_before = [far.answer().len(), expected.lengths.get(configured - 1).copied().unwrap_or(0)];
     for (to, time) in &script.marks {
         let before = far.answer().len();
         far.send(&script.bytes[from..*to])?;
         from = *to;
         let due = expected.lengths.get(to - 1).copied().unwrap_or(0);
-        far.wait_for(due, MOST_TIME)?;
+        far.wait_for(said_before[0] + due.saturating_sub(said_before[1]), MOST_TIME)?;
         silent = if far.answer().len() > before || due == before { 0 } else { silent + 1 };
         ensure!(silent < MOST_SILENT, "the board has not answered {MOST_SILENT} scans");
         turns.push(Turn { time: *time, host: host.take(&expected.bytes[..due]), board: board.take(far.answer()) });
     }
     Ok(turns)
+}
+
+/// Waits until a board has started with its configuration, and has said what it says then.
+fn started(far: &mut impl Far) -> Result<()> {
+    let until = Instant::now() + MOST_TIME;
+    let (mut messages, mut has_started) = (Messages::default(), false);
+    while !has_started && Instant::now() < until {
+        let before = far.answer().len();
+        far.wait_for(before + 1, Duration::from_millis(50))?;
+        has_started = messages.take(far.answer()).iter().any(|heard| match heard {
+            Heard::Message(message) => matches!(Said::read(message, live::SENSOR), Some(Said::Started(Some(_)))),
+            Heard::Frame(_) => false,
+        });
+    }
+    // a bench has no clock of its own: then it is silent
+    let mut before = 0;
+    while far.answer().len() > before {
+        before = far.answer().len();
+        far.wait_for(before + 1, Duration::from_millis(200))?;
+    }
+    Ok(())
 }
 
 /// Takes the messages out of a growing stream.
