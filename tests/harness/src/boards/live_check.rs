@@ -180,7 +180,8 @@ fn exchange(far: &mut impl Far, profile: Profile, settings: &Settings, scans: &[
     far.send(&script.bytes[..configured])?;
     from += configured;
     started(far)?;
-    let said_before = [far.answer().len(), expected.lengths.get(configured - 1).copied().unwrap_or(0)];
+    // what is said at the start comes before the next byte is taken
+    let said_before = [far.answer().len(), expected.lengths.get(configured).copied().unwrap_or(0)];
     for (to, time) in &script.marks {
         let before = far.answer().len();
         far.send(&script.bytes[from..*to])?;
