@@ -278,8 +278,9 @@ fn ended(folder: &Path, arguments: &str, signal: rustix::process::Signal) {
     let before: Vec<_> =
         names(folder).into_iter().map(|name| folder.join(name)).filter(|path| path.is_file()).collect();
     let before: Vec<_> = before.into_iter().map(|path| (std::fs::read(&path).unwrap(), path)).collect();
-    for _ in 0..20 {
-        let status = signalled(folder, arguments, signal);
+    for time in 0..20 {
+        // what is written in one go is not always seen: then the signal comes before it
+        let status = signalled(folder, arguments, signal, time < 5);
         if !status.success() {
             assert_eq!(status.signal(), Some(signal.as_raw()), "{arguments}: {status}");
             return;
@@ -296,13 +297,19 @@ fn ended(folder: &Path, arguments: &str, signal: rustix::process::Signal) {
 }
 
 #[cfg(target_os = "linux")]
-fn signalled(folder: &Path, arguments: &str, signal: rustix::process::Signal) -> std::process::ExitStatus {
+fn signalled(
+    folder: &Path,
+    arguments: &str,
+    signal: rustix::process::Signal,
+    while_writing: bool,
+) -> std::process::ExitStatus {
     use std::time::{Duration, Instant};
 
     let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
     let mut child = command.current_dir(folder).args(arguments.split_whitespace()).spawn().unwrap();
     let started = Instant::now();
-    while !names(folder).iter().any(|name| name.ends_with(".part")) {
+    std::thread::sleep(Duration::from_millis(if while_writing { 0 } else { 50 }));
+    while while_writing && !names(folder).iter().any(|name| name.ends_with(".part")) {
         if let Some(status) = child.try_wait().unwrap() {
             return status;
         }
