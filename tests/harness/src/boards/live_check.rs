@@ -125,16 +125,14 @@ fn is_bench(path: &str, baud: u32, profile: Profile) -> Result<()> {
          To compare a controller with this computer, flash a bench image (boards/README.md), or use --board for an emulated one",
         unit.board()
     );
-    let grid = match profile {
-        Profile::Reference => [200, 120],
-        Profile::Small => [100, 64],
-    };
     let [ranges, azimuths] = unit.grid;
+    let its =
+        Profile::ALL.into_iter().find(|profile| profile.grid() == unit.grid).map_or("none of these", Profile::name);
     ensure!(
-        unit.grid == grid,
+        unit.grid == profile.grid(),
         "{path}: {} has the grid {ranges} x {azimuths}, which is --profile {}; nothing was written",
         unit.board(),
-        if ranges == 100 { "small" } else { "reference" }
+        its
     );
     Ok(())
 }

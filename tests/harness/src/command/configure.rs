@@ -188,8 +188,7 @@ fn on_grids(settings: &Settings) -> Result<ExitCode> {
 fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
     let (in_use, newest) = (unit.in_use()?, unit.newest()?);
     let place = unit.place().to_owned();
-    let head =
-        |Stored { block: (sequence, _) }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
+    let head = |Stored { sequence, .. }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
     match (&in_use, &newest) {
         (Err(BlockError::Empty), Err(BlockError::Empty)) => {
             bail!(
@@ -197,12 +196,12 @@ fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
             )
         }
         (Err(error), Err(_)) => bail!("{place}: {error}"),
-        (Ok(stored), _) => print(&(head(stored) + &file::text(&stored.block.1)?))?,
-        (Err(_), Ok(stored)) => print(&(head(stored) + &file::text(&stored.block.1)?))?,
+        (Ok(stored), _) => print(&(head(stored) + &file::text(&stored.settings)?))?,
+        (Err(_), Ok(stored)) => print(&(head(stored) + &file::text(&stored.settings)?))?,
     }
     match (in_use, newest) {
         (Ok(a), Ok(b)) if a == b => {}
-        (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.block.0))?,
+        (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.sequence))?,
         (_, Err(_)) => print("# its slots are empty: from its next start on it has none\n")?,
     }
     Ok(ExitCode::SUCCESS)
@@ -240,9 +239,9 @@ fn compare(unit: &mut Found<'_>, settings: &Settings) -> Result<ExitCode> {
         print("the unit has no configuration; the file can be used\n")?;
         return Ok(ExitCode::FAILURE);
     };
-    let found = file::differences(&stored.block.1, settings)?;
+    let found = file::differences(&stored.settings, settings)?;
     if found.is_empty() {
-        print(&format!("block {} is what the file says\n", stored.block.0))?;
+        print(&format!("block {} is what the file says\n", stored.sequence))?;
         return Ok(ExitCode::SUCCESS);
     }
     for (name, has, wanted) in &found {

@@ -104,12 +104,6 @@ pub struct Args {
     judging: JudgingArgs,
 }
 
-impl Args {
-    fn extent(&self) -> table::Extent {
-        if self.wide { table::Extent::Wide } else { table::Extent::Terminal }
-    }
-}
-
 /// Simulates, replays, prints.
 ///
 /// # Errors
@@ -142,7 +136,7 @@ fn motorway(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs
     let keep = |day: &Day, bytes: &[u8]| kept.get(&day.name()).map_or(Ok(()), |file| file.write(bytes));
     let experiment = Experiment::run(&plan, settings, &keep, &|| running.step())?;
     drop(running);
-    print(&report::text(&experiment, args.extent()))?;
+    print(&report::text(&experiment, table::Extent::of(args.wide)))?;
     let beside = beside(args, settings)?;
     if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
@@ -173,7 +167,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
         set: if args.train { "training" } else { "reporting" },
         warm_up_s: set.warm_up_s,
         every: extent.every,
-        extent: args.extent(),
+        extent: table::Extent::of(args.wide),
     };
     print(&scenes_report::text(&title, &plan, &counted, &settings.evaluation))?;
     let beside = beside(args, settings)?;
@@ -193,7 +187,7 @@ fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Ou
     let running = bar("simulating and replaying", plan.steps()?);
     let sets = gantry_camera::run(&plan, settings, usize::from(args.every), &|| running.step())?;
     drop(running);
-    print(&camera_report::text(&sets, args.extent()))?;
+    print(&camera_report::text(&sets, table::Extent::of(args.wide)))?;
     if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
         file.write(camera_report::json(&sets, &plan, json_options(settings))?)?;

@@ -73,8 +73,8 @@ impl Drop for Found<'_> {
 /// What is stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stored {
-    /// Sequence and settings.
-    pub block: (u32, Settings),
+    pub sequence: u32,
+    pub settings: Settings,
 }
 
 /// Looks for the unit that is meant, for this long.
@@ -127,14 +127,13 @@ pub fn find<'l>(link: &'l mut dyn Link, wanted: Wanted, patience: Duration) -> R
         );
         link.ask(Ask::Address(unit.chip))?;
         let until = Instant::now() + AGAIN;
-        let answers = |said| matches!(said, Said::Identified(other) if other.chip == unit.chip);
-        let mut heard = false;
-        while let Some(said) = link.hear(until)? {
-            heard |= answers(said);
-            if heard {
-                break;
+        let heard = loop {
+            match link.hear(until)? {
+                Some(Said::Identified(other)) if other.chip == unit.chip => break true,
+                Some(_) => {}
+                None => break false,
             }
-        }
+        };
         ensure!(heard, "{}: chip {:08X} does not answer to its name; nothing was written", link.place(), unit.chip);
     }
     Ok(Found { link, unit, named: named.then_some(unit.sensor) })
@@ -201,7 +200,9 @@ impl Found<'_> {
 
     fn read_block(&mut self, what: Ask<'_>) -> Result<Result<Stored, BlockError>> {
         let heard = self.ask(what, 4 * ANSWER, |said| match said {
-            Said::Block(block) => Some(Settings::from_block(&block).map(|block| Stored { block })),
+            Said::Block(block) => {
+                Some(Settings::from_block(&block).map(|(sequence, settings)| Stored { sequence, settings }))
+            }
             // there is none
             Said::Refused(_) => Some(Err(BlockError::Empty)),
             _ => None,
@@ -261,7 +262,7 @@ impl Found<'_> {
             }
         };
         let stored = self.newest()?;
-        let same = stored.as_ref().is_ok_and(|stored| stored.block == (sequence, *settings));
+        let same = stored.as_ref().is_ok_and(|stored| *stored == Stored { sequence, settings: *settings });
         ensure!(same, "{place}: what reads back is not what was written: {stored:?}; {old}");
         Ok(sequence)
     }
@@ -272,7 +273,7 @@ impl Found<'_> {
     /// It does not come back.
     pub fn restart(&mut self) -> Result<Option<u32>> {
         // it comes back by the number in its newest block
-        let sensor = self.newest()?.map_or(0, |stored| stored.block.1.unit.sensor);
+        let sensor = self.newest()?.map_or(0, |stored| stored.settings.unit.sensor);
         self.link.ask(Ask::Restart)?;
         self.link.restarted(self.unit.is_bench)?;
         self.link.to(Some(sensor));
@@ -285,7 +286,7 @@ impl Found<'_> {
                 }
                 Some(Said::Identified(unit)) if unit.chip == self.unit.chip => {
                     self.unit = unit;
-                    return Ok(self.in_use()?.ok().map(|stored| stored.block.0));
+                    return Ok(self.in_use()?.ok().map(|stored| stored.sequence));
                 }
                 Some(_) => {}
                 // what it said first may be lost

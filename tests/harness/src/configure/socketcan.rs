@@ -3,12 +3,12 @@
 use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, bail};
 use socketcan::{CanFdSocket, ShouldRetry, Socket};
 use viewshed::wire::frame::CanFrame;
 
 use super::can::CanBus;
-use crate::recording::can_log::live::{from_socketcan, refused, to_socketcan};
+use crate::recording::can_log::live::{self, from_socketcan, refused, to_socketcan};
 
 /// Linux's error for a full queue.
 const NO_BUFFERS: i32 = 105;
@@ -27,14 +27,7 @@ impl Interface {
     /// # Errors
     /// None of that name, or one that is down: with what to do.
     pub fn open(name: &str) -> Result<Self> {
-        let open = || {
-            let socket = CanFdSocket::open(name)?;
-            // one that is down can be opened, and says so afterwards
-            socket.as_raw_socket().take_error()?.map_or(Ok(()), Err)?;
-            socket.set_nonblocking(true)?;
-            Ok(socket)
-        };
-        let socket = open().map_err(|error| anyhow!("{}", refused(name, &error)))?;
+        let socket = live::open(name, |socket| socket.set_nonblocking(true))?;
         Ok(Self { name: name.to_owned(), socket })
     }
 }

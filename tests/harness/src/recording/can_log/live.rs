@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame, Id, ShouldRetry, Socket, SocketOptions};
 use viewshed::wire::frame::CanId;
 
@@ -39,19 +39,12 @@ impl Bus {
     /// # Errors
     /// No such interface, one that is down, a kernel without CAN, no permission; each with what to do.
     pub fn open(name: &str) -> Result<Self> {
-        let open = || {
-            let socket = CanFdSocket::open(name)?;
-            // one that is down can be opened, and says so afterwards
-            socket.as_raw_socket().take_error()?.map_or(Ok(()), Err)?;
+        let socket = open(name, |socket| {
             socket.set_error_filter_accept_all()?;
             socket.set_recv_timestamp(true)?;
-            socket.set_read_timeout(WAIT)?;
-            Ok(socket)
-        };
-        match open() {
-            Ok(socket) => Ok(Self { name: name.to_owned(), socket }),
-            Err(error) => bail!("{}", refused(name, &error)),
-        }
+            socket.set_read_timeout(WAIT)
+        })?;
+        Ok(Self { name: name.to_owned(), socket })
     }
 
     /// Hands over every frame until the time is up or `stop` is set, and the time now and then while there is none.
@@ -105,6 +98,21 @@ fn id(id: Id) -> Option<CanId> {
 fn nanoseconds(time: SystemTime) -> i64 {
     let passed = time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(passed.as_nanos()).unwrap_or(i64::MAX)
+}
+
+/// Opens an interface, and sets it as it is wanted.
+///
+/// # Errors
+/// No such interface, one that is down, a kernel without CAN, no permission; each with what to do.
+pub fn open(name: &str, set: impl FnOnce(&CanFdSocket) -> std::io::Result<()>) -> Result<CanFdSocket> {
+    let opened = || {
+        let socket = CanFdSocket::open(name)?;
+        // one that is down can be opened, and says so afterwards
+        socket.as_raw_socket().take_error()?.map_or(Ok(()), Err)?;
+        set(&socket)?;
+        Ok(socket)
+    };
+    opened().map_err(|error| anyhow!("{}", refused(name, &error)))
 }
 
 /// Why an interface cannot be listened to, and what to do.
