@@ -13,6 +13,7 @@ mod traffic;
 
 mod configuration;
 mod detections;
+mod fusion;
 mod maps;
 mod radar_2d;
 mod radar_3d;
