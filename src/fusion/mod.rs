@@ -243,7 +243,7 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         sensor: usize,
         measured: Time,
         now: Time,
-        map: &impl VisibilityMap,
+        map: &(impl VisibilityMap + ?Sized),
     ) -> Result<(), NotTaken> {
         let join = self.held.get_mut(sensor).ok_or(NotTaken::NoSuchSensor)?.admit(measured, now, self.config)?;
         let (origin, cell_cm) = (self.origin, self.cell_cm);

@@ -85,15 +85,18 @@ fn analyse(text: &str, iterations: u32) -> Result<Vec<f64>> {
 /// as a block may begin or end within what stands behind an IT.
 fn assembly(instructions: &[Instruction]) -> String {
     let mut text = String::new();
-    let mut conditions: Vec<&str> = Vec::new();
+    // what an IT is for: its condition or the opposite one, for so many instructions
+    let (mut conditions, mut left) = (Vec::new(), 0);
     for Instruction { mnemonic, operands, .. } in instructions {
         if mnemonic.starts_with("it") {
-            conditions = [operands.as_str(), opposite(operands)].to_vec();
+            (conditions, left) = ([operands.as_str(), opposite(operands)].to_vec(), mnemonic.len() - 1);
             continue;
         }
         let (name, kind) =
             mnemonic.split_once('.').map_or((mnemonic.as_str(), None), |(name, kind)| (name, Some(kind)));
-        let name = conditions.iter().find_map(|condition| name.strip_suffix(condition)).unwrap_or(name);
+        let conditional = conditions.iter().filter(|_| left > 0).find_map(|condition| name.strip_suffix(condition));
+        let name = conditional.unwrap_or(name);
+        left = left.saturating_sub(1);
         let kind = kind.map_or_else(String::new, |kind| format!(".{kind}"));
         let _ = match name {
             "cbz" | "cbnz" => {
@@ -127,8 +130,10 @@ mod tests {
     #[test]
     fn what_llvm_would_not_take_is_rewritten() {
         let lines = [
-            ("it", "hs"),
-            ("addhs", "r0, #1"),
+            ("ite", "hi"),
+            ("addhi", "r0, #1"),
+            ("addls.w", "r0, #2"),
+            ("lsls", "r1, r4, #14"),
             ("vmov.f32", "s0, s1"),
             ("bl", "#0x919a"),
             ("cbz", "r2, #0x94da"),
@@ -142,6 +147,9 @@ mod tests {
             operands: operands.to_owned(),
         };
         let text = assembly(&lines.map(instruction));
-        assert_eq!(text, "add r0, #1\nvmov.f32 s0, s1\nb #4\ncbz r2, #4\nbne #4\nbic r0, r0, #1\n");
+        assert_eq!(
+            text,
+            "add r0, #1\nadd.w r0, #2\nlsls r1, r4, #14\nvmov.f32 s0, s1\nb #4\ncbz r2, #4\nbne #4\nbic r0, r0, #1\n"
+        );
     }
 }
