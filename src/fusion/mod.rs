@@ -17,6 +17,9 @@
 //! said before. Maps of one sensor and one time are parts of the same scan, or repetitions: they are joined, and where both know a cell
 //! the worse of them counts. So neither the order in which maps come, nor repeating them, nor cutting them into parts makes a difference.
 //!
+//! [`fill`] puts it into the cells of a [`polar`] map around a place of one's choice, which a
+//! [`Broadcaster`](crate::wire::broadcast::Broadcaster) sends.
+//!
 //! # Limits
 //! At most 8 sensors; `NX * NY * (3 * S + 2)` bytes. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
 //! A sensor that sends its last picture again and again with new times cannot be told from a road on which nothing moves: its
@@ -26,6 +29,7 @@
 //! Some 15 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
 mod places;
+mod polar;
 mod view;
 
 use crate::fixed::time::Time;
@@ -35,6 +39,7 @@ use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
 use places::Places;
+pub use polar::{fill, polar};
 pub use view::{Conflict, Fused, FusedCell, Sensors};
 
 /// Most sensors.

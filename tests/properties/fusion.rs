@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
-use viewshed::fusion::{Fusion, FusionConfig, NotTaken};
+use viewshed::fusion::{Fusion, FusionConfig, NotTaken, fill, polar};
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, Visibility, VisibilityMap};
 use viewshed::sensor::mount::Mount;
@@ -144,6 +144,46 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn around_a_place_of_ones_own_each_cell_is_what_is_known_at_its_middle() {
+    // 2 m to the left of x = 10 m it is visible, to the right hidden and occupied, behind the place unknown
+    struct Sides;
+    impl VisibilityMap for Sides {
+        fn at(&self, p: RoadPoint) -> CellState {
+            let kind = match (p.x_cm > 1000, p.y_cm > 200) {
+                (false, _) => NOTHING,
+                (true, true) => SEEN_FREE,
+                (true, false) => HIDDEN,
+            };
+            // grades that a threshold of 128 would read the other way round
+            let grade = [0, 200, 100][kind.0 as usize];
+            CellState { grade, ..kind.at(p) }
+        }
+    }
+    let mount = |yaw_deg| Mount { x_m: 10.0, y_m: 2.0, height_m: 1.0, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
+    for yaw_deg in [0.0, 30.0, -45.0] {
+        let mut map = polar::<30, 72>(&mount(yaw_deg), [-180.0, 180.0], 1.0).unwrap();
+        fill(&mut map, &Sides);
+        for azimuth in 0..72_u16 {
+            let bearing = (yaw_deg - 180.0 + 5.0 * (f32::from(azimuth) + 0.5) + 540.0).rem_euclid(360.0) - 180.0;
+            for range in [3, 12, 29] {
+                let cell = map.cell(azimuth.into(), range);
+                let expected = match bearing {
+                    b if b.abs() > 90.0 => Visibility::Unknown,
+                    b if b > 0.0 => Visibility::Visible,
+                    _ => Visibility::Invisible,
+                };
+                assert_eq!(cell.visibility, expected, "{yaw_deg} {bearing} {range}");
+                assert_eq!(cell.occupied, expected == Visibility::Invisible);
+            }
+        }
+    }
+    let refused = |azimuth_deg, cell_m| polar::<30, 72>(&mount(0.0), azimuth_deg, cell_m).unwrap_err().parameter;
+    assert_eq!(refused([-190.0, 0.0], 1.0), "azimuth_deg[0]");
+    assert_eq!(refused([20.0, 10.0], 1.0), "azimuth_deg[1]");
+    assert_eq!(refused([-20.0, 10.0], 0.0), "cell_m");
 }
 
 /// The same everywhere.
