@@ -23,11 +23,12 @@
 //! # Limits
 //! At most 8 sensors; `NX * NY * (3 * S + 2)` bytes. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
 //! A sensor that sends its last picture again and again with new times cannot be told from a road on which nothing moves: its
-//! others that see what it should can.
+//! [`Monitor`] can, where others see what it should.
 //!
 //! # Cost
 //! Some 15 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
+mod monitor;
 mod places;
 mod polar;
 mod view;
@@ -38,6 +39,7 @@ use crate::map::{CellState, Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
+pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
 use places::Places;
 pub use polar::{fill, polar};
 pub use view::{Conflict, Fused, FusedCell, Sensors};

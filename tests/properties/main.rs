@@ -15,6 +15,7 @@ mod configuration;
 mod detections;
 mod fusion;
 mod maps;
+mod monitor;
 mod radar_2d;
 mod radar_3d;
 mod stages;
