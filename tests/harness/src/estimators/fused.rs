@@ -8,7 +8,6 @@ use viewshed::sensor::road::RoadPoint;
 
 use super::Estimator;
 use super::camera_3d::time;
-use crate::evaluation::samples::Cell;
 use crate::recording::Frame;
 
 /// Cells of the road, of one metre.
@@ -31,13 +30,18 @@ struct Fused {
     steps: usize,
 }
 
-/// At most two estimators with their frames, on a grid around these cells. Maps are fused at each `every`-th frame, as no others are
+/// At most two estimators with their frames, on a grid around these cells of the road, metres. Maps are fused at each `every`-th frame, as no others are
 /// judged.
 ///
 /// # Errors
 /// A road larger than the grid.
-pub fn new(members: Vec<(Box<dyn Estimator>, Vec<Frame>)>, road: &[Cell], every: usize) -> Result<Box<dyn Estimator>> {
-    let ends = |of: fn(&Cell) -> i32| (road.iter().map(of).min().unwrap_or(0), road.iter().map(of).max().unwrap_or(0));
+pub fn new(
+    members: Vec<(Box<dyn Estimator>, Vec<Frame>)>,
+    road: &[(i32, i32)],
+    every: usize,
+) -> Result<Box<dyn Estimator>> {
+    let ends =
+        |of: fn(&(i32, i32)) -> i32| (road.iter().map(of).min().unwrap_or(0), road.iter().map(of).max().unwrap_or(0));
     let ((x, x_end), (y, y_end)) = (ends(|c| c.0), ends(|c| c.1));
     let long = [x_end - x, y_end - y].into_iter().max().unwrap_or(0) as usize;
     ensure!(long < CELLS, "the road is {long} m long or wide; {CELLS} m can be fused");

@@ -105,6 +105,11 @@ fn assembly(instructions: &[Instruction]) -> String {
             }
             "bl" => writeln!(text, "b #4"),
             "blx" => writeln!(text, "bx {operands}"),
+            // the model has no comparison with zero
+            _ if name.starts_with("vcmp") && operands.ends_with("#0") => {
+                let register = operands.split(',').next().unwrap_or_default();
+                writeln!(text, "{name}{kind} {register}, {register}")
+            }
             // of 16 bits, so that each condition reaches
             _ if operands.starts_with("#0x") && name.starts_with('b') && !name.starts_with("bk") => {
                 writeln!(text, "{name} #4")
@@ -138,6 +143,7 @@ mod tests {
             ("bl", "#0x919a"),
             ("cbz", "r2, #0x94da"),
             ("bne.w", "#0x10"),
+            ("vcmp.f32", "s2, #0"),
             ("bic", "r0, r0, #1"),
         ];
         let instruction = |(mnemonic, operands): (&str, &str)| Instruction {
@@ -149,7 +155,7 @@ mod tests {
         let text = assembly(&lines.map(instruction));
         assert_eq!(
             text,
-            "add r0, #1\nadd.w r0, #2\nlsls r1, r4, #14\nvmov.f32 s0, s1\nb #4\ncbz r2, #4\nbne #4\nbic r0, r0, #1\n"
+            "add r0, #1\nadd.w r0, #2\nlsls r1, r4, #14\nvmov.f32 s0, s1\nb #4\ncbz r2, #4\nbne #4\nvcmp.f32 s2, s2\nbic r0, r0, #1\n"
         );
     }
 }

@@ -8,6 +8,7 @@ use super::table::{Extent, tables};
 use super::{ORIGIN, percent};
 use crate::evaluation::bounds::SLICE;
 use crate::evaluation::summary::Row;
+use crate::studies::experiment::monitoring::Alerts;
 use crate::studies::experiment::several_sensors::{Counted, Shown};
 
 /// The experiment as text.
@@ -18,12 +19,14 @@ pub fn text(all: &[Counted], extent: Extent) -> String {
         let Some((_, first)) = counted.rows.first() else { continue };
         let summary = &first.summary;
         text += &format!(
-            "{}: {} frames, {} trajectories\n{}\nOn the road of both:\n{}\n\n",
+            "{}: {} frames, {} trajectories\n{}\nOn the road of both:\n{}\n\nEach watched by the other, in order, and with a third of its \
+             view dark:\n{}\n\n",
             counted.name,
             summary.frames,
             summary.objects,
             rates(counted, extent),
-            road(counted, extent)
+            road(counted, extent),
+            watched(counted, extent)
         );
     }
     if all.len() > 1 {
@@ -53,6 +56,29 @@ fn road(counted: &Counted, extent: Extent) -> String {
         [name.clone()].into_iter().chain(shares.map(percent)).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<String>> = counted.rows.iter().zip(&counted.shown).map(row).collect();
+    tables(&heading, &rows, 1, extent)
+}
+
+fn watched(counted: &Counted, extent: Extent) -> String {
+    let heading = [
+        "a miss counts",
+        "sectors\ndark",
+        "named",
+        "within\n10 s",
+        "after s,\nmean",
+        "slowest\ns",
+        "wrong alerts\nan hour",
+    ];
+    let number = |v: Option<f64>| v.map_or_else(|| "n/a".into(), |v| format!("{v:.1}"));
+    let row = |(name, a): (&str, &Alerts)| {
+        let mean = (a.named > 0).then(|| a.named_after_s / a.named as f64);
+        let slowest = (a.named > 0).then_some(a.slowest_s);
+        let counts = [a.dark, a.named, a.within_10_s].map(|n| n.to_string());
+        let rest = [mean, slowest, a.wrong_per_hour()].map(number);
+        [name.to_owned()].into_iter().chain(counts).chain(rest).collect::<Vec<_>>()
+    };
+    let names = ["where its map says visible", "wherever it looks"];
+    let rows: Vec<Vec<String>> = names.into_iter().zip(&counted.watched).map(row).collect();
     tables(&heading, &rows, 1, extent)
 }
 
@@ -94,7 +120,9 @@ pub fn json(all: &[Counted], plan: &Value, options: Options) -> Result<String> {
         let rows = counted.rows.iter().zip(&counted.shown).map(|((name, replay), shown)| {
             json!({"name": name, "report": replay_json::report(replay, None, &[], options), "on_the_road_of_both": shown})
         });
-        json!({"name": counted.name, "rows": rows.collect::<Vec<_>>()})
+        let [with, without] = counted.watched;
+        let watched = json!({"with_visibility": with, "without": without});
+        json!({"name": counted.name, "rows": rows.collect::<Vec<_>>(), "watched": watched})
     };
     let all = json!({ "sites": all.iter().map(site).collect::<Vec<_>>(), "plan": plan, "origin": ORIGIN });
     Ok(serde_json::to_string_pretty(&all)? + "\n")

@@ -6,6 +6,8 @@
 //! [`several_sensors`] are two on one road.
 
 pub mod gantry_camera;
+pub mod monitoring;
+mod pair;
 pub mod plan;
 pub mod scenes;
 pub mod several_sensors;

@@ -11,8 +11,10 @@ use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::monitoring::{self, Worth};
+use super::pair::{estimator, newest};
 use super::plan;
-use crate::estimators::{self, Estimator, fused};
+use crate::estimators::{Estimator, fused};
 use crate::evaluation::counts::rate;
 use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
@@ -64,9 +66,6 @@ pub struct Second {
 
 /// Draws of the second radar are its own: its frames have numbers no frame of the first has.
 const SECOND: u64 = 1 << 32;
-
-/// How old the newest frame of a sensor may be to count, ns.
-const LATEST_NS: i64 = 150_000_000;
 
 impl Plan {
     /// Reads a plan.
@@ -183,12 +182,15 @@ pub struct Counted {
     pub rows: Vec<(String, Replay)>,
     /// In the same order, all on the road of the set.
     pub shown: Vec<Shown>,
+    /// Each sensor watched by the other.
+    pub watched: Worth,
 }
 
 struct SiteResult {
     name: String,
     rows: Vec<(String, Seconds)>,
     shown: Vec<Shown>,
+    watched: Worth,
 }
 
 /// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged.
@@ -212,7 +214,11 @@ pub fn run(plan: &Plan, settings: &Settings, every: usize, progress: &(dyn Fn() 
         let rows = (0..first.rows.len()).map(row).collect::<Option<Vec<_>>>()?;
         let mut shown = vec![Shown::default(); first.shown.len()];
         sites.iter().for_each(|site| shown.iter_mut().zip(&site.shown).for_each(|(sum, one)| *sum += *one));
-        Some(Counted { name: name.to_owned(), rows, shown })
+        let mut watched = Worth::default();
+        for site in sites {
+            watched.iter_mut().zip(site.watched).for_each(|(sum, one)| *sum += one);
+        }
+        Some(Counted { name: name.to_owned(), rows, shown, watched })
     };
     let all: Vec<&SiteResult> = sites.iter().collect();
     let pooled = counted("pooled", &all).into_iter();
@@ -280,12 +286,6 @@ fn recordings(plan: &Plan, site: &Site, settings: &Settings, progress: &(dyn Fn(
     Ok([first, other])
 }
 
-fn estimator(recording: &Recording, settings: &Settings) -> Result<Box<dyn Estimator>> {
-    let all = estimators::all(recording, &settings.estimators)?;
-    let own = ["radar-3d", "camera-3d"];
-    all.into_iter().find(|e| own.contains(&e.name())).context("no estimator for the sensor")
-}
-
 fn site_of(
     plan: &Plan,
     site: &Site,
@@ -338,19 +338,14 @@ fn site_of(
     rows.iter_mut().zip(names).for_each(|((row, _), sensor)| *row = format!("{row}, {sensor}"));
     let name = site.scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = site.fcd.as_ref().map_or(name.clone(), |fcd| format!("{name}, {}", plan_name(fcd)));
-    Ok(SiteResult { name, rows, shown })
+    let watched = monitoring::watch(&both, settings)?;
+    Ok(SiteResult { name, rows, shown, watched })
 }
 
 /// `day-1` of `motorway/day-1.fcd.xml.gz`.
 fn plan_name(fcd: &Path) -> String {
     let file = fcd.file_name().unwrap_or_default().to_string_lossy();
     file.split('.').next().unwrap_or_default().to_owned()
-}
-
-/// A sensor's newest frame at a time.
-fn newest(recording: &Recording, time_ns: i64) -> Option<usize> {
-    let k = recording.frames.partition_point(|f| f.time_ns <= time_ns).checked_sub(1)?;
-    (time_ns - recording.frames[k].time_ns <= LATEST_NS).then_some(k)
 }
 
 /// What the set is judged on at each of the first sensor's frames: all objects and cells that any sensor is judged on.
