@@ -305,7 +305,7 @@ fn site_of(
         })
         .collect();
     let [first, second] = &both;
-    let union = union(&both, &samples, evaluation);
+    let union = union(&both, &samples);
     let grid = evaluation.grid;
     let judge = |running: &mut dyn Estimator, recording: &Recording, samples: &[FrameSamples]| {
         score(running, recording, samples, grid, &|| progress())
@@ -349,11 +349,7 @@ fn plan_name(fcd: &Path) -> String {
 }
 
 /// What the set is judged on at each of the first sensor's frames: all objects and cells that any sensor is judged on.
-fn union(
-    both: &[Recording; 2],
-    samples: &[Vec<FrameSamples>],
-    options: &crate::evaluation::Options,
-) -> Vec<FrameSamples> {
+fn union(both: &[Recording; 2], samples: &[Vec<FrameSamples>]) -> Vec<FrameSamples> {
     let Some(truth) = &both[0].truth else { return Vec::new() };
     let of_frame = |(frame, own): (&Frame, &FrameSamples)| {
         if !own.counted {
@@ -387,7 +383,6 @@ fn union(
         }
         FrameSamples { counted: true, objects: objects.into_values().collect(), cells: cells.into_iter().collect() }
     };
-    let _ = options;
     both[0].frames.par_iter().zip(&samples[0]).map(of_frame).collect()
 }
 
@@ -460,7 +455,7 @@ mod tests {
         second.iter_mut().for_each(|f| f.cells = vec![((20, 9), true), ((22, 9), false)]);
         first[0].counted = false;
         let samples = vec![first, second];
-        let set = union(&both, &samples, &Default::default());
+        let set = union(&both, &samples);
         assert!(!set[0].counted && set[1].counted);
         let objects: Vec<(usize, bool, bool)> =
             set[1].objects.iter().map(|o| (o.track, o.detected, o.slice_in_sight)).collect();
