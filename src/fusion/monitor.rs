@@ -43,7 +43,7 @@ pub struct MonitorConfig {
 
 impl Default for MonitorConfig {
     fn default() -> Self {
-        Self { usual_miss: 0.3, blind_miss: 0.9, threshold: 6.0, window_ms: 500 }
+        Self { usual_miss: 0.5, blind_miss: 0.9, threshold: 8.0, window_ms: 500 }
     }
 }
 

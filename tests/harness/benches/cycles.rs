@@ -2,7 +2,7 @@
 //!
 //! Runs the firmware of `mps2-an386` over the first 60 frames of the shipped recording in QEMU, counts its blocks of instructions,
 //! and adds up what they cost by Arm's table and by LLVM's model (`viewshed_harness::boards::cycles`). Needs QEMU and llvm-mca. No
-//! controller was measured.
+//! controller was measured. A frame is the estimator and its map into messages.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -32,19 +32,21 @@ impl Block {
     }
 }
 
-/// Parts of a function's name that make it one of the estimator, or of what is neither: then it belongs to who called it.
-const ESTIMATOR: [&str; 7] = [
-    "5rooms5frame",
-    "5rooms4grid",
-    "5rooms9obstacles",
-    "5rooms8radar_3d",
-    "5rooms5fixed",
-    "5rooms6sensor",
-    "5rooms3map",
-];
-const ANYBODY: [&str; 3] = ["compiler_builtins", "__aeabi_", "mem"];
+/// Parts of the names of functions that work on a frame: the estimator, and its map into messages. A method of a trait is named in
+/// another way.
+const OF_A_FRAME: [&str; 9] =
+    ["frame", "grid", "obstacles", "radar_3d", "fixed", "sensor", "map", "wire", "unit17Unit"];
+/// Of functions that anybody calls: what they do is done for the caller.
+const ANYBODYS: [&str; 6] = ["compiler_builtins", "__aeabi_", "memcpy", "memset", "memcmp", "int_sqrt"];
 
-/// Runs an image in a folder with its job in it, and gives the blocks of the estimator that ran.
+fn is_of_a_frame(function: &str) -> bool {
+    let room =
+        |from: &str| function.split_once(from).map(|(_, rest)| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
+    let rooms = [room("viewshed5rooms"), room("viewshed..rooms..")].into_iter().flatten().next();
+    rooms.is_some_and(|rest| OF_A_FRAME.iter().any(|name| rest.starts_with(name)))
+}
+
+/// Runs an image in a folder with its job in it, and gives the blocks of its frames that ran.
 ///
 /// # Errors
 /// No emulator, or a log without blocks.
@@ -64,7 +66,7 @@ pub fn run(image: &Path, folder: &Path) -> Result<Vec<Block>> {
     let status = child.wait()?;
     let blocks = blocks?;
     if !status.success() || blocks.is_empty() {
-        bail!("the emulator ended with {status} after {} blocks of the estimator", blocks.len());
+        bail!("the emulator ended with {status} after {} blocks of its frames", blocks.len());
     }
     Ok(blocks)
 }
@@ -76,7 +78,7 @@ pub fn run(image: &Path, folder: &Path) -> Result<Vec<Block>> {
 pub fn read(mut log: impl BufRead) -> Result<Vec<Block>> {
     let mut blocks: HashMap<u32, Block> = HashMap::new();
     let mut line = Vec::new();
-    // the block that is being listed, the one that ran last, and whether the estimator is at work
+    // the block that is being listed, the one that ran last, and whether a frame is worked on
     let (mut listed, mut last, mut at_work) = (None, None, false);
     loop {
         line.clear();
@@ -90,8 +92,8 @@ pub fn read(mut log: impl BufRead) -> Result<Vec<Block>> {
             if let Some(before) = last.take().and_then(|start| blocks.get_mut(&start)) {
                 before.jumped += u64::from(before.end() != Some(address));
             }
-            if !ANYBODY.iter().any(|part| function.contains(part)) {
-                at_work = ESTIMATOR.iter().any(|part| function.contains(part));
+            if !ANYBODYS.iter().any(|part| function.contains(part)) {
+                at_work = is_of_a_frame(function);
             }
             if let (true, Some(block)) = (at_work, blocks.get_mut(&address)) {
                 block.times += 1;
@@ -131,7 +133,7 @@ fn instruction(line: &str) -> Option<Instruction> {
 
 #[cfg(test)]
 mod tests {
-    use super::read;
+    use super::{is_of_a_frame, read};
 
     const LOG: &str = "\
 ----------------
@@ -156,7 +158,26 @@ Trace 0: 0x7fdce8000500 [00800408/0000919e/00000110/ff000200] __aeabi_memcpy
 ";
 
     #[test]
-    fn blocks_of_the_estimator_are_counted_and_what_they_call() {
+    fn functions_of_a_frame_are_told_by_their_names() {
+        for name in [
+            "_ZN8viewshed5rooms4grid7raycast4cast17h0E",
+            "_ZN103_$LT$viewshed..rooms..radar_3d..Radar3d$LT$_$GT$$u20$as$u20$viewshed..rooms..estimator..Estimator$GT$7process17h0E",
+            "_ZN8viewshed5rooms4unit17Unit$LT$E$C$S$GT$5frame17h0E",
+        ] {
+            assert!(is_of_a_frame(name), "{name}");
+        }
+        for name in [
+            "Reset",
+            "_ZN8viewshed5bench3run3run17h0E",
+            "_ZN8viewshed5rooms4unit5build17h0E",
+            "_ZN4libm4math4sqrt5sqrtf17h0E",
+        ] {
+            assert!(!is_of_a_frame(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn blocks_of_a_frame_are_counted_and_what_they_call() {
         let mut blocks = read(LOG.as_bytes()).unwrap();
         blocks.sort_by_key(|block| block.instructions[0].address);
         let [compared, copied] = &blocks[..] else { panic!("{blocks:?}") };
