@@ -64,7 +64,7 @@ impl Default for EvidenceConfig {
             hidden_memory_s: 5.0,
             visible_memory_s: 1.0,
             height_prior_m: 0.5,
-            height_prior_sigma_m: 0.4,
+            height_prior_sigma_m: 1.5,
         }
     }
 }

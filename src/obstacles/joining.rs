@@ -1,5 +1,6 @@
 //! Parts of one vehicle that were taken for several.
 
+use super::body::LONGEST_LOW_CM;
 use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::BIN_CM;
@@ -40,7 +41,10 @@ impl Obstacle {
             && hypot_gate(dvx, dvy) <= t.coupled_speed
             && left.abs() <= t.merge_lateral_cm;
         let widest = if coupled { self.headway_cm(t.coupled_headway, t) } else { self.gap_cm(t) };
-        gap <= widest && length <= t.max_length_cm
+        // nothing low is as long as a lorry
+        let low = self.tallness.is_low() && other.tallness.is_low();
+        let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
+        gap <= widest && length <= longest
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
@@ -106,6 +110,7 @@ mod tests {
     use super::super::by_hand::{rules, seen_at};
     use super::super::obstacle::MOST_WEIGHT;
     use super::super::profile::Extent;
+    use super::super::tallness::Tallness;
     use super::*;
     use crate::fixed::trig::Direction;
 
@@ -119,6 +124,14 @@ mod tests {
         b.extent = Extent { rear_cm: -200, front_cm: 200 };
         (a.lateral_weight, b.lateral_weight) = (MOST_WEIGHT, MOST_WEIGHT);
         (a, b)
+    }
+
+    /// Certain to be low.
+    fn low() -> Tallness {
+        let mut t = Tallness::default();
+        (0..100).for_each(|_| t.add(70, 30));
+        assert!(t.is_low());
+        t
     }
 
     #[test]
@@ -141,6 +154,19 @@ mod tests {
         let (mut a, b) = two(600, 0, 2000);
         a.extent.rear_cm = -1000;
         assert!(!a.is_one_with(&b, &t));
+    }
+
+    #[test]
+    fn two_cars_close_behind_each_other_are_not_joined_to_a_lorry() {
+        let t = rules();
+        let (mut a, mut b) = two(250, 0, 2000);
+        a.tallness = low();
+        assert!(a.is_one_with(&b, &t), "one of them may be high");
+        b.tallness = low();
+        assert!(!a.is_one_with(&b, &t), "10.5 m");
+        let (mut a, mut b) = two(50, 0, 2000);
+        (a.tallness, b.tallness) = (low(), low());
+        assert!(a.is_one_with(&b, &t), "8.5 m");
     }
 
     #[test]

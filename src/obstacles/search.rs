@@ -1,5 +1,6 @@
 //! Which detections can belong to an obstacle, and how well they fit.
 
+use super::body::LONGEST_LOW_CM;
 use super::gathered::{sigma_across, sigma_along};
 use super::obstacle::Obstacle;
 use super::profile::Extent;
@@ -37,6 +38,8 @@ pub(super) struct Search {
     /// The square which that spans: its corner of least coordinates, and its side.
     corner: (i32, i32),
     side_cm: u32,
+    /// Whether it is low for certain, and so no lorry.
+    is_low: bool,
 }
 
 /// A detection in an obstacle's axes, centimetres.
@@ -105,7 +108,9 @@ impl Search {
     /// to this obstacle.
     pub fn misfit(&self, r: &Reflection, offset: Offset, error: i32, t: &Tracking) -> Option<i32> {
         let Offset { left, beside, beyond } = offset;
-        if self.extent.length_cm() + beyond > t.max_length_cm + LENGTH_TO_SPARE_CM {
+        let stretched = self.extent.length_cm() + beyond;
+        if stretched > t.max_length_cm + LENGTH_TO_SPARE_CM || (self.is_low && beyond > 0 && stretched > LONGEST_LOW_CM)
+        {
             return None;
         }
         // far along the vehicle or far to its side, but not both
@@ -141,6 +146,7 @@ impl Obstacle {
             reach_cm,
             corner: (anchor.0 - reach_cm, anchor.1 - reach_cm),
             side_cm: 2 * reach_cm.unsigned_abs(),
+            is_low: self.tallness.is_low(),
         }
     }
 }
@@ -151,6 +157,24 @@ mod tests {
     use super::*;
 
     const AHEAD: Direction = Direction::AHEAD;
+
+    #[test]
+    fn what_is_low_for_certain_does_not_grow_to_a_lorry() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        o.extent = Extent { rear_cm: -225, front_cm: 225 };
+        let fits = |o: &Obstacle, x_cm: i32| {
+            let (search, r) = (o.search(&t), seen_at(x_cm, 0, 2000));
+            search.offset(&r, &t).and_then(|offset| search.misfit(&r, offset, 0, &t)).is_some()
+        };
+        assert!(fits(&o, 5700), "9.25 m in all");
+        (0..100).for_each(|_| o.tallness.add(70, 30));
+        assert!(!fits(&o, 5700));
+        assert!(fits(&o, 5600), "8.25 m in all");
+        // one that is longer already keeps what lies within it
+        o.extent = Extent { rear_cm: -600, front_cm: 600 };
+        assert!(fits(&o, 5550) && !fits(&o, 5650));
+    }
 
     #[test]
     fn a_wheel_turns_the_way_its_vehicle_drives_between_standstill_and_twice_its_speed() {
