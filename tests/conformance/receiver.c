@@ -1,6 +1,6 @@
 /* The C receiver of tests/receiver, fed and answering as README.md beside this says.
  *
- *     cc -std=c11 -O2 -o receiver tests/conformance/receiver.c
+ *     cc -std=c11 -O3 -o receiver tests/conformance/receiver.c
  */
 #define RECEIVER_WITHOUT_MAIN
 #include "../receiver/receiver.c"
@@ -53,22 +53,25 @@ static void answer(const sensor_t *s, uint64_t asked, bool cells) {
     uint64_t now = watch(asked);
     static char rows[AZIMUTHS * (CELLS + 1) + 1];
     uint8_t states[CELLS];
-    int count[3] = {0, 0, 0}, azimuths = trusted(s, now) ? s->azimuths : 0, n = 0;
+    int visible = 0, known = 0, azimuths = trusted(s, now) ? s->azimuths : 0, n = 0;
     uint32_t sum = 0xFFFFFFFF;
     for (int a = 0; a < azimuths; a++) {
         states_of(s, now, a, states);
-        for (int c = 0; c < s->ranges; c++) count[states[c]]++;
+        for (int c = 0; c < s->ranges; c++) {
+            visible += states[c] == 2;
+            known += states[c] != 0;
+        }
         sum = crc32_of(sum, states, s->ranges);
         if (!cells) continue;
         rows[n++] = ' ';
         for (int c = 0; c < s->ranges; c++) rows[n++] = "?#."[states[c]];
     }
-    bool nothing = count[1] + count[2] == 0;
+    bool nothing = known == 0;
     rows[nothing ? 0 : n] = 0;
     if (cells)
         printf("%" PRIu64 "%s\n", asked, rows);
     else
-        printf("%" PRIu64 " %d %d %08" PRIx32 "\n", asked, count[2], count[1], nothing ? 0 : ~sum);
+        printf("%" PRIu64 " %d %d %08" PRIx32 "\n", asked, visible, known - visible, nothing ? 0 : ~sum);
 }
 
 int main(void) {

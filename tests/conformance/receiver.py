@@ -106,10 +106,12 @@ class Header:
 NO_CELLS = (1, 0, 0)
 
 
+@lru_cache(maxsize=None)             # of at most 257 * 257 pairs
 def cells_between(near, end):
     return (1 << end) - 1 >> near << near
 
 
+@lru_cache(maxsize=4096)
 def edges_of(ray):
     """A bit for each edge."""
     near, end, bits = ray
@@ -423,7 +425,8 @@ class Receiver:
 
     def look(self, t):
         """What `states_of` says of each azimuth, azimuth 0 first; None if nothing is shown."""
-        return self.sensor.look(self.time(t))
+        t = self.time(t)                # first: it may put another in the sensor's place
+        return self.sensor.look(t)
 
 
 class Sensor:

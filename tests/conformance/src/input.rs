@@ -46,6 +46,16 @@ pub enum Input {
 }
 
 impl Input {
+    /// By the receiver's clock.
+    pub fn time(&self) -> Option<u64> {
+        match self {
+            Self::Start { .. } => None,
+            Self::Frame { time, .. } | Self::Bytes { time, .. } | Self::Look { time } | Self::Cells { time } => {
+                Some(*time)
+            }
+        }
+    }
+
     /// As a frame of this bus.
     pub fn frame(&self, bus: Bus) -> Option<CanFrame> {
         let Self::Frame { id, data, .. } = self else { return None };

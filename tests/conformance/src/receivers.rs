@@ -19,7 +19,7 @@ pub fn c(folder: &Path) -> Result<Option<Program>> {
     }
     let target: PathBuf = folder.join("receiver-in-c");
     let output = Command::new("cc")
-        .args(["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-o"])
+        .args(["-std=c11", "-O3", "-Wall", "-Wextra", "-Werror", "-o"])
         .arg(&target)
         .arg(Path::new(HERE).join("receiver.c"))
         .output()

@@ -126,6 +126,14 @@ impl World {
         Ok(Self { made_up, lives, inputs, drained, strict_to })
     }
 
+    /// At the end another look, so much before the last time by the receiver's clock.
+    pub fn look_again(&mut self, back_us: u64) {
+        let last = self.inputs.last().and_then(|(at, input)| Some((*at, input.time()?)));
+        if let Some((at, time)) = last {
+            self.inputs.push((at, Input::Look { time: time.saturating_sub(back_us) }));
+        }
+    }
+
     /// The lines that are fed to a receiver.
     pub fn lines(&self) -> impl Iterator<Item = &Input> {
         self.inputs.iter().map(|(_, input)| input)
