@@ -186,8 +186,6 @@ mod tests {
     fn the_longest_part_ends_where_nothing_reflects_for_long() {
         let whole = Extent { rear_cm: -580, front_cm: 580 };
         // two cars 2 m from each other, and a lorry whose axles are as far apart
-        let cars = profile(&[(-580, 20), (-300, 20), (-110, 20), (110, 20), (300, 20), (580, 20)]);
-        assert_eq!(cars.longest_part_cm(&whole, 150), 1200, "no gap of 1.5 m is left between places 1.9 m apart");
         let cars =
             profile(&[(-580, 20), (-420, 20), (-270, 20), (-110, 20), (110, 20), (270, 20), (420, 20), (580, 20)]);
         assert_eq!(cars.longest_part_cm(&whole, 150), 500);
