@@ -64,7 +64,7 @@ impl Default for EvidenceConfig {
             hidden_memory_s: 5.0,
             visible_memory_s: 1.0,
             height_prior_m: 0.5,
-            height_prior_sigma_m: 1.5,
+            height_prior_sigma_m: 0.4,
         }
     }
 }
@@ -74,9 +74,6 @@ const SIGHTS: u8 = 6;
 
 /// Range cells to each side of its own that a detection's evidence reaches at most.
 const MOST_REACH: i32 = 8;
-
-/// Greatest standard deviation of a height that was not measured, centimetres: nothing is filled far above the prior.
-const UNMEASURED_SIGMA_CM: i32 = 40;
 
 /// Steps of the Gaussian table to one standard deviation.
 const STEPS_PER_SIGMA: i32 = 16;
@@ -167,7 +164,7 @@ impl InverseSensor {
                     math::mul_shift(noise, weight, 8),
                 )
             }
-            None => (self.height_prior_cm, prior.min(UNMEASURED_SIGMA_CM * UNMEASURED_SIGMA_CM)),
+            None => (self.height_prior_cm, prior),
         };
         (height, (math::root(variance.unsigned_abs()) as i32).max(1))
     }
@@ -429,15 +426,14 @@ mod tests {
         let (_, axes) = axes();
         let sensor = EvidenceConfig::default().inverse_sensor(&NoiseConfig::default(), &axes).unwrap();
         let height = |measured, sigma| sensor.height(&Reflection { height_cm: Some((measured, sigma)), ..ahead(3050) });
-        // half a metre by default; 0.4 m uncertain where nothing was measured, 1.5 m where it was
+        // half a metre by default, 0.4 m uncertain
         assert_eq!(sensor.height(&ahead(3050)), (50, 40));
         let (sure, sigma) = height(300, 4);
         assert!((295..=300).contains(&sure) && sigma <= 4, "{sure} {sigma}");
-        let (equal, sigma) = height(300, 150);
-        assert!((equal - 175).abs() <= 2 && (sigma - 106).abs() <= 1, "{equal} {sigma}");
-        let (vague, sigma) = height(300, 1500);
-        // the weight has 8 bits
-        assert!((50..=54).contains(&vague) && (130..=150).contains(&sigma), "{vague} {sigma}");
+        let (equal, sigma) = height(300, 40);
+        assert!((equal - 175).abs() <= 2 && (sigma - 28).abs() <= 1, "{equal} {sigma}");
+        let (vague, sigma) = height(300, 400);
+        assert!((50..=54).contains(&vague) && (34..=40).contains(&sigma), "{vague} {sigma}");
     }
 
     #[test]

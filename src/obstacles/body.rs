@@ -8,10 +8,6 @@ use crate::obstacles::solid::Solid;
 
 /// Greatest length of what is low, centimetres.
 pub(super) const LONGEST_LOW_CM: i32 = 900;
-/// Greatest length of a car's outline, and shortest gap between two that are taken for one, centimetres: less than
-/// vehicles leave when they stand, for noise fills a part of it.
-const CAR_CM: i32 = 600;
-const GAP_CM: i32 = 150;
 
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
@@ -19,9 +15,8 @@ impl Obstacle {
         let tall = self.tallness.floor_cm();
         let seen = self.extent.length_cm();
         let size = t.sizes.of(seen.max(self.remembered_length_cm(t)).max(t.sizes.least_length_cm(tall)));
-        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
-        let may_be_low = size.length_cm < LONGEST_LOW_CM || self.is_a_row_of_cars();
-        let lid = if may_be_low { self.tallness.ceiling_cm() } else { i32::MAX };
+        // what is as long as a lorry may be one that shows nothing high
+        let lid = if size.length_cm < LONGEST_LOW_CM { self.tallness.ceiling_cm() } else { i32::MAX };
         let margin = if self.free_heading { t.own_way_margin_cm } else { 0 };
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
@@ -39,11 +34,6 @@ impl Obstacle {
             half_width_cm: size.width_cm / 2 + margin,
             height_cm: size.height_cm.min(lid).max(tall),
         }
-    }
-
-    /// Whether its outline has gaps, and no part between them is longer than a car: a lorry reflects all along.
-    fn is_a_row_of_cars(&self) -> bool {
-        self.profile.longest_part_cm(&self.extent, GAP_CM) <= CAR_CM
     }
 
     /// How far the middle of its width lies behind its detections, centimetres. A radar beside a
@@ -67,7 +57,6 @@ mod tests {
     use super::super::obstacle::Obstacle;
     use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
-    use crate::frame::reflection::Reflection;
     use std::vec::Vec;
 
     const AHEAD: Direction = Direction::AHEAD;
@@ -102,33 +91,6 @@ mod tests {
         assert!((both - 10.0).abs() < 0.5, "{both} m");
         let behind = middle_of(&[2.0], 90.0);
         assert!((behind - 2.0).abs() < 0.3, "{behind} m");
-    }
-
-    /// Height of the box of something low for certain that reflects at these places along it, metres.
-    fn height_of(places_m: &[f64]) -> f64 {
-        let t = rules();
-        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
-        for _ in 0..40 {
-            o.fade_outline(63_000);
-            for x in places_m {
-                let r = reflection([50.0 + x, 0.0], [20.0, 0.0]);
-                o.absorb(&Reflection { height_cm: Some((70, 30)), ..r }, &t);
-            }
-        }
-        o.update_extent(&t);
-        assert!(o.extent.length_cm() > 1000, "{:?}", o.extent);
-        f64::from(o.solid(&t).height_cm) / 100.0
-    }
-
-    #[test]
-    fn two_cars_taken_for_one_vehicle_are_low_and_a_lorry_is_not() {
-        let cars = [-5.6, -4.5, -3.2, -2.0, -1.2, 1.2, 2.0, 3.2, 4.5, 5.6];
-        assert!(height_of(&cars) < 1.7, "{}", height_of(&cars));
-        let lorry = [-5.6, -4.5, -3.2, -2.0, -1.2, 0.0, 1.2, 2.0, 3.2, 4.5, 5.6];
-        assert!(height_of(&lorry) > 3.0, "{}", height_of(&lorry));
-        // a tractor, a gap, and the axles of its trailer
-        let trailer = [-5.6, -4.5, -3.2, -2.0, -1.2, 0.0, 1.2, 5.6];
-        assert!(height_of(&trailer) > 3.0, "{}", height_of(&trailer));
     }
 
     #[test]

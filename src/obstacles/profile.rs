@@ -97,25 +97,6 @@ impl Profile {
         Some(Extent { rear_cm: self.centre_of_pair(first), front_cm: self.centre_of_pair(last) })
     }
 
-    /// Longest part of an outline between gaps of at least `gap_cm`, which hardly reflect: bins with less than a
-    /// tenth of the mean. The whole outline where there is no such gap.
-    pub fn longest_part_cm(&self, extent: &Extent, gap_cm: i32) -> i32 {
-        let bin = |along: i32| usize::try_from(along.div_euclid(BIN_CM) + BINS as i32 / 2).unwrap_or(0);
-        let held = self.bins.get(bin(extent.rear_cm)..=bin(extent.front_cm).min(BINS - 1)).unwrap_or(&[]);
-        let total = held.iter().map(|b| i32::from(*b)).sum::<i32>();
-        let (mut longest, mut part, mut gap) = (0, 0, 0);
-        for b in held {
-            if i32::from(*b) * 10 * (held.len() as i32) < total {
-                gap += BIN_CM;
-                continue;
-            }
-            part = if gap >= gap_cm { 0 } else { part + gap } + BIN_CM;
-            gap = 0;
-            longest = longest.max(part);
-        }
-        longest
-    }
-
     /// Centre of gravity of the bins `i` and `i + 1`, centimetres from the anchor.
     fn centre_of_pair(&self, i: usize) -> i32 {
         let [a, b] = match self.bins.get(i..i + 2) {
@@ -180,39 +161,6 @@ mod tests {
         assert_eq!(e.beyond_cm(e.front_cm + 70), 70);
         assert_eq!(e.beyond_cm(e.rear_cm - 30), 30);
         assert_eq!(e.beyond_cm(0), 0);
-    }
-
-    #[test]
-    fn the_longest_part_ends_where_nothing_reflects_for_long() {
-        let whole = Extent { rear_cm: -580, front_cm: 580 };
-        // two cars 2 m from each other, and a lorry whose axles are as far apart
-        let cars =
-            profile(&[(-580, 20), (-420, 20), (-270, 20), (-110, 20), (110, 20), (270, 20), (420, 20), (580, 20)]);
-        assert_eq!(cars.longest_part_cm(&whole, 150), 500);
-        let stray = profile(&[
-            (-580, 40),
-            (-420, 40),
-            (-270, 40),
-            (-110, 40),
-            (0, 1),
-            (110, 40),
-            (270, 40),
-            (420, 40),
-            (580, 40),
-        ]);
-        assert_eq!(stray.longest_part_cm(&whole, 150), 500, "one stray fills no gap");
-        let lorry = profile(&[
-            (-580, 20),
-            (-420, 20),
-            (-270, 20),
-            (-110, 20),
-            (0, 20),
-            (110, 20),
-            (270, 20),
-            (420, 20),
-            (580, 20),
-        ]);
-        assert_eq!(lorry.longest_part_cm(&whole, 150), 1200);
     }
 
     #[test]

@@ -67,9 +67,6 @@ fn length(v: Ground) -> f64 {
 
 /// Greatest length of what is low.
 const LONGEST_LOW: f64 = 9.0;
-/// Greatest length of a car's outline, and shortest gap between two that are taken for one.
-const CAR: f64 = 6.0;
-const CARS_APART: f64 = 1.5;
 
 impl Obstacle {
     pub fn new(seed: &Placed, heading: Ground, speed: f64) -> Self {
@@ -384,9 +381,8 @@ impl Obstacle {
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
         let [x, y] = moved(middle, left(self.heading), away(unseen, aside));
-        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
-        let row_of_cars = self.profile.longest_part(&self.extent, CARS_APART) <= CAR;
-        let lid = if length < LONGEST_LOW || row_of_cars { self.tallness.ceiling() } else { f64::INFINITY };
+        // what is as long as a lorry may be one that shows nothing high
+        let lid = if length < LONGEST_LOW { self.tallness.ceiling() } else { f64::INFINITY };
         let height = height.min(lid).max(tall);
         let margin = if self.free_heading { rules.own_way_margin } else { 0.0 };
         let yaw_rad = self.heading[1].atan2(self.heading[0]);

@@ -79,19 +79,6 @@ impl Profile {
         Some(Extent { rear: gravity(first), front: gravity(last) })
     }
 
-    /// Longest part of an outline between gaps of at least `gap`, in which bins have less than a tenth of the mean.
-    pub fn longest_part(&self, extent: &Extent, gap: f64) -> f64 {
-        let bin = |along: f64| ((along / BIN_M).floor() + BINS as f64 / 2.0).clamp(0.0, BINS as f64 - 1.0) as usize;
-        let held = &self.0[bin(extent.rear)..=bin(extent.front)];
-        let mean = held.iter().sum::<f64>() / held.len() as f64;
-        let filled: Vec<usize> = (0..held.len()).filter(|&i| held[i] >= mean / 10.0).collect();
-        let apart = |p: &[usize]| (p[1] - p[0] - 1) as f64 * BIN_M >= gap;
-        filled
-            .chunk_by(|a, b| !apart(&[*a, *b]))
-            .map(|part| (part[part.len() - 1] - part[0] + 1) as f64 * BIN_M)
-            .fold(0.0, f64::max)
-    }
-
     /// Moves the anchor forward by whole bins.
     pub fn shift(&mut self, bins: i32) {
         let from = |i: usize| usize::try_from(i as i32 + bins).ok().and_then(|f| self.0.get(f));
