@@ -54,7 +54,8 @@ pub struct Radar3dConfig {
 pub struct VisibilityConfig {
     /// Height above the road at which visibility is judged, metres.
     pub slice_height_m: f32,
-    /// Least graded visibility that counts as visible.
+    /// Least graded visibility that counts as visible; of a camera's unit, the share of the column above a cell that
+    /// has to be seen.
     pub visible_from: f32,
     /// Least occupancy that counts as occupied.
     pub occupied_from: f32,

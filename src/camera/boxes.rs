@@ -50,6 +50,11 @@ impl VehicleClass {
         }
     }
 
+    /// Whether its vehicles are too different in length for a typical one.
+    pub(crate) fn has_any_length(self) -> bool {
+        matches!(self, Self::Truck | Self::Bus)
+    }
+
     /// Every class, by its number on the wire from 1.
     const NUMBERED: [Self; 7] =
         [Self::Car, Self::Van, Self::Truck, Self::Bus, Self::Motorcycle, Self::Bicycle, Self::Pedestrian];

@@ -5,7 +5,8 @@
 //! is the one where the camera would see it with the bottom edge of the image box and between its sides; it is
 //! found by moving the box by the difference between where the road shows the edges that were measured and where it
 //! shows those that are expected, up to four times. Then the top edge, which shows the far end of a roof below the
-//! camera, gives the length within the limits of the class.
+//! camera, gives the length of a truck or a bus within the limits of the class. Of cars and vans the class's length is
+//! surer: 15 cm more of height move the far end of a roof at 60 m, seen from 6 m, by 2 m, and cars differ by less.
 //!
 //! A detector draws its box around what is visible. Where a nearer box covers the bottom edge, or the image ends
 //! there, the top edge and the class's height place the vehicle, or its width, whichever is surer: a roof nearly as
@@ -45,8 +46,10 @@ struct Seen {
 /// Which edges show the vehicle's own: left, top, right, bottom.
 type Free = [bool; 4];
 
-/// Distance to the border within which an edge counts as cut off: two pixels.
+/// Distance to the border within which an edge counts as cut off: two pixels, and a share of the box, 2^-5. Detectors
+/// end the box of a vehicle that goes on beyond the border a little before it: by up to 3 % of the box.
 const AT_BORDER: i32 = 2 * SUBPIXELS;
+const AT_BORDER_SHARE: i32 = 5;
 
 /// Distance within which two edges touch: three pixels, and a share of the box, 2^-4.
 const TOUCHING: i32 = 3 * SUBPIXELS;
@@ -100,7 +103,8 @@ pub(crate) fn check(own: &ImageBox, p: &Projection) -> Result<(), BoxRejection> 
 pub(crate) fn free_edges(own: &ImageBox, others: &[ImageBox], p: &Projection) -> Free {
     let [l, t, r, b] = own.edges;
     let [width, height] = p.size;
-    let mut free = [l > AT_BORDER, t > AT_BORDER, r < width - AT_BORDER, b < height - AT_BORDER];
+    let (border_x, border_y) = (AT_BORDER + ((r - l) >> AT_BORDER_SHARE), AT_BORDER + ((b - t) >> AT_BORDER_SHARE));
+    let mut free = [l > border_x, t > border_y, r < width - border_x, b < height - border_y];
     let (near_x, near_y) = (TOUCHING + ((r - l) >> TOUCHING_SHARE), TOUCHING + ((b - t) >> TOUCHING_SHARE));
     for other in others {
         let [ol, ot, or, ob] = other.edges;
@@ -138,7 +142,12 @@ impl Lifting {
         placed.at = self.start(&seen, by_top, p).ok_or(off)?;
         if bottom_free || by_top {
             self.approach(&mut placed, &seen, free, by_top, p).ok_or(off)?;
-            if bottom_free && top_free && roof_below && self.fit_length(&mut placed, &seen, p).ok_or(off)? {
+            if bottom_free
+                && top_free
+                && roof_below
+                && own.class.has_any_length()
+                && self.fit_length(&mut placed, &seen, p).ok_or(off)?
+            {
                 self.approach(&mut placed, &seen, free, by_top, p).ok_or(off)?;
             }
         } else {
@@ -401,6 +410,17 @@ mod tests {
     }
 
     #[test]
+    fn a_car_lower_or_higher_than_its_class_keeps_its_length() {
+        let c = calibration(0.0);
+        for (x, height) in [(30.0, 1.3), (60.0, 1.35), (60.0, 1.7), (90.0, 1.4), (90.0, 1.65)] {
+            let at = Vehicle(x, x + 4.3, 2.0, 1.8, height);
+            let got = lifted(&c, &seen(&c, at, VehicleClass::Car), &[]);
+            let middle = f64::from(got.footprint.centre.x_cm) / 100.0 - (x + 2.15);
+            assert!(middle.abs() < 0.4, "{x} {height}: {middle}, length {}", got.footprint.half_length_cm * 2);
+        }
+    }
+
+    #[test]
     fn the_far_end_of_the_roof_tells_the_length() {
         let c = calibration(0.0);
         for length in [8.0, 12.0, 16.5] {
@@ -454,6 +474,26 @@ mod tests {
         let got = lifted(&c, &own, &[]);
         let [along, across] = error(&got, at);
         assert!(along.abs() < 0.5 && across.abs() < 0.1, "{along} {across}");
+    }
+
+    #[test]
+    fn a_box_that_ends_a_little_before_the_border_is_cut_as_well() {
+        let c = calibration(0.0);
+        let at = car(16.0, -5.5);
+        let mut own = seen(&c, at, VehicleClass::Car);
+        assert!(own.edges[2] > 1920 * SUBPIXELS && own.edges[3] > 1080 * SUBPIXELS);
+        own.edges[2] = 1910 * SUBPIXELS;
+        own.edges[3] = 1074 * SUBPIXELS;
+        let [along, across] = error(&lifted(&c, &own, &[]), at);
+        assert!(along.abs() < 0.8 && across.abs() < 0.3, "{along} {across}");
+        // a small one that is near the border is whole
+        let small = seen(&c, car(90.0, -12.0), VehicleClass::Car);
+        let moved = (1920 - 6) * SUBPIXELS - small.edges[2];
+        let beside = ImageBox {
+            edges: [small.edges[0] + moved, small.edges[1], small.edges[2] + moved, small.edges[3]],
+            ..small
+        };
+        assert_eq!(free_edges(&beside, &[], &lifting(&c).1), [true; 4]);
     }
 
     #[test]

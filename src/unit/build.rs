@@ -99,14 +99,15 @@ fn header<const R: usize, const A: usize>(
 }
 
 /// Of the settings a camera takes the mount, the field of view as the angles at which its picture ends along its
-/// middle row and column, the slice's height and when maps end; its boxes are those of the native format, shares of
-/// the picture. Traffic drives along the road.
+/// middle row and column, the slice's height, the share of a column that has to be seen (`visibility.visible_from`) and
+/// when maps end; its boxes are those of the native format, shares of the picture. Traffic drives along the road.
 impl<const NX: usize, const NY: usize> InUnit for Camera3d<NX, NY> {
     fn config(settings: &Settings) -> Self::Config {
         let view = settings.sensor.field_of_view;
         let config = Camera3dConfig {
             range_max_m: view.range_max_m,
             slice_height_m: settings.visibility.slice_height_m,
+            visible_share: settings.visibility.visible_from,
             health: settings.health,
             ..Camera3dConfig::default()
         };

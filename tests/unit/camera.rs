@@ -8,7 +8,7 @@ use viewshed::inputs::native::{NativeConfig, NativeMedium, NativeReceiver, Nativ
 use viewshed::map::query::{self, Answer};
 use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
-use viewshed::sensor::{Sensor, field_of_view::FieldOfView, mount::Mount, noise::NoiseConfig};
+use viewshed::sensor::{field_of_view::FieldOfView, mount::Mount};
 use viewshed::unit::Unit;
 use viewshed::unit::profile::camera::{CHECK, Map, Parameters, Sender, State};
 use viewshed::unit::serial_service::SerialLine;
@@ -26,18 +26,16 @@ const PERIOD_US: u64 = 66_667;
 
 /// 60 degrees wide, level, at 6 m; the picture is as high as it is wide.
 fn settings() -> Settings {
-    Settings::of(Sensor {
-        mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 },
-        field_of_view: FieldOfView {
-            azimuth_min_deg: -30.0,
-            azimuth_max_deg: 30.0,
-            elevation_min_deg: -30.0,
-            elevation_max_deg: 30.0,
-            range_min_m: 0.0,
-            range_max_m: 200.0,
-        },
-        noise: NoiseConfig::default(),
-    })
+    let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+    let field_of_view = FieldOfView {
+        azimuth_min_deg: -30.0,
+        azimuth_max_deg: 30.0,
+        elevation_min_deg: -30.0,
+        elevation_max_deg: 30.0,
+        range_min_m: 0.0,
+        range_max_m: 200.0,
+    };
+    Settings::of_camera(mount, field_of_view)
 }
 
 /// The box a vehicle is seen in: its near end, its middle to the left, its length, width and height.
@@ -233,4 +231,27 @@ fn settings_no_camera_can_run_with_are_refused_by_name() {
     assert_eq!(refused(|s| s.sensor.field_of_view.range_max_m = 0.0), "field_of_view.range_max_m");
     assert_eq!(refused(|s| s.sensor.field_of_view.azimuth_min_deg = 40.0), "field_of_view.azimuth_max_deg");
     assert_eq!(refused(|s| s.sensor.field_of_view.elevation_max_deg = f32::NAN), "field_of_view.elevation_max_deg");
+}
+
+#[test]
+fn the_share_of_a_column_that_has_to_be_seen_is_a_setting() {
+    let visible = |share: Option<f32>| {
+        let mut settings = settings();
+        settings.visibility.visible_from = share.unwrap_or(settings.visibility.visible_from);
+        let (_, read) = Settings::from_block(&settings.to_block(1)).unwrap();
+        let (parameters, mut sender) = parameters_and_sender(&read, Medium::Serial);
+        let (mut state, mut map) = (Box::new(State::new()), Box::new(Map::NOWHERE));
+        let mut unit = Unit::new(&parameters, &mut *state, &mut *map, &mut *sender);
+        let mut feed = NativeReceiver::<64, ImageBox>::boxes(NativeConfig::camera(0));
+        let mut camera = NativeSender::new(0);
+        for message in camera.boxes(at(0), false, &road(), NativeMedium::CanFd) {
+            unit.take(&mut feed, message.bytes(), at(0));
+        }
+        assert_eq!(unit.frames(), 1);
+        let cells = (0..60).map(|x| RoadPoint::from_metres(60.5 + x as f32, 4.5).unwrap());
+        cells.filter(|cell| unit.map().at(*cell).visible()).count()
+    };
+    let (usual, few, most) = (visible(None), visible(Some(0.3)), visible(Some(0.9)));
+    assert_eq!(usual, visible(Some(0.6)), "the estimator's own share, not a radar's");
+    assert!(few > usual && usual > most, "{few} {usual} {most}");
 }

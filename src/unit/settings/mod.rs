@@ -23,6 +23,7 @@ mod stored;
 pub use flash::FlashSlots;
 pub use stored::{SettingsCheck, SettingsSlots, StoredSettings};
 
+use crate::camera::Camera3dConfig;
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
@@ -127,6 +128,14 @@ impl Settings {
             radar_bus: BusConfig::default(),
             broadcast_bus: BusConfig::default(),
         }
+    }
+
+    /// Settings for a camera: its mount, and the angles at which its picture ends along its middle row and column. The
+    /// share of a column that has to be seen is the camera's, not a radar's; the rest is by default.
+    pub fn of_camera(mount: Mount, field_of_view: FieldOfView) -> Self {
+        let visible_from = Camera3dConfig::default().visible_share;
+        let visibility = VisibilityConfig { visible_from, ..VisibilityConfig::default() };
+        Self { visibility, ..Self::of(Sensor { mount, field_of_view, noise: NoiseConfig::default() }) }
     }
 
     /// The estimator's configuration; what an integrator does not set is the library's.

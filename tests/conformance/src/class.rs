@@ -140,7 +140,7 @@ impl Class {
             ReceiverRestarts => [84.2, 87.2, 87.0],
             TwoSenders => [65.0, 65.0, 63.0],
             // a clock that jumps forward is no other than a delay, which is waited out for 5.12 s
-            ClockJumps => [62.0, 60.0, 62.0],
+            ClockJumps => [61.5, 60.0, 62.0],
             MailboxesFull => [96.0, 98.0, 98.0],
             DelayPasses => [86.0, 84.0, 78.0],
             DelayStays => [63.0, 61.0, 63.0],

@@ -24,7 +24,7 @@ use viewshed_harness::{estimators, recording};
 /// It cannot be read.
 pub fn maps() -> Result<Maps> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
-    let recording = recording::mcap::read(&path, &recording::ReadOptions::default())?;
+    let recording = recording::read(&path, &recording::ReadOptions::default())?;
     let mut maps = Maps::new(&recording, &estimators::Options::default(), &|| ())?;
     maps.scans.drain(..15);
     Ok(maps)

@@ -119,7 +119,7 @@ static STATES: [[u8; 8]; 256] = {
     let mut states = [[1; 8]; 256];
     let mut at = 0;
     while at < 256 * 8 {
-        states[at / 8][at % 8] += (at / 8 >> (at % 8) & 1) as u8;
+        states[at / 8][at % 8] += ((at / 8) >> (at % 8) & 1) as u8;
         at += 1;
     }
     states

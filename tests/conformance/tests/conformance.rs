@@ -253,7 +253,7 @@ fn every_class(count: u64, runs_of: impl Fn(&str) -> (u64, u64) + Sync) {
 fn receivers_agree_at_every_look_and_are_never_wrongly_visible() {
     // Python takes 1 to 2 s for a run of 30 s: the first faults of each keep the test within two minutes, and the long
     // test gives it twenty whole ones
-    every_class(3, |language| if language == "C" { (3, 30 * SECOND) } else { (3, 8 * SECOND) });
+    every_class(3, |language| if language == "C" { (3, 30 * SECOND) } else { (3, 6 * SECOND) });
 }
 
 #[test]

@@ -28,7 +28,7 @@ use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed_harness::boards::stress;
 use viewshed_harness::estimators::{self, camera_3d};
 use viewshed_harness::recording::Recording;
-use viewshed_harness::recording::mcap::read;
+use viewshed_harness::recording::read;
 
 /// `radar-3d-blurred` is radar-3d with the largest range noise that may be set: evidence spreads widest.
 const ESTIMATORS: [&str; 4] = ["radar-3d", "radar-3d-small", "radar-3d-blurred", "radar-2d"];

@@ -18,7 +18,7 @@ use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::listener::{MEDIUM, Map, SENSOR};
 use super::scans::Scan;
-use crate::recording::candump::Line;
+use crate::recording::can_log::Line;
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;
@@ -155,8 +155,7 @@ pub fn clusters(scans: &[Scan], count: usize, most: usize) -> Vec<Step> {
 }
 
 /// A log's frames as they came, a step for each scan and at least every 50 ms.
-pub fn log(text: &str) -> Vec<Step> {
-    let lines = text.lines().filter_map(|line| Line::parse(line).ok());
+pub fn log(lines: &[Line]) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     let mut first = None;
     for line in lines {

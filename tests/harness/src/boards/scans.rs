@@ -4,9 +4,7 @@ use viewshed::bench::job::{Job, JobEntry, ScanHead};
 use viewshed::camera::boxes::{ImageBox, VehicleClass};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
-use viewshed::sensor::Sensor;
 use viewshed::sensor::field_of_view::FieldOfView;
-use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::settings::Settings;
 
 use crate::estimators::{Intake, camera_3d};
@@ -59,7 +57,7 @@ pub fn camera_settings(camera: &RecordedCamera) -> Settings {
         range_min_m: 0.0,
         range_max_m: 200.0,
     };
-    Settings::of(Sensor { mount: camera_3d::calibration(camera).mount, field_of_view, noise: NoiseConfig::default() })
+    Settings::of_camera(camera_3d::calibration(camera).mount, field_of_view)
 }
 
 /// The job as bytes.

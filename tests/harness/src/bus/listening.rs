@@ -10,7 +10,7 @@ use viewshed::wire::receive::{ReceivedMap, ReceiverLimits, SenderCondition};
 use viewshed::wire::serial::Unstuffer;
 
 use super::ears::{Ears, Key};
-use crate::recording::candump::Line;
+use crate::recording::can_log::Line;
 use crate::recording::serial_log::Chunk;
 
 /// Sensors, azimuths, words of ranges and planes there is room for: all of them.

@@ -23,7 +23,7 @@ use crate::bus::symbols::{self, Symbols};
 use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
 use crate::command::options::SettingsArgs;
 use crate::recording;
-use crate::recording::candump::{Content, Line};
+use crate::recording::can_log::{Content, Line};
 use crate::recording::serial_log::Chunk;
 use crate::results::files::{OutputArgs, Target};
 
@@ -34,7 +34,7 @@ use crate::results::files::{OutputArgs, Target};
 /// sender's after every scan. With a key, CAN FD and the serial line appear twice: bare and authenticated.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// MCAP recordings [default: those shipped in tests/recordings]
+    /// Recordings, of any kind that replay reads [default: those shipped in tests/recordings]
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// Write what was found as JSON: an object, for several recordings an array
@@ -92,7 +92,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let (mut reports, mut symbols) = (Vec::new(), Symbols::new());
     for path in &paths {
-        let recording = recording::mcap::read(path, &settings.reading)?;
+        let recording = recording::read(path, &settings.reading)?;
         let progress = bar(&format!("replaying {}", recording.name), recording.frames.len() as u64);
         let maps = Maps::new(&recording, &settings.estimators, &|| progress.step())?;
         drop(progress);

@@ -17,12 +17,13 @@ const WRONG: u8 = 1;
 
 /// Say what is on a radar's bus or line, what should be, what is wrong and what to do
 ///
-/// Reads a log of `candump -L`, or a capture of a TI mmWave radar's data port or of the native format. Which identifiers were seen and which an ARS408 in its mode would
-/// send, with their lengths; its scans, counters, settings and faults; and what to do about what is
+/// Reads a CAN log of `candump` (with -L, or -t a, d or z), of Vector's tools (ASC) or of SavvyCAN (CSV), or a capture of a
+/// TI mmWave radar's data port or of the native format; each also gzipped. Which identifiers were seen and which an ARS408
+/// in its mode would send, with their lengths; its scans, counters, settings and faults; and what to do about what is
 /// wrong. Exit code 1 if something is wrong, 2 if the log cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The log
+    /// The log; - reads standard input
     log: PathBuf,
     /// Write everything that was found as JSON
     #[arg(long, value_name = "FILE")]
@@ -30,6 +31,9 @@ pub struct Args {
     /// Write every detection of the radar as CSV, as the estimators would be given it
     #[arg(long, value_name = "FILE")]
     detections: Option<PathBuf>,
+    /// Only this bus of a CAN log: can0, or the channel of an ASC log
+    #[arg(long, value_name = "NAME")]
+    interface: Option<String>,
     /// Sensor id for --detections, if there are several
     #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
@@ -48,7 +52,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let json = outputs.file("--json", args.json.as_deref())?;
     let detections = outputs.file("--detections", args.detections.as_deref())?;
     let KindArgs { radar: profile, ti_header, ti_dialect } = args.kind;
-    let options = ReadOptions { sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
+    let interface = args.interface.clone();
+    let options =
+        ReadOptions { interface, sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
     let report = examine(&args.log, &options)?;
     print(&report.text())?;
     if let Some(file) = json {

@@ -1,7 +1,7 @@
 //! `viewshed listen`: a log of a bus in, the maps on it out.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -10,20 +10,26 @@ use viewshed::wire::message::Addresses;
 use super::key::KeyArgs;
 use super::print;
 use crate::bus::listening::{Heard, Listening, Moment, SENSORS, shown};
-use crate::recording::candump::Line;
+use crate::recording::can_log::{self, FORMATS, Format, Line};
+use crate::recording::problems::Problems;
 use crate::recording::serial_log::Chunk;
+use crate::recording::{file, foreign};
 use crate::results::files::{Folder, OutputArgs, Target};
 use crate::results::pictures::polar::{self, PolarGrid};
 
-/// Decode the maps that sensors broadcast in a log written by candump -L or viewshed bus
+/// Decode the maps that sensors broadcast in a CAN log, or in one of a serial line by viewshed bus
 ///
 /// Prints what every sensor says of itself, what happened to its frames, and what its maps show. With a key
 /// only authentic messages count, without one only those that are not authenticated.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Log of classic CAN or CAN FD as candump -L writes it, or of CAN FD or a serial line by viewshed bus --log
+    /// CAN log of `candump` (with -L, or -t a, d or z), Vector ASC or SavvyCAN CSV, or one of a serial line by viewshed bus
+    /// --log; each also gzipped; - reads standard input
     #[arg(value_name = "LOG")]
     log: PathBuf,
+    /// Only this bus of a CAN log: can0, or the channel of an ASC log [default: all]
+    #[arg(long, value_name = "NAME")]
+    interface: Option<String>,
     /// Write what was found as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -50,7 +56,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if args.every.is_nan() || args.every <= 0.0 {
         bail!("--every {} is not above 0", args.every);
     }
-    let text = std::fs::read_to_string(&args.log).with_context(|| format!("cannot read {}", args.log.display()))?;
+    let (logged, unread) = logged(&args.log, args.interface.as_deref())?;
     let mut outputs = args.outputs.beside([args.log.clone()].into_iter().chain(args.key.file()));
     let json = outputs.file("--json", args.json.as_deref())?;
     let pictures = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
@@ -58,18 +64,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let key = args.key.key()?;
     let mut listening = Listening::new(addresses, key.as_ref());
     let mut maps: Vec<Vec<Moment>> = vec![Vec::new(); usize::from(SENSORS)];
-    let (mut unread, mut next) = (0, None);
+    let mut next = None;
     let every_ns = (args.every * 1e9) as i64;
-    for line in text.lines().filter(|line| !line.trim().is_empty()) {
-        let logged = match (Line::parse(line), Chunk::parse(line)) {
-            (Ok(frame), _) => Logged::Frame(frame),
-            (_, Ok(chunk)) => Logged::Chunk(chunk),
-            _ => {
-                unread += 1;
-                continue;
-            }
-        };
-        let time_ns = match &logged {
+    for logged in &logged {
+        let time_ns = match logged {
             Logged::Frame(line) => line.time_ns,
             Logged::Chunk(chunk) => chunk.time_ns,
         };
@@ -78,7 +76,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             look(&listening, &mut maps, pictures.as_ref())?;
             next = Some(due + (time_ns - due) / every_ns * every_ns + every_ns);
         }
-        match &logged {
+        match logged {
             Logged::Frame(line) => listening.take(line),
             Logged::Chunk(chunk) => listening.take_bytes(chunk),
         }
@@ -90,7 +88,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         .filter_map(|n| listening.heard(n, std::mem::take(&mut maps[usize::from(n)])))
         .collect();
     if sensors.is_empty() {
-        let (log, frames, not_authentic) = (args.log.display(), listening.frames(), listening.not_authentic());
+        let (log, frames, not_authentic) = (file::shown(&args.log), listening.frames(), listening.not_authentic());
         match (not_authentic, key) {
             (0, _) => bail!("{log}: none of its {frames} frames is of a broadcast"),
             (n, None) => {
@@ -118,6 +116,30 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 enum Logged {
     Frame(Line),
     Chunk(Chunk),
+}
+
+/// The lines of a log, and how many are none.
+fn logged(path: &Path, interface: Option<&str>) -> Result<(Vec<Logged>, u64)> {
+    let bytes = file::bytes(path)?;
+    if let Some(format) = Format::of(&bytes) {
+        let mut problems = Problems::default();
+        let lines = can_log::read(&bytes, format, interface, &mut problems)?;
+        return Ok((lines.into_iter().map(Logged::Frame).collect(), problems.count("line skipped")));
+    }
+    let text = String::from_utf8_lossy(&bytes);
+    let lines = text.lines().filter(|line| !line.trim().is_empty());
+    let (mut chunks, mut unread) = (Vec::new(), 0);
+    for line in lines {
+        match Chunk::parse(line) {
+            Ok(chunk) => chunks.push(Logged::Chunk(chunk)),
+            Err(_) => unread += 1,
+        }
+    }
+    if chunks.is_empty() {
+        let why = foreign::named(&bytes).unwrap_or_else(|| format!("it is no log of {FORMATS}, nor of a serial line"));
+        bail!("{} cannot be read: {why}", file::shown(path));
+    }
+    Ok((chunks, unread))
 }
 
 /// Counts, and draws, every sensor's map as it is now.
@@ -150,7 +172,7 @@ fn draw(listening: &Listening, sensor: u8, time_s: f64, target: &Target) -> Resu
     polar::draw(&grid).save(target)
 }
 
-fn report(sensors: &[Heard], listening: &Listening, unread: usize) -> String {
+fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
     let mut text = String::new();
     for heard in sensors {
         let _ = writeln!(text, "sensor {}: {}", heard.sensor, heard.condition);

@@ -1,6 +1,8 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod bus;
+pub mod completions;
+pub mod detect;
 pub mod detections;
 pub mod doctor;
 pub mod experiment;
@@ -40,7 +42,9 @@ enum Command {
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
+    Detect(detect::Args),
     Detections(Box<detections::Args>),
+    Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
 }
@@ -56,7 +60,9 @@ impl Cli {
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
+            Command::Detect(args) => detect::run(args),
             Command::Detections(args) => detections::run(args),
+            Command::Completions(args) => completions::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),
         };

@@ -54,11 +54,12 @@ pub struct JudgingArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Reading")]
 pub struct ReadingArgs {
-    /// Topic of the radar's points [default: /radar/points, or whatever carries radar_msgs/msg/RadarScan]
+    /// Topic of the radar's points [default: /radar/points, or the only one of a type that radars send]
     ///
-    /// A PointCloud2 with the fields range, azimuth (or azimuth_angle), radial_velocity (or radial_speed)
-    /// and, where measured, elevation (or elevation_angle), rcs and snr; or a RadarScan. A topic that is
-    /// not there makes an error that lists those that are.
+    /// A sensor_msgs/msg/PointCloud2 with the fields range, azimuth (or azimuth_angle) and, where measured, elevation (or
+    /// elevation_angle), or with x, y and z; with radial_velocity (or radial_speed, velocity, doppler, doppler_velocity,
+    /// v_r, vr, v_radial, range_rate, speed_radial) and, where measured, rcs and snr. Or a radar_msgs/msg/RadarScan. Metres,
+    /// radians, m/s, dBsm and dB. A topic that is not there makes an error that lists those that are.
     #[arg(long, value_name = "TOPIC")]
     radar_topic: Option<String>,
     /// Topic of the labelled objects, a Detection3DArray in frame `road` [default: /ground_truth/objects]
@@ -66,6 +67,15 @@ pub struct ReadingArgs {
     /// A file NAME.labels.csv beside NAME.mcap replaces them. Without labels there are maps and no rates.
     #[arg(long, value_name = "TOPIC")]
     truth_topic: Option<String>,
+    /// Frame of /tf_static that is the road's [default: road]
+    #[arg(long, value_name = "FRAME")]
+    road_frame: Option<String>,
+    /// Frame of /tf_static that is the radar's [default: the one in its messages' headers]
+    #[arg(long, value_name = "FRAME")]
+    radar_frame: Option<String>,
+    /// What a positive radial velocity does [default: recedes]
+    #[arg(long, value_name = "WHAT", value_parser = ["receding", "approaching"])]
+    velocity_sign: Option<String>,
     /// Where the radar hangs: x,y,z,yaw,pitch,roll in metres and degrees [default: /tf_static of the file]
     ///
     /// In the road frame: x along the road, y to the left, z = height above the road. Yaw + to the left,
@@ -77,6 +87,9 @@ pub struct ReadingArgs {
     /// In the sensor frame: azimuth + to the left, elevation + up. Example: --fov -60,60,-16,16,3,200
     #[arg(long, value_name = "AZ,AZ,EL,EL,R,R", value_parser = field_of_view, allow_hyphen_values = true)]
     fov: Option<FieldOfView>,
+    /// Bus of a CAN log with several: can0, or the channel of an ASC log [default: the one with more frames of the radar]
+    #[arg(long, value_name = "NAME")]
+    interface: Option<String>,
     /// Sensor id of the radar in a CAN log or capture that has several
     #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
@@ -213,10 +226,14 @@ impl ReadingArgs {
         ReadOptions {
             radar_topic: self.radar_topic.clone(),
             truth_topic: self.truth_topic.clone(),
+            approaching_is_positive: self.velocity_sign.as_deref() == Some("approaching"),
+            road_frame: self.road_frame.clone(),
+            radar_frame: self.radar_frame.clone(),
             mount: self.mount,
             field_of_view: self.fov,
             from_s: self.from,
             to_s: self.to,
+            interface: self.interface.clone(),
             sensor_id: self.sensor_id,
             profile: self.kind.radar,
             ti_header: self.kind.ti_header,

@@ -7,7 +7,7 @@ use viewshed::inputs::ars408::message::Message;
 use viewshed::wire::frame::CanId;
 
 use super::sensor::{Output, Sensor};
-use crate::recording::candump::{Content, Line};
+use crate::recording::can_log::{Content, Line};
 
 /// One identifier on one interface.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -7,10 +7,12 @@ use viewshed::inputs::ars408::configuration::Ars408Configuration;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::motion::{self, standing};
 use viewshed::wire::frame::{CanFrame, CanId};
+use viewshed::wire::message::Addresses;
 
 use super::Report;
 use super::sensor::{Output, Sensor};
-use crate::recording::candump::{Content, Line};
+use crate::bus::listening::Listening;
+use crate::recording::can_log::{Content, Line};
 
 /// How much it matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -35,6 +37,9 @@ pub struct Finding {
 
 /// Frames of 8 bytes that fit into a second of 500 kbit/s, stuff bits included.
 const MOST_FRAMES: usize = 3700;
+
+/// A log that tells what a radar leaves out, seconds: it says some of it once a second.
+const LEAST_S: f64 = 1.5;
 
 #[derive(Default)]
 struct Findings(Vec<Finding>);
@@ -61,6 +66,13 @@ pub fn judge(report: &Report, lines: &[Line]) -> Vec<Finding> {
 }
 
 fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
+    if report.duration_s < LEAST_S {
+        found.add(
+            Severity::Warning,
+            format!("the log lasts {:.1} s, which is too short to say what is missing", report.duration_s),
+            "record ten seconds or more",
+        );
+    }
     let problems: u64 = report.problems.iter().filter(|p| p.what.starts_with("line skipped")).map(|p| p.count).sum();
     if problems > 0 {
         found.add(
@@ -93,7 +105,14 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
         };
         found.add(Severity::Error, format!("{what}: {n} error frames of class {class:03X}"), remedy);
     }
-    if report.sensors.is_empty() {
+    let broadcasters = broadcasters(lines);
+    if report.sensors.is_empty() && !broadcasters.is_empty() {
+        found.add(
+            Severity::Note,
+            "no radar is on this bus, but the visibility broadcast of a unit",
+            "`viewshed listen` shows its maps",
+        );
+    } else if report.sensors.is_empty() {
         let seen: Vec<&str> = report.identifiers.iter().map(|i| i.id.as_str()).collect();
         let listed = match &seen[..] {
             [] => "no identifier at all".to_owned(),
@@ -121,13 +140,27 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
         );
     }
     let ours = lines.iter().filter_map(Line::frame).filter(|f| matches!(f.id, CanId::Standard(0x400..=0x4FF))).count();
-    if ours > 0 {
+    if !broadcasters.is_empty() {
+        let listed: Vec<String> = broadcasters.iter().map(u8::to_string).collect();
+        found.add(
+            Severity::Note,
+            format!("{ours} frames on 400 to 4FF, and visibility is broadcast there by sensor {}", listed.join(", ")),
+            "`viewshed listen` shows its maps",
+        );
+    } else if ours > 0 {
         found.add(
             Severity::Note,
             format!("{ours} frames on 400 to 4FF, where visibility is broadcast by default"),
             "nothing, if they are; another device there would be taken for a damaged broadcast",
         );
     }
+}
+
+/// Sensors whose visibility broadcast is on the bus, on the usual identifiers.
+fn broadcasters(lines: &[Line]) -> Vec<u8> {
+    let mut listening = Listening::new(Addresses::STANDARD, None);
+    lines.iter().for_each(|line| listening.take(line));
+    listening.sensors()
 }
 
 /// Extended identifiers whose number is a radar's.
@@ -180,8 +213,13 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
         (c.lost, "scans never came, by the radar's counter"),
         (c.no_scan, "entries came without a status message"),
     ] {
-        // a log may begin and end within a scan
-        let severity = if n <= 2 { Severity::Note } else { Severity::Warning };
+        let severity = match n {
+            // a log may begin and end within a scan
+            0..=2 => Severity::Note,
+            // of so little no map is made
+            n if 3 * u64::from(n) >= sensor.announced as u64 => Severity::Error,
+            _ => Severity::Warning,
+        };
         if n > 0 {
             found.add(severity, format!("{name}: {n} {what}"), full.clone());
         }

@@ -9,12 +9,13 @@ pub mod ti;
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde::Serialize;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 
-use crate::recording::ars408::lines;
-use crate::recording::candump;
+use crate::recording::can_log::{self, FORMATS, Format};
+use crate::recording::file;
+use crate::recording::foreign;
 use crate::recording::problems::{Problem, Problems};
 use crate::recording::ti::is_capture;
 use crate::recording::{self, ReadOptions};
@@ -70,10 +71,16 @@ impl Examined {
 /// # Errors
 /// A file that cannot be read or is no such log.
 pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let log = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if candump::is_log(&bytes) {
-        return Ok(can(log, &bytes, known));
+    let bytes = file::bytes(path)?;
+    let log = match file::shown(path) {
+        name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
+        _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    if let Some(format) = Format::of(&bytes) {
+        return can(log, &bytes, format, known);
+    }
+    if let Some(foreign) = foreign::named(&bytes) {
+        bail!("{log} cannot be read: {foreign}");
     }
     if !bytes.starts_with(mcap::MAGIC) {
         if is_capture(&bytes) {
@@ -85,21 +92,21 @@ pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
         }
     }
     bail!(
-        "{log} is not a log of `candump -L`, whose lines are `(seconds) interface identifier#data`, not a capture of a TI mmWave radar's data port, which has the bytes 02 01 04 03 06 05 08 07 before each frame, nor a capture of the native format. Record a bus with `candump -L can0 > {log}`; MCAP recordings are judged by `viewshed replay`"
+        "{log} is not a log of {FORMATS}, not a capture of a TI mmWave radar's data port, which has the bytes 02 01 04 03 06 05 08 07 before each frame, nor a capture of the native format. Record a bus with `candump -L can0 > new.log`; MCAP recordings are judged by `viewshed replay`"
     );
 }
 
-fn can(log: String, bytes: &[u8], known: &ReadOptions) -> Examined {
+fn can(log: String, bytes: &[u8], format: Format, known: &ReadOptions) -> Result<Examined> {
     let mut problems = Problems::default();
-    let lines = lines(bytes, &mut problems);
+    let lines = can_log::read(bytes, format, known.interface.as_deref(), &mut problems)?;
     let sensors = sensor::all(&lines, known.profile.unwrap_or(&Ars408Profile::ARS408));
     let native = recording::native::of_log(&lines);
     if sensors.is_empty() && !native.is_empty() {
-        return Examined::Native(native::examine(log, &native, 0));
+        return Ok(Examined::Native(native::examine(log, &native, 0)));
     }
     let mut report = Report {
         log,
-        kind: "candump",
+        kind: format.name(),
         frames: lines.len(),
         duration_s: can::duration_s(&lines),
         busiest_second: can::busiest_second(&lines),
@@ -109,5 +116,5 @@ fn can(log: String, bytes: &[u8], known: &ReadOptions) -> Examined {
         sensors,
     };
     report.findings = findings::judge(&report, &lines);
-    Examined::Can(report)
+    Ok(Examined::Can(report))
 }

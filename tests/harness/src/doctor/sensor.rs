@@ -12,7 +12,7 @@ use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters};
 use viewshed::inputs::signal::word;
 
 use crate::recording::ars408::scans;
-use crate::recording::candump::Line;
+use crate::recording::can_log::Line;
 
 /// What a sensor sends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -17,11 +17,16 @@ pub const RANGES: usize = State::RANGES;
 pub const AZIMUTHS: usize = State::AZIMUTHS;
 pub const ELEVATIONS: usize = State::ELEVATIONS;
 
+/// Vehicles for which the list had no room, as reports say it.
+const NO_ROOM: &str = "no room in the list of 96 obstacles";
+const _: () = assert!(State::OBSTACLES == 96, "the report names the list's limit");
+
 struct Driver<const D: usize> {
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
     state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
     intake: Intake,
+    no_room: u32,
 }
 
 /// The estimator; storage for 256 detections unless more are asked for.
@@ -55,7 +60,7 @@ impl<const D: usize> Driver<D> {
     fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self> {
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
-        Ok(Self { parameters, state: Box::new(Radar3d::new()), map, intake: Intake::default() })
+        Ok(Self { parameters, state: Box::new(Radar3d::new()), map, intake: Intake::default(), no_room: 0 })
     }
 }
 
@@ -71,7 +76,8 @@ impl<const D: usize> Estimator for Driver<D> {
 
     fn step(&mut self, frame: &Frame) {
         let (now, detections, status) = self.intake.take(frame);
-        self.state.process(&self.parameters, now, detections, status, &mut self.map);
+        let report = self.state.process(&self.parameters, now, detections, status, &mut self.map);
+        self.no_room = report.obstacles_dropped;
     }
 
     fn map(&self) -> &dyn VisibilityMap {
@@ -83,6 +89,55 @@ impl<const D: usize> Estimator for Driver<D> {
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {
-        self.intake.counters(self.state.rejections())
+        let full = [(NO_ROOM, u64::from(self.no_room))].into_iter().filter(|(_, n)| *n > 0);
+        self.intake.counters(self.state.rejections()).into_iter().chain(full).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use viewshed::sensor::field_of_view::FieldOfView;
+    use viewshed::sensor::mount::Mount;
+    use viewshed::sensor::noise::NoiseConfig;
+
+    use super::*;
+    use crate::recording::RadarDetection;
+
+    /// So many vehicles that come nearer, 6 m and 12 degrees apart.
+    fn frame(k: i64, vehicles: usize) -> Frame {
+        let detection = |n: usize| RadarDetection {
+            range_m: 30.0 + 6.0 * (n % 26) as f32 - 8.0 * 0.066 * k as f32,
+            azimuth_rad: 0.2 * ((n / 26) as f32 - 2.0),
+            elevation_rad: None,
+            radial_velocity_mps: -8.0,
+            rcs_dbsm: Some(15.0),
+            snr_db: Some(20.0),
+        };
+        Frame {
+            time_ns: 1_000_000_000 + k * 66_000_000,
+            detections: (0..vehicles).map(detection).collect(),
+            refused: 0,
+        }
+    }
+
+    #[test]
+    fn a_list_of_obstacles_that_is_full_is_reported_with_its_limit() {
+        let field_of_view = FieldOfView {
+            azimuth_min_deg: -60.0,
+            azimuth_max_deg: 60.0,
+            elevation_min_deg: -16.0,
+            elevation_max_deg: 16.0,
+            range_min_m: 3.0,
+            range_max_m: 200.0,
+        };
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 };
+        let sensor = Sensor { mount, field_of_view, noise: NoiseConfig::default() };
+        let no_room = |vehicles: usize| {
+            let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
+            (0..40).for_each(|k| estimator.step(&frame(k, vehicles)));
+            estimator.counters().into_iter().find(|(what, _)| what.contains("96 obstacles")).map_or(0, |(_, n)| n)
+        };
+        assert_eq!(no_room(60), 0);
+        assert!(no_room(130) > 0);
     }
 }

@@ -35,6 +35,8 @@ const OVERLAP: f64 = 0.2;
 const ACCEPTED: f64 = 0.5;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
 const SEEN: (u32, f64) = (15, 1.0);
+/// How often the person looks for something to mend.
+const LOOKS: usize = 3;
 /// How far a drawn line is from the vehicle, metres.
 const DRAWN_M: f64 = 0.8;
 
@@ -107,7 +109,7 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
     let truth = recording.truth.as_ref()?;
     let site = Site::of(recording);
     let instants = instants(recording, truth, options);
-    let moving: Vec<bool> = truth.tracks.iter().map(|t| t.moves() && class_size(&t.class).is_some()).collect();
+    let moving = road_users(truth);
     let mut vehicles: BTreeMap<usize, Vehicle> = BTreeMap::new();
     for (frame, instant) in instants.iter().enumerate() {
         for (o, n) in instant.objects.iter().zip(&instant.detections).filter(|(o, n)| moving[o.track] && **n > 0) {
@@ -138,7 +140,14 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
             whole.class = class.clone();
         }
         if let Some(seen) = vehicles.get(&vehicle) {
-            actions.mended += mend(&mut whole, &instants, vehicle, seen, &site);
+            // what was set changes the boxes beside it, so the person looks again
+            for _ in 0..LOOKS {
+                let points = mend(&mut whole, &instants, vehicle, seen, &site);
+                actions.mended += points;
+                if points == 0 {
+                    break;
+                }
+            }
         }
         labels.push((vehicle, whole));
     }
@@ -178,6 +187,33 @@ fn instants(recording: &Recording, truth: &Truth, options: &Options) -> Vec<Inst
     recording.frames.iter().map(instant).collect()
 }
 
+/// What the person does with a proposal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Decision {
+    /// It becomes a label of this class.
+    Accept {
+        class: String,
+    },
+    Reject,
+}
+
+/// What the person does with each proposal, for scripts that do it in the page. A recording without truth gives `None`.
+pub fn decide(recording: &Recording, proposals: &[Proposal], options: &Options) -> Option<Vec<Decision>> {
+    let truth = recording.truth.as_ref()?;
+    let decision = |vehicle: Option<usize>| match vehicle {
+        Some(vehicle) => Decision::Accept { class: truth.tracks[vehicle].class.clone() },
+        None => Decision::Reject,
+    };
+    let vehicles =
+        vehicles_of(proposals, &instants(recording, truth, options), &road_users(truth), &Site::of(recording));
+    Some(vehicles.into_iter().map(decision).collect())
+}
+
+/// Which tracks of the truth move and have a class with a size.
+fn road_users(truth: &Truth) -> Vec<bool> {
+    truth.tracks.iter().map(|t| t.moves() && class_size(&t.class).is_some()).collect()
+}
+
 /// Accepted pieces by vehicle.
 fn work_through(
     proposals: &[Proposal],
@@ -187,6 +223,21 @@ fn work_through(
 ) -> (BTreeMap<usize, Vec<LabelTrack>>, Actions) {
     let mut pieces: BTreeMap<usize, Vec<LabelTrack>> = BTreeMap::new();
     let mut actions = Actions::default();
+    for (proposal, vehicle) in proposals.iter().zip(vehicles_of(proposals, instants, moving, site)) {
+        match vehicle {
+            Some(vehicle) => {
+                actions.accepted += 1;
+                pieces.entry(vehicle).or_default().push(proposal.track.clone());
+            }
+            None => actions.rejected += 1,
+        }
+    }
+    (pieces, actions)
+}
+
+/// The vehicle each proposal is accepted for.
+fn vehicles_of(proposals: &[Proposal], instants: &[Instant], moving: &[bool], site: &Site) -> Vec<Option<usize>> {
+    let mut all: Vec<Option<usize>> = Vec::new();
     for proposal in proposals {
         let label = Truth::new(labels(&proposal.track, site));
         let (mut steps, mut hits) = (0_u64, BTreeMap::<usize, u64>::new());
@@ -198,20 +249,14 @@ fn work_through(
             }
         }
         let best = hits.into_iter().max_by_key(|(_, n)| *n).filter(|(_, n)| *n as f64 >= ACCEPTED * steps as f64);
-        let Some((vehicle, _)) = best else {
-            actions.rejected += 1;
-            continue;
-        };
-        let before = pieces.entry(vehicle).or_default();
-        if before.iter().any(|t| same_time(t, &proposal.track)) {
-            actions.rejected += 1;
-        } else {
-            actions.accepted += 1;
-            before.push(proposal.track.clone());
-        }
+        let vehicle = best.map(|(vehicle, _)| vehicle);
+        // one that is labelled at that time already is rejected
+        let labelled = |before: &Proposal| same_time(&before.track, &proposal.track);
+        let again =
+            vehicle.is_some() && proposals.iter().zip(&all).any(|(before, v)| *v == vehicle && labelled(before));
+        all.push(vehicle.filter(|_| !again));
     }
-    pieces.retain(|_, pieces| !pieces.is_empty());
-    (pieces, actions)
+    all
 }
 
 fn same_time(a: &LabelTrack, b: &LabelTrack) -> bool {

@@ -9,7 +9,7 @@ use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters, Ars408Outcome};
 
-use super::candump::Line;
+use super::can_log::{self, Format, Line};
 use super::capture::{self, Kind};
 use super::problems::Problems;
 use super::{Frame, ReadOptions, Recording, native};
@@ -20,10 +20,10 @@ const MOST_ENTRIES: usize = 1024;
 /// Reads the scans of one sensor.
 ///
 /// # Errors
-/// No scan of such a radar, or several sensors and none named.
-pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+/// No scan of such a radar, or several sensors and none named, or no such interface.
+pub fn read(name: String, bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Recording> {
     let mut problems = Problems::default();
-    let lines = lines(bytes, &mut problems);
+    let lines = can_log::read(bytes, format, options.interface.as_deref(), &mut problems)?;
     let native = native::of_log(&lines);
     if !native.is_empty() && !lines.iter().any(|l| sensor_of(l).is_some()) {
         return native::read(name, &native, 0, options);
@@ -60,32 +60,6 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
         has_elevation: profile.cluster.up_cm.is_some(),
     };
     Ok(capture::recording(name, kind, frames, problems, options))
-}
-
-/// All lines that are frames, in the order of the log; the others are counted.
-pub fn lines(bytes: &[u8], problems: &mut Problems) -> Vec<Line> {
-    let mut lines: Vec<Line> = Vec::new();
-    for text in String::from_utf8_lossy(bytes).lines().filter(|line| !line.trim().is_empty()) {
-        let last = lines.last().map_or(0, |l| l.time_ns);
-        match Line::parse(text) {
-            Ok(line) => {
-                if !lines.is_empty() && line.time_ns < last {
-                    problems.add(&line.interface, "time runs backwards", line.time_ns);
-                }
-                lines.push(line);
-            }
-            Err(why) => problems.add("log", format!("line skipped: {}", kind_of(&why)), last),
-        }
-    }
-    lines
-}
-
-/// A reason without the text it names, so that many of a kind are one problem.
-fn kind_of(why: &str) -> String {
-    match why.split('`').collect::<Vec<_>>()[..] {
-        [before, _, after] => format!("{before}something{after}").trim().to_owned(),
-        _ => why.to_owned(),
-    }
 }
 
 /// Feeds a radar with frames; `scan` is given every scan that comes of them, to the last.

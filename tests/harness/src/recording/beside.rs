@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
-use super::{Frame, ReadOptions, Recording, labels};
+use super::{Frame, ReadOptions, Recording, labels, plausible};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -25,6 +25,7 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
         let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
         let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
         let (labels, sized_by_class) = labels::read_labels(&labels_csv, start_ns, end_ns)?;
+        labels::check_places(&labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
         let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let beside = Some(LabelsBeside { file, sized_by_class });
         recording.truth = Some(Truth { beside, ..Truth::new(labels) });
@@ -32,6 +33,11 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if occlusion_csv.exists() {
         recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
     }
+    if options.approaching_is_positive {
+        let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
+        all.for_each(|d| d.radial_velocity_mps = -d.radial_velocity_mps);
+    }
+    plausible::check(&mut recording);
     restrict(&mut recording, options);
     if recording.frames.is_empty() {
         bail!("{}: no frame between --from and --to", path.display());

@@ -23,7 +23,7 @@ use viewshed::camera::calibration::Calibration;
 
 use super::camera::{Box2d, CameraFrame, Intrinsics, RecordedCamera};
 use super::problems::Problems;
-use super::{FieldOfView, ReadOptions, Recording, Sensor};
+use super::{ReadOptions, Recording, Sensor};
 use crate::geometry::pose::SensorPose;
 
 const SUFFIX: &str = ".boxes.csv";
@@ -63,37 +63,60 @@ struct Row {
 pub fn read(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
     let name = stem(path).unwrap_or_default();
     let beside = camera_file(path).unwrap_or_default();
-    let place = || beside.display().to_string();
-    let text = std::fs::read_to_string(&beside)
-        .with_context(|| format!("{}: cannot read the camera of these boxes, {}", path.display(), beside.display()))?;
-    let Calibration { intrinsics: i, mount: m } = toml::from_str(&text).with_context(place)?;
-    ensure!(options.field_of_view.is_none(), "--fov does not go with boxes: a camera's view follows from {}", place());
-    let [x, y, z, yaw, pitch, roll] = options.mount.unwrap_or_else(|| {
-        let radians = |degrees: f32| f64::from(degrees).to_radians();
-        let [x, y, z] = [m.x_m, m.y_m, m.height_m].map(f64::from);
-        [x, y, z, radians(m.yaw_deg), radians(m.pitch_deg), radians(m.roll_deg)]
-    });
+    let mut camera = read_camera(&beside).with_context(|| format!("{}: its camera", path.display()))?;
+    ensure!(
+        options.field_of_view.is_none(),
+        "--fov does not go with boxes: a camera's view follows from {}",
+        beside.display()
+    );
+    if let Some([x, y, z, yaw, pitch, roll]) = options.mount {
+        camera.pose = SensorPose::new([x, y, z], yaw, pitch, roll);
+    }
     let (frames, problems) = pictures(bytes).with_context(|| path.display().to_string())?;
-    let camera = RecordedCamera {
-        pose: SensorPose::new([x, y, z], yaw, pitch, roll),
+    camera.frames = frames;
+    let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
+    Ok(Recording { problems, ..camera.alone(name, Sensor::CAMERA, None, range_max_m) })
+}
+
+/// Reads a camera's file: a camera without frames.
+///
+/// # Errors
+/// The file cannot be read; line and key of what is wrong in it.
+pub fn read_camera(path: &Path) -> Result<RecordedCamera> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read the calibration {}", path.display()))?;
+    let Calibration { intrinsics: i, mount: m } = toml::from_str(&text).with_context(|| path.display().to_string())?;
+    let [yaw, pitch, roll] = [m.yaw_deg, m.pitch_deg, m.roll_deg].map(|degrees| f64::from(degrees).to_radians());
+    Ok(RecordedCamera {
+        pose: SensorPose::new([m.x_m, m.y_m, m.height_m].map(f64::from), yaw, pitch, roll),
         intrinsics: Intrinsics {
             size_px: i.size_px.map(u32::from),
             focal_px: i.focal_px.map(f64::from),
             center_px: i.center_px.map(f64::from),
         },
-        frames,
+        frames: Vec::new(),
         alone: true,
-    };
-    let sensor = Sensor {
-        name: "camera".into(),
-        field_of_view: FieldOfView { azimuth_rad: [0.0; 2], elevation_rad: [0.0; 2], range_m: [0.0; 2] },
-        has_elevation: true,
-        frames_independent: false,
-        platform_moving: false,
-        licence: None,
-    };
-    let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
-    Ok(Recording { problems, ..camera.alone(name, sensor, None, range_max_m) })
+    })
+}
+
+/// The rows of pictures, with the heading; edges to a quarter of a pixel, as in a message.
+pub fn rows(frames: &[CameraFrame]) -> String {
+    let mut text = String::from("time_s,class,left_px,top_px,right_px,bottom_px,score\n");
+    for frame in frames {
+        let time_s = format!(
+            "{}.{:06}",
+            frame.time_ns.div_euclid(1_000_000_000),
+            frame.time_ns.rem_euclid(1_000_000_000) / 1000
+        );
+        if frame.boxes.is_empty() {
+            text += &format!("{time_s},,,,,,\n");
+        }
+        for Box2d { class, score, edges } in &frame.boxes {
+            let [l, t, r, b] = edges.map(|v| (v * 4.0).round() / 4.0);
+            text += &format!("{time_s},{class},{l},{t},{r},{b},{score:.3}\n");
+        }
+    }
+    text
 }
 
 fn pictures(bytes: &[u8]) -> Result<(Vec<CameraFrame>, Problems)> {
@@ -147,6 +170,21 @@ mod tests {
             [(1_500_000_000, 2), (1_600_000_000, 0)]
         );
         assert_eq!((frames[0].boxes[1].class.as_str(), frames[0].boxes[1].edges), ("truck", [5.0, 6.0, 7.0, 8.25]));
+        assert!(problems.is_empty());
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let b = |class: &str, edges| Box2d { class: class.into(), score: 0.5, edges };
+        let frame = |time_ns, boxes| CameraFrame { time_ns, boxes, refused: 0 };
+        let truck = b("truck", [-1.0, 2.25, 30.5, 40.0]);
+        let frames = vec![
+            frame(0, vec![b("car", [1.0, 2.0, 3.0, 4.0]), truck]),
+            frame(100_000_000, vec![]),
+            frame(1_200_000_000, vec![]),
+        ];
+        let (back, problems) = pictures(rows(&frames).as_bytes()).unwrap();
+        assert_eq!(back, frames);
         assert!(problems.is_empty());
     }
 

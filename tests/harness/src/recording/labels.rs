@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
+use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::truth::Label;
 
@@ -22,6 +23,12 @@ pub fn class_size(class: &str) -> Option<[f64; 3]> {
         _ => return None,
     })
 }
+
+/// A heading is at most this, and a little more for rounding.
+const TURN_RAD: f64 = 6.3;
+
+/// What is beyond is no time in seconds.
+const LATEST_S: f64 = 1e10;
 
 /// A row as it stands in the file.
 #[derive(Debug, Deserialize)]
@@ -69,7 +76,7 @@ pub fn at_line(path: &Path, line: u64) -> String {
 /// the size of their class.
 ///
 /// # Errors
-/// Names file and line of the first row that is malformed or whose class has no known size.
+/// Names file and line of the first row that is malformed or whose class has no known size; labels of another time.
 pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label>, usize)> {
     let (mut labels, mut sized_by_class) = (Vec::new(), BTreeSet::new());
     for (line, row) in read_rows(path)? {
@@ -78,6 +85,7 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label
         }
         labels.push(label(row).with_context(|| at_line(path, line))?);
     }
+    check_times(path, &labels, start_ns, end_ns)?;
     if !labels.iter().any(|l| (start_ns..=end_ns).contains(&l.time_ns)) {
         for l in &mut labels {
             l.time_ns = l.time_ns.saturating_add(start_ns);
@@ -86,10 +94,60 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label
     Ok((labels, sized_by_class.len()))
 }
 
+/// Refuses labels of which none is of the recording's time, and times that are milliseconds.
+fn check_times(path: &Path, labels: &[Label], start_ns: i64, end_ns: i64) -> Result<()> {
+    let times = || labels.iter().map(|l| l.time_ns);
+    let (Some(first), Some(last)) = (times().min(), times().max()) else { return Ok(()) };
+    let duration_ns = end_ns.saturating_sub(start_ns);
+    let s = |ns: i64| ns as f64 * 1e-9;
+    let spans = || {
+        let clock = if start_ns > 0 {
+            format!(" (on its own clock {:.1} to {:.1} s)", s(start_ns), s(end_ns))
+        } else {
+            String::new()
+        };
+        format!("labels span {:.1} to {:.1} s, the recording 0 to {:.1} s{clock}", s(first), s(last), s(duration_ns))
+    };
+    let within = |from: i64, to: i64| first <= to && last >= from;
+    // far beyond the end as they stand, and just fitting as thousandths
+    let of_milliseconds =
+        last > duration_ns.saturating_mul(10) && first >= 0 && last / 1000 <= duration_ns + duration_ns / 20;
+    if of_milliseconds && !within(start_ns, end_ns) {
+        bail!("{}: {}: time_s is in seconds; are these milliseconds?", path.display(), spans());
+    }
+    if !within(start_ns, end_ns) && !within(0, duration_ns) {
+        bail!("{}: {}: no label is of its time", path.display(), spans());
+    }
+    Ok(())
+}
+
+/// Refuses labels that are nowhere near the sensor.
+///
+/// # Errors
+/// Says where they are, and where the sensor is.
+pub fn check_places(path: &Path, labels: &[Label], pose: &SensorPose, range_m: f64) -> Result<()> {
+    let [x, y, _] = pose.position;
+    let near = |l: &Label| (l.solid.center[0] - x).hypot(l.solid.center[1] - y) <= range_m;
+    if labels.is_empty() || labels.iter().any(near) {
+        return Ok(());
+    }
+    let span = |axis: usize| {
+        let all = labels.iter().map(|l| l.solid.center[axis]);
+        format!("{:.1} to {:.1} m", all.clone().fold(f64::MAX, f64::min), all.fold(f64::MIN, f64::max))
+    };
+    bail!(
+        "{}: no label lies within {range_m:.0} m of the sensor: labels span x {}, y {} in the road frame, the sensor is at x {x:.1}, y {y:.1} m",
+        path.display(),
+        span(0),
+        span(1)
+    );
+}
+
 /// A row as a label standing on the road; a missing size is that of the class.
 ///
 /// # Errors
-/// A class whose size nobody knows, a value that is not finite, a size that is not positive.
+/// A class whose size nobody knows, a value that is not finite, a size that is not positive, a heading of more than a turn, a time that is none in
+/// seconds.
 pub fn label(row: LabelRow) -> Result<Label> {
     let default = class_size(&row.class);
     let pick = |given: Option<f64>, k: usize| given.or(default.map(|d| d[k]));
@@ -97,6 +155,12 @@ pub fn label(row: LabelRow) -> Result<Label> {
         bail!("class `{}` has no default size; give length_m, width_m and height_m", row.class);
     };
     let yaw_rad = row.heading_rad.unwrap_or(0.0);
+    if row.time_s.abs() > LATEST_S {
+        bail!("time_s {} is after the year 2286: it is in seconds; are these milliseconds?", row.time_s);
+    }
+    if yaw_rad.abs() > TURN_RAD {
+        bail!("heading_rad {yaw_rad} is more than a turn: it is in radians, anticlockwise from +x; are these degrees?");
+    }
     if [row.time_s, row.x_m, row.y_m, yaw_rad].iter().any(|v| !v.is_finite())
         || [l, w, h].iter().any(|v| !(*v > 0.0 && v.is_finite()))
     {

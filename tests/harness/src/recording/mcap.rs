@@ -1,12 +1,11 @@
 //! Recordings from MCAP files (profile `ros2`, CDR messages).
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context, Result, anyhow, bail};
 use mcap::records::{MessageHeader, Record};
+use viewshed::camera::Camera3dConfig;
 
-use super::beside;
 use super::camera::{CameraReader, INFO_TOPIC, OBJECTS_TOPIC};
 use super::points::{self, NOT_A_RANGE, NOT_FINITE, Points};
 use super::problems::Problems;
@@ -34,11 +33,23 @@ const SIZE_M: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Distance from the origin of the road an object may have.
 const FARTHEST_M: f64 = 1e5;
 
+/// What messages are in that are read.
+const ENCODING: &str = "cdr";
+
 #[derive(Debug, Clone)]
 struct Topic {
     name: String,
     schema: String,
+    encoding: String,
     messages: u64,
+}
+
+impl Topic {
+    /// Whether its messages are of a radar, by their type; ROS 1 leaves the `/msg` out.
+    fn is_of_a_radar(&self) -> bool {
+        let schema = self.schema.replace("/msg/", "/");
+        [POINT_CLOUD, RADAR_SCAN].iter().any(|known| known.replace("/msg/", "/") == schema)
+    }
 }
 
 #[derive(Default)]
@@ -50,6 +61,7 @@ struct Reader {
     metadata: BTreeMap<String, String>,
     transforms: Transforms,
     radar_frame: Option<String>,
+    topics_of_frames: BTreeSet<String>,
     frames: Vec<Frame>,
     labels: Vec<Label>,
     labelled: bool,
@@ -57,30 +69,25 @@ struct Reader {
     problems: Problems,
 }
 
-/// Reads a recording with the files beside it: `NAME.labels.csv` (replaces the labels inside) and
-/// `NAME.occlusion.csv`.
-///
-/// # Errors
-/// A file that is no MCAP, and whatever makes an evaluation impossible: no radar frames, no mount,
-/// no field of view. The message names what was found and the option that mends it. Anything less
-/// is counted in [`Recording::problems`].
-pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    beside::complete(parse(&bytes, name, options)?, path, options)
-}
-
 /// A whole recording from the bytes of its file, with nothing beside it.
 ///
 /// # Errors
-/// Those of [`read`].
+/// A file that is no MCAP, and whatever makes an evaluation impossible: no radar frames, several radars, no mount,
+/// no field of view. The message names what was found and the option that mends it. Anything less
+/// is counted in [`Recording::problems`].
 pub fn parse(bytes: &[u8], name: String, options: &ReadOptions) -> Result<Recording> {
-    let mut reader = Reader {
-        radar_topic: options.radar_topic.clone(),
-        truth_topic: options.truth_topic.clone(),
-        ..Default::default()
+    let read = |radar_topic: Option<String>| {
+        let truth_topic = options.truth_topic.clone();
+        let mut reader = Reader { radar_topic, truth_topic, ..Default::default() };
+        reader.records(bytes).map(|()| reader)
     };
-    reader.records(bytes)?;
+    let mut reader = read(options.radar_topic.clone())?;
+    if reader.radar_topic.is_none() && reader.topics_of_frames.is_empty() {
+        // the only one that can be meant
+        if let [one] = &reader.radar_topics()[..] {
+            reader = read(Some(one.clone()))?;
+        }
+    }
     reader.finish(name, options)
 }
 
@@ -109,7 +116,12 @@ impl Reader {
                 }
                 Record::Channel(c) => {
                     let schema = self.schemas.get(&c.schema_id).cloned().unwrap_or_else(|| "(no schema)".into());
-                    self.channels.entry(c.id).or_insert(Topic { name: c.topic, schema, messages: 0 });
+                    self.channels.entry(c.id).or_insert(Topic {
+                        name: c.topic,
+                        schema,
+                        encoding: c.message_encoding,
+                        messages: 0,
+                    });
                 }
                 Record::Message { header, data } => self.message(&header, &data),
                 Record::Metadata(m) if m.name == SENSOR_METADATA => self.metadata = m.metadata,
@@ -135,11 +147,14 @@ impl Reader {
             return;
         };
         topic.messages += 1;
-        let Topic { name, schema, .. } = topic.clone();
+        let Topic { name, schema, encoding, .. } = topic.clone();
         let is_radar = self.radar_topic.as_deref().unwrap_or(POINTS_TOPIC) == name
             || (self.radar_topic.is_none() && schema == RADAR_SCAN);
         let is_truth = self.truth_topic.as_deref().unwrap_or(TRUTH_TOPIC) == name;
         let outcome = match schema.as_str() {
+            _ if encoding != ENCODING && (is_radar || is_truth) => {
+                Err(format!("its encoding is {encoding}, and only {ENCODING} (ROS 2) is read"))
+            }
             POINT_CLOUD if is_radar => self.cloud(&name, header, data),
             RADAR_SCAN if is_radar => self.scan(&name, header, data),
             DETECTIONS if is_truth => self.objects(&name, data),
@@ -185,6 +200,9 @@ impl Reader {
         self.problems.add_many(topic, NOT_FINITE, time_ns, points.not_finite);
         self.problems.add_many(topic, NOT_A_RANGE, time_ns, points.not_a_range);
         self.radar_frame.get_or_insert_with(|| header.frame_id.clone());
+        if !self.topics_of_frames.contains(topic) {
+            self.topics_of_frames.insert(topic.to_owned());
+        }
         let refused = points.not_finite + points.not_a_range;
         self.frames.push(Frame { time_ns, detections: points.detections, refused });
     }
@@ -213,31 +231,70 @@ impl Reader {
         Ok(())
     }
 
+    /// Topics of the types that radars send, whatever they are called.
+    fn radar_topics(&self) -> Vec<String> {
+        let found = self.channels.values().filter(|t| t.is_of_a_radar() && t.messages > 0).map(|t| t.name.clone());
+        found.collect::<BTreeSet<_>>().into_iter().collect()
+    }
+
     fn topics(&self) -> String {
         if self.channels.is_empty() {
             return "none".into();
         }
-        let mut found: Vec<_> =
-            self.channels.values().map(|t| format!("{} ({}, {} messages)", t.name, t.schema, t.messages)).collect();
+        let encoding = |t: &Topic| if t.encoding == ENCODING { String::new() } else { format!("{}, ", t.encoding) };
+        let mut found: Vec<_> = self
+            .channels
+            .values()
+            .map(|t| format!("{} ({}, {}{} messages)", t.name, t.schema, encoding(t), t.messages))
+            .collect();
         found.sort();
         found.join(", ")
     }
 
     fn finish(mut self, name: String, options: &ReadOptions) -> Result<Recording> {
-        let topic = options.radar_topic.as_deref().unwrap_or(POINTS_TOPIC);
         if self.frames.is_empty() {
+            // boxes of a camera without a radar are a recording of their own
+            let camera = match options.radar_topic {
+                None => std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems),
+                Some(_) => None,
+            };
+            if let Some(camera) = camera {
+                let truth = self.labelled.then(|| Truth::new(self.labels));
+                let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
+                return Ok(Recording {
+                    problems: self.problems,
+                    ..camera.alone(name, Sensor::CAMERA, truth, range_max_m)
+                });
+            }
             let skipped: String = self.problems.iter().map(|p| format!("\n  {p}")).collect();
-            bail!(
-                "{name}: no radar frame on topic {topic}; topics found: {}. Name another with --radar-topic.{skipped}",
-                self.topics()
-            );
+            let radars = self.radar_topics();
+            let found = match (&options.radar_topic, &radars[..]) {
+                (Some(topic), _) => format!("no radar frame on topic {topic}"),
+                (None, [_, _, ..]) => format!("{} topics may be the radar's: {}", radars.len(), radars.join(", ")),
+                (None, [one]) => format!("no radar frame that can be read on topic {one}"),
+                (None, []) => {
+                    format!("no radar frame: no topic {POINTS_TOPIC}, nor any of type {POINT_CLOUD} or {RADAR_SCAN}")
+                }
+            };
+            let ros_1 = self.channels.values().any(|t| t.encoding == "ros1");
+            let remedy = if ros_1 {
+                "Messages of ROS 1 are not read: convert the bag (`pip install rosbags`, then `rosbags-convert --src OLD.bag --dst FOLDER --dst-storage mcap`)."
+            } else {
+                "Name one with --radar-topic."
+            };
+            bail!("{name}: {found}; topics found: {}. {remedy}{skipped}", self.topics());
         }
-        let radar_frame = self.radar_frame.clone().unwrap_or_default();
+        if let [_, _, ..] = &self.topics_of_frames.iter().collect::<Vec<_>>()[..] {
+            let radars: Vec<_> = self.topics_of_frames.iter().map(String::as_str).collect();
+            bail!("{name}: several radars: {}; choose one with --radar-topic", radars.join(", "));
+        }
+        let radar_frame = options.radar_frame.clone().or(self.radar_frame.take()).unwrap_or_default();
+        let road_frame = options.road_frame.as_deref().unwrap_or(ROAD_FRAME);
         let pose = match options.mount {
             Some([x, y, z, yaw, pitch, roll]) => SensorPose::new([x, y, z], yaw, pitch, roll),
-            None => self.transforms.pose(ROAD_FRAME, &radar_frame).ok_or_else(|| {
+            None => self.transforms.pose(road_frame, &radar_frame).ok_or_else(|| {
                 anyhow!(
-                    "{name}: no mount: /tf_static joins no frame `{ROAD_FRAME}` to the radar's `{radar_frame}` (transforms found: {}). Give it with --mount x,y,z,yaw,pitch,roll (metres, degrees).",
+                    "{name}: no mount: /tf_static joins no frame `{road_frame}` to the radar's `{radar_frame}` (transforms found: {}). Name the frames with --road-frame and --radar-frame, or give the mount with --mount x,y,z,yaw,pitch,roll (metres, degrees).",
                     self.transforms.describe()
                 )
             })?,
@@ -250,7 +307,7 @@ impl Reader {
         }
         let sensor = self.sensor(&name, options)?;
         let truth = self.labelled.then(|| Truth::new(self.labels));
-        let camera = self.camera.finish(&self.transforms, ROAD_FRAME, &mut self.problems);
+        let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);
         Ok(Recording {
             name,
             sensor,

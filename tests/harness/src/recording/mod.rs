@@ -4,11 +4,14 @@ pub mod ars408;
 pub mod beside;
 pub mod boxes;
 pub mod camera;
-pub mod candump;
+pub mod can_log;
 pub mod capture;
+pub mod file;
+pub mod foreign;
 pub mod labels;
 pub mod mcap;
 pub mod native;
+pub mod plausible;
 pub mod points;
 pub mod problems;
 pub mod ros;
@@ -21,7 +24,7 @@ pub mod write;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Result, bail};
 
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
@@ -91,6 +94,18 @@ pub struct Sensor {
     pub licence: Option<String>,
 }
 
+impl Sensor {
+    /// What is known of a camera without a radar, beside its view.
+    pub const CAMERA: Self = Self {
+        name: String::new(),
+        field_of_view: FieldOfView { azimuth_rad: [0.0; 2], elevation_rad: [0.0; 2], range_m: [0.0; 2] },
+        has_elevation: true,
+        frames_independent: false,
+        platform_moving: false,
+        licence: None,
+    };
+}
+
 /// A whole recording in memory.
 #[derive(Debug, Clone)]
 pub struct Recording {
@@ -128,12 +143,19 @@ impl Recording {
 pub struct ReadOptions {
     pub radar_topic: Option<String>,
     pub truth_topic: Option<String>,
+    /// The radar says + of what approaches.
+    pub approaching_is_positive: bool,
+    /// Frames of `/tf_static` that stand for `road` and for the one in the radar's headers.
+    pub road_frame: Option<String>,
+    pub radar_frame: Option<String>,
     /// x, y, z in metres, yaw, pitch, roll in radians.
     pub mount: Option<[f64; 6]>,
     pub field_of_view: Option<FieldOfView>,
     /// Seconds since the first radar frame.
     pub from_s: Option<f64>,
     pub to_s: Option<f64>,
+    /// Which bus of a log with several.
+    pub interface: Option<String>,
     /// Which sensor of a bus with several.
     pub sensor_id: Option<u8>,
     /// Which kind of radar a CAN log is of.
@@ -151,25 +173,28 @@ pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
     [path.to_owned()].into_iter().chain(beside::files(path)).chain(boxes::camera_file(path))
 }
 
-/// Reads a recording of any kind: MCAP, a CAN log of `candump -L`, a capture of a TI mmWave radar or of
-/// the native format, boxes of a camera as CSV.
+/// Reads a recording of any kind: MCAP, a CAN log, a capture of a TI mmWave radar or of the native format, boxes of a
+/// camera as CSV; each also gzipped, and `-` from standard input.
 ///
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let (bytes, name) = (file::bytes(path)?, file::stem(path));
     let recording = if boxes::is_boxes(path) {
         boxes::read(path, &bytes, options)?
-    } else if candump::is_log(&bytes) {
-        ars408::read(name, &bytes, options)?
-    } else if !bytes.starts_with(::mcap::MAGIC) && ti::is_capture(&bytes) {
+    } else if bytes.starts_with(::mcap::MAGIC) {
+        mcap::parse(&bytes, name, options)?
+    } else if let Some(format) = can_log::Format::of(&bytes) {
+        ars408::read(name, &bytes, format, options)?
+    } else if let Some(foreign) = foreign::named(&bytes) {
+        bail!("{} cannot be read: {foreign}", file::shown(path));
+    } else if ti::is_capture(&bytes) {
         ti::read(name, &bytes, options)?
-    } else if !bytes.starts_with(::mcap::MAGIC) && native::is_capture(&bytes) {
+    } else if native::is_capture(&bytes) {
         let (messages, broken) = native::unstuff(&bytes);
         native::read(name, &messages, broken, options)?
     } else {
-        return mcap::read(path, options);
+        mcap::parse(&bytes, name, options)?
     };
     beside::complete(recording, path, options)
 }

@@ -9,7 +9,7 @@ use viewshed::inputs::native::{NativeConfig, NativeCounters, NativeOutcome, Nati
 use viewshed::wire::e2e::Profile;
 use viewshed::wire::serial::Unstuffer;
 
-use super::candump::Line;
+use super::can_log::Line;
 use super::capture::{self, Kind};
 use super::problems::Problems;
 use super::{Frame, ReadOptions, Recording};

@@ -1,13 +1,30 @@
 //! Radar points out of `PointCloud2` and `RadarScan` messages.
+//!
+//! A cloud tells range and angles, or x, y and z in its own frame (x ahead, y left, z up), of which they are computed.
+//! Values are metres, radians and metres per second as they stand: nothing is converted.
 
 use super::RadarDetection;
 use super::ros::{PointCloud2, PointField, RadarScan};
 
-/// Names a field goes by: ours first, then smartmicro's.
+/// Names a field goes by: ours first, then those of drivers.
 const RANGE: &[&str] = &["range"];
 const AZIMUTH: &[&str] = &["azimuth", "azimuth_angle"];
 const ELEVATION: &[&str] = &["elevation", "elevation_angle"];
-const RADIAL_VELOCITY: &[&str] = &["radial_velocity", "radial_speed"];
+const RADIAL_VELOCITY: &[&str] = &[
+    "radial_velocity",
+    "radial_speed",
+    "velocity",
+    "doppler",
+    "doppler_velocity",
+    "v_r",
+    "vr",
+    "v_radial",
+    "range_rate",
+    "speed_radial",
+];
+const X: &[&str] = &["x"];
+const Y: &[&str] = &["y"];
+const Z: &[&str] = &["z"];
 const RCS: &[&str] = &["rcs"];
 const SNR: &[&str] = &["snr"];
 
@@ -63,10 +80,9 @@ impl Column {
     }
 
     fn needed(cloud: &PointCloud2, names: &[&str]) -> Result<Self, String> {
-        Self::find(cloud, names)?.ok_or_else(|| {
-            let found: Vec<_> = cloud.fields.iter().map(|f| f.name.as_str()).collect();
-            format!("no field `{}`; fields found: {}", names.join("` or `"), found.join(", "))
-        })
+        let found = || self::names(cloud);
+        Self::find(cloud, names)?
+            .ok_or_else(|| format!("no field `{}`; fields found: {}", names.join("` or `"), found()))
     }
 
     fn read(self, point: &[u8], big_endian: bool) -> f32 {
@@ -88,10 +104,8 @@ impl Column {
 
 /// Points of a cloud; the error names the field that is missing or malformed.
 pub fn from_cloud(cloud: &PointCloud2) -> Result<Points, String> {
-    let range = Column::needed(cloud, RANGE)?;
-    let azimuth = Column::needed(cloud, AZIMUTH)?;
+    let place = Place::find(cloud)?;
     let velocity = Column::needed(cloud, RADIAL_VELOCITY)?;
-    let elevation = Column::find(cloud, ELEVATION)?;
     let rcs = Column::find(cloud, RCS)?;
     let snr = Column::find(cloud, SNR)?;
 
@@ -109,17 +123,59 @@ pub fn from_cloud(cloud: &PointCloud2) -> Result<Points, String> {
         for point in line[..width * step].chunks_exact(step) {
             let get = |c: Column| c.read(point, cloud.is_bigendian);
             let measured = |c: Option<Column>| c.map(get).filter(|v| !v.is_nan());
+            let [range_m, azimuth_rad, elevation_rad] = place.read(get);
             points.push(RadarDetection {
-                range_m: get(range),
-                azimuth_rad: get(azimuth),
-                elevation_rad: measured(elevation),
+                range_m,
+                azimuth_rad,
+                elevation_rad: Some(elevation_rad).filter(|e| !e.is_nan()),
                 radial_velocity_mps: get(velocity),
                 rcs_dbsm: measured(rcs).filter(|v| v.is_finite()),
                 snr_db: measured(snr).filter(|v| v.is_finite()),
             });
         }
     }
+    // a radar that measures no elevation puts all of its points into its own plane
+    if matches!(place, Place::Cartesian(..)) && points.detections.iter().all(|d| d.elevation_rad == Some(0.0)) {
+        points.detections.iter_mut().for_each(|d| d.elevation_rad = None);
+    }
     Ok(points)
+}
+
+/// How a cloud says where its points are.
+enum Place {
+    /// Range, azimuth and, where measured, elevation.
+    Polar(Column, Column, Option<Column>),
+    Cartesian(Column, Column, Column),
+}
+
+impl Place {
+    fn find(cloud: &PointCloud2) -> Result<Self, String> {
+        let find = |names| Column::find(cloud, names);
+        if let (Some(range), Some(azimuth)) = (find(RANGE)?, find(AZIMUTH)?) {
+            return Ok(Self::Polar(range, azimuth, find(ELEVATION)?));
+        }
+        match (find(X)?, find(Y)?, find(Z)?) {
+            (Some(x), Some(y), Some(z)) => Ok(Self::Cartesian(x, y, z)),
+            _ => Err(format!("neither range and azimuth nor x, y and z; fields found: {}", names(cloud))),
+        }
+    }
+
+    /// Range, azimuth, elevation; NaN where that is not measured.
+    fn read(&self, get: impl Fn(Column) -> f32) -> [f32; 3] {
+        match *self {
+            Self::Polar(range, azimuth, elevation) => [get(range), get(azimuth), elevation.map_or(f32::NAN, get)],
+            Self::Cartesian(x, y, z) => {
+                let [x, y, z] = [x, y, z].map(|c| f64::from(get(c)));
+                let flat = x.hypot(y);
+                // a point that is not finite stays so
+                [flat.hypot(z) as f32, y.atan2(x) as f32, if z.is_nan() { f32::INFINITY } else { z.atan2(flat) as f32 }]
+            }
+        }
+    }
+}
+
+fn names(cloud: &PointCloud2) -> String {
+    cloud.fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// Points of a `RadarScan`; its amplitude in dB stands for the SNR.
@@ -185,6 +241,32 @@ mod tests {
                 snr_db: None
             }]
         );
+    }
+
+    #[test]
+    fn range_and_angles_are_computed_of_x_y_and_z() {
+        let one = |xyz: &[f32], velocity: &str| {
+            from_cloud(&cloud(&["x", "y", "z", velocity], &[&[xyz, &[-3.0]].concat()])).unwrap()
+        };
+        let d = one(&[30.0, 40.0, -50.0], "velocity").detections[0];
+        let elevation = d.elevation_rad.unwrap();
+        assert!((d.range_m - 70.710_68).abs() < 1e-4, "{d:?}");
+        assert!((d.azimuth_rad - 0.927_295).abs() < 1e-6, "to the left is +: {d:?}");
+        assert!((elevation + std::f32::consts::FRAC_PI_4).abs() < 1e-6, "below is -: {d:?}");
+        assert_eq!(d.radial_velocity_mps, -3.0);
+        for name in ["doppler", "v_r", "range_rate", "doppler_velocity"] {
+            assert_eq!(one(&[30.0, -40.0, 0.0], name).detections[0].elevation_rad, None, "all in the radar's plane");
+        }
+        assert_eq!(one(&[f32::NAN, 1.0, 1.0], "vr").not_finite, 1);
+        assert_eq!(one(&[1.0, 1.0, f32::NAN], "vr").not_finite, 1);
+        assert_eq!(one(&[0.0, 0.0, 0.0], "vr").not_a_range, 1);
+    }
+
+    #[test]
+    fn range_and_angles_go_before_x_y_and_z() {
+        let names = ["x", "y", "z", "range", "azimuth", "radial_velocity"];
+        let d = from_cloud(&cloud(&names, &[&[1.0, 2.0, 3.0, 50.0, 0.25, 1.0]])).unwrap().detections[0];
+        assert_eq!((d.range_m, d.azimuth_rad, d.elevation_rad), (50.0, 0.25, None));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use super::candump::{bytes, nanoseconds};
+use super::can_log::candump::{bytes, nanoseconds};
 
 /// One line of a log: some bytes.
 #[derive(Debug, Clone, PartialEq)]

@@ -48,7 +48,7 @@ pub struct RecordingWriter<W: Write + Seek> {
 impl<W: Write + Seek> RecordingWriter<W> {
     /// Begins a recording of a sensor mounted at `pose` since `start_ns`.
     pub fn new(sink: W, sensor: &Sensor, pose: &SensorPose, start_ns: i64) -> Result<Self> {
-        Self::begin(sink, sensor, start_ns, &mount(pose, RADAR_FRAME, start_ns))
+        Self::begin(sink, Some(sensor), start_ns, &mount(pose, RADAR_FRAME, start_ns))
     }
 
     /// The same with a camera beside the radar.
@@ -62,15 +62,24 @@ impl<W: Write + Seek> RecordingWriter<W> {
         let mut mounts = mount(pose, RADAR_FRAME, start_ns);
         mounts.transforms.extend(mount(camera, CAMERA_FRAME, start_ns).transforms);
         mounts.transforms.push(optical(start_ns));
-        Self::begin(sink, sensor, start_ns, &mounts)
+        Self::begin(sink, Some(sensor), start_ns, &mounts)
     }
 
-    fn begin(sink: W, sensor: &Sensor, start_ns: i64, mounts: &TfMessage) -> Result<Self> {
+    /// Begins a recording of a camera without a radar.
+    pub fn of_camera(sink: W, camera: &SensorPose, start_ns: i64) -> Result<Self> {
+        let mut mounts = mount(camera, CAMERA_FRAME, start_ns);
+        mounts.transforms.push(optical(start_ns));
+        Self::begin(sink, None, start_ns, &mounts)
+    }
+
+    fn begin(sink: W, sensor: Option<&Sensor>, start_ns: i64, mounts: &TfMessage) -> Result<Self> {
         let options = WriteOptions::new().profile("ros2").compression(Some(Compression::Zstd));
         // one thread whatever the machine: the bytes must not depend on its processors
         let options = options.compression_level(COMPRESSION_LEVEL).compression_threads(1).chunk_size(Some(CHUNK_BYTES));
         let mut writer = options.create(sink)?;
-        writer.write_metadata(&sensor_metadata(sensor))?;
+        if let Some(sensor) = sensor {
+            writer.write_metadata(&sensor_metadata(sensor))?;
+        }
         let mut recording = Self { writer, channels: BTreeMap::new(), sequence: 0 };
         recording.message(TF_TOPIC, TF, start_ns, mounts)?;
         Ok(recording)

@@ -7,12 +7,12 @@ use viewshed::camera::boxes::ImageBox;
 use viewshed::unit::settings::Settings;
 use viewshed_harness::boards::scans::{self, Scan};
 use viewshed_harness::boards::{Board, check_camera};
-use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::recording::{self, ReadOptions};
 
 /// Settings of the shipped recording's camera, and all its pictures.
 fn shipped() -> (Settings, Vec<Scan<ImageBox>>) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
-    let recording = mcap::read(&path, &ReadOptions::default()).unwrap();
+    let recording = recording::read(&path, &ReadOptions::default()).unwrap();
     let camera = recording.camera.unwrap();
     (scans::camera_settings(&camera), scans::of_camera(&camera))
 }

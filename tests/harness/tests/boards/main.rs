@@ -16,13 +16,13 @@ use std::path::Path;
 use viewshed::unit::settings::Settings;
 use viewshed_harness::boards::scans::{self, Scan};
 use viewshed_harness::estimators;
-use viewshed_harness::recording::{ReadOptions, Recording, mcap};
+use viewshed_harness::recording::{self, ReadOptions, Recording};
 
 /// The shipped recording's settings and its first seconds.
 fn shipped(seconds: f64) -> (Settings, Vec<Scan>) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
     let reading = ReadOptions { to_s: Some(seconds), ..ReadOptions::default() };
-    let recording = mcap::read(&path, &reading).unwrap();
+    let recording = recording::read(&path, &reading).unwrap();
     (settings_of(&recording), scans::of(&recording))
 }
 

@@ -100,7 +100,7 @@ fn boxes_that_cannot_be_read_say_why() {
     write("key.boxes.csv", &format!("{heading}1,car,1,2,3,4\n"));
     write("key.camera.toml", &format!("{CAMERA}lens = 3\n"));
     for (arguments, words) in [
-        ("alone.boxes.csv", "cannot read the camera of these boxes, alone.camera.toml"),
+        ("alone.boxes.csv", "cannot read the calibration alone.camera.toml"),
         ("word.boxes.csv", "line: 3"),
         ("empty.boxes.csv", "no picture in it"),
         ("nowhere.boxes.csv", "intrinsics.focal_px[0] is 0, outside 50 to 20000"),

@@ -142,6 +142,7 @@ fn the_doctor_says_what_to_do_about_a_silent_bus() {
     let (severity, remedy) = finding(&report, "nothing of an ARS408").unwrap();
     assert!(severity == "error" && remedy.contains("500 kbit/s") && remedy.contains("termination"));
     assert!(report["findings"][0]["what"].as_str().unwrap().contains("123, 456"));
+    assert!(finding(&report, "lasts 0.5 s, which is too short").is_some());
     // there, but its output is switched off
     let (code, report) = judge(&folder, &["(1.0) can0 221#401F400012000000", "(1.1) can0 720#041E0100"]);
     assert_eq!(code, 1);
@@ -260,4 +261,24 @@ fn the_doctor_refuses_what_is_no_log() {
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("candump -L"), "{}", stderr(&output));
     assert_eq!(doctor(&folder, &["absent.log"]).status.code(), Some(2));
+}
+
+#[test]
+fn the_doctor_knows_a_broadcast_of_visibility() {
+    let folder = folder("doctor_broadcast");
+    let bus = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(&folder).arg("bus").args(arguments).output().unwrap()
+    };
+    crate::scene::Scene::default().save(&folder, "a");
+    let output = bus(&["a.mcap", "--log", "maps.log", "--sensor", "3"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let output = doctor(&folder, &["maps.log", "--json", "d.json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    let report = json(&folder.join("d.json"));
+    for what in ["no radar is on this bus, but the visibility broadcast", "visibility is broadcast there by sensor 3"] {
+        assert!(finding(&report, what).is_some_and(|(_, remedy)| remedy.contains("viewshed listen")), "{what}");
+    }
+    // and a log of a CAN bus goes through `bus` as any recording does
+    let output = bus(&[LOG, "--sensor-id", "0", "--mount", "0,0,5,0,2,0"]);
+    assert!(output.status.success() && stdout(&output).contains("classic-500k"), "{}", stderr(&output));
 }

@@ -6,6 +6,7 @@ mod can_log;
 mod foxglove;
 mod native_capture;
 mod outputs;
+mod own_data;
 mod python;
 mod radar_scan;
 mod replay;

@@ -7,7 +7,7 @@ use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::inputs::native::{NativeMedium, NativeSender, id};
-use viewshed_harness::recording::candump::{Content, Line};
+use viewshed_harness::recording::can_log::{Content, Line};
 use viewshed_harness::recording::{ReadOptions, read};
 
 use crate::scene::{folder, json, replay, stderr};

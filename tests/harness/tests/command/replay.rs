@@ -1,7 +1,7 @@
 //! Results of a replay, as table, JSON and CSV.
 
 use serde_json::{Value, json};
-use viewshed_harness::recording::{RadarDetection, ReadOptions, mcap};
+use viewshed_harness::recording::{self, RadarDetection, ReadOptions};
 
 use crate::scene::{FRAMES, PERIOD_NS, Scene, folder, json, replay, stderr, stdout};
 
@@ -16,7 +16,7 @@ fn row<'a>(report: &'a Value, name: &str) -> &'a Value {
 fn what_is_written_is_what_is_read() {
     let folder = folder("round_trip");
     let scene = Scene::default();
-    let read = mcap::read(&scene.save(&folder, "scene"), &ReadOptions::default()).unwrap();
+    let read = recording::read(&scene.save(&folder, "scene"), &ReadOptions::default()).unwrap();
     assert_eq!(read.sensor, scene.sensor);
     assert_eq!(read.frames, scene.steps.iter().map(|(f, _)| f.clone()).collect::<Vec<_>>());
     assert!((read.pose.pitch_rad() - scene.pose.pitch_rad()).abs() < 1e-12);
@@ -93,7 +93,7 @@ fn without_truth_there_are_no_rates_and_no_error() {
             assert_eq!(estimator[key], Value::Null, "{key} of {}", estimator["name"]);
         }
     }
-    assert!(stdout(&output).contains("no ground truth"));
+    assert!(stdout(&output).contains("No labels, so maps and pictures"));
     assert_eq!(std::fs::read_to_string(folder.join("r.csv")).unwrap().lines().count(), 1);
 }
 

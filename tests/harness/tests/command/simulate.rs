@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use viewshed_harness::evaluation::bounds::{self, BOX};
 use viewshed_harness::evaluation::{self, samples};
-use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::recording::{self, ReadOptions, mcap};
 use viewshed_harness::studies::experiment::hidden;
 use viewshed_harness::studies::experiment::plan::Plan;
 
@@ -103,7 +103,7 @@ fn a_recording_keeps_to_the_contract_and_can_be_replayed() {
     // 45 frames in 3 s; those from 2.0 s to before 2.3 s are missing
     assert_eq!((made["made"]["frames"].as_u64(), made["made"]["camera_frames"].as_u64()), (Some(40), Some(15)));
     assert_eq!(made["made"]["vehicles"], 2);
-    let recording = mcap::read(&folder.join("r.mcap"), &ReadOptions::default()).unwrap();
+    let recording = recording::read(&folder.join("r.mcap"), &ReadOptions::default()).unwrap();
     assert!(recording.problems.is_empty());
     assert_eq!((recording.frames.len(), recording.frames[0].time_ns), (40, 1_700_000_000_000_000_000));
     let truth = recording.truth.as_ref().unwrap();

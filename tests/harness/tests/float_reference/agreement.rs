@@ -16,7 +16,7 @@ mod tests {
     use viewshed_harness::evaluation::samples::{self, FrameSamples};
     use viewshed_harness::evaluation::score::{Score, score};
     use viewshed_harness::evaluation::{self, Grid};
-    use viewshed_harness::recording::{ReadOptions, Recording, mcap};
+    use viewshed_harness::recording::{self, ReadOptions, Recording};
 
     use crate::pipeline::Pipeline;
     use crate::scene::{Random, within};
@@ -26,7 +26,7 @@ mod tests {
     const COPIES: u64 = 64;
 
     fn recording() -> Recording {
-        mcap::read(Path::new(RECORDING), &ReadOptions::default()).unwrap()
+        recording::read(Path::new(RECORDING), &ReadOptions::default()).unwrap()
     }
 
     /// The estimator of the library, and the same in double precision.

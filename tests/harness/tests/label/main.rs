@@ -6,6 +6,7 @@
 mod appearance;
 mod browser;
 mod page;
+mod person;
 mod plots;
 mod requests;
 mod server;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use viewshed_harness::recording::write::RecordingWriter;
-use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::recording::{self, ReadOptions};
 
 use crate::browser::{Browser, Page, SHIFT};
 use crate::server::{SHIPPED, Server, folder, recording};
@@ -15,7 +15,7 @@ const MANY: usize = 200_000;
 /// The shipped recording with copies of its detections beside them, up to 200 000.
 fn dense(test: &str) -> PathBuf {
     let path = folder(test).join("dense.mcap");
-    let mut recording = mcap::read(Path::new(SHIPPED), &ReadOptions::default()).unwrap();
+    let mut recording = recording::read(Path::new(SHIPPED), &ReadOptions::default()).unwrap();
     let frames = recording.frames.len();
     for (k, frame) in recording.frames.iter_mut().enumerate() {
         let wanted = (k + 1) * MANY / frames - k * MANY / frames;

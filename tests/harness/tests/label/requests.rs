@@ -7,7 +7,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use viewshed_harness::recording::write::RecordingWriter;
-use viewshed_harness::recording::{ReadOptions, mcap};
+use viewshed_harness::recording::{self, ReadOptions};
 
 use crate::server::{SHIPPED, Server, folder, recording, skipped};
 
@@ -263,7 +263,7 @@ fn a_recording_without_radar_is_an_error() {
     fs::write(&file, "nothing").unwrap();
     let (code, error) = run(&[file.to_str().unwrap()]);
     assert!(code == Some(2) && error.contains("empty.mcap"), "{error}");
-    let recording = mcap::read(Path::new(SHIPPED), &ReadOptions::default()).unwrap();
+    let recording = recording::read(Path::new(SHIPPED), &ReadOptions::default()).unwrap();
     let silent = File::create(folder.join("silent.mcap")).unwrap();
     RecordingWriter::new(silent, &recording.sensor, &recording.pose, 0).unwrap().finish().unwrap();
     let (code, error) = run(&[folder.join("silent.mcap").to_str().unwrap()]);

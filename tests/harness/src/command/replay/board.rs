@@ -17,7 +17,7 @@ use crate::boards::{
 use crate::command::{complain, print};
 use crate::evaluation::Settings;
 #[cfg(unix)]
-use crate::recording::candump;
+use crate::recording::can_log;
 use crate::results::files::{Folder, Target};
 use crate::{estimators, recording};
 
@@ -109,9 +109,8 @@ fn live(
             (_, Some(port)) => live_check::port(port, args.baud, profile, name, &block, &scans())?,
             (Some(board @ Board::Zcu102R5), _) => {
                 ensure!(profile == Profile::Reference, "the live program of {} has the reference grid", board.name());
-                let text = std::fs::read(path).ok().filter(|bytes| candump::is_log(bytes));
-                let steps = match text {
-                    Some(text) => can_twin::log(&String::from_utf8_lossy(&text)),
+                let steps = match can_log::of_file(path, settings.reading.interface.as_deref())? {
+                    Some(lines) => can_twin::log(&lines),
                     None => {
                         let scans = scans();
                         can_twin::clusters(&scans, scans.len(), 240)

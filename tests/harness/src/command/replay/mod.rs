@@ -114,7 +114,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let folders = out.map(|out| out::folders(&out, &paths)).transpose()?;
     let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
-    let mut failed = false;
+    let (mut failed, mut labelled) = (false, false);
     for (k, path) in paths.iter().enumerate() {
         let one = match replay(path, args, mcap.as_ref(), &settings) {
             Ok(one) => one,
@@ -124,6 +124,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 continue;
             }
         };
+        labelled |= one.replay.recording.truth.is_some();
         let text = one.text(args, &settings);
         print(&text)?;
         if let Some(csv) = &mut samples {
@@ -152,10 +153,25 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             (_, several) => file.write(json::array(several)?)?,
         }
     }
-    if !reports.is_empty() {
+    if labelled {
         print(&format!("\n{ORIGIN}\n"))?;
     }
+    if !reports.is_empty() {
+        print(&written(args))?;
+    }
     Ok(if failed { ExitCode::from(BAD_INPUT) } else { ExitCode::SUCCESS })
+}
+
+/// Where everything went.
+fn written(args: &Args) -> String {
+    let all = [
+        ("table and pictures", &args.out),
+        ("results as JSON", &args.json),
+        ("objects as CSV", &args.csv),
+        ("map as MCAP, for Foxglove or Lichtblick", &args.mcap),
+    ];
+    let named = all.into_iter().filter_map(|(what, path)| Some(format!("{what}: {}\n", path.as_ref()?.display())));
+    named.collect()
 }
 
 /// One recording replayed, with what was asked for beside its rates.
@@ -178,6 +194,7 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
         replay
     };
     drop(replaying);
+    judged(&replay, settings)?;
 
     if let Some(target) = mcap {
         write_mcap(path, target, &args.mcap_estimator, &replay, settings)?;
@@ -199,6 +216,28 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
     let shown = replay.score(SHOWN).or(replay.score(SHOWN_OF_CAMERA));
     let examples = shown.map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
     Ok(Replayed { replay, examples, mount_error })
+}
+
+/// Refuses a labelled recording of which nothing could be judged: a table without a number tells nobody anything.
+fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
+    let (recording, summary) = (&replay.recording, &replay.summary);
+    let cells = summary.rows.iter().any(|row| row.cell_fvr().is_some() || row.cell_fir().is_some());
+    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty());
+    let Some(truth) = truth.filter(|_| summary.objects == 0 && !cells) else { return Ok(()) };
+    let (name, frames) = (&recording.name, recording.frames.len());
+    if summary.frames == 0 {
+        bail!(
+            "{name}: nothing can be judged: its {frames} frames, {:.1} s, end within the warm-up of {} s; shorten that with --warm-up",
+            recording.duration_s(),
+            settings.evaluation.warm_up_s
+        );
+    }
+    bail!(
+        "{name}: nothing can be judged: of its {} labelled objects none is faster than {} m/s and in the field of view in one of the {} frames that count; look at times, places and --fov, or set --min-speed",
+        truth.tracks.len(),
+        settings.evaluation.min_speed_mps,
+        summary.frames
+    );
 }
 
 /// `NAME.camera.csv` beside `NAME.csv`.

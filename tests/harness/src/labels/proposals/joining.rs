@@ -1,8 +1,10 @@
 //! Tracklets to paths: what both directions of time found, pieces of one long vehicle, pieces before and after a gap.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use super::path::{Path, quantile};
+use super::lane::Lane;
+use super::path::Path;
 use super::reflections::Instant;
 use super::tracker::{LONGEST_M, Tracklet};
 
@@ -10,18 +12,13 @@ use super::tracker::{LONGEST_M, Tracklet};
 const COMMON: f64 = 0.3;
 /// Longest gap in which something that moves is followed, seconds.
 const GAP_S: f64 = 10.0;
+/// Longest gap in which it may have changed lanes, seconds, and how far that is at most, metres.
+const CHANGES_S: f64 = 3.0;
+const LANE_M: f64 = 4.2;
 /// Longest gap in which something that stands is waited for, seconds.
 const STANDING_GAP_S: f64 = 90.0;
 /// Speed below which vehicles may keep so close together that they look like one, m/s.
 const SLOW_MPS: f64 = 8.0;
-/// Cells along a vehicle in which reflections are counted, metres; how many.
-const BIN_M: f64 = 0.5;
-const BINS: usize = 80;
-/// A void has less than this share of what its cells would have on average, is this long, and has on either side at
-/// least this share of all reflections.
-const THIN: f64 = 0.15;
-const VOID_M: f64 = 2.5;
-const SMALLER: f64 = 0.1;
 /// Cars are not higher than this, metres.
 const LOW_M: f64 = 1.8;
 /// Nor longer than this.
@@ -49,7 +46,8 @@ pub fn both_ways(forward: &[Tracklet], backward: &[Tracklet]) -> Vec<Tracklet> {
     let (mut taken_f, mut taken_b) = (vec![false; forward.len()], vec![false; backward.len()]);
     for (n, f, b) in pairs {
         let enough = n as f64 >= COMMON * forward[f].members.len().min(backward[b].members.len()) as f64;
-        if taken_f[f] || taken_b[b] || !enough {
+        let other_lane = forward[f].lane.zip(backward[b].lane).is_some_and(|(f, b)| f != b);
+        if taken_f[f] || taken_b[b] || !enough || other_lane {
             continue;
         }
         (taken_f[f], taken_b[b]) = (true, true);
@@ -64,7 +62,7 @@ pub fn both_ways(forward: &[Tracklet], backward: &[Tracklet]) -> Vec<Tracklet> {
     for (b, t) in backward.iter().enumerate().filter(|(b, _)| !taken_b[*b]) {
         let own: Vec<(usize, usize)> = t.members.iter().copied().filter(|m| !owner.contains_key(m)).collect();
         if own.len() * 2 > backward[b].members.len() {
-            all.push(Tracklet { members: own });
+            all.push(Tracklet { members: own, lane: t.lane });
         }
     }
     all
@@ -115,8 +113,9 @@ fn joined(paths: Vec<Path>, mut pairs: Vec<(f64, usize, usize)>, instants: &[Ins
             continue;
         }
         if let (Some(first), Some(second)) = (all[a].take(), all[b].take()) {
+            let lane = common(&first, &second);
             let members = [first.members, second.members].concat();
-            all.push(Path::new(members, instants));
+            all.push(Path::new(members, lane, instants));
         }
     }
     all.into_iter().flatten().collect()
@@ -127,6 +126,9 @@ fn rigid(a: &Path, b: &Path) -> Option<f64> {
     let (begin, end) = (a.first.max(b.first), a.last().min(b.last()));
     let shorter = a.motions.len().min(b.motions.len());
     if end < begin || end - begin + 1 < TOGETHER.max(shorter / 2) {
+        return None;
+    }
+    if differ(a, b) || (a.lane.is_some() && b.lane.is_some() && a.mean_speed().max(b.mean_speed()) < SLOW_MPS) {
         return None;
     }
     let (mut along, mut left, mut speeds) = (Vec::new(), Vec::new(), 0.0_f64);
@@ -188,56 +190,20 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
     let (along, left) = (rest[0] * c + rest[1] * s, -rest[0] * s + rest[1] * c);
     let wait = gap_s.abs();
     let length = (before.reach[1] - before.reach[0]).max(after.reach[1] - after.reach[0]).clamp(0.0, 10.0);
+    // changing lanes it moved to the side
+    let side = if differ(before, after) && gap_s.abs() < CHANGES_S { LANE_M } else { 0.0 };
+    let left = (left.abs() - side).max(0.0) + if side > 0.0 { 0.3 } else { 0.0 };
     let (along, left) =
         (along.abs() / (2.0 + 0.5 * length + 0.08 * speed * wait + 0.3 * wait), left.abs() / (1.2 + 0.3 * wait));
     (along < 1.0 && left < 1.0).then_some(along + left + wait / 5.0)
 }
 
-/// Takes apart paths that hold two vehicles one behind the other: between their reflections is a void.
-pub fn apart(paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
-    paths.into_iter().flat_map(|path| halves(path, instants)).collect()
+/// Whether they keep to different lanes.
+fn differ(a: &Path, b: &Path) -> bool {
+    a.lane.as_ref().zip(b.lane.as_ref()).is_some_and(|(a, b)| !Arc::ptr_eq(a, b))
 }
 
-fn halves(path: Path, instants: &[Instant]) -> Vec<Path> {
-    let along: Vec<Option<f64>> =
-        path.members.iter().zip(path.reflections(instants)).map(|(_, (f, r))| Some(path.local(f, r)?[0])).collect();
-    let mut counts = [0_usize; BINS];
-    let bin = |v: f64| ((v / BIN_M + BINS as f64 / 2.0).floor().max(0.0) as usize).min(BINS - 1);
-    for v in along.iter().flatten() {
-        counts[bin(*v)] += 1;
-    }
-    let total: usize = counts.iter().sum();
-    let (low, high) = (bin(path.reach[0]), bin(path.reach[1]));
-    let thin = (THIN * total as f64 / (high + 1 - low) as f64) as usize;
-    // the longest run of thin bins within the reach
-    let (mut best, mut run) = ((0, 0), 0);
-    for (k, count) in counts.iter().enumerate().take(high + 1).skip(low) {
-        run = if *count <= thin { run + 1 } else { 0 };
-        if run > best.0 {
-            best = (run, k);
-        }
-    }
-    if path.mean_speed() > SLOW_MPS {
-        return vec![path];
-    }
-    let (length, end) = best;
-    let cut = (end as f64 + 1.0 - length as f64 / 2.0 - BINS as f64 / 2.0) * BIN_M;
-    let behind = along.iter().flatten().filter(|v| **v < cut).count();
-    let smaller = behind.min(total - behind);
-    if (length as f64) * BIN_M < VOID_M || (smaller as f64) < SMALLER * total as f64 {
-        return vec![path];
-    }
-    let top = |front: bool| {
-        let own = path.reflections(instants).zip(&along).filter(|(_, v)| v.is_some_and(|v| (v >= cut) == front));
-        quantile(&own.map(|((_, r), _)| r.height_m).collect::<Vec<_>>(), 0.85)
-    };
-    // one long vehicle is high
-    if [top(false), top(true)].iter().flatten().any(|top| *top > LOW_M) {
-        return vec![path];
-    }
-    let part = |front: bool| {
-        let own = path.members.iter().zip(&along).filter(|(_, v)| v.is_some_and(|v| (v >= cut) == front));
-        Path::new(own.map(|(m, _)| *m).collect(), instants)
-    };
-    [part(false), part(true)].into_iter().flatten().collect()
+/// The lane of both; none if they differ.
+fn common(a: &Path, b: &Path) -> Option<Arc<Lane>> {
+    if differ(a, b) { None } else { a.lane.clone().or_else(|| b.lane.clone()) }
 }

@@ -1,8 +1,11 @@
 //! The path of a road user through all its reflections, both directions of time used.
 
+use std::sync::Arc;
+
+use super::lane::Lane;
 use super::motion::{Motion, smooth};
 use super::reflections::{Instant, Reflection};
-use super::tracker::{across_m, measure};
+use super::tracker::{across_m, keep_to, measure};
 use crate::labels::near_face::headings;
 
 /// A gap in which it moved less than this although it lasted longer than that: it stood.
@@ -29,16 +32,18 @@ pub struct Path {
     pub reach: [f64; 2],
     /// Height of the higher reflections, metres.
     pub top_m: f64,
+    /// The lane it keeps to.
+    pub lane: Option<Arc<Lane>>,
 }
 
 impl Path {
     /// `None` without members.
-    pub fn new(mut members: Vec<(usize, usize)>, instants: &[Instant]) -> Option<Self> {
+    pub fn new(mut members: Vec<(usize, usize)>, lane: Option<Arc<Lane>>, instants: &[Instant]) -> Option<Self> {
         members.sort_unstable();
         members.dedup();
         let (first, last) = (members.first()?.0, members.last()?.0);
         let mut path =
-            Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2], top_m: 0.0 };
+            Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2], top_m: 0.0, lane };
         // how long it is tells how much a place can be trusted, and the other way round
         for _ in 0..2 {
             path.motions = smooth(&path.filtered(last, instants)?);
@@ -112,6 +117,9 @@ impl Path {
                 now.update([0.0, 0.0, 1.0, 0.0], 0.0, 0.3);
                 now.update([0.0, 0.0, 0.0, 1.0], 0.0, 0.3);
             }
+            if let Some(b) = self.lane.as_ref().and_then(|lane| lane.beside(now.place())) {
+                keep_to(&mut now, &b);
+            }
             motion = Some(now);
             filtered.push((instant.time_s, now));
         }
@@ -132,6 +140,9 @@ impl Path {
         let places: Vec<[f64; 2]> = self.motions.iter().map(|(_, m)| m.place()).collect();
         let by_place = headings(&places);
         let all = self.motions.iter().zip(by_place).map(|((_, m), by_place)| {
+            if let Some(b) = self.lane.as_ref().and_then(|lane| lane.beside(m.place())) {
+                return b.heading[1].atan2(b.heading[0]);
+            }
             let [vx, vy] = m.velocity();
             if m.speed() >= HEADED_MPS { vy.atan2(vx) } else { by_place }
         });

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::lane::{Lane, nearest};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::recording::Recording;
 
@@ -11,6 +12,9 @@ const HEIGHT_M: f64 = 1.0;
 pub const STANDS_MPS: f64 = 0.4;
 /// Share of all frames in which a cell has standing reflections from which on it holds a fixture.
 const FIXTURE_SHARE: f64 = 0.4;
+
+/// How far from a lane's middle vehicles stand, metres.
+const ON_LANE_M: f64 = 1.8;
 
 /// One detection in the road frame.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +55,13 @@ pub fn instants(recording: &Recording) -> Vec<Instant> {
     }
     mark_fixtures(&mut all);
     all
+}
+
+/// What stands where vehicles drive is no fixture.
+pub fn free_lanes(instants: &mut [Instant], lanes: &[Lane]) {
+    for r in instants.iter_mut().flat_map(|i| &mut i.reflections).filter(|r| r.fixture) {
+        r.fixture = nearest(lanes, r.place, None, ON_LANE_M).is_none();
+    }
 }
 
 fn reflection(pose: &SensorPose, [x, y, z]: [f64; 3], doppler_mps: f64) -> Reflection {

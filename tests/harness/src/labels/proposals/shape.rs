@@ -17,6 +17,8 @@ const BEYOND_S: f64 = 3.0;
 const STEP_S: f64 = 0.25;
 /// Speed from which on something is fast, m/s.
 const FAST_MPS: f64 = 10.0;
+/// Extents that only buses have, metres: a truck that is seen well is longer.
+const BUS_M: std::ops::RangeInclusive<f64> = 12.6..=13.8;
 /// Fewest reflections an end is told by.
 const FEWEST: usize = 5;
 
@@ -57,6 +59,7 @@ impl Extent {
             _ => self.reach[1] - self.reach[0],
         };
         match () {
+            () if BUS_M.contains(&length_m) => "bus",
             () if length_m > 7.2 || (self.top_m > 2.9 && length_m > 5.5) => "truck",
             () if length_m > 5.5 || self.top_m > 2.4 => "van",
             () => "car",

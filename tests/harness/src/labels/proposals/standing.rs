@@ -30,7 +30,7 @@ pub fn stood(path: Path, instants: &[Instant]) -> Path {
         return path;
     }
     let members = [&path.members[..], &more[..]].concat();
-    Path::new(members, instants).unwrap_or(path)
+    Path::new(members, path.lane.clone(), instants).unwrap_or(path)
 }
 
 /// Reflections that stand at a place, frame by frame away from the end of a path, until there are none.

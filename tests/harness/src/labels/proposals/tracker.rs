@@ -5,6 +5,9 @@
 //! tracklet whose prediction it fits best; what belongs to none and moves begins tracklets. A tracklet without
 //! reflections goes on as predicted for [`COAST_S`], then ends.
 
+use std::collections::HashMap;
+
+use super::lane::{Beside, Lane, nearest};
 use super::motion::Motion;
 use super::reflections::{Instant, Reflection, STANDS_MPS};
 
@@ -26,10 +29,19 @@ pub const LONGEST_M: f64 = 18.0;
 /// Doppler of one vehicle's reflections differs by about this, m/s.
 const DOPPLER_MPS: f64 = 0.35;
 
+/// How closely vehicles keep to the middle of their lane, metres, and along it, m/s.
+const IN_LANE_M: f64 = 0.5;
+const IN_LANE_MPS: f64 = 0.3;
+
+/// Half of a lane, metres.
+const LANE_HALF_M: f64 = 1.8;
+
 /// Reflections of one road user: frame and index in it, in the order they were found.
 #[derive(Debug, Clone, Default)]
 pub struct Tracklet {
     pub members: Vec<(usize, usize)>,
+    /// Number of the lane it keeps to.
+    pub lane: Option<usize>,
 }
 
 struct Running {
@@ -40,6 +52,7 @@ struct Running {
     members: Vec<(usize, usize)>,
     frames: usize,
     last_s: f64,
+    lane: Option<usize>,
 }
 
 /// Spread of a place across the line of sight, metres.
@@ -48,7 +61,7 @@ pub fn across_m(distance_m: f64) -> f64 {
 }
 
 /// Tracklets of all frames, forwards in time or backwards.
-pub fn tracklets(instants: &[Instant], backwards: bool, progress: &dyn Fn(f64)) -> Vec<Tracklet> {
+pub fn tracklets(instants: &[Instant], lanes: &[Lane], backwards: bool, progress: &dyn Fn(f64)) -> Vec<Tracklet> {
     let sign = if backwards { -1.0 } else { 1.0 };
     let (mut running, mut done): (Vec<Running>, Vec<Tracklet>) = Default::default();
     let mut before_s = None;
@@ -64,23 +77,25 @@ pub fn tracklets(instants: &[Instant], backwards: bool, progress: &dyn Fn(f64)) 
         let owners = owners(&running, &instant.reflections, sign, now_s);
         for (k, r) in running.iter_mut().enumerate() {
             let own: Vec<usize> = (0..owners.len()).filter(|i| owners[*i] == Some(k)).collect();
-            r.take(frame, &own, &instant.reflections, sign, now_s);
+            r.take(frame, &own, &instant.reflections, lanes, sign, now_s);
         }
         running.retain_mut(|r| {
             let young = r.frames < GROWN_FRAMES;
             let lost = now_s - r.last_s > if young { YOUNG_COAST_S } else { COAST_S };
             if lost && !young {
-                done.push(Tracklet { members: std::mem::take(&mut r.members) });
+                done.push(Tracklet { members: std::mem::take(&mut r.members), lane: r.lane });
             }
             !lost
         });
         let free: Vec<usize> = (0..owners.len()).filter(|i| owners[*i].is_none()).collect();
-        running.extend(births(frame, &free, &instant.reflections, sign, now_s));
+        running.extend(births(frame, &free, &instant.reflections, lanes, sign, now_s));
         if step % 32 == 0 {
             progress(step as f64 / instants.len() as f64);
         }
     }
-    done.extend(running.into_iter().filter(|r| r.frames >= GROWN_FRAMES).map(|r| Tracklet { members: r.members }));
+    done.extend(
+        running.into_iter().filter(|r| r.frames >= GROWN_FRAMES).map(|r| Tracklet { members: r.members, lane: r.lane }),
+    );
     done
 }
 
@@ -98,7 +113,8 @@ impl Running {
     fn cost(&self, r: &Reflection, sign: f64, now_s: f64) -> Option<f64> {
         let [x, y] = self.motion.place();
         let [dx, dy] = [r.place[0] - x, r.place[1] - y];
-        if dx.hypot(dy) > LONGEST_M + 8.0 {
+        // squares, since most of all pairs end here
+        if dx * dx + dy * dy > (LONGEST_M + 8.0) * (LONGEST_M + 8.0) {
             return None;
         }
         let [ux, uy] = r.sight;
@@ -130,7 +146,10 @@ impl Running {
                 beyond = (along.abs() - 1.5).max(0.0);
             }
         }
-        let side = 0.6 + across_m(r.distance_m) + 0.5 * missed;
+        let side = match self.lane {
+            Some(_) => 0.6 + 0.5 * across_m(r.distance_m),
+            None => 0.6 + across_m(r.distance_m) + 0.5 * missed,
+        };
         // queues move as one: what is slow may only reach as far as it did
         let slow = (self.motion.speed() / SLOW_MPS).min(1.0);
         let ahead = 0.4 + 0.6 * slow + 1.2 * missed * slow;
@@ -140,15 +159,20 @@ impl Running {
         Some((beyond / ahead).powi(2) + (left / side).powi(2) + (doppler / doppler_spread).powi(2))
     }
 
-    fn take(&mut self, frame: usize, own: &[usize], reflections: &[Reflection], sign: f64, now_s: f64) {
+    fn take(&mut self, frame: usize, own: &[usize], reflections: &[Reflection], lanes: &[Lane], sign: f64, now_s: f64) {
         if own.is_empty() {
             return;
         }
         let all: Vec<Reflection> = own.iter().map(|i| reflections[*i]).collect();
         measure(&mut self.motion, &all, sign, self.heading, self.reach[1] - self.reach[0]);
+        let in_lane = self.lane.and_then(|k| lanes.get(k)?.beside(self.motion.place()));
+        if let Some(b) = &in_lane {
+            keep_to(&mut self.motion, b);
+            self.heading = Some(b.heading.map(|v| sign * v));
+        }
         let stands = self.motion.speed() < STOPPED_MPS;
         let speed = self.motion.speed();
-        if speed > HEADED_MPS && self.frames >= 3 {
+        if speed > HEADED_MPS && self.frames >= 3 && in_lane.is_none() {
             let [vx, vy] = self.motion.velocity();
             if self.heading.is_none() {
                 self.reach = [0.0, 0.0];
@@ -198,9 +222,17 @@ pub fn measure(motion: &mut Motion, all: &[Reflection], sign: f64, heading: Opti
 }
 
 /// Groups of free reflections that move alike begin tracklets.
-fn births(frame: usize, free: &[usize], reflections: &[Reflection], sign: f64, now_s: f64) -> Vec<Running> {
+fn births(
+    frame: usize,
+    free: &[usize],
+    reflections: &[Reflection],
+    lanes: &[Lane],
+    sign: f64,
+    now_s: f64,
+) -> Vec<Running> {
     let mut left: Vec<usize> =
         free.iter().copied().filter(|i| reflections[*i].doppler_mps.abs() >= MOVES_MPS).collect();
+    let lane_of: HashMap<usize, Option<usize>> = left.iter().map(|i| (*i, own_lane(&reflections[*i], lanes))).collect();
     let mut all = Vec::new();
     while let Some(first) = left.pop() {
         let mut group = vec![first];
@@ -210,7 +242,9 @@ fn births(frame: usize, free: &[usize], reflections: &[Reflection], sign: f64, n
             left.retain(|i| {
                 let b = reflections[*i];
                 let near = (a.place[0] - b.place[0]).hypot(a.place[1] - b.place[1]) < 2.0 + across_m(a.distance_m);
-                let alike = near && (a.doppler_mps - b.doppler_mps).abs() < 2.0 * DOPPLER_MPS;
+                let alike = near
+                    && lane_of.get(i) == lane_of.get(&group[next])
+                    && (a.doppler_mps - b.doppler_mps).abs() < 2.0 * DOPPLER_MPS;
                 if alike {
                     group.push(*i);
                 }
@@ -226,21 +260,43 @@ fn births(frame: usize, free: &[usize], reflections: &[Reflection], sign: f64, n
         let ground = ux.hypot(uy).max(1e-6);
         let radial = sign * mean(&|r| r.doppler_mps) / ground;
         let direction = [ux / ground, uy / ground];
-        let motion = Motion::new(
+        let lane = lane_of.get(&first).copied().flatten();
+        let mut motion = Motion::new(
             place,
             direction.map(|v| v * radial),
             across_m(members[0].distance_m),
             direction,
             [1.0, (0.5 * radial.abs()).clamp(2.0, 12.0)],
         );
+        let beside = lane.and_then(|k| lanes.get(k)?.beside(place));
+        if let Some(b) = &beside {
+            keep_to(&mut motion, b);
+        }
         all.push(Running {
             motion,
-            heading: None,
+            heading: beside.map(|b| b.heading.map(|v| sign * v)),
             reach: [-1.0, 1.0],
             members: group.iter().map(|i| (frame, *i)).collect(),
             frames: 1,
             last_s: now_s,
+            lane,
         });
     }
     all
+}
+
+/// Holds a motion in its lane.
+pub fn keep_to(motion: &mut Motion, beside: &Beside) {
+    let [c, s] = beside.heading;
+    let [x, y] = motion.place();
+    let across = -s * x + c * y;
+    motion.update([-s, c, 0.0, 0.0], across - beside.left_m, IN_LANE_M);
+    motion.update([0.0, 0.0, -s, c], 0.0, IN_LANE_MPS);
+}
+
+/// The lane whose direction of travel a reflection's Doppler fits.
+fn own_lane(r: &Reflection, lanes: &[Lane]) -> Option<usize> {
+    let sign = r.doppler_mps.signum();
+    let towards = r.sight.map(|v| v * sign);
+    nearest(lanes, r.place, Some(towards), LANE_HALF_M + across_m(r.distance_m)).map(|(k, _)| k)
 }

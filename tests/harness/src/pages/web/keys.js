@@ -29,7 +29,7 @@ export function table(page) {
     ['Shift+Delete', 'Changes', 'delete the selected track', () => session.removeTrack(), false, 'delete-track'],
     ['s', 'Changes', 'split the selected track at the cursor', () => page.split(), false, 'split'],
     ['j', 'Changes', 'join: remember this track; press again on the other', () => session.join(), false, 'join'],
-    ['1', 'Changes', 'car, 2 van, 3 truck, 4 bus, 5 motorcycle, 6 bicycle, 7 pedestrian', () => page.classify(0), false],
+    ['1', 'Changes', 'car, 2 van, 3 truck, 4 bus, 5 motorcycle, 6 bicycle, 7 pedestrian; of what is offered, too', () => page.classify(0), false],
     ...[1, 2, 3, 4, 5, 6].map((k) => [String(k + 1), 'Changes', null, () => page.classify(k), false]),
     ['i', 'Changes', 'go to the id of the selected track', () => page.focusId(), false],
     ['PageDown', 'Selection', 'select the next track', () => session.selectNext(1), true],

@@ -232,7 +232,13 @@ export class Session {
     return undefined;
   }
 
+  // Of the selected track, or of the proposal that is shown.
   classify(kind) {
+    const { current, shown } = this.proposals;
+    if (!this.track && current && shown) {
+      current.track.class = kind;
+      return this.changed('proposal');
+    }
     if (!this.track) return this.say('Select a track first.');
     return this.change(tracks.withTrack(this.tracks, { ...this.track, class: kind }));
   }

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use mcap::records::{MessageHeader, Record};
 
 use crate::recording::write::RecordingWriter;
-use crate::recording::{Recording, ros};
+use crate::recording::{Recording, file, ros};
 
 /// A channel worth copying.
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ pub struct Input {
 
 /// The bytes of a recording as an MCAP file; one of another kind is written as such first.
 pub fn bytes(path: &Path, recording: &Recording) -> Result<Vec<u8>> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = file::bytes(path)?;
     if bytes.starts_with(mcap::MAGIC) {
         return Ok(bytes);
     }

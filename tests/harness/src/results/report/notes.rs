@@ -17,7 +17,7 @@ pub fn heading(replay: &Replay) -> String {
         format!(" (sensor {})", recording.sensor.name)
     };
     if recording.truth.is_none() {
-        return format!("{}{sensor}: {} frames, no ground truth, so no rates", recording.name, summary.frames);
+        return format!("{}{sensor}: {} frames", recording.name, summary.frames);
     }
     let spread = summary
         .coverage_interval
@@ -68,6 +68,10 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines.extend(recording.sensor.licence.as_ref().map(|l| format!("Licence of the recording: {l}.")));
     lines
 }
+
+/// What stands in place of a table without a number.
+pub const WITHOUT_LABELS: &str = "No labels, so maps and pictures and no rates. `viewshed label RECORDING` draws them in a minute; \
+                                  NAME.labels.csv beside the recording is where they are read from.";
 
 /// How a camera's objects and cells are judged.
 pub const RULE_OF_CAMERA: &str = "Detected: a box of the camera's own, assigned one to one to the visible outline \

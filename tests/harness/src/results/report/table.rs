@@ -14,7 +14,11 @@ use crate::evaluation::summary::{Row, Summary};
 
 /// The table of one recording with the notes below it.
 pub fn text(replay: &Replay, options: &Options) -> String {
-    let mut text = format!("{}\n{}\n", notes::heading(replay), rates(&replay.summary));
+    let rates_of = |replay: &Replay| match &replay.recording.truth {
+        Some(_) => rates(&replay.summary).to_string(),
+        None => notes::WITHOUT_LABELS.to_owned(),
+    };
+    let mut text = format!("{}\n{}\n", notes::heading(replay), rates_of(replay));
     for line in notes::below(replay, options) {
         text += &line;
         text.push('\n');
@@ -27,7 +31,7 @@ pub fn text(replay: &Replay, options: &Options) -> String {
         text += &(notes::RULE_OF_CAMERA.to_owned() + "\n");
     }
     if let Some(camera) = &replay.camera {
-        text += &format!("\n{}\n{}\n", notes::heading(camera), rates(&camera.summary));
+        text += &format!("\n{}\n{}\n", notes::heading(camera), rates_of(camera));
         for line in notes::of_camera(camera) {
             text += &line;
             text.push('\n');

@@ -5,6 +5,20 @@
 //! the visible share; edges err by a constant and a share of the box; boxes that overlap too much are put
 //! out as one around both.
 //!
+//! # Where the numbers come from
+//! `viewshed detect --tiles 2` with a small CenterNet (MobileNetV3, 512 x 512) on four roadside pictures of 1920 x 1080
+//! with labels: one of a crossing (Rope3D) and three of a motorway (BrnoCompSpeed), 29 vehicles at 16 to 170 m, all
+//! found. The threshold of the score, 0.3, was chosen on these pictures.
+//! - Misses by height: each vehicle in each view of it, the whole picture and tiles of four sizes, 182 in all. Of free
+//!   ones none of 5 was found below 12 px of the network's input, 20 of 22 from 12 to 24 px, 127 of 130 above; the
+//!   likeliest curve is half at 13 px, 0.25 wide. A tile of 618 px is shrunk to 512: 16 px of the picture.
+//! - By visible share: partly hidden ones, of which 53 to 97 % shows, were found in 18 of 20 views above 24 px: a ramp
+//!   that reaches one at 0.7. None shows less: where it begins is a guess.
+//! - Edges: free vehicles, 88 edges, by likelihood; the systematic part, which `--bottom-offset` takes away, left out.
+//! - Overlap of two boxes: the default of `--same`. The real one leaves the surer of the two instead.
+//! - False boxes: 2 in four pictures (a road sign, a taxi's sign), with scores below 0.35. Eleven more boxes were
+//!   around vehicles without a label.
+//!
 //! # References
 //! - D. Hoiem, Y. Chodpathumwan, Q. Dai, "Diagnosing Error in Object Detectors", ECCV 2012: size and
 //!   occlusion decide.
@@ -44,14 +58,14 @@ pub struct DetectorModel {
 impl Default for DetectorModel {
     fn default() -> Self {
         Self {
-            best: 0.97,
+            best: 0.98,
             half_height_px: 16.0,
             fall: 0.25,
-            share: [0.1, 0.5],
-            noise_px: 1.0,
-            noise_share: 0.03,
-            merge_overlap: 0.5,
-            false_boxes: 0.05,
+            share: [0.1, 0.7],
+            noise_px: 2.7,
+            noise_share: 0.035,
+            merge_overlap: 0.45,
+            false_boxes: 0.5,
         }
     }
 }
@@ -167,7 +181,7 @@ mod tests {
     #[test]
     fn misses_grow_with_distance_and_occlusion() {
         let near = found(&[car(40.0, 0.0)], &[]);
-        assert!((near - 0.97).abs() < 0.03, "{near}");
+        assert!((near - 0.98).abs() < 0.03, "{near}");
         assert!(camera().model.probability(16.0, 1.0) < 0.5 && camera().model.probability(8.0, 1.0) < 0.1);
         let wall = Solid { center: [35.0, 0.55, 5.0], yaw_rad: 0.0, size: [1.0, 1.6, 10.0] };
         let sighting = camera().view(&[car(40.0, 0.0).solid], &[wall])[0];
@@ -196,7 +210,7 @@ mod tests {
             })
             .collect();
         let spread = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        let expected = 1.0_f64.hypot(0.03 * (exact[3] - exact[1]));
+        let expected = 2.7_f64.hypot(0.035 * (exact[3] - exact[1]));
         assert!((spread - expected).abs() < 0.15 * expected, "{spread} {expected}");
     }
 

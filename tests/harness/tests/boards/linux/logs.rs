@@ -14,7 +14,7 @@ use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Epoch};
 use viewshed_harness::boards::can_twin::clusters;
 use viewshed_harness::boards::machine::Folder;
-use viewshed_harness::recording::candump::{Content, Line};
+use viewshed_harness::recording::can_log::{Content, Line, candump};
 
 use super::daemon::{Daemon, tables};
 use crate::shipped;
@@ -68,7 +68,7 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
 
 fn read(path: &Path) -> Sent {
     let text = std::fs::read_to_string(path).unwrap();
-    let lines = text.lines().map(|line| Line::parse(line).unwrap());
+    let lines = text.lines().map(|line| candump::line(line).unwrap());
     lines.map(|line| (line.time_ns as u64 / 1000, *line.frame().unwrap())).collect()
 }
 

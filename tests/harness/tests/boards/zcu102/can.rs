@@ -14,7 +14,7 @@ use viewshed_harness::boards::can_twin::{Sent, Step, clusters, flashed, log};
 use viewshed_harness::boards::listener::{Listener, Look};
 use viewshed_harness::boards::listener::{MEDIUM, SENSOR};
 use viewshed_harness::boards::{Board, Profile, firmware};
-use viewshed_harness::recording::{self, ReadOptions};
+use viewshed_harness::recording::{self, ReadOptions, can_log};
 
 use crate::{settings_of, shipped};
 
@@ -78,7 +78,7 @@ fn a_log_of_a_bus_gives_the_same_maps() {
     let recording = recording::read(&path, &reading).unwrap();
     let mut settings = settings_of(&recording);
     settings.radar_bus.listen_first = false;
-    let steps = log(&std::fs::read_to_string(&path).unwrap());
+    let steps = log(&can_log::of_file(&path, None).unwrap().unwrap());
     let mut flash = flashed(&settings);
     let mut board = CanBoard::start(&image(), &flash).unwrap();
     let sent = board.run(&mut flash, &steps).unwrap();

@@ -1,0 +1,101 @@
+//! The bytes of a recording: of a file, plain or gzip, or of standard input.
+
+use std::borrow::Cow;
+use std::io::{IsTerminal, Read};
+use std::path::Path;
+use std::sync::OnceLock;
+
+use anyhow::{Context, Result, anyhow, bail};
+use flate2::read::MultiGzDecoder;
+
+/// The path that stands for standard input.
+pub const STANDARD_INPUT: &str = "-";
+
+/// What a gzip file begins with.
+const GZIP: [u8; 2] = [0x1F, 0x8B];
+
+/// All bytes, unpacked. Standard input is read once and kept.
+///
+/// # Errors
+/// A file that cannot be read or unpacked; a terminal as standard input.
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+    let place = || format!("cannot read {}", shown(path));
+    let bytes =
+        if path == Path::new(STANDARD_INPUT) { standard_input()? } else { std::fs::read(path).with_context(place)? };
+    if !bytes.starts_with(&GZIP) {
+        return Ok(bytes);
+    }
+    let mut unpacked = Vec::new();
+    match MultiGzDecoder::new(&bytes[..]).read_to_end(&mut unpacked) {
+        Ok(_) => Ok(unpacked),
+        // what comes before the break is read, as of other files
+        Err(_) if !unpacked.is_empty() => Ok(unpacked),
+        Err(error) => Err(error).with_context(place),
+    }
+}
+
+fn standard_input() -> Result<Vec<u8>> {
+    static READ: OnceLock<Result<Vec<u8>, String>> = OnceLock::new();
+    let mut input = std::io::stdin().lock();
+    if READ.get().is_none() && input.is_terminal() {
+        bail!("`-` is standard input, and that is a terminal: give a file, or pipe a log into it");
+    }
+    let read = READ.get_or_init(|| {
+        let mut bytes = Vec::new();
+        input.read_to_end(&mut bytes).map(|_| bytes).map_err(|error| error.to_string())
+    });
+    read.clone().map_err(|error| anyhow!("cannot read standard input: {error}"))
+}
+
+/// The path to be shown.
+pub fn shown(path: &Path) -> Cow<'_, str> {
+    if path == Path::new(STANDARD_INPUT) { "standard input".into() } else { path.to_string_lossy() }
+}
+
+/// The name of a recording: its file's, without what comes after the last point and without `.gz`.
+pub fn stem(path: &Path) -> String {
+    if path == Path::new(STANDARD_INPUT) {
+        return "stdin".into();
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    #[test]
+    fn packed_files_are_unpacked_and_cut_ones_up_to_the_break() {
+        let folder = std::env::temp_dir().join(format!("viewshed-packed-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.log.gz");
+        // two members, as `cat a.gz b.gz` makes them
+        let packed = |text: &str| {
+            let mut gz = GzEncoder::new(Vec::new(), Compression::fast());
+            gz.write_all(text.as_bytes()).unwrap();
+            gz.finish().unwrap()
+        };
+        let text = "(1.0) can0 60A#01C24910\n".repeat(4000);
+        std::fs::write(&path, [packed("first\n"), packed(&text)].concat()).unwrap();
+        assert_eq!(bytes(&path).unwrap(), format!("first\n{text}").into_bytes());
+        let whole = packed(&text);
+        std::fs::write(&path, &whole[..whole.len() - 12]).unwrap();
+        assert!(text.as_bytes().starts_with(&bytes(&path).unwrap()));
+        std::fs::write(&path, &whole[..10]).unwrap();
+        assert!(bytes(&path).unwrap_err().to_string().contains("a.log.gz"));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn names_are_of_what_is_packed() {
+        let names = ["logs/a.log.gz", "a.mcap", "b", "-", "c.boxes.csv"].map(|path| stem(Path::new(path)));
+        assert_eq!(names, ["a", "a", "b", "stdin", "c.boxes"]);
+    }
+}

@@ -1,0 +1,85 @@
+//! A person at the page, played by keys that are really pressed: every proposal of a recording is decided about.
+
+use std::path::Path;
+use std::time::Instant;
+
+use viewshed_harness::evaluation::Options;
+use viewshed_harness::labels::judged::{Decision, decide};
+use viewshed_harness::labels::{Site, file, proposals};
+use viewshed_harness::recording::{self, ReadOptions};
+
+use crate::browser::{Browser, Page};
+use crate::server::{Server, folder, recording};
+
+/// Keys of the classes, as the page's help lists them.
+const CLASSES: [&str; 7] = ["car", "van", "truck", "bus", "motorcycle", "bicycle", "pedestrian"];
+
+/// Presses a key and counts it.
+fn press(page: &Page, key: &str, pressed: &mut usize) {
+    page.key(key);
+    *pressed += 1;
+}
+
+/// Works through the proposals of a recording's first seconds; keys pressed, proposals, labels in the file.
+fn works_through(recording: &Path, seconds: f64) -> Option<[usize; 3]> {
+    let browser = Browser::start("a person's keys")?;
+    let options = ReadOptions { to_s: Some(seconds), ..Default::default() };
+    let read = recording::read(recording, &options).unwrap();
+    let offered = proposals::propose(&read, &|_| ());
+    let decisions = decide(&read, &offered, &Options::default()).expect("ground truth");
+    let server = Server::with(recording, &["--to", &seconds.to_string()]);
+    let page = browser.open(&server.url);
+    page.until_saved();
+    page.until("viewshed.session.proposals.ready");
+    let (mut pressed, mut expected) = (0, Vec::new());
+    for (proposal, decision) in offered.iter().zip(&decisions) {
+        page.until("viewshed.session.proposals.shown");
+        assert_eq!(page.ask("viewshed.session.proposals.current.track.id"), proposal.track.id.as_str());
+        match decision {
+            Decision::Reject => press(&page, "x", &mut pressed),
+            Decision::Accept { class } => {
+                if *class != proposal.track.class {
+                    let key = CLASSES.iter().position(|c| c == class).expect("a class") + 1;
+                    press(&page, &key.to_string(), &mut pressed);
+                    page.until("viewshed.session.proposals.shown");
+                }
+                press(&page, "a", &mut pressed);
+                expected.push((class.clone(), proposal.track.points.len()));
+            }
+        }
+    }
+    page.until("viewshed.session.proposals.current === null");
+    page.until_saved();
+    // what is saved is what was decided, class by class and point by point
+    let saved = file::read(&server.labels, &Site::of(&read)).unwrap();
+    let saved: Vec<(String, usize)> = saved.iter().map(|t| (t.class.clone(), t.points.len())).collect();
+    assert_eq!(saved, expected);
+    Some([pressed, offered.len(), saved.len()])
+}
+
+#[test]
+fn a_person_works_through_the_shipped_recording_s_proposals_with_a_key_or_two_each() {
+    let Some([pressed, offered, labels]) = works_through(&recording("person"), 6.0) else { return };
+    println!("{pressed} keys for {offered} proposals, {labels} labels");
+    assert!(offered > 10 && labels as f64 > 0.7 * offered as f64, "{labels} of {offered}");
+    assert!(pressed as f64 <= 1.5 * labels as f64, "{pressed} keys for {labels} labels");
+}
+
+/// `VIEWSHED_LABELLED=a.mcap:b.mcap cargo test --release -p viewshed-harness --test label keys_of -- --ignored --nocapture`
+#[test]
+#[ignore = "minutes for each recording that VIEWSHED_LABELLED names"]
+fn keys_of_the_recordings_that_are_named() {
+    let paths = std::env::var("VIEWSHED_LABELLED").expect("VIEWSHED_LABELLED: recordings with truth, : between them");
+    for path in paths.split(':') {
+        // the labels file is beside the recording
+        let copy = folder("named").join("site.mcap");
+        std::fs::copy(path, &copy).unwrap();
+        let begin = Instant::now();
+        if let Some([pressed, offered, labels]) = works_through(&copy, 60.0) {
+            println!(
+                "{path}: {pressed} keys for {offered} proposals, {labels} labels, {:.0} s",
+                begin.elapsed().as_secs_f64()
+            );
+        }
+    }
+}

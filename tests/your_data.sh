@@ -1,0 +1,28 @@
+#!/bin/sh
+# The commands of "From nothing to a map of your road", on files that other libraries wrote.
+set -eu
+cd "$(dirname "$0")/.."
+. tests/tools.sh
+need_compilers
+target=${CARGO_TARGET_DIR:-$PWD/target}
+# VIEWSHED: one that is built already
+viewshed=${VIEWSHED:-$target/release/viewshed}
+[ -n "${VIEWSHED:-}" ] || cargo build --release --locked --package viewshed-harness
+folder=$target/your_data
+rm -rf "$folder"
+mkdir -p "$folder/bin"
+ln -s "$(realpath "$viewshed")" "$folder/bin/viewshed"
+# made ready by mcap_ros2.sh and cantools.sh
+for writer in mcap_ros2:bag cantools:bus; do
+    "$target/${writer%:*}/bin/python" tests/your_data.py "${writer#*:}" "$folder" 2>/dev/null ||
+        { echo "skipped: the page of own recordings, as ${writer%:*} could not be installed here"; exit 0; }
+done
+# every block of commands, as it stands on the page
+sed -n '/^```sh$/,/^```$/{/^```/!p}' tests/harness/src/recording/YOUR_DATA.md >"$folder/commands.sh"
+[ "$(wc -l <"$folder/commands.sh")" -ge 4 ]
+(cd "$folder" && PATH=$folder/bin:$PATH sh -eux commands.sh) >"$folder/said.txt" 2>&1 || { cat "$folder/said.txt"; exit 1; }
+for said in 'radar-3d' 'drive.labels.csv' 'sensor 0 on 1: Clusters, 28 of 28 scans' 'table and pictures: bus-map'; do
+    grep -q "$said" "$folder/said.txt" || { cat "$folder/said.txt"; echo "your_data: \`$said\` was not said"; exit 1; }
+done
+[ -f "$folder/map/birdseye-radar-3d.png" ] && [ -f "$folder/results.json" ] && [ -f "$folder/bus-map/birdseye-radar-3d.png" ]
+echo "the commands of tests/harness/src/recording/YOUR_DATA.md do what they say"
