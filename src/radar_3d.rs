@@ -11,13 +11,14 @@
 use crate::estimator::{Estimator, Progress};
 use crate::fixed::math;
 use crate::fixed::time::{Step, Time};
+use crate::frame::by_range::ByRange;
 use crate::frame::detection::Detection;
 use crate::frame::gate::{Gate, GateConfig, Rejections};
 use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
 use crate::frame::reflection::Reflection;
 use crate::frame::scan::Scan;
 use crate::grid::axes::Axes;
-use crate::grid::evidence::{EvidenceConfig, InverseSensor};
+use crate::grid::evidence::{Around, BODY_CM, BODY_REFLECTIONS, EvidenceConfig, InverseSensor};
 use crate::grid::raycast;
 use crate::grid::shadow;
 use crate::grid::spherical::SphericalGrid;
@@ -316,10 +317,15 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let reflections = self.scan.reflections();
         p.inverse_sensor.clear(reflections, &p.axes, &mut self.grid);
         ended();
+        let by_range = ByRange::<D>::sort(reflections, p.tracking.limit_cm);
         for (i, r) in reflections.iter().enumerate() {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
-            if first || !(claimed.contains(i) || p.tracking.course(r).is_some()) {
-                p.inverse_sensor.add(r, first, &p.axes, &mut self.grid);
+            if first {
+                p.inverse_sensor.add(r, Around::Unknown, &p.axes, &mut self.grid);
+            } else if !(claimed.contains(i) || p.tracking.course(r).is_some()) {
+                let is_of_body = by_range.is_one_of(BODY_REFLECTIONS, BODY_CM, r, |k| !claimed.contains(k));
+                let around = if is_of_body { Around::Body } else { Around::Nothing };
+                p.inverse_sensor.add(r, around, &p.axes, &mut self.grid);
             }
         }
         ended();

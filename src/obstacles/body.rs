@@ -15,8 +15,9 @@ impl Obstacle {
         let tall = self.tallness.floor_cm();
         let seen = self.extent.length_cm();
         let size = t.sizes.of(seen.max(self.remembered_length_cm(t)).max(t.sizes.least_length_cm(tall)));
-        // what is as long as a lorry may be one that shows nothing high
-        let lid = if size.length_cm < LONGEST_LOW_CM { self.tallness.ceiling_cm() } else { i32::MAX };
+        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
+        let may_be_low = size.length_cm < LONGEST_LOW_CM || self.profile.is_a_row_of_cars(&self.extent);
+        let lid = if may_be_low { self.tallness.ceiling_cm() } else { i32::MAX };
         let margin = if self.free_heading { t.own_way_margin_cm } else { 0 };
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
@@ -57,6 +58,7 @@ mod tests {
     use super::super::obstacle::Obstacle;
     use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
+    use crate::frame::reflection::Reflection;
     use std::vec::Vec;
 
     const AHEAD: Direction = Direction::AHEAD;
@@ -91,6 +93,34 @@ mod tests {
         assert!((both - 10.0).abs() < 0.5, "{both} m");
         let behind = middle_of(&[2.0], 90.0);
         assert!((behind - 2.0).abs() < 0.3, "{behind} m");
+    }
+
+    /// Height of the box of something that reflects at these places along it, metres, so many times at this height.
+    fn height_of(places_m: &[f64], times: usize, height_cm: i16) -> f64 {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        for _ in 0..times {
+            o.fade_outline(63_000);
+            for x in places_m {
+                let r = reflection([50.0 + x, 0.0], [20.0, 0.0]);
+                o.absorb(&Reflection { height_cm: Some((height_cm, 30)), ..r }, &t);
+            }
+        }
+        o.update_extent(&t);
+        assert!(o.extent.length_cm() > 1000, "{:?}", o.extent);
+        f64::from(o.solid(&t).height_cm) / 100.0
+    }
+
+    #[test]
+    fn two_low_cars_taken_for_one_vehicle_are_low_and_a_lorry_is_not() {
+        let cars = [-6.1, -5.0, -3.9, -2.6, -1.6, 1.6, 2.6, 3.9, 5.0, 6.1];
+        assert!(height_of(&cars, 40, 70) < 1.7, "{}", height_of(&cars, 40, 70));
+        assert!(height_of(&cars, 2, 70) > 3.0, "two frames make nothing low");
+        assert!(height_of(&cars, 40, 250) > 3.0, "and those are no cars");
+        for lorry in [&[-6.1, -5.0, -3.9, -2.6, -1.6, -0.4, 0.9, 1.6, 2.6, 3.9, 5.0, 6.1][..], &[-6.1, -5.6, 5.6, 6.1]]
+        {
+            assert!(height_of(lorry, 40, 70) > 3.0, "{lorry:?}: {}", height_of(lorry, 40, 70));
+        }
     }
 
     #[test]

@@ -135,7 +135,7 @@ impl Default for ObstacleConfig {
             outline_sigmas: 0.7,
             turning_noise_mps: 1.0,
             own_way_sigmas: 3.0,
-            own_way_mps: 2.0,
+            own_way_mps: 1.5,
             own_way_share: 0.2,
             own_way_follow: 0.05,
             own_way_margin_m: 0.6,

@@ -5,7 +5,7 @@ use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::BIN_CM;
 use super::tracking::{MERGE_PARALLEL, Tracking};
-use crate::fixed::math::hypot_gate;
+use crate::fixed::math::{hypot_gate, mul_shift, ratio};
 
 impl Obstacle {
     /// Whether another obstacle is near enough to be a part of the same vehicle, or to lie within it.
@@ -77,6 +77,14 @@ impl Obstacle {
         self.tallness.join(&before.tallness);
     }
 
+    /// Where this frame's detections of both have their centre: it has moved, but neither of them has.
+    fn centre_with(&self, other: &Self) -> (i32, i32) {
+        let (n, m) = (self.gathered.count, other.gathered.count);
+        let share = ratio::<8>(m, (n + m).max(1));
+        let (dx, dy) = (other.free.place.0 - self.free.place.0, other.free.place.1 - self.free.place.1);
+        (self.free.place.0 + mul_shift(dx, share, 8), self.free.place.1 + mul_shift(dy, share, 8))
+    }
+
     /// Standard deviation of the lateral place, centimetres.
     fn lateral_sigma(&self) -> i32 {
         sigma_of_weight(self.lateral_weight)
@@ -97,6 +105,7 @@ impl Obstacle {
         let share = (i64::from(left << FRACTION) * i64::from(other.lateral_weight) / i64::from(weight)) as i32;
         self.move_left(share);
         self.lateral_weight = weight;
+        self.free.place = self.centre_with(other);
         self.existence = (self.existence + other.existence).min(t.existence_max);
         self.hits = self.hits.saturating_add(other.hits);
         self.travelled_cm = self.travelled_cm.max(other.travelled_cm);
@@ -112,6 +121,7 @@ mod tests {
     use super::super::profile::Extent;
     use super::super::tallness::Tallness;
     use super::*;
+    use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
 
     const AHEAD: Direction = Direction::AHEAD;
@@ -167,6 +177,31 @@ mod tests {
         let (mut a, mut b) = two(50, 0, 2000);
         (a.tallness, b.tallness) = (low(), low());
         assert!(a.is_one_with(&b, &t), "8.5 m");
+    }
+
+    #[test]
+    fn joining_two_parts_that_stand_is_no_motion() {
+        let t = rules();
+        let (mut a, mut b) = two(0, 60, 0);
+        // three frames of standing still, each seen where it is
+        let step = Step::from_micros(67_000);
+        let frame = |o: &mut Obstacle, places: &[(i32, i32)]| {
+            o.predict(step, 1 << 16, &t);
+            places.iter().for_each(|(x, y)| o.absorb(&seen_at(*x, *y, 0), &t));
+            o.settle(step, &t);
+        };
+        let (rear, front) = ([(4900, 0), (5100, 0)], [(5300, 120), (5500, 120), (5450, 120), (5350, 120)]);
+        for _ in 0..30 {
+            frame(&mut a, &rear);
+            frame(&mut b, &front);
+        }
+        a.join(&b, &t);
+        let before = a.free.velocity;
+        for _ in 0..5 {
+            frame(&mut a, &[&rear[..], &front[..]].concat());
+        }
+        let pushed = (a.free.velocity.1 - before.1).abs() >> FRACTION;
+        assert!(pushed < 15, "{pushed} cm/s to the side");
     }
 
     #[test]

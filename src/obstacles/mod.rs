@@ -68,7 +68,6 @@
 mod body;
 #[cfg(test)]
 mod by_hand;
-mod by_range;
 pub mod config;
 mod gathered;
 mod joining;
@@ -87,9 +86,9 @@ pub mod tracking;
 use heapless::Vec;
 
 use crate::fixed::time::Step;
+use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 use crate::obstacles::solid::Solid;
-use by_range::ByRange;
 use obstacle::Obstacle;
 use tracking::Tracking;
 

@@ -162,6 +162,32 @@ fn a_guard_rail_hides_nothing() {
 }
 
 #[test]
+fn a_mast_hides_what_is_behind_it_as_far_as_its_reflection_proves() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    for _ in 0..30 {
+        let mast = detection(&rig.sensor, [30.0, 0.0, 3.0], [0.0; 2], true);
+        let d: Vec<Detection> = mast.into_iter().collect();
+        rig.frame(&d);
+    }
+    // 3 m less half a standard deviation of elevation: over the top at 30 m the line of sight is 1 m high at 47 m
+    assert_eq!(rig.visibility(40.0, 0.0), Visibility::Invisible);
+    assert_eq!(rig.visibility(60.0, 0.0), Visibility::Visible);
+    assert_eq!(rig.visibility(40.0, 4.0), Visibility::Visible, "beside it");
+}
+
+#[test]
+fn a_car_that_was_never_seen_to_move_hides_what_is_close_behind_it() {
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let car = Vehicle::car(60.0, 0.0, 0.0);
+    for _ in 0..30 {
+        let d = car.detections(&rig.sensor, true);
+        rig.frame(&d);
+    }
+    assert_eq!(rig.visibility(66.0, 0.5), Visibility::Invisible);
+    assert_eq!(rig.visibility(90.0, 0.5), Visibility::Visible);
+}
+
+#[test]
 fn an_empty_road_is_visible_to_the_limit_and_unknown_beyond() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
     let report = rig.frame(&[]);

@@ -355,6 +355,9 @@ impl Obstacle {
         self.profile.merge(&other.profile, ahead);
         self.lateral_weight += other.lateral_weight;
         self.anchor = moved(self.anchor, left(self.heading), offset * other.lateral_weight / self.lateral_weight);
+        let share = other.gathered.count / (self.gathered.count + other.gathered.count).max(1.0);
+        let centre = |k: usize| self.free.place[k] + share * (other.free.place[k] - self.free.place[k]);
+        self.free.place = [centre(0), centre(1)];
         self.existence = (self.existence + other.existence).min(rules.max_evidence);
         self.hits += other.hits;
         self.travelled = self.travelled.max(other.travelled);
@@ -381,8 +384,12 @@ impl Obstacle {
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
         let [x, y] = moved(middle, left(self.heading), away(unseen, aside));
-        // what is as long as a lorry may be one that shows nothing high
-        let lid = if length < LONGEST_LOW { self.tallness.ceiling() } else { f64::INFINITY };
+        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
+        let lid = if length < LONGEST_LOW || self.profile.is_a_row_of_cars(&self.extent) {
+            self.tallness.ceiling()
+        } else {
+            f64::INFINITY
+        };
         let height = height.min(lid).max(tall);
         let margin = if self.free_heading { rules.own_way_margin } else { 0.0 };
         let yaw_rad = self.heading[1].atan2(self.heading[0]);

@@ -1,9 +1,11 @@
-//! A frame's reflections in bins of range, so that an obstacle looks only at those around it.
+//! A frame's reflections in bins of range, so that one looks only at those around a place.
 
 use crate::frame::reflection::Reflection;
 
 /// Bins of range.
 const BINS: usize = 128;
+/// Reflections around one that are looked at: a crowd is a cluster long before.
+pub const MOST_AROUND: usize = 64;
 
 /// Where a reflection is, centimetres in the levelled frame, and its place in the scan.
 #[derive(Debug, Clone, Copy)]
@@ -62,6 +64,15 @@ impl<const D: usize> ByRange<D> {
         let end = self.begins.get(self.bin(to_cm) + 1).copied().unwrap_or(0);
         self.places.get(usize::from(begin)..usize::from(end)).unwrap_or(&[])
     }
+
+    /// Whether so many of the reflections that count, itself included, lie no farther than `reach_cm` from reflection
+    /// `r` on either axis. Looks at no more than [`MOST_AROUND`] of them.
+    pub fn is_one_of(&self, many: usize, reach_cm: i32, r: &Reflection, counts: impl Fn(usize) -> bool) -> bool {
+        let (ground, near) = (i32::from(r.ground_cm), |a: i32, b: i32| (a - b).abs() <= reach_cm);
+        let around = self.between(ground - 2 * reach_cm, ground + 2 * reach_cm).iter().take(MOST_AROUND);
+        let close = around.filter(|p| near(p.x_cm, r.x_cm) && near(p.y_cm, r.y_cm) && counts(usize::from(p.index)));
+        close.take(many).count() == many
+    }
 }
 
 #[cfg(test)]
@@ -69,6 +80,28 @@ mod tests {
     use super::*;
     use crate::fixed::trig::Direction;
     use std::vec::Vec;
+
+    #[test]
+    fn a_reflection_is_one_of_those_that_lie_close_to_it_and_count() {
+        let at = |x_cm: i32, y_cm: i32| Reflection {
+            x_cm,
+            y_cm,
+            ground_cm: crate::fixed::math::length(x_cm, y_cm) as u16,
+            sight: Direction::AHEAD,
+            radial_velocity_cm_s: 0,
+            across_cm: 1,
+            height_cm: None,
+            strength: 0,
+        };
+        // the fourth is as far away as the others, in another direction
+        let all = [at(3000, 4000), at(3290, 4000), at(3000, 3710), at(4000, 3000), at(3000, 4310)];
+        let sorted = ByRange::<8>::sort(&all, 22_500);
+        let is_one_of = |many, i: usize| sorted.is_one_of(many, 300, &all[i], |_| true);
+        assert!(is_one_of(3, 0) && !is_one_of(4, 0));
+        assert!(is_one_of(1, 3) && !is_one_of(2, 3));
+        assert!(!is_one_of(2, 4), "3.1 m from the first");
+        assert!(!sorted.is_one_of(3, 300, &all[0], |i| i != 2), "one that does not count");
+    }
 
     #[test]
     fn every_reflection_in_the_interval_is_found_once() {
