@@ -8,7 +8,8 @@
 //! where a degree is metres, an unmoving reflection is taken as low until it is seen near. What is
 //! *of a body*, one of several reflections within a vehicle's size, may be as high as a vehicle: its
 //! prior is vague. A guard rail's posts stand alone. And what was measured half a standard deviation
-//! above a level fills it whatever the prior says. Each detection draws a stack towards its own profile,
+//! above a level fills it whatever the prior says; where that is higher than a car, the thing is a mast,
+//! a sign or a wall, which reflects anywhere, and twice as high. Each detection draws a stack towards its own profile,
 //! so that repeated noisy heights average instead of piling up: a level is filled where most
 //! detections prove it.
 //!
@@ -73,11 +74,15 @@ impl Default for EvidenceConfig {
 }
 
 /// Reflections of a body in one frame, and how far from one the others lie at most on either axis, centimetres.
-pub const BODY_REFLECTIONS: usize = 3;
+pub const BODY_REFLECTIONS: usize = 4;
 /// See [`BODY_REFLECTIONS`].
-pub const BODY_CM: i32 = 300;
+pub const BODY_CM: i32 = 250;
 /// Variance of the height of a body that was measured, cm^2: a vehicle's.
 const BODY_VARIANCE: i32 = 150 * 150;
+
+/// Height from which what stands is a mast, a sign or a wall, centimetres. Any part of such a thing reflects, half its
+/// height on average.
+const TALL_CM: i32 = 200;
 
 /// What a frame shows around an unmoving reflection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -191,10 +196,13 @@ impl InverseSensor {
         (height, (math::root(variance.unsigned_abs()) as i32).max(1))
     }
 
-    /// Height up to which a detection proves something, centimetres, whatever the prior says.
+    /// Height up to which a detection says that something is there, centimetres, whatever the prior says.
     fn proven_cm(r: &Reflection, around: Around) -> i32 {
         match r.height_cm {
-            Some((measured, sigma)) if around != Around::Unknown => i32::from(measured) - i32::from(sigma / 2),
+            Some((measured, sigma)) if around != Around::Unknown => {
+                let proven = i32::from(measured) - i32::from(sigma / 2);
+                if proven > TALL_CM { 2 * proven } else { proven }
+            }
             _ => i32::MIN,
         }
     }
@@ -495,9 +503,10 @@ mod tests {
     fn levels_that_most_detections_prove_are_filled_whatever_the_prior_says() {
         let (_, axes) = axes();
         let rows_to = |cm| (0..4).filter(|row| axes.height_at(axes.row_centre(*row), 3050) <= cm).count();
-        assert!(rows_to(120) < rows_to(300), "the grid tells them apart");
-        // a mast that reflects 3.3 m above the road, a post at 0.6 m; noise of a standard deviation
-        assert_eq!(full_rows(&[330, 270, 390, 330], 60, 40), rows_to(300));
+        assert!(rows_to(120) < rows_to(450), "the grid tells them apart");
+        // a bollard that reflects 1.4 m above the road, a sign at 2.6 m, a post at 0.6 m; noise of a standard deviation
+        assert_eq!(full_rows(&[140, 80, 200, 140], 60, 40), rows_to(120));
+        assert_eq!(full_rows(&[260, 200, 320, 260], 60, 40), rows_to(450));
         assert!(full_rows(&[60, 0, 120, 60], 60, 40) <= rows_to(120));
         assert!(full_rows(&[60, 60, 60, 330], 60, 40) <= rows_to(120), "one in four proves nothing");
     }

@@ -13,6 +13,8 @@ use crate::frame::reflection::Reflection;
 const NOISE_REACH_CM: i32 = 600;
 /// How far beyond the longest vehicle an outline may be stretched, centimetres.
 const LENGTH_TO_SPARE_CM: i32 = 100;
+/// How far beyond its outline an end of a vehicle may reflect, centimetres: noise has been taken off the outline.
+const END_CM: i32 = 50;
 /// One, in the scale of a misfit: a squared distance in standard deviations, 2^-8.
 const UNIT: i32 = 256;
 /// Distance beyond an end that counts as one, squared and over [`UNIT`]: 0.7 m, cm^2.
@@ -109,8 +111,9 @@ impl Search {
     pub fn misfit(&self, r: &Reflection, offset: Offset, error: i32, t: &Tracking) -> Option<i32> {
         let Offset { left, beside, beyond } = offset;
         let stretched = self.extent.length_cm() + beyond;
-        if stretched > t.max_length_cm + LENGTH_TO_SPARE_CM || (self.is_low && beyond > 0 && stretched > LONGEST_LOW_CM)
-        {
+        // one as long as a lorry that shows nothing high keeps its ends
+        let becomes_lorry = beyond > END_CM && stretched > LONGEST_LOW_CM;
+        if stretched > t.max_length_cm + LENGTH_TO_SPARE_CM || (self.is_low && becomes_lorry) {
             return None;
         }
         // far along the vehicle or far to its side, but not both
@@ -171,9 +174,9 @@ mod tests {
         (0..100).for_each(|_| o.tallness.add(70, 30));
         assert!(!fits(&o, 5700));
         assert!(fits(&o, 5600), "8.25 m in all");
-        // one that is longer already keeps what lies within it
+        // one that is longer already keeps its ends
         o.extent = Extent { rear_cm: -600, front_cm: 600 };
-        assert!(fits(&o, 5550) && !fits(&o, 5650));
+        assert!(fits(&o, 5550) && fits(&o, 5640) && !fits(&o, 5660));
     }
 
     #[test]

@@ -17,6 +17,9 @@ const SIGHTS: usize = 6;
 /// Standard deviation of the height of a body that was measured, metres.
 const BODY_SIGMA: f64 = 1.5;
 
+/// Height from which what stands is twice as high as its reflection.
+const TALL: f64 = 2.0;
+
 /// What a frame shows around one of the reflections that belong to no obstacle.
 pub fn around(d: &Placed, unclaimed: &[Placed]) -> Around {
     let reach = f64::from(BODY_CM) / 100.0;
@@ -108,6 +111,7 @@ impl InverseSensor {
         let gain = if first { 1.0 } else { f64::from(self.config.gain) };
         let (height, sigma) = self.height(d, around);
         let proven = d.height.filter(|_| !first).map_or(f64::NEG_INFINITY, |(measured, noise)| measured - noise / 2.0);
+        let proven = if proven > TALL { 2.0 * proven } else { proven };
         let place = axes.column_place(d.bearing());
         let middle = (d.ground() / axes.cell_m) as usize;
         for a in 0..axes.azimuths {

@@ -65,6 +65,8 @@ fn length(v: Ground) -> f64 {
     v[0].hypot(v[1])
 }
 
+/// How far beyond its outline an end of a vehicle may reflect.
+const END: f64 = 0.5;
 /// Greatest length of what is low.
 const LONGEST_LOW: f64 = 9.0;
 
@@ -173,7 +175,7 @@ impl Obstacle {
         let fits = error.abs() <= rules.doppler_gate
             && ahead.hypot(aside) <= 1.0
             && self.extent.length() + beyond <= rules.max_length + LENGTH_TO_SPARE
-            && !(self.is_low() && beyond > 0.0 && self.extent.length() + beyond > LONGEST_LOW);
+            && !(self.is_low() && beyond > END && self.extent.length() + beyond > LONGEST_LOW);
         // squared distances in their own scales: 0.7 m along, width and noise across, half a metre a
         // second (twice) in speed
         let across = left.powi(2) / (rules.half_width.powi(2) + sigma_across.powi(2));
