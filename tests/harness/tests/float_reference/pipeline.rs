@@ -4,6 +4,7 @@ use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Measurement;
 use viewshed::frame::gate::Rejection;
 use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
+use viewshed::grid::evidence::Around;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
