@@ -19,12 +19,19 @@ pub fn start<E: InUnit, S: MapSender<E::Map>>(
     now: Time,
 ) {
     (*parameters, *sender) = (None, None);
-    let Some(Ok(header)) = settings.map(|settings| settings.build::<E>(parameters)) else { return };
-    start_sender(sender, header, medium, epoch, now);
+    let Some(settings) = settings else { return };
+    let Ok(header) = settings.build::<E>(parameters) else { return };
+    start_sender(sender, header, (settings.unit.sensor, medium), epoch, now);
 }
 
 #[inline(never)]
-fn start_sender<M, S: MapSender<M>>(sender: &mut Option<S>, header: Header, medium: Medium, epoch: Epoch, now: Time) {
-    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
+fn start_sender<M, S: MapSender<M>>(
+    sender: &mut Option<S>,
+    header: Header,
+    (number, medium): (u8, Medium),
+    epoch: Epoch,
+    now: Time,
+) {
+    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(number, medium) };
     *sender = S::start(config, header, epoch, now).ok();
 }

@@ -10,7 +10,7 @@ use crate::sensor::config::{ConfigError, Problem};
 use crate::unit::sender::MapSender;
 use crate::unit::settings::{Settings, SettingsCheck};
 use crate::wire::code::ray::Known;
-use crate::wire::header::{Header, MOST_AZIMUTHS, fingerprint};
+use crate::wire::header::{Header, MOST_AZIMUTHS};
 
 /// An estimator that an integrator's settings can set up and whose maps can be broadcast.
 pub trait InUnit: Estimator {
@@ -43,6 +43,7 @@ impl Settings {
         *parameters = None;
         self.radar_bus.check("radar_bus")?;
         self.broadcast_bus.check("broadcast_bus")?;
+        self.unit.check()?;
         E::check(self)?;
         // large: moved once
         let made = parameters.insert(E::parameters(&E::config(self))?);
@@ -87,7 +88,6 @@ fn header<const R: usize, const A: usize>(
     geometry: &PolarGeometry,
     usual: Known,
 ) -> Result<Header, ConfigError> {
-    let block = settings.to_block(0);
     // the mount was checked with the parameters, so it is the grid
     #[allow(clippy::cast_precision_loss)]
     let refused = ConfigError {
@@ -95,7 +95,7 @@ fn header<const R: usize, const A: usize>(
         value: A as f32,
         problem: Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 },
     };
-    Header::new::<R, A>(&settings.sensor.mount, geometry, usual, 1, fingerprint(&block)).map_err(|_| refused)
+    Header::new::<R, A>(&settings.sensor.mount, geometry, usual, 1, settings.fingerprint()).map_err(|_| refused)
 }
 
 /// Of the settings a camera takes the mount, the field of view as the angles at which its picture ends along its

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | what an estimator needs to be in a unit, and the two sizes of radar-3d | [`build`](mod@build), [`profile`] |
 //! | settings: the checked block, two slots of it, in flash | [`settings`] |
-//! | the integrator: asked for and written over serial lines and CAN, and what is said without settings | [`service`], [`serial_service`], [`can_service`], `safe_state` |
+//! | the integrator: asked for and written over serial lines and CAN, what a unit answers, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`said`], [`identity`], `safe_state` |
 //! | native scans and the integrator on serial lines, and whose clock it is | [`session`], [`radar_clock`] |
 //! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
 //! | a unit on hardware of its own: the loop, and what its lamp shows | [`roadside`], [`status_output`] |
@@ -19,10 +19,12 @@ pub mod build;
 pub mod can_bus;
 pub mod can_service;
 pub mod frame_queue;
+pub mod identity;
 pub mod profile;
 pub mod radar_clock;
 pub mod roadside;
 mod safe_state;
+pub mod said;
 pub mod sender;
 pub mod serial_service;
 pub mod service;

@@ -1,6 +1,7 @@
 //! The unit's end of a serial line: the integrator's requests answered, and what is said without settings.
 
 use crate::fixed::time::Time;
+use crate::unit::identity::{Identity, VERSION};
 use crate::unit::safe_state::SafeState;
 use crate::unit::service::{Reply, Request};
 use crate::unit::settings::{SettingsSlots, StoredSettings};
@@ -30,6 +31,7 @@ pub(crate) enum Asked {
 #[derive(Debug)]
 pub(crate) struct SerialService {
     sensor: u8,
+    identity: Identity,
     stored: StoredSettings,
     safe: SafeState,
     counter: u8,
@@ -39,11 +41,17 @@ pub(crate) struct SerialService {
 
 impl SerialService {
     /// Says what the unit starts with, or why with nothing.
-    pub fn start(sensor: u8, epoch: Epoch, now: Time, stored: StoredSettings, line: &mut impl SerialLine) -> Self {
+    pub fn start(
+        (sensor, identity): (u8, Identity),
+        epoch: Epoch,
+        now: Time,
+        stored: StoredSettings,
+        line: &mut impl SerialLine,
+    ) -> Self {
         let safe = SafeState::new(sensor, Medium::Serial, epoch, now);
-        let mut service = Self { sensor, stored, safe, counter: 0, refused: 0 };
+        let mut service = Self { sensor, identity, stored, safe, counter: 0, refused: 0 };
         let place = stored.place();
-        service.reply(&Reply::Started(place.ok().map(|(slot, _)| slot)), line);
+        service.reply(&Reply::Started(place.ok()), line);
         if let Err(reason) = &place {
             service.reply(&Reply::Refused(reason), line);
         }
@@ -72,6 +80,19 @@ impl SerialService {
             Request::Read => {
                 let stored = self.stored;
                 self.reply(&Reply::Block(stored.block(slots)), line);
+            }
+            Request::ReadNewest => {
+                let slot = self.stored.newest_slot(slots);
+                let block = slot.map_or(&[][..], |slot| StoredSettings::in_slot(slots, slot));
+                self.reply(&Reply::Block(block), line);
+            }
+            Request::Identify => {
+                let identity = self.identity;
+                self.reply(&Reply::Identified(&identity, VERSION), line);
+            }
+            Request::Clear => {
+                StoredSettings::clear(slots);
+                self.reply(&Reply::Cleared, line);
             }
         }
         Some(Asked::Nothing)

@@ -2,8 +2,8 @@
 //!
 //! # Model
 //! Messages are stuffed as in [`serial`](crate::wire::serial) and protected by AUTOSAR E2E profile 05 with
-//! the data ID `0xC000 | sensor`, so that no radar's and no map's message is taken for one of these. All
-//! numbers are little-endian.
+//! the data ID `0xC000 | sensor`, so that no radar's and no map's message is taken for one of these. Whoever does not
+//! know the sensor's number asks for it (kind 5) by [`EVERY_SENSOR`]. All numbers are little-endian.
 //!
 //! | byte | content |
 //! |---|---|
@@ -15,25 +15,37 @@
 //! | kind | towards the unit | body |
 //! |---|---|---|
 //! | 1 | write a configuration block into the slot not in use | block ([`settings`](crate::unit::settings)) |
-//! | 2 | read the block in use | |
+//! | 2 | read a block | none: the one in use; 1: the one that counts from the next restart on |
 //! | 3 | restart with the newest block | |
 //! | 4 | the time, where the unit has no clock of its own | microseconds, 8 bytes |
+//! | 5 | say which unit you are | |
+//! | 6 | empty both slots; it counts from the next restart on | `VSCF` |
 //!
 //! | kind | from the unit | body |
 //! |---|---|---|
 //! | 129 | a block was written; it counts from the next restart on | sequence, 4 bytes |
-//! | 130 | the block in use | block |
-//! | 131 | the unit starts | slot, 1 byte; 255 without a block |
+//! | 130 | the block that was asked for | block |
+//! | 131 | the unit starts | slot, 1 byte; 255 without a block; the block's sequence, 4 bytes |
 //! | 132 | a block was refused, the unit stays in its safe state if it has no other | reason, 1 byte; of a parameter: its value as `f32`, 4 bytes, and its name |
+//! | 133 | which unit it is, by [`EVERY_SENSOR`] | sensor; 1 for a test bench, which takes scans on this line, else 0; ranges and azimuths of its grid; major, minor and patch number; the chip's number, 4 bytes; the board's name |
+//! | 134 | both slots are empty | |
 
 use crate::fixed::bytes::Reader;
 use crate::fixed::time::Time;
 use crate::sensor::config::ConfigError;
+use crate::unit::identity::{Identified, Identity};
+use crate::unit::said::{Refusal, Said};
 use crate::unit::settings::{BLOCK_LEN, BlockError};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
 
 const HEADER: usize = 4;
+
+/// In place of a sensor's number: the unit at the other end, whichever it is.
+pub const EVERY_SENSOR: u8 = u8::MAX;
+
+/// Marks the emptying of the slots: not every message that passes its check sum by chance does it.
+const CLEAR: [u8; 4] = *b"VSCF";
 
 /// What the integrator asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,10 +54,16 @@ pub enum Request<'a> {
     Write(&'a [u8]),
     /// Send the block in use.
     Read,
+    /// Send the block that counts from the next restart on.
+    ReadNewest,
     /// Start over.
     Restart,
     /// It is this time.
     Time(Time),
+    /// Say which unit you are.
+    Identify,
+    /// Empty both slots.
+    Clear,
 }
 
 /// What the unit answers.
@@ -53,12 +71,16 @@ pub enum Request<'a> {
 pub enum Reply<'a> {
     /// A block was written, with this sequence.
     Written(u32),
-    /// The block in use.
+    /// The block that was asked for.
     Block(&'a [u8]),
-    /// The unit starts with the block of a slot.
-    Started(Option<u8>),
+    /// The unit starts with the block of a slot and its sequence.
+    Started(Option<(u8, u32)>),
     /// A block was refused.
     Refused(&'a BlockError),
+    /// Which unit it is, and the version of its firmware.
+    Identified(&'a Identity, [u8; 3]),
+    /// Both slots are empty.
+    Cleared,
 }
 
 /// The data ID of a sensor's service messages.
@@ -112,10 +134,21 @@ impl<'a> Request<'a> {
                 message
             }
             Self::Read => ServiceMessage::new(2),
+            Self::ReadNewest => {
+                let mut message = ServiceMessage::new(2);
+                message.put(&[1]);
+                message
+            }
             Self::Restart => ServiceMessage::new(3),
             Self::Time(time) => {
                 let mut message = ServiceMessage::new(4);
                 message.put(&time.micros().to_le_bytes());
+                message
+            }
+            Self::Identify => return ServiceMessage::new(5).protect(EVERY_SENSOR, counter),
+            Self::Clear => {
+                let mut message = ServiceMessage::new(6);
+                message.put(&CLEAR);
                 message
             }
         };
@@ -124,13 +157,16 @@ impl<'a> Request<'a> {
 
     /// Reads a message; `None` for everybody else's and for damaged ones.
     pub fn read(message: &'a [u8], sensor: u8) -> Option<Self> {
-        Profile::P05.check(message, data_id(sensor)).ok()?;
-        let body = message.get(HEADER..)?;
-        match message.get(HEADER - 1)? {
+        let (kind, body) = (message.get(HEADER - 1)?, message.get(HEADER..)?);
+        let asked = if *kind == 5 { EVERY_SENSOR } else { sensor };
+        Profile::P05.check(message, data_id(asked)).ok()?;
+        match kind {
             1 => Some(Self::Write(body)),
-            2 => Some(Self::Read),
+            2 => Some(if body.first().is_some_and(|which| *which != 0) { Self::ReadNewest } else { Self::Read }),
             3 => Some(Self::Restart),
             4 => Reader(body).u64().map(|t| Self::Time(Time::from_micros(t))),
+            5 => Some(Self::Identify),
+            6 => (body == CLEAR).then_some(Self::Clear),
             _ => None,
         }
     }
@@ -150,9 +186,11 @@ impl Reply<'_> {
                 message.put(block.get(..BLOCK_LEN).unwrap_or(block));
                 message
             }
-            Self::Started(slot) => {
+            Self::Started(place) => {
+                let (slot, sequence) = place.unwrap_or((u8::MAX, 0));
                 let mut message = ServiceMessage::new(131);
-                message.put(&[slot.unwrap_or(u8::MAX)]);
+                message.put(&[slot]);
+                message.put(&sequence.to_le_bytes());
                 message
             }
             Self::Refused(reason) => {
@@ -164,8 +202,50 @@ impl Reply<'_> {
                 }
                 message
             }
+            Self::Identified(identity, firmware) => {
+                let mut message = ServiceMessage::new(133);
+                message.put(&identity.head(sensor, *firmware));
+                message.put(identity.letters());
+                return message.protect(EVERY_SENSOR, counter);
+            }
+            Self::Cleared => ServiceMessage::new(134),
         };
         message.protect(sensor, counter)
+    }
+}
+
+impl Said {
+    /// Reads a message of a unit; `None` for everybody else's and for damaged ones.
+    pub fn read(message: &[u8], sensor: u8) -> Option<Self> {
+        let (kind, body) = (message.get(HEADER - 1)?, message.get(HEADER..)?);
+        let by = if *kind == 133 { EVERY_SENSOR } else { sensor };
+        Profile::P05.check(message, data_id(by)).ok()?;
+        let mut r = Reader(body);
+        match kind {
+            129 => r.u32().map(Self::Written),
+            130 => {
+                let mut block = [0xFF; BLOCK_LEN];
+                block.iter_mut().zip(body).for_each(|(to, from)| *to = *from);
+                Some(Self::Block(block))
+            }
+            131 => {
+                let [slot] = r.take()?;
+                let sequence = r.u32()?;
+                Some(Self::Started((slot != u8::MAX).then_some((slot, sequence))))
+            }
+            132 => {
+                let [reason] = r.take()?;
+                let value = r.f32().filter(|_| reason == Refusal::PARAMETER);
+                let mut refusal = Refusal::new(reason, value.map_or([0; 4], f32::to_be_bytes));
+                if value.is_some() {
+                    refusal.name.iter_mut().zip(r.0).for_each(|(to, from)| *to = *from);
+                }
+                Some(Self::Refused(refusal))
+            }
+            133 => Identified::read(body).map(Self::Identified),
+            134 => Some(Self::Cleared),
+            _ => None,
+        }
     }
 }
 
@@ -181,10 +261,14 @@ mod tests {
             Request::Read,
             Request::Restart,
             Request::Time(Time::from_micros(0x0102_0304_0506_0708)),
+            Request::ReadNewest,
+            Request::Clear,
+            Request::Identify,
         ] {
             let message = request.message(3, 9);
             assert_eq!(Request::read(message.bytes(), 3), Some(request));
-            assert_eq!(Request::read(message.bytes(), 4), None);
+            let others = (request == Request::Identify).then_some(request);
+            assert_eq!(Request::read(message.bytes(), 4), others, "who it is everybody is asked");
             let mut damaged = [0; MOST_BYTES];
             let damaged = &mut damaged[..message.bytes().len()];
             damaged.copy_from_slice(message.bytes());
@@ -204,5 +288,30 @@ mod tests {
         assert_eq!(message.bytes()[3..5], [132, 5]);
         assert_eq!(message.bytes()[5..9], 50.0_f32.to_le_bytes());
         assert_eq!(&message.bytes()[9..], b"mount.height_m");
+        let Some(Said::Refused(refusal)) = Said::read(message.bytes(), 0) else { panic!() };
+        assert_eq!((refusal.reason, refusal.value(), refusal.parameter()), (5, 50.0, "mount.height_m"));
+        let empty = Reply::Refused(&BlockError::Empty).message(0, 0);
+        assert_eq!(Said::read(empty.bytes(), 0), Some(Said::Refused(Refusal::new(1, [0; 4]))));
+    }
+
+    #[test]
+    fn replies_read_back_and_belong_to_one_sensor() {
+        let identity = Identity { board: "a-board", chip: 7, is_bench: true, grid: [100, 64] };
+        let mut block = [0xFF; BLOCK_LEN];
+        block[..3].copy_from_slice(&[1, 2, 3]);
+        for (reply, said) in [
+            (Reply::Written(70_000), Said::Written(70_000)),
+            (Reply::Block(&[1, 2, 3]), Said::Block(block)),
+            (Reply::Started(Some((1, 9))), Said::Started(Some((1, 9)))),
+            (Reply::Started(None), Said::Started(None)),
+            (Reply::Cleared, Said::Cleared),
+        ] {
+            let message = reply.message(3, 9);
+            assert_eq!(Said::read(message.bytes(), 3), Some(said));
+            assert_eq!(Said::read(message.bytes(), 4), None);
+        }
+        let message = Reply::Identified(&identity, [0, 1, 2]).message(3, 9);
+        let Some(Said::Identified(unit)) = Said::read(message.bytes(), 7) else { panic!() };
+        assert_eq!((unit.sensor, unit.chip, unit.is_bench, unit.board()), (3, 7, true, "a-board"));
     }
 }

@@ -15,6 +15,7 @@ use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::inputs::Feed;
 use crate::inputs::native::{NativeConfig, NativeEntry, NativeReceiver};
+use crate::unit::identity::Identity;
 use crate::unit::serial_service::{Asked, SerialLine, SerialService};
 use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
 use crate::unit::{Event, Flow, MapSender, Unit};
@@ -39,11 +40,17 @@ pub struct SerialSession<const D: usize, T = Detection> {
 impl<const D: usize, T: NativeEntry> SerialSession<D, T> {
     /// Starts with a block, or without.
     #[inline(never)] // what it takes of the stack is free again afterwards
-    pub fn start(sensor: u8, epoch: Epoch, stored: StoredSettings, line: &mut impl SerialLine) -> Self {
+    pub fn start(
+        sensor: u8,
+        identity: Identity,
+        epoch: Epoch,
+        stored: StoredSettings,
+        line: &mut impl SerialLine,
+    ) -> Self {
         let now = Time::from_micros(0);
         Self {
             unstuffer: Unstuffer::new(),
-            service: SerialService::start(sensor, epoch, now, stored, line),
+            service: SerialService::start((sensor, identity), epoch, now, stored, line),
             radar: NativeReceiver::empty(NativeConfig::sensor(sensor)),
             now,
             refused: 0,

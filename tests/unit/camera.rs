@@ -10,6 +10,7 @@ use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 use viewshed::sensor::{field_of_view::FieldOfView, mount::Mount};
 use viewshed::unit::Unit;
+use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::camera::{CHECK, Map, Parameters, Sender, State};
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::session::SerialSession;
@@ -95,8 +96,13 @@ fn boxes_on_a_serial_line_become_the_map_of_a_receiver_each_cell_as_the_nearest_
     let (parameters, mut sender) = parameters_and_sender(&settings, Medium::Serial);
     let (mut state, mut map) = (Box::new(State::new()), Box::new(Map::NOWHERE));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Line::default());
-    let mut session =
-        SerialSession::<64, ImageBox>::start(0, Epoch::new(7), StoredSettings::read(&slots, CHECK), &mut line);
+    let mut session = SerialSession::<64, ImageBox>::start(
+        0,
+        Identity::UNNAMED,
+        Epoch::new(7),
+        StoredSettings::read(&slots, CHECK),
+        &mut line,
+    );
     assert_eq!(session.settings(), Some(&settings));
     let mut unit = Some(Unit::new(&parameters, &mut *state, &mut *map, &mut *sender));
     let mut receiver = Box::new(Receiver::<1, AZIMUTHS, 7>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));

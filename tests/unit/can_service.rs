@@ -3,8 +3,10 @@
 use proptest::prelude::*;
 use viewshed::fixed::time::Time;
 use viewshed::unit::Flow;
-use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Said, Tool};
+use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Tool};
+use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::small;
+use viewshed::unit::said::Said;
 use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings, SettingsSlots, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
@@ -78,6 +80,9 @@ fn a_block_is_written_read_back_and_counts_from_the_restart_on() {
             }
             sequence += 1;
             assert!(answers(&mut unit, &slots, medium).contains(&Said::Written(sequence)));
+            unit.take(&tool.read_newest().unwrap(), &mut slots);
+            let written = settings(height).to_block(sequence);
+            assert_eq!(answers(&mut unit, &slots, medium), [Said::Block(written)], "what was written reads back");
             assert_eq!(unit.settings().copied(), before, "not before the restart");
             assert_eq!(unit.take(&tool.restart().unwrap(), &mut slots), Some(Flow::Restart));
             unit = start(medium, &slots);
@@ -98,12 +103,12 @@ fn the_messages_are_these_bytes() {
     let block = settings(6.0).to_block(1);
     let frames: Vec<String> = tool.write(&block).map(|frame| format!("{frame:?}")).collect();
     assert_eq!(frames.len(), 2 + BLOCK_LEN / 4);
-    // begin, 148 bytes; part 0 is the magic; part 36 and the completion have the check sum
+    // begin, 156 bytes; part 0 is the magic; part 38 and the completion have the check sum
     let sum: String = block[BLOCK_LEN - 4..].iter().map(|b| format!("{b:02X}")).collect();
-    assert_eq!(frames[0], "458#4D00010000940000");
+    assert_eq!(frames[0], "458#41000100009C0000");
     assert_eq!(frames[1], "458#3F01020056534342");
-    assert_eq!(frames[37][6..], format!("070224{sum}"), "{}", frames[37]);
-    assert_eq!(frames[38][6..], format!("080300{sum}"), "{}", frames[38]);
+    assert_eq!(frames[39][6..], format!("090226{sum}"), "{}", frames[39]);
+    assert_eq!(frames[40][6..], format!("0A0300{sum}"), "{}", frames[40]);
     // the rest is the specification's example
     let mut unit = start(CLASSIC, &slots);
     let mut talk: Vec<CanFrame> = (0..2).map(|_| unit.next_frame(at(0), &slots).unwrap()).collect();
@@ -176,7 +181,7 @@ fn a_lost_part_is_asked_for_and_a_repeated_completion_writes_once() {
     assert_eq!((refusal.reason, refusal.detail[0], slots.1), (INCOMPLETE, 17, 0));
     send(tool.again(&block, 17), &mut unit, &mut slots);
     assert_eq!(answers(&mut unit, &slots, CLASSIC), [Said::Written(1)]);
-    unit.take(&frames[38], &mut slots);
+    unit.take(frames.last().unwrap(), &mut slots);
     assert_eq!((answers(&mut unit, &slots, CLASSIC), slots.1), (vec![Said::Written(1)], 1), "the answer was lost");
     // the parts alone, without a beginning, are of no block
     send(frames[1..].iter().copied(), &mut unit, &mut slots);
@@ -230,11 +235,115 @@ fn answers_keep_their_distance_and_identifiers_are_where_the_installation_has_th
     assert!(unit.next_frame(Time::from_micros(0), &slots).is_some());
 }
 
+/// A unit with a chip of its own.
+fn unit_of(chip: u32, slots: &InRam) -> CanService {
+    let identity = Identity { board: "a-board", chip, is_bench: false, grid: [100, 64] };
+    let config = CanServiceConfig { gap_us: 0, identity, ..CanServiceConfig::new(SENSOR, CLASSIC) };
+    CanService::start(config, Epoch::new(1), at(0), stored(slots))
+}
+
+#[test]
+fn two_units_of_one_number_are_told_apart_by_their_chips() {
+    let chips = [0x0102_0305, 0x0102_0309];
+    let mut slots = [empty(), empty()];
+    let mut units = [0, 1].map(|k| unit_of(chips[k], &slots[k]));
+    let mut tool = Tool::new(SENSOR, CLASSIC);
+    for (unit, slots) in units.iter_mut().zip(&mut slots) {
+        while unit.next_frame(at(0), slots).is_some() {}
+        unit.take(&tool.identify().unwrap(), slots);
+    }
+    // both answer, 16 ms apart
+    let mut heard = Vec::new();
+    for ms in 0..300 {
+        for (unit, slots) in units.iter_mut().zip(&slots) {
+            let Some(frame) = unit.next_frame(at(ms), slots) else { continue };
+            let Some(Said::Identified(unit)) = Answers::new(SENSOR, CLASSIC).take(&frame) else { panic!("{frame:?}") };
+            heard.push((ms, unit.chip));
+        }
+    }
+    assert_eq!(heard, [(20, chips[0]), (36, chips[1])]);
+    // one of them is named, and takes a number of its own
+    let mut own = settings(6.0);
+    own.unit.sensor = 5;
+    let frames: Vec<CanFrame> = tool.address(chips[1]).into_iter().chain(tool.write(&own.to_block(0))).collect();
+    for (unit, slots) in units.iter_mut().zip(&mut slots) {
+        for frame in &frames {
+            assert_eq!(unit.take(frame, slots), Some(Flow::Continue));
+        }
+    }
+    assert_eq!([slots[0].1, slots[1].1], [0, 1], "blocks written");
+    assert_eq!(answers(&mut units[0], &slots[0], CLASSIC), []);
+    let said = answers(&mut units[1], &slots[1], CLASSIC);
+    assert!(matches!(said[..], [Said::Written(1), Said::Identified(unit)] if unit.chip == chips[1]), "{said:?}");
+    assert_eq!(stored(&slots[1]).unit().sensor, 5);
+    // a restart is not for the other one either, until all are named again
+    let restart = tool.restart().unwrap();
+    assert_eq!(units[0].take(&restart, &mut slots[0]), Some(Flow::Continue));
+    assert_eq!(units[1].take(&restart, &mut slots[1]), Some(Flow::Restart));
+    units[0].take(&tool.address(0).unwrap(), &mut slots[0]);
+    assert_eq!(units[0].take(&restart, &mut slots[0]), Some(Flow::Restart));
+}
+
+#[test]
+fn a_clock_that_steps_back_keeps_nobody_from_saying_which_unit_it_is() {
+    let slots = empty();
+    let mut unit = unit_of(63, &slots);
+    while unit.next_frame(at(5000), &slots).is_some() {}
+    unit.take(&Tool::new(SENSOR, CLASSIC).identify().unwrap(), &mut slots.clone());
+    assert!(unit.next_frame(at(5000), &slots).is_none(), "its turn is 252 ms later");
+    assert!(unit.next_frame(at(10), &slots).is_some());
+}
+
+#[test]
+fn emptied_slots_count_from_the_restart_on() {
+    for medium in [CLASSIC, FD] {
+        let (mut slots, mut tool) =
+            (InRam([settings(6.0).to_block(1), settings(7.0).to_block(2)], 0), Tool::new(SENSOR, medium));
+        let mut unit = start(medium, &slots);
+        send(tool.write(&settings(8.0).to_block(0)), &mut unit, &mut slots);
+        let last = tool.write(&settings(8.0).to_block(0)).last().unwrap();
+        answers(&mut unit, &slots, medium);
+        send(tool.clear().into_iter(), &mut unit, &mut slots);
+        assert_eq!(answers(&mut unit, &slots, medium), [Said::Cleared]);
+        assert_eq!(unit.settings(), Some(&settings(7.0)), "it runs on");
+        // there is nothing to read, and the block that was written before does not count as written any more
+        send(tool.read().into_iter().chain([last]), &mut unit, &mut slots);
+        let said = answers(&mut unit, &slots, medium);
+        assert!(matches!(said[..], [Said::Refused(_)]), "{said:?}");
+        let restarted = start(medium, &slots);
+        assert_eq!((restarted.settings(), restarted.refusal()), (None, Some(BlockError::Empty)));
+    }
+}
+
+#[test]
+fn a_block_of_layout_1_is_taken_and_the_units_own_figures_stay() {
+    let mut own = settings(6.0);
+    own.unit.serial_baud = 921_600;
+    let mut slots = InRam([own.to_block(1), [0xFF; BLOCK_LEN]], 0);
+    let (mut unit, mut tool) = (start(CLASSIC, &slots), Tool::new(SENSOR, CLASSIC));
+    // as tools before layout 2 make it
+    let mut old = settings(7.0).to_block(0)[..148].to_vec();
+    (old[4], old[6]) = (1, 148);
+    let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&old[..144]);
+    old[144..].copy_from_slice(&sum.to_le_bytes());
+    send(tool.write(&old), &mut unit, &mut slots);
+    assert!(answers(&mut unit, &slots, CLASSIC).contains(&Said::Written(2)));
+    let now = stored(&slots);
+    assert_eq!(now.settings().map(|s| (s.sensor.mount.height_m, s.unit.serial_baud)), Some((7.0, 921_600)));
+    // one that an older firmware left in its slot is read back as it is
+    let slot: [u8; BLOCK_LEN] = std::array::from_fn(|k| old.get(k).copied().unwrap_or(0xFF));
+    let slots = InRam([slot, [0xFF; BLOCK_LEN]], 0);
+    let mut unit = start(CLASSIC, &slots);
+    unit.take(&tool.read().unwrap(), &mut slots.clone());
+    let said = answers(&mut unit, &slots, CLASSIC);
+    assert!(said.contains(&Said::Block(slot)), "{said:?}");
+}
+
 proptest! {
     /// Whatever requests and answers pass their check sums, nothing is written that does not hold.
     #[test]
     fn any_requests_and_answers_are_taken(
-        messages in prop::collection::vec((prop_oneof![0_u8..7, 128_u8..136, any::<u8>()], any::<[u8; 5]>()), 0..200),
+        messages in prop::collection::vec((prop_oneof![0_u8..5, 128_u8..138, any::<u8>()], any::<[u8; 5]>()), 0..200),
     ) {
         let (mut slots, mut unit) = (empty(), start(CLASSIC, &empty()));
         let mut answers = Answers::new(SENSOR, CLASSIC);
@@ -253,13 +362,13 @@ proptest! {
     /// Two blocks on a bus that loses, repeats and reorders: whatever is written is one of them, whole.
     #[test]
     fn only_whole_blocks_are_written(
-        order in prop::collection::vec((0_usize..78, 0_usize..6), 0..160),
-        lost in prop::collection::vec(0_usize..78, 0..4),
+        order in prop::collection::vec((0_usize..82, 0_usize..6), 0..160),
+        lost in prop::collection::vec(0_usize..82, 0..4),
     ) {
         let mut tool = Tool::new(SENSOR, CLASSIC);
         let blocks = [settings(6.0).to_block(1), settings(7.0).to_block(1)];
         let mut frames: Vec<(usize, CanFrame)> = tool.write(&blocks[0]).collect::<Vec<_>>().into_iter().enumerate().collect();
-        frames.extend(tool.write(&blocks[1]).enumerate().map(|(k, frame)| (39 + k, frame)));
+        frames.extend(tool.write(&blocks[1]).enumerate().map(|(k, frame)| (41 + k, frame)));
         frames.retain(|(k, _)| !lost.contains(k));
         for (k, to) in order {
             let Some(place) = frames.iter().position(|(n, _)| *n == k) else { continue };

@@ -3,6 +3,7 @@
 use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::unit::Unit;
+use viewshed::unit::identity::Identity;
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
 use viewshed::unit::session::SerialSession;
@@ -37,7 +38,7 @@ fn a_line_that_takes_nothing_costs_messages_that_are_counted_and_not_the_unit() 
     let mut unit = Some(Unit::new(&parameters, &mut *state, &mut map, &mut sender));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow::default());
     let stored = StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>());
-    let mut session = SerialSession::<64>::start(0, Epoch::new(1), stored, &mut line);
+    let mut session = SerialSession::<64>::start(0, Identity::UNNAMED, Epoch::new(1), stored, &mut line);
     assert_eq!(session.settings(), Some(&settings));
 
     let (mut radar, car) = (NativeSender::new(0), Vehicle::car(40.0, 2.0, 22.0));
@@ -67,7 +68,7 @@ fn a_radar_that_stops_is_told_by_the_units_own_clock() {
     let mut unit = Some(Unit::new(&parameters, &mut *state, &mut map, &mut sender));
     let (mut slots, mut line) = (Block(settings.to_block(1)), Narrow { open: true, messages: 0 });
     let stored = StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>());
-    let mut session = SerialSession::<64>::start(0, Epoch::new(1), stored, &mut line);
+    let mut session = SerialSession::<64>::start(0, Identity::UNNAMED, Epoch::new(1), stored, &mut line);
 
     let (mut radar, car) = (NativeSender::new(0), Vehicle::car(40.0, 2.0, 22.0));
     for k in 0..20_u64 {
@@ -115,7 +116,7 @@ fn the_safe_state_is_told_in_the_epoch_of_the_start_four_times_a_second() {
     for epoch in [Epoch::new(1), Epoch::new(9)] {
         let mut line = Kept::default();
         let stored = StoredSettings::read(&slots, SettingsCheck::of::<SmallState, SmallSender>());
-        let mut session = SerialSession::<64>::start(0, epoch, stored, &mut line);
+        let mut session = SerialSession::<64>::start(0, Identity::UNNAMED, epoch, stored, &mut line);
         let mut unit: Option<Unit<'_, SmallState, SmallSender>> = None;
         line.0.clear();
         for ms in 0..10_000 {

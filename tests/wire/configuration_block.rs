@@ -9,7 +9,6 @@ use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::wire::header::fingerprint;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -32,15 +31,16 @@ fn settings() -> Settings {
 fn changed(at: usize, bytes: &[u8]) -> [u8; BLOCK_LEN] {
     let mut block = settings().to_block(7);
     block[at..at + bytes.len()].copy_from_slice(bytes);
-    let sum = CRC.checksum(&block[..144]);
-    block[144..].copy_from_slice(&sum.to_le_bytes());
+    let sum = CRC.checksum(&block[..152]);
+    block[152..].copy_from_slice(&sum.to_le_bytes());
     block
 }
 
 fn check(settings: &Settings) -> Result<(), ConfigError> {
     Radar3dParameters::<50, 40, 8>::new(&settings.sensor, &settings.radar_3d())?;
     settings.radar_bus.check("radar_bus")?;
-    settings.broadcast_bus.check("broadcast_bus")
+    settings.broadcast_bus.check("broadcast_bus")?;
+    settings.unit.check()
 }
 
 struct Row {
@@ -62,7 +62,9 @@ fn rows() -> Vec<Row> {
 fn bytes(row: &Row, value: f32) -> Vec<u8> {
     match row.name.split_once('.').unwrap().1 {
         "bit_rate" => (value as u32).to_le_bytes().to_vec(),
-        "sample_point_permille" | "listen_first" => (value as u16).to_le_bytes().to_vec(),
+        "serial_baud" => (value as u32).to_le_bytes().to_vec(),
+        "sample_point_permille" | "listen_first" | "max_delay_ms" => (value as u16).to_le_bytes().to_vec(),
+        "sensor" | "radar_id" => vec![value as u8],
         _ => value.to_le_bytes().to_vec(),
     }
 }
@@ -81,21 +83,29 @@ fn every_parameter_lies_where_the_page_says_and_has_its_limits() {
             assert_eq!((bus(read(0.0)).listen_first, bus(read(1.0)).listen_first), (false, true));
             continue;
         }
-        let refused = check(&read(-1e9)).unwrap_err();
+        // numbers without a sign that begin at 0 have an upper limit only
+        let outside = if row.name.starts_with("unit.") && row.least == 0.0 { row.most + 1.0 } else { -1e9 };
+        let refused = check(&read(outside)).unwrap_err();
         assert_eq!(refused.parameter, row.name);
         assert_eq!(refused.problem, Problem::OutOfLimits { min: row.least, max: row.most }, "{}", row.name);
     }
-    assert_eq!((next, rows.len(), BLOCK_LEN), (144, 29 + 6, 148));
+    assert_eq!((next, rows.len(), BLOCK_LEN), (152, 29 + 6 + 4, 156));
 }
 
 #[test]
 fn the_rest_of_the_block_is_as_on_the_page() {
     let block = settings().to_block(0x0102_0304);
-    assert_eq!(block[..12], [0x56, 0x53, 0x43, 0x42, 1, 0, 148, 0, 4, 3, 2, 1]);
-    assert_eq!(block[144..], CRC.checksum(&block[..144]).to_le_bytes());
+    assert_eq!(block[..12], [0x56, 0x53, 0x43, 0x42, 2, 0, 156, 0, 4, 3, 2, 1]);
+    assert_eq!(block[152..], CRC.checksum(&block[..152]).to_le_bytes());
     assert_eq!(CRC.algorithm.poly, 0x04C1_1DB7);
-    assert_eq!(fingerprint(&settings().to_block(0)), CRC.checksum(&settings().to_block(0)));
-    assert!(PAGE.contains("the CRC-32 of all 148 bytes with sequence 0"));
+    // layout 1, made from the page: without the unit's own figures
+    let mut old = settings().to_block(0)[..148].to_vec();
+    (old[4], old[6]) = (1, 148);
+    let sum = CRC.checksum(&old[..144]);
+    old[144..].copy_from_slice(&sum.to_le_bytes());
+    assert_eq!(Settings::from_block(&old), Ok((0, settings())));
+    assert_eq!(settings().fingerprint(), sum);
+    assert!(PAGE.contains("the check sum of the block in layout 1 with sequence 0"));
     // no row is left for the order of the limits, which has its own reason
     let reversed = changed(36, &60.0_f32.to_le_bytes());
     let refused = check(&Settings::from_block(&reversed).unwrap().1).unwrap_err();

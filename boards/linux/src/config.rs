@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::board::{Ars408Configuration, Ars408Profile};
+use viewshed::board::{Ars408Configuration, Ars408Profile, Identity};
 use viewshed::{
     Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Medium, Mount,
     NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference,
@@ -299,6 +299,15 @@ impl Config {
         let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise: self.noise };
         let settings = Settings::of(sensor);
         Some(Settings { gate: self.gate, visibility: self.visibility, health: self.health, ..settings })
+    }
+
+    /// Which program the service says this is; its chip is the machine.
+    pub fn identity(&self) -> Identity {
+        let machine = std::fs::read("/etc/machine-id").unwrap_or_default();
+        let chip = if machine.is_empty() { 0 } else { Identity::number(machine.trim_ascii()) };
+        let is_bench = self.input.radar == Radar::Native && self.input.clock == ClockSource::Input;
+        // the reference grid
+        Identity { board: "linux", chip, is_bench, grid: [200, 120] }
     }
 
     /// What the file means, in words.

@@ -8,7 +8,7 @@ use std::os::fd::BorrowedFd;
 use anyhow::{Context, Result, bail};
 use log::{info, warn};
 use socketcan::dump::{ParseError, Reader};
-use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, RadarClock, SerialSession, StoredSettings};
+use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, Identity, RadarClock, SerialSession, StoredSettings};
 use viewshed::{
     BusConfig, CanFrame, Epoch, Reason, Ti, Time,
     reference::{Radar as Decoder, State},
@@ -90,6 +90,7 @@ pub fn open(config: &Config) -> Result<Box<dyn Input>> {
                 port: port(bench)?,
                 bench,
                 sensor: input.sensor_id,
+                identity: config.identity(),
                 session: None,
                 clock: RadarClock::NEW,
                 rest: Vec::new(),
@@ -279,6 +280,7 @@ struct NativePort {
     /// Time is what the input says.
     bench: bool,
     sensor: u8,
+    identity: Identity,
     session: Option<SerialSession<{ State::DETECTIONS }>>,
     clock: RadarClock,
     /// What came after a restart.
@@ -289,7 +291,7 @@ impl Input for NativePort {
     fn start(&mut self, epoch: Epoch, stored: StoredSettings, output: &mut Output) {
         self.port.keep_open();
         let mut lines = Lines { output, own: Some(&mut self.port) };
-        self.session = Some(SerialSession::start(self.sensor, epoch, stored, &mut lines));
+        self.session = Some(SerialSession::start(self.sensor, self.identity, epoch, stored, &mut lines));
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {

@@ -72,7 +72,10 @@ impl Output {
         // nothing of the epoch before
         self.held = None;
         let medium = config.medium().filter(|_| config.output.service);
-        let service = medium.map(|medium| CanServiceConfig::new(config.output.sensor, medium));
+        let service = medium.map(|medium| {
+            let identity = config.identity();
+            CanServiceConfig { identity, ..CanServiceConfig::new(config.output.sensor, medium) }
+        });
         self.service = service.map(|service| CanService::start(service, epoch, now, stored));
     }
 

@@ -40,11 +40,16 @@ fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     fs::rename(new, path)
 }
 
-/// The two slots of configuration blocks: in a file once one was written, before that the settings of the
-/// configuration file.
+/// Bytes of a block of layout 1, of which an older file has two.
+const LAYOUT_1_LEN: usize = 148;
+
+/// The two slots of configuration blocks: in a file once one was written, before that, and once both were emptied, the
+/// settings of the configuration file.
 pub struct FileSlots {
     path: Option<PathBuf>,
     slots: [[u8; BLOCK_LEN]; 2],
+    /// What the configuration file says.
+    of_file: [u8; BLOCK_LEN],
 }
 
 impl FileSlots {
@@ -53,14 +58,19 @@ impl FileSlots {
         let path = folder.map(|folder| folder.join(SLOTS));
         let mut slots = [[0xFF; BLOCK_LEN]; 2];
         let kept = path.as_ref().and_then(|path| fs::read(path).ok()).unwrap_or_default();
-        for (slot, bytes) in slots.iter_mut().zip(kept.chunks(BLOCK_LEN)) {
+        let length = if kept.len() == 2 * LAYOUT_1_LEN { LAYOUT_1_LEN } else { BLOCK_LEN };
+        for (slot, bytes) in slots.iter_mut().zip(kept.chunks(length)) {
             slot[..bytes.len()].copy_from_slice(bytes);
         }
-        let written = !kept.is_empty();
-        if let (false, Some(settings)) = (written, settings) {
-            slots[0] = settings.to_block(1);
+        let of_file = settings.map_or([0xFF; BLOCK_LEN], |settings| settings.to_block(1));
+        if kept.is_empty() {
+            slots[0] = of_file;
         }
-        Self { path, slots }
+        Self { path, slots, of_file }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.slots.as_flattened().iter().all(|byte| *byte == 0xFF)
     }
 
     fn keep(&self, slot: usize) -> std::io::Result<()> {
@@ -68,8 +78,12 @@ impl FileSlots {
             warn!("a configuration block was written; without a state folder it is kept until the daemon ends");
             return Ok(());
         };
+        if self.is_empty() {
+            return fs::remove_file(path);
+        }
         let file = fs::OpenOptions::new().create(true).truncate(false).write(true).open(path)?;
-        if file.metadata()?.len() == 0 {
+        // new, or with blocks of the layout before
+        if file.metadata()?.len() != self.slots.as_flattened().len() as u64 {
             file.write_all_at(self.slots.as_flattened(), 0)?;
         }
         file.write_all_at(&self.slots[slot], (slot * BLOCK_LEN) as u64)?;
@@ -89,6 +103,9 @@ impl SettingsSlots for FileSlots {
             error!("{}: {e}: a configuration block is lost", self.path.as_deref().unwrap_or(Path::new("")).display());
             // reading it back is to show that it was not written
             self.slots[slot] = before;
+        }
+        if self.is_empty() {
+            self.slots[0] = self.of_file;
         }
     }
 }

@@ -10,7 +10,8 @@ use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFram
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
-use viewshed::unit::can_service::{Answers, Said, Tool};
+use viewshed::unit::can_service::{Answers, Tool};
+use viewshed::unit::said::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};

@@ -35,14 +35,11 @@ use embassy_stm32::{bind_interrupts, can, dma, flash, pac, rng};
 use stm32::can::open;
 use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
-use viewshed::board::{FlashSlots, ResetFlags, RoadsideStart, StoredSettings};
+use viewshed::board::{FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
 use viewshed::reference::{CHECK, Radar};
 use viewshed::{Ars408Config, Epoch};
 
-/// The radar's number on its bus and in the broadcast.
-const SENSOR: u8 = 0;
 const CAN_CLOCK_HZ: u32 = 80_000_000;
-const BAUD: u32 = 115_200;
 /// Frames of the radar between interrupt and loop: 60 ms of a full bus.
 const FRAMES: usize = 256;
 const FLASH_BASE: u32 = 0x0800_0000;
@@ -125,11 +122,12 @@ async fn main(_spawner: Spawner) {
     let broadcast = open(can, pac::FDCAN2, broadcast_timing, &REQUESTS);
 
     let mut line = usart::Config::default();
-    line.baudrate = BAUD;
+    line.baudrate = UnitConfig::SERVICE_BAUD;
     let line = Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, line).expect("a baud rate it has");
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
-    let start = RoadsideStart { sensor: SENSOR, epoch, stored, reset_cause: flags.into() };
+    let identity = stm32::identity("nucleo-h743zi", [200, 120]);
+    let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into() };
     let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PB0, Level::Low, Speed::Low), watchdog };
     let scans = scans(radar_receiver).expect("room for one");
-    run(start, memory(), || Radar::new(Ars408Config::sensor(SENSOR)), scans, wiring).await
+    run(start, memory(), move || Radar::new(Ars408Config::sensor(stored.unit().radar_id)), scans, wiring).await
 }

@@ -10,8 +10,14 @@ pub mod serial;
 pub mod unit;
 
 use viewshed::Time;
+use viewshed::board::Identity;
 
 /// The hardware timer's time, in which the loop, the receive queues and the events count.
 pub fn now() -> Time {
     Time::from_micros(embassy_time::Instant::now().as_micros())
+}
+
+/// A board's program on this chip; of the chip's 96-bit number a check sum.
+pub fn identity(board: &'static str, grid: [u8; 2]) -> Identity {
+    Identity { board, chip: Identity::number(embassy_stm32::uid::uid()), is_bench: false, grid }
 }

@@ -7,7 +7,7 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
-use viewshed::board::{SerialLine, SerialPort};
+use viewshed::board::{SerialLine, SerialPort, UnitConfig};
 
 use crate::dma::SEND;
 
@@ -42,6 +42,13 @@ impl SerialPort for Line {
             Poll::Ready(Ok(came)) => came,
             // noise and overruns cost bytes, which the messages' check sums notice; the next read goes on
             Poll::Ready(Err(_)) | Poll::Pending => 0,
+        }
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        // both directions have one divider; a refused rate leaves the part switched off
+        if self.receiver.set_baudrate(baud).is_err() {
+            let _ = self.receiver.set_baudrate(UnitConfig::SERVICE_BAUD);
         }
     }
 }

@@ -11,16 +11,21 @@
 //! | 1 | a block begins | 0 | its length (2, big-endian), 0, 0 |
 //! | 2 | a part of it | n | its bytes 4 n to 4 n + 3 |
 //! | 3 | it is complete: check it, write it into the slot not in use | 0 | its last four bytes |
-//! | 4 | read the block in use | 0 | 0 |
+//! | 4 | read a block | 0: the one in use; 1: the one that counts from the next restart on | 0 |
 //! | 5 | restart with the newest block | 0 | `VSCB` |
+//! | 6 | empty both slots; it counts from the next restart on | 0 | `VSCF` |
+//! | 7 | say which unit you are | 0 | 0 |
+//! | 8 | from now on this chip's unit alone takes requests; 0: every unit | 0 | the chip's number, big-endian |
 //!
 //! | kind | from the unit | number | four bytes |
 //! |---|---|---|---|
 //! | 129 | a block was written; it counts from the next restart on | 0 | its sequence, big-endian |
-//! | 130 | a part of the block in use | n | its bytes 4 n to 4 n + 3 |
+//! | 130 | a part of the block that was asked for | n | its bytes 4 n to 4 n + 3 |
 //! | 131 | the unit starts | slot; 255 without a block | the block's sequence, big-endian |
 //! | 132 | a block was refused | reason | see below |
 //! | 133 | letters of the refused parameter's name | n | letters 4 n to 4 n + 3; zeros after the last |
+//! | 134 | which unit it is; after 7, and after 8 by the chip that was named | 1 for a test bench, else 0 | the chip's number, big-endian |
+//! | 135 | both slots are empty | 0 | 0 |
 //!
 //! Reasons are those of [`BlockError::code`](crate::unit::settings::BlockError::code), with the layout that was
 //! found (2 bytes, big-endian) or the parameter's value (`f32`, big-endian), and
@@ -32,13 +37,17 @@
 //! came: parts of two blocks do not pass. After a block that lacks parts these can be sent alone. A repeated
 //! completion is answered again and not written again.
 //!
+//! *Two units of one number*, as two that are new are, send with the same identifiers. They answer kind 7 at
+//! times that follow from their chips' numbers, 64 of them 4 ms apart; kind 8 then names one of them, and the
+//! others take nothing until their next start or until kind 8 names all.
+//!
 //! # Limits
 //! There is no authentication on classic CAN: who can send on the bus can configure the unit.
 
 mod tool;
 mod unit;
 
-pub use tool::{Answers, Refusal, Said, Tool};
+pub use tool::{Answers, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
 use crate::unit::settings::BLOCK_LEN;
@@ -55,11 +64,14 @@ pub const ANSWER: Message = Message::Other(25);
 /// Reason of a refusal: parts of the block are missing.
 pub const INCOMPLETE: u8 = 6;
 
-/// Parts of a block.
+/// Parts of the longest block.
 pub const PARTS: usize = BLOCK_LEN / 4;
 
 /// Marks a restart: not every message that passes its check sum by chance begins one.
 const RESTART: [u8; 4] = *b"VSCB";
+
+/// Marks the emptying of the slots, likewise.
+const CLEAR: [u8; 4] = *b"VSCF";
 
 /// What arrived is a bit each.
 const _: () = assert!(BLOCK_LEN.is_multiple_of(4) && PARTS <= 64);
@@ -72,8 +84,11 @@ enum BlockRequest {
     Begin { length: u16 },
     Part { number: u8, bytes: [u8; 4] },
     Complete { last: [u8; 4] },
-    Read,
+    Read { newest: bool },
     Restart,
+    Clear,
+    Identify,
+    Address { chip: u32 },
 }
 
 impl BlockRequest {
@@ -85,8 +100,11 @@ impl BlockRequest {
             }
             Self::Part { number, bytes } => own(2, number, bytes),
             Self::Complete { last } => own(3, 0, last),
-            Self::Read => own(4, 0, [0; 4]),
+            Self::Read { newest } => own(4, u8::from(newest), [0; 4]),
             Self::Restart => own(5, 0, RESTART),
+            Self::Clear => own(6, 0, CLEAR),
+            Self::Identify => own(7, 0, [0; 4]),
+            Self::Address { chip } => own(8, 0, chip.to_be_bytes()),
         }
     }
 
@@ -98,8 +116,11 @@ impl BlockRequest {
             1 => Some(Self::Begin { length: u16::from_be_bytes([a, b]) }),
             2 => Some(Self::Part { number, bytes }),
             3 => Some(Self::Complete { last: bytes }),
-            4 => Some(Self::Read),
+            4 => Some(Self::Read { newest: number != 0 }),
             5 => (bytes == RESTART).then_some(Self::Restart),
+            6 => (bytes == CLEAR).then_some(Self::Clear),
+            7 => Some(Self::Identify),
+            8 => Some(Self::Address { chip: u32::from_be_bytes(bytes) }),
             _ => None,
         }
     }
@@ -112,6 +133,8 @@ enum BlockAnswer {
     Started { slot: u8, sequence: u32 },
     Refused { reason: u8, detail: [u8; 4] },
     Name { number: u8, letters: [u8; 4] },
+    Identified { is_bench: bool, chip: u32 },
+    Cleared,
 }
 
 impl BlockAnswer {
@@ -122,6 +145,8 @@ impl BlockAnswer {
             Self::Started { slot, sequence } => own(131, slot, sequence.to_be_bytes()),
             Self::Refused { reason, detail } => own(132, reason, detail),
             Self::Name { number, letters } => own(133, number, letters),
+            Self::Identified { is_bench, chip } => own(134, u8::from(is_bench), chip.to_be_bytes()),
+            Self::Cleared => own(135, 0, [0; 4]),
         }
     }
 
@@ -134,6 +159,8 @@ impl BlockAnswer {
             131 => Some(Self::Started { slot: number, sequence: u32::from_be_bytes(bytes) }),
             132 => Some(Self::Refused { reason: number, detail: bytes }),
             133 => Some(Self::Name { number, letters: bytes }),
+            134 => Some(Self::Identified { is_bench: number != 0, chip: u32::from_be_bytes(bytes) }),
+            135 => Some(Self::Cleared),
             _ => None,
         }
     }
@@ -171,8 +198,12 @@ mod tests {
             BlockRequest::Begin { length: 0x0102 },
             BlockRequest::Part { number: 36, bytes: [1, 2, 3, 4] },
             BlockRequest::Complete { last: [5, 6, 7, 8] },
-            BlockRequest::Read,
+            BlockRequest::Read { newest: false },
+            BlockRequest::Read { newest: true },
             BlockRequest::Restart,
+            BlockRequest::Clear,
+            BlockRequest::Identify,
+            BlockRequest::Address { chip: 0x0102_0304 },
         ] {
             assert_eq!(BlockRequest::read(&request.own()), Some(request));
         }
@@ -182,10 +213,13 @@ mod tests {
             BlockAnswer::Started { slot: 255, sequence: 7 },
             BlockAnswer::Refused { reason: 4, detail: [9; 4] },
             BlockAnswer::Name { number: 1, letters: *b"t.he" },
+            BlockAnswer::Identified { is_bench: true, chip: 0x0102_0304 },
+            BlockAnswer::Cleared,
         ] {
             assert_eq!(BlockAnswer::read(&answer.own()), Some(answer));
         }
         assert_eq!(BlockRequest::read(&own(5, 0, *b"VSCA")), None, "a restart by chance");
+        assert_eq!(BlockRequest::read(&own(6, 0, *b"VSCB")), None, "emptied by chance");
         assert_eq!(BlockRequest::read(&own(9, 0, [0; 4])), None);
         assert_eq!(BlockRequest::read(&[1, 0, 0, 148, 0]), None);
     }

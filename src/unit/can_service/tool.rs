@@ -1,6 +1,8 @@
 //! The integrator's end: what to send, and what the answers say.
 
-use super::{ANSWER, BlockAnswer, BlockRequest, PARTS, REQUEST, frame, received};
+use super::{ANSWER, BlockAnswer, BlockRequest, REQUEST, frame, received};
+use crate::unit::identity::Identified;
+use crate::unit::said::{Refusal, Said};
 use crate::unit::settings::BLOCK_LEN;
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
@@ -45,7 +47,12 @@ impl Tool {
 
     /// Asks for the block in use.
     pub fn read(&mut self) -> Option<CanFrame> {
-        self.frame(BlockRequest::Read)
+        self.frame(BlockRequest::Read { newest: false })
+    }
+
+    /// Asks for the block that counts from the next restart on.
+    pub fn read_newest(&mut self) -> Option<CanFrame> {
+        self.frame(BlockRequest::Read { newest: true })
     }
 
     /// Asks for a restart with the newest block.
@@ -53,51 +60,25 @@ impl Tool {
         self.frame(BlockRequest::Restart)
     }
 
+    /// Asks for both slots to be emptied.
+    pub fn clear(&mut self) -> Option<CanFrame> {
+        self.frame(BlockRequest::Clear)
+    }
+
+    /// Asks every unit of the sensor's number which one it is; all have answered 0.3 s later.
+    pub fn identify(&mut self) -> Option<CanFrame> {
+        self.frame(BlockRequest::Identify)
+    }
+
+    /// Of the units of the sensor's number this chip's alone takes what follows; 0: all of them.
+    pub fn address(&mut self, chip: u32) -> Option<CanFrame> {
+        self.frame(BlockRequest::Address { chip })
+    }
+
     fn frame(&mut self, request: BlockRequest) -> Option<CanFrame> {
         // requests are of no epoch
         frame(&self.medium, self.sensor, REQUEST, Epoch::new(0), &mut self.counter, request.own())
     }
-}
-
-/// Why a unit refused a block.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Refusal {
-    /// As in [`BlockError::code`](crate::unit::settings::BlockError::code), or [`INCOMPLETE`](super::INCOMPLETE).
-    pub reason: u8,
-    /// What goes with it: a layout, a parameter's value, the first missing part.
-    pub detail: [u8; 4],
-    name: [u8; Refusal::MOST_LETTERS],
-}
-
-impl Refusal {
-    const MOST_LETTERS: usize = 48;
-    /// Reason of a refusal for a parameter: its name follows.
-    const PARAMETER: u8 = 5;
-
-    /// The parameter's name; empty if the refusal is not about one.
-    pub fn parameter(&self) -> &str {
-        let letters = self.name.split(|byte| *byte == 0).next().unwrap_or(&[]);
-        core::str::from_utf8(letters).unwrap_or("")
-    }
-
-    /// The parameter's value.
-    pub fn value(&self) -> f32 {
-        f32::from_be_bytes(self.detail)
-    }
-}
-
-/// What a unit says.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(clippy::large_enum_variant)] // no allocator here
-pub enum Said {
-    /// A block was written, with this sequence.
-    Written(u32),
-    /// The block in use, every part of it; its own check sum is still to be looked at.
-    Block([u8; BLOCK_LEN]),
-    /// The unit starts, with the block of a slot and its sequence or without one.
-    Started(Option<(u8, u32)>),
-    /// A block was refused.
-    Refused(Refusal),
 }
 
 /// Collects a unit's answers.
@@ -126,8 +107,12 @@ impl Answers {
                 self.came = 0;
                 Some(Said::Started((slot != u8::MAX).then_some((slot, sequence))))
             }
+            BlockAnswer::Identified { is_bench, chip } => {
+                Some(Said::Identified(Identified::by_chip(self.sensor, is_bench, chip)))
+            }
+            BlockAnswer::Cleared => Some(Said::Cleared),
             BlockAnswer::Refused { reason, detail } => {
-                let refusal = Refusal { reason, detail, name: [0; Refusal::MOST_LETTERS] };
+                let refusal = Refusal::new(reason, detail);
                 self.refusal = (reason == Refusal::PARAMETER).then_some(refusal);
                 self.refusal.is_none().then_some(Said::Refused(refusal))
             }
@@ -147,11 +132,15 @@ impl Answers {
         let at = 4 * usize::from(number);
         if number == 0 {
             // a block is read from its beginning on
-            self.came = 0;
+            (self.came, self.block) = (0, [0xFF; BLOCK_LEN]);
         }
         self.block.get_mut(at..at + 4)?.copy_from_slice(&bytes);
         self.came |= 1 << number;
-        if self.came.count_ones() as usize == PARTS {
+        // the second part says how long the block is
+        let [.., low, high] = *self.block.first_chunk::<8>()?;
+        let parts = usize::from(u16::from_le_bytes([low, high])).div_ceil(4);
+        let has_length = self.came & 0b10 != 0;
+        if has_length && self.came.count_ones() as usize == parts {
             self.came = 0;
             return Some(Said::Block(self.block));
         }

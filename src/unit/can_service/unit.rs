@@ -1,14 +1,20 @@
 //! The unit's end: takes a block, keeps it, answers what it runs with, and what it sends without one.
 
-use super::{ANSWER, BlockAnswer, BlockRequest, INCOMPLETE, PARTS, REQUEST, frame, received};
+use super::{ANSWER, BlockAnswer, BlockRequest, INCOMPLETE, REQUEST, frame, received};
 use crate::fixed::time::Time;
 use crate::unit::Flow;
+use crate::unit::identity::Identity;
 use crate::unit::safe_state::SafeState;
 use crate::unit::settings::{BLOCK_LEN, BlockError, Settings, SettingsSlots, StoredSettings};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
 use crate::wire::status::Status;
+
+/// Times at which units of one number say which ones they are, and the time from one to the next, microseconds: two
+/// frames of a slow bus.
+const SLOTS: u32 = 64;
+const SLOT_US: u64 = 4000;
 
 /// Where and how a unit answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,12 +26,14 @@ pub struct CanServiceConfig {
     pub medium: Medium,
     /// Least time between two answers, microseconds.
     pub gap_us: u32,
+    /// Which program on which chip.
+    pub identity: Identity,
 }
 
 impl CanServiceConfig {
     /// An answer every 2 ms at most: between them there is room for a map.
     pub const fn new(sensor: u8, medium: Medium) -> Self {
-        Self { sensor, medium, gap_us: 2000 }
+        Self { sensor, medium, gap_us: 2000, identity: Identity::UNNAMED }
     }
 }
 
@@ -34,7 +42,8 @@ impl CanServiceConfig {
 /// # Example
 /// A block is sent in parts, written, and read by the next start:
 /// ```
-/// # use viewshed::unit::can_service::{Answers, Said, Tool};
+/// # use viewshed::unit::can_service::{Answers, Tool};
+/// # use viewshed::unit::said::Said;
 /// # use viewshed::board::{BLOCK_LEN, CanService, CanServiceConfig, Flow, SettingsSlots, StoredSettings};
 /// # use viewshed::{Addresses, Epoch, FieldOfView, Medium, Mount, NoiseConfig, Sensor, Settings, Time, small};
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);
@@ -82,6 +91,18 @@ pub struct CanService {
     counter: u8,
     /// When the next answer may be sent.
     next: Time,
+    /// Requests are for another chip's unit.
+    passed_over: bool,
+    /// Whether somebody asked which unit this is, and when it says so.
+    presence: Presence,
+}
+
+/// An answer that waits, so that units of one number do not answer at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Presence {
+    NotAsked,
+    Asked,
+    Due(Time),
 }
 
 impl CanService {
@@ -94,9 +115,11 @@ impl CanService {
             stored,
             safe: SafeState::new(config.sensor, config.medium, epoch, now),
             incoming: Incoming::NONE,
-            outgoing: Outgoing { started: true, refused, written: None, part: None },
+            outgoing: Outgoing { started: true, refused, written: None, part: None, identified: false, cleared: false },
             counter: 0,
             next: now,
+            passed_over: false,
+            presence: Presence::NotAsked,
         }
     }
 
@@ -113,20 +136,51 @@ impl CanService {
     /// Takes a frame of the bus; `None` if it is none of the integrator's.
     pub fn take(&mut self, frame: &CanFrame, slots: &mut impl SettingsSlots) -> Option<Flow> {
         let own = received(frame, &self.config.medium, self.config.sensor, REQUEST)?;
-        match BlockRequest::read(own)? {
+        let request = BlockRequest::read(own)?;
+        let chip = self.config.identity.chip;
+        match request {
+            BlockRequest::Identify => self.presence = Presence::Asked,
+            BlockRequest::Address { chip: named } => {
+                self.passed_over = named != 0 && named != chip;
+                self.outgoing.identified |= named == chip && named != 0;
+            }
+            _ if !self.passed_over => return Some(self.work(request, slots)),
+            // heard, and not for this one
+            _ => {}
+        }
+        Some(Flow::Continue)
+    }
+
+    /// Does what is asked of this unit.
+    fn work(&mut self, request: BlockRequest, slots: &mut impl SettingsSlots) -> Flow {
+        match request {
             BlockRequest::Begin { length } => self.incoming.begin(length),
             BlockRequest::Part { number, bytes } => self.incoming.part(number, bytes),
             BlockRequest::Complete { last } => match self.incoming.complete(last, &self.stored, slots) {
                 Ok(sequence) => self.outgoing.written = Some(sequence),
                 Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
             },
-            BlockRequest::Read => match self.stored.place() {
-                Ok(_) => self.outgoing.part = Some(0),
-                Err(error) => self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 }),
-            },
-            BlockRequest::Restart => return Some(Flow::Restart),
+            BlockRequest::Read { newest } => {
+                let in_use = || self.stored.place().ok().map(|(slot, _)| usize::from(slot));
+                let slot = if newest { self.stored.newest_slot(slots) } else { in_use() };
+                match slot.filter(|slot| !StoredSettings::in_slot(slots, *slot).is_empty()) {
+                    Some(slot) => self.outgoing.part = Some((slot, 0)),
+                    None => {
+                        let error = self.stored.place().err().unwrap_or(BlockError::Empty);
+                        self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 });
+                    }
+                }
+            }
+            BlockRequest::Clear => {
+                StoredSettings::clear(slots);
+                // a completion that is repeated is of no block any more
+                self.incoming = Incoming::NONE;
+                self.outgoing.cleared = true;
+            }
+            BlockRequest::Restart => return Flow::Restart,
+            BlockRequest::Identify | BlockRequest::Address { .. } => {}
         }
-        Some(Flow::Continue)
+        Flow::Continue
     }
 
     /// The next answer, if one is due.
@@ -136,10 +190,32 @@ impl CanService {
         if self.next.since(now).is_some_and(|wait| wait > 0 && wait <= gap_us) {
             return None;
         }
-        let answer = self.outgoing.next(&self.stored, slots)?;
+        self.outgoing.identified |= self.is_present(now);
+        let answer = self.outgoing.next(&self.stored, slots, &self.config.identity)?;
         self.next = Time::from_micros(now.micros().saturating_add(gap_us));
         let CanServiceConfig { sensor, medium, .. } = self.config;
         frame(&medium, sensor, ANSWER, self.epoch, &mut self.counter, answer.own())
+    }
+
+    /// Whether it is this unit's time to say which one it is.
+    fn is_present(&mut self, now: Time) -> bool {
+        match self.presence {
+            Presence::NotAsked => false,
+            Presence::Asked => {
+                let wait = u64::from(self.config.identity.chip % SLOTS) * SLOT_US;
+                self.presence = Presence::Due(Time::from_micros(now.micros().saturating_add(wait)));
+                false
+            }
+            // a clock that stepped back does not put it off
+            Presence::Due(due) => {
+                let wait = due.since(now).unwrap_or(0);
+                let is_due = wait == 0 || wait > u64::from(SLOTS) * SLOT_US;
+                if is_due {
+                    self.presence = Presence::NotAsked;
+                }
+                is_due
+            }
+        }
     }
 
     /// The next status of a unit in its safe state, where nothing else of it is sent; versions and counters as
@@ -225,12 +301,19 @@ struct Outgoing {
     started: bool,
     refused: Option<Refused>,
     written: Option<u32>,
-    /// Next part of the block in use.
-    part: Option<u8>,
+    /// A block's slot, and its next part.
+    part: Option<(usize, u8)>,
+    identified: bool,
+    cleared: bool,
 }
 
 impl Outgoing {
-    fn next(&mut self, stored: &StoredSettings, slots: &impl SettingsSlots) -> Option<BlockAnswer> {
+    fn next(
+        &mut self,
+        stored: &StoredSettings,
+        slots: &impl SettingsSlots,
+        identity: &Identity,
+    ) -> Option<BlockAnswer> {
         if core::mem::take(&mut self.started) {
             let (slot, sequence) = stored.place().unwrap_or((u8::MAX, 0));
             return Some(BlockAnswer::Started { slot, sequence });
@@ -238,15 +321,22 @@ impl Outgoing {
         if let Some(sequence) = self.written.take() {
             return Some(BlockAnswer::Written { sequence });
         }
+        if core::mem::take(&mut self.identified) {
+            return Some(BlockAnswer::Identified { is_bench: identity.is_bench, chip: identity.chip });
+        }
+        if core::mem::take(&mut self.cleared) {
+            return Some(BlockAnswer::Cleared);
+        }
         if let Some(mut refused) = self.refused.take() {
             let answer = refused.answer();
             refused.next = refused.next.saturating_add(1);
             self.refused = refused.goes_on().then_some(refused);
             return Some(answer);
         }
-        let number = self.part.take()?;
-        let bytes = *stored.block(slots).get(4 * usize::from(number)..)?.first_chunk::<4>()?;
-        self.part = (usize::from(number) + 1 < PARTS).then_some(number + 1);
+        let (slot, number) = self.part.take()?;
+        let block = StoredSettings::in_slot(slots, slot);
+        let bytes = *block.get(4 * usize::from(number)..)?.first_chunk::<4>()?;
+        self.part = (4 * (usize::from(number) + 1) < block.len()).then_some((slot, number + 1));
         Some(BlockAnswer::Part { number, bytes })
     }
 }

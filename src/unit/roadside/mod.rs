@@ -19,6 +19,9 @@
 //! *Safe state.* Without a block that holds there is no unit, only a status on both lines that says so. The
 //! buses are then only listened to until their bit rate is proven.
 //!
+//! *Bit rate of the serial line.* It is [`UnitConfig::SERVICE_BAUD`] at every start, and the configured one
+//! [`UnitConfig::SERVICE_S`] later unless a request came until then.
+//!
 //! # Limits
 //! 64 frames of each bus and 64 bytes of the serial line a step. Three mailboxes. While a block is written
 //! the loop stands still, on parts with large sectors for seconds: the map ends and comes back.
@@ -30,8 +33,9 @@ use crate::fixed::time::Time;
 use crate::inputs::Feed;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
+use crate::unit::identity::{Identity, VERSION};
 use crate::unit::serial_service::{Asked, SerialLine, SerialService};
-use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
+use crate::unit::settings::{Settings, SettingsSlots, StoredSettings, UnitConfig};
 use crate::unit::{Flow, InUnit, MapSender, Unit};
 use crate::wire::broadcast::{BroadcastConfig, Medium};
 use crate::wire::frame::CanFrame;
@@ -50,14 +54,13 @@ const MOST_BYTES: usize = 64;
 const MOST_MESSAGES: usize = 64;
 /// Time without a scan after which the map's age is looked at, microseconds.
 const IDLE_US: u64 = 50_000;
-/// Age at which a map is not handed to the drivers any more, milliseconds: 20 less than the delay receivers
-/// allow, for frames that lie in a mailbox while the next map is made.
-const STALE_MS: u16 = 80;
 
-/// The serial line, as a board offers it; no call waits.
+/// The serial line, as a board offers it; no call waits. It begins at [`UnitConfig::SERVICE_BAUD`].
 pub trait SerialPort: SerialLine {
     /// Takes bytes that came; how many.
     fn receive(&mut self, buffer: &mut [u8]) -> usize;
+    /// Goes on at another bit rate; one the part cannot make leaves it where it is.
+    fn set_baud(&mut self, baud: u32);
 }
 
 /// The drivers.
@@ -76,30 +79,14 @@ pub struct RoadsidePorts<R, B, L, S> {
 /// What a start needs to know.
 #[derive(Debug, Clone, Copy)]
 pub struct RoadsideStart {
-    /// The sensor's number, on its own bus as on the broadcast's.
-    pub sensor: u8,
+    /// Which program on which chip.
+    pub identity: Identity,
     /// One that was not used lately.
     pub epoch: Epoch,
     /// The block to run with, or why there is none.
     pub stored: StoredSettings,
     /// Why the controller started.
     pub reset_cause: ResetCause,
-}
-
-/// Major, minor and patch number of this version.
-pub const VERSION: [u8; 3] = [
-    number(env!("CARGO_PKG_VERSION_MAJOR")),
-    number(env!("CARGO_PKG_VERSION_MINOR")),
-    number(env!("CARGO_PKG_VERSION_PATCH")),
-];
-
-const fn number(digits: &str) -> u8 {
-    let (mut rest, mut value) = (digits.as_bytes(), 0_u8);
-    while let [digit, tail @ ..] = rest {
-        value = value.saturating_mul(10).saturating_add(*digit - b'0');
-        rest = tail;
-    }
-    value
 }
 
 /// The pieces of memory a unit works in.
@@ -153,6 +140,9 @@ pub struct Roadside<'u, E: InUnit, S, F> {
     worked: Option<Time>,
     /// Frames of the radar lost between its bus and the loop.
     lost: u32,
+    started: Time,
+    /// Bit rate the serial line has yet to change to.
+    baud: Option<u32>,
 }
 
 impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::Input>> Roadside<'u, E, S, F> {
@@ -164,8 +154,11 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         now: Time,
         ports: &mut RoadsidePorts<R, B, L, P>,
     ) -> Self {
-        let service = SerialService::start(start.sensor, start.epoch, now, start.stored, &mut ports.serial);
-        let asked = CanServiceConfig::new(start.sensor, Medium::Can(Addresses::STANDARD));
+        let RoadsideStart { identity, stored, .. } = start;
+        let config = stored.unit();
+        let service = SerialService::start((config.sensor, identity), start.epoch, now, stored, &mut ports.serial);
+        let medium = Medium::Can(Addresses::STANDARD);
+        let asked = CanServiceConfig { identity, ..CanServiceConfig::new(config.sensor, medium) };
         let can_service = CanService::start(asked, start.epoch, now, start.stored);
         let [radar_bus, broadcast_bus] = start.stored.buses();
         let maps = start.stored.settings().and_then(|settings| maps(&start, settings, memory, now));
@@ -182,6 +175,8 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             looked: now,
             worked: None,
             lost: 0,
+            started: now,
+            baud: (config.serial_baud != UnitConfig::SERVICE_BAUD).then_some(config.serial_baud),
         }
     }
 
@@ -191,7 +186,7 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         now: Time,
         ports: &mut RoadsidePorts<R, B, L, P>,
     ) -> RoadsideStep {
-        let mut flow = self.serve(&mut ports.serial, &mut ports.slots);
+        let mut flow = self.serve(now, &mut ports.serial, &mut ports.slots);
         self.radar_bus.poll(now, &mut ports.radar);
         self.broadcast_bus.poll(now, &mut ports.broadcast);
         for _ in 0..MOST_FRAMES {
@@ -216,14 +211,21 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
     }
 
     /// Takes the integrator's requests on the serial line. The time is the controller's own here, nobody sets it.
-    fn serve(&mut self, line: &mut impl SerialPort, slots: &mut impl SettingsSlots) -> Flow {
+    fn serve(&mut self, now: Time, line: &mut impl SerialPort, slots: &mut impl SettingsSlots) -> Flow {
+        let over = now.since(self.started).is_some_and(|us| us >= u64::from(UnitConfig::SERVICE_S) * 1_000_000);
+        if let Some(baud) = self.baud.take_if(|_| over) {
+            line.set_baud(baud);
+        }
         let mut buffer = [0; MOST_BYTES];
         let came = line.receive(&mut buffer);
         let mut rest = buffer.get(..came).unwrap_or(&[]);
         while !rest.is_empty() {
             let (taken, message) = self.unstuffer.push(rest);
             rest = rest.get(taken..).unwrap_or(&[]);
-            if message.and_then(|m| self.service.take(m, slots, line)) == Some(Asked::Restart) {
+            let Some(asked) = message.and_then(|m| self.service.take(m, slots, line)) else { continue };
+            // somebody is at work at this bit rate
+            self.baud = None;
+            if asked == Asked::Restart {
                 return Flow::Restart;
             }
         }
@@ -342,7 +344,9 @@ fn maps<'u, E: InUnit, S: MapSender<E::Map>>(
     let header = settings.build::<E>(memory.parameters).ok()?;
     let parameters = memory.parameters.as_ref()?;
     let sender = |medium| {
-        let config = BroadcastConfig { stale_ms: STALE_MS, ..BroadcastConfig::new(start.sensor, medium) };
+        let (stale_ms, max_delay_ms) = (settings.unit.stale_ms(), settings.unit.max_delay_ms);
+        let usual = BroadcastConfig::new(settings.unit.sensor, medium);
+        let config = BroadcastConfig { stale_ms, max_delay_ms, ..usual };
         S::start(config, header, start.epoch, now).ok()
     };
     *memory.broadcast = sender(Medium::Can(Addresses::STANDARD));

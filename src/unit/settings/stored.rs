@@ -5,7 +5,8 @@
 //! only those that can start count. If there is none, the unit has no maps and answers its service: the
 //! safe state.
 
-use super::{BLOCK_LEN, BlockError, Newest, Settings};
+use super::block::{is_layout_1, length};
+use super::{BLOCK_LEN, BlockError, Newest, Settings, UnitConfig};
 use crate::sensor::config::ConfigError;
 use crate::unit::can_bus::BusConfig;
 
@@ -76,14 +77,32 @@ impl StoredSettings {
         self.found.map(|newest| (newest.slot as u8, newest.next_sequence.wrapping_sub(1)))
     }
 
-    /// The block in use, as it is stored; empty without one.
+    /// The block in use, as it is stored; empty without one, or once its slot was emptied.
     pub fn block<'s>(&self, slots: &'s impl SettingsSlots) -> &'s [u8] {
-        self.found.as_ref().map_or(&[], |newest| slots.slot(newest.slot))
+        self.found.as_ref().map_or(&[], |newest| Self::in_slot(slots, newest.slot))
+    }
+
+    /// The slot of the block that counts from the next start on, which is another one after a write; none in empty slots.
+    /// Takes as long as two starts.
+    pub fn newest_slot(&self, slots: &impl SettingsSlots) -> Option<usize> {
+        newest(slots, self.check).ok().map(|newest| newest.slot)
+    }
+
+    /// The block in a slot, as long as its layout; empty without one.
+    pub fn in_slot(slots: &impl SettingsSlots, slot: usize) -> &[u8] {
+        let bytes = slots.slot(slot);
+        // a slot is as long as the longest layout
+        bytes.get(..length(bytes)).unwrap_or(&[])
     }
 
     /// Both buses as the block in use describes them: the radar's, the broadcast's. By default without one.
     pub fn buses(self) -> [BusConfig; 2] {
         self.settings().map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus])
+    }
+
+    /// The unit's own numbers and rates by the block in use; by default without one.
+    pub fn unit(&self) -> UnitConfig {
+        self.settings().map_or_else(UnitConfig::default, |settings| settings.unit)
     }
 
     /// Checks a block that came and writes it into the slot not in use; its sequence. It counts from the
@@ -92,12 +111,22 @@ impl StoredSettings {
     /// # Errors
     /// Why the unit could not start with it; nothing is written then.
     pub fn write(&self, block: &[u8], slots: &mut impl SettingsSlots) -> Result<u32, BlockError> {
-        let (_, settings) = Settings::from_block(block)?;
+        let (_, mut settings) = Settings::from_block(block)?;
+        if is_layout_1(block) {
+            settings.unit = self.unit();
+        }
         self.check.settings(&settings).map_err(BlockError::Parameter)?;
         let (slot, sequence) = newest(slots, self.check).map_or((0, 1), |n| (n.next_slot, n.next_sequence));
         slots.write(slot, &settings.to_block(sequence));
         // what was written counts, not what was meant
         Settings::from_block(slots.slot(slot)).map(|(sequence, _)| sequence)
+    }
+
+    /// Empties both slots: from the next start on the unit is as it was before its first block.
+    pub fn clear(slots: &mut impl SettingsSlots) {
+        for slot in [0, 1] {
+            slots.write(slot, &[0xFF; BLOCK_LEN]);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Who builds a unit has the names of `viewshed::board` as well.
 
-use viewshed::board::{BLOCK_LEN, Flow, SerialLine, SerialSession, SettingsSlots, StoredSettings};
+use viewshed::board::{BLOCK_LEN, Flow, Identity, SerialLine, SerialSession, SettingsSlots, StoredSettings};
 use viewshed::small::{CHECK, Sender, State};
 use viewshed::{Epoch, Settings, Unit};
 
@@ -32,7 +32,7 @@ pub fn a_session_from_start_to_restart(settings: &Settings) {
     let stored = StoredSettings::read(&slots, CHECK);
     assert!(stored.settings().is_none() && stored.write(&settings.to_block(0), &mut slots).is_ok());
     let stored = StoredSettings::read(&slots, CHECK);
-    let mut session = SerialSession::<256>::start(0, Epoch::new(1), stored, &mut line);
+    let mut session = SerialSession::<256>::start(0, Identity::UNNAMED, Epoch::new(1), stored, &mut line);
     let started = line.0;
     let mut unit = None::<Unit<'_, State, Sender>>;
     let flow = session.take(&[0, 1, 2, 0], &mut unit, &mut slots, &mut line, &mut |_, _| {});

@@ -22,6 +22,7 @@
 //! | [`bus`] | maps in, their load on CAN, CAN FD and serial lines out; what a receiver of a log has |
 //! | [`doctor`] | a radar's log in, what is wrong with it and what to do out |
 //! | [`boards`] | the same scans through a controller and through the library here, compared frame by frame |
+//! | [`configure`] | a TOML file in, a unit that runs with it out, over serial ports and CAN |
 //! | [`results`] | figures in; text, JSON, CSV, pictures and recordings for Foxglove out, written whole or not at all |
 //! | `pages` | recordings in; pages in a browser out, and labels a person draws there (feature `pages`) |
 //! | [`command`] | the `viewshed` command: options, and one file for each subcommand |
@@ -31,6 +32,7 @@
 pub mod boards;
 pub mod bus;
 pub mod command;
+pub mod configure;
 pub mod doctor;
 pub mod estimators;
 pub mod evaluation;

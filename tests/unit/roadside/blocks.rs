@@ -2,7 +2,8 @@
 
 use crc::Crc;
 use proptest::prelude::*;
-use viewshed::unit::can_service::{Refusal, Said, Tool};
+use viewshed::unit::can_service::Tool;
+use viewshed::unit::said::{Refusal, Said};
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, SettingsSlots};
 use viewshed::wire::broadcast::Medium;
@@ -71,7 +72,16 @@ fn change() -> impl Strategy<Value = (usize, [u8; 4])> {
     let rate = prop::sample::select(vec![0, 9_999, 10_000, 125_000, 333_333, 500_000, 1_000_000, 1_000_001, u32::MAX]);
     let bus = (0_usize..2, rate).prop_map(|(bus, rate)| (NUMBERS.0 + 4 * NUMBERS.1 + 8 * bus, rate.to_le_bytes()));
     let rest = (0_usize..2, any::<[u8; 4]>()).prop_map(|(bus, bytes)| (NUMBERS.0 + 4 * NUMBERS.1 + 8 * bus + 4, bytes));
-    prop_oneof![12 => (0..NUMBERS.1).prop_flat_map(value), 1 => bus, 1 => rest]
+    // the sensor's number stays, by which it is asked here
+    let at = NUMBERS.0 + 4 * NUMBERS.1 + 2 * 8;
+    let delay = prop::sample::select(vec![39_u16, 40, 100, 500, 501, u16::MAX]);
+    let numbers = (0_u8..9, delay).prop_map(move |(radar_id, delay)| {
+        let [low, high] = delay.to_le_bytes();
+        (at, [SENSOR, radar_id, low, high])
+    });
+    let bauds = prop::sample::select(vec![0, 57_599, 57_600, 115_200, 921_600, 1_000_000, 1_000_001, u32::MAX]);
+    let baud = bauds.prop_map(move |baud: u32| (at + 4, baud.to_le_bytes()));
+    prop_oneof![12 => (0..NUMBERS.1).prop_flat_map(value), 1 => bus, 1 => rest, 1 => numbers, 1 => baud]
 }
 
 /// A block with some numbers changed and a right check sum.

@@ -1,6 +1,7 @@
 //! The loop of a board with hardware of its own, with drivers that are not hardware.
 
 mod blocks;
+mod own_figures;
 
 use std::collections::VecDeque;
 
@@ -9,10 +10,10 @@ use viewshed::inputs::ars408::{Ars408, Ars408Config};
 use viewshed::map::polar::PolarMap;
 use viewshed::unit::Flow;
 use viewshed::unit::can_bus::CanPort;
-use viewshed::unit::can_service::{Answers, Said, Tool};
-use viewshed::unit::roadside::{
-    Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, RoadsideStep, SerialPort, VERSION,
-};
+use viewshed::unit::can_service::{Answers, Tool};
+use viewshed::unit::identity::{Identity, VERSION};
+use viewshed::unit::roadside::{Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, RoadsideStep, SerialPort};
+use viewshed::unit::said::Said;
 use viewshed::unit::serial_service;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredSettings};
@@ -87,6 +88,8 @@ impl CanPort for Bus {
 struct Line {
     incoming: VecDeque<u8>,
     sent: Vec<u8>,
+    /// Bit rates it was changed to.
+    bauds: Vec<u32>,
 }
 
 impl SerialPort for Line {
@@ -94,6 +97,10 @@ impl SerialPort for Line {
         let came = self.incoming.len().min(buffer.len());
         buffer.iter_mut().zip(self.incoming.drain(..came)).for_each(|(to, from)| *to = from);
         came
+    }
+
+    fn set_baud(&mut self, baud: u32) {
+        self.bauds.push(baud);
     }
 }
 
@@ -167,7 +174,8 @@ impl World {
         };
         let stored =
             StoredSettings::read(&ports.slots, SettingsCheck::of::<SmallState, SmallSender>().on_can(CAN_CLOCK_HZ));
-        let start = RoadsideStart { sensor: SENSOR, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
+        let identity = Identity { board: "a-board", chip: 7, is_bench: false, grid: [50, 40] };
+        let start = RoadsideStart { identity, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
         let unit = Unit::start(start, memory, Ars408::new(Ars408Config::sensor(SENSOR)), at(0), &mut ports);
         assert!(ports.radar.silent && ports.broadcast.silent, "until the bit rate is proven");
         let far = || Far::new([SENSOR], ADDRESSES, ReceiverLimits::DEFAULT);
@@ -197,6 +205,11 @@ impl World {
 
     /// A millisecond.
     fn step(&mut self) -> RoadsideStep {
+        self.step_hearing(&mut |_| {})
+    }
+
+    /// A millisecond, with what leaves on the bus.
+    fn step_hearing(&mut self, heard: &mut dyn FnMut(&CanFrame)) -> RoadsideStep {
         let before = self.ms;
         self.ms += 1 + std::mem::take(&mut self.busy_ms);
         for ms in (before + 1..=self.ms).filter(|ms| ms.is_multiple_of(SCAN_MS)) {
@@ -227,6 +240,7 @@ impl World {
         if !self.ports.broadcast.stuck
             && let Some(frame) = self.ports.broadcast.mailboxes.pop_front()
         {
+            heard(&frame);
             self.said.extend(self.answers.take(&frame));
             let message = Received::from_frame(&frame, &ADDRESSES).unwrap().message;
             self.statuses[0].extend((message == Message::Status).then_some(self.ms));

@@ -12,6 +12,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::bench::flash::Flash;
 use viewshed::bench::record::{Closing, Opening, Record, Tracer};
 use viewshed::bench::start;
+use viewshed::unit::identity::Identity;
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::session::SerialSession;
 use viewshed::unit::settings::StoredSettings;
@@ -20,7 +21,8 @@ use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Epoch;
 
-const SENSOR: u8 = 0;
+/// The emulator has no number of its own: letters of the board's name.
+const CHIP: u32 = 0x4D50_5332;
 
 static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
@@ -49,7 +51,10 @@ impl SerialLine for Lines {
 /// Apart, so that what this takes of the stack is free again.
 #[inline(never)]
 fn session(epoch: Epoch, flash: &Flash, lines: &mut Lines) -> SerialSession<{ State::DETECTIONS }> {
-    SerialSession::start(SENSOR, epoch, StoredSettings::read(flash, CHECK), lines)
+    let stored = StoredSettings::read(flash, CHECK);
+    let grid = [State::RANGES as u8, State::AZIMUTHS as u8];
+    let identity = Identity { board: "mps2-an386", chip: CHIP, is_bench: true, grid };
+    SerialSession::start(stored.unit().sensor, identity, epoch, stored, lines)
 }
 
 #[entry]

@@ -12,6 +12,7 @@ use viewshed::bench::start;
 use viewshed::inputs::ars408::Ars408Config;
 use viewshed::unit::can_bus::BusKeeper;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
+use viewshed::unit::identity::Identity;
 use viewshed::unit::settings::StoredSettings;
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
@@ -20,7 +21,10 @@ use zcu102_r5::can::Can;
 use zcu102_r5::profile::{CHECK, Map, Parameters, Radar, Sender, State};
 use zcu102_r5::stack;
 
-const SENSOR: u8 = 0;
+/// The radar's own number on this bench, whatever the block says.
+const RADAR: u8 = 0;
+/// The emulator has no number of its own: letters of the board's name.
+const CHIP: u32 = 0x5A43_5531;
 /// Identifiers of this installation: sensor 0's begin at 0x400.
 const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 /// Clock of the CAN controllers, by the boot loader's default.
@@ -36,9 +40,9 @@ extern "C" fn main() -> ! {
         exit(4)
     };
     let mut flash = FlashFile::<HostFile>::open();
-    // answers without a gap: time comes in steps here
-    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
-    let mut session = CanBench::new(Radar::new(Ars408Config::sensor(SENSOR)));
+    let grid = [State::RANGES as u8, State::AZIMUTHS as u8];
+    let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid };
+    let mut session = CanBench::new(Radar::new(Ars408Config::sensor(RADAR)));
     let (mut starts, mut has_time) = (0, false);
 
     loop {
@@ -52,6 +56,9 @@ extern "C" fn main() -> ! {
         while !has_time {
             has_time = session.clock(&mut keeper, &mut can);
         }
+        // answers without a gap: time comes in steps here
+        let sensor = stored.unit().sensor;
+        let config = CanServiceConfig { gap_us: 0, identity, ..CanServiceConfig::new(sensor, MEDIUM) };
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
         start::<State, _>(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());

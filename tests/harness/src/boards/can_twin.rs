@@ -11,6 +11,7 @@ use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::Ars408Config;
 use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
+use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::reference::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
 use viewshed::unit::settings::{Settings, StoredSettings};
 use viewshed::unit::{Flow, Unit};
@@ -19,6 +20,9 @@ use viewshed::wire::frame::{CanFrame, CanId};
 use super::listener::{MEDIUM, Map, SENSOR};
 use super::scans::Scan;
 use crate::recording::can_log::Line;
+
+/// What the emulated board calls its chip.
+const CHIP: u32 = 0x5A43_5531;
 
 /// Time of a script's first step.
 const FIRST_US: u64 = 1_000_000;
@@ -88,7 +92,7 @@ impl<I: Iterator<Item = (usize, CanFrame)>> CanPort for Scripted<I> {
 
 /// What a board with the reference grid sends, from the moment it has power.
 pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
-    let config = CanServiceConfig { gap_us: 0, ..CanServiceConfig::new(SENSOR, MEDIUM) };
+    let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid: [200, 120] };
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
     let mut sender: Box<Option<Sender>> = Box::new(None);
@@ -106,6 +110,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
         while !ticked && port.frames.peek().is_some() {
             ticked = session.clock(&mut keeper, &mut port);
         }
+        let config = CanServiceConfig { gap_us: 0, identity, ..CanServiceConfig::new(stored.unit().sensor, MEDIUM) };
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
         start::<State, _>(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());

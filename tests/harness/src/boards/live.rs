@@ -10,6 +10,7 @@ use viewshed::fixed::time::Time;
 use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::Request;
@@ -53,33 +54,45 @@ pub fn answer(profile: Profile, bytes: &[u8]) -> Answered {
         }
         answered.maps.extend(map.map(|map| (answered.lengths.len(), map)));
     };
-    run(profile, &mut bytes.iter().copied(), &mut |bytes| sent.borrow_mut().extend_from_slice(bytes), &mut after);
+    run(
+        (profile, true),
+        &mut bytes.iter().copied(),
+        &mut |bytes| sent.borrow_mut().extend_from_slice(bytes),
+        &mut after,
+    );
     answered.bytes = sent.into_inner();
     answered
 }
 
-/// A board of this computer: takes bytes from one stream and answers on the other, until there are no more.
-pub fn device(profile: Profile, mut from: impl Read, mut to: impl Write) {
+/// A board of this computer: takes bytes from one stream and answers on the other, until there are no more. One that is
+/// not a bench is a product's: asked for its name, it says so.
+pub fn device(profile: Profile, is_bench: bool, mut from: impl Read, mut to: impl Write) {
     let mut bytes = iter::from_fn(|| {
         let mut byte = [0];
         from.read_exact(&mut byte).ok().map(|()| byte[0])
     });
     // who does not listen any more misses something
-    run(profile, &mut bytes, &mut |bytes| drop(to.write_all(bytes)), &mut |_, _| {});
+    run((profile, is_bench), &mut bytes, &mut |bytes| drop(to.write_all(bytes)), &mut |_, _| {});
 }
 
 /// Called after each byte with the time and the map that it led to.
 type After<'a> = &'a mut dyn FnMut(Time, Option<Map>);
 
-fn run(profile: Profile, bytes: &mut dyn Iterator<Item = u8>, send: &mut dyn FnMut(&[u8]), after: After<'_>) {
+fn run(
+    (profile, is_bench): (Profile, bool),
+    bytes: &mut dyn Iterator<Item = u8>,
+    send: &mut dyn FnMut(&[u8]),
+    after: After<'_>,
+) {
     match profile {
-        Profile::Reference => work(&mut *Box::new(reference::State::new()), bytes, send, after),
-        Profile::Small => work(&mut *Box::new(small::State::new()), bytes, send, after),
+        Profile::Reference => work(&mut *Box::new(reference::State::new()), is_bench, bytes, send, after),
+        Profile::Small => work(&mut *Box::new(small::State::new()), is_bench, bytes, send, after),
     }
 }
 
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
     state: &mut Radar3d<R, A, E, W, N, D>,
+    is_bench: bool,
     bytes: &mut dyn Iterator<Item = u8>,
     send: &mut dyn FnMut(&[u8]),
     after: After<'_>,
@@ -91,7 +104,10 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     'start: loop {
         let epoch = flash.start();
         let stored = StoredSettings::read(&flash, SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>());
-        let mut session = SerialSession::<D>::start(SENSOR, epoch, stored, &mut line);
+        // of this computer: a real board names itself
+        #[allow(clippy::cast_possible_truncation)] // at most 200
+        let identity = Identity { board: "this-computer", chip: 0, is_bench, grid: [R as u8, A as u8] };
+        let mut session = SerialSession::<D>::start(stored.unit().sensor, identity, epoch, stored, &mut line);
         let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
         let (settings, now) = (session.settings(), session.now());
         start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);

@@ -24,6 +24,7 @@ use super::report::Cost;
 use super::scans::Scan;
 use super::serial::{Far, LINES, Port, Waiting};
 use super::{Board, Profile, firmware};
+use crate::configure;
 
 /// Scans without an answer after which a board is taken for absent.
 const MOST_SILENT: usize = 5;
@@ -96,9 +97,35 @@ pub fn serial(board: Board, profile: Profile, name: &str, settings: &Settings, s
 /// No port, a board that does not answer.
 pub fn port(path: &Path, baud: u32, profile: Profile, name: &str, settings: &Settings, scans: &[Scan]) -> Result<Live> {
     let path = path.to_string_lossy();
+    is_bench(&path, baud, profile)?;
     let mut far = Port::open(&path, baud)?;
     let turns = exchange(&mut far, profile, settings, scans)?;
     Ok(judge(&turns, name, &path, profile, Past::Its))
+}
+
+/// Asks what is behind a port before anything is sent to it.
+fn is_bench(path: &str, baud: u32, profile: Profile) -> Result<()> {
+    let mut link = configure::serial::open(path, Some(baud))?;
+    let found = configure::find(&mut link, configure::Wanted::default(), MOST_TIME)?;
+    let unit = found.unit;
+    ensure!(
+        unit.is_bench,
+        "{path}: {} is no test bench: its image takes no scans on this line, but a radar's on its CAN bus. Nothing was written. \
+         To compare a controller with this computer, flash a bench image (boards/README.md), or use --board for an emulated one",
+        unit.board()
+    );
+    let grid = match profile {
+        Profile::Reference => [200, 120],
+        Profile::Small => [100, 64],
+    };
+    let [ranges, azimuths] = unit.grid;
+    ensure!(
+        unit.grid == grid,
+        "{path}: {} has the grid {ranges} x {azimuths}, which is --profile {}; nothing was written",
+        unit.board(),
+        if ranges == 100 { "small" } else { "reference" }
+    );
+    Ok(())
 }
 
 /// Runs a script through the live program of an emulated board with a CAN bus.

@@ -2,6 +2,7 @@
 
 pub mod bus;
 pub mod completions;
+pub mod configure;
 pub mod detect;
 pub mod detections;
 pub mod doctor;
@@ -44,6 +45,7 @@ enum Command {
     Site(Box<site::Args>),
     Detect(detect::Args),
     Detections(Box<detections::Args>),
+    Configure(Box<configure::Args>),
     Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
@@ -62,6 +64,7 @@ impl Cli {
             Command::Site(args) => site::run(args),
             Command::Detect(args) => detect::run(args),
             Command::Detections(args) => detections::run(args),
+            Command::Configure(args) => configure::run(args),
             Command::Completions(args) => completions::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),

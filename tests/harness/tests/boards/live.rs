@@ -68,6 +68,11 @@ impl<R: Read> Read for Through<R> {
 
 /// A port with this computer's own board behind it.
 fn port(profile: Profile, through: fn(usize, u8) -> u8) -> String {
+    device(profile, true, through)
+}
+
+/// The same, or one with a product behind it.
+fn device(profile: Profile, is_bench: bool, through: fn(usize, u8) -> u8) -> String {
     let (mut far, near) = TTYPort::pair().unwrap();
     far.set_timeout(Duration::from_secs(1)).unwrap();
     let name = near.name().unwrap();
@@ -75,7 +80,7 @@ fn port(profile: Profile, through: fn(usize, u8) -> u8) -> String {
     std::thread::spawn(move || {
         // the pair stays open for as long as the board runs
         let _near = near;
-        live::device(profile, Through(far, through, 0), write);
+        live::device(profile, is_bench, Through(far, through, 0), write);
     });
     name
 }
@@ -113,5 +118,24 @@ fn a_port_with_nobody_behind_it_is_told() {
     let (output, _) = replay(&folder, "motorway.mcap", &["--port", &path, "--to", "3"]);
     assert!(!output.status.success());
     let printed = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(printed.contains("not answered") || printed.contains("takes no more"), "{printed}");
+    assert!(printed.contains("nothing answers") && printed.contains("reset button"), "{printed}");
+}
+
+#[test]
+fn nothing_is_written_to_a_port_before_a_bench_of_that_grid_has_named_itself() {
+    let folder = folder("port-product");
+    for (is_bench, profile, what) in [
+        (false, "small", "this-computer is no test bench: its image takes no scans on this line"),
+        (true, "reference", "has the grid 100 x 64, which is --profile small"),
+    ] {
+        let path = device(Profile::Small, is_bench, |_, byte| byte);
+        let (output, _) = replay(&folder, "motorway.mcap", &["--port", &path, "--profile", profile, "--to", "1"]);
+        assert_eq!(output.status.code(), Some(2));
+        let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(printed.contains(what), "{printed}");
+        // it still has no configuration
+        let read = Command::new(env!("CARGO_BIN_EXE_viewshed")).args(["configure", "--port", &path, "--read"]).output();
+        let printed = String::from_utf8_lossy(&read.unwrap().stderr).into_owned();
+        assert!(printed.contains("the unit has no configuration"), "{printed}");
+    }
 }

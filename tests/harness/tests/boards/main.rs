@@ -3,6 +3,8 @@
 //! see to that.
 
 mod camera;
+#[cfg(unix)]
+mod configure;
 #[cfg(target_os = "linux")]
 mod linux;
 #[cfg(unix)]

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
-use viewshed::unit::can_service::{Answers, Said, Tool};
+use viewshed::unit::can_service::{Answers, Tool};
+use viewshed::unit::said::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, UnitState};

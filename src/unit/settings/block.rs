@@ -1,0 +1,281 @@
+//! Settings as bytes and back.
+
+use super::{BlockError, Settings, UnitConfig};
+use crate::fixed::bytes::{Reader, Writer};
+use crate::frame::gate::GateConfig;
+use crate::frame::health::HealthConfig;
+use crate::radar_3d::VisibilityConfig;
+use crate::sensor::Sensor;
+use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::mount::Mount;
+use crate::sensor::noise::NoiseConfig;
+use crate::unit::can_bus::BusConfig;
+use crate::wire::header::fingerprint;
+
+/// Numbers of a block, in `f32`.
+const NUMBERS: usize = 29;
+/// Bytes of a bus.
+const BUS_LEN: usize = 8;
+/// Bytes of the unit's own figures.
+const UNIT_LEN: usize = 8;
+/// Bytes of the check sum.
+const SUM_LEN: usize = 4;
+/// Bytes before the numbers.
+const HEADER_LEN: usize = 12;
+/// Bytes of a block of layout 1.
+const LAYOUT_1_LEN: usize = HEADER_LEN + 4 * NUMBERS + 2 * BUS_LEN + SUM_LEN;
+/// Bytes of a block.
+pub const BLOCK_LEN: usize = LAYOUT_1_LEN + UNIT_LEN;
+
+const MAGIC: [u8; 4] = *b"VSCB";
+/// Of the blocks that are written.
+pub(super) const LAYOUT: u16 = 2;
+
+impl Settings {
+    /// Writes the block.
+    pub fn to_block(&self, sequence: u32) -> [u8; BLOCK_LEN] {
+        let mut block = [0; BLOCK_LEN];
+        self.write(LAYOUT, sequence, &mut block);
+        block
+    }
+
+    /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0.
+    pub fn fingerprint(&self) -> u32 {
+        let mut block = [0; LAYOUT_1_LEN];
+        self.write(1, 0, &mut block);
+        // not of the check sum as well: a CRC over its own is the same for every block
+        block.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum))
+    }
+
+    /// Fills a block that is as long as its layout asks for.
+    #[allow(clippy::cast_possible_truncation)] // a block has a hundred-odd bytes
+    fn write(&self, layout: u16, sequence: u32, block: &mut [u8]) {
+        let length = block.len() as u16;
+        let mut w = Writer(block);
+        w.put(MAGIC);
+        w.put(layout.to_le_bytes());
+        w.put(length.to_le_bytes());
+        w.put(sequence.to_le_bytes());
+        for number in self.numbers() {
+            w.put(number.to_le_bytes());
+        }
+        for bus in [self.radar_bus, self.broadcast_bus] {
+            w.put(bus.bit_rate.to_le_bytes());
+            w.put(bus.sample_point_permille.to_le_bytes());
+            w.put(u16::from(bus.listen_first).to_le_bytes());
+        }
+        if layout > 1 {
+            w.put([self.unit.sensor, self.unit.radar_id]);
+            w.put(self.unit.max_delay_ms.to_le_bytes());
+            w.put(self.unit.serial_baud.to_le_bytes());
+        }
+        if let Some((body, sum)) = block.split_last_chunk_mut::<SUM_LEN>() {
+            *sum = fingerprint(body).to_le_bytes();
+        }
+    }
+
+    /// Reads a block with its sequence; bytes after it do not matter. Its parameters may be anything: whether
+    /// a unit can run with them is `SettingsCheck`'s to say. What layout 1 does not say is by default.
+    ///
+    /// # Errors
+    /// The first thing that does not hold.
+    pub fn from_block(bytes: &[u8]) -> Result<(u32, Self), BlockError> {
+        let mut header = Reader(bytes);
+        match header.take::<4>() {
+            Some(MAGIC) => {}
+            Some(_) => return Err(BlockError::Empty),
+            None => return Err(BlockError::Short),
+        }
+        let layout = header.u16().ok_or(BlockError::Short)?;
+        let expected = length_of(layout).ok_or(BlockError::Layout(layout))?;
+        let length = header.u16().ok_or(BlockError::Short)?;
+        let block = bytes.get(..expected).filter(|_| usize::from(length) == expected).ok_or(BlockError::Short)?;
+        let (body, sum) = block.split_last_chunk::<SUM_LEN>().ok_or(BlockError::Short)?;
+        if fingerprint(body) != u32::from_le_bytes(*sum) {
+            return Err(BlockError::CheckSum);
+        }
+        let sequence = header.u32().ok_or(BlockError::Short)?;
+        let settings = Self::read(&mut header, layout).ok_or(BlockError::Short)?;
+        Ok((sequence, settings))
+    }
+
+    fn numbers(&self) -> [f32; NUMBERS] {
+        let Sensor { mount: m, field_of_view: v, noise: n } = self.sensor;
+        let (g, s, h) = (self.gate, self.visibility, self.health);
+        [
+            m.x_m,
+            m.y_m,
+            m.height_m,
+            m.yaw_deg,
+            m.pitch_deg,
+            m.roll_deg,
+            v.azimuth_min_deg,
+            v.azimuth_max_deg,
+            v.elevation_min_deg,
+            v.elevation_max_deg,
+            v.range_min_m,
+            v.range_max_m,
+            n.range_m,
+            n.azimuth_deg,
+            n.elevation_deg,
+            n.radial_velocity_mps,
+            n.reflector_height_m,
+            g.min_snr_db,
+            g.min_rcs_dbsm,
+            g.max_speed_mps,
+            g.min_speed_mps,
+            g.elevation_margin_deg,
+            f32::from(g.max_detections),
+            s.slice_height_m,
+            s.visible_from,
+            s.occupied_from,
+            h.hold_s,
+            h.blind_after_s,
+            h.reset_gap_s,
+        ]
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, checked afterwards
+    fn read(r: &mut Reader, layout: u16) -> Option<Self> {
+        let mount = Mount {
+            x_m: r.f32()?,
+            y_m: r.f32()?,
+            height_m: r.f32()?,
+            yaw_deg: r.f32()?,
+            pitch_deg: r.f32()?,
+            roll_deg: r.f32()?,
+        };
+        let field_of_view = FieldOfView {
+            azimuth_min_deg: r.f32()?,
+            azimuth_max_deg: r.f32()?,
+            elevation_min_deg: r.f32()?,
+            elevation_max_deg: r.f32()?,
+            range_min_m: r.f32()?,
+            range_max_m: r.f32()?,
+        };
+        let noise = NoiseConfig {
+            range_m: r.f32()?,
+            azimuth_deg: r.f32()?,
+            elevation_deg: r.f32()?,
+            radial_velocity_mps: r.f32()?,
+            reflector_height_m: r.f32()?,
+        };
+        let gate = GateConfig {
+            min_snr_db: r.f32()?,
+            min_rcs_dbsm: r.f32()?,
+            max_speed_mps: r.f32()?,
+            min_speed_mps: r.f32()?,
+            elevation_margin_deg: r.f32()?,
+            max_detections: r.f32()? as u16,
+        };
+        let visibility = VisibilityConfig { slice_height_m: r.f32()?, visible_from: r.f32()?, occupied_from: r.f32()? };
+        let health = HealthConfig { hold_s: r.f32()?, blind_after_s: r.f32()?, reset_gap_s: r.f32()? };
+        let bus = |r: &mut Reader| {
+            Some(BusConfig { bit_rate: r.u32()?, sample_point_permille: r.u16()?, listen_first: r.u16()? != 0 })
+        };
+        let (radar_bus, broadcast_bus) = (bus(r)?, bus(r)?);
+        let unit = if layout == 1 { UnitConfig::default() } else { unit(r)? };
+        let sensor = Sensor { mount, field_of_view, noise };
+        Some(Self { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit })
+    }
+}
+
+/// Bytes of a block of this layout, where it is known.
+const fn length_of(layout: u16) -> Option<usize> {
+    match layout {
+        1 => Some(LAYOUT_1_LEN),
+        LAYOUT => Some(BLOCK_LEN),
+        _ => None,
+    }
+}
+
+/// Whether a block says nothing of the unit itself.
+pub(super) fn is_layout_1(block: &[u8]) -> bool {
+    layout(block) == Some(1)
+}
+
+/// Bytes of the block that a slot begins with; 0 without one.
+pub(super) fn length(slot: &[u8]) -> usize {
+    layout(slot).and_then(length_of).unwrap_or(0)
+}
+
+fn layout(block: &[u8]) -> Option<u16> {
+    let mut r = Reader(block);
+    r.take().filter(|magic| *magic == MAGIC).and_then(|_| r.u16())
+}
+
+fn unit(r: &mut Reader) -> Option<UnitConfig> {
+    let [sensor, radar_id] = r.take()?;
+    Some(UnitConfig { sensor, radar_id, max_delay_ms: r.u16()?, serial_baud: r.u32()? })
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A block as firmware before layout 2 wrote it.
+    pub fn layout_1(settings: &Settings, sequence: u32) -> [u8; LAYOUT_1_LEN] {
+        let mut block = [0; LAYOUT_1_LEN];
+        settings.write(1, sequence, &mut block);
+        block
+    }
+
+    pub fn settings() -> Settings {
+        let mut s = Settings::of(Sensor {
+            mount: Mount { x_m: 1.0, y_m: -2.0, height_m: 6.0, yaw_deg: 3.0, pitch_deg: 4.0, roll_deg: -5.0 },
+            field_of_view: FieldOfView {
+                azimuth_min_deg: -60.0,
+                azimuth_max_deg: 50.0,
+                elevation_min_deg: -16.0,
+                elevation_max_deg: 12.0,
+                range_min_m: 3.0,
+                range_max_m: 200.0,
+            },
+            noise: NoiseConfig::default(),
+        });
+        s.gate.max_detections = 176;
+        s.broadcast_bus.bit_rate = 250_000;
+        s.unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600 };
+        s
+    }
+
+    #[test]
+    fn a_block_reads_back() {
+        let block = settings().to_block(7);
+        assert_eq!(Settings::from_block(&block), Ok((7, settings())));
+        assert_eq!(fingerprint(b"123456789"), 0xCBF4_3926, "the check value of CRC-32");
+    }
+
+    #[test]
+    fn every_flipped_bit_is_refused() {
+        let block = settings().to_block(7);
+        for bit in 0..8 * BLOCK_LEN {
+            let mut bad = block;
+            bad[bit / 8] ^= 1 << (bit % 8);
+            assert!(Settings::from_block(&bad).is_err(), "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn a_block_of_layout_1_is_read_and_says_nothing_of_the_unit() {
+        let (old, unit) = (layout_1(&settings(), 7), UnitConfig::default());
+        assert_eq!((old.len(), old[4], old[6]), (148, 1, 148));
+        assert_eq!(Settings::from_block(&old), Ok((7, Settings { unit, ..settings() })));
+        let padded: [u8; BLOCK_LEN] = core::array::from_fn(|k| old.get(k).copied().unwrap_or(0xFF));
+        assert_eq!(Settings::from_block(&padded), Settings::from_block(&old), "in a slot of today's length");
+        // neither layout passes for the other
+        let mut relabelled = settings().to_block(7);
+        relabelled[4] = 1;
+        assert_eq!(Settings::from_block(&relabelled), Err(BlockError::Short));
+    }
+
+    #[test]
+    fn the_fingerprint_is_of_what_maps_depend_on() {
+        let (a, mut b) = (settings(), settings());
+        assert_eq!(a.fingerprint(), fingerprint(&layout_1(&a, 0)[..LAYOUT_1_LEN - SUM_LEN]));
+        b.unit = UnitConfig::default();
+        assert_eq!(a.fingerprint(), b.fingerprint());
+        b.sensor.mount.height_m += 0.5;
+        assert_ne!(a.fingerprint(), b.fingerprint());
+    }
+}

@@ -1,0 +1,63 @@
+//! What an integrator sets of a unit that its maps do not depend on: numbers, rates, delays.
+
+use crate::sensor::config::{ConfigError, within};
+
+/// Numbers and rates of a unit on a controller of its own. The daemon on Linux has these in its file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct UnitConfig {
+    /// Number of this sensor among those that broadcast, 0 to 7; its native scans carry the same.
+    pub sensor: u8,
+    /// The radar's own number on its bus, as an ARS408 is set to, 0 to 7.
+    pub radar_id: u8,
+    /// Greatest age at which a receiver takes a message of a map, milliseconds; as it is set at the receivers.
+    pub max_delay_ms: u16,
+    /// Bit rate of the serial line, from [`SERVICE_S`](Self::SERVICE_S) after the start on.
+    pub serial_baud: u32,
+}
+
+impl Default for UnitConfig {
+    fn default() -> Self {
+        Self { sensor: 0, radar_id: 0, max_delay_ms: 100, serial_baud: Self::SERVICE_BAUD }
+    }
+}
+
+impl UnitConfig {
+    /// Bit rate of the serial line at every start: a wrong one in a block locks nobody out.
+    pub const SERVICE_BAUD: u32 = 115_200;
+
+    /// How long the line has that bit rate after a start, seconds; longer, until the next start, if a request comes.
+    pub const SERVICE_S: u8 = 2;
+
+    /// What a map needs of the greatest delay for its last frames to leave the mailboxes while the next one is made.
+    const IN_MAILBOXES_MS: u16 = 20;
+
+    /// Age at which a map is not handed to the drivers any more, milliseconds.
+    pub const fn stale_ms(&self) -> u16 {
+        self.max_delay_ms.saturating_sub(Self::IN_MAILBOXES_MS)
+    }
+
+    /// Checks the figures.
+    ///
+    /// # Errors
+    /// Names the parameter outside its limits.
+    #[allow(clippy::cast_precision_loss)] // bit rates are small
+    pub fn check(&self) -> Result<(), ConfigError> {
+        within("unit.sensor", f32::from(self.sensor), 0.0, 7.0)?;
+        within("unit.radar_id", f32::from(self.radar_id), 0.0, 7.0)?;
+        within("unit.max_delay_ms", f32::from(self.max_delay_ms), 40.0, 500.0)?;
+        within("unit.serial_baud", self.serial_baud as f32, 57_600.0, 1_000_000.0).map(|_| ())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_is_stale_20_ms_before_receivers_refuse_it() {
+        assert_eq!(UnitConfig::default().stale_ms(), 80);
+        assert_eq!(UnitConfig { max_delay_ms: 60, ..UnitConfig::default() }.stale_ms(), 40);
+    }
+}

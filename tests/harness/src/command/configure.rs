@@ -1,0 +1,214 @@
+//! `viewshed configure`: a unit's configuration written, read, compared, emptied.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::{Result, bail, ensure};
+use viewshed::unit::profile::{reference, small};
+use viewshed::unit::settings::{BlockError, Settings};
+
+use super::print;
+use crate::configure::file::{self, EXAMPLE, UnitFile};
+use crate::configure::link::Link;
+use crate::configure::{Found, Stored, Wanted, find, name};
+
+/// Write the configuration of a unit on a controller, over its serial port or its CAN bus
+///
+/// A flashed unit sends nothing but its status until it has a configuration: where it stands, what its radar could see, its
+/// buses. This writes one, reads it back, and says what the unit refuses and why. The unit keeps its old configuration until
+/// its next start, and for good if anything goes wrong on the way.
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Args {
+    /// TOML file of the configuration; one of the daemon's does as well
+    #[arg(value_name = "FILE", required_unless_present_any = ["read", "restart", "factory", "example"])]
+    file: Option<PathBuf>,
+    /// CAN interface of the bus the unit broadcasts on
+    #[arg(long, value_name = "INTERFACE", conflicts_with = "port")]
+    can: Option<String>,
+    /// Serial port of the unit
+    #[arg(long, value_name = "PATH")]
+    port: Option<String>,
+    /// Bit rate of the port [default: 115200, as after every start; then those that units are set to]
+    #[arg(long, value_name = "BAUD", requires = "port")]
+    baud: Option<u32>,
+    /// The unit of this sensor's number, 0 to 7 [default: the only one that answers]
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..8))]
+    sensor: Option<u8>,
+    /// The unit with this chip, eight hexadecimal digits as they are printed: for units of one number, as new ones are
+    #[arg(long, value_name = "CHIP", value_parser = chip)]
+    chip: Option<u32>,
+    /// Print the unit's configuration as a file instead
+    #[arg(long, conflicts_with_all = ["file", "check", "restart", "factory"])]
+    read: bool,
+    /// Write nothing: say whether the file can be used and, with a unit, what the unit has differently
+    #[arg(long, conflicts_with_all = ["restart", "factory"])]
+    check: bool,
+    /// Restart the unit, after the file was written if there is one, so that it counts
+    #[arg(long, conflicts_with = "factory")]
+    restart: bool,
+    /// Take every configuration from the unit and restart it: as it was when it was flashed first
+    #[arg(long, conflicts_with = "file")]
+    factory: bool,
+    /// Print a file to begin with, with every key explained
+    #[arg(long, exclusive = true)]
+    example: bool,
+    /// How long to look for the unit, in seconds; in it its reset button may be pressed
+    #[arg(long, value_name = "SECONDS", default_value_t = 3.0)]
+    wait: f64,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  viewshed configure --example > unit.toml                      a file to begin with; edit it
+  viewshed configure unit.toml --check                          whether it can be used, on which grid
+  viewshed configure unit.toml --port /dev/ttyACM0 --restart    write it and let it count
+  viewshed configure --port /dev/ttyACM0 --read > unit.toml     what the unit runs with
+  viewshed configure unit.toml --can can0 --chip 1A2B3C4D       one of two new units on a bus
+
+Exit codes: 0 done; 1 --check found differences; 2 nothing was changed, and why.";
+
+fn chip(text: &str) -> Result<u32, String> {
+    u32::from_str_radix(text.trim_start_matches("0x"), 16).map_err(|_| "not eight hexadecimal digits".into())
+}
+
+/// Does what the options say.
+///
+/// # Errors
+/// A file that cannot be used, a unit that does not answer or refuses.
+pub fn run(args: &Args) -> Result<ExitCode> {
+    if args.example {
+        print(EXAMPLE)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    ensure!(args.wait.is_finite() && args.wait > 0.0, "--wait {} is not above 0", args.wait);
+    let file = args.file.as_deref().map(file::read).transpose()?;
+    if let Some(file) = &file {
+        left_out(file)?;
+        if args.check && args.can.is_none() && args.port.is_none() {
+            return on_grids(&file.settings);
+        }
+    }
+    let mut link = open(args)?;
+    let wanted = Wanted { sensor: args.sensor, chip: args.chip };
+    let mut unit = find(&mut *link, wanted, Duration::from_secs_f64(args.wait))?;
+    if !args.read {
+        print(&format!("{}: {}\n", unit.place(), name(&unit.unit)))?;
+    }
+    if args.read {
+        return read(&mut unit);
+    }
+    if args.factory {
+        unit.clear()?;
+        unit.restart()?;
+        print("emptied and restarted: it sends its status only, until it is configured\n")?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let (Some(file), true) = (&file, args.check) {
+        return compare(&mut unit, &file.settings);
+    }
+    let mut written = None;
+    if let Some(UnitFile { settings, .. }) = &file {
+        unit.check(settings)?;
+        written = Some(unit.write(settings)?);
+        print(&format!("written as block {}, and read back the same\n", written.unwrap_or(0)))?;
+    }
+    if !args.restart {
+        print(
+            "it counts from the unit's next start on: the same with --restart and without the file, or its reset button\n",
+        )?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    match (unit.restart()?, written) {
+        (Some(sequence), None) => print(&format!("restarted with block {sequence}\n"))?,
+        (Some(sequence), Some(wanted)) if sequence == wanted => print(&format!("restarted with block {sequence}\n"))?,
+        (Some(sequence), Some(wanted)) => {
+            bail!("it runs with block {sequence}, not with {wanted}: restart it once more")
+        }
+        (None, None) => print("restarted, without a configuration: it sends its status only\n")?,
+        (None, Some(wanted)) => bail!("it runs without a configuration: block {wanted} is gone; write it again"),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn open(args: &Args) -> Result<Box<dyn Link>> {
+    match (&args.port, &args.can) {
+        #[cfg(unix)]
+        (Some(port), _) => Ok(Box::new(crate::configure::serial::open(port, args.baud)?)),
+        #[cfg(target_os = "linux")]
+        (_, Some(name)) => {
+            use crate::configure::{can::CanLink, socketcan::Interface};
+            Ok(Box::new(CanLink::new(Interface::open(name)?, name)))
+        }
+        (None, None) => {
+            bail!("say where the unit is: --port PATH or --can INTERFACE (or only look at the file: --check)")
+        }
+        #[allow(unreachable_patterns)]
+        _ => bail!("this system has no such lines; serial ports need Unix, CAN interfaces Linux"),
+    }
+}
+
+/// Keys of a daemon's file that no block has.
+fn left_out(file: &UnitFile) -> Result<()> {
+    if file.left_out.is_empty() {
+        return Ok(());
+    }
+    print(&format!("not part of a unit's configuration, the daemon's alone: {}\n", file.left_out.join(", ")))
+}
+
+/// Whether a file can be used, without a unit.
+fn on_grids(settings: &Settings) -> Result<ExitCode> {
+    let mut any = false;
+    for (grid, check) in [("reference", reference::CHECK), ("small", small::CHECK)] {
+        match check.settings(settings) {
+            Ok(()) => {
+                any = true;
+                print(&format!("{grid} grid: can be used\n"))?;
+            }
+            Err(error) => print(&format!("{grid} grid: {error}\n"))?,
+        }
+    }
+    ensure!(any, "no unit can run with this");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
+    let (in_use, newest) = (unit.in_use()?, unit.newest()?);
+    let place = unit.place().to_owned();
+    let head =
+        |Stored { block: (sequence, _) }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
+    match (&in_use, &newest) {
+        (Err(BlockError::Empty), Err(BlockError::Empty)) => {
+            bail!(
+                "{place}: the unit has no configuration; `viewshed configure --example > unit.toml` writes a file to begin with"
+            )
+        }
+        (Err(error), Err(_)) => bail!("{place}: {error}"),
+        (Ok(stored), _) => print(&(head(stored) + &file::text(&stored.block.1)?))?,
+        (Err(_), Ok(stored)) => print(&(head(stored) + &file::text(&stored.block.1)?))?,
+    }
+    match (in_use, newest) {
+        (Ok(a), Ok(b)) if a == b => {}
+        (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.block.0))?,
+        (_, Err(_)) => print("# its slots are empty: from its next start on it has none\n")?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn compare(unit: &mut Found<'_>, settings: &Settings) -> Result<ExitCode> {
+    unit.check(settings)?;
+    let Ok(stored) = unit.newest()? else {
+        print("the unit has no configuration; the file can be used\n")?;
+        return Ok(ExitCode::FAILURE);
+    };
+    let found = file::differences(&stored.block.1, settings)?;
+    if found.is_empty() {
+        print(&format!("block {} is what the file says\n", stored.block.0))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    for (name, has, wanted) in &found {
+        print(&format!("{name}: {has} in the unit, {wanted} in the file\n"))?;
+    }
+    Ok(ExitCode::FAILURE)
+}

@@ -1,0 +1,197 @@
+//! Settings of a unit as a TOML file: the tables of the daemon's file, and those only a controller has.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow};
+use serde::{Deserialize, Serialize};
+use viewshed::frame::gate::GateConfig;
+use viewshed::frame::health::HealthConfig;
+use viewshed::radar_3d::VisibilityConfig;
+use viewshed::sensor::Sensor;
+use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::noise::NoiseConfig;
+use viewshed::unit::can_bus::BusConfig;
+use viewshed::unit::settings::{Settings, UnitConfig};
+
+/// A file that explains every key, with their defaults.
+pub const EXAMPLE: &str = include_str!("../../../../boards/unit.toml");
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct Tables {
+    #[serde(default)]
+    unit: UnitConfig,
+    mount: Mount,
+    field_of_view: FieldOfView,
+    #[serde(default)]
+    noise: NoiseConfig,
+    #[serde(default)]
+    gate: GateConfig,
+    #[serde(default)]
+    visibility: VisibilityConfig,
+    #[serde(default)]
+    health: HealthConfig,
+    #[serde(default)]
+    radar_bus: BusConfig,
+    #[serde(default)]
+    broadcast_bus: BusConfig,
+    // a daemon's file is taken as it is: these are of the machine it runs on
+    #[serde(default, skip_serializing)]
+    state_dir: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    input: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    output: Option<toml::Value>,
+}
+
+/// What a file says.
+#[derive(Debug)]
+pub struct UnitFile {
+    pub settings: Settings,
+    /// Keys of the daemon's that no block has.
+    pub left_out: Vec<&'static str>,
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// Names the file, and line and key of what is wrong.
+pub fn read(path: &Path) -> Result<UnitFile> {
+    let text = std::fs::read_to_string(path).with_context(|| {
+        format!("cannot read {}; `viewshed configure --example > unit.toml` writes one to begin with", path.display())
+    })?;
+    parse(&text).map_err(|(line, what)| anyhow!("{}:{line}: {what}", path.display()))
+}
+
+/// Reads a text; the line and what is wrong there.
+fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
+    let tables: Tables = toml::from_str(text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start.min(text.len()));
+        (1 + text[..at].matches('\n').count(), error.message().to_owned())
+    })?;
+    let Tables { unit, mount, field_of_view, noise, gate, visibility, health, radar_bus, broadcast_bus, .. } = tables;
+    let sensor = Sensor { mount, field_of_view, noise };
+    let keys = [
+        ("state_dir", tables.state_dir.is_some()),
+        ("[input]", tables.input.is_some()),
+        ("[output]", tables.output.is_some()),
+    ];
+    let left_out = keys.into_iter().filter(|(_, is_there)| *is_there).map(|(key, _)| key).collect();
+    Ok(UnitFile { settings: Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit }, left_out })
+}
+
+/// Settings as a file.
+///
+/// # Errors
+/// None that are known: numbers and flags have a form in TOML.
+pub fn text(settings: &Settings) -> Result<String> {
+    toml::to_string(&tables(settings)).context("cannot be written as TOML")
+}
+
+/// Parameters that two settings have differently: name, and both values.
+///
+/// # Errors
+/// As [`text`].
+pub fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, String, String)>> {
+    let value = |settings| toml::Value::try_from(tables(settings)).context("cannot be compared");
+    let (a, b) = (value(a)?, value(b)?);
+    let (Some(a), Some(b)) = (a.as_table(), b.as_table()) else { return Ok(Vec::new()) };
+    let mut found = Vec::new();
+    for (table, of_a) in a {
+        for (key, left) in of_a.as_table().into_iter().flatten() {
+            let right = b.get(table).and_then(|of_b| of_b.get(key));
+            if right != Some(left) {
+                let right = right.map_or_else(String::new, ToString::to_string);
+                found.push((format!("{table}.{key}"), left.to_string(), right));
+            }
+        }
+    }
+    Ok(found)
+}
+
+fn tables(settings: &Settings) -> Tables {
+    let Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit } = *settings;
+    let Sensor { mount, field_of_view, noise } = sensor;
+    let (state_dir, input, output) = (None, None, None);
+    Tables {
+        unit,
+        mount,
+        field_of_view,
+        noise,
+        gate,
+        visibility,
+        health,
+        radar_bus,
+        broadcast_bus,
+        state_dir,
+        input,
+        output,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_explains_every_key_with_its_default() {
+        let example = parse(EXAMPLE).unwrap().settings;
+        assert_eq!(example, Settings { sensor: example.sensor, ..Settings::of(example.sensor) });
+        // what is commented out is what counts without it
+        let all: String = EXAMPLE
+            .lines()
+            .map(|line| line.strip_prefix('#').filter(|rest| !rest.starts_with(' ')).unwrap_or(line))
+            .map(|line| format!("{line}\n"))
+            .collect();
+        assert_eq!(parse(&all).unwrap().settings, example);
+        for line in text(&example).unwrap().lines().filter(|line| !line.is_empty()) {
+            let key = line.split(" = ").next().unwrap();
+            assert!(all.lines().any(|l| l.starts_with(key)), "{key} is not explained");
+        }
+    }
+
+    #[test]
+    fn settings_come_back_from_their_own_text() {
+        let mut settings = parse(EXAMPLE).unwrap().settings;
+        settings.sensor.noise.range_m = 0.1;
+        settings.unit.serial_baud = 921_600;
+        let text = text(&settings).unwrap();
+        assert!(text.contains("range_m = 0.1\n"), "{text}");
+        assert_eq!(parse(&text).unwrap().settings, settings);
+    }
+
+    #[test]
+    fn the_daemons_file_is_taken_and_what_is_not_in_a_block_is_told() {
+        let file = parse(include_str!("../../../../boards/linux/viewshed.toml")).unwrap();
+        assert_eq!(file.left_out, ["[input]", "[output]"]);
+        assert_eq!(file.settings.sensor.mount.height_m, 6.0);
+    }
+
+    #[test]
+    fn mistakes_have_their_line() {
+        let wrong = |from: &str, to: &str| parse(&EXAMPLE.replacen(from, to, 1)).unwrap_err();
+        let line = 1 + EXAMPLE[..EXAMPLE.find("\nheight_m").unwrap() + 1].matches('\n').count();
+        for (to, what) in [
+            ("\nhight_m", "unknown field `hight_m`"),
+            ("\nheight_m = \"high\" #", "invalid type: string \"high\", expected f32"),
+        ] {
+            let (at, said) = wrong("\nheight_m", to);
+            assert_eq!(at, line);
+            assert!(said.contains(what), "{said}");
+        }
+        let (_, said) = wrong("[mount]", "[mounts]");
+        assert!(said.contains("mounts"), "{said}");
+    }
+
+    #[test]
+    fn differences_have_names_and_both_values() {
+        let a = parse(EXAMPLE).unwrap().settings;
+        let mut b = a;
+        b.sensor.mount.height_m = 5.5;
+        b.broadcast_bus.bit_rate = 250_000;
+        let found = differences(&a, &b).unwrap();
+        let found: Vec<String> = found.iter().map(|(name, a, b)| format!("{name} {a} {b}")).collect();
+        assert_eq!(found, ["broadcast_bus.bit_rate 500000 250000", "mount.height_m 6.0 5.5"]);
+    }
+}
