@@ -267,7 +267,7 @@ pub mod board {
     pub use crate::unit::identity::{Identified, Identity};
     pub use crate::unit::session::SerialSession;
     pub use crate::unit::settings::{
-        BLOCK_LEN, BlockError, FlashSlots, SettingsCheck, SettingsSlots, StoredSettings, UnitConfig,
+        BLOCK_LEN, BlockError, ConfigureRadar, FlashSlots, SettingsCheck, SettingsSlots, StoredSettings, UnitConfig,
     };
 
     // the loop
@@ -275,4 +275,5 @@ pub mod board {
     pub use crate::unit::radar_clock::RadarClock;
     pub use crate::unit::roadside::{ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SerialPort};
     pub use crate::unit::status_output::StatusOutput;
+    pub use crate::unit::timing::CycleCounter;
 }

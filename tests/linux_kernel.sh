@@ -1,6 +1,6 @@
 #!/bin/sh
-# Runs the daemon's test on virtual CAN buses under Debian's kernel in QEMU: for machines whose own kernel has
-# no CAN. Downloads 80 MB, once, into the target folder; takes about half a minute then.
+# Runs the daemon, and `viewshed listen` and `viewshed doctor`, on virtual CAN buses under Debian's kernel in QEMU: for
+# machines whose own kernel has no CAN. Downloads 80 MB, once, into the target folder; takes about a minute then.
 #
 #   tests/linux_kernel.sh
 set -eu
@@ -17,7 +17,8 @@ need_compilers
 for program in qemu-system-x86_64:qemu-system-x86 busybox:busybox-static ip:iproute2; do
     PATH=$PATH:/usr/sbin:/sbin command -v "${program%:*}" >/dev/null || install "${program#*:}" || skip "no ${program%:*}"
 done
-target=${CARGO_TARGET_DIR:-$PWD/target}/boards/linux
+harness=${CARGO_TARGET_DIR:-$PWD/target}
+target=$harness/boards/linux
 kernel=$target/kernel
 if [ ! -e "$kernel/done" ]; then
     rm -rf "$kernel"
@@ -32,12 +33,17 @@ fi
 cargo build --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target"
 tests=$(cargo test --release --locked --no-run --test vcan --manifest-path boards/linux/Cargo.toml --target-dir "$target" 2>&1 |
     sed -n 's/.*Executable.*(\(.*\))$/\1/p')
+# VIEWSHED: one that is built already
+viewshed=${VIEWSHED:-$harness/release/viewshed}
+[ -n "${VIEWSHED:-}" ] || cargo build --quiet --release --locked --package viewshed-harness
 disk=$kernel/disk
 rm -rf "$disk"
 mkdir -p "$disk/bin" "$disk/modules" "$disk/proc" "$disk/sys" "$disk/dev" "$disk/tmp"
 cp "$(command -v busybox)" "$disk/bin/busybox"
 cp "$target/release/viewshedd" "$disk/bin/viewshedd"
 cp "$tests" "$disk/bin/vcan"
+cp "$viewshed" "$disk/bin/viewshed"
+"$viewshed" bus tests/recordings/motorway.mcap --to 6 --log "$disk/broadcast.log" >/dev/null
 cp "$(PATH=$PATH:/usr/sbin:/sbin command -v ip)" "$disk/bin/ip"
 for program in "$disk"/bin/*; do ldd "$program" 2>/dev/null | grep -o '/[^ ]*' || true; done | sort -u |
     while read -r library; do
@@ -52,7 +58,8 @@ cat >"$disk/init" <<'END'
 for kind in proc sys; do /bin/busybox mount -t ${kind}fs $kind /$kind 2>/dev/null || /bin/busybox mount -t $kind $kind /$kind; done
 /bin/busybox mount -t devtmpfs dev /dev
 for module in can can-raw can-dev vcan; do /bin/busybox insmod /modules/$module.ko; done
-export PATH=/bin VIEWSHEDD=/bin/viewshedd
+/bin/ip link set lo up
+export PATH=/bin VIEWSHEDD=/bin/viewshedd VIEWSHED=/bin/viewshed BROADCAST=/broadcast.log
 echo "kernel $(/bin/busybox uname -r)"
 /bin/vcan --nocapture
 /bin/busybox poweroff -f
@@ -63,7 +70,7 @@ chmod +x "$disk/init"
 log=$kernel/log
 timeout -k 5 300 qemu-system-x86_64 -m 512 -nographic -no-reboot -net none -kernel "$kernel"/files/boot/vmlinuz-* \
     -initrd "$kernel/disk.gz" -append "console=ttyS0 quiet panic=1" </dev/null 2>&1 | tr -d '\r' >"$log" || true
-grep -E '^kernel |frames, Counters' "$log" || true
+grep -E '^kernel |frames, Counters|^listen --can' "$log" || true
 if ! grep '^test result: ok' "$log"; then
     cat "$log"
     exit 1

@@ -21,7 +21,7 @@ done
 sed -n '/^```sh$/,/^```$/{/^```/!p}' tests/harness/src/recording/YOUR_DATA.md >"$folder/commands.sh"
 [ "$(wc -l <"$folder/commands.sh")" -ge 4 ]
 (cd "$folder" && PATH=$folder/bin:$PATH sh -eux commands.sh) >"$folder/said.txt" 2>&1 || { cat "$folder/said.txt"; exit 1; }
-for said in 'radar-3d' 'drive.labels.csv' 'sensor 0 on 1: Clusters, 28 of 28 scans' 'table and pictures: bus-map'; do
+for said in 'radar-3d' 'drive.labels.csv' 'sensor 0 on 1: Clusters, 28 of 28 scans' 'files into bus-map'; do
     grep -q "$said" "$folder/said.txt" || { cat "$folder/said.txt"; echo "your_data: \`$said\` was not said"; exit 1; }
 done
 [ -f "$folder/map/birdseye-radar-3d.png" ] && [ -f "$folder/results.json" ] && [ -f "$folder/bus-map/birdseye-radar-3d.png" ]

@@ -13,7 +13,7 @@
 //! | the integrator: asked for and written over serial lines and CAN, what a unit answers, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`said`], [`identity`], `safe_state` |
 //! | native scans and the integrator on serial lines, and whose clock it is | [`session`], [`radar_clock`] |
 //! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
-//! | a unit on hardware of its own: the loop, and what its lamp shows | [`roadside`], [`status_output`] |
+//! | a unit on hardware of its own: the loop, what its lamp shows, and how long frames take | [`roadside`], [`status_output`], [`timing`] |
 
 pub mod build;
 pub mod can_bus;
@@ -31,6 +31,7 @@ pub mod service;
 pub mod session;
 pub mod settings;
 pub mod status_output;
+pub mod timing;
 pub mod transmitter;
 
 pub use build::InUnit;
@@ -109,8 +110,19 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
 
     /// Takes what came over the sensor's line.
     pub fn take<F: Feed<Input = E::Input>>(&mut self, feed: &mut F, piece: &F::Piece, now: Time) {
+        self.take_timed(feed, piece, now, &mut |_| {});
+    }
+
+    /// The same; `event` is called with what is done with a frame.
+    pub fn take_timed<F: Feed<Input = E::Input>>(
+        &mut self,
+        feed: &mut F,
+        piece: &F::Piece,
+        now: Time,
+        event: &mut impl FnMut(Event),
+    ) {
         feed.take(piece, now, &mut |frame| {
-            self.frame(frame, &mut |_| {});
+            self.frame(frame, event);
         });
     }
 

@@ -2,6 +2,7 @@
 
 use super::identity::Identified;
 use super::settings::BLOCK_LEN;
+use super::timing::Took;
 
 /// Why a unit refused a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,4 +53,6 @@ pub enum Said {
     Identified(Identified),
     /// Both slots are empty; it counts from the next start on.
     Cleared,
+    /// How long frames take.
+    Took(Took),
 }

@@ -5,6 +5,7 @@ use crate::unit::identity::{Identity, VERSION};
 use crate::unit::safe_state::SafeState;
 use crate::unit::service::{Reply, Request};
 use crate::unit::settings::{SettingsSlots, StoredSettings};
+use crate::unit::timing::Took;
 use crate::wire::broadcast::Medium;
 use crate::wire::message::{Epoch, Packing};
 use crate::wire::serial::{MOST_STUFFED, stuff};
@@ -25,6 +26,8 @@ pub(crate) enum Asked {
     Restart,
     /// To take this for the time.
     Time(Time),
+    /// How long frames take, from whoever counts that.
+    Timing,
 }
 
 /// Requests in, replies out, from start to restart.
@@ -90,12 +93,18 @@ impl SerialService {
                 let identity = self.identity;
                 self.reply(&Reply::Identified(&identity, VERSION), line);
             }
+            Request::Timing => return Some(Asked::Timing),
             Request::Clear => {
                 StoredSettings::clear(slots);
                 self.reply(&Reply::Cleared, line);
             }
         }
         Some(Asked::Nothing)
+    }
+
+    /// Answers how long frames take.
+    pub fn tell(&mut self, took: &Took, line: &mut impl SerialLine) {
+        self.reply(&Reply::Took(took), line);
     }
 
     /// Without settings: the status, if it is due, versions and counters as in `base`.

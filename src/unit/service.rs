@@ -20,6 +20,7 @@
 //! | 4 | the time, where the unit has no clock of its own | microseconds, 8 bytes |
 //! | 5 | say which unit you are | |
 //! | 6 | empty both slots; it counts from the next restart on | `VSCF` |
+//! | 7 | say how long frames take | |
 //!
 //! | kind | from the unit | body |
 //! |---|---|---|
@@ -29,6 +30,7 @@
 //! | 132 | a block was refused, the unit stays in its safe state if it has no other | reason, 1 byte; of a parameter: its value as `f32`, 4 bytes, and its name |
 //! | 133 | which unit it is, by [`EVERY_SENSOR`] | sensor; 1 for a test bench, which takes scans on this line, else 0; ranges and azimuths of its grid; major, minor and patch number; the chip's number, 4 bytes; the board's name |
 //! | 134 | both slots are empty | |
+//! | 135 | how long frames take, where the unit counts it | counts in a second, frames since the start; of a whole frame and of 8 stages: the last count and the greatest; 4 bytes each |
 
 use crate::fixed::bytes::Reader;
 use crate::fixed::time::Time;
@@ -36,6 +38,7 @@ use crate::sensor::config::ConfigError;
 use crate::unit::identity::{Identified, Identity};
 use crate::unit::said::{Refusal, Said};
 use crate::unit::settings::{BLOCK_LEN, BlockError};
+use crate::unit::timing::{Count, Took};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
 
@@ -64,6 +67,8 @@ pub enum Request<'a> {
     Identify,
     /// Empty both slots.
     Clear,
+    /// Say how long frames take.
+    Timing,
 }
 
 /// What the unit answers.
@@ -81,6 +86,8 @@ pub enum Reply<'a> {
     Identified(&'a Identity, [u8; 3]),
     /// Both slots are empty.
     Cleared,
+    /// How long frames take.
+    Took(&'a Took),
 }
 
 /// The data ID of a sensor's service messages.
@@ -151,6 +158,7 @@ impl<'a> Request<'a> {
                 message.put(&CLEAR);
                 message
             }
+            Self::Timing => ServiceMessage::new(7),
         };
         message.protect(sensor, counter)
     }
@@ -167,6 +175,7 @@ impl<'a> Request<'a> {
             4 => Reader(body).u64().map(|t| Self::Time(Time::from_micros(t))),
             5 => Some(Self::Identify),
             6 => (body == CLEAR).then_some(Self::Clear),
+            7 => Some(Self::Timing),
             _ => None,
         }
     }
@@ -209,6 +218,16 @@ impl Reply<'_> {
                 return message.protect(EVERY_SENSOR, counter);
             }
             Self::Cleared => ServiceMessage::new(134),
+            Self::Took(took) => {
+                let mut message = ServiceMessage::new(135);
+                message.put(&took.hz.to_le_bytes());
+                message.put(&took.frames.to_le_bytes());
+                for count in core::iter::once(&took.frame).chain(&took.stages) {
+                    message.put(&count.last.to_le_bytes());
+                    message.put(&count.worst.to_le_bytes());
+                }
+                message
+            }
         };
         message.protect(sensor, counter)
     }
@@ -244,6 +263,14 @@ impl Said {
             }
             133 => Identified::read(body).map(Self::Identified),
             134 => Some(Self::Cleared),
+            135 => {
+                let count = |r: &mut Reader<'_>| Some(Count { last: r.u32()?, worst: r.u32()? });
+                let mut took = Took { hz: r.u32()?, frames: r.u32()?, frame: count(&mut r)?, ..Took::default() };
+                for stage in &mut took.stages {
+                    *stage = count(&mut r)?;
+                }
+                Some(Self::Took(took))
+            }
             _ => None,
         }
     }
@@ -263,6 +290,7 @@ mod tests {
             Request::Time(Time::from_micros(0x0102_0304_0506_0708)),
             Request::ReadNewest,
             Request::Clear,
+            Request::Timing,
             Request::Identify,
         ] {
             let message = request.message(3, 9);
@@ -299,12 +327,15 @@ mod tests {
         let identity = Identity { board: "a-board", chip: 7, is_bench: true, grid: [100, 64] };
         let mut block = [0xFF; BLOCK_LEN];
         block[..3].copy_from_slice(&[1, 2, 3]);
+        let stages = core::array::from_fn(|k| Count { last: k as u32, worst: 70_000 + k as u32 });
+        let took = Took { hz: 480_000_000, frames: 9, frame: Count { last: 1, worst: 2 }, stages };
         for (reply, said) in [
             (Reply::Written(70_000), Said::Written(70_000)),
             (Reply::Block(&[1, 2, 3]), Said::Block(block)),
             (Reply::Started(Some((1, 9))), Said::Started(Some((1, 9)))),
             (Reply::Started(None), Said::Started(None)),
             (Reply::Cleared, Said::Cleared),
+            (Reply::Took(&took), Said::Took(took)),
         ] {
             let message = reply.message(3, 9);
             assert_eq!(Said::read(message.bytes(), 3), Some(said));

@@ -32,6 +32,12 @@ fn and_is_enough_for_a_user() {
     }
 }
 
+#[test]
+fn and_for_the_example() {
+    let output = cargo(&["test", "--package", "viewshed-example"]);
+    assert!(output.contains("1 passed"), "{output}");
+}
+
 /// Names by kind.
 fn counted(page: &str) -> BTreeMap<String, usize> {
     let lists = page.split("<h3 id=\"").skip(1);

@@ -103,12 +103,12 @@ fn the_messages_are_these_bytes() {
     let block = settings(6.0).to_block(1);
     let frames: Vec<String> = tool.write(&block).map(|frame| format!("{frame:?}")).collect();
     assert_eq!(frames.len(), 2 + BLOCK_LEN / 4);
-    // begin, 156 bytes; part 0 is the magic; part 38 and the completion have the check sum
+    // begin, 160 bytes; part 0 is the magic; part 39 and the completion have the check sum
     let sum: String = block[BLOCK_LEN - 4..].iter().map(|b| format!("{b:02X}")).collect();
-    assert_eq!(frames[0], "458#41000100009C0000");
+    assert_eq!(frames[0], "458#6300010000A00000");
     assert_eq!(frames[1], "458#3F01020056534342");
-    assert_eq!(frames[39][6..], format!("090226{sum}"), "{}", frames[39]);
-    assert_eq!(frames[40][6..], format!("0A0300{sum}"), "{}", frames[40]);
+    assert_eq!(frames[40][6..], format!("0A0227{sum}"), "{}", frames[40]);
+    assert_eq!(frames[41][6..], format!("0B0300{sum}"), "{}", frames[41]);
     // the rest is the specification's example
     let mut unit = start(CLASSIC, &slots);
     let mut talk: Vec<CanFrame> = (0..2).map(|_| unit.next_frame(at(0), &slots).unwrap()).collect();
@@ -362,13 +362,13 @@ proptest! {
     /// Two blocks on a bus that loses, repeats and reorders: whatever is written is one of them, whole.
     #[test]
     fn only_whole_blocks_are_written(
-        order in prop::collection::vec((0_usize..82, 0_usize..6), 0..160),
-        lost in prop::collection::vec(0_usize..82, 0..4),
+        order in prop::collection::vec((0_usize..84, 0_usize..6), 0..160),
+        lost in prop::collection::vec(0_usize..84, 0..4),
     ) {
         let mut tool = Tool::new(SENSOR, CLASSIC);
         let blocks = [settings(6.0).to_block(1), settings(7.0).to_block(1)];
         let mut frames: Vec<(usize, CanFrame)> = tool.write(&blocks[0]).collect::<Vec<_>>().into_iter().enumerate().collect();
-        frames.extend(tool.write(&blocks[1]).enumerate().map(|(k, frame)| (41 + k, frame)));
+        frames.extend(tool.write(&blocks[1]).enumerate().map(|(k, frame)| (42 + k, frame)));
         frames.retain(|(k, _)| !lost.contains(k));
         for (k, to) in order {
             let Some(place) = frames.iter().position(|(n, _)| *n == k) else { continue };

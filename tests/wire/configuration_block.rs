@@ -8,7 +8,7 @@ use viewshed::sensor::config::{ConfigError, Problem};
 use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -31,8 +31,8 @@ fn settings() -> Settings {
 fn changed(at: usize, bytes: &[u8]) -> [u8; BLOCK_LEN] {
     let mut block = settings().to_block(7);
     block[at..at + bytes.len()].copy_from_slice(bytes);
-    let sum = CRC.checksum(&block[..152]);
-    block[152..].copy_from_slice(&sum.to_le_bytes());
+    let sum = CRC.checksum(&block[..156]);
+    block[156..].copy_from_slice(&sum.to_le_bytes());
     block
 }
 
@@ -64,7 +64,7 @@ fn bytes(row: &Row, value: f32) -> Vec<u8> {
         "bit_rate" => (value as u32).to_le_bytes().to_vec(),
         "serial_baud" => (value as u32).to_le_bytes().to_vec(),
         "sample_point_permille" | "listen_first" | "max_delay_ms" => (value as u16).to_le_bytes().to_vec(),
-        "sensor" | "radar_id" => vec![value as u8],
+        "sensor" | "radar_id" | "configure_radar" => vec![value as u8],
         _ => value.to_le_bytes().to_vec(),
     }
 }
@@ -85,18 +85,22 @@ fn every_parameter_lies_where_the_page_says_and_has_its_limits() {
         }
         // numbers without a sign that begin at 0 have an upper limit only
         let outside = if row.name.starts_with("unit.") && row.least == 0.0 { row.most + 1.0 } else { -1e9 };
-        let refused = check(&read(outside)).unwrap_err();
+        let refused = match Settings::from_block(&changed(row.at, &bytes(row, outside))) {
+            Ok((_, settings)) => check(&settings).unwrap_err(),
+            Err(BlockError::Parameter(error)) => error,
+            Err(error) => panic!("{error}"),
+        };
         assert_eq!(refused.parameter, row.name);
         assert_eq!(refused.problem, Problem::OutOfLimits { min: row.least, max: row.most }, "{}", row.name);
     }
-    assert_eq!((next, rows.len(), BLOCK_LEN), (152, 29 + 6 + 4, 156));
+    assert_eq!((next, rows.len(), BLOCK_LEN), (153, 29 + 6 + 5, 160));
 }
 
 #[test]
 fn the_rest_of_the_block_is_as_on_the_page() {
     let block = settings().to_block(0x0102_0304);
-    assert_eq!(block[..12], [0x56, 0x53, 0x43, 0x42, 2, 0, 156, 0, 4, 3, 2, 1]);
-    assert_eq!(block[152..], CRC.checksum(&block[..152]).to_le_bytes());
+    assert_eq!(block[..12], [0x56, 0x53, 0x43, 0x42, 2, 0, 160, 0, 4, 3, 2, 1]);
+    assert_eq!(block[156..], CRC.checksum(&block[..156]).to_le_bytes());
     assert_eq!(CRC.algorithm.poly, 0x04C1_1DB7);
     // layout 1, made from the page: without the unit's own figures
     let mut old = settings().to_block(0)[..148].to_vec();

@@ -311,8 +311,8 @@ impl Config {
     }
 
     /// What the file means, in words.
-    pub fn summary(&self, path: &Path) -> String {
-        let mut lines = vec![format!("{}: ok", path.display())];
+    pub fn summary(&self, path: &Path, ok: bool) -> String {
+        let mut lines = vec![format!("{}: {}", path.display(), if ok { "ok" } else { "cannot be run now" })];
         let (input, output) = (&self.input, &self.output);
         let radar = match input.radar {
             Radar::Ars408 => format!("ARS408 of sensor id {}", input.sensor_id),
@@ -351,6 +351,19 @@ impl Config {
         }
         lines.extend(self.absent().iter().map(|device| format!("not there now, would be waited for: {device}")));
         lines.join("\n")
+    }
+
+    /// Files that the daemon could not read or write: nobody plugs these in.
+    pub fn missing_files(&self) -> Vec<String> {
+        let mut missing = Vec::new();
+        if let Some(log) = self.input.candump.as_ref().filter(|log| !log.is_file()) {
+            missing.push(format!("input.candump: {} is not there", log.display()));
+        }
+        let folder = self.output.candump.as_ref().and_then(|log| log.parent());
+        if let Some(folder) = folder.filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+            missing.push(format!("output.candump: the folder {} is not there", folder.display()));
+        }
+        missing
     }
 
     /// Devices that are not there at this moment.

@@ -17,6 +17,7 @@ use viewshed::{
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;
+use crate::hearing::{Heard, Hearing, Line};
 use crate::output::{Lines, Output};
 use crate::run::Unit;
 use crate::serial::Serial;
@@ -79,11 +80,17 @@ pub fn open(config: &Config) -> Result<Box<dyn Input>> {
         let path = input.port.as_ref().context("input.port is missing")?;
         anyhow::Ok(Serial::new(path, input.baud(), patient))
     };
+    let hearing = |what| {
+        let port = input.port.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+        Hearing::new(Line::Serial { port, baud: input.baud(), what })
+    };
     Ok(match (input.radar, &input.candump, &input.interface) {
         (Radar::Ars408, Some(_), _) => Box::new(Log::open(config)?),
         (Radar::Ars408, None, Some(name)) => Box::new(Bus::new(config, name)),
         (Radar::Ars408, None, None) => bail!("input.interface is missing"),
-        (Radar::Ti, ..) => Box::new(TiPort { port: port(false)?, decoder: Ti::new(input.ti()) }),
+        (Radar::Ti, ..) => {
+            Box::new(TiPort { port: port(false)?, hearing: hearing("frames"), decoder: Ti::new(input.ti()) })
+        }
         (Radar::Native, ..) => {
             let bench = input.clock == ClockSource::Input;
             Box::new(NativePort {
@@ -91,6 +98,7 @@ pub fn open(config: &Config) -> Result<Box<dyn Input>> {
                 bench,
                 sensor: input.sensor_id,
                 identity: config.identity(),
+                hearing: hearing("scans"),
                 session: None,
                 clock: RadarClock::NEW,
                 rest: Vec::new(),
@@ -105,6 +113,7 @@ struct Bus {
     keeper: BusKeeper,
     decoder: Decoder,
     upkeep: Option<Ars408Upkeep>,
+    hearing: Hearing,
     holds: bool,
     last: Time,
 }
@@ -117,7 +126,8 @@ impl Bus {
         // the radar's frames prove the bit rate before anything is sent to it
         let keeper = BusKeeper::start(&BusConfig::default(), &mut interface);
         let decoder = Decoder::new(input.ars408());
-        Self { interface, keeper, decoder, upkeep, holds: false, last: Time::from_micros(0) }
+        let hearing = Hearing::new(Line::Ars408 { interface: name.to_owned(), id: input.sensor_id });
+        Self { interface, keeper, decoder, upkeep, hearing, holds: false, last: Time::from_micros(0) }
     }
 
     /// Sends the radar its configuration, and that it stands.
@@ -154,15 +164,26 @@ impl Input for Bus {
             self.last = Time::from_micros(now.micros().saturating_sub(age)).max(self.last);
             unit.take(&mut self.decoder, &frame, self.last);
             work.output.send(self.last, unit, None);
+            self.hearing.frame(&frame);
             self.look_after(Some(&frame), now);
         }
         self.look_after(None, now);
+        say(self.hearing.look(now, unit.frames()));
         self.last = now;
         unit.wait(&mut self.decoder, now);
         if self.upkeep.as_ref().is_some_and(|upkeep| upkeep.disagrees(now)) {
             unit.degrade(now, Reason::RadarConfiguration);
         }
         Step::Now(now)
+    }
+}
+
+/// Into the log, for whoever looks why there are no maps.
+fn say(heard: Option<Heard>) {
+    match heard {
+        Some(Heard::Trouble(what)) => warn!("{what}"),
+        Some(Heard::Scans) => info!("scans come"),
+        None => {}
     }
 }
 
@@ -247,6 +268,7 @@ impl Input for Log {
 /// A TI radar's data port.
 struct TiPort {
     port: Serial,
+    hearing: Hearing,
     decoder: Ti<{ State::DETECTIONS }>,
 }
 
@@ -263,11 +285,13 @@ impl Input for TiPort {
             if bytes.is_empty() {
                 break;
             }
+            self.hearing.bytes(bytes.len());
             if let Some(unit) = work.unit {
                 unit.take(&mut self.decoder, bytes, now);
             }
         }
         if let Some(unit) = work.unit {
+            say(self.hearing.look(now, unit.frames()));
             unit.wait(&mut self.decoder, now);
         }
         Step::Now(now)
@@ -281,6 +305,7 @@ struct NativePort {
     bench: bool,
     sensor: u8,
     identity: Identity,
+    hearing: Hearing,
     session: Option<SerialSession<{ State::DETECTIONS }>>,
     clock: RadarClock,
     /// What came after a restart.
@@ -311,6 +336,7 @@ impl Input for NativePort {
                 break;
             }
             let bytes = std::mem::take(&mut self.rest);
+            self.hearing.bytes(bytes.len());
             // byte by byte: what stands after a restart belongs to the next session
             for (k, byte) in bytes.iter().enumerate() {
                 let before = session.now();
@@ -323,6 +349,9 @@ impl Input for NativePort {
                     self.clock.stamp(session.now(), now);
                 }
             }
+        }
+        if let Some(unit) = work.unit {
+            say(self.hearing.look(now, unit.frames()));
         }
         if !self.bench {
             let mut lines = Lines { output: work.output, own: Some(&mut self.port) };

@@ -3,6 +3,7 @@
 mod can;
 mod config;
 mod frames;
+mod hearing;
 mod input;
 mod locate;
 #[path = "../../../tests/harness/src/results/files/one_file.rs"]
@@ -48,7 +49,7 @@ Examples:
   viewshedd -c viewshed.toml             run here; Ctrl-C or SIGTERM stops it cleanly
   systemctl enable --now viewshed        run as a service, with boards/linux/viewshed.service
 
-A first try without hardware: input.candump = \"LOG\", input.clock = \"input\" and output.candump = \"OUT\" turn a
+A first try without hardware is boards/linux/first-try.toml: input.candump = \"LOG\", input.clock = \"input\" and output.candump = \"OUT\" turn a
 log written by `candump -L` into the log of its broadcast, as fast as it goes; `viewshed listen OUT` decodes that.
 
 Interfaces that are down and ports that are unplugged are tried again until they work. A silent radar is reported
@@ -67,8 +68,10 @@ fn main() -> ExitCode {
         }
     };
     if args.check {
-        println!("{}", config.summary(&args.config));
-        return ExitCode::SUCCESS;
+        let missing = config.missing_files();
+        missing.iter().for_each(|problem| error!("{}: {problem}", args.config.display()));
+        println!("{}", config.summary(&args.config, missing.is_empty()));
+        return if missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) };
     }
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {

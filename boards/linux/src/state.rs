@@ -179,6 +179,53 @@ mod tests {
     }
 
     #[test]
+    fn emptied_slots_are_the_files_settings_again() {
+        let folder = folder("emptied");
+        let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
+        slots.write(1, &settings(7.0).to_block(2));
+        assert_eq!(height(&slots), Ok(7.0));
+        StoredSettings::clear(&mut slots);
+        assert_eq!(height(&slots), Ok(6.0));
+        assert!(!folder.join("slots").exists());
+        assert_eq!(height(&FileSlots::open(Some(&folder), Some(&settings(8.0)))), Ok(8.0));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_file_of_the_layout_before_is_read_and_grows_with_the_first_write() {
+        let folder = folder("older");
+        let old = |height_m, sequence: u32| {
+            let mut block = settings(height_m).to_block(sequence)[..LAYOUT_1_LEN].to_vec();
+            (block[4], block[6]) = (1, 148);
+            let sum = crc32(&block[..LAYOUT_1_LEN - 4]);
+            block[LAYOUT_1_LEN - 4..].copy_from_slice(&sum.to_le_bytes());
+            block
+        };
+        fs::write(folder.join("slots"), [old(6.0, 1), old(7.0, 2)].concat()).unwrap();
+        let mut slots = FileSlots::open(Some(&folder), None);
+        assert_eq!(height(&slots), Ok(7.0));
+        slots.write(0, &settings(8.0).to_block(3));
+        assert_eq!(fs::metadata(folder.join("slots")).unwrap().len(), 2 * BLOCK_LEN as u64);
+        let slots = FileSlots::open(Some(&folder), None);
+        assert_eq!(height(&slots), Ok(8.0));
+        // the other one is still there, should power fail now
+        let mut bytes = fs::read(folder.join("slots")).unwrap();
+        bytes[40] ^= 1;
+        fs::write(folder.join("slots"), &bytes).unwrap();
+        assert_eq!(height(&FileSlots::open(Some(&folder), None)), Ok(7.0));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0, |sum, byte| {
+            (0..8).fold(
+                sum ^ u32::from(*byte),
+                |sum: u32, _| if sum & 1 == 1 { sum >> 1 ^ 0xEDB8_8320 } else { sum >> 1 },
+            )
+        })
+    }
+
+    #[test]
     fn a_block_that_cannot_run_is_not_written_and_not_used() {
         let folder = folder("limits");
         // in no view: 1 m above ground from 6 m high, 4 m far

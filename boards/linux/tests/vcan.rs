@@ -16,7 +16,7 @@ use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
-use viewshed::wire::receive::{ReceiverLimits, Receiver};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::status::{Reason, UnitState};
 
 const RADAR: &str = "vsradar";
@@ -215,6 +215,104 @@ fn settings() -> Settings {
     let part = |name: &str| table[name].clone();
     let (mount, field_of_view) = (part("mount").try_into().unwrap(), part("field_of_view").try_into().unwrap());
     Settings::of(Sensor { mount, field_of_view, noise: Default::default() })
+}
+
+/// What a command wrote, and how it ended.
+fn ran(child: Child) -> (Option<i32>, String, String) {
+    let output = child.wait_with_output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+/// Plays a log to a bus at its pace, to a time since its first frame; how many frames that are.
+fn play(log: &[u8], socket: &CanFdSocket, seconds: u64) -> usize {
+    let mut reader = Reader::from_reader(log);
+    let (started, mut first, mut count) = (Instant::now(), None, 0);
+    while let Some(record) = reader.next_record().unwrap() {
+        let due = Duration::from_micros(record.t_us - *first.get_or_insert(record.t_us));
+        if due > Duration::from_secs(seconds) {
+            break;
+        }
+        std::thread::sleep(due.saturating_sub(started.elapsed()));
+        socket.write_frame(&record.frame).unwrap();
+        count += 1;
+    }
+    count
+}
+
+/// `viewshed doctor --can` and `viewshed listen --can`: `VIEWSHED` names the command, `BROADCAST` a log of a broadcast.
+#[test]
+fn the_command_examines_and_shows_a_live_bus() {
+    const LIVE: &str = "vslive";
+    let (Ok(viewshed), Ok(broadcast)) = (std::env::var("VIEWSHED"), std::env::var("BROADCAST")) else {
+        return println!("skipped: `viewshed` on live buses: no VIEWSHED and BROADCAST are named");
+    };
+    if let Err(why) = ip(&format!("link add dev {LIVE} type vcan")) {
+        return println!("skipped: `viewshed` on live buses: ip link add type vcan: {why}");
+    }
+    let start = |arguments: &str| {
+        let mut command = Command::new(&viewshed);
+        let command = command.args(arguments.split(' ')).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().unwrap()
+    };
+    // what cannot be listened to
+    for (arguments, says) in [
+        ("listen --can absent0", "there is no interface absent0; CAN interfaces here: "),
+        ("doctor --can lo", "lo is no CAN interface"),
+        ("doctor --can vslive", "vslive is down; set it up: `ip link set vslive up type can bitrate 500000`"),
+    ] {
+        let (code, _, error) = ran(start(arguments));
+        assert_eq!(code, Some(2), "{arguments}: {error}");
+        assert!(error.starts_with("error: ") && error.contains(says), "{arguments}: {error}");
+    }
+    ip(&format!("link set {LIVE} mtu 72")).unwrap();
+    ip(&format!("link set {LIVE} up")).unwrap();
+    let socket = CanFdSocket::open(LIVE).unwrap();
+
+    let (code, text, error) = ran(start("doctor --can vslive --for 1"));
+    assert_eq!(code, Some(1), "{error}");
+    assert!(text.contains("WRONG: no frame came within 1."), "{text}");
+
+    // a bus with two radars
+    let doctor = start("doctor --can vslive --for 5");
+    std::thread::sleep(Duration::from_secs(2));
+    let played = play(include_bytes!("../../../tests/recordings/ars408-made-up.log"), &socket, 10);
+    let (code, text, error) = ran(doctor);
+    assert_eq!(code, Some(0), "{text}{error}");
+    for said in [
+        &format!("vslive: {played} frames in 5.") as &str,
+        "sensor 0 on vslive: Clusters, 28 of 28 scans, 564 entries",
+        "sensor 3 on vslive: Objects, 28 of 28 scans",
+        "`cansend vslive 230#7800000010240000`",
+    ] {
+        assert!(text.contains(said), "`{said}` in: {text}");
+    }
+
+    // a bus with a broadcast that ends after three seconds
+    let log = std::fs::read(broadcast).unwrap();
+    let listen = start("listen --can vslive --for 8 --every 0.5");
+    std::thread::sleep(Duration::from_secs(2));
+    let played = play(&log, &socket, 3);
+    let (code, text, error) = ran(listen);
+    assert_eq!(code, Some(0), "{text}{error}");
+    let looks: Vec<&str> = text.lines().filter(|line| line.contains("s  sensor 0: ")).collect();
+    let visible = |line: &str| line.split("sensor 0: ").nth(1)?.split(' ').next()?.parse::<f64>().ok();
+    let most = looks.iter().filter_map(|line| visible(line)).fold(0.0, f64::max);
+    println!("listen --can: {played} frames, {} looks, {most} % visible at most", looks.len());
+    assert!(looks.len() >= 6 && most > 60.0, "{text}");
+    assert!(text.contains("no broadcast among 0 frames"), "before: {text}");
+    assert!(looks.last().is_some_and(|line| line.contains("all of its map is unknown")), "after: {text}");
+    assert!(text.contains(&format!("frames: {played} came, ")) && text.contains("; 0 never came"), "{text}");
+
+    // Ctrl-C ends it, and the report is there
+    let listen = start("listen --can vslive");
+    std::thread::sleep(Duration::from_secs(2));
+    let pid = rustix::process::Pid::from_child(&listen);
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).unwrap();
+    let (code, _, error) = ran(listen);
+    assert_eq!(code, Some(2));
+    assert!(error.contains("vslive: no frame came"), "{error}");
+    ip(&format!("link del {LIVE}")).unwrap();
 }
 
 #[test]

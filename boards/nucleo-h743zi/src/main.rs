@@ -35,7 +35,8 @@ use embassy_stm32::{bind_interrupts, can, dma, flash, pac, rng};
 use stm32::can::open;
 use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
-use viewshed::board::{FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
+use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
+use cortex_m::peripheral::DWT;
 use viewshed::reference::{CHECK, Radar};
 use viewshed::{Ars408Config, Epoch};
 
@@ -106,6 +107,8 @@ async fn main(_spawner: Spawner) {
     let p = embassy_stm32::init(config());
     let mut core = cortex_m::Peripherals::take().expect("taken once");
     caches::enable(&mut core.MPU, &mut core.SCB, &mut core.CPUID);
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
     let mut watchdog = IndependentWatchdog::new(p.IWDG1, WATCHDOG_US);
     watchdog.unleash();
     let last = crash::last();
@@ -126,7 +129,8 @@ async fn main(_spawner: Spawner) {
     let line = Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, line).expect("a baud rate it has");
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
     let identity = stm32::identity("nucleo-h743zi", [200, 120]);
-    let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into() };
+    let cycles = Some(CycleCounter { count: DWT::cycle_count, hz: 480_000_000 });
+    let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into(), cycles };
     let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PB0, Level::Low, Speed::Low), watchdog };
     let scans = scans(radar_receiver).expect("room for one");
     run(start, memory(), move || Radar::new(Ars408Config::sensor(stored.unit().radar_id)), scans, wiring).await

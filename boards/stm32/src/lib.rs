@@ -19,5 +19,5 @@ pub fn now() -> Time {
 
 /// A board's program on this chip; of the chip's 96-bit number a check sum.
 pub fn identity(board: &'static str, grid: [u8; 2]) -> Identity {
-    Identity { board, chip: Identity::number(embassy_stm32::uid::uid()), is_bench: false, grid }
+    Identity { board, chip: Identity::number(&embassy_stm32::uid::uid()), is_bench: false, grid }
 }

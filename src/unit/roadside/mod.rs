@@ -14,6 +14,9 @@
 //! to the drivers. Only this feeds a watchdog: a loop that turns without a timer, or hangs in any of the
 //! stages, is reset. A radar that stops is no reason for a reset; the map runs out and that is sent.
 //!
+//! *The radar.* Where the block says so an ARS408 is set to send clusters or objects, until it reads that back, and told that
+//! it stands.
+//!
 //! *Late frames.* A frame that still lies in a mailbox when its map is too old is taken back.
 //!
 //! *Safe state.* Without a block that holds there is no unit, only a status on both lines that says so. The
@@ -31,11 +34,13 @@ mod reset;
 
 use crate::fixed::time::Time;
 use crate::inputs::Feed;
+use crate::inputs::ars408::upkeep::Ars408Upkeep;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
 use crate::unit::identity::{Identity, VERSION};
 use crate::unit::serial_service::{Asked, SerialLine, SerialService};
 use crate::unit::settings::{Settings, SettingsSlots, StoredSettings, UnitConfig};
+use crate::unit::timing::{CycleCounter, Timing};
 use crate::unit::{Flow, InUnit, MapSender, Unit};
 use crate::wire::broadcast::{BroadcastConfig, Medium};
 use crate::wire::frame::CanFrame;
@@ -87,6 +92,8 @@ pub struct RoadsideStart {
     pub stored: StoredSettings,
     /// Why the controller started.
     pub reset_cause: ResetCause,
+    /// What frames are timed with, where the controller has it.
+    pub cycles: Option<CycleCounter>,
 }
 
 /// The pieces of memory a unit works in.
@@ -131,6 +138,9 @@ pub struct Roadside<'u, E: InUnit, S, F> {
     can_service: CanService,
     maps: Option<Maps<'u, E, S>>,
     radar: F,
+    /// What the radar is sent.
+    upkeep: Option<Ars408Upkeep>,
+    timing: Option<Timing>,
     radar_bus: BusKeeper,
     broadcast_bus: BusKeeper,
     outbox: Outbox,
@@ -169,6 +179,8 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             can_service,
             maps,
             radar,
+            upkeep: config.configure_radar.settings().map(|wanted| Ars408Upkeep::new(config.radar_id, wanted)),
+            timing: start.cycles.map(Timing::new),
             radar_bus: BusKeeper::start(&radar_bus, &mut ports.radar),
             broadcast_bus: BusKeeper::start(&broadcast_bus, &mut ports.broadcast),
             outbox: Outbox::new(),
@@ -196,6 +208,7 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             }
         }
         let frame_done = self.receive(now, &mut ports.radar);
+        self.look_after(now, &mut ports.radar);
         self.transmit(now, ports);
         let state = match &mut self.maps {
             Some(maps) => {
@@ -225,8 +238,10 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             let Some(asked) = message.and_then(|m| self.service.take(m, slots, line)) else { continue };
             // somebody is at work at this bit rate
             self.baud = None;
-            if asked == Asked::Restart {
-                return Flow::Restart;
+            match (asked, &self.timing) {
+                (Asked::Restart, _) => return Flow::Restart,
+                (Asked::Timing, Some(timing)) => self.service.tell(timing.took(), line),
+                _ => {}
             }
         }
         Flow::Continue
@@ -241,11 +256,19 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         self.lost = self.lost.saturating_add(port.take_lost());
         for _ in 0..MOST_FRAMES {
             let Some(frame) = self.radar_bus.receive(port) else { break };
+            if let Some(upkeep) = &mut self.upkeep {
+                upkeep.take(&frame);
+            }
             let Some(maps) = &mut self.maps else { continue };
             let before = maps.unit.frames();
             // it may have waited while the map before was made
             let came = port.arrived().filter(|came| *came <= now).unwrap_or(now);
-            maps.unit.take(&mut self.radar, &frame, came);
+            let timing = &mut self.timing;
+            maps.unit.take_timed(&mut self.radar, &frame, came, &mut |event| {
+                if let Some(timing) = timing {
+                    timing.event(event);
+                }
+            });
             scanned = maps.unit.frames() != before;
             if scanned {
                 // what was sent of the map before has to leave first
@@ -266,6 +289,21 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             self.complete_status(now);
         }
         true
+    }
+
+    /// Sends the radar its settings until it reads them back, and that it stands.
+    fn look_after(&mut self, now: Time, port: &mut impl CanPort) {
+        let Some(upkeep) = &mut self.upkeep else { return };
+        // what has no room now is due again
+        if self.radar_bus.state() != BusState::Active {
+            return;
+        }
+        while let Some(frame) = upkeep.poll(now) {
+            self.radar_bus.send(&frame, port);
+        }
+        if let (Some(maps), true) = (&mut self.maps, upkeep.disagrees(now)) {
+            maps.unit.degrade(now, Reason::RadarConfiguration);
+        }
     }
 
     /// Offers the map to the second sender and completes the status of both.

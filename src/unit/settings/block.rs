@@ -1,11 +1,12 @@
 //! Settings as bytes and back.
 
-use super::{BlockError, Settings, UnitConfig};
+use super::{BlockError, ConfigureRadar, Settings, UnitConfig};
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
 use crate::radar_3d::VisibilityConfig;
 use crate::sensor::Sensor;
+use crate::sensor::config::{ConfigError, Problem};
 use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
@@ -17,7 +18,7 @@ const NUMBERS: usize = 29;
 /// Bytes of a bus.
 const BUS_LEN: usize = 8;
 /// Bytes of the unit's own figures.
-const UNIT_LEN: usize = 8;
+const UNIT_LEN: usize = 12;
 /// Bytes of the check sum.
 const SUM_LEN: usize = 4;
 /// Bytes before the numbers.
@@ -68,6 +69,7 @@ impl Settings {
             w.put([self.unit.sensor, self.unit.radar_id]);
             w.put(self.unit.max_delay_ms.to_le_bytes());
             w.put(self.unit.serial_baud.to_le_bytes());
+            w.put([self.unit.configure_radar as u8, 0, 0, 0]);
         }
         if let Some((body, sum)) = block.split_last_chunk_mut::<SUM_LEN>() {
             *sum = fingerprint(body).to_le_bytes();
@@ -95,7 +97,10 @@ impl Settings {
             return Err(BlockError::CheckSum);
         }
         let sequence = header.u32().ok_or(BlockError::Short)?;
-        let settings = Self::read(&mut header, layout).ok_or(BlockError::Short)?;
+        let mut settings = Self::read(&mut header).ok_or(BlockError::Short)?;
+        if layout > 1 {
+            settings.unit = unit(&mut header).ok_or(BlockError::Short)?.map_err(BlockError::Parameter)?;
+        }
         Ok((sequence, settings))
     }
 
@@ -136,7 +141,7 @@ impl Settings {
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates, checked afterwards
-    fn read(r: &mut Reader, layout: u16) -> Option<Self> {
+    fn read(r: &mut Reader) -> Option<Self> {
         let mount = Mount {
             x_m: r.f32()?,
             y_m: r.f32()?,
@@ -174,7 +179,7 @@ impl Settings {
             Some(BusConfig { bit_rate: r.u32()?, sample_point_permille: r.u16()?, listen_first: r.u16()? != 0 })
         };
         let (radar_bus, broadcast_bus) = (bus(r)?, bus(r)?);
-        let unit = if layout == 1 { UnitConfig::default() } else { unit(r)? };
+        let unit = UnitConfig::default();
         let sensor = Sensor { mount, field_of_view, noise };
         Some(Self { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit })
     }
@@ -204,9 +209,14 @@ fn layout(block: &[u8]) -> Option<u16> {
     r.take().filter(|magic| *magic == MAGIC).and_then(|_| r.u16())
 }
 
-fn unit(r: &mut Reader) -> Option<UnitConfig> {
+fn unit(r: &mut Reader) -> Option<Result<UnitConfig, ConfigError>> {
     let [sensor, radar_id] = r.take()?;
-    Some(UnitConfig { sensor, radar_id, max_delay_ms: r.u16()?, serial_baud: r.u32()? })
+    let (max_delay_ms, serial_baud) = (r.u16()?, r.u32()?);
+    let [number, _, _, _] = r.take()?;
+    let problem = Problem::OutOfLimits { min: 0.0, max: 2.0 };
+    let refused = ConfigError { parameter: "unit.configure_radar", value: f32::from(number), problem };
+    let made = |configure_radar| UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar };
+    Some(ConfigureRadar::from_number(number).map(made).ok_or(refused))
 }
 
 #[cfg(test)]
@@ -235,7 +245,8 @@ pub(super) mod tests {
         });
         s.gate.max_detections = 176;
         s.broadcast_bus.bit_rate = 250_000;
-        s.unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600 };
+        let configure_radar = ConfigureRadar::Objects;
+        s.unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600, configure_radar };
         s
     }
 

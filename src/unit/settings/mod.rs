@@ -15,7 +15,7 @@
 //! | 4 | sequence: the newer slot has the higher one, modulo 2^32 |
 //! | 4 x 29 | `f32`: mount, field of view, noise, gate, visibility, health, each in the order of its fields |
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
-//! | 8 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate |
+//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), 0 (3 bytes) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
@@ -29,7 +29,7 @@ mod unit_config;
 pub use block::BLOCK_LEN;
 pub use flash::FlashSlots;
 pub use stored::{SettingsCheck, SettingsSlots, StoredSettings};
-pub use unit_config::UnitConfig;
+pub use unit_config::{ConfigureRadar, UnitConfig};
 
 use crate::camera::Camera3dConfig;
 use crate::frame::gate::GateConfig;

@@ -1,6 +1,42 @@
 //! What an integrator sets of a unit that its maps do not depend on: numbers, rates, delays.
 
+use crate::inputs::ars408::configuration::Ars408Configuration;
 use crate::sensor::config::{ConfigError, within};
+
+/// What a unit does about the settings of its radar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum ConfigureRadar {
+    /// Nothing is sent to it.
+    #[default]
+    No,
+    /// It is set to send clusters until it reads that back, and told twenty times a second that it stands.
+    Clusters,
+    /// The same with objects.
+    Objects,
+}
+
+impl ConfigureRadar {
+    /// Of the number in a block.
+    pub const fn from_number(number: u8) -> Option<Self> {
+        match number {
+            0 => Some(Self::No),
+            1 => Some(Self::Clusters),
+            2 => Some(Self::Objects),
+            _ => None,
+        }
+    }
+
+    /// The settings that are sent; none for [`No`](Self::No).
+    pub const fn settings(self) -> Option<Ars408Configuration> {
+        match self {
+            Self::No => None,
+            Self::Clusters => Some(Ars408Configuration::CLUSTERS),
+            Self::Objects => Some(Ars408Configuration::OBJECTS),
+        }
+    }
+}
 
 /// Numbers and rates of a unit on a controller of its own. The daemon on Linux has these in its file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,11 +51,19 @@ pub struct UnitConfig {
     pub max_delay_ms: u16,
     /// Bit rate of the serial line, from [`SERVICE_S`](Self::SERVICE_S) after the start on.
     pub serial_baud: u32,
+    /// Whether an ARS408 is configured over its bus.
+    pub configure_radar: ConfigureRadar,
 }
 
 impl Default for UnitConfig {
     fn default() -> Self {
-        Self { sensor: 0, radar_id: 0, max_delay_ms: 100, serial_baud: Self::SERVICE_BAUD }
+        Self {
+            sensor: 0,
+            radar_id: 0,
+            max_delay_ms: 100,
+            serial_baud: Self::SERVICE_BAUD,
+            configure_radar: ConfigureRadar::No,
+        }
     }
 }
 

@@ -17,6 +17,7 @@ use viewshed::unit::said::Said;
 use viewshed::unit::serial_service;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredSettings};
+use viewshed::unit::timing::CycleCounter;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Message, Received};
@@ -175,7 +176,8 @@ impl World {
         let stored =
             StoredSettings::read(&ports.slots, SettingsCheck::of::<SmallState, SmallSender>().on_can(CAN_CLOCK_HZ));
         let identity = Identity { board: "a-board", chip: 7, is_bench: false, grid: [50, 40] };
-        let start = RoadsideStart { identity, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog };
+        let cycles = Some(CycleCounter { count: own_figures::count, hz: 1000 });
+        let start = RoadsideStart { identity, epoch: Epoch::new(3), stored, reset_cause: ResetCause::Watchdog, cycles };
         let unit = Unit::start(start, memory, Ars408::new(Ars408Config::sensor(SENSOR)), at(0), &mut ports);
         assert!(ports.radar.silent && ports.broadcast.silent, "until the bit rate is proven");
         let far = || Far::new([SENSOR], ADDRESSES, ReceiverLimits::DEFAULT);

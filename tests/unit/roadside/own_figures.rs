@@ -1,8 +1,8 @@
 //! What a block says of the unit itself: its number, the bit rate of its line, how old its maps may get.
 
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, Settings, UnitConfig};
-use viewshed::wire::frame::CanFrame;
+use viewshed::unit::settings::{BLOCK_LEN, ConfigureRadar, Settings, UnitConfig};
+use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::{VERSION, World, settings};
 use viewshed::unit::said::Said;
@@ -78,4 +78,54 @@ fn frames_wait_in_mailboxes_no_longer_than_the_receivers_allow() {
     };
     let (short, long) = (taken_back_after(60), taken_back_after(300));
     assert!(short < 120 && long > 200, "{short} ms, {long} ms");
+}
+
+/// A counter that goes on by ten whenever it is read.
+pub fn count() -> u32 {
+    use std::sync::atomic::{AtomicU32, Ordering};
+    static COUNT: AtomicU32 = AtomicU32::new(u32::MAX - 1000);
+    COUNT.fetch_add(10, Ordering::Relaxed)
+}
+
+#[test]
+fn frames_are_timed_in_all_and_by_stage() {
+    let mut world = World::with_settings();
+    world.run(660);
+    world.ask(Request::Timing);
+    world.run(100);
+    let took = world.replies.iter().find_map(|reply| match Said::read(reply, 0)? {
+        Said::Took(took) => Some(took),
+        _ => None,
+    });
+    let took = took.expect("it answers");
+    assert_eq!((took.hz, took.frames), (1000, 10));
+    // another test may read the counter meanwhile
+    assert!(took.stages.iter().all(|stage| stage.last >= 10 && stage.worst >= stage.last), "{took:?}");
+    let stages: u32 = took.stages.iter().map(|stage| stage.last).sum();
+    assert!(took.frame.last > stages, "the end is read once more: {took:?}");
+}
+
+#[test]
+fn a_radar_is_configured_until_it_reads_its_settings_back_and_told_that_it_stands() {
+    let mut world = with(UnitConfig { configure_radar: ConfigureRadar::Clusters, ..UnitConfig::default() });
+    let mut sent = Vec::new();
+    // as the radar says it twice a second: it sends objects; from the third second on clusters
+    for ms in 1..=5000_u32 {
+        if ms.is_multiple_of(500) {
+            let output = if ms > 3000 { 0x18 } else { 0x14 };
+            let state = [0x40, 0x1F, 0x40, 0x00, 0x22, output, 0x00, 0x00];
+            world.ports.radar.incoming.push_back(CanFrame::classic(CanId::Standard(0x201), &state).unwrap());
+        }
+        world.step();
+        sent.extend(world.ports.radar.mailboxes.drain(..).map(|frame| (ms, frame.id.raw())));
+    }
+    let times = |id| sent.iter().filter(|(_, other)| *other == id).map(|(ms, _)| *ms).collect::<Vec<_>>();
+    let settings = times(0x200);
+    assert!((2..=4).contains(&settings.len()) && settings[0] < 500, "{settings:?}");
+    assert!(settings.iter().all(|ms| *ms <= 3500), "not once they hold: {settings:?}");
+    assert!((90..=101).contains(&times(0x300).len()) && times(0x300).len() == times(0x301).len());
+    // nothing is sent unless the block says so
+    let mut world = World::with_settings();
+    world.run(1000);
+    assert!(world.ports.radar.mailboxes.is_empty());
 }

@@ -155,6 +155,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let boxes: usize = frames.iter().map(|f| f.boxes.len()).sum();
     eprintln!("{} pictures, {boxes} boxes", frames.len());
+    eprint!("{}", outputs.told());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -120,6 +120,11 @@ impl Listening {
         let _ = self.ears.frame(self.last, frame);
     }
 
+    /// Lets time pass in which nothing came: maps grow old.
+    pub fn pass(&mut self, time_ns: i64) {
+        self.last = Time::from_micros(u64::try_from(time_ns / 1000).unwrap_or(0));
+    }
+
     /// Takes bytes of a serial line.
     pub fn take_bytes(&mut self, chunk: &Chunk) {
         self.last = Time::from_micros(u64::try_from(chunk.time_ns / 1000).unwrap_or(0));
@@ -133,6 +138,11 @@ impl Listening {
             }
             rest = &rest[taken..];
         }
+    }
+
+    /// The time of what came last, or of the last look at silence; on the log's clock.
+    pub fn time_s(&self) -> f64 {
+        self.last.micros() as f64 / 1e6
     }
 
     /// Frames so far.
@@ -166,7 +176,7 @@ impl Listening {
     pub fn moment(&self, sensor: u8) -> Option<Moment> {
         let map = self.map(sensor);
         let header = map.header()?;
-        let mut moment = Moment { time_s: self.last.micros() as f64 / 1e6, visible: 0, invisible: 0, unknown: 0 };
+        let mut moment = Moment { time_s: self.time_s(), visible: 0, invisible: 0, unknown: 0 };
         for azimuth in 0..usize::from(header.azimuths) {
             let ray = map.ray(Plane::Visibility, azimuth);
             let (known, visible) = (ray.known.end().saturating_sub(ray.known.near()), ray.bits().count() as usize);

@@ -1,11 +1,11 @@
 //! The table of `viewshed bus`, and the same as JSON.
 
-use comfy_table::{Cell, CellAlignment, Table, presets};
 use serde::Serialize;
 
 use super::entropy::Entropy;
 use super::load::Load;
 use super::loss::Arrived;
+use crate::results::report::table::table;
 
 /// What one recording's maps cost.
 #[derive(Debug, Clone, Serialize)]
@@ -24,16 +24,9 @@ pub struct Report {
     pub holes: u64,
 }
 
-fn table(heading: &[&str], rows: Vec<Vec<String>>) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(heading.to_vec());
-    for row in rows {
-        table.add_row(row.into_iter().enumerate().map(|(column, text)| {
-            let side = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
-            Cell::new(text).set_alignment(side)
-        }));
-    }
-    table
+/// `fd-500k-2M-authenticated` in two lines.
+fn name(bus: &str) -> String {
+    bus.replace("-authenticated", "\nauthenticated")
 }
 
 fn percent(share: f64) -> String {
@@ -47,29 +40,29 @@ impl Report {
             let Load { name, load_median, load_worst, frames_per_scan, bytes_per_scan } = bus;
             let loads = [percent(*load_median), percent(*load_worst)];
             let sizes = [format!("{frames_per_scan:.1}"), format!("{bytes_per_scan:.0}")];
-            [name.to_string()].into_iter().chain(loads).chain(sizes).collect()
+            [self::name(name)].into_iter().chain(loads).chain(sizes).collect()
         });
-        let headings = ["bus", "load %", "worst second %", "frames a scan", "bytes a scan"];
+        let headings = ["bus", "load %", "worst\nsecond %", "frames\na scan", "bytes\na scan"];
         let received = self.received.iter().map(|r| {
             let shares = [percent(r.visible_median), percent(r.visible_p05), percent(r.equal)];
-            let begin = [r.name.to_string(), percent(r.loss)];
+            let begin = [name(r.name), percent(r.loss)];
             begin.into_iter().chain(shares).chain([r.wrongly_visible.to_string()]).collect()
         });
         let arrived =
-            ["bus", "lost %", "visible cells there %", "worst 5 % of scans", "scans equal %", "wrongly visible"];
+            ["bus", "lost %", "visible cells\nthere %", "worst 5 %\nof scans", "scans\nequal %", "wrongly\nvisible"];
         let Entropy { neighbours, previous_scan } = self.entropy_bytes_per_scan;
         let mut text = format!(
             "{}: {} scans of radar-3d, {:.1} a second\n{}\n",
             self.recording,
             self.scans,
             self.scans_per_second,
-            table(&headings, loads.collect())
+            table(&headings, loads)
         );
         text += "Load: every frame, status and header included, with its stuff bits; median and worst of all windows of 1 s.\n";
         text += &format!(
             "Entropy of the maps: {neighbours:.0} bytes a scan given the neighbours, {previous_scan:.0} given the previous scan too.\n"
         );
-        text += &format!("{}\n", table(&arrived, received.collect()));
+        text += &format!("{}\n", table(&arrived, received));
         if self.dropped > 0 {
             text += &format!("{} azimuths were not sent in time.\n", self.dropped);
         }

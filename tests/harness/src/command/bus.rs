@@ -113,6 +113,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         };
         file.write(text.context("the report as JSON")? + "\n")?;
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
 }
 

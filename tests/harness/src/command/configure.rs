@@ -5,8 +5,10 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Result, bail, ensure};
+use viewshed::bench::stage::Stage;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::settings::{BlockError, Settings};
+use viewshed::unit::timing::Count;
 
 use super::print;
 use crate::configure::file::{self, EXAMPLE, UnitFile};
@@ -22,7 +24,7 @@ use crate::configure::{Found, Stored, Wanted, find, name};
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
     /// TOML file of the configuration; one of the daemon's does as well
-    #[arg(value_name = "FILE", required_unless_present_any = ["read", "restart", "factory", "example"])]
+    #[arg(value_name = "FILE", required_unless_present_any = ["read", "restart", "factory", "timing", "example"])]
     file: Option<PathBuf>,
     /// CAN interface of the bus the unit broadcasts on
     #[arg(long, value_name = "INTERFACE", conflicts_with = "port")]
@@ -51,6 +53,9 @@ pub struct Args {
     /// Take every configuration from the unit and restart it: as it was when it was flashed first
     #[arg(long, conflicts_with = "file")]
     factory: bool,
+    /// Print how long frames take on the unit: the last one and the longest since its start, in all and by stage
+    #[arg(long, conflicts_with_all = ["file", "read", "check", "restart", "factory", "can"])]
+    timing: bool,
     /// Print a file to begin with, with every key explained
     #[arg(long, exclusive = true)]
     example: bool,
@@ -66,6 +71,7 @@ Examples:
   viewshed configure unit.toml --port /dev/ttyACM0 --restart    write it and let it count
   viewshed configure --port /dev/ttyACM0 --read > unit.toml     what the unit runs with
   viewshed configure unit.toml --can can0 --chip 1A2B3C4D       one of two new units on a bus
+  viewshed configure --port /dev/ttyACM0 --timing               how long frames take on it, in cycles and microseconds
 
 Exit codes: 0 done; 1 --check found differences; 2 nothing was changed, and why.";
 
@@ -98,6 +104,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     if args.read {
         return read(&mut unit);
+    }
+    if args.timing {
+        return timing(&mut unit);
     }
     if args.factory {
         unit.clear()?;
@@ -193,6 +202,32 @@ fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
         (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.block.0))?,
         (_, Err(_)) => print("# its slots are empty: from its next start on it has none\n")?,
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn timing(unit: &mut Found<'_>) -> Result<ExitCode> {
+    let took = unit.timing()?;
+    ensure!(
+        took.frames > 0 && took.hz > 0,
+        "no frame was worked up since its start: is it configured, and is its radar there?"
+    );
+    let row = |name: &str, count: Count| {
+        let micros = |counts: u32| f64::from(counts) * 1e6 / f64::from(took.hz);
+        format!(
+            "{name:<10}{:>12}{:>12}{:>12.0}{:>12.0}\n",
+            count.last,
+            count.worst,
+            micros(count.last),
+            micros(count.worst)
+        )
+    };
+    let mut text = format!("{} frames, a core of {} MHz\n", took.frames, took.hz / 1_000_000);
+    text += &format!("{:<10}{:>12}{:>12}{:>12}{:>12}\n", "", "cycles last", "worst", "us last", "worst");
+    text += &row("frame", took.frame);
+    for (stage, count) in Stage::ALL.iter().zip(took.stages) {
+        text += &row(stage.name(), count);
+    }
+    print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 

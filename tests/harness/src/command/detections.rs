@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
     let mut outputs = args.outputs.beside(paths.iter().chain(&args.real).flat_map(|path| recording::files(path)));
     outputs.reads(args.settings.files());
-    let picture = outputs.file("--out", args.out.as_deref())?;
+    let picture = outputs.picture("--out", args.out.as_deref())?;
     let json = outputs.file("--json", args.json.as_deref())?;
     let all = paths.iter().chain(&args.real).map(|path| returns(path, &settings)).collect::<Result<Vec<_>>>()?;
     print(&text(&all, args.real.is_some()))?;
@@ -66,6 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let real = args.real.as_ref().and_then(|_| all.last()).map(|r| &r.recording);
         file.write(serde_json::to_string_pretty(&json!({ "recordings": all, "real": real }))? + "\n")?;
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -79,8 +80,8 @@ fn returns(path: &Path, settings: &Settings) -> Result<Returns> {
 }
 
 fn text(all: &[Returns], compared: bool) -> String {
-    let mut text = String::from("Median number of detections of an object in sight, by its distance:\n");
-    let headings: Vec<String> = STRETCHES.iter().map(|[from, to]| format!("{from}–{to} m")).collect();
+    let mut text = String::from("Median number of detections of an object in sight, by its distance in metres:\n");
+    let headings: Vec<String> = STRETCHES.iter().map(|[from, to]| format!("{from}–{to}")).collect();
     let heading: Vec<&str> = ["recording", "objects"].into_iter().chain(headings.iter().map(String::as_str)).collect();
     let number = |v: Option<f64>| v.map_or_else(|| "–".into(), |v| format!("{v:.1}"));
     let rows = all.iter().flat_map(|r| {

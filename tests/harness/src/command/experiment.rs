@@ -114,20 +114,21 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = args.outputs.beside(args.beside.iter().flat_map(|path| recording::files(path)));
     outputs.reads(args.judging.files().chain([path.clone()]));
     match args.scene {
-        World::Motorway => motorway(args, &path, &settings, outputs)?,
-        World::Crossing | World::Queue => several_scenes(args, &path, &settings, outputs)?,
-        World::GantryCamera => gantry_camera(args, &path, &settings, outputs)?,
+        World::Motorway => motorway(args, &path, &settings, &mut outputs)?,
+        World::Crossing | World::Queue => several_scenes(args, &path, &settings, &mut outputs)?,
+        World::GantryCamera => gantry_camera(args, &path, &settings, &mut outputs)?,
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn motorway(args: &Args, path: &Path, settings: &Settings, mut outputs: Outputs) -> Result<()> {
+fn motorway(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
     let asked = args.train || args.every > 1 || args.only_elevation;
     ensure!(!asked, "--train, --every and --only-elevation go with --scene crossing or --scene queue");
     let plan = Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
-    let kept = kept(args, plan.days().map(Day::name), &mut outputs)?;
+    let kept = kept(args, plan.days().map(Day::name), outputs)?;
     let running = bar("simulating and replaying", total_steps(&plan, ESTIMATORS)?);
     let keep = |day: &Day, bytes: &[u8]| kept.get(&day.name()).map_or(Ok(()), |file| file.write(bytes));
     let experiment = Experiment::run(&plan, settings, &keep, &|| running.step())?;
@@ -141,7 +142,7 @@ fn motorway(args: &Args, path: &Path, settings: &Settings, mut outputs: Outputs)
     Ok(())
 }
 
-fn several_scenes(args: &Args, path: &Path, settings: &Settings, mut outputs: Outputs) -> Result<()> {
+fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
     let plan = scenes::Plan::read(path)?;
     let set = if args.train { &plan.training } else { &plan.reporting };
     let all = plan.scenes(set)?;
@@ -150,7 +151,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, mut outputs: Ou
         outputs.reads(scene.files(None)?);
     }
     let json_file = outputs.file("--json", args.json.as_deref())?;
-    let kept = kept(args, all.iter().map(|scene| scene.name.clone()), &mut outputs)?;
+    let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
     let running = bar("simulating and replaying", scenes::total_steps(&all, extent, ESTIMATORS));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
@@ -173,7 +174,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, mut outputs: Ou
     Ok(())
 }
 
-fn gantry_camera(args: &Args, path: &Path, settings: &Settings, mut outputs: Outputs) -> Result<()> {
+fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
     let asked = args.train || args.only_elevation || args.keep.is_some() || !args.beside.is_empty();
     ensure!(!asked, "--train, --only-elevation, --keep and --beside do not go with --scene gantry-camera");
     let plan = gantry_camera::Plan::read(path)?;

@@ -1,23 +1,29 @@
 //! `viewshed listen`: a log of a bus in, the maps on it out.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+#[cfg(target_os = "linux")]
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use viewshed::wire::message::Addresses;
 
 use super::key::KeyArgs;
+use super::options::seconds;
 use super::print;
-use crate::bus::listening::{Heard, Listening, Moment, SENSORS, shown};
+use crate::bus::listening::{Counted, Heard, Listening, Moment, SENSORS, shown};
 use crate::recording::can_log::{self, FORMATS, Format, Line};
 use crate::recording::problems::Problems;
 use crate::recording::serial_log::Chunk;
 use crate::recording::{file, foreign};
+#[cfg(target_os = "linux")]
+use crate::results::files::until_ctrl_c;
 use crate::results::files::{Folder, OutputArgs, Target};
 use crate::results::pictures::polar::{self, PolarGrid};
 
-/// Decode the maps that sensors broadcast in a CAN log, or in one of a serial line by viewshed bus
+/// Decode the maps that sensors broadcast on a CAN bus, in its log, or in one of a serial line by viewshed bus
 ///
 /// Prints what every sensor says of itself, what happened to its frames, and what its maps show. With a key
 /// only authentic messages count, without one only those that are not authenticated.
@@ -25,8 +31,14 @@ use crate::results::pictures::polar::{self, PolarGrid};
 pub struct Args {
     /// CAN log of `candump` (with -L, or -t a, d or z), Vector ASC or SavvyCAN CSV, or one of a serial line by viewshed bus
     /// --log; each also gzipped; - reads standard input
-    #[arg(value_name = "LOG")]
-    log: PathBuf,
+    #[arg(value_name = "LOG", required_unless_present = "can")]
+    log: Option<PathBuf>,
+    /// Listen to this SocketCAN interface in place of a log, until Ctrl-C
+    #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["log", "interface"])]
+    can: Option<String>,
+    /// Listen to it for this time only, in seconds
+    #[arg(long = "for", value_name = "SECONDS", requires = "can", value_parser = seconds)]
+    seconds: Option<f64>,
     /// Only this bus of a CAN log: can0, or the channel of an ASC log [default: all]
     #[arg(long, value_name = "NAME")]
     interface: Option<String>,
@@ -36,8 +48,8 @@ pub struct Args {
     /// Write a picture of every sensor's map into this folder now and then
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Time between two looks at the maps, in seconds of the log
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    /// Time between two looks at the maps, in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true)]
     every: f64,
     /// Sensors on 29-bit identifiers from 0x4000000 on, instead of 0x400 to 0x4FF
     #[arg(long)]
@@ -48,49 +60,60 @@ pub struct Args {
     key: KeyArgs,
 }
 
-/// Listens to a log.
+/// Listens to a log or a bus.
 ///
 /// # Errors
-/// A log that cannot be read, or holds no broadcast.
+/// A log that cannot be read, an interface that cannot be listened to, and one that has no broadcast.
 pub fn run(args: &Args) -> Result<ExitCode> {
     if args.every.is_nan() || args.every <= 0.0 {
         bail!("--every {} is not above 0", args.every);
     }
-    let (logged, unread) = logged(&args.log, args.interface.as_deref())?;
-    let mut outputs = args.outputs.beside([args.log.clone()].into_iter().chain(args.key.file()));
+    let mut outputs = args.outputs.beside(args.log.clone().into_iter().chain(args.key.file()));
     let json = outputs.file("--json", args.json.as_deref())?;
     let pictures = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     let addresses = if args.extended { Addresses::EXTENDED } else { Addresses::STANDARD };
     let key = args.key.key()?;
-    let mut listening = Listening::new(addresses, key.as_ref());
-    let mut maps: Vec<Vec<Moment>> = vec![Vec::new(); usize::from(SENSORS)];
-    let mut next = None;
-    let every_ns = (args.every * 1e9) as i64;
-    for logged in &logged {
-        let time_ns = match logged {
-            Logged::Frame(line) => line.time_ns,
-            Logged::Chunk(chunk) => chunk.time_ns,
-        };
-        let due = *next.get_or_insert(time_ns + every_ns);
-        if time_ns >= due {
-            look(&listening, &mut maps, pictures.as_ref())?;
-            next = Some(due + (time_ns - due) / every_ns * every_ns + every_ns);
+    let mut session = Session {
+        listening: Listening::new(addresses, key.as_ref()),
+        maps: vec![Vec::new(); usize::from(SENSORS)],
+        pictures,
+        every_ns: (args.every * 1e9) as i64,
+        begin_ns: None,
+        next_ns: 0,
+        told: false,
+    };
+    let (log, unread) = match (&args.can, &args.log) {
+        (Some(interface), _) => {
+            session.told = true;
+            live(interface, args.seconds, &mut session)?;
+            (Cow::Borrowed(interface.as_str()), 0)
         }
-        match logged {
-            Logged::Frame(line) => listening.take(line),
-            Logged::Chunk(chunk) => listening.take_bytes(chunk),
+        (None, Some(log)) => {
+            let (logged, unread) = logged(log, args.interface.as_deref())?;
+            for logged in &logged {
+                match logged {
+                    Logged::Frame(line) => session.at(line.time_ns)?.take(line),
+                    Logged::Chunk(chunk) => session.at(chunk.time_ns)?.take_bytes(chunk),
+                }
+            }
+            (file::shown(log), unread)
         }
-    }
-    look(&listening, &mut maps, pictures.as_ref())?;
+        (None, None) => bail!("neither a log nor an interface"),
+    };
+    session.look()?;
+    let Session { listening, mut maps, .. } = session;
     let sensors: Vec<Heard> = listening
         .sensors()
         .into_iter()
         .filter_map(|n| listening.heard(n, std::mem::take(&mut maps[usize::from(n)])))
         .collect();
     if sensors.is_empty() {
-        let (log, frames, not_authentic) = (file::shown(&args.log), listening.frames(), listening.not_authentic());
+        let (frames, not_authentic) = (listening.frames(), listening.not_authentic());
         match (not_authentic, key) {
-            (0, _) => bail!("{log}: none of its {frames} frames is of a broadcast"),
+            (0, _) if frames == 0 => bail!("{log}: no frame came; `viewshed doctor` says what to check"),
+            (0, _) => bail!(
+                "{log}: none of its {frames} frames is of a broadcast; `viewshed doctor` says what is there, and --extended takes those of 29 bits"
+            ),
             (n, None) => {
                 bail!("{log}: {n} of its {frames} frames are authenticated; give the sender's key with --key-file")
             }
@@ -109,7 +132,85 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         });
         file.write(serde_json::to_string_pretty(&report).context("the report as JSON")? + "\n")?;
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Maps as they are heard, looked at now and then.
+struct Session {
+    listening: Listening,
+    maps: Vec<Vec<Moment>>,
+    pictures: Option<Folder>,
+    every_ns: i64,
+    begin_ns: Option<i64>,
+    next_ns: i64,
+    /// Each look is printed.
+    told: bool,
+}
+
+impl Session {
+    /// What is to be given what came at a time; looks at the maps before it where that is due.
+    fn at(&mut self, time_ns: i64) -> Result<&mut Listening> {
+        if self.begin_ns.is_none() {
+            (self.begin_ns, self.next_ns) = (Some(time_ns), time_ns + self.every_ns);
+        }
+        if time_ns >= self.next_ns {
+            self.look()?;
+            let missed = (time_ns - self.next_ns) / self.every_ns;
+            self.next_ns += (missed + 1) * self.every_ns;
+        }
+        Ok(&mut self.listening)
+    }
+
+    fn look(&mut self) -> Result<()> {
+        look(&self.listening, &mut self.maps, self.pictures.as_ref())?;
+        if !self.told {
+            return Ok(());
+        }
+        let begin_s = self.begin_ns.unwrap_or(0) as f64 * 1e-9;
+        let sensors = self.listening.sensors();
+        let mut text = String::new();
+        let passed_s = (self.listening.time_s() - begin_s).max(0.0);
+        for sensor in &sensors {
+            // never the map as it was: who is silent shows nothing
+            let now = self.listening.moment(*sensor).map_or_else(|| UNKNOWN.to_owned(), |m| shares(&m));
+            let _ = writeln!(text, "{passed_s:7.1} s  sensor {sensor}: {now}");
+        }
+        if sensors.is_empty() {
+            let _ = writeln!(text, "{passed_s:7.1} s  no broadcast among {} frames", self.listening.frames());
+        }
+        print(&text)
+    }
+}
+
+/// Listens to an interface.
+#[cfg(target_os = "linux")]
+fn live(interface: &str, seconds: Option<f64>, session: &mut Session) -> Result<()> {
+    let bus = can_log::live::Bus::open(interface)?;
+    let stop = until_ctrl_c().context("Ctrl-C")?;
+    bus.listen(seconds.map(Duration::from_secs_f64), &stop, |heard| {
+        match heard {
+            can_log::live::Heard::Frame(line) => session.at(line.time_ns)?.take(&line),
+            can_log::live::Heard::Nothing(time_ns) => session.at(time_ns)?.pass(time_ns),
+        }
+        Ok(())
+    })
+}
+
+#[cfg(not(target_os = "linux"))]
+fn live(_: &str, _: Option<f64>, _: &mut Session) -> Result<()> {
+    bail!("--can listens to SocketCAN, which Linux has; record the bus and name the log")
+}
+
+/// Said of a sensor that has been silent for too long.
+const UNKNOWN: &str = "silent, so all of its map is unknown";
+
+/// How much of a map is visible.
+fn shares(m: &Moment) -> String {
+    let all = (m.visible + m.invisible + m.unknown).max(1) as f64;
+    let share = |n: usize| 100.0 * n as f64 / all;
+    let (visible, invisible, unknown) = (share(m.visible), share(m.invisible), share(m.unknown));
+    format!("{visible:.1} % of the cells visible, {invisible:.1} % not, {unknown:.1} % unknown")
 }
 
 /// A line of a log.
@@ -172,6 +273,28 @@ fn draw(listening: &Listening, sensor: u8, time_s: f64, target: &Target) -> Resu
     polar::draw(&grid).save(target)
 }
 
+/// What happened to a sensor's frames: those that were not used by reason, with their total.
+fn used(c: &Counted) -> String {
+    let reasons = [
+        (c.protection, "failed the protection"),
+        (c.not_authentic, "not authentic"),
+        (c.repeated, "repeated"),
+        (c.out_of_sequence, "out of sequence"),
+        (c.late, "late"),
+        (c.epoch, "of another epoch"),
+        (c.early, "before their header or refresh"),
+        (c.malformed, "malformed"),
+    ];
+    let unused: u64 = reasons.iter().map(|(n, _)| u64::from(*n)).sum();
+    let arrived = u64::from(c.accepted) + unused;
+    let said: Vec<String> = reasons.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{n} {why}")).collect();
+    let mut text = format!("frames: {arrived} came, {} used", c.accepted);
+    if unused > 0 {
+        text += &format!(", {unused} not: {}", said.join(", "));
+    }
+    text + &format!("; {} never came, by their counters", c.lost)
+}
+
 fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
     let mut text = String::new();
     for heard in sensors {
@@ -213,36 +336,17 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
                 s.bus_off
             );
         }
-        let c = &heard.counters;
-        let _ = writeln!(
-            text,
-            "  frames: {} used; {} failed the protection, {} not authentic, {} missing by their counters, {} repeated, {} out of sequence, \
-             {} late, {} of another epoch, {} before their header or refresh, {} malformed",
-            c.accepted,
-            c.protection,
-            c.not_authentic,
-            c.lost,
-            c.repeated,
-            c.out_of_sequence,
-            c.late,
-            c.epoch,
-            c.early,
-            c.malformed
-        );
+        let _ = writeln!(text, "  {}", used(&heard.counters));
         if let Some(m) = heard.maps.last() {
-            let all = (m.visible + m.invisible + m.unknown).max(1) as f64;
-            let share = |n: usize| 100.0 * n as f64 / all;
-            let _ = writeln!(
-                text,
-                "  {} looks at its map; the last: {:.1} % of the cells visible, {:.1} % not, {:.1} % unknown",
-                heard.maps.len(),
-                share(m.visible),
-                share(m.invisible),
-                share(m.unknown)
-            );
+            let end = if listening.moment(heard.sensor).is_none() {
+                format!("; in the end {UNKNOWN}")
+            } else {
+                String::new()
+            };
+            let _ = writeln!(text, "  {} looks at its map; the last: {}{end}", heard.maps.len(), shares(m));
         }
     }
-    let _ = writeln!(text, "{} frames, {} of others", listening.frames(), listening.foreign());
+    let _ = writeln!(text, "{} frames in all, {} of others", listening.frames(), listening.foreign());
     if unread > 0 {
         let _ = writeln!(text, "{unread} lines are no frames");
     }

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
-use crate::estimators;
+use crate::estimators::{self, MOST_RANGE_M};
 use crate::evaluation::{self, Grid, Settings};
 use crate::recording::{FieldOfView, ReadOptions};
 
@@ -84,7 +84,8 @@ pub struct ReadingArgs {
     mount: Option<[f64; 6]>,
     /// Field of view: az_min,az_max,el_min,el_max,r_min,r_max in degrees and metres [default: the file's metadata]
     ///
-    /// In the sensor frame: azimuth + to the left, elevation + up. Example: --fov -60,60,-16,16,3,200
+    /// In the sensor frame: azimuth + to the left, elevation + up. A radar's ranges end at 256 m at most. Example:
+    /// --fov=-60,60,-16,16,3,200
     #[arg(long, value_name = "AZ,AZ,EL,EL,R,R", value_parser = field_of_view, allow_hyphen_values = true)]
     fov: Option<FieldOfView>,
     /// Bus of a CAN log with several: can0, or the channel of an ASC log [default: the one with more frames of the radar]
@@ -96,13 +97,13 @@ pub struct ReadingArgs {
     #[command(flatten)]
     kind: KindArgs,
     /// Time between frames of a TI mmWave capture, which holds none [default: 0.1]
-    #[arg(long, value_name = "SECONDS", value_parser = period)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", value_parser = period)]
     frame_period: Option<f64>,
     /// Begin this many seconds after the first radar frame
-    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", value_parser = finite)]
     from: Option<f64>,
     /// End this many seconds after the first radar frame
-    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS", value_parser = finite)]
     to: Option<f64>,
 }
 
@@ -130,40 +131,40 @@ pub struct KindArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Evaluation")]
 struct EvaluationArgs {
-    /// Objects slower than this are not counted, in m/s; they still hide others [default: 1]
-    #[arg(long, value_name = "M/S")]
+    /// Objects slower than this are not counted, in m/s; they still hide others [default: 1, from 0 to 100]
+    #[arg(long, allow_negative_numbers = true, value_name = "M/S")]
     min_speed: Option<f64>,
-    /// Height above the road at which visibility is judged, in metres [default: 1]
-    #[arg(long, value_name = "METRES")]
+    /// Height above the road at which visibility is judged, in metres [default: 1, from 0 to 20]
+    #[arg(long, allow_negative_numbers = true, value_name = "METRES")]
     slice_height: Option<f64>,
-    /// Start of each recording that is not counted, in seconds [default: 1; 0 for independent frames]
-    #[arg(long, value_name = "SECONDS")]
+    /// Start of each recording that is not counted, in seconds [default: 1, from 0 to 86400; 0 for independent frames]
+    #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     warm_up: Option<f64>,
-    /// A detection belongs to an object within this distance of its footprint, in metres [default: 1]
-    #[arg(long, value_name = "METRES")]
+    /// A detection belongs to an object within this distance of its footprint, in metres [default: 1, from 0 to 20]
+    #[arg(long, allow_negative_numbers = true, value_name = "METRES")]
     growth: Option<f64>,
-    /// The footprint grows further across the line of sight, in degrees of azimuth to each side [default: 1]
-    #[arg(long, value_name = "DEGREES")]
+    /// The footprint grows further across the line of sight, in degrees of azimuth to each side [default: 1, from 0 to 45]
+    #[arg(long, allow_negative_numbers = true, value_name = "DEGREES")]
     growth_azimuth: Option<f64>,
-    /// A detection's radial velocity must match the object's within this, in m/s [default: 1.5]
-    #[arg(long, value_name = "M/S")]
+    /// A detection's radial velocity must match the object's within this, in m/s [default: 1.5, from 0 to 1000]
+    #[arg(long, allow_negative_numbers = true, value_name = "M/S")]
     doppler_tolerance: Option<f64>,
-    /// An object is detected from this many detections on [default: 1]
+    /// An object is detected from this many detections on [default: 1, from 1 to 1000000]
     ///
     /// More where labels were drawn on what the radar itself saw.
-    #[arg(long, value_name = "N")]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
     min_detections: Option<u32>,
     /// Cells an object's visibility is judged on [default: cartesian]
     #[arg(long, value_enum)]
     grid: Option<Grid>,
-    /// Draws behind each 95 % interval; 0 for no intervals [default: 1000]
+    /// Draws behind each 95 % interval; 0 for no intervals [default: 1000, from 0 to 100000]
     ///
     /// Tracks are drawn with replacement (independent frames where the recording has them; for cells
     /// blocks of one second), since samples of one track are correlated. All estimators share the draws.
-    #[arg(long, value_name = "N")]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
     bootstrap: Option<u32>,
     /// Seed of the draws [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
     seed: Option<u64>,
 }
 
@@ -171,11 +172,11 @@ struct EvaluationArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Estimators")]
 struct EstimatorArgs {
-    /// Detections a frame that estimators take, after the gate; the weakest beyond are dropped and counted [default: 256]
-    #[arg(long, value_name = "N")]
+    /// Detections a frame that estimators take, after the gate; the weakest beyond are dropped and counted [default: 256, from 1 to 4096]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
     max_detections: Option<usize>,
-    /// Share of a cell that boxes must fill for `reference` to call it occupied [default: 0.5]
-    #[arg(long, value_name = "SHARE")]
+    /// Share of a cell that boxes must fill for `reference` to call it occupied [default: 0.5, above 0 to 1]
+    #[arg(long, allow_negative_numbers = true, value_name = "SHARE")]
     reference_share: Option<f64>,
 }
 
@@ -239,6 +240,7 @@ impl ReadingArgs {
             ti_header: self.kind.ti_header,
             ti_dialect: self.kind.ti_dialect,
             frame_period_s: self.frame_period,
+            one_of_several: false,
         }
     }
 }
@@ -271,7 +273,7 @@ impl EstimatorArgs {
     }
 }
 
-fn finite(text: &str) -> Result<f64, String> {
+pub(super) fn finite(text: &str) -> Result<f64, String> {
     let value: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
     if value.is_finite() { Ok(value) } else { Err(format!("`{text}` is not finite")) }
 }
@@ -311,6 +313,16 @@ fn ti_dialect(text: &str) -> Result<TiDialect, String> {
     })
 }
 
+/// How long something is to last.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = finite(text)?;
+    if (0.1..=86_400.0).contains(&seconds) {
+        Ok(seconds)
+    } else {
+        Err(format!("{seconds} s is not within 0.1 to 86400"))
+    }
+}
+
 fn period(text: &str) -> Result<f64, String> {
     let seconds = finite(text)?;
     if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
@@ -330,6 +342,11 @@ fn field_of_view(text: &str) -> Result<FieldOfView, String> {
         if lo >= hi {
             return Err(format!("{what} from {lo} to {hi} is no interval: the lower limit comes first"));
         }
+    }
+    if r1 > MOST_RANGE_M {
+        return Err(format!(
+            "range to {r1} m: grids go to {MOST_RANGE_M} m; give that, and what is farther is left out"
+        ));
     }
     Ok(FieldOfView {
         azimuth_rad: [az0.to_radians(), az1.to_radians()],
@@ -370,6 +387,38 @@ mod tests {
         assert!(error(&["--fov", "60,-60,-16,16,3,200"]).contains("azimuth from 60 to -60 is no interval"));
         assert!(error(&["--fov", "nan,60,-16,16,3,200"]).contains("not finite"));
         assert!(error(&["--min-detections", "0"]).contains("`min_detections` is 0"));
+    }
+
+    /// Every `[default: D, from LOW to HIGH...]` of the help is what is in force.
+    #[test]
+    fn defaults_and_limits_in_the_help_are_those_that_are_enforced() {
+        use clap::CommandFactory;
+
+        let command = Line::command();
+        let mut found = 0;
+        for option in command.get_arguments() {
+            let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+            let Some((default, rest)) = help.split_once("[default: ").and_then(|(_, h)| h.split_once(", from ")) else {
+                continue;
+            };
+            let number = |text: &str| text.parse::<f64>().unwrap();
+            let (low, high) = rest.split_once(" to ").unwrap();
+            let high = number(high.split(|c: char| !c.is_ascii_digit()).next().unwrap());
+            let (low, name) = (number(low), option.get_long().unwrap());
+            let with = |value: f64| parse(&[&format!("--{name}"), &value.to_string()]);
+            let (usual, given) = (parse(&[]).unwrap(), with(number(default)).unwrap());
+            assert_eq!((usual.evaluation, usual.estimators), (given.evaluation, given.estimators), "{name}");
+            assert!(with(low).is_ok() && with(high).is_ok(), "{name}");
+            if name != "max-detections" {
+                assert!(with(low - 1.0).is_err() && with(high + 1.0).is_err(), "{name}");
+            }
+            found += 1;
+        }
+        assert!(found >= 9, "{found}");
+        let error = parse(&["--warm-up", "-1"]).unwrap_err().to_string();
+        assert_eq!(error, "evaluation option `warm_up_s` is -1, it must lie in 0 to 86400");
+        let error = parse(&["--fov=-60,60,-16,16,3,400"]).unwrap_err().to_string();
+        assert!(error.contains("grids go to 256 m"), "{error}");
     }
 
     #[test]

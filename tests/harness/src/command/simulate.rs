@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Length in place of the scene's own, in seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Write as JSON what was made: frames, detections, vehicles in view, seconds it took, the scene
     #[arg(long, value_name = "FILE")]
@@ -83,6 +83,9 @@ x and y are the middle of the footprint; classes: car, van, truck, bus, motorcyc
   viewshed simulate tests/recordings/motorway.toml --out motorway.mcap
   viewshed replay motorway.mcap";
 
+/// An empty road at the end of a recording that is worth telling, seconds.
+const EMPTY_S: f64 = 5.0;
+
 /// Simulates and writes.
 ///
 /// # Errors
@@ -115,6 +118,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         made.vehicles_in_view,
         made.most_vehicles_in_view
     ))?;
+    let ends_s = simulation.traffic_ends_s();
+    if duration_s - ends_s > EMPTY_S {
+        print(&format!(
+            "traffic ends at {ends_s:.1} s of {duration_s} s: the road is empty from then on; --duration {:.0} leaves that out\n",
+            ends_s.ceil()
+        ))?;
+    }
     if let Some(file) = json_file {
         let all = json!({
             "recording": args.out.display().to_string(),
@@ -125,6 +135,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         });
         file.write(serde_json::to_string_pretty(&all)? + "\n")?;
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
 }
 

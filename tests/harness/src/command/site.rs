@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Rank::Vehicles)]
     rank: Rank,
     /// Time between the instants that are looked at, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true)]
     every: f64,
     /// Only vehicles and road between these places along the road count, in metres: FROM,TO
     #[arg(long, value_name = "FROM,TO", value_parser = stretch, allow_hyphen_values = true)]
@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
     let mut outputs = args.outputs.beside(scene.files(args.fcd.as_deref())?.into_iter().chain([args.scene.clone()]));
     outputs.reads(args.judging.files());
-    let picture = outputs.file("--out", args.out.as_deref())?;
+    let picture = outputs.picture("--out", args.out.as_deref())?;
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let base = scene.radar.mount;
     let along = args.along.clone().unwrap_or(List(vec![base.x_m]));
@@ -104,6 +104,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ranked.iter_mut().skip(1).for_each(|sets| sets.truncate(SETS_TOLD));
         file.write(report::json(&site, &ranked, &search, args.rank, &json!(settings.evaluation))?)?;
     }
+    print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -82,6 +82,8 @@ impl<B: CanBus> Link for CanLink<B> {
                 Ask::Again(block, part) => tool.again(block, part).collect(),
                 Ask::Restart => tool.restart().into_iter().collect(),
                 Ask::Clear => tool.clear().into_iter().collect(),
+                // on the serial line only
+                Ask::Timing => Vec::new(),
             };
             for frame in &frames {
                 self.bus.send(frame)?;

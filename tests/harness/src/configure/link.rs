@@ -25,6 +25,8 @@ pub enum Ask<'a> {
     Restart,
     /// Empty both slots.
     Clear,
+    /// Say how long frames take.
+    Timing,
 }
 
 /// What came that was no answer: to say what is at the other end when nothing answers.

@@ -17,12 +17,13 @@ pub mod socketcan;
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use viewshed::unit::can_service::{INCOMPLETE, PARTS};
 use viewshed::unit::identity::Identified;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::said::{Refusal, Said};
 use viewshed::unit::settings::{BlockError, Settings, SettingsCheck};
+use viewshed::unit::timing::Took;
 
 use link::{Ask, Link};
 
@@ -299,6 +300,18 @@ impl Found<'_> {
         let cleared = self.ask(Ask::Clear, WRITING, |said| (said == Said::Cleared).then_some(()))?;
         ensure!(cleared.is_some(), "{}: the unit does not say that its slots are empty; --read tells", self.place());
         Ok(())
+    }
+
+    /// How long its frames take.
+    ///
+    /// # Errors
+    /// It does not count that, or not on this line.
+    pub fn timing(&mut self) -> Result<Took> {
+        let place = self.place().to_owned();
+        ensure!(!self.link.is_bus(), "{place}: a unit says on its serial line only how long frames take: --port PATH");
+        let took =
+            self.ask(Ask::Timing, 3 * AGAIN, |said| if let Said::Took(took) = said { Some(took) } else { None })?;
+        took.with_context(|| format!("{place}: {} does not time its frames", self.unit.board()))
     }
 
     /// What it refuses before it is asked: settings that its grid cannot run with.

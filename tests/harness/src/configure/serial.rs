@@ -103,6 +103,7 @@ impl<P: Read + Write + Baud> Link for SerialLink<P> {
             Ask::Write(block) => Request::Write(block),
             Ask::Restart => Request::Restart,
             Ask::Clear => Request::Clear,
+            Ask::Timing => Request::Timing,
         };
         let message = request.message(self.sensor, self.counter);
         self.counter = self.counter.wrapping_add(1);

@@ -4,13 +4,11 @@ use std::io::ErrorKind;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use socketcan::id::FdFlags;
-use socketcan::{
-    CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, ExtendedId, Id, ShouldRetry, Socket, StandardId,
-};
-use viewshed::wire::frame::{CanFrame, CanId};
+use socketcan::{CanFdSocket, ShouldRetry, Socket};
+use viewshed::wire::frame::CanFrame;
 
 use super::can::CanBus;
+use crate::recording::can_log::live::{from_socketcan, to_socketcan};
 
 /// How long an interface may take no frame.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -84,28 +82,4 @@ impl CanBus for Interface {
             }
         }
     }
-}
-
-/// The library's frame; `None` for remote and error frames.
-fn from_socketcan(frame: &CanAnyFrame) -> Option<CanFrame> {
-    let id = match frame.id() {
-        Id::Standard(id) => CanId::standard(id.as_raw())?,
-        Id::Extended(id) => CanId::extended(id.as_raw())?,
-    };
-    match frame {
-        CanAnyFrame::Normal(frame) => CanFrame::classic(id, frame.data()),
-        CanAnyFrame::Fd(frame) => CanFrame::fd(id, frame.data()),
-        CanAnyFrame::Remote(_) | CanAnyFrame::Error(_) => None,
-    }
-}
-
-fn to_socketcan(frame: &CanFrame) -> Option<CanAnyFrame> {
-    let id: Id = match frame.id {
-        CanId::Standard(raw) => StandardId::new(raw)?.into(),
-        CanId::Extended(raw) => ExtendedId::new(raw)?.into(),
-    };
-    if frame.fd {
-        return CanFdFrame::with_flags(id, frame.data(), FdFlags::BRS).map(CanAnyFrame::Fd);
-    }
-    CanDataFrame::new(id, frame.data()).map(CanAnyFrame::Normal)
 }

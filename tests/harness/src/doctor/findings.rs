@@ -9,8 +9,8 @@ use viewshed::inputs::ars408::motion::{self, standing};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::Addresses;
 
-use super::Report;
 use super::sensor::{Output, Sensor};
+use super::{LIVE, Report};
 use crate::bus::listening::Listening;
 use crate::recording::can_log::{Content, Line};
 
@@ -65,12 +65,25 @@ pub fn judge(report: &Report, lines: &[Line]) -> Vec<Finding> {
     found.0
 }
 
+/// What is said of a bus on which nothing came.
+pub fn silence(seconds: f64) -> Finding {
+    Finding {
+        severity: Severity::Error,
+        what: format!("no frame came within {seconds:.1} s"),
+        remedy: "check that this is the radar's bus, its supply, 500 kbit/s on both sides, and termination at both ends (the radar has none of its own)".into(),
+    }
+}
+
 fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
     if report.duration_s < LEAST_S {
         found.add(
             Severity::Warning,
             format!("the log lasts {:.1} s, which is too short to say what is missing", report.duration_s),
-            "record ten seconds or more",
+            if report.kind == LIVE {
+                "listen for ten seconds or more (--for 10)"
+            } else {
+                "record ten seconds or more"
+            },
         );
     }
     let problems: u64 = report.problems.iter().filter(|p| p.what.starts_with("line skipped")).map(|p| p.count).sum();
@@ -192,7 +205,7 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
         found.add(
             Severity::Error,
             format!("{name} is there but sends no scans; {heard}"),
-            format!("send {} to switch clusters on, and read 2{}1 back", clusters(sensor), sensor.sensor),
+            format!("switch clusters on, and read 2{}1 back: {}", sensor.sensor, clusters(sensor)),
         );
         return;
     }
@@ -256,7 +269,7 @@ fn settings(found: &mut Findings, sensor: &Sensor) {
         found.add(
             Severity::Note,
             format!("{name} sends objects, which it has tracked and thinned out"),
-            format!("clusters show more of what hides what: send {}", clusters(sensor)),
+            format!("clusters show more of what hides what: {}", clusters(sensor)),
         );
     }
     let Some(state) = sensor.state else {
@@ -282,7 +295,7 @@ fn settings(found: &mut Findings, sensor: &Sensor) {
             format!(
                 "{name} sends no quality: predicted, ambiguous and invalid entries cannot be told from measured ones"
             ),
-            format!("send {}", clusters(sensor)),
+            format!("switch it on: {}", clusters(sensor)),
         );
     }
 }
@@ -295,8 +308,8 @@ fn faults(found: &mut Findings, sensor: &Sensor) {
                 (Severity::Warning, "another radar of the band faces it: turn one, or set another frequency".to_owned())
             }
             "speed missing" | "yaw rate missing" => {
-                let frames: Vec<String> = standing(sensor.sensor).map(|f| format!("{f:?}")).collect();
-                (Severity::Warning, format!("tell it that it stands: send {} every 50 ms", frames.join(" and ")))
+                let frames: Vec<String> = standing(sensor.sensor).map(|f| cansend(sensor, &f)).collect();
+                (Severity::Warning, format!("tell it every 50 ms that it stands: {}", frames.join(" and ")))
             }
             "supply voltage" => (Severity::Error, "it wants 8 to 32 V at its plug, under load".to_owned()),
             "temperature" => (Severity::Error, "let it cool; shade it".to_owned()),
@@ -346,9 +359,16 @@ fn lengths(found: &mut Findings, report: &Report) {
     }
 }
 
-/// The frame that switches clusters on.
+/// The line that switches clusters on.
 fn clusters(sensor: &Sensor) -> String {
-    Ars408Configuration::CLUSTERS.frame(sensor.sensor).map_or_else(String::new, |f: CanFrame| format!("{f:?}"))
+    Ars408Configuration::CLUSTERS.frame(sensor.sensor).map_or_else(String::new, |f| cansend(sensor, &f))
+}
+
+/// A line for a shell that sends a frame. Where the log numbers its buses, that of SocketCAN's first.
+fn cansend(sensor: &Sensor, frame: &CanFrame) -> String {
+    let named = sensor.interface.starts_with(|c: char| c.is_ascii_alphabetic());
+    let interface = if named { &sensor.interface } else { "can0" };
+    format!("`cansend {interface} {frame:?}`")
 }
 
 fn of(sensor: &Sensor) -> String {

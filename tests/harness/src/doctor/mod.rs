@@ -13,7 +13,7 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 
-use crate::recording::can_log::{self, FORMATS, Format};
+use crate::recording::can_log::{self, FORMATS, Format, Line};
 use crate::recording::file;
 use crate::recording::foreign;
 use crate::recording::problems::{Problem, Problems};
@@ -96,25 +96,49 @@ pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
     );
 }
 
+/// The kind of a report on a bus that was listened to.
+pub const LIVE: &str = "SocketCAN";
+
+/// Judges what was heard of a bus within some seconds.
+pub fn heard(interface: &str, seconds: f64, lines: &[Line], known: &ReadOptions) -> Examined {
+    let mut examined = judged(interface.to_owned(), LIVE, lines, &Problems::default(), known, seconds);
+    if let (Examined::Can(report), []) = (&mut examined, lines) {
+        report.findings = vec![findings::silence(seconds)];
+    }
+    examined
+}
+
 fn can(log: String, bytes: &[u8], format: Format, known: &ReadOptions) -> Result<Examined> {
     let mut problems = Problems::default();
     let lines = can_log::read(bytes, format, known.interface.as_deref(), &mut problems)?;
-    let sensors = sensor::all(&lines, known.profile.unwrap_or(&Ars408Profile::ARS408));
-    let native = recording::native::of_log(&lines);
+    let duration_s = can::duration_s(&lines);
+    Ok(judged(log, format.name(), &lines, &problems, known, duration_s))
+}
+
+fn judged(
+    log: String,
+    kind: &'static str,
+    lines: &[Line],
+    problems: &Problems,
+    known: &ReadOptions,
+    duration_s: f64,
+) -> Examined {
+    let sensors = sensor::all(lines, known.profile.unwrap_or(&Ars408Profile::ARS408));
+    let native = recording::native::of_log(lines);
     if sensors.is_empty() && !native.is_empty() {
-        return Ok(Examined::Native(native::examine(log, &native, 0)));
+        return Examined::Native(native::examine(log, &native, 0));
     }
     let mut report = Report {
         log,
-        kind: format.name(),
+        kind,
         frames: lines.len(),
-        duration_s: can::duration_s(&lines),
-        busiest_second: can::busiest_second(&lines),
-        identifiers: can::identifiers(&lines, &sensors),
+        duration_s,
+        busiest_second: can::busiest_second(lines),
+        identifiers: can::identifiers(lines, &sensors),
         problems: problems.iter().collect(),
         findings: Vec::new(),
         sensors,
     };
-    report.findings = findings::judge(&report, &lines);
-    Ok(Examined::Can(report))
+    report.findings = findings::judge(&report, lines);
+    Examined::Can(report)
 }

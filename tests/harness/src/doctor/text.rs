@@ -1,5 +1,6 @@
 //! The report to be read.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table, presets};
@@ -11,7 +12,12 @@ use super::{Report, native, ti};
 
 /// The report of a bus.
 pub fn can(report: &Report) -> String {
-    let mut text = format!("{}: {} frames in {:.1} s\n", report.log, report.frames, report.duration_s);
+    let buses: BTreeSet<&str> = report.identifiers.iter().map(|i| i.interface.as_str()).collect();
+    let on = match buses.iter().collect::<Vec<_>>()[..] {
+        [one] if *one != report.log => format!(" on {one}"),
+        _ => String::new(),
+    };
+    let mut text = format!("{}: {} frames{on} in {:.1} s\n", report.log, report.frames, report.duration_s);
     if !report.identifiers.is_empty() {
         let _ = writeln!(text, "{}", identifiers(&report.identifiers));
     }
@@ -74,9 +80,13 @@ fn findings(all: &[Finding]) -> String {
 }
 
 fn identifiers(all: &[Identifier]) -> Table {
+    // of a log of one bus its name is said once, above
+    let several = all.iter().any(|i| i.interface != all[0].interface);
+    let bus = |name: &str| several.then(|| name.to_owned());
     let mut table = Table::new();
     table.load_style(presets::UTF8_FULL_CONDENSED);
-    table.set_header(["interface", "id", "message", "sensor", "frames", "per second", "bytes", "expected"]);
+    let heading = ["id", "message", "sensor", "frames", "per\nsecond", "bytes", "expected"];
+    table.set_header(bus("bus").into_iter().chain(heading.map(str::to_owned)));
     for i in all {
         let lengths: Vec<String> = i.lengths.iter().map(ToString::to_string).collect();
         let expected = match (i.expected, i.frames, i.expected_length) {
@@ -84,8 +94,7 @@ fn identifiers(all: &[Identifier]) -> Table {
             (_, _, Some(length)) => format!("{length} bytes"),
             _ => String::new(),
         };
-        table.add_row([
-            i.interface.clone(),
+        let figures = [
             i.id.clone(),
             i.message.unwrap_or("").to_owned(),
             i.sensor.map_or_else(String::new, |s| s.to_string()),
@@ -93,14 +102,34 @@ fn identifiers(all: &[Identifier]) -> Table {
             format!("{:.1}", i.rate_hz),
             lengths.join(", "),
             expected,
-        ]);
+        ];
+        table.add_row(bus(&i.interface).into_iter().chain(figures));
     }
-    for column in [4, 5] {
+    for column in [2, 3, 4].map(|k| k + usize::from(several)) {
         if let Some(column) = table.column_mut(column) {
             column.set_cell_alignment(CellAlignment::Right);
+            column.set_padding((0, 1));
         }
     }
     table
+}
+
+/// What a counter of the decoder counts; `None` for frames and scans, which are no flaws.
+fn in_words(counter: &str) -> Option<&'static str> {
+    Some(match counter {
+        "incomplete" => "scans of which some is missing",
+        "broken" => "scans of which most is missing",
+        "lost" => "scans lost, by their counter",
+        "restarts" => "restarts of the radar",
+        "too_short" => "frames too short",
+        "no_scan" => "entries outside of a scan",
+        "repeated" => "entries twice",
+        "surplus" => "entries more than announced",
+        "unknown_entry" => "entries of another scan",
+        "no_range" => "entries at no measurable range",
+        "overflow" => "entries more than there is room for",
+        _ => return None,
+    })
 }
 
 fn sensor_lines(s: &Sensor) -> String {
@@ -117,10 +146,11 @@ fn sensor_lines(s: &Sensor) -> String {
     if let Some(version) = &s.version {
         let _ = write!(text, ", software {version}");
     }
-    let counted: Vec<String> =
-        named(&s.counters).iter().skip(2).filter(|(_, n)| *n > 0).map(|(name, n)| format!("{name} {n}")).collect();
+    let counted = |(name, n): (&str, u32)| Some((n, in_words(name)?)).filter(|(n, _)| *n > 0);
+    let counted = named(&s.counters).into_iter().filter_map(counted).map(|(n, what)| format!("{n} {what}"));
+    let counted: Vec<String> = counted.collect();
     if !counted.is_empty() {
-        let _ = write!(text, "; {}", counted.join(", "));
+        let _ = write!(text, "\n    not used, of {} frames: {}", s.counters.frames, counted.join(", "));
     }
     text + "\n"
 }

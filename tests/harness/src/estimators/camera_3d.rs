@@ -27,7 +27,7 @@ const ROWS: usize = 200;
 const COLUMNS: usize = 60;
 
 /// Counted for boxes of classes that are no vehicles.
-const NO_VEHICLE: &str = "box of no vehicle";
+pub const NO_VEHICLE: &str = "box of no vehicle";
 
 struct Driver {
     parameters: Camera3dParameters<ROWS, COLUMNS>,

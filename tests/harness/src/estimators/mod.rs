@@ -100,10 +100,12 @@ impl Options {
 /// Most detections a frame that storage is compiled for.
 pub const MOST_DETECTIONS: usize = 4096;
 
+pub use radar_2d::MOST_RANGE_M;
+
 /// Every estimator for a recording, in the order of the table. `reference` needs ground truth.
 ///
 /// # Errors
-/// A parameter the library refuses, by name.
+/// A parameter the library refuses, by name, and a field of view that grids here do not cover.
 pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estimator>>> {
     if let Some(camera) = recording.of_camera() {
         return camera_3d::all(camera, recording.truth.as_ref(), &options.camera_3d);
@@ -112,6 +114,20 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
         Ok(n) if n > 0 && options.max_detections <= MOST_DETECTIONS => n,
         _ => bail!("--max-detections {} is outside 1 to {MOST_DETECTIONS}", options.max_detections),
     };
+    let view = &recording.sensor.field_of_view;
+    if view.range_m[1] > MOST_RANGE_M {
+        let [a, e] = [view.azimuth_rad, view.elevation_rad].map(|ends| ends.map(f64::to_degrees));
+        bail!(
+            "{}: its field of view reaches {} m, and grids here {MOST_RANGE_M} m: give it with --fov={:.0},{:.0},{:.0},{:.0},{:.0},{MOST_RANGE_M}",
+            recording.name,
+            view.range_m[1],
+            a[0],
+            a[1],
+            e[0],
+            e[1],
+            view.range_m[0]
+        );
+    }
     let sensor = sensor(recording, &options.noise);
     let mut radar_2d = options.radar_2d;
     radar_2d.gate.max_detections = max_detections;

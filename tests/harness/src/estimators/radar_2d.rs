@@ -12,6 +12,10 @@ use crate::recording::Frame;
 
 /// Cells along the road, and words of eight cells across: any heading of a 250 m fan fits.
 const CELLS: usize = 512;
+
+/// Distance to which cells of the usual 1 m reach in any direction.
+pub const MOST_RANGE_M: f64 = (CELLS / 2) as f64;
+
 const WORDS: usize = 64;
 /// 0.4 degrees over 120 degrees: 1.4 m at 200 m.
 const RAYS: usize = 320;

@@ -331,6 +331,7 @@ pub mod by_hand {
                 has_elevation: true,
                 frames_independent: false,
                 platform_moving: false,
+                synthetic: false,
                 licence: None,
             },
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),

@@ -77,7 +77,7 @@ pub fn write(target: &Target, tracks: &[LabelTrack], site: &Site) -> Result<()> 
 /// # Errors
 /// A file that cannot be read, and the line of the first row that is malformed; the id of what is no track.
 pub fn read(path: &Path, site: &Site) -> Result<Vec<LabelTrack>> {
-    let mut rows = read_rows(path)?;
+    let mut rows = read_rows::<LabelRow>(path)?;
     for (line, row) in &rows {
         // what the evaluation would refuse
         label(LabelRow { object_id: String::new(), class: row.class.clone(), ..*row })

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
-use super::{Frame, ReadOptions, Recording, labels, plausible};
+use super::{Frame, ReadOptions, Recording, clock, labels, plausible};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -36,6 +36,9 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if options.approaching_is_positive {
         let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
         all.for_each(|d| d.radial_velocity_mps = -d.radial_velocity_mps);
+    }
+    if !recording.sensor.frames_independent {
+        clock::check(&recording.frames, &mut recording.problems);
     }
     plausible::check(&mut recording);
     restrict(&mut recording, options);

@@ -54,6 +54,7 @@ pub fn recording(
         has_elevation: kind.has_elevation,
         frames_independent: false,
         platform_moving: false,
+        synthetic: false,
         licence: None,
     };
     Recording { name, sensor, pose, frames, truth: None, occlusion: BTreeMap::new(), camera: None, problems }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
@@ -47,11 +48,11 @@ pub struct LabelRow {
     pub near_y_m: Option<f64>,
 }
 
-/// Every row of a file, with its line.
+/// Every row of a file, with its line. Lines that begin with # are none.
 ///
 /// # Errors
 /// Names file and line of the first row that is malformed.
-pub fn read_rows(path: &Path) -> Result<Vec<(u64, LabelRow)>> {
+pub fn read_rows<Row: DeserializeOwned>(path: &Path) -> Result<Vec<(u64, Row)>> {
     let place = || path.display().to_string();
     let mut csv =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).with_context(place)?;
@@ -79,7 +80,7 @@ pub fn at_line(path: &Path, line: u64) -> String {
 /// Names file and line of the first row that is malformed or whose class has no known size; labels of another time.
 pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label>, usize)> {
     let (mut labels, mut sized_by_class) = (Vec::new(), BTreeSet::new());
-    for (line, row) in read_rows(path)? {
+    for (line, row) in read_rows::<LabelRow>(path)? {
         if [row.length_m, row.width_m, row.height_m].contains(&None) {
             sized_by_class.insert(row.object_id.clone());
         }
@@ -181,14 +182,14 @@ struct OcclusionRow {
 }
 
 /// Reads human occlusion grades by object id.
+///
+/// # Errors
+/// Names file and line of the first row that is malformed, or whose grade is none.
 pub fn read_occlusion(path: &Path) -> Result<BTreeMap<String, u8>> {
-    let place = || path.display().to_string();
-    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).with_context(place)?;
     let mut grades = BTreeMap::new();
-    for (i, row) in csv.deserialize::<OcclusionRow>().enumerate() {
-        let row = row.with_context(|| format!("{}, line {}", place(), i + 2))?;
+    for (line, row) in read_rows::<OcclusionRow>(path)? {
         if row.occlusion_0_to_2 > 2 {
-            bail!("{}, line {}: occlusion {} is not 0, 1 or 2", place(), i + 2, row.occlusion_0_to_2);
+            bail!("{}: occlusion {} is not 0, 1 or 2", at_line(path, line), row.occlusion_0_to_2);
         }
         grades.insert(row.object_id, row.occlusion_0_to_2);
     }

@@ -58,7 +58,8 @@ struct Reader {
     truth_topic: Option<String>,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Topic>,
-    metadata: BTreeMap<String, String>,
+    /// Records of [`SENSOR_METADATA`].
+    metadata: Vec<BTreeMap<String, String>>,
     transforms: Transforms,
     radar_frame: Option<String>,
     topics_of_frames: BTreeSet<String>,
@@ -67,6 +68,33 @@ struct Reader {
     labelled: bool,
     camera: CameraReader,
     problems: Problems,
+}
+
+/// Topics with messages of a radar, by what is in their first; sorted.
+///
+/// A lidar's clouds, which have no velocity, are none of them.
+pub fn radar_topics(bytes: &[u8]) -> Vec<String> {
+    let options = mcap::read::Options::IgnoreEndMagic.into();
+    let Ok(messages) = mcap::MessageStream::new_with_options(bytes, options) else { return Vec::new() };
+    let (mut radars, mut seen) = (BTreeSet::new(), BTreeSet::new());
+    // a file that breaks off has told by then which topics it has
+    for message in messages.map_while(Result::ok) {
+        let channel = &message.channel;
+        if !seen.insert(channel.id) || channel.message_encoding != ENCODING {
+            continue;
+        }
+        let is_radar = match channel.schema.as_ref().map(|schema| schema.name.as_str()) {
+            Some(POINT_CLOUD) => {
+                ros::decode::<PointCloud2>(&message.data).is_ok_and(|c| points::from_cloud(&c).is_ok())
+            }
+            Some(RADAR_SCAN) => ros::decode::<RadarScan>(&message.data).is_ok(),
+            _ => false,
+        };
+        if is_radar {
+            radars.insert(channel.topic.clone());
+        }
+    }
+    radars.into_iter().collect()
 }
 
 /// A whole recording from the bytes of its file, with nothing beside it.
@@ -84,7 +112,9 @@ pub fn parse(bytes: &[u8], name: String, options: &ReadOptions) -> Result<Record
     let mut reader = read(options.radar_topic.clone())?;
     if reader.radar_topic.is_none() && reader.topics_of_frames.is_empty() {
         // the only one that can be meant
-        if let [one] = &reader.radar_topics()[..] {
+        let by_type = reader.radar_topics();
+        let by_content = if by_type.len() > 1 { radar_topics(bytes) } else { Vec::new() };
+        if let ([one], _) | (_, [one]) = (&by_type[..], &by_content[..]) {
             reader = read(Some(one.clone()))?;
         }
     }
@@ -124,7 +154,7 @@ impl Reader {
                     });
                 }
                 Record::Message { header, data } => self.message(&header, &data),
-                Record::Metadata(m) if m.name == SENSOR_METADATA => self.metadata = m.metadata,
+                Record::Metadata(m) if m.name == SENSOR_METADATA => self.metadata.push(m.metadata),
                 Record::DataEnd(_) => {
                     ended = true;
                 }
@@ -190,12 +220,6 @@ impl Reader {
         if time_ns == 0 && message.log_time > 0 {
             time_ns = message.log_time as i64;
             self.problems.add(topic, "header without a stamp, log time taken", time_ns);
-        }
-        if let Some(last) = self.frames.last()
-            && time_ns <= last.time_ns
-        {
-            let what = if time_ns == last.time_ns { "time stands still" } else { "time runs backwards" };
-            self.problems.add(topic, what, time_ns);
         }
         self.problems.add_many(topic, NOT_FINITE, time_ns, points.not_finite);
         self.problems.add_many(topic, NOT_A_RANGE, time_ns, points.not_a_range);
@@ -321,7 +345,17 @@ impl Reader {
     }
 
     fn sensor(&self, recording: &str, options: &ReadOptions) -> Result<Sensor> {
-        let text = |key: &str| self.metadata.get(key).map(String::as_str);
+        // the record that names this radar's topic; else the one that names none
+        let topic = self.topics_of_frames.first().map(String::as_str);
+        let of_this = self.metadata.iter().rev().find(|m| m.get("topic").is_some_and(|t| Some(t.as_str()) == topic));
+        let metadata = of_this.or(self.metadata.iter().rev().find(|m| !m.contains_key("topic")));
+        if options.one_of_several && of_this.is_none() && options.field_of_view.is_none() {
+            bail!(
+                "{recording}: no metadata `{SENSOR_METADATA}` with `topic` = {}; give the field of view with --fov",
+                topic.unwrap_or("?")
+            );
+        }
+        let text = |key: &str| metadata.and_then(|m| m.get(key)).map(String::as_str);
         let flag = |key: &str| text(key).map(|v| v.eq_ignore_ascii_case("true"));
         let field_of_view = match options.field_of_view {
             Some(f) => f,
@@ -356,6 +390,7 @@ impl Reader {
             has_elevation: flag("has_elevation").unwrap_or_else(measured),
             frames_independent: flag("frames_independent").unwrap_or(false),
             platform_moving: text("platform") == Some("moving"),
+            synthetic: flag("synthetic").unwrap_or(false),
             licence: text("licence").map(str::to_owned),
         })
     }

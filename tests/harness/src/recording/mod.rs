@@ -6,6 +6,7 @@ pub mod boxes;
 pub mod camera;
 pub mod can_log;
 pub mod capture;
+pub mod clock;
 pub mod file;
 pub mod foreign;
 pub mod labels;
@@ -91,6 +92,8 @@ pub struct Sensor {
     /// Single frames without continuity: the estimator is reset before each.
     pub frames_independent: bool,
     pub platform_moving: bool,
+    /// Of a simulated world.
+    pub synthetic: bool,
     pub licence: Option<String>,
 }
 
@@ -102,6 +105,7 @@ impl Sensor {
         has_elevation: true,
         frames_independent: false,
         platform_moving: false,
+        synthetic: false,
         licence: None,
     };
 }
@@ -166,11 +170,60 @@ pub struct ReadOptions {
     pub ti_dialect: Option<viewshed::inputs::ti::TiDialect>,
     /// Time between frames of a TI capture.
     pub frame_period_s: Option<f64>,
+    /// The file has other radars, too: what it says of one without naming it is not this one's.
+    pub one_of_several: bool,
 }
 
 /// Every file that [`read`] may read for a recording.
 pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
     [path.to_owned()].into_iter().chain(beside::files(path)).chain(boxes::camera_file(path))
+}
+
+/// Reads a recording as [`read`] does, and where an MCAP file has several radars and none is chosen, that of each: its
+/// own, with a name made of the file's and the topic's.
+///
+/// # Errors
+/// Those of [`read`]; several radars, some of them without a mount or a field of view: all are listed.
+pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, ReadOptions)>> {
+    let asked = options.radar_topic.is_some() || path.as_os_str() == file::STANDARD_INPUT || boxes::is_boxes(path);
+    let bytes = if asked { Vec::new() } else { file::bytes(path)? };
+    let topics = if bytes.starts_with(::mcap::MAGIC) { mcap::radar_topics(&bytes) } else { Vec::new() };
+    if topics.len() < 2 {
+        // whoever reads the file again finds the same topic
+        let radar_topic = options.radar_topic.clone().or(topics.first().cloned());
+        return Ok(vec![(read(path, options)?, ReadOptions { radar_topic, ..options.clone() })]);
+    }
+    let name = file::stem(path);
+    if options.mount.is_some() {
+        bail!(
+            "{name}: {} radars: {}; --mount is of one: choose it with --radar-topic",
+            topics.len(),
+            topics.join(", ")
+        );
+    }
+    let (mut found, mut said, mut all) = (Vec::new(), String::new(), true);
+    for topic in &topics {
+        let of_one = ReadOptions { radar_topic: Some(topic.clone()), one_of_several: true, ..options.clone() };
+        let outcome = mcap::parse(&bytes, name.clone(), &of_one).and_then(|r| beside::complete(r, path, &of_one));
+        match outcome {
+            Ok(recording) => {
+                said += &format!("\n  {topic}: can be read");
+                let name = format!("{name}-{}", topic.trim_matches('/').replace('/', "-"));
+                found.push((Recording { name, ..recording }, of_one));
+            }
+            Err(error) => {
+                said += &format!("\n  {topic}: {error:#}");
+                all = false;
+            }
+        }
+    }
+    if !all {
+        bail!(
+            "{name}: {} radars, and not each has mount and field of view; choose one with --radar-topic:{said}",
+            topics.len()
+        );
+    }
+    Ok(found)
 }
 
 /// Reads a recording of any kind: MCAP, a CAN log, a capture of a TI mmWave radar or of the native format, boxes of a

@@ -86,9 +86,6 @@ pub fn read(name: String, messages: &Messages, broken: u32, options: &ReadOption
     let mut frames: Vec<Frame> = Vec::new();
     let counters = scans(sensor, messages, |scan| {
         let time_ns = i64::try_from(scan.time.micros()).unwrap_or(i64::MAX).saturating_mul(1000);
-        if frames.last().is_some_and(|last| time_ns <= last.time_ns) {
-            problems.add("native", "time stands still or runs backwards", time_ns);
-        }
         if scan.fault {
             problems.add("native", "scan of a radar that reports a fault", time_ns);
         }

@@ -196,6 +196,9 @@ pub fn sensor_metadata(sensor: &Sensor) -> Metadata {
     if sensor.platform_moving {
         map.insert("platform".into(), "moving".into());
     }
+    if sensor.synthetic {
+        map.insert("synthetic".into(), "true".into());
+    }
     map.extend(sensor.licence.iter().map(|l| ("licence".to_owned(), l.clone())));
     Metadata { name: SENSOR_METADATA.into(), metadata: map }
 }

@@ -127,6 +127,12 @@ impl Simulation {
         Ok(Self { radar: scene.radar.radar(), vehicles, structures, traffic, scene })
     }
 
+    /// When the last vehicle leaves, seconds since the begin.
+    pub fn traffic_ends_s(&self) -> f64 {
+        let ends = self.traffic.vehicles.iter().filter_map(|v| v.ends_s());
+        ends.fold(0.0, f64::max) - self.scene.from_s()
+    }
+
     /// Radar frames of the whole recording.
     pub fn frames(&self) -> u64 {
         self.count(self.scene.radar.rate_hz)
@@ -282,6 +288,7 @@ impl Simulation {
             has_elevation: self.radar.has_elevation,
             frames_independent: false,
             platform_moving: false,
+            synthetic: true,
             licence: self.scene.licence.clone(),
         }
     }

@@ -127,6 +127,8 @@ fn a_unit_is_configured_compared_read_and_emptied() {
     assert_eq!(ask(&["unit.toml"]).0, 0);
     let (_, text, _) = ask(&["--read"]);
     assert!(text.contains("height_m = 6.0") && text.contains("# block 2 counts from its next start on"), "{text}");
+    let (code, _, error) = ask(&["--timing"]);
+    assert!(code == 2 && error.contains("this-computer does not time its frames"), "{error}");
     let (code, text, _) = ask(&["--factory"]);
     assert!(code == 0 && text.contains("emptied and restarted"), "{text}");
     assert!(ask(&["--read"]).2.contains("no configuration"));

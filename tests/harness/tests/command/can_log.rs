@@ -180,9 +180,9 @@ fn the_doctor_finds_losses_faults_lengths_and_foreign_clocks() {
     assert_eq!(code, 1, "a frame too short is an error");
     for (what, remedy) in [
         ("reports interference", "another radar"),
-        ("reports speed missing", "300#0000 and 301#8000"),
-        ("reports yaw rate missing", "300#0000 and 301#8000"),
-        ("sends no quality", "200#78"),
+        ("reports speed missing", "`cansend can0 300#0000` and `cansend can0 301#8000`"),
+        ("reports yaw rate missing", "`cansend can0 300#0000` and"),
+        ("sends no quality", "`cansend can0 200#78"),
         ("says that its id is 1", "power it off and on"),
         ("is told that it moves, at up to 20.00 m/s", "stands"),
         ("1 lines of the log are no frames", "candump -L"),

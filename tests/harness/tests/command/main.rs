@@ -9,6 +9,7 @@ mod outputs;
 mod own_data;
 mod python;
 mod radar_scan;
+mod read_by_people;
 mod replay;
 mod scene;
 mod scenes;

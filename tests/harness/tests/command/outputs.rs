@@ -1,9 +1,10 @@
 //! Files out of every command: never over what it reads, over other files when asked to, whole or not at all.
 
 use std::path::Path;
-use std::process::{Command, Output};
+#[cfg(target_os = "linux")]
+use std::process::Command;
 
-use crate::scene::{Scene, folder, replay, stderr};
+use crate::scene::{Scene, folder, replay, stderr, stdout, viewshed};
 
 const RECORDING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
 const SIMULATED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.toml");
@@ -21,11 +22,6 @@ fn traffic() -> String {
         format!("<timestep time=\"{time}\"><vehicle id=\"a\" x=\"{x}\" y=\"0\" angle=\"90\" type=\"car\"/></timestep>")
     };
     format!("<fcd-export>{}</fcd-export>", (0..8).map(step).collect::<String>())
-}
-
-fn viewshed(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
-    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
 }
 
 /// A folder with something for every command to read.
@@ -134,6 +130,7 @@ fn what_exists_is_replaced_when_that_is_asked_for_only() {
         assert!(stderr(&refused).contains("out exists; add --force"), "{arguments}: {}", stderr(&refused));
         assert_eq!(std::fs::read(folder.join("out")).unwrap(), b"before", "{arguments}");
         let forced = viewshed(&folder, &format!("{arguments} --force"));
+        assert!(stdout(&forced).lines().any(|line| line == "wrote out"), "{arguments}: {}", stdout(&forced));
         assert!(matches!(forced.status.code(), Some(0 | 1)), "{arguments}: {}", stderr(&forced));
         let bytes = std::fs::read(folder.join("out")).unwrap();
         let begins: Vec<u8> = written.chars().map(|c| c as u8).collect();
@@ -143,12 +140,42 @@ fn what_exists_is_replaced_when_that_is_asked_for_only() {
 }
 
 #[test]
+fn a_place_for_results_that_is_none_is_found_before_anything_is_read() {
+    let folder = prepared("no_place");
+    let all = names(&folder);
+    for arguments in [
+        "replay broken.mcap --out key/maps",
+        "replay broken.mcap --json no/r.json",
+        "replay broken.mcap --csv no/r.csv",
+        "bus broken.mcap --log no/b.log",
+        "listen broken.log --out key/maps",
+        "listen broken.log --json no/r.json",
+        "doctor broken.log --json no/r.json",
+        "simulate s.toml --out no/r.mcap",
+        "site s.toml --out no/s.png",
+        "detections broken.mcap --json no/r.json",
+    ] {
+        let output = viewshed(&folder, arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments}");
+        let text = stderr(&output);
+        assert!(text.contains("there is no folder no") || text.contains("key is a file"), "{arguments}: {text}");
+    }
+    for arguments in ["site s.toml --out map.jpg", "detections a.mcap --out map.jpg"] {
+        let text = stderr(&viewshed(&folder, arguments));
+        assert!(text.contains("pictures are PNG; name it map.png"), "{arguments}: {text}");
+    }
+    assert_eq!(names(&folder), all);
+}
+
+#[test]
 fn the_main_job_runs_twice() {
     let folder = folder("twice");
     Scene::default().save(&folder, "a");
     for time in ["first", "second"] {
         let output = replay(&folder, &["a.mcap", "--bootstrap", "0", "--out", "out"]);
         assert!(output.status.success(), "{time} time: {}", stderr(&output));
+        let files = std::fs::read_dir(folder.join("out")).unwrap().count();
+        assert!(stdout(&output).ends_with(&format!("wrote {files} files into out\n")), "{}", stdout(&output));
         assert!(std::fs::metadata(folder.join("out/tradeoff-cells.png")).unwrap().len() > 1000);
     }
 }
@@ -170,12 +197,44 @@ fn commands(text: &str) -> Vec<String> {
     let code = text.lines().filter_map(|line| line.strip_prefix("    ")).map(str::to_owned);
     let quoted = text.split('`').skip(1).step_by(2).map(|quoted| quoted.replace('\n', " "));
     let command = |code: String| {
-        let code = code.split(" # ").next().unwrap_or_default().trim();
+        let code = code.split(" # ").next().unwrap_or_default().split(" > ").next().unwrap_or_default().trim();
         let replay = code.strip_prefix("tests/replay.sh ").map(|rest| format!("replay {rest}"));
-        let rest = ["viewshed ", "$viewshed "].iter().find_map(|name| code.strip_prefix(name)).map(str::to_owned);
+        // a variable of two words is one word in zsh and fish
+        assert!(!code.starts_with('$'), "{code}");
+        let rest = code.strip_prefix("viewshed ").map(str::to_owned);
         replay.or(rest).filter(|rest| rest.contains(' ') && !rest.starts_with('='))
     };
     code.chain(quoted).filter_map(command).collect()
+}
+
+#[test]
+fn links_between_pages_lead_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let (mut folders, mut links) = (vec![root.clone()], 0);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if path.is_dir() && name != "target" && !name.starts_with('.') {
+                folders.push(path);
+            } else if name.ends_with(".md") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+                    let file = link.split('#').next().unwrap_or_default();
+                    if file.is_empty()
+                        || file.contains("::")
+                        || file.contains("://")
+                        || file.contains(char::is_whitespace)
+                    {
+                        continue;
+                    }
+                    links += 1;
+                    assert!(folder.join(file).exists(), "{}: {link}", path.display());
+                }
+            }
+        }
+    }
+    assert!(links > 30, "{links}");
 }
 
 #[test]
@@ -184,11 +243,19 @@ fn the_commands_that_are_written_down_are_understood_and_run_twice() {
 
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
-    let all: Vec<String> = ["README.md", "boards/README.md", "tests/recordings/README.md"]
-        .iter()
-        .flat_map(|name| commands(&read(name)))
-        .collect();
-    assert!(all.len() >= 9, "{all:?}");
+    let pages = [
+        "README.md",
+        "boards/README.md",
+        "src/README.md",
+        "src/inputs/README.md",
+        "src/wire/README.md",
+        "tests/harness/src/evaluation/README.md",
+        "tests/harness/src/recording/YOUR_DATA.md",
+        "tests/harness/src/twin/README.md",
+        "tests/recordings/README.md",
+    ];
+    let all: Vec<String> = pages.iter().flat_map(|name| commands(&read(name))).collect();
+    assert!(all.len() >= 20, "{all:?}");
     for command in &all {
         let words = ["viewshed"].into_iter().chain(command.split_whitespace());
         if let Err(error) = viewshed_harness::command::Cli::try_parse_from(words) {
@@ -231,6 +298,8 @@ fn ctrl_c_leaves_nothing_half_written() {
     ended(&folder, &format!("simulate {SIMULATED} --out r.mcap"), Signal::INT);
     assert_eq!(names(&folder), all);
     ended(&folder, &format!("replay {RECORDING} --csv r.csv --json r.json"), Signal::TERM);
+    assert_eq!(names(&folder), all);
+    ended(&folder, &format!("simulate {SIMULATED} --out r.mcap"), Signal::HUP);
     assert_eq!(names(&folder), all);
     // and what was there before is there still
     std::fs::write(folder.join("r.mcap"), "before").unwrap();

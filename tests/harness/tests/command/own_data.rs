@@ -151,8 +151,16 @@ impl Default for Bag {
 
 impl Bag {
     fn bytes(&self) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+        self.write(&mut writer);
+        writer.finish().unwrap();
+        drop(writer);
+        bytes.into_inner()
+    }
+
+    fn write(&self, writer: &mut mcap::Writer<&mut Cursor<Vec<u8>>>) {
         let scene = Scene::default();
-        let mut writer = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
         let mut channel = |topic: &str, schema: &str| {
             let schema = writer.add_schema(schema, "ros2msg", b"").unwrap();
             writer.add_channel(schema, topic, self.encoding, &BTreeMap::new()).unwrap()
@@ -205,8 +213,6 @@ impl Bag {
             let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: at as u64, publish_time: 0 };
             writer.write_to_known_channel(&header, &data).unwrap();
         }
-        writer.finish().unwrap();
-        writer.into_inner().into_inner()
     }
 }
 
@@ -236,6 +242,104 @@ fn the_only_cloud_is_taken_whatever_its_topic_and_fields_are_called() {
                 assert_eq!(d.radial_velocity_mps, e.radial_velocity_mps);
             }
         }
+    }
+}
+
+#[test]
+fn each_of_several_radars_is_judged_alone() {
+    let folder = folder("own_several");
+    let bag = Bag { topics: vec!["/front/cloud", "/rear/cloud"], ..Bag::default() };
+    std::fs::write(folder.join("two.mcap"), bag.bytes()).unwrap();
+    let view = "--fov=-57,57,-17,17,3,150";
+    let output = replay(&folder, &["two.mcap", view, "--out", "maps", "--json", "r.json"]);
+    let text = stdout(&output);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(
+        text.contains("two-front-cloud (sensor two): ") && text.contains("two-rear-cloud (sensor two): "),
+        "{text}"
+    );
+    let report = json(&folder.join("r.json"));
+    let names: Vec<&str> = report.as_array().unwrap().iter().map(|r| r["recording"].as_str().unwrap()).collect();
+    assert_eq!(names, ["two-front-cloud", "two-rear-cloud"]);
+    for name in names {
+        assert!(folder.join("maps").join(name).join("birdseye-radar-3d.png").exists(), "{name}");
+    }
+    let one = replay(&folder, &["two.mcap", view, "--radar-topic", "/rear/cloud", "--mcap", "m.mcap"]);
+    assert!(stdout(&one).starts_with("two: "), "{}{}", stdout(&one), stderr(&one));
+    let both = replay(&folder, &["two.mcap", view, "--mcap", "m2.mcap"]);
+    assert!(stderr(&both).contains("--mcap writes one radar's map"), "{}", stderr(&both));
+    // the bag says how far each sees
+    let told = |topics: &[&str]| {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+        for topic in topics {
+            let metadata = mcap::records::Metadata {
+                name: "viewshed.sensor".into(),
+                metadata: sensor_keys(if *topic == "/front/cloud" { 150.0 } else { 60.0 }, topic),
+            };
+            writer.write_metadata(&metadata).unwrap();
+        }
+        bag.write(&mut writer);
+        writer.finish().unwrap();
+        drop(writer);
+        std::fs::write(folder.join("told.mcap"), bytes.into_inner()).unwrap();
+        replay(&folder, &["told.mcap", "--json", "t.json", "--force"])
+    };
+    let output = told(&["/front/cloud", "/rear/cloud"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report = json(&folder.join("t.json"));
+    let range = |k: usize| report[k]["sensor"]["field_of_view"]["range_m"][1].as_f64();
+    assert_eq!((range(0), range(1)), (Some(150.0), Some(60.0)), "{:#}", report[0]["sensor"]);
+    assert!(stderr(&told(&["/front/cloud"])).contains("/rear/cloud: told: no metadata"));
+}
+
+/// What a metadata record says of a radar.
+fn sensor_keys(range_max_m: f64, topic: &str) -> BTreeMap<String, String> {
+    let numbers = [
+        ("azimuth_min_rad", -1.0),
+        ("azimuth_max_rad", 1.0),
+        ("elevation_min_rad", -0.3),
+        ("elevation_max_rad", 0.3),
+        ("range_min_m", 3.0),
+        ("range_max_m", range_max_m),
+    ];
+    let numbers = numbers.map(|(key, value)| (key.to_owned(), value.to_string()));
+    numbers.into_iter().chain([("topic".to_owned(), topic.to_owned())]).collect()
+}
+
+#[test]
+fn a_lidar_beside_the_radar_is_not_taken_for_one() {
+    let folder = folder("own_lidar");
+    let mut scan = Bag { topics: vec!["/a/lidar"], fields: vec!["x", "y", "z", "intensity"], ..Bag::default() };
+    let mut bytes = Cursor::new(Vec::new());
+    let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+    scan.write(&mut writer);
+    scan.topics = vec!["/b/radar"];
+    scan.fields[3] = "doppler";
+    scan.write(&mut writer);
+    writer.finish().unwrap();
+    drop(writer);
+    std::fs::write(folder.join("both.mcap"), bytes.into_inner()).unwrap();
+    let output = replay(&folder, &["both.mcap", "--fov=-57,57,-17,17,3,150"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(stdout(&output).starts_with("both: "), "{}", stdout(&output));
+}
+
+#[test]
+fn an_interface_that_cannot_be_listened_to_says_what_to_do() {
+    for command in ["doctor", "listen"] {
+        let output = piped(&[command, "--can", "absent0"], b"");
+        let text = stderr(&output);
+        assert_eq!((output.status.code(), text.lines().count()), (Some(2), 1), "{text}");
+        let known = [
+            "there is no interface absent0; CAN interfaces here: ",
+            "modprobe can-raw",
+            "run as root",
+            "which Linux has",
+        ];
+        assert!(text.contains("absent0") && known.iter().any(|said| text.contains(said)), "{text}");
+        let both = piped(&[command, "--can", "can0", "a.log"], b"");
+        assert!(stderr(&both).contains("cannot be used with"), "{}", stderr(&both));
     }
 }
 
@@ -397,11 +501,28 @@ fn bad() -> Vec<Bad> {
             "no radar frame on topic /lidar; topics found: /ground_truth/objects",
         ),
         (
-            "two clouds",
+            "two radars without a mount",
+            "a.mcap",
+            bag(|b| {
+                b.topics.push("/rear/cloud");
+                b.road = "map";
+            }),
+            view,
+            "2 radars, and not each has mount and field of view; choose one with --radar-topic:\n  /rear/cloud: a: no mount",
+        ),
+        (
+            "two radars without a field of view",
             "a.mcap",
             bag(|b| b.topics.push("/rear/cloud")),
-            view,
-            "2 topics may be the radar's: /rear/cloud, /sensing/front/cloud",
+            "",
+            "no metadata `viewshed.sensor` with `topic` = /sensing/front/cloud; give the field of view with --fov",
+        ),
+        (
+            "one mount for two radars",
+            "a.mcap",
+            bag(|b| b.topics.push("/rear/cloud")),
+            "--mount 0,0,5,0,2,0",
+            "2 radars: /rear/cloud, /sensing/front/cloud; --mount is of one",
         ),
         (
             "a cloud without velocity",

@@ -41,6 +41,7 @@ impl Default for Scene {
                 has_elevation: true,
                 frames_independent: false,
                 platform_moving: false,
+                synthetic: true,
                 licence: None,
             },
             pose,
@@ -108,6 +109,12 @@ impl Scene {
         std::fs::write(&path, self.bytes()).unwrap();
         path
     }
+}
+
+/// Runs `viewshed` inside a folder.
+pub fn viewshed(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
 }
 
 /// A fresh folder for one test.

@@ -349,7 +349,10 @@ fn mounts_are_ranked_alone_and_in_sets_and_impossible_ones_left_out() {
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
     assert!(text.contains("One sensor, best first") && text.contains("Sets of 2, best first"), "{text}");
-    assert!(text.contains("left out: x 40, y 3.75, h 1, yaw 0, pitch 2: car `car.0` drives through it"), "{text}");
+    assert!(
+        text.contains("left out: x 40 m, y 3.75 m, h 1 m, yaw 0°, pitch 2°: car `car.0` drives through it"),
+        "{text}"
+    );
     let found = json(&folder.join("site.json"));
     let all = found["candidates"].as_array().unwrap();
     assert_eq!((all.len(), found["left_out"].as_array().unwrap().len()), (10, 2));

@@ -46,7 +46,7 @@ pub struct BoardArgs {
     #[arg(long, value_name = "PATH", conflicts_with = "board")]
     pub port: Option<PathBuf>,
     /// Bit rate of the port
-    #[arg(long, value_name = "BAUD", default_value_t = 230_400, requires = "port")]
+    #[arg(long, value_name = "BAUD", default_value_t = viewshed::unit::settings::UnitConfig::SERVICE_BAUD, requires = "port")]
     baud: u32,
     /// Run scans nobody should send as well, to know the most a frame costs
     #[arg(long, requires = "board")]

@@ -12,11 +12,12 @@ use anyhow::{Result, bail};
 
 use super::progress::bar;
 use super::{BAD_INPUT, complain, print};
-use crate::command::options::SettingsArgs;
+use crate::command::options::{SettingsArgs, finite};
 use crate::evaluation::Settings;
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, camera_steps, steps};
+use crate::recording::{Frame, ReadOptions, Recording};
 use crate::results::files::{OutputArgs, Target};
 use crate::results::foxglove;
 use crate::results::report::csv::SampleWriter;
@@ -39,9 +40,10 @@ const SHOWN_OF_CAMERA: &str = "camera-3d";
 /// geometry-box are exact lines of sight past the labelled boxes, the bounds of any such method. Cell FVR
 /// and FIR compare the map itself with exact lines of sight, wherever traffic passes.
 #[derive(Debug, clap::Args)]
+#[command(after_long_help = LABELS)]
 pub struct Args {
-    /// MCAP recordings, CAN logs of `candump -L` (ARS408), captures of a TI mmWave radar's data port or of the
-    /// native format, a camera's boxes (NAME.boxes.csv beside NAME.camera.toml) [default: the MCAP files in tests/recordings]
+    /// MCAP recordings, CAN logs (ARS408) of `candump`, Vector ASC or SavvyCAN, captures of a TI mmWave radar's data port or
+    /// of the native format, a camera's boxes (NAME.boxes.csv beside NAME.camera.toml) [default: the MCAP files in tests/recordings]
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
     /// Write everything that was found as JSON: an object, for several recordings an array
@@ -63,9 +65,15 @@ pub struct Args {
     /// Write table and pictures into this folder, one subfolder a recording where there are several
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
+    /// Draw the frame at this time after the first, in seconds [default: one with a hidden vehicle, or the middle]
+    #[arg(long, value_name = "SECONDS", requires = "out", value_parser = finite, allow_negative_numbers = true, help_heading = "Results")]
+    time: Option<f64>,
     /// Print the rates by class and by distance too
     #[arg(long, help_heading = "Results")]
     breakdown: bool,
+    /// Print tables as wide as they are: all intervals, and distances to the bound geometry-slice, too
+    #[arg(long, help_heading = "Results")]
+    wide: bool,
     /// Replay again with the mount wrong by this pitch (degrees) and height (metres), each way
     ///
     /// Only the estimators are given the wrong mount, truth keeps the right one. Without values 0.5,0.2;
@@ -88,6 +96,19 @@ pub struct Args {
     settings: SettingsArgs,
 }
 
+const LABELS: &str = "\
+Labels beside the recording, in the road frame (x along the road, y to the left):
+
+  NAME.labels.csv      time_s,object_id,class,x_m,y_m[,heading_rad,length_m,width_m,height_m]
+                       a row is an object at an instant; between two rows of one object_id its place is
+                       interpolated. time_s counts from the first frame, or is the recording's own clock.
+                       x_m, y_m: middle of the box; heading_rad anticlockwise from +x; a size that is missing
+                       is the class's: car, van, truck, bus, motorcycle, bicycle, pedestrian
+  NAME.occlusion.csv   object_id,occlusion_0_to_2
+                       how much of it a person saw hidden: 0 nothing, 1 some, 2 most
+
+  Examples: example.labels.csv and example.occlusion.csv in tests/recordings.";
+
 /// Replays one recording after the other. One that cannot be replayed is reported, and the rest go on.
 ///
 /// # Errors
@@ -101,7 +122,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let out = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     if args.processor.board.is_some() || args.processor.port.is_some() {
         let pictures = out.map_or_else(|| outputs.folder("--out", Path::new("out")), Ok)?;
-        return board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings);
+        let ended = board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings)?;
+        print(&outputs.told())?;
+        return Ok(ended);
     }
     if args.mcap.is_some() && paths.len() > 1 {
         bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());
@@ -114,64 +137,64 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let folders = out.map(|out| out::folders(&out, &paths)).transpose()?;
     let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
-    let (mut failed, mut labelled) = (false, false);
+    let (mut failed, mut synthetic) = (false, false);
     for (k, path) in paths.iter().enumerate() {
-        let one = match replay(path, args, mcap.as_ref(), &settings) {
-            Ok(one) => one,
+        let radars = match radars(path, &settings, mcap.is_some()) {
+            Ok(radars) => radars,
             Err(error) => {
                 complain(&error);
                 failed = true;
                 continue;
             }
         };
-        labelled |= one.replay.recording.truth.is_some();
-        let text = one.text(args, &settings);
-        print(&text)?;
-        if let Some(csv) = &mut samples {
-            csv.write(&one.replay)?;
-        }
-        if let (Some(camera), Some(file)) = (&one.replay.camera, &camera_csv) {
-            let csv = match &mut camera_samples {
-                Some(csv) => csv,
-                None => camera_samples.insert(SampleWriter::new(file.create()?)),
+        let several = radars.len() > 1;
+        for (recording, reading) in radars {
+            let settings = Settings { reading, ..settings.clone() };
+            let one = match replay(path, recording, args, mcap.as_ref(), &settings) {
+                Ok(one) => one,
+                Err(error) => {
+                    complain(&error);
+                    failed = true;
+                    continue;
+                }
             };
-            csv.write(camera)?;
+            synthetic |= one.of_simulated_labels();
+            let text = one.text(args, &settings);
+            print(&text)?;
+            if let Some(csv) = &mut samples {
+                csv.write(&one.replay)?;
+            }
+            if let (Some(camera), Some(file)) = (&one.replay.camera, &camera_csv) {
+                let csv = match &mut camera_samples {
+                    Some(csv) => csv,
+                    None => camera_samples.insert(SampleWriter::new(file.create()?)),
+                };
+                csv.write(camera)?;
+            }
+            if let Some(folder) = folders.as_ref().and_then(|f| f.get(k)) {
+                let origin = if one.of_simulated_labels() { format!("\n{ORIGIN}\n") } else { String::new() };
+                let own = if several { folder.folder(&one.replay.recording.name) } else { folder.clone() };
+                out::write(&own, &(text + &origin), &one.replay, &one.examples, one.shown_frame, &settings)?;
+            }
+            reports.push(one.report(&settings));
         }
-        if let Some(folder) = folders.as_ref().and_then(|f| f.get(k)) {
-            out::write(folder, &text, &one.replay, &one.examples, &settings)?;
-        }
-        reports.push(one.report(&settings));
     }
     for csv in [samples.filter(|_| !reports.is_empty()), camera_samples].into_iter().flatten() {
         csv.finish()?.finish()?;
     }
     if let Some(file) = json_file {
-        // the number asked for decides the form, not the number that could be read
+        // the number asked for decides the form, not the number that could be read; a file can have several radars
         match (&paths[..], &reports[..]) {
             ([_], []) => {}
-            ([_], [report, ..]) => file.write(json::object(report)?)?,
+            ([_], [report]) => file.write(json::object(report)?)?,
             (_, several) => file.write(json::array(several)?)?,
         }
     }
-    if labelled {
+    if synthetic {
         print(&format!("\n{ORIGIN}\n"))?;
     }
-    if !reports.is_empty() {
-        print(&written(args))?;
-    }
+    print(&outputs.told())?;
     Ok(if failed { ExitCode::from(BAD_INPUT) } else { ExitCode::SUCCESS })
-}
-
-/// Where everything went.
-fn written(args: &Args) -> String {
-    let all = [
-        ("table and pictures", &args.out),
-        ("results as JSON", &args.json),
-        ("objects as CSV", &args.csv),
-        ("map as MCAP, for Foxglove or Lichtblick", &args.mcap),
-    ];
-    let named = all.into_iter().filter_map(|(what, path)| Some(format!("{what}: {}\n", path.as_ref()?.display())));
-    named.collect()
 }
 
 /// One recording replayed, with what was asked for beside its rates.
@@ -179,10 +202,28 @@ struct Replayed {
     replay: Replay,
     examples: Vec<Example>,
     mount_error: Option<Vec<Sensitivity>>,
+    /// The frame of --time.
+    shown_frame: Option<usize>,
 }
 
-fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) -> Result<Replayed> {
-    let recording = recording::read(path, &settings.reading).map_err(|error| named(error, path))?;
+/// What each radar of a file recorded, and how it is read.
+fn radars(path: &Path, settings: &Settings, one_only: bool) -> Result<Vec<(Recording, ReadOptions)>> {
+    let radars = recording::read_each(path, &settings.reading).map_err(|error| named(error, path))?;
+    if let (true, [_, _, ..]) = (one_only, &radars[..]) {
+        let topics: Vec<&str> = radars.iter().filter_map(|(_, reading)| reading.radar_topic.as_deref()).collect();
+        bail!("--mcap writes one radar's map: {} has {}; choose with --radar-topic", path.display(), topics.join(", "));
+    }
+    Ok(radars)
+}
+
+fn replay(
+    path: &Path,
+    recording: Recording,
+    args: &Args,
+    mcap: Option<&Target>,
+    settings: &Settings,
+) -> Result<Replayed> {
+    let shown_frame = args.time.map(|time_s| frame_at(&recording, time_s)).transpose()?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
     let replaying = bar(&format!("replaying {name}"), passes + camera_steps(&recording));
@@ -215,7 +256,19 @@ fn replay(path: &Path, args: &Args, mcap: Option<&Target>, settings: &Settings) 
     let mount_error = args.mount_error.filter(|_| labelled).map(wrong).transpose()?;
     let shown = replay.score(SHOWN).or(replay.score(SHOWN_OF_CAMERA));
     let examples = shown.map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
-    Ok(Replayed { replay, examples, mount_error })
+    Ok(Replayed { replay, examples, mount_error, shown_frame })
+}
+
+/// The frame nearest to a time since the first.
+fn frame_at(recording: &Recording, time_s: f64) -> Result<usize> {
+    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+    let apart = |f: &Frame| (f.time_ns.saturating_sub(start) as f64 * 1e-9 - time_s).abs();
+    let duration_s = recording.duration_s();
+    let nearest = recording.frames.iter().enumerate().min_by(|a, b| apart(a.1).total_cmp(&apart(b.1)));
+    let Some((frame, _)) = nearest.filter(|_| (-1.0..=duration_s + 1.0).contains(&time_s)) else {
+        bail!("--time {time_s}: {} lasts {duration_s:.1} s; name a time from 0 to that", recording.name);
+    };
+    Ok(frame)
 }
 
 /// Refuses a labelled recording of which nothing could be judged: a table without a number tells nobody anything.
@@ -270,14 +323,20 @@ fn write_mcap(source: &Path, target: &Target, estimator: &str, replay: &Replay, 
 }
 
 impl Replayed {
+    /// Whether its rates are of a simulated world.
+    fn of_simulated_labels(&self) -> bool {
+        self.replay.recording.sensor.synthetic && self.replay.recording.truth.is_some()
+    }
+
     fn text(&self, args: &Args, settings: &Settings) -> String {
-        let mut text = table::text(&self.replay, &settings.evaluation);
+        let extent = if args.wide { table::Extent::Wide } else { table::Extent::Terminal };
+        let mut text = table::text(&self.replay, &settings.evaluation, extent);
         if args.breakdown {
-            text += &table::breakdown(&self.replay.summary);
-            text += &self.replay.camera.as_ref().map(|c| table::breakdown(&c.summary)).unwrap_or_default();
+            text += &table::breakdown(&self.replay.summary, extent);
+            text += &self.replay.camera.as_ref().map(|c| table::breakdown(&c.summary, extent)).unwrap_or_default();
         }
         if let Some(sensitivities) = &self.mount_error {
-            text += &table::mount_error(sensitivities);
+            text += &table::mount_error(sensitivities, extent);
         }
         text
     }

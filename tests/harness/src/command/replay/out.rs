@@ -11,7 +11,6 @@ use crate::evaluation::Settings;
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::replay::Replay;
 use crate::results::files::Folder;
-use crate::results::report::ORIGIN;
 
 /// The folder of each recording: the one named for a single recording, one inside it for each of several.
 ///
@@ -28,14 +27,25 @@ pub fn folders(dir: &Folder, recordings: &[PathBuf]) -> Result<Vec<Folder>> {
 }
 
 /// Fills one recording's folder.
-pub fn write(folder: &Folder, text: &str, replay: &Replay, examples: &[Example], settings: &Settings) -> Result<()> {
-    folder.file("table.txt")?.write(format!("{text}\n{ORIGIN}\n"))?;
+pub fn write(
+    folder: &Folder,
+    text: &str,
+    replay: &Replay,
+    examples: &[Example],
+    shown_frame: Option<usize>,
+    settings: &Settings,
+) -> Result<()> {
+    folder.file("table.txt")?.write(text)?;
     let shown = if replay.recording.of_camera().is_some() { SHOWN_OF_CAMERA } else { SHOWN };
-    pictures::write(folder, replay, shown, examples, settings)?;
+    pictures::write(folder, replay, shown, examples, shown_frame, settings)?;
     if let Some(camera) = &replay.camera {
         let score = camera.score(SHOWN_OF_CAMERA);
+        // its frames are at times of their own
+        let time_ns = shown_frame.and_then(|k| replay.recording.frames.get(k)).map(|f| f.time_ns);
+        let apart = |time_ns: i64| move |k: &usize| camera.recording.frames[*k].time_ns.abs_diff(time_ns);
+        let of_camera = time_ns.and_then(|t| (0..camera.recording.frames.len()).min_by_key(apart(t)));
         let examples = score.map(|s| examples::find(&camera.recording, &camera.samples, s)).unwrap_or_default();
-        pictures::write(&folder.folder("camera"), camera, SHOWN_OF_CAMERA, &examples, settings)?;
+        pictures::write(&folder.folder("camera"), camera, SHOWN_OF_CAMERA, &examples, of_camera, settings)?;
     }
     Ok(())
 }

@@ -1,33 +1,44 @@
 //! The pictures of one replay: a frame from above, found examples, the polar grid, the trade-offs, a camera's view.
 
 use anyhow::Result;
+use viewshed::sensor::road::RoadPoint;
 
 use crate::command::progress::bar;
 use crate::estimators;
 use crate::estimators::{Estimator, camera_3d};
-use crate::evaluation::Settings;
 use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
 use crate::evaluation::examples::Example;
 use crate::evaluation::replay::{Replay, visit};
 use crate::evaluation::score::Score;
 use crate::evaluation::summary::Row;
+use crate::evaluation::{Grid, Settings, bounds};
+use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
+use crate::recording::FieldOfView;
+use crate::recording::truth::Object;
 use crate::results::files::Folder;
 use crate::results::pictures::birdseye;
 use crate::results::pictures::camera_view::{self, View};
 use crate::results::pictures::polar::{self, PolarGrid};
 use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
-use crate::results::pictures::tradeoff::{self, Curve, Marker, MarkerKind, Span, TradeOff};
+use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKind, Span, TradeOff};
 use crate::results::pictures::{canvas::Canvas, palette};
 
 /// Estimators that are drawn from above at the chosen frame, beside the one examples are of.
 const ALSO_DRAWN: [&str; 3] = ["radar-2d", "reference", "camera-reference"];
 
 /// Draws everything into a folder.
-pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example], settings: &Settings) -> Result<()> {
+pub fn write(
+    folder: &Folder,
+    replay: &Replay,
+    shown: &str,
+    examples: &[Example],
+    asked: Option<usize>,
+    settings: &Settings,
+) -> Result<()> {
     let drawing = bar("drawing pictures", 1);
-    let chosen = chosen_frame(replay, examples);
+    let chosen = asked.unwrap_or_else(|| chosen_frame(replay, examples));
     let mut all = estimators::all(&replay.recording, &settings.estimators)?;
     for estimator in &mut all {
         let name = estimator.name().to_owned();
@@ -49,8 +60,8 @@ pub fn write(folder: &Folder, replay: &Replay, shown: &str, examples: &[Example]
             save(canvas, folder, &format!("birdseye-{name}"))?;
         }
     }
-    save(trade_off(replay, "objects", |row| (&row.curve, rates(row))), folder, "tradeoff-objects")?;
-    save(trade_off(replay, "road cells", |row| (&row.cell_curve, cell_rates(row))), folder, "tradeoff-cells")?;
+    save(trade_off(replay, Counted::Objects, |row| (&row.curve, rates(row))), folder, "tradeoff-objects")?;
+    save(trade_off(replay, Counted::Cells, |row| (&row.cell_curve, cell_rates(row))), folder, "tradeoff-cells")?;
     drawing.step();
     Ok(())
 }
@@ -117,16 +128,25 @@ fn from_above(
         .iter()
         .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
         .collect();
+    let by_cells = settings.evaluation.grid == Grid::Cartesian;
+    let seldom_visible = |o: &Object| {
+        let seen = cells_in_sight(replay, estimator, frame, o.track);
+        seen.is_some_and(|(visible, all)| visible > 0 && 2 * visible <= all)
+    };
+    let any_cell = objects.iter().any(seldom_visible);
     let highlight = example.and_then(|e| {
         let sample = replay.samples.get(frame)?.objects.get(e.object)?;
         let solid = objects.iter().find(|o| o.track == sample.track)?.solid;
+        let cells = cells_in_sight(replay, estimator, frame, sample.track).filter(|_| by_cells);
+        let by = cells.map(|(visible, all)| format!("; {visible} of the {all} cells under it are visible"));
         let note = format!(
-            "{}: {} {} at {:.0} m, lasting {} frames",
+            "{}: {} {} at {:.0} m, lasting {} frames{}",
             e.outcome.name(),
             e.class,
             e.object_id,
             e.distance_m,
-            e.lasts
+            e.lasts,
+            by.unwrap_or_default()
         );
         Some(Highlight::on(solid, &recording.pose, note))
     });
@@ -140,13 +160,25 @@ fn from_above(
         boxes,
         road: &[],
         title: title(replay, estimator.name(), frame),
-        caption: caption(replay),
+        caption: caption(replay).map(|said| if by_cells && any_cell { format!("{said} · {ANY_CELL}") } else { said }),
         highlight,
     };
     birdseye::draw(&scene)
 }
 
-/// Everything labelled inside the field of view, and the sensor; without labels the detections.
+/// Said where a box called visible stands on cells of which most are not.
+const ANY_CELL: &str =
+    "An object is called visible where any of the 1 m cells under it is: a box on orange can be FV or TV.";
+
+/// Visible cells under an object, and all of them.
+fn cells_in_sight(replay: &Replay, estimator: &dyn Estimator, frame: usize, track: usize) -> Option<(usize, usize)> {
+    let sample = replay.samples.get(frame)?.objects.iter().find(|s| s.track == track)?;
+    let visible = |&&(i, j): &&(i32, i32)| estimator.map().at(RoadPoint::cell_centre(i, j)).visible();
+    Some((sample.cells.iter().filter(visible).count(), sample.cells.len()))
+}
+
+/// Everything labelled inside the field of view, and the sensor; without labels the detections, or the whole field of
+/// view where they show little of it.
 fn window(replay: &Replay) -> Window {
     let recording = &replay.recording;
     let inside = |p: [f64; 3]| recording.sensor.field_of_view.contains(recording.pose.to_spherical(p));
@@ -163,7 +195,25 @@ fn window(replay: &Replay) -> Window {
             .collect();
     }
     points.push(sensor);
+    let view = &recording.sensor.field_of_view;
+    let reach = points.iter().map(|p| (p[0] - sensor[0]).hypot(p[1] - sensor[1])).fold(0.0, f64::max);
+    if points.len() < LITTLE || reach < 0.5 * view.range_m[1] {
+        points.extend(corners(&recording.pose, view));
+    }
     Window::around(points, 6.0)
+}
+
+/// Fewer places than this, of a whole recording, do not show where the road is.
+const LITTLE: usize = 100;
+
+/// Ends of the field of view on the road: to the right, ahead and to the left.
+fn corners(pose: &SensorPose, view: &FieldOfView) -> impl Iterator<Item = [f64; 2]> {
+    let [right, left] = view.azimuth_rad;
+    let far = view.range_m[1];
+    (0..=8).map(move |k| right + (left - right) * f64::from(k) / 8.0).map(move |azimuth| {
+        let heading = pose.yaw_rad() + azimuth;
+        [pose.position[0] + far * heading.cos(), pose.position[1] + far * heading.sin()]
+    })
 }
 
 /// How an estimator's verdict on a track compares with its detection; `None` where it is not counted.
@@ -226,10 +276,15 @@ fn cell_rates(row: &Row) -> Rates {
 }
 
 /// The chart, unless there is nothing to draw.
-fn trade_off(replay: &Replay, what: &str, of: impl Fn(&Row) -> (&Vec<CurvePoint>, Rates)) -> Option<Canvas> {
+fn trade_off(replay: &Replay, counted: Counted, of: impl Fn(&Row) -> (&Vec<CurvePoint>, Rates)) -> Option<Canvas> {
+    let what = match counted {
+        Counted::Objects => "objects",
+        Counted::Cells => "road cells",
+    };
     let mut chart = TradeOff {
         curves: Vec::new(),
         markers: Vec::new(),
+        counted,
         span: Span::Full,
         title: format!(
             "{} · {what} · false visible against false invisible, by the threshold on the grade",
@@ -249,8 +304,80 @@ fn trade_off(replay: &Replay, what: &str, of: impl Fn(&Row) -> (&Vec<CurvePoint>
             chart.curves.push(Curve { name: row.name.clone(), points: points.collect() });
         }
         let (Some(fvr), Some(fir)) = (fvr, fir) else { continue };
-        let kind = if points.is_empty() { MarkerKind::Bound } else { MarkerKind::OperatingPoint };
+        let kind = match row.name.as_str() {
+            bounds::SLICE => MarkerKind::Slice,
+            bounds::BOX => MarkerKind::Box,
+            _ => MarkerKind::OperatingPoint,
+        };
         chart.markers.push(Marker { name: row.name.clone(), kind, fvr, fir, fvr_interval, fir_interval });
     }
     (!chart.markers.is_empty()).then(|| tradeoff::draw(&chart))
+}
+
+#[cfg(test)]
+mod tests {
+    use viewshed::map::{CellState, Visibility, VisibilityMap};
+
+    use super::*;
+    use crate::evaluation::Options;
+    use crate::evaluation::samples::by_hand;
+    use crate::recording::{Frame, RadarDetection};
+
+    /// Visible to the right of the road's axis.
+    struct Half;
+
+    impl VisibilityMap for Half {
+        fn at(&self, point: RoadPoint) -> CellState {
+            let visibility = if point.y_cm < 0 { Visibility::Visible } else { Visibility::Invisible };
+            CellState { visibility, grade: 255, occupancy: 0, occupied: false }
+        }
+    }
+
+    impl Estimator for Half {
+        fn name(&self) -> &str {
+            "half"
+        }
+        fn reset(&mut self) {}
+        fn step(&mut self, _: &Frame) {}
+        fn map(&self) -> &dyn VisibilityMap {
+            self
+        }
+    }
+
+    fn replay(recording: crate::recording::Recording) -> Replay {
+        Replay::new(recording, &mut [], &Options { warm_up_s: 0.0, bootstrap: 0, ..Options::default() }, &|| ())
+    }
+
+    #[test]
+    fn where_little_was_detected_the_whole_field_of_view_is_shown() {
+        let detection = |range_m: f32| RadarDetection {
+            range_m,
+            azimuth_rad: 0.0,
+            elevation_rad: None,
+            radial_velocity_mps: 0.0,
+            rcs_dbsm: None,
+            snr_db: None,
+        };
+        let seen = |detections: Vec<RadarDetection>| {
+            let mut recording = by_hand::recording(1, 0);
+            (recording.truth, recording.frames[0].detections) = (None, detections);
+            window(&replay(recording))
+        };
+        // 1 rad to each side of 200 m
+        for little in [vec![], vec![detection(30.0); 3], vec![detection(30.0); 500]] {
+            let all = seen(little);
+            assert!(all.x_m[1] >= 200.0 && all.y_m[0] <= -168.0 && all.y_m[1] >= 168.0, "{all:?}");
+        }
+        let road = seen((0..500).map(|k| detection(20.0 + 0.3 * k as f32)).collect());
+        assert!(road.x_m[1] < 190.0 && road.y_m[1] <= 10.0, "{road:?}");
+    }
+
+    #[test]
+    fn the_cells_that_make_an_object_visible_are_counted() {
+        // 4.6 x 1.8 m: five or six cells long, y from -0.9 to 0.9
+        let replay = replay(by_hand::recording(2, 1));
+        let (visible, all) = cells_in_sight(&replay, &Half, 0, 0).unwrap();
+        assert!(2 * visible == all && all >= 10, "{visible} of {all}");
+        assert_eq!(cells_in_sight(&replay, &Half, 0, 7), None, "nobody of that name");
+    }
 }

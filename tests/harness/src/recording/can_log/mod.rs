@@ -2,6 +2,8 @@
 
 pub mod asc;
 pub mod candump;
+#[cfg(target_os = "linux")]
+pub mod live;
 pub mod savvycan;
 
 use std::collections::BTreeSet;

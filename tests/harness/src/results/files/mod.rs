@@ -9,11 +9,12 @@ mod unfinished;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
 
 use one_file::is_one_file;
-pub use unfinished::Unfinished;
+pub use unfinished::{Unfinished, until_ctrl_c};
 
 /// `--force`.
 #[derive(Debug, Clone, Copy, Default, clap::Args)]
@@ -28,7 +29,25 @@ pub struct OutputArgs {
 impl OutputArgs {
     /// The outputs of a command that reads these files.
     pub fn beside(self, inputs: impl IntoIterator<Item = PathBuf>) -> Outputs {
-        Outputs { inputs: inputs.into_iter().collect(), force: self.force, named: Vec::new() }
+        let (inputs, force) = (inputs.into_iter().collect(), self.force);
+        Outputs { inputs, force, named: Vec::new(), written: Written::default() }
+    }
+}
+
+/// A file by its path, or a folder with the number of its files.
+type Place = (PathBuf, Option<usize>);
+
+/// What was written, in the order it was finished.
+#[derive(Debug, Clone, Default)]
+struct Written(Arc<Mutex<Vec<Place>>>);
+
+impl Written {
+    fn add(&self, path: &Path, in_folder: bool) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match all.iter_mut().find(|(known, _)| known == path) {
+            Some((_, files)) => *files = files.map(|n| n + 1),
+            None => all.push((path.to_owned(), in_folder.then_some(1))),
+        }
     }
 }
 
@@ -38,6 +57,7 @@ pub struct Outputs {
     force: bool,
     /// Outputs so far, with their options.
     named: Vec<(String, PathBuf)>,
+    written: Written,
 }
 
 impl Outputs {
@@ -57,8 +77,13 @@ impl Outputs {
         if !is_stream(path) {
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
             if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-                bail!("{option}: cannot write {}: there is no folder {}", path.display(), folder.display());
+                bail!(
+                    "{option}: cannot write {}: there is no folder {}; make it with `mkdir -p {1}`",
+                    path.display(),
+                    folder.display()
+                );
             }
+            can_be_written(option, folder.unwrap_or(Path::new(".")))?;
             if let Some((other, _)) = self.named.iter().find(|(_, named)| is_one_file(named, path)) {
                 bail!("{option} {}: {other} writes this file too; name another", path.display());
             }
@@ -71,17 +96,52 @@ impl Outputs {
             );
         }
         self.named.push((option.to_owned(), path.to_owned()));
-        Ok(Some(Target { path: path.to_owned() }))
+        Ok(Some(Target { path: path.to_owned(), folder: None, written: self.written.clone() }))
+    }
+
+    /// The picture an option names, if it does.
+    ///
+    /// # Errors
+    /// Those of [`Outputs::file`], and a name that ends in that of another kind: nothing but PNG is drawn.
+    pub fn picture(&mut self, option: &str, path: Option<&Path>) -> Result<Option<Target>> {
+        if let Some(path) = path.filter(|path| !is_stream(path)) {
+            not_read(option, path, &self.inputs)?;
+            let is_png = path.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("png"));
+            let png = path.with_extension("png");
+            ensure!(is_png, "{option} {}: pictures are PNG; name it {}", path.display(), png.display());
+        }
+        self.file(option, path)
     }
 
     /// The folder an option names. Its files may be replaced.
     ///
     /// # Errors
-    /// It is a file.
+    /// It is a file, or cannot be made or written to.
     pub fn folder(&self, option: &str, path: &Path) -> Result<Folder> {
         ensure!(!path.exists() || path.is_dir(), "{option} {} is a file, and a folder is needed", path.display());
-        Ok(Folder { option: option.to_owned(), path: path.to_owned(), inputs: self.inputs.clone() })
+        let there = path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
+        ensure!(there.is_dir(), "{option} {}: {} is a file, and a folder is needed", path.display(), there.display());
+        can_be_written(option, there)?;
+        let (option, path, root) = (option.to_owned(), path.to_owned(), path.to_owned());
+        Ok(Folder { option, path, root, inputs: self.inputs.clone(), written: self.written.clone() })
     }
+
+    /// A line for each file and folder that was written.
+    pub fn told(&self) -> String {
+        let all = self.written.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = |(path, files): &Place| match files {
+            None => format!("wrote {}\n", path.display()),
+            Some(1) => format!("wrote 1 file into {}\n", path.display()),
+            Some(files) => format!("wrote {files} files into {}\n", path.display()),
+        };
+        all.iter().map(line).collect()
+    }
+}
+
+/// Finds out before anything is computed whether files can be made in a folder.
+fn can_be_written(option: &str, folder: &Path) -> Result<()> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    unfinished::try_in(folder).with_context(|| format!("{option}: no file can be made in {}", folder.display()))
 }
 
 /// A folder that is filled. It is made with its first file.
@@ -89,7 +149,10 @@ impl Outputs {
 pub struct Folder {
     option: String,
     path: PathBuf,
+    /// The one that was named, which this is or is in.
+    root: PathBuf,
     inputs: Rc<[PathBuf]>,
+    written: Written,
 }
 
 impl Folder {
@@ -111,7 +174,7 @@ impl Folder {
             .with_context(|| format!("cannot make the folder {}", self.path.display()))?;
         let path = self.path.join(name);
         not_read(&self.option, &path, &self.inputs)?;
-        Ok(Target { path })
+        Ok(Target { path, folder: Some(self.root.clone()), written: self.written.clone() })
     }
 }
 
@@ -119,6 +182,9 @@ impl Folder {
 #[derive(Debug)]
 pub struct Target {
     path: PathBuf,
+    /// The folder that was named, where not the file was.
+    folder: Option<PathBuf>,
+    written: Written,
 }
 
 impl Target {
@@ -131,7 +197,11 @@ impl Target {
     /// # Errors
     /// It cannot be written.
     pub fn create(&self) -> Result<Unfinished> {
-        Unfinished::create(&self.path)
+        let (written, folder, path) = (self.written.clone(), self.folder.clone(), self.path.clone());
+        Unfinished::create(&self.path, move || match &folder {
+            Some(folder) => written.add(folder, true),
+            None => written.add(&path, false),
+        })
     }
 
     /// Writes the whole file.
@@ -255,6 +325,54 @@ mod tests {
         fs::write(folder.join("file"), "").unwrap();
         assert!(outputs(&[], true).folder("--out", &folder.join("file")).is_err());
         assert!(outputs(&[], true).file("--json", Some(&folder.join("new"))).is_err());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_place_nothing_can_be_written_to_is_found_before() {
+        let folder = folder("place");
+        fs::write(folder.join("file"), "x").unwrap();
+        let into = |path: &str| outputs(&[], false).folder("--out", &folder.join(path)).map(|_| ()).unwrap_err();
+        assert!(into("file/in/it").to_string().contains("is a file, and a folder is needed"));
+        let missing = outputs(&[], false).file("--json", Some(&folder.join("no/r.json"))).unwrap_err().to_string();
+        assert!(missing.contains("there is no folder") && missing.contains("mkdir -p"), "{missing}");
+        #[cfg(target_os = "linux")]
+        {
+            // no file can be made in /proc, by root neither
+            let error = outputs(&[], false).folder("--out", Path::new("/proc/maps")).unwrap_err().to_string();
+            assert_eq!(error, "--out: no file can be made in /proc");
+            assert!(outputs(&[], false).file("--json", Some(Path::new("/proc/r.json"))).is_err());
+        }
+        assert_eq!(names(&folder), ["file"], "the attempt leaves nothing");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_picture_is_not_called_what_it_is_not() {
+        let picture = |name: &str| outputs(&[], false).picture("--out", Some(Path::new(name)));
+        let error = picture("map.jpg").unwrap_err().to_string();
+        assert_eq!(error, "--out map.jpg: pictures are PNG; name it map.png");
+        for name in ["absent", "absent.png", "absent.PNG", "/dev/null"] {
+            assert!(picture(name).unwrap().is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_told_and_what_was_not_is_not() {
+        let folder = folder("told");
+        let mut outputs = outputs(&[], false);
+        let (a, b) = (folder.join("a.json"), folder.join("b.json"));
+        let file = outputs.file("--json", Some(&a)).unwrap().unwrap();
+        let never = outputs.file("--csv", Some(&b)).unwrap().unwrap();
+        let into = outputs.folder("--out", &folder.join("maps")).unwrap();
+        outputs.file("--log", Some(Path::new("/dev/null"))).unwrap().unwrap().write("x").unwrap();
+        drop(never.create().unwrap());
+        for name in ["x.png", "y.png"] {
+            into.folder("deep").file(name).unwrap().write("x").unwrap();
+        }
+        file.write("{}").unwrap();
+        let maps = folder.join("maps");
+        assert_eq!(outputs.told(), format!("wrote 2 files into {}\nwrote {}\n", maps.display(), a.display()));
         fs::remove_dir_all(folder).unwrap();
     }
 

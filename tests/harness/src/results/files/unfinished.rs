@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 
 use anyhow::{Context, Result};
 
@@ -17,24 +17,26 @@ fn parts() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 }
 
 /// A file that becomes its target when [`Unfinished::finish`] is called, and nothing when it is dropped before,
-/// on Ctrl-C or on SIGTERM.
+/// on Ctrl-C, on SIGTERM or when its terminal closes.
 pub struct Unfinished {
     target: PathBuf,
     /// Name until it is whole; `None` for pipes and devices, which are written to as they are.
     part: Option<PathBuf>,
     file: BufWriter<File>,
+    /// Told once it is whole.
+    whole: Box<dyn Fn() + Send>,
 }
 
 impl Unfinished {
     /// Opens the file.
-    pub(super) fn create(target: &Path) -> Result<Self> {
+    pub(super) fn create(target: &Path, whole: impl Fn() + Send + 'static) -> Result<Self> {
         let opened = if super::is_stream(target) {
             OpenOptions::new().write(true).open(target).map(|file| (target.to_owned(), None, file))
         } else {
             open_part(target).map(|(target, part, file)| (target, Some(part), file))
         };
         let (target, part, file) = opened.with_context(|| format!("cannot write {}", target.display()))?;
-        Ok(Self { target, part, file: BufWriter::new(file) })
+        Ok(Self { target, part, file: BufWriter::new(file), whole: Box::new(whole) })
     }
 
     /// Gives the file its name.
@@ -52,6 +54,7 @@ impl Unfinished {
         fs::rename(part, &self.target)?;
         parts.remove(part);
         self.part = None;
+        (self.whole)();
         Ok(())
     }
 }
@@ -83,6 +86,15 @@ impl Seek for Unfinished {
     }
 }
 
+/// Makes a file in a folder and removes it.
+pub(super) fn try_in(folder: &Path) -> io::Result<()> {
+    let (_, part, file) = open_part(&folder.join("try"))?;
+    drop(file);
+    let mut parts = parts();
+    parts.remove(&part);
+    fs::remove_file(part)
+}
+
 /// The target with links resolved, the name it has until it is whole, and the open file.
 fn open_part(target: &Path) -> io::Result<(PathBuf, PathBuf, File)> {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -100,19 +112,41 @@ fn open_part(target: &Path) -> io::Result<(PathBuf, PathBuf, File)> {
     Ok((target, part, file))
 }
 
-/// Removes what is not whole when the program is ended by Ctrl-C or SIGTERM, and lets it end by that.
+/// Whether Ctrl-C is waited for by the command itself.
+static WAITED_FOR: AtomicBool = AtomicBool::new(false);
+
+/// From now on Ctrl-C does not end the program but sets what is returned, once: for commands that go on until then.
+///
+/// # Errors
+/// The system's.
+#[cfg(unix)]
+pub fn until_ctrl_c() -> io::Result<Arc<AtomicBool>> {
+    use signal_hook::consts::SIGINT;
+
+    let stop = Arc::new(AtomicBool::new(false));
+    signal_hook::flag::register(SIGINT, stop.clone())?;
+    WAITED_FOR.store(true, Ordering::SeqCst);
+    Ok(stop)
+}
+
+/// Removes what is not whole when the program is ended by Ctrl-C, SIGTERM or a terminal that closes, and lets it end by
+/// that.
 #[cfg(unix)]
 fn remove_at_signals() {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
 
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         // without the handler a part may be left, which has another name than the target
-        let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
+        let hangup = if outlasts_its_terminal() { None } else { Some(SIGHUP) };
+        let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(hangup)) else { return };
         std::thread::spawn(move || {
             for signal in signals.forever() {
+                if signal == SIGINT && WAITED_FOR.load(Ordering::SeqCst) {
+                    continue;
+                }
                 // kept to the end: no file becomes whole or begins any more
                 let parts = parts();
                 parts.iter().for_each(|part| drop(fs::remove_file(part)));
@@ -120,6 +154,14 @@ fn remove_at_signals() {
             }
         });
     });
+}
+
+/// Whether hang-ups are ignored, as `nohup` has it; that is kept. Where it cannot be known, too.
+#[cfg(unix)]
+fn outlasts_its_terminal() -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_none_or(|mask| mask & 1 != 0)
 }
 
 #[cfg(not(unix))]

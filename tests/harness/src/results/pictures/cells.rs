@@ -32,9 +32,13 @@ pub fn legend() -> Vec<Entry> {
         swatch("visible (paler: lower grade)", 56, |f| 255 - (127.0 * f) as u8, Visibility::Visible),
         swatch("invisible (paler: higher grade)", 56, |f| (127.0 * f) as u8, Visibility::Invisible),
         swatch("unknown", 34, |_| 0, Visibility::Unknown),
-        Entry::new("occupied", 34, move |canvas, area| {
-            let occupied = CellState { occupied: true, ..state(Visibility::Visible, 255) };
-            canvas.shade(area, |px, py| palette::ground(&occupied, px, py));
+        Entry::new("occupied, over visible and invisible", 56, move |canvas, area| {
+            let half = Area { width: area.width / 2, ..area };
+            for (of, left) in [(Visibility::Visible, area.left), (Visibility::Invisible, area.left + half.width)] {
+                let sure = if of == Visibility::Visible { 255 } else { 0 };
+                let occupied = CellState { occupied: true, ..state(of, sure) };
+                canvas.shade(Area { left, ..half }, |px, py| palette::ground(&occupied, px, py));
+            }
             border(canvas, area);
         }),
     ]
@@ -63,7 +67,6 @@ mod tests {
                 fill(&mut canvas, &plot, [x, x + 1.0], [y, y + 1.0], &dark);
             }
         }
-        let colour = palette::ground(&dark, 0, 0);
-        assert!((0..31).all(|y| (0..97).all(|x| canvas.pixel(x, y) == colour)));
+        assert!((0..31).all(|y| (0..97).all(|x| canvas.pixel(x, y) == palette::ground(&dark, x, y))));
     }
 }

@@ -1,7 +1,7 @@
 //! Colours shared by all pictures, distinct with any colour vision.
 //!
 //! Ground: blue is visible, orange invisible, hatched grey unknown; the surer the grade, the
-//! stronger the tone. Outlines: the dash says "not detected", the hue says what the map said.
+//! stronger the tone. A dark lattice over it is occupied. Outlines: the dash says "not detected", the hue says what the map said.
 
 use viewshed::map::{CellState, Visibility};
 
@@ -20,6 +20,10 @@ const OCCUPIED: Colour = Colour::hex(0x2A3340);
 /// Distance between the lines of the hatching, pixels.
 const HATCH_PX: i32 = 7;
 
+/// Distance between the bars of the lattice over what is occupied, and their width, pixels.
+const LATTICE_PX: i32 = 5;
+const LATTICE_BAR_PX: i32 = 2;
+
 /// Colour of a cell at one pixel of the picture.
 pub fn ground(state: &CellState, x: i32, y: i32) -> Colour {
     let grade = f32::from(state.grade) / 255.0;
@@ -28,7 +32,9 @@ pub fn ground(state: &CellState, x: i32, y: i32) -> Colour {
         Visibility::Invisible => INVISIBLE[0].mix(INVISIBLE[1], grade),
         Visibility::Unknown => UNKNOWN[usize::from((x + y).rem_euclid(HATCH_PX) == 0)],
     };
-    if state.occupied { base.mix(OCCUPIED, 0.92) } else { base }
+    // a lattice, through whose holes the ground is seen
+    let bar = |v: i32| v.rem_euclid(LATTICE_PX) < LATTICE_BAR_PX;
+    if state.occupied && (bar(x) || bar(y)) { base.mix(OCCUPIED, 0.92) } else { base }
 }
 
 /// What the evaluation says of an object: visibility V against detection D.
@@ -132,10 +138,18 @@ mod tests {
     }
 
     #[test]
-    fn unknown_is_hatched_and_occupied_is_dark() {
+    fn unknown_is_hatched_and_occupied_is_a_lattice_that_the_ground_is_seen_through() {
         let unknown = |x| ground(&CellState::UNKNOWN, x, 0);
         assert_ne!(unknown(0), unknown(1));
-        let occupied = CellState { occupied: true, ..state(Visibility::Visible, 255) };
-        assert!(luminance(ground(&occupied, 1, 1)) < 110.0);
+        for free in [state(Visibility::Visible, 255), state(Visibility::Invisible, 0)] {
+            let occupied = CellState { occupied: true, ..free };
+            // on any 6 x 6 pixels, which a cell has on an overview
+            for (left, top) in [(0, 0), (3, 1), (101, 58)] {
+                let pixels = || (left..left + 6).flat_map(|x| (top..top + 6).map(move |y| (x, y)));
+                let seen = pixels().filter(|&(x, y)| ground(&occupied, x, y) == ground(&free, x, y)).count();
+                let dark = pixels().filter(|&(x, y)| luminance(ground(&occupied, x, y)) < 80.0).count();
+                assert!(seen >= 9 && dark >= 18, "{seen} {dark}");
+            }
+        }
     }
 }

@@ -34,8 +34,33 @@ pub struct Curve {
 pub enum MarkerKind {
     /// Where an estimator is operated; has the colour of the curve of the same name.
     OperatingPoint,
-    /// What exact geometry allows.
-    Bound,
+    /// What exact lines of sight at one height allow: `geometry-slice`.
+    Slice,
+    /// What exact lines of sight to any height allow: `geometry-box`.
+    Box,
+}
+
+/// What is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counted {
+    Objects,
+    Cells,
+}
+
+impl Counted {
+    /// Titles of the axes: FVR, FIR.
+    const fn axes(self) -> [&'static str; 2] {
+        match self {
+            Self::Objects => [
+                "FVR = FV / (FV + TI): objects not detected, yet called visible (%)",
+                "FIR = FI / (TV + FI): objects detected, yet called invisible (%)",
+            ],
+            Self::Cells => [
+                "cell FVR: road cells out of sight, yet called visible, of all out of sight (%)",
+                "cell FIR: road cells in sight, yet called invisible, of all in sight (%)",
+            ],
+        }
+    }
 }
 
 /// A named point, with intervals where known.
@@ -63,6 +88,7 @@ pub enum Span {
 pub struct TradeOff {
     pub curves: Vec<Curve>,
     pub markers: Vec<Marker>,
+    pub counted: Counted,
     pub span: Span,
     pub title: String,
     /// What has to be said of the data.
@@ -105,11 +131,8 @@ pub fn draw(chart: &TradeOff) -> Canvas {
     for (curve, pen) in chart.curves.iter().zip(CURVES.iter().cycle()) {
         thresholds(&mut canvas, &plot, &mut labels, curve, pen.colour);
     }
-    plot.axes(
-        &mut canvas,
-        "FVR = FV / (FV + TI): not detected, yet called visible (%)",
-        "FIR = FI / (TV + FI): detected, yet called invisible (%)",
-    );
+    let [fvr, fir] = chart.counted.axes();
+    plot.axes(&mut canvas, fvr, fir);
     canvas
 }
 
@@ -148,7 +171,8 @@ fn layout(chart: &TradeOff) -> (Surround, Plot) {
         }
     };
     kinds(MarkerKind::OperatingPoint, "operating point (bars: interval)");
-    kinds(MarkerKind::Bound, "bound by exact geometry");
+    kinds(MarkerKind::Slice, "geometry-slice");
+    kinds(MarkerKind::Box, "geometry-box: bounds by exact geometry");
     if chart.curves.iter().flat_map(|c| &c.points).any(|p| p.threshold.is_some()) {
         entries.push(Entry::new("threshold of a point on a curve", 26, |canvas, area| {
             let middle = [area.left as f32 + 13.0, area.top as f32 + area.height as f32 / 2.0];
@@ -189,8 +213,11 @@ fn symbol(canvas: &mut Canvas, [x, y]: Pixel, kind: MarkerKind, colour: Colour) 
             canvas.disc([x, y], 8.5, Colour::WHITE);
             canvas.disc([x, y], 6.5, colour);
         }
-        MarkerKind::Bound => {
-            let corners = [[x, y - 8.0], [x + 8.0, y], [x, y + 8.0], [x - 8.0, y]];
+        MarkerKind::Slice | MarkerKind::Box => {
+            let corners = match kind {
+                MarkerKind::Slice => [[x, y - 8.0], [x + 8.0, y], [x, y + 8.0], [x - 8.0, y]],
+                _ => [[x - 6.5, y - 6.5], [x + 6.5, y - 6.5], [x + 6.5, y + 6.5], [x - 6.5, y + 6.5]],
+            };
             canvas.polygon(&corners, Colour::WHITE);
             canvas.polyline(&corners, true, Pen::new(colour, 2.2));
         }
@@ -242,10 +269,28 @@ mod tests {
                     .to_vec(),
             }],
             markers: vec![marker("radar-3d", MarkerKind::OperatingPoint, 0.80, 0.20)],
+            counted: Counted::Objects,
             span,
             title: "title".into(),
             caption: None,
         }
+    }
+
+    #[test]
+    fn the_two_bounds_and_the_two_things_counted_look_different() {
+        let with = |kind: MarkerKind, counted: Counted| {
+            let chart = TradeOff { counted, ..chart(Span::Full) };
+            let bound = TradeOff { markers: vec![marker("geometry", kind, 0.5, 0.5)], ..chart };
+            let (canvas, (_, plot)) = (draw(&bound), layout(&bound));
+            let [x, y] = at(&plot, 0.5, 0.5).map(|v| v as i32);
+            // a corner that a square has and a diamond has not
+            ((-7..=-6).any(|d| canvas.pixel(x + d, y + d).red < 90), canvas.png().unwrap())
+        };
+        let (slice, slice_picture) = with(MarkerKind::Slice, Counted::Objects);
+        let (of_box, _) = with(MarkerKind::Box, Counted::Objects);
+        assert!(of_box && !slice);
+        assert_ne!(slice_picture, with(MarkerKind::Slice, Counted::Cells).1, "the axes say what is counted");
+        assert!(Counted::Cells.axes().iter().all(|title| title.contains("road cells") && !title.contains("detected")));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::json::{self, Options, Report};
 use super::percent;
-use super::table::table;
+use super::table::{Extent, table};
 use super::{ORIGIN, notes};
 use crate::evaluation::summary::Row;
 use crate::studies::experiment::{DayResult, Experiment, PAPER, PAPER_COVERAGE, PAPER_TRAJECTORIES, Pooled, hidden};
@@ -173,7 +173,7 @@ fn closing(experiment: &Experiment) -> String {
 
 /// One recording replayed beside the experiment: the same rows.
 pub fn beside(replay: &crate::evaluation::replay::Replay) -> String {
-    format!("{}\n{}\n", notes::heading(replay), super::table::rates(&replay.summary))
+    format!("{}\n{}\n", notes::heading(replay), super::table::rates(&replay.summary, Extent::Wide))
 }
 
 /// One reporting day with everything `replay --json` has.

@@ -44,7 +44,7 @@ pub struct Report {
     sensor: Value,
     input: Input,
     options: Value,
-    origin: &'static str,
+    origin: Option<&'static str>,
 }
 
 /// The camera of a recording.
@@ -148,7 +148,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
             "reading": reading(options.reading),
             "estimators": options.estimators,
         }),
-        origin: ORIGIN,
+        origin: recording.sensor.synthetic.then_some(ORIGIN),
     }
 }
 
@@ -231,6 +231,7 @@ fn sensor(recording: &Recording) -> Value {
         "has_elevation": sensor.has_elevation,
         "frames_independent": sensor.frames_independent,
         "platform_moving": sensor.platform_moving,
+        "synthetic": sensor.synthetic,
         "licence": sensor.licence,
     })
 }

@@ -9,7 +9,7 @@ pub mod scenes;
 pub mod site;
 pub mod table;
 
-/// To be said wherever results are shown.
+/// To be said wherever results of synthetic recordings are shown.
 pub const ORIGIN: &str = "No labelled gantry-radar recording is publicly obtainable. Synthetic recordings are synthetic: \
                           their figures show that the method works on their world, not how well it does on a road.";
 

@@ -1,11 +1,17 @@
 //! The lines around the table: what was counted, how the intervals came about, what was rejected.
 
+use viewshed::camera::boxes::BoxRejection;
+use viewshed::frame::gate::Rejection;
+
 use super::percent;
+use crate::estimators::camera_3d::NO_VEHICLE;
+use crate::estimators::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE};
 use crate::evaluation::Options;
 use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
+use crate::recording::Recording;
 use crate::recording::truth::LabelsBeside;
 
 /// What the table is of.
@@ -57,7 +63,7 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     let cartesian = summary.rows.iter().filter(|r| !r.curve.is_empty() && r.grid != options.grid);
     lines.extend(cartesian.map(|r| format!("{} was judged on the {} grid: its map has no other.", r.name, r.grid)));
     lines.extend(summary.comparisons.iter().map(comparison));
-    lines.extend(counters(&summary.rows));
+    lines.extend(left_out(recording, &summary.rows));
     if recording.problems.is_empty() {
         lines.push("Problems of the input: none.".into());
     } else {
@@ -79,7 +85,7 @@ pub const RULE_OF_CAMERA: &str = "Detected: a box of the camera's own, assigned 
 
 /// What has to be known to read the table of a camera, beside what stands below the radar's.
 pub fn of_camera(replay: &Replay) -> Vec<String> {
-    [RULE_OF_CAMERA.to_owned()].into_iter().chain(counters(&replay.summary.rows)).collect()
+    [RULE_OF_CAMERA.to_owned()].into_iter().chain(left_out(&replay.recording, &replay.summary.rows)).collect()
 }
 
 fn comparison(c: &Comparison) -> String {
@@ -97,20 +103,57 @@ fn comparison(c: &Comparison) -> String {
     )
 }
 
-/// What estimators did not use, by reason; estimators that say the same share a line.
-fn counters(rows: &[Row]) -> Vec<String> {
-    let mut said: Vec<(String, Vec<&str>)> = Vec::new();
-    for row in rows {
-        let counted: Vec<String> =
-            row.counters.iter().filter(|(_, n)| *n > 0).map(|(reason, n)| format!("{reason} {n}")).collect();
-        let counted = counted.join(", ");
-        match said.iter_mut().find(|(before, _)| *before == counted) {
+/// A reason for which estimators leave out a detection or a box, in words; `None` for what is neither.
+fn in_words(reason: &str) -> Option<&str> {
+    Some(match reason {
+        _ if reason == Rejection::Range.name() => "nearer or farther than the field of view",
+        _ if reason == Rejection::Azimuth.name() => "beside the field of view",
+        _ if reason == Rejection::Elevation.name() => "above or below the field of view",
+        _ if reason == Rejection::Quality.name() => "with too low an SNR",
+        _ if reason == Rejection::Rcs.name() => "with too low an RCS",
+        _ if reason == Rejection::Velocity.name() => "with a velocity no vehicle has",
+        _ if reason == Rejection::Overflow.name() => "weaker than the --max-detections strongest of their frame",
+        DROPPED => "not finite or without a range when read",
+        NOT_FINITE => "not finite",
+        NO_RANGE => "at no measurable range",
+        ABSURD => "with an absurd value",
+        _ if reason == NO_VEHICLE => "of no vehicle",
+        _ => reason.strip_prefix("box ").or((reason == BoxRejection::Refused.name()).then_some("not finite"))?,
+    })
+}
+
+/// How often each reason came.
+type Counters<'a> = &'a [(String, u64)];
+
+/// What estimators left out, by reason and with the total; estimators that say the same share a line.
+fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
+    let mut said: Vec<(Counters, Vec<&str>)> = Vec::new();
+    for row in rows.iter().filter(|row| row.counters.iter().any(|(_, n)| *n > 0)) {
+        match said.iter_mut().find(|(before, _)| *before == row.counters) {
             Some((_, names)) => names.push(&row.name),
-            None => said.push((counted, vec![&row.name])),
+            None => said.push((&row.counters, vec![&row.name])),
         }
     }
-    said.retain(|(counted, _)| !counted.is_empty());
-    said.iter().map(|(counted, names)| format!("Not used by {}: {counted}.", names.join(", "))).collect()
+    let (all, what) = match recording.of_camera() {
+        Some(camera) => (camera.frames.iter().map(|f| f.boxes.len() as u64 + f.refused).sum(), "boxes"),
+        None => (recording.frames.iter().map(|f| f.detections.len() as u64 + f.refused).sum::<u64>(), "detections"),
+    };
+    let line = |(counters, names): &(Counters, Vec<&str>)| {
+        let named = |(reason, n): &(String, u64)| Some((in_words(reason)?.to_owned(), *n));
+        let mut reasons: Vec<(String, u64)> = counters.iter().filter(|(_, n)| *n > 0).filter_map(named).collect();
+        reasons.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+        let sum: u64 = reasons.iter().map(|(_, n)| n).sum();
+        // a pool of recordings keeps no frames
+        let total = if all >= sum && all > 0 { format!(" of {all}") } else { String::new() };
+        let reasons: Vec<String> = reasons.iter().map(|(reason, n)| format!("{n} {reason}")).collect();
+        let others = counters.iter().filter(|(reason, n)| *n > 0 && in_words(reason).is_none());
+        let others: String = others.map(|(reason, n)| format!(" {n} times there was {reason}.")).collect();
+        match reasons.is_empty() {
+            true => format!("{}:{others}", names.join(", ")),
+            false => format!("{} left out {sum}{total} {what}: {}.{others}", names.join(", "), reasons.join(", ")),
+        }
+    };
+    said.iter().map(line).collect()
 }
 
 #[cfg(test)]
@@ -126,7 +169,28 @@ mod tests {
         let mut scores = ["a", "b", "c"].map(|name| score(name, &samples, |_| Some(255)));
         scores[0].counters = vec![("range".into(), 3), ("snr".into(), 0)];
         scores[2].counters = scores[0].counters.clone();
-        let summary = Summary::new(&recording(1, 1), &samples, &scores, &Options::default());
-        assert_eq!(counters(&summary.rows), ["Not used by a, c: range 3."]);
+        scores[1].counters = vec![("azimuth".into(), 1), (NOT_FINITE.into(), 4), ("no room in the list".into(), 2)];
+        let mut recording = recording(1, 1);
+        recording.frames[0].refused = 7;
+        let summary = Summary::new(&recording, &samples, &scores, &Options::default());
+        let all = 7 + recording.frames[0].detections.len();
+        let expected = [
+            format!("a, c left out 3 of {all} detections: 3 nearer or farther than the field of view."),
+            format!(
+                "b left out 5 of {all} detections: 4 not finite, 1 beside the field of view. \
+                 2 times there was no room in the list."
+            ),
+        ];
+        assert_eq!(left_out(&recording, &summary.rows), expected);
+    }
+
+    #[test]
+    fn every_reason_has_its_words() {
+        for reason in Rejection::ALL.into_iter().filter(|r| *r != Rejection::Refused) {
+            assert!(in_words(reason.name()).is_some(), "{}", reason.name());
+        }
+        for reason in BoxRejection::ALL {
+            assert!(in_words(reason.name()).is_some_and(|words| !words.starts_with("box")), "{}", reason.name());
+        }
     }
 }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::json::{self, Options, Report};
 use super::percent;
-use super::table::{rates, signed, table};
+use super::table::{Extent, rates, signed, table};
 use super::{ORIGIN, notes};
 use crate::evaluation::Options as EvaluationOptions;
 use crate::evaluation::replay::Replay;
@@ -42,7 +42,7 @@ pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &Evaluatio
         summary.frames,
         summary.objects,
         percent(summary.coverage_rate),
-        rates(summary)
+        rates(summary, Extent::Wide)
     );
     for line in notes::below(&main.pooled, options) {
         text += &(line + "\n");

@@ -5,15 +5,15 @@ use serde_json::{Value, json};
 
 use super::ORIGIN;
 use super::percent;
-use super::table::table;
+use super::table::{Extent, tables};
 use crate::studies::site::sets::{Rank, Ranked};
 use crate::studies::site::{Search, Site};
 use crate::twin::scene::Mount;
 
-/// `h 6, y -14, yaw 10, pitch 4`, with the place along the road where it is not 0.
+/// `y -14 m, h 6 m, yaw 10°, pitch 4°`, with the place along the road where it is not 0.
 pub fn name(mount: &Mount) -> String {
-    let along = if mount.x_m == 0.0 { String::new() } else { format!("x {}, ", mount.x_m) };
-    format!("{along}y {}, h {}, yaw {}, pitch {}", mount.y_m, mount.height_m, mount.yaw_deg, mount.pitch_deg)
+    let along = if mount.x_m == 0.0 { String::new() } else { format!("x {} m, ", mount.x_m) };
+    format!("{along}y {} m, h {} m, yaw {}°, pitch {}°", mount.y_m, mount.height_m, mount.yaw_deg, mount.pitch_deg)
 }
 
 /// The tables: single mounts, then sets of each size, the first `top` of each.
@@ -41,14 +41,14 @@ pub fn text(site: &Site, ranked: &[Vec<Ranked>], top: usize) -> String {
 fn singles(site: &Site, sets: &[Ranked], top: usize) -> String {
     let heading = [
         "",
-        "height m",
-        "along m",
-        "across m",
-        "yaw °",
-        "pitch °",
+        "height\nm",
+        "along\nm",
+        "across\nm",
+        "yaw\n°",
+        "pitch\n°",
         "vehicles\ndetected %",
         "road in\nsight %",
-        "coverage rate\nin own view %",
+        "coverage in\nown view %",
     ];
     let rows = sets.iter().take(top).enumerate().map(|(k, set)| {
         let candidate = &site.candidates[set.members[0]];
@@ -57,17 +57,17 @@ fn singles(site: &Site, sets: &[Ranked], top: usize) -> String {
         let shares = [Some(set.detected[0]), Some(set.road[0]), candidate.coverage_rate()].map(percent);
         std::iter::once((k + 1).to_string()).chain(figures).chain(shares).collect()
     });
-    table(&heading, rows).to_string()
+    tables(&heading, &rows.collect::<Vec<_>>(), 6, Extent::Terminal)
 }
 
 fn several(site: &Site, sets: &[Ranked], top: usize) -> String {
-    let heading = ["", "mounts", "vehicles %\nby one", "vehicles %\nby two", "road %\nby one", "road %\nby two"];
+    let heading = ["", "mounts", "vehicles\nby one %", "vehicles\nby two %", "road\nby one %", "road\nby two %"];
     let rows = sets.iter().take(top).enumerate().map(|(k, set)| {
         let names: Vec<String> = set.members.iter().map(|&m| name(&site.candidates[m].mount)).collect();
         let shares = [set.detected[0], set.detected[1], set.road[0], set.road[1]].map(|v| percent(Some(v)));
         [(k + 1).to_string(), names.join("\n")].into_iter().chain(shares).collect()
     });
-    table(&heading, rows).to_string()
+    tables(&heading, &rows.collect::<Vec<_>>(), 2, Extent::Terminal)
 }
 
 /// The file of `--json`: `candidates` and `sets`, best first.

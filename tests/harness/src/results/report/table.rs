@@ -12,10 +12,22 @@ use crate::evaluation::mount_error::Sensitivity;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::{Row, Summary};
 
+/// Columns of a terminal, which tables fit unless they are asked for wide.
+const TERMINAL: usize = 80;
+
+/// How much is shown of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// What fits a terminal.
+    Terminal,
+    /// Everything, side by side.
+    Wide,
+}
+
 /// The table of one recording with the notes below it.
-pub fn text(replay: &Replay, options: &Options) -> String {
+pub fn text(replay: &Replay, options: &Options, extent: Extent) -> String {
     let rates_of = |replay: &Replay| match &replay.recording.truth {
-        Some(_) => rates(&replay.summary).to_string(),
+        Some(_) => rates(&replay.summary, extent).to_string(),
         None => notes::WITHOUT_LABELS.to_owned(),
     };
     let mut text = format!("{}\n{}\n", notes::heading(replay), rates_of(replay));
@@ -24,7 +36,7 @@ pub fn text(replay: &Replay, options: &Options) -> String {
         text.push('\n');
     }
     if replay.summary.rows.iter().any(|r| !r.breakdown.occlusion.is_empty()) {
-        text += &by_occlusion(&replay.summary);
+        text += &by_occlusion(&replay.summary, extent);
         text.push('\n');
     }
     if replay.recording.of_camera().is_some() {
@@ -50,20 +62,58 @@ pub(super) fn signed(points: Option<f64>, interval: Option<Interval>) -> String 
     points.map_or_else(|| "n/a".into(), |p| format!("{p:+.1}")) + &spread.unwrap_or_default()
 }
 
+/// A table whose first column is text and whose others are figures.
 pub fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(heading.to_vec());
+    let cell = |(column, text): (usize, String)| {
+        let side = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
+        Cell::new(text).set_alignment(side)
+    };
+    let heading = heading.iter().map(|name| (*name).to_owned()).enumerate().map(cell);
+    table.load_style(presets::UTF8_FULL_CONDENSED).set_header(heading.collect::<Vec<_>>());
     for row in rows {
-        table.add_row(row.into_iter().enumerate().map(|(column, text)| {
-            let side = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
-            Cell::new(text).set_alignment(side)
-        }));
+        table.add_row(row.into_iter().enumerate().map(cell));
     }
+    // figures stand away from what is left of them
+    table.column_iter_mut().skip(1).for_each(|column| {
+        column.set_padding((0, 1));
+    });
     table
 }
 
-/// Rates in per cent with their intervals, one row an estimator.
-pub(super) fn rates(summary: &Summary) -> Table {
+/// The same as text; in a terminal as several tables below each other where one would be too wide, each with the
+/// first `fixed` columns.
+pub(super) fn tables(heading: &[&str], rows: &[Vec<String>], fixed: usize, extent: Extent) -> String {
+    let longest = |text: &str| text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+    // with its border and the space to it
+    let width = |k: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(k)).map(|cell| longest(cell));
+        2 + usize::from(k == 0) + cells.chain(heading.get(k).map(|name| longest(name))).max().unwrap_or(0)
+    };
+    let begin = 1 + (0..fixed).map(width).sum::<usize>();
+    let mut parts: Vec<Vec<usize>> = vec![Vec::new()];
+    let mut used = begin;
+    for k in fixed..heading.len() {
+        let begun = parts.last().is_some_and(|part| !part.is_empty());
+        if extent == Extent::Terminal && begun && used + width(k) > TERMINAL {
+            used = begin;
+            parts.push(Vec::new());
+        }
+        used += width(k);
+        parts.last_mut().into_iter().for_each(|part| part.push(k));
+    }
+    let part = |shown: &Vec<usize>| {
+        let columns = || (0..fixed).chain(shown.iter().copied());
+        let heading: Vec<&str> = columns().filter_map(|k| heading.get(k).copied()).collect();
+        let rows = rows.iter().map(|row| columns().filter_map(|k| row.get(k).cloned()).collect());
+        table(&heading, rows).to_string()
+    };
+    parts.iter().map(part).collect::<Vec<_>>().join("\n")
+}
+
+/// Rates in per cent with their intervals, one row an estimator. In a terminal without what follows from the rest: the
+/// intervals of TVR and TIR, which are those of FIR and FVR turned over, and the distances to a bound.
+pub(super) fn rates(summary: &Summary, extent: Extent) -> Table {
     let heading = [
         "estimator",
         "TVR %",
@@ -75,18 +125,21 @@ pub(super) fn rates(summary: &Summary) -> Table {
         "FVR from\nslice, points",
         "FIR from\nslice, points",
     ];
-    table(&heading, summary.rows.iter().map(rate_row))
+    let shown = if extent == Extent::Wide { heading.len() } else { heading.len() - 2 };
+    let rows = summary.rows.iter().map(|row| rate_row(row, extent).into_iter().take(shown).collect());
+    table(&heading[..shown], rows)
 }
 
-fn rate_row(row: &Row) -> Vec<String> {
+fn rate_row(row: &Row, extent: Extent) -> Vec<String> {
     let (c, i, d) = (&row.counts, &row.intervals, &row.to_slice);
     // the bound's distance to itself has no spread
     let spread = |interval| if row.name == SLICE { None } else { interval };
+    let wide = |interval| if extent == Extent::Wide { interval } else { None };
     vec![
         row.name.clone(),
-        with_interval(c.tvr(), i.tvr),
+        with_interval(c.tvr(), wide(i.tvr)),
         with_interval(c.fvr(), i.fvr),
-        with_interval(c.tir(), i.tir),
+        with_interval(c.tir(), wide(i.tir)),
         with_interval(c.fir(), i.fir),
         with_interval(row.cell_fvr(), i.cell_fvr),
         with_interval(row.cell_fir(), i.cell_fir),
@@ -96,20 +149,20 @@ fn rate_row(row: &Row) -> Vec<String> {
 }
 
 /// FVR / FIR of every estimator by class and by distance.
-pub fn breakdown(summary: &Summary) -> String {
-    let by_class =
-        grouped(summary, "class", |r| r.breakdown.class.iter().map(|(class, &c)| (class.clone(), c)).collect());
-    let by_distance = grouped(summary, "distance, m", |r| {
-        r.breakdown.distance.iter().map(|(&band, &c)| (band_name(band), c)).collect()
-    });
+pub fn breakdown(summary: &Summary, extent: Extent) -> String {
+    let of_class = |r: &Row| r.breakdown.class.iter().map(|(class, &c)| (class.clone(), c)).collect();
+    let of_band = |r: &Row| r.breakdown.distance.iter().map(|(&band, &c)| (band_name(band), c)).collect();
+    let by_class = grouped(summary, "class", of_class, extent);
+    let by_distance = grouped(summary, "distance, m", of_band, extent);
     format!("{by_class}\n{by_distance}\n")
 }
 
-fn by_occlusion(summary: &Summary) -> String {
-    grouped(summary, "occlusion", |r| r.breakdown.occlusion.iter().map(|(&g, &c)| (g.to_string(), c)).collect())
+fn by_occlusion(summary: &Summary, extent: Extent) -> String {
+    let of_grade = |r: &Row| r.breakdown.occlusion.iter().map(|(&g, &c)| (g.to_string(), c)).collect();
+    grouped(summary, "occlusion", of_grade, extent)
 }
 
-fn grouped(summary: &Summary, by: &str, groups: impl Fn(&Row) -> Vec<(String, Counts)>) -> String {
+fn grouped(summary: &Summary, by: &str, groups: impl Fn(&Row) -> Vec<(String, Counts)>, extent: Extent) -> String {
     let names: Vec<&str> = summary.rows.iter().map(|r| r.name.as_str()).collect();
     let heading = [&[by, "samples", "coverage %"], &names[..]].concat();
     let columns: Vec<Vec<(String, Counts)>> = summary.rows.iter().map(groups).collect();
@@ -118,14 +171,15 @@ fn grouped(summary: &Summary, by: &str, groups: impl Fn(&Row) -> Vec<(String, Co
         let cells = columns.iter().map(|column| column.get(k).map_or_else(String::new, |(_, c)| pair(c)));
         [group.clone(), counts.total().to_string(), percent(counts.coverage())].into_iter().chain(cells).collect()
     });
-    format!("FVR / FIR in % by {by}:\n{}", table(&heading, rows))
+    let rows: Vec<Vec<String>> = rows.collect();
+    format!("FVR / FIR in % by {by}:\n{}", tables(&heading, &rows, 3, extent))
 }
 
 /// How the rates of every estimator move with a wrong mount, in points.
-pub fn mount_error(sensitivities: &[Sensitivity]) -> String {
+pub fn mount_error(sensitivities: &[Sensitivity], extent: Extent) -> String {
     let describe = |s: &Sensitivity| match (s.error.pitch_deg, s.error.height_m) {
-        (pitch, 0.0) => format!("pitch {pitch:+} deg"),
-        (_, height) => format!("height {height:+} m"),
+        (pitch, 0.0) => format!("pitch\n{pitch:+} deg"),
+        (_, height) => format!("height\n{height:+} m"),
     };
     let headings: Vec<String> = sensitivities.iter().map(describe).collect();
     let heading: Vec<&str> = ["estimator", "rates"].into_iter().chain(headings.iter().map(String::as_str)).collect();
@@ -143,13 +197,25 @@ pub fn mount_error(sensitivities: &[Sensitivity]) -> String {
             |name: &str, of: &str, cells| [name.to_owned(), of.to_owned()].into_iter().chain(moved(cells)).collect();
         [row(&name, "FVR / FIR", false), row("", "cell FVR / FIR", true)]
     });
-    let table = table(&heading, rows);
-    format!("What a wrong mount does, given to the estimators and not to the truth (points):\n{table}\n")
+    let tables = tables(&heading, &rows.collect::<Vec<_>>(), 2, extent);
+    format!("What a wrong mount does, given to the estimators and not to the truth (points):\n{tables}\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_too_wide_for_a_terminal_goes_on_below_with_its_first_columns() {
+        let heading: Vec<String> = (0..9).map(|k| format!("a column {k}")).collect();
+        let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
+        let rows: Vec<Vec<String>> = vec![(0..9).map(|k| format!("value {k}")).collect()];
+        let text = tables(&heading, &rows, 2, Extent::Terminal);
+        assert!(text.lines().all(|line| line.chars().count() <= TERMINAL), "{text}");
+        assert_eq!(text.matches("value 1").count(), text.matches('╞').count());
+        assert!((0..9).all(|k| text.contains(&format!("value {k}"))), "{text}");
+        assert_eq!(tables(&heading, &rows, 2, Extent::Wide).matches('╞').count(), 1);
+    }
 
     #[test]
     fn nothing_to_divide_by_reads_not_applicable() {

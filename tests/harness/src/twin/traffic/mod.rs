@@ -250,6 +250,11 @@ impl Traffic {
 }
 
 impl Vehicle {
+    /// When its last row is.
+    pub fn ends_s(&self) -> Option<f64> {
+        self.samples.last().map(|s| s.time_s)
+    }
+
     /// Pose between the first and the last row.
     pub fn at(&self, time_s: f64) -> Option<Pose> {
         let s = &self.samples;

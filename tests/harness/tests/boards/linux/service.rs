@@ -216,11 +216,50 @@ fn linux_mistakes_are_reported_with_file_line_and_key() {
     let output = Command::new(program()).arg("--config").arg(&path).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(std::fs::read_to_string(&log).unwrap(), "(1.0) can0 123#00\n");
+    // --check finds logs that are not there
+    let (code, said) = check(&sample.replace("interface = \"can0\"", "candump = \"none.log\""));
+    assert!(code == Some(2) && said.contains("input.candump: none.log is not there"), "{said}");
+    let (code, said) = check(&sample.replace("interface = \"can1\"", "candump = \"nowhere/out.log\""));
+    assert!(code == Some(2) && said.contains("output.candump: the folder nowhere is not there"), "{said}");
     // a log that is not there is no device to wait for
     std::fs::write(&path, sample.replace("interface = \"can0\"", "candump = \"none.log\"")).unwrap();
     let output = Command::new(program()).arg("--config").arg(&path).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("input.candump: none.log: No such file"), "{output:?}");
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_the_first_try_without_hardware_works_from_the_projects_folder() {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let text = std::fs::read_to_string(project.join("boards/linux/first-try.toml")).unwrap();
+    let folder = Folder::new().unwrap();
+    let (path, log) = (folder.0.join("try.toml"), folder.0.join("first-try.log"));
+    std::fs::write(&path, text.replace("\"first-try.log\"", &format!("{log:?}"))).unwrap();
+    let output = Command::new(program()).current_dir(&project).arg("-c").arg(&path).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.contains("35 maps, 211 messages sent, 0 refused"), "{said}");
+    assert_eq!(std::fs::read_to_string(&log).unwrap().lines().count(), 211);
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_bytes_that_are_no_scans_are_told_from_silence() {
+    let (settings, _) = shipped(0.1);
+    let folder = Folder::new().unwrap();
+    let _ear = Ear::plug(&folder.0.join("maps"), Instant::now());
+    let mut radar = Terminal::plug(&folder.0.join("radar"));
+    let config =
+        "[input]\nradar = \"ti\"\nport = \"FOLDER/radar\"\n[output]\nmedium = \"serial\"\nport = \"FOLDER/maps\"\n";
+    let mut daemon = start(folder, &format!("{config}{}", tables(&settings)));
+    daemon.wait_for("radar: no byte; is the radar powered");
+    for _ in 0..40 {
+        radar.send(&[0x55; 64]);
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    daemon.wait_for("radar: bytes, and no frames among them; is 921600 its baud rate (input.baud)?");
+    daemon.terminate();
+    assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
 }
 
 /// The sample with every key on that can be on together.
