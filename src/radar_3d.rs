@@ -320,13 +320,16 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let by_range = ByRange::<D>::sort(reflections, p.tracking.limit_cm);
         for (i, r) in reflections.iter().enumerate() {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
-            if first {
-                p.inverse_sensor.add(r, Around::Unknown, &p.axes, &mut self.grid);
-            } else if !(claimed.contains(i) || p.tracking.course(r).is_some()) {
-                let is_of_body = by_range.is_one_of(BODY_REFLECTIONS, BODY_CM, r, |k| !claimed.contains(k));
-                let around = if is_of_body { Around::Body } else { Around::Nothing };
-                p.inverse_sensor.add(r, around, &p.axes, &mut self.grid);
-            }
+            let around = if first {
+                Around::Unknown
+            } else if claimed.contains(i) || p.tracking.course(r).is_some() {
+                continue;
+            } else if by_range.is_one_of(BODY_REFLECTIONS, BODY_CM, r, |k| !claimed.contains(k)) {
+                Around::Body
+            } else {
+                Around::Nothing
+            };
+            p.inverse_sensor.add(r, around, &p.axes, &mut self.grid);
         }
         ended();
     }

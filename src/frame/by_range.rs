@@ -25,7 +25,8 @@ pub struct ByRange<const D: usize> {
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // bins and lists are short
 impl<const D: usize> ByRange<D> {
-    /// Sorts by counting: two passes over the reflections.
+    /// Sorts by counting: two passes over the reflections. Called twice a frame, and a controller's flash is small.
+    #[inline(never)]
     pub fn sort(reflections: &[Reflection], limit_cm: i32) -> Self {
         let mut sorted = Self {
             places: [Place { x_cm: 0, y_cm: 0, index: 0 }; D],
@@ -71,7 +72,7 @@ impl<const D: usize> ByRange<D> {
         let (ground, near) = (i32::from(r.ground_cm), |a: i32, b: i32| (a - b).abs() <= reach_cm);
         let around = self.between(ground - 2 * reach_cm, ground + 2 * reach_cm).iter().take(MOST_AROUND);
         let close = around.filter(|p| near(p.x_cm, r.x_cm) && near(p.y_cm, r.y_cm) && counts(usize::from(p.index)));
-        close.take(many).count() == many
+        close.count() >= many
     }
 }
 

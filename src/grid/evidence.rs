@@ -178,6 +178,7 @@ impl InverseSensor {
     }
 
     /// Height of an unmoving reflection and its standard deviation, centimetres.
+    #[inline(never)]
     fn height(&self, r: &Reflection, around: Around) -> (i32, i32) {
         let (height, variance) = match r.height_cm {
             Some((measured, sigma)) => {

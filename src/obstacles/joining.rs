@@ -5,7 +5,7 @@ use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::BIN_CM;
 use super::tracking::{MERGE_PARALLEL, Tracking};
-use crate::fixed::math::{hypot_gate, mul_shift, ratio};
+use crate::fixed::math::hypot_gate;
 
 impl Obstacle {
     /// Whether another obstacle is near enough to be a part of the same vehicle, or to lie within it.
@@ -79,10 +79,9 @@ impl Obstacle {
 
     /// Where this frame's detections of both have their centre: it has moved, but neither of them has.
     fn centre_with(&self, other: &Self) -> (i32, i32) {
-        let (n, m) = (self.gathered.count, other.gathered.count);
-        let share = ratio::<8>(m, (n + m).max(1));
-        let (dx, dy) = (other.free.place.0 - self.free.place.0, other.free.place.1 - self.free.place.1);
-        (self.free.place.0 + mul_shift(dx, share, 8), self.free.place.1 + mul_shift(dy, share, 8))
+        let ((x, y), count) = (self.free.place, other.gathered.count);
+        let both = (self.gathered.count + count).max(1);
+        (x + (other.free.place.0 - x) / both * count, y + (other.free.place.1 - y) / both * count)
     }
 
     /// Standard deviation of the lateral place, centimetres.

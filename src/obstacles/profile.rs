@@ -9,11 +9,11 @@ pub const BINS: usize = 48;
 pub const BIN_CM: i32 = 50;
 /// Bins that hold one end of a vehicle: its bumper, lamps and nearest axle.
 const END_BINS: usize = 5;
-/// Shortest and longest outline of a car that shows both its ends, centimetres.
-const CAR_CM: [i32; 2] = [250, 600];
-/// Narrowest and widest gap between cars taken for one vehicle, centimetres: less than what they keep when they stand,
-/// for noise fills a part of it, and what still joins two parts.
-const GAP_CM: [i32; 2] = [150, 700];
+/// Shortest and longest outline of a car that shows both its ends, bins: 2.5 to 6 m.
+const CAR_BINS: [i32; 2] = [5, 12];
+/// Narrowest and widest gap between cars taken for one vehicle, bins: 1.5 m, which is less than what they keep when they
+/// stand, for noise fills a part of it, to 7 m, which is what still joins two parts.
+const GAP_BINS: [i32; 2] = [3, 14];
 /// One hit, in the histogram's unit.
 pub const HIT: i32 = 64;
 
@@ -108,25 +108,23 @@ impl Profile {
         let bin = |along: i32| usize::try_from(along.div_euclid(BIN_CM) + BINS as i32 / 2).unwrap_or(0);
         let held = self.bins.get(bin(extent.rear_cm)..=bin(extent.front_cm).min(BINS - 1)).unwrap_or(&[]);
         let total = held.iter().map(|b| i32::from(*b)).sum::<i32>();
-        let of_a_car = |part: i32| (CAR_CM[0]..=CAR_CM[1]).contains(&part);
-        let (mut parts, mut part, mut gap) = (0, 0, 0);
+        let is_car = |part: i32| (CAR_BINS[0]..=CAR_BINS[1]).contains(&part);
+        let (mut cars, mut others, mut part, mut gap) = (0, 0, 0, 0);
         for b in held {
-            if i32::from(*b) * 10 * (held.len() as i32) < total {
-                gap += BIN_CM;
+            if i32::from(*b) * 10 * (held.len() as i32) >= total {
+                part += if gap < GAP_BINS[0] { gap + 1 } else { 1 };
+                gap = 0;
                 continue;
             }
-            if gap < GAP_CM[0] {
-                part += gap + BIN_CM;
-            } else {
-                if gap > GAP_CM[1] || !of_a_car(part) {
-                    return false;
-                }
-                parts += 1;
-                part = BIN_CM;
+            gap += 1;
+            if gap == GAP_BINS[0] {
+                cars += 1;
+                others += i32::from(!is_car(part));
+                part = 0;
             }
-            gap = 0;
+            others += i32::from(gap > GAP_BINS[1]);
         }
-        parts > 0 && of_a_car(part)
+        cars > 0 && others == 0 && is_car(part)
     }
 
     /// Centre of gravity of the bins `i` and `i + 1`, centimetres from the anchor.
