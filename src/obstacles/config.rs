@@ -138,7 +138,7 @@ impl Default for ObstacleConfig {
             own_way_mps: 1.5,
             own_way_share: 0.2,
             own_way_follow: 0.05,
-            own_way_margin_m: 0.6,
+            own_way_margin_m: 0.4,
             length_growth_s: 1.0,
             length_memory_s: 3.0,
             slow_mps: 4.0,
