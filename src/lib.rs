@@ -264,7 +264,7 @@ pub mod board {
 
     // settings that outlast a restart, and the service that sets them
     pub use crate::unit::can_service::{CanService, CanServiceConfig};
-    pub use crate::unit::identity::{Identified, Identity};
+    pub use crate::unit::identity::Identity;
     pub use crate::unit::session::SerialSession;
     pub use crate::unit::settings::{
         BLOCK_LEN, BlockError, ConfigureRadar, FlashSlots, SettingsCheck, SettingsSlots, StoredSettings, UnitConfig,

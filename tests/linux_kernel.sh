@@ -61,7 +61,7 @@ for module in can can-raw can-dev vcan; do /bin/busybox insmod /modules/$module.
 /bin/ip link set lo up
 export PATH=/bin VIEWSHEDD=/bin/viewshedd VIEWSHED=/bin/viewshed BROADCAST=/broadcast.log
 echo "kernel $(/bin/busybox uname -r)"
-/bin/vcan --nocapture
+/bin/vcan --nocapture --test-threads=1
 /bin/busybox poweroff -f
 END
 chmod +x "$disk/init"

@@ -3,20 +3,52 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::board::{Ars408Configuration, Ars408Profile, Identity};
+use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck};
 use viewshed::{
     Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Medium, Mount,
-    NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference,
+    NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference, small,
 };
 
 use crate::locate;
 use crate::one_file::is_one_file;
 use crate::state;
 
+/// Size of the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grid {
+    /// 200 x 120 x 16 cells.
+    #[default]
+    Reference,
+    /// 100 x 64 x 8 cells: half the resolution for less than half of the work.
+    Small,
+}
+
+impl Grid {
+    /// Whether a unit of this size can run with settings.
+    fn check(self) -> SettingsCheck {
+        match self {
+            Self::Reference => reference::CHECK,
+            Self::Small => small::CHECK,
+        }
+    }
+
+    /// Ranges and azimuths.
+    fn cells(self) -> [u8; 2] {
+        let cells = match self {
+            Self::Reference => [reference::State::RANGES, reference::State::AZIMUTHS],
+            Self::Small => [small::State::RANGES, small::State::AZIMUTHS],
+        };
+        cells.map(|n| u8::try_from(n).unwrap_or(u8::MAX))
+    }
+}
+
 /// The whole file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
+    #[serde(default)]
+    pub grid: Grid,
     /// Where the epoch and the configuration blocks are kept.
     pub state_dir: Option<PathBuf>,
     pub input: Input,
@@ -278,7 +310,7 @@ impl Config {
         problems.extend(refused.map(|e| of_library(&e)));
         let missing = [("mount", self.mount.is_none()), ("field_of_view", self.field_of_view.is_none())];
         match self.settings() {
-            Some(settings) => problems.extend(reference::CHECK.settings(&settings).err().map(|e| of_library(&e))),
+            Some(settings) => problems.extend(self.grid.check().settings(&settings).err().map(|e| of_library(&e))),
             // the integrator's messages can bring them
             None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {}
             None => {
@@ -306,8 +338,7 @@ impl Config {
         let machine = std::fs::read("/etc/machine-id").unwrap_or_default();
         let chip = if machine.is_empty() { 0 } else { Identity::number(machine.trim_ascii()) };
         let is_bench = self.input.radar == Radar::Native && self.input.clock == ClockSource::Input;
-        // the reference grid
-        Identity { board: "linux", chip, is_bench, grid: [200, 120] }
+        Identity { board: "linux", chip, is_bench, grid: self.grid.cells() }
     }
 
     /// What the file means, in words.

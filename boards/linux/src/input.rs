@@ -9,17 +9,15 @@ use anyhow::{Context, Result, bail};
 use log::{info, warn};
 use socketcan::dump::{ParseError, Reader};
 use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, Identity, RadarClock, SerialSession, StoredSettings};
-use viewshed::{
-    BusConfig, CanFrame, Epoch, Reason, Ti, Time,
-    reference::{Radar as Decoder, State},
-};
+use viewshed::{BusConfig, CanFrame, Epoch, Reason, Ti, Time};
 
+use super::run::Unit;
+use super::size::{Radar as Decoder, State};
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;
 use crate::hearing::{Heard, Hearing, Line};
 use crate::output::{Lines, Output};
-use crate::run::Unit;
 use crate::serial::Serial;
 use crate::state::FileSlots;
 

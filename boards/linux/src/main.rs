@@ -4,13 +4,14 @@ mod can;
 mod config;
 mod frames;
 mod hearing;
-mod input;
 mod locate;
 #[path = "../../../tests/harness/src/results/files/one_file.rs"]
 mod one_file;
 mod output;
-mod run;
+mod reference;
 mod serial;
+#[allow(clippy::duplicate_mod)] // the two grids' loops are the same two files
+mod small;
 mod state;
 mod systemd;
 
@@ -23,7 +24,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Parser;
 use log::{Level, LevelFilter, error};
 
-use crate::config::Config;
+use crate::config::{Config, Grid};
 
 /// Computes where a roadside radar can see, and broadcasts it
 ///
@@ -80,7 +81,11 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     }
-    match run::run(&config, &stop) {
+    let run = match config.grid {
+        Grid::Reference => reference::run::run,
+        Grid::Small => small::run::run,
+    };
+    match run(&config, &stop) {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             error!("{e:#}");

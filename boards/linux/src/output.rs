@@ -7,12 +7,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use log::{error, info};
 use viewshed::board::{BusKeeper, CanService, CanServiceConfig, Flow, SerialLine, StoredSettings};
-use viewshed::{BusConfig, CanFrame, Epoch, MOST_STUFFED, Reason, Status, Time};
+use viewshed::{BusConfig, CanFrame, Epoch, Estimator, MOST_STUFFED, MapSender, Reason, Status, Time, Unit};
 
 use crate::can::Interface;
 use crate::config::{ClockSource, Config};
 use crate::frames;
-use crate::run::{Unit, version};
 use crate::serial::Serial;
 use crate::state::FileSlots;
 
@@ -124,7 +123,12 @@ impl Output {
     }
 
     /// Sends what is due; `own` is the radar's line.
-    pub fn send(&mut self, now: Time, unit: &mut Unit<'_>, own: Option<&mut Serial>) {
+    pub fn send<E: Estimator, S: MapSender<E::Map>>(
+        &mut self,
+        now: Time,
+        unit: &mut Unit<'_, E, S>,
+        own: Option<&mut Serial>,
+    ) {
         if matches!(self.sink, Sink::Serial(_)) {
             let mut line = [0; MOST_STUFFED];
             let mut lines = Lines { output: self, own };
@@ -205,4 +209,10 @@ impl SerialLine for Lines<'_> {
         *if sent { &mut self.output.sent } else { &mut self.output.refused } += 1;
         sent
     }
+}
+
+/// Version of the daemon, for the status.
+pub fn version() -> [u8; 3] {
+    let mut parts = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse().unwrap_or(0));
+    std::array::from_fn(|_| parts.next().unwrap_or(0))
 }

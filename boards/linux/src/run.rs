@@ -7,18 +7,16 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::board::{BlockError, Flow, StoredSettings};
-use viewshed::{
-    PolarMap, Reason, Time, UnitState,
-    reference::{CHECK, Map, Parameters, Sender, State},
-};
+use viewshed::{PolarMap, Reason, Time, UnitState};
 
+use super::input::{self, Input, Step, Work};
+use super::size::{CHECK, Map, Parameters, Sender, State};
 use crate::config::{ClockSource, Config};
-use crate::input::{self, Input, Step, Work};
-use crate::output::Output;
+use crate::output::{Output, version};
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
 
-/// The daemon's unit: radar-3d on the reference grid.
+/// The daemon's unit: radar-3d on the grid of this module.
 pub type Unit<'u> = viewshed::Unit<'u, State, Sender>;
 
 /// Waits between two looks: while something is to be sent, and otherwise.
@@ -174,12 +172,6 @@ impl Clock {
         self.ticks += u64::from(self.steps);
         self.now()
     }
-}
-
-/// Version of the daemon, for the status.
-pub fn version() -> [u8; 3] {
-    let mut parts = env!("CARGO_PKG_VERSION").split('.').map(|part| part.parse().unwrap_or(0));
-    std::array::from_fn(|_| parts.next().unwrap_or(0))
 }
 
 /// Looks at what the unit does.

@@ -345,6 +345,26 @@ fn frames_come_and_go_over_the_kernels_buses() {
         assert!(bench.until(|bench| height(bench) == Some(750)), "{medium}: {:?}", height(&bench));
         assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}", bench.state());
 
+        // and another by the command, which reads it back; `VIEWSHED` names it
+        if let Ok(viewshed) = std::env::var("VIEWSHED") {
+            let file = daemon.1.join("unit.toml");
+            std::fs::write(&file, include_str!("../viewshed.toml").replace("height_m = 6.0", "height_m = 8.25"))
+                .unwrap();
+            let mut command = Command::new(viewshed);
+            command.arg("configure").arg(&file).args(["--can", MAPS, "--restart"]).stdout(Stdio::piped());
+            if medium == "can-fd" {
+                command.arg("--fd");
+            }
+            let (code, text, error) = ran(command.stderr(Stdio::piped()).spawn().unwrap());
+            assert_eq!(code, Some(0), "{medium}: {text}{error}");
+            assert!(
+                text.contains("written as block 3, and read back the same\nrestarted with block 3"),
+                "{medium}: {text}"
+            );
+            assert!(bench.until(|bench| height(bench) == Some(825)), "{medium}: {:?}", height(&bench));
+            assert!(bench.play_until(|bench| bench.is_ok()), "{medium}: {:?}", bench.state());
+        }
+
         // silence
         let blind = Some((UnitState::Blind, Reason::RadarSilent));
         assert!(bench.until(|bench| bench.state() == blind && bench.visible() == 0), "{medium}: {:?}", bench.state());

@@ -17,6 +17,7 @@ use viewshed::unit::settings::{Settings, StoredSettings};
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::frame::{CanFrame, CanId};
 
+use super::Profile;
 use super::listener::{MEDIUM, Map, SENSOR};
 use super::scans::Scan;
 use crate::recording::can_log::Line;
@@ -92,7 +93,7 @@ impl<I: Iterator<Item = (usize, CanFrame)>> CanPort for Scripted<I> {
 
 /// What a board with the reference grid sends, from the moment it has power.
 pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
-    let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid: [200, 120] };
+    let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid: Profile::Reference.grid() };
     let mut state = Box::new(State::new());
     let mut map = Box::new(PolarMap::NOWHERE);
     let mut sender: Box<Option<Sender>> = Box::new(None);

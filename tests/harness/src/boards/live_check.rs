@@ -2,12 +2,13 @@
 //! with the same program here.
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
+use viewshed::unit::said::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Message, Received};
@@ -25,6 +26,7 @@ use super::scans::Scan;
 use super::serial::{Far, LINES, Port, Waiting};
 use super::{Board, Profile, firmware};
 use crate::configure;
+use crate::configure::link::{Ask, Link};
 
 /// Scans without an answer after which a board is taken for absent.
 const MOST_SILENT: usize = 5;
@@ -106,24 +108,31 @@ pub fn port(path: &Path, baud: u32, profile: Profile, name: &str, settings: &Set
 /// Asks what is behind a port before anything is sent to it.
 fn is_bench(path: &str, baud: u32, profile: Profile) -> Result<()> {
     let mut link = configure::serial::open(path, Some(baud))?;
-    let found = configure::find(&mut link, configure::Wanted::default(), MOST_TIME)?;
-    let unit = found.unit;
+    // one question: an answer to a second would still be on the line when the scans go out
+    link.to(None);
+    link.ask(Ask::Identify)?;
+    let until = Instant::now() + MOST_TIME;
+    let unit = loop {
+        match link.hear(until)? {
+            Some(Said::Identified(unit)) => break unit,
+            Some(_) => {}
+            None => break configure::find(&mut link, configure::Wanted::default(), Duration::from_millis(100))?.unit,
+        }
+    };
     ensure!(
         unit.is_bench,
         "{path}: {} is no test bench: its image takes no scans on this line, but a radar's on its CAN bus. Nothing was written. \
          To compare a controller with this computer, flash a bench image (boards/README.md), or use --board for an emulated one",
         unit.board()
     );
-    let grid = match profile {
-        Profile::Reference => [200, 120],
-        Profile::Small => [100, 64],
-    };
     let [ranges, azimuths] = unit.grid;
+    let its =
+        Profile::ALL.into_iter().find(|profile| profile.grid() == unit.grid).map_or("none of these", Profile::name);
     ensure!(
-        unit.grid == grid,
+        unit.grid == profile.grid(),
         "{path}: {} has the grid {ranges} x {azimuths}, which is --profile {}; nothing was written",
         unit.board(),
-        if ranges == 100 { "small" } else { "reference" }
+        its
     );
     Ok(())
 }
@@ -159,22 +168,50 @@ pub fn can(board: Board, name: &str, settings: &Settings, steps: &[Step]) -> Res
 fn exchange(far: &mut impl Far, profile: Profile, settings: &Settings, scans: &[Scan]) -> Result<Vec<Turn>> {
     let mut script = Script::default();
     script.configure(settings);
+    let configured = script.bytes.len();
     let Some(first) = scans.first() else { bail!("the recording has no scans") };
     scans.iter().for_each(|scan| script.scan(scan, first.time));
     let expected = live::answer(profile, &script.bytes);
     let (mut host, mut board) = (Messages::default(), Messages::default());
     let (mut turns, mut from, mut silent) = (Vec::new(), 0, 0);
+    // what both say before their restart may differ: a real board has a past, and was asked for its name
+    far.send(&script.bytes[..configured])?;
+    from += configured;
+    started(far)?;
+    // what is said at the start comes before the next byte is taken
+    let said_before = [far.answer().len(), expected.lengths.get(configured).copied().unwrap_or(0)];
     for (to, time) in &script.marks {
         let before = far.answer().len();
         far.send(&script.bytes[from..*to])?;
         from = *to;
         let due = expected.lengths.get(to - 1).copied().unwrap_or(0);
-        far.wait_for(due, MOST_TIME)?;
+        far.wait_for(said_before[0] + due.saturating_sub(said_before[1]), MOST_TIME)?;
         silent = if far.answer().len() > before || due == before { 0 } else { silent + 1 };
         ensure!(silent < MOST_SILENT, "the board has not answered {MOST_SILENT} scans");
         turns.push(Turn { time: *time, host: host.take(&expected.bytes[..due]), board: board.take(far.answer()) });
     }
     Ok(turns)
+}
+
+/// Waits until a board has started with its configuration, and has said what it says then.
+fn started(far: &mut impl Far) -> Result<()> {
+    let until = Instant::now() + MOST_TIME;
+    let (mut messages, mut has_started) = (Messages::default(), false);
+    while !has_started && Instant::now() < until {
+        let before = far.answer().len();
+        far.wait_for(before + 1, Duration::from_millis(50))?;
+        has_started = messages.take(far.answer()).iter().any(|heard| match heard {
+            Heard::Message(message) => matches!(Said::read(message, live::SENSOR), Some(Said::Started(Some(_)))),
+            Heard::Frame(_) => false,
+        });
+    }
+    // a bench has no clock of its own: then it is silent
+    let mut before = 0;
+    while far.answer().len() > before {
+        before = far.answer().len();
+        far.wait_for(before + 1, Duration::from_millis(200))?;
+    }
+    Ok(())
 }
 
 /// Takes the messages out of a growing stream.

@@ -74,6 +74,14 @@ impl Profile {
             Self::Small => "small",
         }
     }
+
+    /// Ranges and azimuths.
+    pub const fn grid(self) -> [u8; 2] {
+        match self {
+            Self::Reference => [200, 120],
+            Self::Small => [100, 64],
+        }
+    }
 }
 
 /// What is run on which board.

@@ -29,6 +29,9 @@ pub struct Args {
     /// CAN interface of the bus the unit broadcasts on
     #[arg(long, value_name = "INTERFACE", conflicts_with = "port")]
     can: Option<String>,
+    /// Its frames are CAN FD's, as a daemon's with medium = "can-fd"
+    #[arg(long, requires = "can")]
+    fd: bool,
     /// Serial port of the unit
     #[arg(long, value_name = "PATH")]
     port: Option<String>,
@@ -148,7 +151,7 @@ fn open(args: &Args) -> Result<Box<dyn Link>> {
         #[cfg(target_os = "linux")]
         (_, Some(name)) => {
             use crate::configure::{can::CanLink, socketcan::Interface};
-            Ok(Box::new(CanLink::new(Interface::open(name)?, name)))
+            Ok(Box::new(CanLink::new(Interface::open(name)?, name, args.fd)))
         }
         (None, None) => {
             bail!("say where the unit is: --port PATH or --can INTERFACE (or only look at the file: --check)")
@@ -185,8 +188,7 @@ fn on_grids(settings: &Settings) -> Result<ExitCode> {
 fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
     let (in_use, newest) = (unit.in_use()?, unit.newest()?);
     let place = unit.place().to_owned();
-    let head =
-        |Stored { block: (sequence, _) }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
+    let head = |Stored { sequence, .. }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
     match (&in_use, &newest) {
         (Err(BlockError::Empty), Err(BlockError::Empty)) => {
             bail!(
@@ -194,12 +196,12 @@ fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
             )
         }
         (Err(error), Err(_)) => bail!("{place}: {error}"),
-        (Ok(stored), _) => print(&(head(stored) + &file::text(&stored.block.1)?))?,
-        (Err(_), Ok(stored)) => print(&(head(stored) + &file::text(&stored.block.1)?))?,
+        (Ok(stored), _) => print(&(head(stored) + &file::text(&stored.settings)?))?,
+        (Err(_), Ok(stored)) => print(&(head(stored) + &file::text(&stored.settings)?))?,
     }
     match (in_use, newest) {
         (Ok(a), Ok(b)) if a == b => {}
-        (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.block.0))?,
+        (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.sequence))?,
         (_, Err(_)) => print("# its slots are empty: from its next start on it has none\n")?,
     }
     Ok(ExitCode::SUCCESS)
@@ -237,9 +239,9 @@ fn compare(unit: &mut Found<'_>, settings: &Settings) -> Result<ExitCode> {
         print("the unit has no configuration; the file can be used\n")?;
         return Ok(ExitCode::FAILURE);
     };
-    let found = file::differences(&stored.block.1, settings)?;
+    let found = file::differences(&stored.settings, settings)?;
     if found.is_empty() {
-        print(&format!("block {} is what the file says\n", stored.block.0))?;
+        print(&format!("block {} is what the file says\n", stored.sequence))?;
         return Ok(ExitCode::SUCCESS);
     }
     for (name, has, wanted) in &found {

@@ -15,7 +15,7 @@ use crate::evaluation::Settings;
 use crate::evaluation::replay::{Replay, steps};
 use crate::results::files::{OutputArgs, Outputs, Target};
 use crate::results::report::{
-    experiment as report, gantry_camera as camera_report, json as replay_json, scenes as scenes_report,
+    experiment as report, gantry_camera as camera_report, json as replay_json, scenes as scenes_report, table,
 };
 use crate::studies::experiment::plan::{Day, Plan};
 use crate::studies::experiment::scenes::{self, Extent, Variant};
@@ -86,6 +86,9 @@ pub struct Args {
     /// Leave out the runs without elevation, which is faster (crossing, queue)
     #[arg(long)]
     only_elevation: bool,
+    /// Print tables as wide as they are: all intervals, and distances to the bound geometry-slice, too
+    #[arg(long, help_heading = "Results")]
+    wide: bool,
     /// Write everything as JSON: pooled, and by day (`seeds`) or by scene (`variants`)
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
@@ -133,7 +136,7 @@ fn motorway(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs
     let keep = |day: &Day, bytes: &[u8]| kept.get(&day.name()).map_or(Ok(()), |file| file.write(bytes));
     let experiment = Experiment::run(&plan, settings, &keep, &|| running.step())?;
     drop(running);
-    print(&report::text(&experiment))?;
+    print(&report::text(&experiment, table::Extent::of(args.wide)))?;
     let beside = beside(args, settings)?;
     if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
@@ -164,6 +167,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
         set: if args.train { "training" } else { "reporting" },
         warm_up_s: set.warm_up_s,
         every: extent.every,
+        extent: table::Extent::of(args.wide),
     };
     print(&scenes_report::text(&title, &plan, &counted, &settings.evaluation))?;
     let beside = beside(args, settings)?;
@@ -183,7 +187,7 @@ fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Ou
     let running = bar("simulating and replaying", plan.steps()?);
     let sets = gantry_camera::run(&plan, settings, usize::from(args.every), &|| running.step())?;
     drop(running);
-    print(&camera_report::text(&sets))?;
+    print(&camera_report::text(&sets, table::Extent::of(args.wide)))?;
     if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
         file.write(camera_report::json(&sets, &plan, json_options(settings))?)?;

@@ -38,15 +38,13 @@ pub struct CanLink<B> {
     noise: Noise,
 }
 
-/// Sensors on 11-bit identifiers.
-const SENSORS: u8 = 8;
-
 impl<B: CanBus> CanLink<B> {
-    /// On classic CAN, with identifiers from 0x400 on.
-    pub fn new(bus: B, name: &str) -> Self {
+    /// On classic CAN or CAN FD, with identifiers from 0x400 on.
+    pub fn new(bus: B, name: &str, fd: bool) -> Self {
         let addresses = Addresses::STANDARD;
-        let medium = Medium::Can(addresses);
-        let units = (0..SENSORS).map(|sensor| (Tool::new(sensor, medium), Answers::new(sensor, medium))).collect();
+        let medium = if fd { Medium::CanFd(addresses) } else { Medium::Can(addresses) };
+        let sensors = 0..=addresses.most_sensor();
+        let units = sensors.map(|sensor| (Tool::new(sensor, medium), Answers::new(sensor, medium))).collect();
         Self { bus, place: name.to_owned(), medium, addresses, units, only: None, noise: Noise::default() }
     }
 }
@@ -63,13 +61,13 @@ impl<B: CanBus> Link for CanLink<B> {
     fn to(&mut self, sensor: Option<u8>) {
         self.only = sensor;
         // half an answer to what was asked before is of no use
-        for (sensor, (_, answers)) in (0..SENSORS).zip(&mut self.units) {
+        for (sensor, (_, answers)) in (0..).zip(&mut self.units) {
             *answers = Answers::new(sensor, self.medium);
         }
     }
 
     fn ask(&mut self, what: Ask<'_>) -> Result<()> {
-        for (sensor, (tool, _)) in (0..SENSORS).zip(&mut self.units) {
+        for (sensor, (tool, _)) in (0..).zip(&mut self.units) {
             if self.only.is_some_and(|only| only != sensor) {
                 continue;
             }

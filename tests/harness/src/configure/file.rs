@@ -40,6 +40,8 @@ struct Tables {
     #[serde(default, skip_serializing)]
     state_dir: Option<toml::Value>,
     #[serde(default, skip_serializing)]
+    grid: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
     input: Option<toml::Value>,
     #[serde(default, skip_serializing)]
     output: Option<toml::Value>,
@@ -74,6 +76,7 @@ fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
     let sensor = Sensor { mount, field_of_view, noise };
     let keys = [
         ("state_dir", tables.state_dir.is_some()),
+        ("grid", tables.grid.is_some()),
         ("[input]", tables.input.is_some()),
         ("[output]", tables.output.is_some()),
     ];
@@ -113,7 +116,7 @@ pub fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, String, St
 fn tables(settings: &Settings) -> Tables {
     let Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
-    let (state_dir, input, output) = (None, None, None);
+    let (state_dir, grid, input, output) = (None, None, None, None);
     Tables {
         unit,
         mount,
@@ -125,6 +128,7 @@ fn tables(settings: &Settings) -> Tables {
         radar_bus,
         broadcast_bus,
         state_dir,
+        grid,
         input,
         output,
     }
@@ -180,7 +184,7 @@ mod tests {
             assert_eq!(at, line);
             assert!(said.contains(what), "{said}");
         }
-        let (_, said) = wrong("[mount]", "[mounts]");
+        let (_, said) = wrong("\n[mount]", "\n[mounts]");
         assert!(said.contains("mounts"), "{said}");
     }
 

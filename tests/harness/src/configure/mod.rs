@@ -29,6 +29,9 @@ use link::{Ask, Link};
 
 /// Time after which a question is put again.
 const AGAIN: Duration = Duration::from_millis(500);
+/// Time in which an answer is whole: on a bus it comes in forty parts, each after what is more urgent, and a question put
+/// again begins it anew.
+const ANSWER: Duration = Duration::from_secs(2);
 /// Time in which all units of a bus have said which ones they are.
 const ALL: Duration = Duration::from_millis(400);
 /// Time a unit may take to erase and write a slot: parts with large sectors take seconds.
@@ -70,8 +73,8 @@ impl Drop for Found<'_> {
 /// What is stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stored {
-    /// Sequence and settings.
-    pub block: (u32, Settings),
+    pub sequence: u32,
+    pub settings: Settings,
 }
 
 /// Looks for the unit that is meant, for this long.
@@ -124,14 +127,13 @@ pub fn find<'l>(link: &'l mut dyn Link, wanted: Wanted, patience: Duration) -> R
         );
         link.ask(Ask::Address(unit.chip))?;
         let until = Instant::now() + AGAIN;
-        let answers = |said| matches!(said, Said::Identified(other) if other.chip == unit.chip);
-        let mut heard = false;
-        while let Some(said) = link.hear(until)? {
-            heard |= answers(said);
-            if heard {
-                break;
+        let heard = loop {
+            match link.hear(until)? {
+                Some(Said::Identified(other)) if other.chip == unit.chip => break true,
+                Some(_) => {}
+                None => break false,
             }
-        }
+        };
         ensure!(heard, "{}: chip {:08X} does not answer to its name; nothing was written", link.place(), unit.chip);
     }
     Ok(Found { link, unit, named: named.then_some(unit.sensor) })
@@ -186,7 +188,7 @@ impl Found<'_> {
         let begun = Instant::now();
         while begun.elapsed() < patience {
             self.link.ask(what)?;
-            let until = Instant::now() + AGAIN;
+            let until = Instant::now() + ANSWER;
             while let Some(said) = self.link.hear(until)? {
                 if let Some(answer) = answer(said) {
                     return Ok(Some(answer));
@@ -197,8 +199,10 @@ impl Found<'_> {
     }
 
     fn read_block(&mut self, what: Ask<'_>) -> Result<Result<Stored, BlockError>> {
-        let heard = self.ask(what, 6 * AGAIN, |said| match said {
-            Said::Block(block) => Some(Settings::from_block(&block).map(|block| Stored { block })),
+        let heard = self.ask(what, 4 * ANSWER, |said| match said {
+            Said::Block(block) => {
+                Some(Settings::from_block(&block).map(|(sequence, settings)| Stored { sequence, settings }))
+            }
             // there is none
             Said::Refused(_) => Some(Err(BlockError::Empty)),
             _ => None,
@@ -258,7 +262,7 @@ impl Found<'_> {
             }
         };
         let stored = self.newest()?;
-        let same = stored.as_ref().is_ok_and(|stored| stored.block == (sequence, *settings));
+        let same = stored.as_ref().is_ok_and(|stored| *stored == Stored { sequence, settings: *settings });
         ensure!(same, "{place}: what reads back is not what was written: {stored:?}; {old}");
         Ok(sequence)
     }
@@ -269,7 +273,7 @@ impl Found<'_> {
     /// It does not come back.
     pub fn restart(&mut self) -> Result<Option<u32>> {
         // it comes back by the number in its newest block
-        let sensor = self.newest()?.map_or(0, |stored| stored.block.1.unit.sensor);
+        let sensor = self.newest()?.map_or(0, |stored| stored.settings.unit.sensor);
         self.link.ask(Ask::Restart)?;
         self.link.restarted(self.unit.is_bench)?;
         self.link.to(Some(sensor));
@@ -282,7 +286,7 @@ impl Found<'_> {
                 }
                 Some(Said::Identified(unit)) if unit.chip == self.unit.chip => {
                     self.unit = unit;
-                    return Ok(self.in_use()?.ok().map(|stored| stored.block.0));
+                    return Ok(self.in_use()?.ok().map(|stored| stored.sequence));
                 }
                 Some(_) => {}
                 // what it said first may be lost
@@ -310,7 +314,7 @@ impl Found<'_> {
         let place = self.place().to_owned();
         ensure!(!self.link.is_bus(), "{place}: a unit says on its serial line only how long frames take: --port PATH");
         let took =
-            self.ask(Ask::Timing, 3 * AGAIN, |said| if let Said::Took(took) = said { Some(took) } else { None })?;
+            self.ask(Ask::Timing, 2 * ANSWER, |said| if let Said::Took(took) = said { Some(took) } else { None })?;
         took.with_context(|| format!("{place}: {} does not time its frames", self.unit.board()))
     }
 

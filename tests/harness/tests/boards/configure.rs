@@ -19,17 +19,18 @@ use viewshed::unit::Flow;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{BLOCK_LEN, SettingsSlots, StoredSettings};
+use viewshed::unit::settings::StoredSettings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Epoch};
 use viewshed_harness::boards::can::CanBoard;
 use viewshed_harness::boards::machine::{Emulator, Folder, Lines};
 use viewshed_harness::boards::serial::{Far, LINES, Waiting};
-use viewshed_harness::boards::{Board, Profile, firmware, live};
+use viewshed_harness::boards::{Board, Profile, firmware};
 use viewshed_harness::configure::can::{CanBus, CanLink};
-use viewshed_harness::configure::{Wanted, find};
+use viewshed_harness::configure::{Stored, Wanted, find};
 
+use crate::live::device;
 use crate::shipped;
 
 fn folder(name: &str) -> PathBuf {
@@ -61,37 +62,9 @@ fn file(folder: &Path, name: &str, changes: &[(&str, &str)]) {
     std::fs::write(folder.join(name), text).unwrap();
 }
 
-/// A port with this computer's own unit behind it.
+/// A port with this computer's own unit behind it; some bytes on their way to it do not arrive.
 fn own_unit(through: impl FnMut(u8) -> Option<u8> + Send + 'static) -> String {
-    let (mut far, near) = TTYPort::pair().unwrap();
-    far.set_timeout(Duration::from_secs(1)).unwrap();
-    let name = near.name().unwrap();
-    let write = far.try_clone_native().unwrap();
-    std::thread::spawn(move || {
-        let _near = near;
-        live::device(Profile::Small, true, Through(far, through), write);
-    });
-    name
-}
-
-/// Bytes on their way to a unit; some do not arrive.
-struct Through<R, F>(R, F);
-
-impl<R: Read, F: FnMut(u8) -> Option<u8>> Read for Through<R, F> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        loop {
-            match self.0.read(&mut buffer[..1]) {
-                Err(e) if e.kind() == std::io::ErrorKind::TimedOut => {}
-                Ok(1) => {
-                    if let Some(byte) = (self.1)(buffer[0]) {
-                        buffer[0] = byte;
-                        return Ok(1);
-                    }
-                }
-                other => return other,
-            }
-        }
-    }
+    device(Profile::Small, true, through)
 }
 
 #[test]
@@ -213,7 +186,7 @@ fn a_wrong_port_a_foreign_device_and_silence_are_told_apart() {
     assert!(code == 2 && error.contains("no message of a viewshed unit among them"), "{error}");
     let (code, _, error) = said(&folder, &["unit.toml", "--can", "nowhere0"]);
     assert_eq!(code, 2);
-    assert!(error.contains("no such CAN interface") || error.contains("kernel has no CAN"), "{error}");
+    assert!(error.contains("there is no interface nowhere0") || error.contains("kernel has no CAN"), "{error}");
 }
 
 #[test]
@@ -243,21 +216,9 @@ struct Bus(Rc<RefCell<Vec<Node>>>);
 
 struct Node {
     identity: Identity,
-    slots: InRam,
+    slots: Flash,
     service: CanService,
     sent: VecDeque<CanFrame>,
-}
-
-struct InRam([[u8; BLOCK_LEN]; 2]);
-
-impl SettingsSlots for InRam {
-    fn slot(&self, slot: usize) -> &[u8] {
-        &self.0[slot]
-    }
-
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
-        self.0[slot] = *block;
-    }
 }
 
 const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
@@ -265,12 +226,12 @@ const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 impl Node {
     fn new(chip: u32) -> Self {
         let identity = Identity { board: "a-board", chip, is_bench: false, grid: [100, 64] };
-        let slots = InRam([[0xFF; BLOCK_LEN]; 2]);
+        let slots = Flash::ERASED;
         let service = Self::start(identity, &slots);
         Self { identity, slots, service, sent: VecDeque::new() }
     }
 
-    fn start(identity: Identity, slots: &InRam) -> CanService {
+    fn start(identity: Identity, slots: &Flash) -> CanService {
         let stored = StoredSettings::read(slots, small::CHECK);
         let config = CanServiceConfig { identity, gap_us: 0, ..CanServiceConfig::new(stored.unit().sensor, MEDIUM) };
         CanService::start(config, Epoch::new(1), Time::from_micros(0), stored)
@@ -315,7 +276,7 @@ fn since() -> Instant {
 fn two_new_units_on_one_bus_get_numbers_of_their_own() {
     since();
     let bus = Bus(Rc::new(RefCell::new([0x11, 0x2222].map(Node::new).into())));
-    let mut link = CanLink::new(bus.clone(), "can0");
+    let mut link = CanLink::new(bus.clone(), "can0", false);
     let patience = Duration::from_secs(1);
     let error = find(&mut link, Wanted::default(), patience).err().unwrap().to_string();
     assert!(error.contains("2 units answer; say which one with --chip\n  sensor 0, chip 00000011"), "{error}");
@@ -325,7 +286,7 @@ fn two_new_units_on_one_bus_get_numbers_of_their_own() {
         let mut unit = find(&mut link, Wanted { chip: Some(chip), ..Wanted::default() }, patience).unwrap();
         assert_eq!(unit.write(&settings).unwrap(), 1);
         assert_eq!(unit.restart().unwrap(), Some(1));
-        assert_eq!(unit.in_use().unwrap().unwrap().block.1, settings);
+        assert_eq!(unit.in_use().unwrap().unwrap().settings, settings);
     }
     let numbers: Vec<u8> = bus.0.borrow().iter().map(|node| node.service.settings().unwrap().unit.sensor).collect();
     assert_eq!(numbers, [4, 5]);
@@ -350,11 +311,11 @@ fn lost_frames_are_sent_again() {
     }
     since();
     let bus = Bus(Rc::new(RefCell::new(vec![Node::new(0x77)])));
-    let mut link = CanLink::new(Lossy(bus, 0), "can0");
+    let mut link = CanLink::new(Lossy(bus, 0), "can0", false);
     let (settings, _) = shipped(0.1);
     let mut unit = find(&mut link, Wanted::default(), Duration::from_secs(5)).unwrap();
     assert_eq!(unit.write(&settings).unwrap(), 1);
-    assert_eq!(unit.newest().unwrap().unwrap().block, (1, settings));
+    assert_eq!(unit.newest().unwrap().unwrap(), Stored { sequence: 1, settings });
 }
 
 /// A port with an emulated board behind it: what is written goes to its radar's line, what it sends comes back.
@@ -446,7 +407,7 @@ fn zcu102_is_configured_over_its_can_controller() {
     since();
     let image = firmware::build(Board::Zcu102R5, Profile::Reference, "live").unwrap();
     let board = CanBoard::start(&image, &Flash::ERASED).unwrap();
-    let mut link = CanLink::new(Emulated(board, 0), "can0");
+    let mut link = CanLink::new(Emulated(board, 0), "can0", false);
     let (mut settings, _) = shipped(0.1);
     // frames of others would have to prove the bit rate
     settings.broadcast_bus.listen_first = false;
@@ -464,7 +425,7 @@ fn zcu102_is_configured_over_its_can_controller() {
     let sequence = unit.write(&settings).unwrap();
     assert_eq!(unit.restart().unwrap(), Some(sequence));
     assert_eq!(unit.unit.sensor, 6);
-    assert_eq!(unit.in_use().unwrap().unwrap().block, (sequence, settings));
+    assert_eq!(unit.in_use().unwrap().unwrap(), Stored { sequence, settings });
     unit.clear().unwrap();
     assert_eq!(unit.restart().unwrap(), None);
     assert!(unit.in_use().unwrap().is_err());

@@ -48,31 +48,28 @@ fn zcu102_live_from_the_command_line() {
     assert!(json[0]["scans"].as_u64().unwrap() > 20 && json[0]["equal"] == json[0]["scans"], "{json}");
 }
 
-/// What a device behind a port does to its bytes.
-struct Through<R>(R, fn(usize, u8) -> u8, usize);
+/// Bytes on their way to a device, each by itself: as another one, or not at all.
+struct Through<R, F>(R, F);
 
-impl<R: Read> Read for Through<R> {
+impl<R: Read, F: FnMut(u8) -> Option<u8>> Read for Through<R, F> {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
         loop {
             match self.0.read(&mut buffer[..1]) {
                 Err(e) if e.kind() == std::io::ErrorKind::TimedOut => {}
-                other => {
-                    buffer[0] = (self.1)(self.2, buffer[0]);
-                    self.2 += 1;
-                    return other;
+                Ok(1) => {
+                    if let Some(byte) = (self.1)(buffer[0]) {
+                        buffer[0] = byte;
+                        return Ok(1);
+                    }
                 }
+                other => return other,
             }
         }
     }
 }
 
-/// A port with this computer's own board behind it.
-fn port(profile: Profile, through: fn(usize, u8) -> u8) -> String {
-    device(profile, true, through)
-}
-
-/// The same, or one with a product behind it.
-fn device(profile: Profile, is_bench: bool, through: fn(usize, u8) -> u8) -> String {
+/// A port with this computer's own board behind it: a test bench, or a product.
+pub fn device(profile: Profile, is_bench: bool, through: impl FnMut(u8) -> Option<u8> + Send + 'static) -> String {
     let (mut far, near) = TTYPort::pair().unwrap();
     far.set_timeout(Duration::from_secs(1)).unwrap();
     let name = near.name().unwrap();
@@ -80,7 +77,7 @@ fn device(profile: Profile, is_bench: bool, through: fn(usize, u8) -> u8) -> Str
     std::thread::spawn(move || {
         // the pair stays open for as long as the board runs
         let _near = near;
-        live::device(profile, is_bench, Through(far, through, 0), write);
+        live::device(profile, is_bench, Through(far, through), write);
     });
     name
 }
@@ -88,7 +85,7 @@ fn device(profile: Profile, is_bench: bool, through: fn(usize, u8) -> u8) -> Str
 #[test]
 fn a_board_behind_a_port_is_compared_scan_by_scan() {
     let folder = folder("port");
-    let path = port(Profile::Small, |_, byte| byte);
+    let path = device(Profile::Small, true, Some);
     let (output, json) = replay(&folder, "motorway.mcap", &["--port", &path, "--profile", "small", "--to", "2"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let live = &json[0];
@@ -100,7 +97,11 @@ fn a_board_behind_a_port_is_compared_scan_by_scan() {
 fn a_board_behind_a_port_that_hears_something_else_fails_with_a_picture() {
     let folder = folder("port-noise");
     // a byte in 40 000 is another one
-    let path = port(Profile::Small, |k, byte| if k % 40_000 == 39_999 { byte ^ 0x55 } else { byte });
+    let mut count = 0;
+    let path = device(Profile::Small, true, move |byte| {
+        count += 1;
+        Some(if count % 40_000 == 0 { byte ^ 0x55 } else { byte })
+    });
     let (output, json) = replay(&folder, "motorway.mcap", &["--port", &path, "--profile", "small", "--to", "3"]);
     assert!(!output.status.success());
     assert!(json[0]["equal"].as_u64() < json[0]["scans"].as_u64(), "{json}");
@@ -128,7 +129,7 @@ fn nothing_is_written_to_a_port_before_a_bench_of_that_grid_has_named_itself() {
         (false, "small", "this-computer is no test bench: its image takes no scans on this line"),
         (true, "reference", "has the grid 100 x 64, which is --profile small"),
     ] {
-        let path = device(Profile::Small, is_bench, |_, byte| byte);
+        let path = device(Profile::Small, is_bench, Some);
         let (output, _) = replay(&folder, "motorway.mcap", &["--port", &path, "--profile", profile, "--to", "1"]);
         assert_eq!(output.status.code(), Some(2));
         let printed = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -132,6 +132,8 @@ fn the_experiment_of_a_camera_tells_why_what_was_not_found_is_called_visible() {
     let output = viewshed(&folder, "experiment p.toml --scene gantry-camera --every 3 --bootstrap 0 --json e.json");
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
+    let widest = text.lines().filter(|line| line.starts_with('│')).map(|line| line.chars().count()).max();
+    assert!(widest > Some(60) && widest <= Some(80), "tables fit a terminal: {text}");
     assert!(
         text.contains("The paper's 3D camera grid: TVR 93, FVR 2, FIR 7.") && text.contains("15 % missed"),
         "{text}"

@@ -60,6 +60,8 @@ fn scenes_are_pooled_and_told_apart_with_and_without_elevation_and_warm_up() {
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
     assert!(text.contains("crossing, reporting: 2 scenes") && text.contains("one frame in 3 judged"), "{text}");
+    let widest = text.lines().filter(|line| line.starts_with('│')).map(|line| line.chars().count()).max();
+    assert!(widest > Some(60) && widest <= Some(80), "tables fit a terminal: {text}");
     assert!(text.contains("At equal FIR of cells") && text.contains("without warm-up"), "{text}");
     assert!(folder.join("kept/train-2.mcap").exists() && folder.join("kept/train-1.mcap").exists());
 

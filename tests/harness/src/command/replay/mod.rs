@@ -329,7 +329,7 @@ impl Replayed {
     }
 
     fn text(&self, args: &Args, settings: &Settings) -> String {
-        let extent = if args.wide { table::Extent::Wide } else { table::Extent::Terminal };
+        let extent = table::Extent::of(args.wide);
         let mut text = table::text(&self.replay, &settings.evaluation, extent);
         if args.breakdown {
             text += &table::breakdown(&self.replay.summary, extent);

@@ -1,9 +1,10 @@
 //! Frames of a SocketCAN interface as they come, as lines of a log.
 
+use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame, Id, ShouldRetry, Socket, SocketOptions};
 use viewshed::wire::frame::CanId;
 
@@ -38,19 +39,12 @@ impl Bus {
     /// # Errors
     /// No such interface, one that is down, a kernel without CAN, no permission; each with what to do.
     pub fn open(name: &str) -> Result<Self> {
-        let open = || {
-            let socket = CanFdSocket::open(name)?;
-            // one that is down can be opened, and says so afterwards
-            socket.as_raw_socket().take_error()?.map_or(Ok(()), Err)?;
+        let socket = open(name, |socket| {
             socket.set_error_filter_accept_all()?;
             socket.set_recv_timestamp(true)?;
-            socket.set_read_timeout(WAIT)?;
-            Ok(socket)
-        };
-        match open() {
-            Ok(socket) => Ok(Self { name: name.to_owned(), socket }),
-            Err(error) => bail!("{}", refused(name, &error)),
-        }
+            socket.set_read_timeout(WAIT)
+        })?;
+        Ok(Self { name: name.to_owned(), socket })
     }
 
     /// Hands over every frame until the time is up or `stop` is set, and the time now and then while there is none.
@@ -67,7 +61,8 @@ impl Bus {
         while !stop.load(Ordering::SeqCst) && longest.is_none_or(|longest| started.elapsed() < longest) {
             let (frame, stamps) = match self.socket.read_frame_with_timestamps() {
                 Ok(read) => read,
-                Err(e) if e.should_retry() => {
+                // by a signal, too
+                Err(e) if e.should_retry() || e.kind() == ErrorKind::Interrupted => {
                     each(Heard::Nothing(nanoseconds(SystemTime::now())))?;
                     continue;
                 }
@@ -105,8 +100,23 @@ fn nanoseconds(time: SystemTime) -> i64 {
     i64::try_from(passed.as_nanos()).unwrap_or(i64::MAX)
 }
 
+/// Opens an interface, and sets it as it is wanted.
+///
+/// # Errors
+/// No such interface, one that is down, a kernel without CAN, no permission; each with what to do.
+pub fn open(name: &str, set: impl FnOnce(&CanFdSocket) -> std::io::Result<()>) -> Result<CanFdSocket> {
+    let opened = || {
+        let socket = CanFdSocket::open(name)?;
+        // one that is down can be opened, and says so afterwards
+        socket.as_raw_socket().take_error()?.map_or(Ok(()), Err)?;
+        set(&socket)?;
+        Ok(socket)
+    };
+    opened().map_err(|error| anyhow!("{}", refused(name, &error)))
+}
+
 /// Why an interface cannot be listened to, and what to do.
-fn refused(name: &str, error: &std::io::Error) -> String {
+pub fn refused(name: &str, error: &std::io::Error) -> String {
     let kind = |name: &str| std::fs::read_to_string(format!("/sys/class/net/{name}/type")).ok();
     let is_can = |name: &str| kind(name).is_some_and(|kind| kind.trim() == KIND_CAN);
     match error.raw_os_error() {
@@ -125,7 +135,7 @@ fn refused(name: &str, error: &std::io::Error) -> String {
         Some(code) if NO_CAN_IN_KERNEL.contains(&code) => format!(
             "{name}: this kernel has no CAN; load it with `modprobe can-raw` (as root), or record where there is one and name the log"
         ),
-        _ if error.kind() == std::io::ErrorKind::PermissionDenied => {
+        _ if error.kind() == ErrorKind::PermissionDenied => {
             format!("{name}: this user may not open it; run as root, or outside of the container")
         }
         _ => format!("{name} cannot be listened to: {error}"),

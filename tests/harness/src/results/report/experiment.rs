@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::json::{self, Options, Report};
 use super::percent;
-use super::table::{Extent, table};
+use super::table::{Extent, tables};
 use super::{ORIGIN, notes};
 use crate::evaluation::summary::Row;
 use crate::studies::experiment::{DayResult, Experiment, PAPER, PAPER_COVERAGE, PAPER_TRAJECTORIES, Pooled, hidden};
@@ -54,19 +54,19 @@ const RATES: [Rate; 6] = [
 ];
 
 /// The whole experiment as text.
-pub fn text(experiment: &Experiment) -> String {
+pub fn text(experiment: &Experiment, extent: Extent) -> String {
     let days = experiment.reporting.len();
     format!(
         "{days} reporting days of one scene, pooled (below: least and most of a day); beside them the paper's figures\n{}\n{}{}\n{}\n{}\n",
-        comparison(experiment),
+        comparison(experiment, extent),
         expectations(experiment),
         at_equal_fir(experiment),
-        by_day(experiment),
+        by_day(experiment, extent),
         closing(experiment)
     )
 }
 
-fn comparison(experiment: &Experiment) -> String {
+fn comparison(experiment: &Experiment, extent: Extent) -> String {
     let heading = [
         "estimator",
         "TVR %",
@@ -96,7 +96,7 @@ fn comparison(experiment: &Experiment) -> String {
         let not_here = vec!["–".to_owned(); RATES.len()];
         std::iter::once(p.ours.to_owned()).chain(not_here).chain(of_paper(p.ours)).collect()
     });
-    table(&heading, ours.chain(missing)).to_string()
+    tables(&heading, &ours.chain(missing).collect::<Vec<_>>(), 1, extent)
 }
 
 /// What the rebuilt experiment is expected to reach, and whether it does.
@@ -136,7 +136,7 @@ fn at_equal_fir(experiment: &Experiment) -> String {
     ["objects", "cells"].into_iter().filter(|of| comparisons().any(|c| c.of == *of)).map(line).collect()
 }
 
-fn by_day(experiment: &Experiment) -> String {
+fn by_day(experiment: &Experiment, extent: Extent) -> String {
     let heading =
         ["day", "seed", "trajectories", "coverage %", "hidden %", "radar-3d\nFVR / FIR", "reference\nFVR / FIR"];
     let row = |result: &DayResult, remark: &str| {
@@ -156,7 +156,8 @@ fn by_day(experiment: &Experiment) -> String {
         ]
     };
     let training = std::iter::once(row(&experiment.training, " (training, not pooled)"));
-    table(&heading, training.chain(experiment.reporting.iter().map(|r| row(r, "")))).to_string()
+    let rows = training.chain(experiment.reporting.iter().map(|r| row(r, "")));
+    tables(&heading, &rows.collect::<Vec<_>>(), 1, extent)
 }
 
 fn closing(experiment: &Experiment) -> String {

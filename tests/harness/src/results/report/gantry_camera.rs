@@ -4,7 +4,7 @@ use anyhow::Result;
 use serde_json::{Value, json};
 
 use super::json::{self as replay_json, Options};
-use super::table::table;
+use super::table::{Extent, tables};
 use super::{ORIGIN, percent};
 use crate::evaluation::counts::rate;
 use crate::evaluation::summary::Row;
@@ -15,7 +15,7 @@ const OWN: &str = "camera-3d";
 const REFERENCE: &str = "camera-reference";
 
 /// The experiment as text.
-pub fn text(sets: &[SetResult]) -> String {
+pub fn text(sets: &[SetResult], extent: Extent) -> String {
     let mut text = String::new();
     for result in sets {
         let Some(first) = result.detected.first() else { continue };
@@ -27,13 +27,13 @@ pub fn text(sets: &[SetResult]) -> String {
             summary.frames,
             summary.objects,
             percent(Some(result.heavy)),
-            rows(result)
+            rows(result, extent)
         );
-        text += &format!("FVR by cause, camera-3d:\n{}\n", causes(result));
+        text += &format!("FVR by cause, camera-3d:\n{}\n", causes(result, extent));
         text += &format!(
             "camera-3d by the share of the column that has to be seen, {}:\n{}\n\n",
             first.detector.name,
-            curve(first)
+            curve(first, extent)
         );
     }
     let paper = PAPER.iter().find(|p| p.ours == OWN);
@@ -42,7 +42,7 @@ pub fn text(sets: &[SetResult]) -> String {
     text + &paper.unwrap_or_default() + &format!("\n{ORIGIN}\n")
 }
 
-fn rows(result: &SetResult) -> String {
+fn rows(result: &SetResult, extent: Extent) -> String {
     let heading = [
         "detector",
         "estimator",
@@ -69,11 +69,11 @@ fn rows(result: &SetResult) -> String {
         ]
     };
     let rows = result.detected.iter().flat_map(|d| d.pooled.summary.rows.iter().map(move |r| row(d, r)));
-    table(&heading, rows).to_string()
+    tables(&heading, &rows.collect::<Vec<_>>(), 2, extent)
 }
 
 /// Shares of the steps at which nothing was found.
-fn causes(result: &SetResult) -> String {
+fn causes(result: &SetResult, extent: Extent) -> String {
     let heading = [
         "detector",
         "nothing shows,\nits column does",
@@ -95,7 +95,7 @@ fn causes(result: &SetResult) -> String {
             percent(counts.fvr()),
         ]
     };
-    table(&heading, result.detected.iter().map(row)).to_string()
+    tables(&heading, &result.detected.iter().map(row).collect::<Vec<_>>(), 1, extent)
 }
 
 /// Grade from which a share of the column is seen.
@@ -103,7 +103,7 @@ fn grade(share: f64) -> u16 {
     (share * 254.0).round() as u16 + 1
 }
 
-fn curve(detected: &Detected) -> String {
+fn curve(detected: &Detected, extent: Extent) -> String {
     let shares = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
     let at = |share: f64| {
         let curve = detected.pooled.summary.row(OWN).map(|r| r.curve.as_slice()).unwrap_or_default();
@@ -116,7 +116,7 @@ fn curve(detected: &Detected) -> String {
         [name.to_owned()].into_iter().chain(rates).collect::<Vec<_>>()
     };
     let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
-    table(&heading, [line("FVR %", |fvr, _| fvr), line("FIR %", |_, fir| fir)]).to_string()
+    tables(&heading, &[line("FVR %", |fvr, _| fvr), line("FIR %", |_, fir| fir)], 1, extent)
 }
 
 /// The file of `--json`.

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::json::{self, Options, Report};
 use super::percent;
-use super::table::{Extent, rates, signed, table};
+use super::table::{Extent, rates, signed, tables};
 use super::{ORIGIN, notes};
 use crate::evaluation::Options as EvaluationOptions;
 use crate::evaluation::replay::Replay;
@@ -24,6 +24,8 @@ pub struct Title<'a> {
     pub set: &'a str,
     pub warm_up_s: f64,
     pub every: usize,
+    /// How much of the tables.
+    pub extent: Extent,
 }
 
 /// Everything as text; the first of `counted` is what is reported.
@@ -42,7 +44,7 @@ pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &Evaluatio
         summary.frames,
         summary.objects,
         percent(summary.coverage_rate),
-        rates(summary, Extent::Wide)
+        rates(summary, title.extent)
     );
     for line in notes::below(&main.pooled, options) {
         text += &(line + "\n");
@@ -51,9 +53,9 @@ pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &Evaluatio
         text += &goal.as_ref().and_then(|g| reached(name, g, &main.pooled)).unwrap_or_default();
     }
     if !beside.is_empty() {
-        text += &format!("\n{OURS} beside it:\n{}\n", variants(counted));
+        text += &format!("\n{OURS} beside it:\n{}\n", variants(counted, title.extent));
     }
-    format!("{text}\n{OURS} by scene:\n{}\n\n{ORIGIN}\n", by_scene(counted))
+    format!("{text}\n{OURS} by scene:\n{}\n\n{ORIGIN}\n", by_scene(counted, title.extent))
 }
 
 /// Whether the estimator is as good as it should be.
@@ -100,7 +102,7 @@ fn at_equal_fir(replay: &Replay, of: &str) -> String {
     found.map_or_else(|| "n/a".into(), |c| signed(Some(c.difference_points), c.difference_interval))
 }
 
-fn variants(counted: &[Counted]) -> comfy_table::Table {
+fn variants(counted: &[Counted], extent: Extent) -> String {
     let heading = [
         "counted",
         "objects\nFVR / FIR %",
@@ -120,11 +122,11 @@ fn variants(counted: &[Counted]) -> comfy_table::Table {
             at_equal_fir(&c.pooled, "cells"),
         ]
     };
-    table(&heading, counted.iter().map(row))
+    tables(&heading, &counted.iter().map(row).collect::<Vec<_>>(), 1, extent)
 }
 
-fn by_scene(counted: &[Counted]) -> comfy_table::Table {
-    let Some((main, beside)) = counted.split_first() else { return comfy_table::Table::new() };
+fn by_scene(counted: &[Counted], extent: Extent) -> String {
+    let Some((main, beside)) = counted.split_first() else { return String::new() };
     let fixed = [
         "scene",
         "trajec-\ntories",
@@ -154,7 +156,8 @@ fn by_scene(counted: &[Counted]) -> comfy_table::Table {
         let more = beside.iter().map(|c| cells(c.scenes.get(k).and_then(|s| s.summary.row(OURS))));
         fixed.into_iter().chain(more).collect()
     });
-    table(&heading.iter().map(String::as_str).collect::<Vec<_>>(), rows)
+    let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
+    tables(&heading, &rows.collect::<Vec<_>>(), 1, extent)
 }
 
 /// The file of `--json`: every way of counting, pooled and by scene; `beside` are recordings that were replayed too.

@@ -24,6 +24,13 @@ pub enum Extent {
     Wide,
 }
 
+impl Extent {
+    /// As `--wide` says.
+    pub fn of(wide: bool) -> Self {
+        if wide { Self::Wide } else { Self::Terminal }
+    }
+}
+
 /// The table of one recording with the notes below it.
 pub fn text(replay: &Replay, options: &Options, extent: Extent) -> String {
     let rates_of = |replay: &Replay| match &replay.recording.truth {

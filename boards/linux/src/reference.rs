@@ -1,0 +1,8 @@
+//! The loop and its inputs on the grid of 200 x 120 x 16 cells; `small` has the same two files with another size.
+
+use viewshed::reference as size;
+
+#[path = "input.rs"]
+mod input;
+#[path = "run.rs"]
+pub mod run;

@@ -1,0 +1,8 @@
+//! The loop and its inputs on the grid of 100 x 64 x 8 cells; `reference` has the same two files with another size.
+
+use viewshed::small as size;
+
+#[path = "input.rs"]
+mod input;
+#[path = "run.rs"]
+pub mod run;
