@@ -83,7 +83,7 @@ pub(crate) fn hypot_gate(a: i32, b: i32) -> i32 {
 ///
 /// A table of eight bits and one Newton step: a third of what the exact `u32::isqrt` costs.
 #[allow(clippy::cast_possible_truncation)] // the root of 32 bits has 16
-#[inline]
+#[inline(never)] // a hundred bytes of a controller's flash wherever it is called
 pub(crate) fn root(v: u32) -> u32 {
     if v < 64 * 64 {
         return v.isqrt();
