@@ -270,9 +270,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             _ => Step::from_micros(0),
         };
         ended();
-        let claimed = self.follow_obstacles(p, step, map);
+        let by_range = ByRange::sort(self.scan.reflections(), p.tracking.limit_cm);
+        let claimed = self.follow_obstacles(p, &by_range, step, map);
         ended();
-        self.update_grid(p, step, continuity, &claimed, map, ended);
+        self.update_grid(p, step, continuity, (&by_range, &claimed), map, ended);
         let condition = self.health.condition(now, &p.health);
         if condition == Condition::Healthy {
             raycast::cast(&self.grid, &p.axes, map);
@@ -296,10 +297,16 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         report
     }
 
-    fn follow_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, step: Step, map: &PolarMap<R, A>) -> Claimed<D> {
+    fn follow_obstacles(
+        &mut self,
+        p: &Radar3dParameters<R, A, E>,
+        by_range: &ByRange<D>,
+        step: Step,
+        map: &PolarMap<R, A>,
+    ) -> Claimed<D> {
         let in_view = |x, y| map.locate(x, y).is_some_and(|(a, r)| map.cell(a, r).visible());
         let reflections = self.scan.reflections();
-        self.obstacles.step(reflections, step, &p.tracking, in_view)
+        self.obstacles.step(reflections, by_range, step, &p.tracking, in_view)
     }
 
     fn update_grid(
@@ -307,7 +314,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         p: &Radar3dParameters<R, A, E>,
         step: Step,
         continuity: Continuity,
-        claimed: &Claimed<D>,
+        (by_range, claimed): (&ByRange<D>, &Claimed<D>),
         map: &PolarMap<R, A>,
         ended: &mut impl FnMut(),
     ) {
@@ -317,7 +324,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let reflections = self.scan.reflections();
         p.inverse_sensor.clear(reflections, &p.axes, &mut self.grid);
         ended();
-        let by_range = ByRange::<D>::sort(reflections, p.tracking.limit_cm);
         for (i, r) in reflections.iter().enumerate() {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
             let around = if first {

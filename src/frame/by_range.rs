@@ -5,13 +5,16 @@ use crate::frame::reflection::Reflection;
 /// Bins of range.
 const BINS: usize = 128;
 /// Reflections around one that are looked at: a crowd is a cluster long before.
-pub const MOST_AROUND: usize = 64;
+pub const MOST_AROUND: usize = 32;
 
 /// Where a reflection is, centimetres in the levelled frame, and its place in the scan.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
+    /// Along the levelled frame's axis.
     pub x_cm: i32,
+    /// To its left.
     pub y_cm: i32,
+    /// Place in the scan.
     pub index: u16,
 }
 
@@ -25,8 +28,7 @@ pub struct ByRange<const D: usize> {
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // bins and lists are short
 impl<const D: usize> ByRange<D> {
-    /// Sorts by counting: two passes over the reflections. Called twice a frame, and a controller's flash is small.
-    #[inline(never)]
+    /// Sorts by counting: two passes over the reflections.
     pub fn sort(reflections: &[Reflection], limit_cm: i32) -> Self {
         let mut sorted = Self {
             places: [Place { x_cm: 0, y_cm: 0, index: 0 }; D],
@@ -69,10 +71,16 @@ impl<const D: usize> ByRange<D> {
     /// Whether so many of the reflections that count, itself included, lie no farther than `reach_cm` from reflection
     /// `r` on either axis. Looks at no more than [`MOST_AROUND`] of them.
     pub fn is_one_of(&self, many: usize, reach_cm: i32, r: &Reflection, counts: impl Fn(usize) -> bool) -> bool {
-        let (ground, near) = (i32::from(r.ground_cm), |a: i32, b: i32| (a - b).abs() <= reach_cm);
-        let around = self.between(ground - 2 * reach_cm, ground + 2 * reach_cm).iter().take(MOST_AROUND);
-        let close = around.filter(|p| near(p.x_cm, r.x_cm) && near(p.y_cm, r.y_cm) && counts(usize::from(p.index)));
-        close.count() >= many
+        let ground = i32::from(r.ground_cm);
+        // what is no farther on either axis is no farther than 3/2 of it along the ground
+        let reach_along = 3 * reach_cm / 2;
+        let around = self.between(ground - reach_along, ground + reach_along).iter().take(MOST_AROUND);
+        // one comparison for both sides
+        let (corner, side) = ((r.x_cm - reach_cm, r.y_cm - reach_cm), 2 * reach_cm.unsigned_abs());
+        let within = |v: i32, corner: i32| v.wrapping_sub(corner).cast_unsigned() <= side;
+        let mut close =
+            around.filter(|p| within(p.y_cm, corner.1) && within(p.x_cm, corner.0) && counts(usize::from(p.index)));
+        many == 0 || close.nth(many - 1).is_some()
     }
 }
 

@@ -58,6 +58,7 @@ mod tests {
     use super::super::obstacle::Obstacle;
     use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
+    use crate::frame::by_range::ByRange;
     use crate::frame::reflection::Reflection;
     use std::vec::Vec;
 
@@ -70,7 +71,8 @@ mod tests {
             let x = x_m + 5.0 * PERIOD_S * f64::from(k);
             let places = (0..5).flat_map(|i| rows_m.iter().map(move |y| [x + 3.2 * f64::from(i) - 6.4, *y]));
             let reflections: Vec<_> = places.map(|p| reflection(p, [5.0, 0.0])).collect();
-            list.step::<64>(&reflections, Step::from_micros((PERIOD_S * 1e6) as u64), &t, |_, _| true);
+            let step = Step::from_micros((PERIOD_S * 1e6) as u64);
+            list.step(&reflections, &ByRange::<64>::sort(&reflections, t.limit_cm), step, &t, |_, _| true);
         }
         let boxes: Vec<_> = list.solids(&t).collect();
         assert_eq!(boxes.len(), 1);

@@ -173,6 +173,7 @@ impl<const N: usize> Obstacles<N> {
     pub fn step<const D: usize>(
         &mut self,
         reflections: &[Reflection],
+        by_range: &ByRange<D>,
         step: Step,
         t: &Tracking,
         in_view: impl Fn(i32, i32) -> bool,
@@ -181,12 +182,11 @@ impl<const N: usize> Obstacles<N> {
         for o in &mut self.list {
             o.predict(step, kept.lateral, t);
         }
-        let by_range = ByRange::<D>::sort(reflections, t.limit_cm);
-        let mut claimed = self.associate(reflections, &by_range, kept.outline, t);
+        let mut claimed = self.associate(reflections, by_range, kept.outline, t);
         for o in &mut self.list {
             o.settle(step, t);
         }
-        self.found(reflections, &by_range, &mut claimed, t);
+        self.found(reflections, by_range, &mut claimed, t);
         self.join_parts(t);
         self.doubt_the_unseen(step, t, in_view);
         claimed
@@ -398,13 +398,17 @@ mod tests {
         }
     }
 
+    fn sorted<const D: usize>(reflections: &[Reflection]) -> ByRange<D> {
+        ByRange::sort(reflections, tracking().limit_cm)
+    }
+
     /// One obstacle with so much evidence; what it loses in a tenth of a second without a detection.
     fn lost(existence: i32, in_view: impl Fn(i32, i32) -> bool) -> i32 {
         let mut all = Obstacles::<4>::new();
         let mut o = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, 2000);
         (o.existence, o.extent) = (existence, profile::Extent { rear_cm: -200, front_cm: 200 });
         let _ = all.list.push(o);
-        let _: Claimed<4> = all.step(&[], Step::from_micros(100_000), &tracking(), in_view);
+        let _: Claimed<4> = all.step(&[], &sorted(&[]), Step::from_micros(100_000), &tracking(), in_view);
         existence - all.iter().next().map_or(0, |o| o.existence)
     }
 
@@ -467,7 +471,8 @@ mod tests {
             (o.existence, o.extent) = (t.confirmed, profile::Extent { rear_cm: -25, front_cm });
             let _ = all.list.push(o);
         }
-        let claimed: Claimed<4> = all.step(&[reflection(5450, 0, 2000)], Step::from_micros(0), &t, |_, _| false);
+        let seen = [reflection(5450, 0, 2000)];
+        let claimed: Claimed<4> = all.step(&seen, &sorted(&seen), Step::from_micros(0), &t, |_, _| false);
         assert!(claimed.contains(0) && !claimed.contains(1));
         assert_eq!(all.iter().map(|o| o.hits).collect::<StdVec<_>>(), [0, 1], "7 m from one, 4 m from the other");
     }
@@ -480,7 +485,7 @@ mod tests {
             let mut o = Obstacle::new(&reflection(x, 0, 0), Direction::AHEAD, 2000);
             (o.existence, o.age) = (existence, 5);
             let _ = all.list.push(o);
-            let _: Claimed<4> = all.step(&[], Step::from_micros(200_000), &t, |_, _| false);
+            let _: Claimed<4> = all.step(&[], &sorted(&[]), Step::from_micros(200_000), &t, |_, _| false);
             (all.iter().count(), all.solids(&t).count())
         };
         assert_eq!(after(5000, t.confirmed + 1000), (1, 1));
@@ -495,9 +500,9 @@ mod tests {
         let t = tracking();
         let mut all = Obstacles::<4>::new();
         let seen = [-900, -300, 300, 900].map(|y| reflection(5000, y, 2000));
-        let _: Claimed<4> = all.step(&seen, Step::from_micros(0), &t, |_, _| true);
+        let _: Claimed<4> = all.step(&seen, &sorted(&seen), Step::from_micros(0), &t, |_, _| true);
         assert_eq!(all.iter().count(), 2);
-        let _: Claimed<4> = all.step(&seen, Step::from_micros(1), &t, |_, _| true);
+        let _: Claimed<4> = all.step(&seen, &sorted(&seen), Step::from_micros(1), &t, |_, _| true);
         assert_eq!(all.iter().count(), 4);
     }
 
@@ -509,7 +514,7 @@ mod tests {
         while all.solids(&t).next().is_none() {
             assert!(frames < 20, "never");
             let seen = [reflection(5000 + 133 * frames, 0, 2000), reflection(5200 + 133 * frames, 0, 2000)];
-            let _: Claimed<4> = all.step(&seen, Step::from_micros(66_667), &t, |_, _| true);
+            let _: Claimed<4> = all.step(&seen, &sorted(&seen), Step::from_micros(66_667), &t, |_, _| true);
             frames += 1;
         }
         // after 2 m of way, which takes it two frames after the first
