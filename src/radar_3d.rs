@@ -11,13 +11,14 @@
 use crate::estimator::{Estimator, Progress};
 use crate::fixed::math;
 use crate::fixed::time::{Step, Time};
+use crate::frame::by_range::ByRange;
 use crate::frame::detection::Detection;
 use crate::frame::gate::{Gate, GateConfig, Rejections};
 use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
 use crate::frame::reflection::Reflection;
 use crate::frame::scan::Scan;
 use crate::grid::axes::Axes;
-use crate::grid::evidence::{EvidenceConfig, InverseSensor};
+use crate::grid::evidence::{Around, BODY_CM, BODY_REFLECTIONS, EvidenceConfig, InverseSensor};
 use crate::grid::raycast;
 use crate::grid::shadow;
 use crate::grid::spherical::SphericalGrid;
@@ -269,9 +270,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             _ => Step::from_micros(0),
         };
         ended();
-        let claimed = self.follow_obstacles(p, step, map);
+        let by_range = ByRange::sort(self.scan.reflections(), p.tracking.limit_cm);
+        let claimed = self.follow_obstacles(p, &by_range, step, map);
         ended();
-        self.update_grid(p, step, continuity, &claimed, map, ended);
+        self.update_grid(p, step, continuity, (&by_range, &claimed), map, ended);
         let condition = self.health.condition(now, &p.health);
         if condition == Condition::Healthy {
             raycast::cast(&self.grid, &p.axes, map);
@@ -295,10 +297,16 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         report
     }
 
-    fn follow_obstacles(&mut self, p: &Radar3dParameters<R, A, E>, step: Step, map: &PolarMap<R, A>) -> Claimed<D> {
+    fn follow_obstacles(
+        &mut self,
+        p: &Radar3dParameters<R, A, E>,
+        by_range: &ByRange<D>,
+        step: Step,
+        map: &PolarMap<R, A>,
+    ) -> Claimed<D> {
         let in_view = |x, y| map.locate(x, y).is_some_and(|(a, r)| map.cell(a, r).visible());
         let reflections = self.scan.reflections();
-        self.obstacles.step(reflections, step, &p.tracking, in_view)
+        self.obstacles.step(reflections, by_range, step, &p.tracking, in_view)
     }
 
     fn update_grid(
@@ -306,7 +314,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         p: &Radar3dParameters<R, A, E>,
         step: Step,
         continuity: Continuity,
-        claimed: &Claimed<D>,
+        (by_range, claimed): (&ByRange<D>, &Claimed<D>),
         map: &PolarMap<R, A>,
         ended: &mut impl FnMut(),
     ) {
@@ -318,9 +326,16 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         ended();
         for (i, r) in reflections.iter().enumerate() {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
-            if first || !(claimed.contains(i) || p.tracking.course(r).is_some()) {
-                p.inverse_sensor.add(r, first, &p.axes, &mut self.grid);
-            }
+            let around = if first {
+                Around::Unknown
+            } else if claimed.contains(i) || p.tracking.course(r).is_some() {
+                continue;
+            } else if by_range.is_one_of(BODY_REFLECTIONS, BODY_CM, r, |k| !claimed.contains(k)) {
+                Around::Body
+            } else {
+                Around::Nothing
+            };
+            p.inverse_sensor.add(r, around, &p.axes, &mut self.grid);
         }
         ended();
     }

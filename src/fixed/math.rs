@@ -73,6 +73,7 @@ pub(crate) fn round_i32(x: f32) -> i32 {
 }
 
 /// Length of (a, b), at most 7 % above and 3 % below the exact value, for noise gates.
+#[inline(never)] // as the root
 pub(crate) fn hypot_gate(a: i32, b: i32) -> i32 {
     let (a, b) = (a.abs(), b.abs());
     let (long, short) = if a > b { (a, b) } else { (b, a) };
@@ -83,7 +84,7 @@ pub(crate) fn hypot_gate(a: i32, b: i32) -> i32 {
 ///
 /// A table of eight bits and one Newton step: a third of what the exact `u32::isqrt` costs.
 #[allow(clippy::cast_possible_truncation)] // the root of 32 bits has 16
-#[inline]
+#[inline(never)] // a hundred bytes of a controller's flash wherever it is called
 pub(crate) fn root(v: u32) -> u32 {
     if v < 64 * 64 {
         return v.isqrt();
@@ -114,7 +115,7 @@ const fn roots() -> [u8; 256] {
 
 /// Length of a ground vector; beyond 46 340 along an axis it is taken to lie there.
 #[allow(clippy::cast_possible_wrap)] // a root of 32 bits
-#[inline]
+#[inline(never)] // as the root
 pub(crate) fn length(x: i32, y: i32) -> i32 {
     let (x, y) = (x.unsigned_abs().min(46_340), y.unsigned_abs().min(46_340));
     root(x * x + y * y) as i32

@@ -1,5 +1,6 @@
 //! One radar frame: its detections, which of them count, where they lie on the road, and what a missing one means.
 
+pub mod by_range;
 pub mod detection;
 pub mod gate;
 pub mod health;

@@ -5,9 +5,13 @@
 //! Gaussian over range and azimuth (the sensor's noise). Things stand on the road, so a stack fills
 //! from the ground up to the reflection's height and fades above it as the height's Gaussian. The
 //! height is the measured one drawn towards a prior, by the inverse of their variances: far away,
-//! where a degree is metres, an unmoving reflection is taken as low until it is seen near. Each
-//! detection draws a stack towards its own profile, so that repeated noisy heights average instead
-//! of piling up.
+//! where a degree is metres, an unmoving reflection is taken as low until it is seen near. What is
+//! *of a body*, one of several reflections within a vehicle's size, may be as high as a vehicle: its
+//! prior is vague. A guard rail's posts stand alone. And what was measured half a standard deviation
+//! above a level fills it whatever the prior says; where that is higher than a car, the thing is a mast,
+//! a sign or a wall, which reflects anywhere, and twice as high. Each detection draws a stack towards its own profile,
+//! so that repeated noisy heights average instead of piling up: a level is filled where most
+//! detections prove it.
 //!
 //! *Negative*: the space in front of a detection is free along its line of sight, and above it, for
 //! things stand on the road. Where nothing was detected, evidence fades: slowly in a shadow, where
@@ -67,6 +71,28 @@ impl Default for EvidenceConfig {
             height_prior_sigma_m: 0.4,
         }
     }
+}
+
+/// Reflections of a body in one frame, and how far from one the others lie at most on either axis, centimetres.
+pub const BODY_REFLECTIONS: usize = 4;
+/// See [`BODY_REFLECTIONS`].
+pub const BODY_CM: i32 = 250;
+/// Variance of the height of a body that was measured, cm^2: a vehicle's.
+const BODY_VARIANCE: i32 = 150 * 150;
+
+/// Height from which what stands is a mast, a sign or a wall, centimetres. Any part of such a thing reflects, half its
+/// height on average.
+const TALL_CM: i32 = 200;
+
+/// What a frame shows around an unmoving reflection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Around {
+    /// Nobody knows: a first frame, in which anything may move. It is all the evidence there is and counts in full.
+    Unknown,
+    /// Too little for a body.
+    Nothing,
+    /// [Others](BODY_REFLECTIONS), of one body.
+    Body,
 }
 
 /// Lines of sight of one frame that clear a column.
@@ -152,10 +178,12 @@ impl InverseSensor {
     }
 
     /// Height of an unmoving reflection and its standard deviation, centimetres.
-    fn height(&self, r: &Reflection) -> (i32, i32) {
-        let prior = self.height_prior_variance;
+    #[inline(never)]
+    fn height(&self, r: &Reflection, around: Around) -> (i32, i32) {
         let (height, variance) = match r.height_cm {
             Some((measured, sigma)) => {
+                let least = if around == Around::Body { BODY_VARIANCE } else { 0 };
+                let prior = self.height_prior_variance.max(least);
                 let (measured, sigma) = (i32::from(measured), i32::from(sigma));
                 let noise = sigma.min(10_000) * sigma.min(10_000);
                 let weight = (prior << 8) / (prior + noise).max(1);
@@ -164,9 +192,20 @@ impl InverseSensor {
                     math::mul_shift(noise, weight, 8),
                 )
             }
-            None => (self.height_prior_cm, prior),
+            None => (self.height_prior_cm, self.height_prior_variance),
         };
         (height, (math::root(variance.unsigned_abs()) as i32).max(1))
+    }
+
+    /// Height up to which a detection says that something is there, centimetres, whatever the prior says.
+    fn proven_cm(r: &Reflection, around: Around) -> i32 {
+        match r.height_cm {
+            Some((measured, sigma)) if around != Around::Unknown => {
+                let proven = i32::from(measured) - i32::from(sigma / 2);
+                if proven > TALL_CM { 2 * proven } else { proven }
+            }
+            _ => i32::MIN,
+        }
     }
 
     /// Lets all evidence fade by a time step, by how well each cell was seen.
@@ -223,7 +262,7 @@ impl InverseSensor {
         let mut row = None;
         column.change_before(end, |stack| {
             let row = *row.get_or_insert_with(|| {
-                let (height, _) = self.height(r);
+                let (height, _) = self.height(r, Around::Nothing);
                 ((axes.row_place(axes.slope(height, i32::from(r.ground_cm))) + 255) >> 8) as usize
             });
             for v in stack.iter_mut().skip(row) {
@@ -232,22 +271,22 @@ impl InverseSensor {
         });
     }
 
-    /// Adds the evidence of a detection that belongs to no obstacle. In a `first` frame it is all the
-    /// evidence there is and counts in full.
+    /// Adds the evidence of a detection that belongs to no obstacle.
     pub fn add<const R: usize, const A: usize, const E: usize, const W: usize>(
         &self,
         r: &Reflection,
-        first: bool,
+        around: Around,
         axes: &Axes<R, A, E>,
         grid: &mut SphericalGrid<R, A, E, W>,
     ) {
-        let gain = if first { 256 } else { self.gain };
+        let gain = if around == Around::Unknown { 256 } else { self.gain };
         let ground_cm = i32::from(r.ground_cm);
-        let (height, sigma) = self.height(r);
+        let (height, sigma) = self.height(r, around);
+        let proven = Self::proven_cm(r, around);
         let mut profile = [0_u8; E];
         for (row, p) in profile.iter_mut().enumerate() {
-            let above = axes.height_at(axes.row_centre(row), ground_cm) - height;
-            *p = self.bell(above.max(0), sigma) as u8;
+            let level = axes.height_at(axes.row_centre(row), ground_cm);
+            *p = if level <= proven { 255 } else { self.bell((level - height).max(0), sigma) as u8 };
         }
         let place = axes.column_place(r.bearing());
         let reach = 2 * self.azimuth_sigma;
@@ -373,7 +412,7 @@ mod tests {
         let noise = NoiseConfig { range_m, ..NoiseConfig::default() };
         let sensor = EvidenceConfig::default().inverse_sensor(&noise, &axes).unwrap();
         let mut grid = Grid::new();
-        sensor.add(&ahead(3050), true, &axes, &mut grid);
+        sensor.add(&ahead(3050), Around::Unknown, &axes, &mut grid);
         let cells = grid.column_mut(2).unwrap().stacks().map(|(r, _)| r).collect();
         let column = grid.column_mut(2).unwrap();
         (0..30).for_each(|r| column.evidence(r).unwrap().fill(200));
@@ -410,13 +449,13 @@ mod tests {
         let (_, axes) = axes();
         let sensor = EvidenceConfig::default().inverse_sensor(&NoiseConfig::default(), &axes).unwrap();
         let mut grid = Grid::new();
-        sensor.add(&Reflection { height_cm: Some((100, 5)), ..ahead(3050) }, true, &axes, &mut grid);
+        sensor.add(&Reflection { height_cm: Some((100, 5)), ..ahead(3050) }, Around::Unknown, &axes, &mut grid);
         let full = grid.column_mut(2).unwrap().evidence(30).unwrap().to_vec();
         // 60 m away is the slice's lowest slope: everything up to 1 m, and less and less above
         assert!(full.is_sorted_by(|a, b| a >= b) && full[0] > 120 && full[3] < 30, "{full:?}");
         // a later detection counts by its gain only
         let mut grid = Grid::new();
-        sensor.add(&Reflection { height_cm: Some((100, 5)), ..ahead(3050) }, false, &axes, &mut grid);
+        sensor.add(&Reflection { height_cm: Some((100, 5)), ..ahead(3050) }, Around::Nothing, &axes, &mut grid);
         let part = i32::from(grid.column_mut(2).unwrap().evidence(30).unwrap()[0]);
         assert!((part - i32::from(full[0]) * 3 / 10).abs() <= 3, "{part} of {full:?}");
     }
@@ -425,15 +464,52 @@ mod tests {
     fn a_sure_height_counts_and_a_vague_one_is_drawn_to_the_prior() {
         let (_, axes) = axes();
         let sensor = EvidenceConfig::default().inverse_sensor(&NoiseConfig::default(), &axes).unwrap();
-        let height = |measured, sigma| sensor.height(&Reflection { height_cm: Some((measured, sigma)), ..ahead(3050) });
+        let height = |measured, sigma| {
+            sensor.height(&Reflection { height_cm: Some((measured, sigma)), ..ahead(3050) }, Around::Nothing)
+        };
         // half a metre by default, 0.4 m uncertain
-        assert_eq!(sensor.height(&ahead(3050)), (50, 40));
+        assert_eq!(sensor.height(&ahead(3050), Around::Nothing), (50, 40));
         let (sure, sigma) = height(300, 4);
         assert!((295..=300).contains(&sure) && sigma <= 4, "{sure} {sigma}");
         let (equal, sigma) = height(300, 40);
         assert!((equal - 175).abs() <= 2 && (sigma - 28).abs() <= 1, "{equal} {sigma}");
         let (vague, sigma) = height(300, 400);
         assert!((50..=54).contains(&vague) && (34..=40).contains(&sigma), "{vague} {sigma}");
+    }
+
+    #[test]
+    fn the_height_of_a_body_is_vague_where_it_was_measured() {
+        let (_, axes) = axes();
+        let sensor = EvidenceConfig::default().inverse_sensor(&NoiseConfig::default(), &axes).unwrap();
+        let height = |height_cm| sensor.height(&Reflection { height_cm, ..ahead(3050) }, Around::Body);
+        assert_eq!(height(None), (50, 40));
+        let (equal, sigma) = height(Some((300, 150)));
+        assert!((equal - 175).abs() <= 2 && (sigma - 106).abs() <= 1, "{equal} {sigma}");
+    }
+
+    /// Rows of the stack of a thing 30.5 m away that are full after so many detections at these heights, in turn.
+    fn full_rows(heights_cm: &[i16], sigma_cm: u16, detections: usize) -> usize {
+        let (_, axes) = axes();
+        let sensor = EvidenceConfig::default().inverse_sensor(&NoiseConfig::default(), &axes).unwrap();
+        let mut grid = Grid::new();
+        for h in heights_cm.iter().cycle().take(detections) {
+            let r = Reflection { height_cm: Some((*h, sigma_cm)), ..ahead(3050) };
+            sensor.add(&r, Around::Nothing, &axes, &mut grid);
+        }
+        let stack = grid.column_mut(2).unwrap().evidence(30).unwrap();
+        stack.iter().filter(|v| **v >= 128).count()
+    }
+
+    #[test]
+    fn levels_that_most_detections_prove_are_filled_whatever_the_prior_says() {
+        let (_, axes) = axes();
+        let rows_to = |cm| (0..4).filter(|row| axes.height_at(axes.row_centre(*row), 3050) <= cm).count();
+        assert!(rows_to(120) < rows_to(450), "the grid tells them apart");
+        // a bollard that reflects 1.4 m above the road, a sign at 2.6 m, a post at 0.6 m; noise of a standard deviation
+        assert_eq!(full_rows(&[140, 80, 200, 140], 60, 40), rows_to(120));
+        assert_eq!(full_rows(&[260, 200, 320, 260], 60, 40), rows_to(450));
+        assert!(full_rows(&[60, 0, 120, 60], 60, 40) <= rows_to(120));
+        assert!(full_rows(&[60, 60, 60, 330], 60, 40) <= rows_to(120), "one in four proves nothing");
     }
 
     #[test]

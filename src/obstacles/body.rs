@@ -6,8 +6,8 @@ use super::tracking::Tracking;
 use crate::fixed::math::root;
 use crate::obstacles::solid::Solid;
 
-/// Length from which nothing is low, centimetres.
-const LORRY_CM: i32 = 900;
+/// Greatest length of what is low, centimetres.
+pub(super) const LONGEST_LOW_CM: i32 = 900;
 
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
@@ -15,8 +15,10 @@ impl Obstacle {
         let tall = self.tallness.floor_cm();
         let seen = self.extent.length_cm();
         let size = t.sizes.of(seen.max(self.remembered_length_cm(t)).max(t.sizes.least_length_cm(tall)));
-        // what is as long as a lorry may be one that shows nothing high
-        let lid = if size.length_cm < LORRY_CM { self.tallness.ceiling_cm() } else { i32::MAX };
+        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
+        let may_be_low = size.length_cm < LONGEST_LOW_CM || self.profile.is_a_row_of_cars(&self.extent);
+        let lid = if may_be_low { self.tallness.ceiling_cm() } else { i32::MAX };
+        let margin = if self.free_heading { t.own_way_margin_cm } else { 0 };
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
         let hidden = (size.length_cm - seen).max(0) / 2;
@@ -30,7 +32,7 @@ impl Obstacle {
             y_cm: y,
             heading: self.heading,
             half_length_cm: size.length_cm / 2,
-            half_width_cm: size.width_cm / 2,
+            half_width_cm: size.width_cm / 2 + margin,
             height_cm: size.height_cm.min(lid).max(tall),
         }
     }
@@ -56,6 +58,8 @@ mod tests {
     use super::super::obstacle::Obstacle;
     use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
+    use crate::frame::by_range::ByRange;
+    use crate::frame::reflection::Reflection;
     use std::vec::Vec;
 
     const AHEAD: Direction = Direction::AHEAD;
@@ -67,7 +71,8 @@ mod tests {
             let x = x_m + 5.0 * PERIOD_S * f64::from(k);
             let places = (0..5).flat_map(|i| rows_m.iter().map(move |y| [x + 3.2 * f64::from(i) - 6.4, *y]));
             let reflections: Vec<_> = places.map(|p| reflection(p, [5.0, 0.0])).collect();
-            list.step::<64>(&reflections, Step::from_micros((PERIOD_S * 1e6) as u64), &t, |_, _| true);
+            let step = Step::from_micros((PERIOD_S * 1e6) as u64);
+            list.step(&reflections, &ByRange::<64>::sort(&reflections, t.limit_cm), step, &t, |_, _| true);
         }
         let boxes: Vec<_> = list.solids(&t).collect();
         assert_eq!(boxes.len(), 1);
@@ -90,6 +95,44 @@ mod tests {
         assert!((both - 10.0).abs() < 0.5, "{both} m");
         let behind = middle_of(&[2.0], 90.0);
         assert!((behind - 2.0).abs() < 0.3, "{behind} m");
+    }
+
+    /// Height of the box of something that reflects at these places along it, metres, so many times at this height.
+    fn height_of(places_m: &[f64], times: usize, height_cm: i16) -> f64 {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        for _ in 0..times {
+            o.fade_outline(63_000);
+            for x in places_m {
+                let r = reflection([50.0 + x, 0.0], [20.0, 0.0]);
+                o.absorb(&Reflection { height_cm: Some((height_cm, 30)), ..r }, &t);
+            }
+        }
+        o.update_extent(&t);
+        assert!(o.extent.length_cm() > 1000, "{:?}", o.extent);
+        f64::from(o.solid(&t).height_cm) / 100.0
+    }
+
+    #[test]
+    fn two_low_cars_taken_for_one_vehicle_are_low_and_a_lorry_is_not() {
+        let cars = [-6.1, -5.0, -3.9, -2.6, -1.6, 1.6, 2.6, 3.9, 5.0, 6.1];
+        assert!(height_of(&cars, 40, 70) < 1.7, "{}", height_of(&cars, 40, 70));
+        assert!(height_of(&cars, 2, 70) > 3.0, "two frames make nothing low");
+        assert!(height_of(&cars, 40, 250) > 3.0, "and those are no cars");
+        for lorry in [&[-6.1, -5.0, -3.9, -2.6, -1.6, -0.4, 0.9, 1.6, 2.6, 3.9, 5.0, 6.1][..], &[-6.1, -5.6, 5.6, 6.1]]
+        {
+            assert!(height_of(lorry, 40, 70) > 3.0, "{lorry:?}: {}", height_of(lorry, 40, 70));
+        }
+    }
+
+    #[test]
+    fn what_goes_its_own_way_is_drawn_wider_by_what_is_unsure_of_its_place() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 0), AHEAD, 2000);
+        let along_the_road = o.solid(&t).half_width_cm;
+        o.free_heading = true;
+        assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.own_way_margin_cm);
+        assert!(t.own_way_margin_cm > 0);
     }
 
     #[test]

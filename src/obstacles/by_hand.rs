@@ -8,6 +8,7 @@ use super::tracking::Tracking;
 use crate::fixed::math::length;
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
+use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 use crate::sensor::noise::NoiseConfig;
 
@@ -101,7 +102,8 @@ pub fn follow<const N: usize>(list: &mut Obstacles<N>, vehicles: &mut [Vehicle],
     let t = rules();
     for _ in 0..(seconds / PERIOD_S) as usize {
         let reflections: Vec<Reflection> = vehicles.iter().flat_map(Vehicle::reflections).collect();
-        list.step::<256>(&reflections, Step::from_micros((PERIOD_S * 1e6) as u64), &t, |_, _| in_view);
+        let step = Step::from_micros((PERIOD_S * 1e6) as u64);
+        list.step(&reflections, &ByRange::<256>::sort(&reflections, t.limit_cm), step, &t, |_, _| in_view);
         vehicles.iter_mut().for_each(|v| v.moved(PERIOD_S));
     }
 }

@@ -80,6 +80,9 @@ pub struct ObstacleConfig {
     pub own_way_share: f32,
     /// Share of the way to the place seen that the outline of what goes its own way is moved in a frame.
     pub own_way_follow: f32,
+    /// How much farther than its width the box of what goes its own way reaches to either side, metres: its place
+    /// across is known to so much, and what may be in the way is not drawn smaller.
+    pub own_way_margin_m: f32,
     /// How long an outline must be longer until the box is, seconds.
     pub length_growth_s: f32,
     /// How long the box stays longer than an outline of which a part is hidden, seconds.
@@ -132,9 +135,10 @@ impl Default for ObstacleConfig {
             outline_sigmas: 0.7,
             turning_noise_mps: 1.0,
             own_way_sigmas: 3.0,
-            own_way_mps: 2.0,
+            own_way_mps: 1.5,
             own_way_share: 0.2,
             own_way_follow: 0.05,
+            own_way_margin_m: 0.4,
             length_growth_s: 1.0,
             length_memory_s: 3.0,
             slow_mps: 4.0,
@@ -206,6 +210,7 @@ impl ObstacleConfig {
             own_way_sigmas: sigmas("obstacles.own_way_sigmas", self.own_way_sigmas)?,
             own_way_cm_s: cm("obstacles.own_way_mps", self.own_way_mps, 0.0, 50.0)?,
             own_way_share: math::round_i32(within("obstacles.own_way_share", self.own_way_share, 0.0, 2.0)? * 65536.0),
+            own_way_margin_cm: cm("obstacles.own_way_margin_m", self.own_way_margin_m, 0.0, 2.0)?,
             length_growth: seconds("obstacles.length_growth_s", self.length_growth_s)?,
             length_memory: seconds("obstacles.length_memory_s", self.length_memory_s)?,
             slow_speed: fine("obstacles.slow_mps", self.slow_mps, 0.0, 50.0)?,

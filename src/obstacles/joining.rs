@@ -1,5 +1,6 @@
 //! Parts of one vehicle that were taken for several.
 
+use super::body::LONGEST_LOW_CM;
 use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::BIN_CM;
@@ -40,7 +41,10 @@ impl Obstacle {
             && hypot_gate(dvx, dvy) <= t.coupled_speed
             && left.abs() <= t.merge_lateral_cm;
         let widest = if coupled { self.headway_cm(t.coupled_headway, t) } else { self.gap_cm(t) };
-        gap <= widest && length <= t.max_length_cm
+        // nothing low is as long as a lorry
+        let low = self.tallness.is_low() && other.tallness.is_low();
+        let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
+        gap <= widest && length <= longest
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
@@ -73,6 +77,13 @@ impl Obstacle {
         self.tallness.join(&before.tallness);
     }
 
+    /// Where this frame's detections of both have their centre: it has moved, but neither of them has.
+    fn centre_with(&self, other: &Self) -> (i32, i32) {
+        let ((x, y), count) = (self.free.place, other.gathered.count);
+        let both = (self.gathered.count + count).max(1);
+        (x + (other.free.place.0 - x) / both * count, y + (other.free.place.1 - y) / both * count)
+    }
+
     /// Standard deviation of the lateral place, centimetres.
     fn lateral_sigma(&self) -> i32 {
         sigma_of_weight(self.lateral_weight)
@@ -93,6 +104,7 @@ impl Obstacle {
         let share = (i64::from(left << FRACTION) * i64::from(other.lateral_weight) / i64::from(weight)) as i32;
         self.move_left(share);
         self.lateral_weight = weight;
+        self.free.place = self.centre_with(other);
         self.existence = (self.existence + other.existence).min(t.existence_max);
         self.hits = self.hits.saturating_add(other.hits);
         self.travelled_cm = self.travelled_cm.max(other.travelled_cm);
@@ -106,7 +118,9 @@ mod tests {
     use super::super::by_hand::{rules, seen_at};
     use super::super::obstacle::MOST_WEIGHT;
     use super::super::profile::Extent;
+    use super::super::tallness::Tallness;
     use super::*;
+    use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
 
     const AHEAD: Direction = Direction::AHEAD;
@@ -119,6 +133,14 @@ mod tests {
         b.extent = Extent { rear_cm: -200, front_cm: 200 };
         (a.lateral_weight, b.lateral_weight) = (MOST_WEIGHT, MOST_WEIGHT);
         (a, b)
+    }
+
+    /// Certain to be low.
+    fn low() -> Tallness {
+        let mut t = Tallness::default();
+        (0..100).for_each(|_| t.add(70, 30));
+        assert!(t.is_low());
+        t
     }
 
     #[test]
@@ -141,6 +163,44 @@ mod tests {
         let (mut a, b) = two(600, 0, 2000);
         a.extent.rear_cm = -1000;
         assert!(!a.is_one_with(&b, &t));
+    }
+
+    #[test]
+    fn two_cars_close_behind_each_other_are_not_joined_to_a_lorry() {
+        let t = rules();
+        let (mut a, mut b) = two(250, 0, 2000);
+        a.tallness = low();
+        assert!(a.is_one_with(&b, &t), "one of them may be high");
+        b.tallness = low();
+        assert!(!a.is_one_with(&b, &t), "10.5 m");
+        let (mut a, mut b) = two(50, 0, 2000);
+        (a.tallness, b.tallness) = (low(), low());
+        assert!(a.is_one_with(&b, &t), "8.5 m");
+    }
+
+    #[test]
+    fn joining_two_parts_that_stand_is_no_motion() {
+        let t = rules();
+        let (mut a, mut b) = two(0, 60, 0);
+        // three frames of standing still, each seen where it is
+        let step = Step::from_micros(67_000);
+        let frame = |o: &mut Obstacle, places: &[(i32, i32)]| {
+            o.predict(step, 1 << 16, &t);
+            places.iter().for_each(|(x, y)| o.absorb(&seen_at(*x, *y, 0), &t));
+            o.settle(step, &t);
+        };
+        let (rear, front) = ([(4900, 0), (5100, 0)], [(5300, 120), (5500, 120), (5450, 120), (5350, 120)]);
+        for _ in 0..30 {
+            frame(&mut a, &rear);
+            frame(&mut b, &front);
+        }
+        a.join(&b, &t);
+        let before = a.free.velocity;
+        for _ in 0..5 {
+            frame(&mut a, &[&rear[..], &front[..]].concat());
+        }
+        let pushed = (a.free.velocity.1 - before.1).abs() >> FRACTION;
+        assert!(pushed < 15, "{pushed} cm/s to the side");
     }
 
     #[test]

@@ -9,6 +9,11 @@ pub const BINS: usize = 48;
 pub const BIN_CM: i32 = 50;
 /// Bins that hold one end of a vehicle: its bumper, lamps and nearest axle.
 const END_BINS: usize = 5;
+/// Shortest and longest outline of a car that shows both its ends, bins: 2.5 to 6 m.
+const CAR_BINS: [i32; 2] = [5, 12];
+/// Narrowest and widest gap between cars taken for one vehicle, bins: 1.5 m, which is less than what they keep when they
+/// stand, for noise fills a part of it, to 7 m, which is what still joins two parts.
+const GAP_BINS: [i32; 2] = [3, 14];
 /// One hit, in the histogram's unit.
 pub const HIT: i32 = 64;
 
@@ -97,6 +102,31 @@ impl Profile {
         Some(Extent { rear_cm: self.centre_of_pair(first), front_cm: self.centre_of_pair(last) })
     }
 
+    /// Whether an outline falls into parts that are all as long as a car, with gaps between them that are as wide as
+    /// cars leave. Bins with less than a tenth of the mean are empty.
+    pub fn is_a_row_of_cars(&self, extent: &Extent) -> bool {
+        let bin = |along: i32| usize::try_from(along.div_euclid(BIN_CM) + BINS as i32 / 2).unwrap_or(0);
+        let held = self.bins.get(bin(extent.rear_cm)..=bin(extent.front_cm).min(BINS - 1)).unwrap_or(&[]);
+        let total = held.iter().map(|b| i32::from(*b)).sum::<i32>();
+        let is_car = |part: i32| (CAR_BINS[0]..=CAR_BINS[1]).contains(&part);
+        let (mut cars, mut others, mut part, mut gap) = (0, 0, 0, 0);
+        for b in held {
+            if i32::from(*b) * 10 * (held.len() as i32) >= total {
+                part += if gap < GAP_BINS[0] { gap + 1 } else { 1 };
+                gap = 0;
+                continue;
+            }
+            gap += 1;
+            if gap == GAP_BINS[0] {
+                cars += 1;
+                others += i32::from(!is_car(part));
+                part = 0;
+            }
+            others += i32::from(gap > GAP_BINS[1]);
+        }
+        cars > 0 && others == 0 && is_car(part)
+    }
+
     /// Centre of gravity of the bins `i` and `i + 1`, centimetres from the anchor.
     fn centre_of_pair(&self, i: usize) -> i32 {
         let [a, b] = match self.bins.get(i..i + 2) {
@@ -143,6 +173,7 @@ fn filling<'a>(bins: impl Iterator<Item = &'a u16> + Clone, needed: i32) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::Vec;
 
     fn profile(hits: &[(i32, usize)]) -> Profile {
         let mut p = Profile::EMPTY;
@@ -161,6 +192,28 @@ mod tests {
         assert_eq!(e.beyond_cm(e.front_cm + 70), 70);
         assert_eq!(e.beyond_cm(e.rear_cm - 30), 30);
         assert_eq!(e.beyond_cm(0), 0);
+    }
+
+    fn row(places: &[i32]) -> bool {
+        let hits: Vec<(i32, usize)> = places.iter().map(|x| (*x, 40)).collect();
+        let whole = Extent { rear_cm: places[0], front_cm: *places.last().unwrap() };
+        let (all, with_a_stray) = (profile(&hits), profile(&[&hits[..], &[(0, 1)]].concat()));
+        assert_eq!(all.is_a_row_of_cars(&whole), with_a_stray.is_a_row_of_cars(&whole), "one stray fills no gap");
+        all.is_a_row_of_cars(&whole)
+    }
+
+    #[test]
+    fn a_row_of_cars_is_parts_as_long_as_cars_with_gaps_as_between_cars() {
+        let two_cars = [-610, -500, -390, -260, -160, 160, 260, 390, 500, 610];
+        assert!(row(&two_cars), "3.2 m apart");
+        let three = [-1010, -900, -790, -660, -260, -150, -30, 90, 200, 520, 640, 750, 860];
+        assert!(row(&three));
+        assert!(!row(&[-610, -500, -390, -260, -160, -30, 90, 160, 260, 390, 500, 610]), "it reflects all along");
+        assert!(!row(&[-610, -560, 560, 610]), "a lorry that shows only its ends");
+        assert!(!row(&[-810, -700, -590, -460, 360, 460, 590, 700]), "8 m apart");
+        assert!(!row(&[-610, -500, -390, -260, -160, 160, 210]), "a trailer and what draws it");
+        assert!(!row(&[-1010, -900, -790, -660, -540, -430, -300, -190, 160, 260, 390, 500, 610]), "8.5 m and a car");
+        assert!(!row(&[-230, -100, 20, 130, 230]), "one car");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Which detections can belong to an obstacle, and how well they fit.
 
+use super::body::LONGEST_LOW_CM;
 use super::gathered::{sigma_across, sigma_along};
 use super::obstacle::Obstacle;
 use super::profile::Extent;
@@ -12,6 +13,8 @@ use crate::frame::reflection::Reflection;
 const NOISE_REACH_CM: i32 = 600;
 /// How far beyond the longest vehicle an outline may be stretched, centimetres.
 const LENGTH_TO_SPARE_CM: i32 = 100;
+/// How far beyond its outline an end of a vehicle may reflect, centimetres: noise has been taken off the outline.
+const END_CM: i32 = 50;
 /// One, in the scale of a misfit: a squared distance in standard deviations, 2^-8.
 const UNIT: i32 = 256;
 /// Distance beyond an end that counts as one, squared and over [`UNIT`]: 0.7 m, cm^2.
@@ -37,6 +40,8 @@ pub(super) struct Search {
     /// The square which that spans: its corner of least coordinates, and its side.
     corner: (i32, i32),
     side_cm: u32,
+    /// Whether it is low for certain, and so no lorry.
+    is_low: bool,
 }
 
 /// A detection in an obstacle's axes, centimetres.
@@ -105,7 +110,10 @@ impl Search {
     /// to this obstacle.
     pub fn misfit(&self, r: &Reflection, offset: Offset, error: i32, t: &Tracking) -> Option<i32> {
         let Offset { left, beside, beyond } = offset;
-        if self.extent.length_cm() + beyond > t.max_length_cm + LENGTH_TO_SPARE_CM {
+        let stretched = self.extent.length_cm() + beyond;
+        // one as long as a lorry that shows nothing high keeps its ends
+        let becomes_lorry = beyond > END_CM && stretched > LONGEST_LOW_CM;
+        if stretched > t.max_length_cm + LENGTH_TO_SPARE_CM || (self.is_low && becomes_lorry) {
             return None;
         }
         // far along the vehicle or far to its side, but not both
@@ -141,6 +149,7 @@ impl Obstacle {
             reach_cm,
             corner: (anchor.0 - reach_cm, anchor.1 - reach_cm),
             side_cm: 2 * reach_cm.unsigned_abs(),
+            is_low: self.tallness.is_low(),
         }
     }
 }
@@ -151,6 +160,24 @@ mod tests {
     use super::*;
 
     const AHEAD: Direction = Direction::AHEAD;
+
+    #[test]
+    fn what_is_low_for_certain_does_not_grow_to_a_lorry() {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        o.extent = Extent { rear_cm: -225, front_cm: 225 };
+        let fits = |o: &Obstacle, x_cm: i32| {
+            let (search, r) = (o.search(&t), seen_at(x_cm, 0, 2000));
+            search.offset(&r, &t).and_then(|offset| search.misfit(&r, offset, 0, &t)).is_some()
+        };
+        assert!(fits(&o, 5700), "9.25 m in all");
+        (0..100).for_each(|_| o.tallness.add(70, 30));
+        assert!(!fits(&o, 5700));
+        assert!(fits(&o, 5600), "8.25 m in all");
+        // one that is longer already keeps its ends
+        o.extent = Extent { rear_cm: -600, front_cm: 600 };
+        assert!(fits(&o, 5550) && fits(&o, 5640) && !fits(&o, 5660));
+    }
 
     #[test]
     fn a_wheel_turns_the_way_its_vehicle_drives_between_standstill_and_twice_its_speed() {

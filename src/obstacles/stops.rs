@@ -6,6 +6,7 @@ use super::Obstacles;
 use super::by_hand::{car, change_speed, follow, reflection, rules};
 use super::solid::Solid;
 use crate::fixed::time::Step;
+use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 
 fn boxes<const N: usize>(list: &Obstacles<N>) -> Vec<Solid> {
@@ -98,7 +99,8 @@ fn a_crowd_of_standing_detections_makes_no_obstacle() {
         (0..256).map(|i| reflection([10.0 + f64::from(i % 16) * 8.0, f64::from(i / 16) - 8.0], [0.0; 2])).collect();
     let mut list = Obstacles::<16>::new();
     for _ in 0..100 {
-        let claimed = list.step::<256>(&crowd, Step::from_micros(66_972), &rules(), |_, _| true);
+        let sorted = ByRange::<256>::sort(&crowd, rules().limit_cm);
+        let claimed = list.step(&crowd, &sorted, Step::from_micros(66_972), &rules(), |_, _| true);
         assert!((0..256).all(|i| !claimed.contains(i)));
     }
     assert_eq!((list.iter().count(), list.dropped()), (0, 0));
@@ -152,7 +154,9 @@ fn one_stray_reflection_that_moves_takes_no_standing_box_away() {
     let (mut list, found) = stopped();
     let place = [f64::from(found.x_cm) / 100.0, f64::from(found.y_cm) / 100.0];
     for _ in 0..20 {
-        list.step::<256>(&[reflection(place, [6.0, 0.0])], Step::from_micros(67_000), &rules(), |_, _| false);
+        let seen = [reflection(place, [6.0, 0.0])];
+        let sorted = ByRange::<256>::sort(&seen, rules().limit_cm);
+        list.step(&seen, &sorted, Step::from_micros(67_000), &rules(), |_, _| false);
         follow(&mut list, &mut [], 2.0, false);
     }
     let after = boxes(&list);

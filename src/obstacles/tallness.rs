@@ -78,7 +78,12 @@ impl Tallness {
 
     /// The height it does not exceed, centimetres, if it is short.
     pub fn ceiling_cm(&self) -> i32 {
-        if self.tall <= -SURE { LOW_CM } else { i32::MAX }
+        if self.is_low() { LOW_CM } else { i32::MAX }
+    }
+
+    /// Whether it is low for certain.
+    pub fn is_low(&self) -> bool {
+        self.tall <= -SURE
     }
 
     /// Takes over another's counts.

@@ -65,6 +65,7 @@ pub struct Tracking {
     pub own_way_cm_s: i32,
     /// 2^-16
     pub own_way_follow: i32,
+    pub own_way_margin_cm: i32,
     /// 2^-16 s
     pub length_growth: i32,
     /// 2^-16 s

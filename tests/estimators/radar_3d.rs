@@ -151,14 +151,47 @@ fn more_vehicles_than_the_list_holds_are_counted() {
 
 #[test]
 fn a_guard_rail_hides_nothing() {
+    for spacing in [2, 3] {
+        let mut rig = Rig::new(gantry(6.0, 0.0));
+        for frame in 0..60 {
+            let posts = (0..150 / spacing).map(|k| 20.0 + f64::from(k * spacing + frame % spacing));
+            let rail = posts.filter_map(|x| detection(&rig.sensor, [x, 8.0, 0.6], [0.0; 2], true));
+            let d: Vec<Detection> = rail.collect();
+            rig.frame(&d);
+        }
+        assert!(!rig.draw(30..190, -15..25).contains('#'), "{}", rig.draw(30..190, -15..25));
+    }
+}
+
+#[test]
+fn a_sign_hides_what_is_behind_it_and_a_bollard_does_not() {
+    let behind = |reflection_m: f64| {
+        let mut rig = Rig::new(gantry(6.0, 0.0));
+        for _ in 0..30 {
+            let sign = detection(&rig.sensor, [30.0, 0.0, reflection_m], [0.0; 2], true);
+            let d: Vec<Detection> = sign.into_iter().collect();
+            rig.frame(&d);
+        }
+        assert_eq!(rig.visibility(50.0, 5.0), Visibility::Visible, "beside it");
+        rig.visibility(50.0, 0.0)
+    };
+    // it reflects half way up: over a top of 4.3 m at 30 m the line of sight is 1 m high at 87 m
+    assert_eq!(behind(2.4), Visibility::Invisible);
+    assert_eq!(behind(1.4), Visibility::Visible);
+}
+
+#[test]
+fn a_car_that_was_never_seen_to_move_hides_what_is_close_behind_it() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
-    for frame in 0..60 {
-        let rail = (0..50)
-            .filter_map(|k| detection(&rig.sensor, [20.0 + f64::from(k * 3 + frame % 3), 8.0, 0.6], [0.0; 2], true));
-        let d: Vec<Detection> = rail.collect();
+    let car = Vehicle::car(60.0, 0.0, 0.0);
+    // it reflects here and there
+    let shifted = |k: u32| Vehicle { x: car.x + 0.5 * f64::from(k % 3) - 0.5, length: 3.4, ..car };
+    for frame in 0..30 {
+        let d: Vec<Detection> = (0..2).flat_map(|k| shifted(frame + k).detections(&rig.sensor, true)).collect();
         rig.frame(&d);
     }
-    assert!(!rig.draw(30..190, -15..25).contains('#'), "{}", rig.draw(30..190, -15..25));
+    assert_eq!(rig.visibility(65.0, 0.5), Visibility::Invisible);
+    assert_eq!(rig.visibility(90.0, 0.5), Visibility::Visible);
 }
 
 #[test]

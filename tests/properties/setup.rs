@@ -123,6 +123,7 @@ pub const OF_RADAR_3D: &[Parameter] = parameters! {
     "obstacles.length_memory_s" 0.05 60.0 radar_3d.obstacles.length_memory_s;
     "obstacles.slow_mps" 0.0 50.0 radar_3d.obstacles.slow_mps;
     "obstacles.own_way_follow" 0.0 1.0 radar_3d.obstacles.own_way_follow;
+    "obstacles.own_way_margin_m" 0.0 2.0 radar_3d.obstacles.own_way_margin_m;
     "obstacles.own_way_share" 0.0 2.0 radar_3d.obstacles.own_way_share;
     "obstacles.heading_sigmas" 0.0 8.0 radar_3d.obstacles.heading_sigmas;
     "obstacles.standing_speed_mps" 0.0 5.0 radar_3d.obstacles.standing_speed_mps;

@@ -4,6 +4,7 @@ use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Measurement;
 use viewshed::frame::gate::Rejection;
 use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
+use viewshed::grid::evidence::Around;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
@@ -11,7 +12,7 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed_harness::estimators::{Estimator, PolarCells};
 use viewshed_harness::recording::Frame;
 
-use crate::evidence::InverseSensor;
+use crate::evidence::{InverseSensor, around};
 use crate::gate::Scan;
 use crate::geometry::{Levelled, Placed};
 use crate::grid::{Axes, Grid};
@@ -89,10 +90,13 @@ impl Pipeline {
         let claimed = self.obstacles.step(&scan.placed, dt, &self.rules, in_view);
         self.inverse_sensor.fade(&mut self.grid, &self.map, &self.axes, dt);
         self.inverse_sensor.clear(&scan.placed, &self.axes, &mut self.grid);
+        let unclaimed: Vec<Placed> =
+            scan.placed.iter().zip(&claimed).filter(|(_, claimed)| !**claimed).map(|(d, _)| *d).collect();
         for (d, claimed) in scan.placed.iter().zip(claimed) {
             // what moves leaves no lasting evidence; in a first frame nobody knows yet what moves
             if first || !(claimed || self.rules.course(d).is_some()) {
-                self.inverse_sensor.add(d, first, &self.axes, &mut self.grid);
+                let around = if first { Around::Unknown } else { around(d, &unclaimed) };
+                self.inverse_sensor.add(d, around, &self.axes, &mut self.grid);
             }
         }
         if self.health.condition(now, &self.health_limits) == Condition::Healthy {

@@ -121,16 +121,16 @@ pub fn axes(mount: &Mount) -> (Box<IntegerAxes>, Axes) {
     (Box::new(integer), Axes::new([RANGES, AZIMUTHS, ELEVATIONS], &Levelled::new(mount), &VIEW, 1.0))
 }
 
-/// Differences of two grids in steps of 255, and what the exact one holds, where either holds anything.
-pub fn differences(integer: &IntegerGrid, exact: &Grid) -> Vec<(f64, f64)> {
+/// Differences of two grids in steps of 255 where either holds anything, each with its row.
+pub fn differences(integer: &IntegerGrid, exact: &Grid) -> Vec<(f64, usize)> {
     let mut found = Vec::new();
     for (a, column) in integer.columns().enumerate() {
         let mut stacks = vec![[0; ELEVATIONS]; RANGES];
         column.stacks().for_each(|(r, stack)| stacks[r] = *stack);
         for (r, stack) in stacks.iter().enumerate() {
-            let pairs = stack.iter().zip(exact.stack(a, r));
-            let pairs = pairs.filter(|(got, exact)| **got > 0 || **exact > 0.0);
-            found.extend(pairs.map(|(got, exact)| (f64::from(*got) - exact * 255.0, *exact)));
+            let pairs = stack.iter().zip(exact.stack(a, r)).enumerate();
+            let pairs = pairs.filter(|(_, (got, exact))| **got > 0 || **exact > 0.0);
+            found.extend(pairs.map(|(row, (got, exact))| (f64::from(*got) - exact * 255.0, row)));
         }
     }
     found

@@ -65,8 +65,10 @@ fn length(v: Ground) -> f64 {
     v[0].hypot(v[1])
 }
 
-/// Length from which nothing is low.
-const LORRY_M: f64 = 9.0;
+/// How far beyond its outline an end of a vehicle may reflect.
+const END: f64 = 0.5;
+/// Greatest length of what is low.
+const LONGEST_LOW: f64 = 9.0;
 
 impl Obstacle {
     pub fn new(seed: &Placed, heading: Ground, speed: f64) -> Self {
@@ -172,11 +174,17 @@ impl Obstacle {
         let aside = beside / (rules.lateral_gate + rules.sigmas * sigma_across);
         let fits = error.abs() <= rules.doppler_gate
             && ahead.hypot(aside) <= 1.0
-            && self.extent.length() + beyond <= rules.max_length + LENGTH_TO_SPARE;
+            && self.extent.length() + beyond <= rules.max_length + LENGTH_TO_SPARE
+            && !(self.is_low() && beyond > END && self.extent.length() + beyond > LONGEST_LOW);
         // squared distances in their own scales: 0.7 m along, width and noise across, half a metre a
         // second (twice) in speed
         let across = left.powi(2) / (rules.half_width.powi(2) + sigma_across.powi(2));
         fits.then(|| (beyond / 0.7).powi(2) + across + 2.0 * (error / 0.5).powi(2))
+    }
+
+    /// Whether it is low for certain, and so no lorry.
+    fn is_low(&self) -> bool {
+        self.tallness.ceiling() < f64::INFINITY
     }
 
     /// Takes a detection that belongs to it.
@@ -309,7 +317,7 @@ impl Obstacle {
             && along(self.heading, other.heading) >= rules.merge_parallel
             && left.abs() <= abreast.max(rules.merge_lateral + uncertain)
             && gap <= widest
-            && whole <= rules.max_length
+            && whole <= if self.is_low() && other.is_low() { LONGEST_LOW } else { rules.max_length }
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be.
@@ -349,6 +357,9 @@ impl Obstacle {
         self.profile.merge(&other.profile, ahead);
         self.lateral_weight += other.lateral_weight;
         self.anchor = moved(self.anchor, left(self.heading), offset * other.lateral_weight / self.lateral_weight);
+        let share = other.gathered.count / (self.gathered.count + other.gathered.count).max(1.0);
+        let centre = |k: usize| self.free.place[k] + share * (other.free.place[k] - self.free.place[k]);
+        self.free.place = [centre(0), centre(1)];
         self.existence = (self.existence + other.existence).min(rules.max_evidence);
         self.hits += other.hits;
         self.travelled = self.travelled.max(other.travelled);
@@ -375,10 +386,15 @@ impl Obstacle {
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
         let [x, y] = moved(middle, left(self.heading), away(unseen, aside));
-        // what is as long as a lorry may be one that shows nothing high
-        let lid = if length < LORRY_M { self.tallness.ceiling() } else { f64::INFINITY };
+        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
+        let lid = if length < LONGEST_LOW || self.profile.is_a_row_of_cars(&self.extent) {
+            self.tallness.ceiling()
+        } else {
+            f64::INFINITY
+        };
         let height = height.min(lid).max(tall);
+        let margin = if self.free_heading { rules.own_way_margin } else { 0.0 };
         let yaw_rad = self.heading[1].atan2(self.heading[0]);
-        Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width, height] }
+        Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width + 2.0 * margin, height] }
     }
 }

@@ -9,6 +9,9 @@ pub const BIN_M: f64 = BIN_CM as f64 / 100.0;
 const FULL: f64 = 512.0;
 /// Bins that hold one end of a vehicle.
 const END_BINS: usize = 5;
+/// Shortest and longest outline of a car, and narrowest and widest gap between cars taken for one vehicle.
+const CAR: [f64; 2] = [2.5, 6.0];
+const GAP: [f64; 2] = [1.5, 7.0];
 /// Share of a young histogram that makes an end of it.
 const YOUNG_SHARE: f64 = 0.4;
 
@@ -77,6 +80,24 @@ impl Profile {
         let last = last + self.0[last..last + END_BINS].windows(2).rposition(pair)?;
         let gravity = |i: usize| Self::rear_of(i) + BIN_M / 2.0 + BIN_M * self.0[i + 1] / (self.0[i] + self.0[i + 1]);
         Some(Extent { rear: gravity(first), front: gravity(last) })
+    }
+
+    /// Whether an outline falls into parts that are all as long as a car, with gaps between them as cars leave; bins
+    /// with less than a tenth of the mean are empty.
+    pub fn is_a_row_of_cars(&self, extent: &Extent) -> bool {
+        let bin = |along: f64| ((along / BIN_M).floor() + BINS as f64 / 2.0).clamp(0.0, BINS as f64 - 1.0) as usize;
+        let held = &self.0[bin(extent.rear)..=bin(extent.front)];
+        let mean = held.iter().sum::<f64>() / held.len() as f64;
+        let filled: Vec<usize> = (0..held.len()).filter(|&i| held[i] >= mean / 10.0).collect();
+        let gap = |a: usize, b: usize| (b - a - 1) as f64 * BIN_M;
+        let parts: Vec<&[usize]> = filled.chunk_by(|a, b| gap(*a, *b) < GAP[0]).collect();
+        let is_car = |p: &&[usize]| {
+            let length = (p[p.len() - 1] - p[0] + 1) as f64 * BIN_M;
+            (CAR[0]..=CAR[1]).contains(&length)
+        };
+        parts.len() > 1
+            && parts.iter().all(is_car)
+            && parts.windows(2).all(|p| gap(p[0][p[0].len() - 1], p[1][0]) <= GAP[1])
     }
 
     /// Moves the anchor forward by whole bins.

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests {
     use viewshed::fixed::time::Step;
+    use viewshed::frame::by_range::ByRange;
     use viewshed::frame::detection::Measurement;
     use viewshed::frame::reflection::Reflection;
     use viewshed::obstacles::Obstacles as IntegerObstacles;
@@ -79,7 +80,8 @@ mod tests {
             let reflections: Vec<Reflection> =
                 measured.iter().map(|m| reflection(m, &noise, &self.levelling)).collect();
             let step = Step::from_micros(PERIOD_US);
-            self.integer.step::<64>(&reflections, step, &self.tracking, |_, _| true);
+            let sorted = ByRange::<64>::sort(&reflections, self.tracking.limit_cm);
+            self.integer.step(&reflections, &sorted, step, &self.tracking, |_, _| true);
             let placed: Vec<Placed> = measured.iter().map(|m| place(m, &self.noise, &self.levelled)).collect();
             self.exact.step(&placed, PERIOD_US as f64 * 1e-6, &self.rules, |_| true);
         }
@@ -185,7 +187,8 @@ mod tests {
             }
             let mut followed = [0_usize; 2];
             for _ in 0..200 {
-                both.integer.step::<64>(&[], Step::from_micros(PERIOD_US), &both.tracking, |_, _| in_view);
+                let nothing = ByRange::<64>::sort(&[], both.tracking.limit_cm);
+                both.integer.step(&[], &nothing, Step::from_micros(PERIOD_US), &both.tracking, |_, _| in_view);
                 both.exact.step(&[], PERIOD_US as f64 * 1e-6, &both.rules, |_| in_view);
                 followed[0] += usize::from(both.integer.iter().count() > 0);
                 followed[1] += usize::from(!both.exact.list.is_empty());
