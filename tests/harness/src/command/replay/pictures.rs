@@ -71,7 +71,7 @@ fn save(canvas: Option<Canvas>, folder: &Folder, name: &str) -> Result<()> {
 }
 
 /// The frame of the true invisible example, which has something to show; else the middle one.
-fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
+pub fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
     let telling = examples.iter().find(|e| e.outcome == Outcome::Ti).or(examples.first());
     telling.map_or(replay.recording.frames.len() / 2, |e| e.frame)
 }
@@ -98,7 +98,7 @@ fn shown_frame(
     Ok(())
 }
 
-fn title(replay: &Replay, name: &str, frame: usize) -> String {
+pub fn title(replay: &Replay, name: &str, frame: usize) -> String {
     let recording = &replay.recording;
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let time = recording.frames.get(frame).map_or(0, |f| f.time_ns.saturating_sub(start));
@@ -114,7 +114,8 @@ fn caption(replay: &Replay) -> Option<String> {
     })
 }
 
-fn from_above(
+/// A frame as an estimator has it, from above.
+pub fn from_above(
     replay: &Replay,
     estimator: &dyn Estimator,
     frame: usize,
@@ -122,12 +123,7 @@ fn from_above(
     settings: &Settings,
 ) -> Canvas {
     let recording = &replay.recording;
-    let objects =
-        recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default();
-    let boxes: Vec<TruthBox> = objects
-        .iter()
-        .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
-        .collect();
+    let objects = objects_at(replay, frame);
     let by_cells = settings.evaluation.grid == Grid::Cartesian;
     let seldom_visible = |o: &Object| {
         let seen = cells_in_sight(replay, estimator, frame, o.track);
@@ -150,7 +146,46 @@ fn from_above(
         );
         Some(Highlight::on(solid, &recording.pose, note))
     });
-    let scene = Scene {
+    let mut scene = scene(replay, estimator, frame, highlight, settings);
+    if by_cells && any_cell {
+        scene.caption = scene.caption.map(|said| format!("{said} · {ANY_CELL}"));
+    }
+    birdseye::draw(&scene)
+}
+
+/// What is about one labelled object at a frame, enlarged; `None` where it is not labelled then.
+pub fn about(
+    replay: &Replay,
+    estimator: &dyn Estimator,
+    frame: usize,
+    track: usize,
+    width_px: i32,
+    settings: &Settings,
+) -> Option<Canvas> {
+    let solid = objects_at(replay, frame).into_iter().find(|o| o.track == track)?.solid;
+    let highlight = Highlight::on(solid, &replay.recording.pose, "");
+    birdseye::tile(&scene(replay, estimator, frame, Some(highlight), settings), width_px)
+}
+
+fn objects_at(replay: &Replay, frame: usize) -> Vec<Object> {
+    let recording = &replay.recording;
+    recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default()
+}
+
+/// Everything there is to be drawn of a frame.
+fn scene<'a>(
+    replay: &'a Replay,
+    estimator: &'a dyn Estimator,
+    frame: usize,
+    highlight: Option<Highlight>,
+    settings: &Settings,
+) -> Scene<'a> {
+    let recording = &replay.recording;
+    let boxes = objects_at(replay, frame)
+        .iter()
+        .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
+        .collect();
+    Scene {
         map: estimator.map(),
         pose: recording.pose,
         field_of_view: recording.sensor.field_of_view,
@@ -160,10 +195,9 @@ fn from_above(
         boxes,
         road: &[],
         title: title(replay, estimator.name(), frame),
-        caption: caption(replay).map(|said| if by_cells && any_cell { format!("{said} · {ANY_CELL}") } else { said }),
+        caption: caption(replay),
         highlight,
-    };
-    birdseye::draw(&scene)
+    }
 }
 
 /// Said where a box called visible stands on cells of which most are not.
@@ -225,7 +259,7 @@ fn outcome(replay: &Replay, name: &str, frame: usize, track: usize) -> Option<pa
     Some(palette::Outcome::of(verdict.visible, samples.objects.get(index)?.detected))
 }
 
-fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
+pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
     let cells = estimator.polar()?;
     Some(polar::draw(&PolarGrid {
         azimuths: cells.azimuths,
@@ -239,7 +273,7 @@ fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Optio
 }
 
 /// A camera's picture of a frame, with what the estimator made of it.
-fn camera_view(
+pub fn camera_view(
     replay: &Replay,
     estimator: &dyn Estimator,
     frame: usize,
