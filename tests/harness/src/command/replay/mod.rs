@@ -57,7 +57,7 @@ pub struct Args {
     /// Write the input with an estimator's map beside it, to open in Foxglove or Lichtblick
     ///
     /// The map is a foxglove.Grid on /visibility/ESTIMATOR: blue is visible, orange invisible, dark occupied,
-    /// nothing unknown. Show it in a 3D panel with `road` as the fixed frame.
+    /// nothing unknown. FILE.layout.json beside it has the panels: import it as a layout.
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     mcap: Option<PathBuf>,
     /// Estimator whose map goes into --mcap
@@ -139,6 +139,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("{option} writes one recording and {} are to be replayed; name one", paths.len());
     }
     let mcap = outputs.file("--mcap", args.mcap.as_deref())?;
+    let panels = args.mcap.as_deref().map(|path| path.with_extension("layout.json"));
+    let panels = outputs.file("--mcap", panels.as_deref())?;
+    let mcap = mcap.zip(panels);
     let page = outputs.file("--report", args.report.as_deref())?;
     let csv = outputs.file("--csv", args.csv.as_deref())?;
     let camera_csv = args.csv.as_deref().map(of_camera);
@@ -237,7 +240,7 @@ fn replay(
     path: &Path,
     recording: Recording,
     args: &Args,
-    mcap: Option<&Target>,
+    mcap: Option<&(Target, Target)>,
     settings: &Settings,
 ) -> Result<Replayed> {
     let shown_frame = args.time.map(|time_s| frame_at(&recording, time_s)).transpose()?;
@@ -254,8 +257,8 @@ fn replay(
     drop(replaying);
     judged(&replay, settings)?;
 
-    if let Some(target) = mcap {
-        write_mcap(path, target, &args.mcap_estimator, &replay, settings)?;
+    if let Some((target, panels)) = mcap {
+        write_mcap(path, [target, panels], &args.mcap_estimator, &replay, settings)?;
     }
     let wrong = |extent: Extent| {
         let again = bar(&format!("replaying {name} with a wrong mount"), 4 * passes);
@@ -321,22 +324,30 @@ fn named(error: anyhow::Error, path: &Path) -> anyhow::Error {
     if format!("{error:#}").contains(&*stem) { error } else { error.context(path.display().to_string()) }
 }
 
-fn write_mcap(source: &Path, target: &Target, estimator: &str, replay: &Replay, settings: &Settings) -> Result<()> {
+fn write_mcap(
+    source: &Path,
+    targets: [&Target; 2],
+    estimator: &str,
+    replay: &Replay,
+    settings: &Settings,
+) -> Result<()> {
     let mut names = Vec::new();
     let mut found = None;
-    for recording in [Some(&replay.recording), replay.camera.as_deref().map(|c| &c.recording)].into_iter().flatten() {
-        for one in estimators::all(recording, &settings.estimators)? {
+    for replay in [Some(replay), replay.camera.as_deref()].into_iter().flatten() {
+        for one in estimators::all(&replay.recording, &settings.estimators)? {
             names.push(one.name().to_owned());
             if one.name() == estimator {
-                found = Some((recording, one));
+                found = Some((replay, one));
             }
         }
     }
-    let Some((recording, mut estimator)) = found else {
+    let Some((replay, mut estimator)) = found else {
         bail!("--mcap-estimator: no estimator `{estimator}`; there are {}", names.join(", "));
     };
-    let writing = bar(&format!("writing {}", target.path().display()), recording.frames.len() as u64);
-    foxglove::write(source, target, recording, &settings.reading, estimator.as_mut(), &|| writing.step())
+    let (recording, name) = (&replay.recording, estimator.name().to_owned());
+    let writing = bar(&format!("writing {}", targets[0].path().display()), recording.frames.len() as u64);
+    let boxes = |frame| pictures::boxes(replay, &name, frame);
+    foxglove::write(source, targets, recording, &settings.reading, estimator.as_mut(), &boxes, &|| writing.step())
 }
 
 impl Replayed {

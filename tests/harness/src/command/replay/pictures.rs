@@ -172,6 +172,12 @@ fn objects_at(replay: &Replay, frame: usize) -> Vec<Object> {
     recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default()
 }
 
+/// The labelled boxes of a frame, and what became of them by an estimator.
+pub fn boxes(replay: &Replay, estimator: &str, frame: usize) -> Vec<TruthBox> {
+    let of = |o: &Object| TruthBox { solid: o.solid, outcome: outcome(replay, estimator, frame, o.track) };
+    objects_at(replay, frame).iter().map(of).collect()
+}
+
 /// Everything there is to be drawn of a frame.
 fn scene<'a>(
     replay: &'a Replay,
@@ -181,10 +187,6 @@ fn scene<'a>(
     settings: &Settings,
 ) -> Scene<'a> {
     let recording = &replay.recording;
-    let boxes = objects_at(replay, frame)
-        .iter()
-        .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
-        .collect();
     Scene {
         map: estimator.map(),
         pose: recording.pose,
@@ -192,7 +194,7 @@ fn scene<'a>(
         slice_height_m: settings.evaluation.slice_height_m,
         window: window(replay),
         detections: recording.frames.get(frame).map_or(&[], |f| &f.detections),
-        boxes,
+        boxes: boxes(replay, estimator.name(), frame),
         road: &[],
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),

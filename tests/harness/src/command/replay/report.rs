@@ -83,7 +83,7 @@ fn worst(replay: &Replay, shown: &str) -> Vec<Lasting> {
     [Outcome::Fv, Outcome::Fi].into_iter().flat_map(of).collect()
 }
 
-/// Frames of a strip: before, at the beginning, in the middle, at the end, and after.
+/// Frames of a strip: before, at the beginning, twice in between, at the end, and after.
 fn of_strip(replay: &Replay, lasting: &Lasting) -> Vec<usize> {
     let times: Vec<i64> = replay.recording.frames.iter().map(|f| f.time_ns).collect();
     let time = |frame: usize| times.get(frame).copied().unwrap_or(0);
@@ -93,7 +93,8 @@ fn of_strip(replay: &Replay, lasting: &Lasting) -> Vec<usize> {
     let frames = [
         nearest(first - around_ns),
         lasting.first,
-        nearest(first + (last - first) / 2),
+        nearest(first + (last - first) / 3),
+        nearest(first + (last - first) / 3 * 2),
         lasting.last,
         nearest(last + around_ns),
     ];

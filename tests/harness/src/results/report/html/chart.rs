@@ -12,6 +12,7 @@ use crate::results::pictures::Ticks;
 use crate::results::pictures::canvas::Pen;
 
 const WIDTH: f64 = 560.0;
+const WIDE: f64 = 1160.0;
 const HEIGHT: f64 = 350.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 14.0;
@@ -61,12 +62,18 @@ pub struct Chart<'a> {
     pub y: Axis,
     pub series: Vec<Series<'a>>,
     pub marks: Vec<Mark>,
+    /// Over the whole page.
+    pub is_wide: bool,
 }
 
 impl Chart<'_> {
+    fn width(&self) -> f64 {
+        if self.is_wide { WIDE } else { WIDTH }
+    }
+
     fn column(&self, x: f64) -> f64 {
         let [low, high] = self.x.range;
-        LEFT + (x - low) / (high - low) * (WIDTH - LEFT - RIGHT)
+        LEFT + (x - low) / (high - low) * (self.width() - LEFT - RIGHT)
     }
 
     fn row(&self, y: f64) -> f64 {
@@ -79,9 +86,11 @@ impl Chart<'_> {
         let names: Vec<&str> = self.series.iter().filter(|s| !s.points.is_empty()).map(|s| s.name).collect();
         let label = format!("{}: {} over {}, of {}", self.title, self.y.title, self.x.title, names.join(", "));
         let mut svg = format!(
-            "<figure class=\"chart\"><figcaption>{}</figcaption>\n<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
+            "<figure class=\"chart{}\"><figcaption>{}</figcaption>\n<svg viewBox=\"0 0 {} {HEIGHT}\" role=\"img\" \
              tabindex=\"0\" aria-label=\"{}\">",
+            if self.is_wide { " wide" } else { "" },
             escaped(self.title),
+            self.width(),
             escaped(&label)
         );
         self.axes(&mut svg);
@@ -105,7 +114,7 @@ impl Chart<'_> {
     }
 
     fn axes(&self, svg: &mut String) {
-        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BELOW);
+        let (right, bottom) = (self.width() - RIGHT, HEIGHT - BELOW);
         let ticks = Ticks::new(self.x.range, (right - LEFT) / 62.0);
         for tick in ticks.positions() {
             let x = self.column(tick);
@@ -239,6 +248,7 @@ mod tests {
                 spread: [None; 2],
             }],
             marks: Vec::new(),
+            is_wide: false,
         }
     }
 

@@ -34,7 +34,7 @@ pub fn of_rates(replay: &Replay, shown: &str, marks: &[(f64, String, String)]) -
     if replay.recording.truth.is_none() || rows.is_empty() {
         return String::new();
     }
-    let pens: Vec<Pen> = (0..rows.len()).map(|k| CURVES[k % CURVES.len()]).collect();
+    let pens = pens(rows);
     let names: Vec<(&str, Pen, bool)> =
         rows.iter().zip(&pens).map(|(row, pen)| (row.name.as_str(), *pen, row.name != HIDDEN)).collect();
     let mut html = String::from("<div class=\"group\">\n") + &legend(&names);
@@ -58,6 +58,13 @@ pub fn of_rates(replay: &Replay, shown: &str, marks: &[(f64, String, String)]) -
         html += &by_time(title, replay, &windows, &names, shown, unsafe_rate, marks).figure();
     }
     html + "</div></div>\n"
+}
+
+/// A pen a row: those of the trade-off pictures, which leave one reading of the flat grid out.
+fn pens(rows: &[Row]) -> Vec<Pen> {
+    let (shown, hidden): (Vec<usize>, Vec<usize>) = (0..rows.len()).partition(|k| rows[*k].name != HIDDEN);
+    let order: Vec<usize> = shown.into_iter().chain(hidden).collect();
+    (0..rows.len()).map(|k| CURVES[order.iter().position(|o| *o == k).unwrap_or(k) % CURVES.len()]).collect()
 }
 
 /// A curve, its operating point, and the intervals of that: FVR, FIR.
@@ -119,6 +126,7 @@ fn operating<'a>(
         y: Axis { title: "FVR, % (unsafe)", range: PERCENT },
         series,
         marks: Vec::new(),
+        is_wide: false,
     }
 }
 
@@ -157,6 +165,7 @@ fn by_distance<'a>(title: &'static str, rows: &'a [Row], pens: &[Pen], shown: &s
         y: Axis { title: axis, range: PERCENT },
         series: series.collect(),
         marks: Vec::new(),
+        is_wide: false,
     }
 }
 
@@ -185,6 +194,7 @@ fn by_time<'a>(
         y: Axis { title: axis, range: PERCENT },
         series: series.collect(),
         marks: marks.iter().map(|(x, name, link)| Mark { x: *x, name: name.clone(), link: link.clone() }).collect(),
+        is_wide: false,
     }
 }
 
@@ -222,6 +232,7 @@ pub fn of_shares(shares: &[Shares]) -> String {
         y: Axis { title: "share of the map's cells, %", range: PERCENT },
         series,
         marks: Vec::new(),
+        is_wide: true,
     };
     format!("<div class=\"group\">\n{legend}<div class=\"charts\">{}</div></div>\n", chart.figure())
 }

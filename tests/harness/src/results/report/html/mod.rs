@@ -249,7 +249,8 @@ impl Report<'_> {
         let mut html = String::from("<section id=\"rates\"><h2>Rates</h2>\n");
         html += &tables::rates(&self.replay.summary, self.shown);
         html += "<p class=\"note\">TVR + FIR = 100 % of the detected, FVR + TIR = 100 % of the undetected. The rows geometry-slice \
-                 and geometry-box are exact lines of sight past the labelled boxes: the bounds of any such method.</p>\n";
+                 (1 m above the road) and geometry-box (all of a vehicle) are exact lines of sight past the labelled boxes: the bounds \
+                 of any such method. Slice in the last columns is geometry-slice.</p>\n";
         html += &list(&notes::below(self.replay, &self.settings.evaluation));
         html += "<p class=\"note\">Point at a curve, or give a chart the focus and use the arrow keys; the buttons hide and show. \
                  Hollow points are of fewer than 50 samples; triangles lead to the worst moments.</p>\n";
@@ -331,7 +332,7 @@ impl Report<'_> {
             let alt = format!("{} {since_s:+.1} s from its beginning", title(&strip.lasting));
             let _ = write!(
                 html,
-                "<figure>{}<figcaption>{:.1} s ({since_s:+.1})</figcaption></figure>\n",
+                "<figure>{}<figcaption>{:.2} s ({since_s:+.2})</figcaption></figure>\n",
                 room.image(png, &alt),
                 begin_s + since_s
             );
@@ -430,7 +431,7 @@ impl Report<'_> {
             return "none: these options hold values that are no settings of a unit".into();
         }
         format!(
-            "<code>{:08X}</code>: what `viewshed listen` shows of a unit with this mount and configuration",
+            "<code>{:08X}</code>: what <code>viewshed listen</code> shows of a unit with this mount and configuration",
             unit.fingerprint()
         )
     }

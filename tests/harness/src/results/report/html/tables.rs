@@ -50,8 +50,8 @@ pub fn rates(summary: &Summary, shown: &str) -> String {
         "<abbr title=\"of the detected, called invisible: costs availability\">FIR</abbr> %",
         "cell FVR %",
         "cell FIR %",
-        "FVR from geometry-slice, points",
-        "FIR from geometry-slice, points",
+        "FVR from slice, points",
+        "FIR from slice, points",
     ]
     .map(str::to_owned);
     let row = |row: &Row| {
