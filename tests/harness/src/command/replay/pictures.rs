@@ -10,7 +10,6 @@ use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
 use crate::evaluation::examples::Example;
 use crate::evaluation::replay::{Replay, visit};
-use crate::evaluation::score::Score;
 use crate::evaluation::summary::Row;
 use crate::evaluation::{Grid, Settings, bounds};
 use crate::geometry::pose::SensorPose;
@@ -174,7 +173,11 @@ fn objects_at(replay: &Replay, frame: usize) -> Vec<Object> {
 
 /// The labelled boxes of a frame, and what became of them by an estimator.
 pub fn boxes(replay: &Replay, estimator: &str, frame: usize) -> Vec<TruthBox> {
-    let of = |o: &Object| TruthBox { solid: o.solid, outcome: outcome(replay, estimator, frame, o.track) };
+    let outcome = |track| {
+        let (visible, detected) = replay.judged(estimator, frame, track)?;
+        Some(palette::Outcome::of(visible, detected))
+    };
+    let of = |o: &Object| TruthBox { solid: o.solid, outcome: outcome(o.track) };
     objects_at(replay, frame).iter().map(of).collect()
 }
 
@@ -250,15 +253,6 @@ fn corners(pose: &SensorPose, view: &FieldOfView) -> impl Iterator<Item = [f64; 
         let heading = pose.yaw_rad() + azimuth;
         [pose.position[0] + far * heading.cos(), pose.position[1] + far * heading.sin()]
     })
-}
-
-/// How an estimator's verdict on a track compares with its detection; `None` where it is not counted.
-fn outcome(replay: &Replay, name: &str, frame: usize, track: usize) -> Option<palette::Outcome> {
-    let samples = replay.samples.get(frame)?;
-    let index = samples.objects.iter().position(|s| s.track == track)?;
-    let score: &Score = replay.score(name)?;
-    let verdict = score.verdicts.get(frame)?.get(index)?;
-    Some(palette::Outcome::of(verdict.visible, samples.objects.get(index)?.detected))
 }
 
 pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
