@@ -179,7 +179,7 @@ fn listened(viewing: &Viewing, lines: Vec<Logged>, listening: Listening, every_s
             receiving.look(&viewing.instants)?;
             next_ns += every_ns;
         }
-        receiving.listening.take_logged(line);
+        receiving.take(line);
     }
     receiving.look(&viewing.instants)
 }
@@ -233,7 +233,7 @@ fn ended(viewing: &Viewing, error: &anyhow::Error) {
 
 #[cfg(unix)]
 fn from_port(path: &str, baud: u32, addresses: Addresses, key: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
-    use std::io::Read;
+    use std::io::{ErrorKind, Read};
 
     let mut port = crate::configure::serial::open_port(path, baud)?;
     let viewing = Viewing::broadcast(About::broadcast(path.to_owned(), "live", Vec::new()));
@@ -246,23 +246,15 @@ fn from_port(path: &str, baud: u32, addresses: Addresses, key: Option<&Key>) -> 
                 match port.read(&mut buffer) {
                     Ok(n) if n > 0 => {
                         let bytes = buffer[..n].to_vec();
-                        live.receiving.listening.take_bytes(&Chunk {
-                            time_ns: now_ns(),
-                            device: device.clone(),
-                            bytes,
-                        });
+                        let chunk = Chunk { time_ns: now_ns(), device: device.clone(), bytes };
+                        live.receiving.take(&Logged::Chunk(chunk));
                         live.is_new = true;
                         // what is not a whole buffer was all there was
                         live.look(n < buffer.len())?;
                     }
                     Ok(_) => std::thread::sleep(Duration::from_millis(1)),
                     Err(e)
-                        if matches!(
-                            e.kind(),
-                            std::io::ErrorKind::TimedOut
-                                | std::io::ErrorKind::WouldBlock
-                                | std::io::ErrorKind::Interrupted
-                        ) =>
+                        if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
                     {
                         live.receiving.listening.pass(now_ns());
                         live.look(true)?;
@@ -293,7 +285,7 @@ fn from_can(interface: &str, addresses: Addresses, key: Option<&Key>) -> Result<
         let outcome = bus.listen(None, &never, |heard| {
             match heard {
                 can_log::live::Heard::Frame(line) => {
-                    live.receiving.listening.take(&line);
+                    live.receiving.take(&Logged::Frame(line));
                     live.is_new = true;
                 }
                 can_log::live::Heard::Nothing(time_ns) => live.receiving.listening.pass(time_ns),

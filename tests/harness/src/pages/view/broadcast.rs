@@ -8,7 +8,8 @@ use viewshed::wire::scan_number::ScanNumber;
 
 use super::instant::{Cells, Instant, Sample, Shown};
 use super::instants::{Event, Instants};
-use crate::bus::listening::{Heard, Listening, SENSORS, shown};
+use crate::bus::listening::{Heard, Listening, Map, SENSORS, shown};
+use crate::bus::logged::Logged;
 
 /// An azimuth's newest scan, and when it came.
 type News = Option<(ScanNumber, f64)>;
@@ -28,6 +29,17 @@ pub struct Receiving {
 impl Receiving {
     pub fn new(listening: Listening) -> Self {
         Self { listening, news: BTreeMap::new(), cells: BTreeMap::new(), before: BTreeMap::new(), begin_s: None }
+    }
+
+    /// Takes what came, and notes which azimuths it has news of.
+    pub fn take(&mut self, logged: &Logged) {
+        self.listening.take_logged(logged);
+        let now_s = self.listening.time_s();
+        for sensor in self.listening.sensors() {
+            let map = self.listening.map(sensor);
+            let Some(header) = map.header() else { continue };
+            renew(self.news.entry(sensor).or_default(), &map, usize::from(header.azimuths), now_s);
+        }
     }
 
     /// Seconds since the first look.
@@ -65,13 +77,7 @@ impl Receiving {
             ],
         };
         let news = self.news.entry(sensor).or_default();
-        news.resize(cells.azimuths, None);
-        for (azimuth, news) in news.iter_mut().enumerate() {
-            *news = map.scan(azimuth).map(|scan| match *news {
-                Some((before, at)) if before == scan => (scan, at),
-                _ => (scan, now_s),
-            });
-        }
+        renew(news, &map, cells.azimuths, now_s);
         let ages = news.iter().map(|news| news.map(|(_, at)| ((now_s - at).max(0.0) * 1000.0) as u32)).collect();
         let (shown, sample) = Shown::new(name, cells, |azimuth, range| shown(&map, azimuth, range));
         self.cells.insert(sensor, cells);
@@ -101,6 +107,17 @@ impl Receiving {
             ("messages not authentic".to_owned(), u64::from(self.listening.not_authentic())),
         ];
         instants.add(Instant { sample: Sample { time_s, ..first }, maps, senders, counters, ..Instant::default() })
+    }
+}
+
+/// Notes the time at which azimuths show another scan.
+fn renew(news: &mut Vec<News>, map: &Map<'_>, azimuths: usize, now_s: f64) {
+    news.resize(azimuths, None);
+    for (azimuth, news) in news.iter_mut().enumerate() {
+        *news = map.scan(azimuth).map(|scan| match *news {
+            Some((before, at)) if before == scan => (scan, at),
+            _ => (scan, now_s),
+        });
     }
 }
 

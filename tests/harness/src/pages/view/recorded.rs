@@ -8,6 +8,7 @@ use super::broadcast::Receiving;
 use super::instant::{Box3, Cells, Instant, Sample, Shown, mount};
 use super::instants::Instants;
 use crate::bus::listening::Listening;
+use crate::bus::logged::Logged;
 use crate::bus::traffic::{BUSES, Bus, Maps, Traffic};
 use crate::estimators::{self, radar_3d};
 use crate::evaluation::Settings;
@@ -127,7 +128,7 @@ impl Received {
     /// What the receiver shows at a time.
     fn until(&mut self, time_ns: i64) -> Option<Shown> {
         while let Some(line) = self.lines.next_if(|line| line.time_ns <= time_ns) {
-            self.receiving.listening.take(&line);
+            self.receiving.take(&Logged::Frame(line));
         }
         self.receiving.listening.pass(time_ns);
         self.receiving.maps(|_| format!("receiver, {}", BUS.name)).into_iter().next().map(|(shown, _)| shown)

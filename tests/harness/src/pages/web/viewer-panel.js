@@ -28,7 +28,7 @@ export function showCell(told, instant, name) {
     return;
   }
   const state = STATES[told.state & 3];
-  const since = told.since_begin ? 'from the first instant on' : `${told.or_longer ? 'at least ' : ''}since ${told.since_s.toFixed(1)} s`;
+  const since = told.since_begin ? 'the first instant' : `${told.since_s.toFixed(1)} s${told.or_longer ? ' or longer' : ''}`;
   const obstacles = told.shadows.map((k) => {
     const { center: [x, y], size: [length, , height] } = instant.obstacles[k];
     return `obstacle at (${x.toFixed(0)}, ${y.toFixed(0)}) m, ${length.toFixed(1)} m long, ${height.toFixed(1)} m high`;
@@ -86,12 +86,14 @@ export function showEvents(events) {
   }));
 }
 
-export function showCounters(instant, labelled) {
+export function showCounters(instant, about) {
   const { sample } = instant;
+  const { labelled, source } = about;
   const outcomes = labelled ? ['tv', 'fv', 'ti', 'fi'].map((key) => [key.toUpperCase(), sample[key]]) : [];
-  const detections = instant.senders.length === 0 ? [['detections', sample.detections], ['obstacles', instant.obstacles.length]] : [];
+  const detections = source === 'recording' ? [['detections', sample.detections], ['obstacles', instant.obstacles.length]] : [];
   const shares = ['visible', 'invisible', 'unknown'].map((key) => [key, `${(100 * sample[key]).toFixed(1)} %`]);
-  define(element('counters'), [...shares, ...detections, ...outcomes, ...instant.counters]);
+  const counted = instant.counters.map(([what, n]) => [source === 'recording' ? `left out: ${what}` : what, n]);
+  define(element('counters'), [...shares, ...detections, ...outcomes, ...counted]);
 }
 
 export function showNotes(about) {

@@ -23,6 +23,7 @@ class Page {
   constructor() {
     this.layers = { detections: true, labels: true, obstacles: true, rays: false };
     this.number = -1;
+    this.wanted = -1;
     this.instant = null;
     this.chosen = 0;
     this.cell = null;
@@ -103,7 +104,7 @@ class Page {
     this.legend();
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
       this.legend();
-      this.redraw();
+      if (this.instant) this.show(this.instant);
     });
     this.following = this.isLive;
     this.showPlaying();
@@ -115,8 +116,8 @@ class Page {
     const toggle = (layer) => () => this.toggle(layer);
     return [
       [' ', 'Time', 'play and pause; live: follow and hold', () => this.play(), false, 'play'],
-      ['.', 'Time', 'one step on', () => this.goTo(this.number + 1), true, 'on'],
-      [',', 'Time', 'one step back', () => this.goTo(this.number - 1), true, 'back'],
+      ['.', 'Time', 'one step on', () => this.goTo(this.wanted + 1), true, 'on'],
+      [',', 'Time', 'one step back', () => this.goTo(this.wanted - 1), true, 'back'],
       ['PageDown', 'Time', 'one second on', () => this.skip(1), true],
       ['PageUp', 'Time', 'one second back', () => this.skip(-1), true],
       ['Home', 'Time', 'the first instant', () => this.goTo(this.source.keptFrom), false],
@@ -161,6 +162,9 @@ class Page {
     if (done && (this.isLive || says.startsWith('failed'))) this.complain(says);
     showEvents(events);
     if (this.number < 0 && count > 0) this.goTo(this.isLive ? count - 1 : 0, true);
+    // the first instants of an estimator say little
+    const begins = samples.findIndex((sample) => sample && sample.tv + sample.fv + sample.ti + sample.fi > 0);
+    if (!this.isLive && !this.touched && begins > 0 && this.number < begins) this.goTo(begins, true);
     this.fitTime(samples);
     this.plots.time.changed();
   }
@@ -186,7 +190,7 @@ class Page {
   }
 
   async goTo(number, follows = false) {
-    if (!follows) this.following = false;
+    if (!follows) [this.following, this.touched] = [false, true];
     const wanted = Math.max(this.source.keptFrom ?? 0, Math.min(number, this.source.count - 1));
     if (wanted < 0) return;
     this.wanted = wanted;
@@ -197,17 +201,18 @@ class Page {
   }
 
   show(instant) {
-    const first = this.instant === null || this.instant.maps.length !== instant.maps.length;
+    const isFirst = this.instant === null;
+    const first = isFirst || this.instant.maps.length !== instant.maps.length;
     Object.assign(this, { instant, number: instant.number, wanted: instant.number });
     const { x, y, velocity } = instant.points;
     this.layer = { across: x, up: y, size: sizes(velocity), colour: new Uint32Array(x.length).fill(inkColour()) };
     if (first) this.listMaps();
     element('now').value = String(instant.number);
     element('now-text').textContent = `${instant.sample.time_s.toFixed(2)} s`;
-    showCounters(instant, this.about.labelled);
+    showCounters(instant, this.about);
     showSenders(instant);
     this.redraw();
-    if (first) this.fit();
+    if (isFirst || (first && !this.touched)) this.fit();
     if (this.cell) this.ask();
     this.camera?.show(instant, this.mapsOf('plan')[0]);
   }
@@ -304,8 +309,11 @@ class Page {
     if (element('beside-button').hidden) return;
     element('beside').hidden = !element('beside').hidden;
     element('beside-button').setAttribute('aria-pressed', String(!element('beside').hidden));
-    this.plots.second.show(this.plots.plan.view);
-    requestAnimationFrame(() => this.redraw());
+    // when both have their new size
+    setTimeout(() => {
+      this.plots.second.show(this.plots.plan.view);
+      this.redraw();
+    }, 60);
   }
 
   // All of the map: what is labelled or detected, or its field of view.
@@ -321,7 +329,8 @@ class Page {
     });
     if (!places?.length) return;
     // of what is beside the road little is of interest
-    const road = this.instant.boxes.map(({ center }) => center);
+    const [{ cells }] = this.instant.maps;
+    const road = this.instant.boxes.map(({ center }) => center).filter((center) => cellAt(cells, center));
     const wanted = road.length > 3 ? [...road, places[0]] : places;
     const side = (k) => [Math.min(...wanted.map((p) => p[k])), Math.max(...wanted.map((p) => p[k]))];
     const [[left, right], [bottom, top]] = [side(0), side(1)];
