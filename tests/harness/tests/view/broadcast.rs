@@ -140,7 +140,7 @@ fn what_is_no_source_is_refused_with_what_to_do() {
     let folder = folder("nothing");
     std::fs::write(folder.join("text.log"), "hello\n").unwrap();
     for (arguments, said) in [
-        (&["view", "text.log"][..], "cannot be read"),
+        (&["view", "text.log"][..], "text.log: not an MCAP file"),
         (&["view", "missing.mcap"], "missing.mcap"),
         (&["view", "--port", "/dev/no-such-port"], "no such port"),
         (&["view"], "required"),

@@ -70,8 +70,7 @@ impl Sent {
 
 /// A port, and a page over the other end of it.
 fn pair() -> (TTYPort, TTYPort, Server) {
-    let (far, mut near) = TTYPort::pair().unwrap();
-    near.set_exclusive(false).unwrap();
+    let (far, near) = TTYPort::pair().unwrap();
     let name = near.name().unwrap();
     let server = Server::run(["view", "--port", &name]);
     (far, near, server)

@@ -13,8 +13,8 @@ use crate::evaluation::counts::Outcome;
 use crate::evaluation::examples::{self, Lasting};
 use crate::evaluation::replay::{Replay, visit};
 use crate::results::files::Target;
-use crate::results::report::html::charts::Shares;
-use crate::results::report::html::{Picture, Report, Strip};
+use crate::results::html::charts::Shares;
+use crate::results::html::{Picture, Report, Strip};
 
 /// Situations of each false outcome that are shown.
 const MOMENTS: usize = 3;

@@ -101,6 +101,9 @@ class Page {
     element('now').addEventListener('input', (event) => this.goTo(Number(event.target.value)));
     element('map').addEventListener('change', (event) => this.choose(event.target.selectedIndex));
     for (const kind of ['fv', 'fi']) element(`next-${kind}`).hidden = !this.about.labelled;
+    // a broadcast holds maps alone
+    const layers = { detections: this.about.source === 'recording', obstacles: this.about.source === 'recording', labels: this.about.labelled };
+    for (const [layer, there] of Object.entries(layers)) document.querySelector(`[data-key="${layer}"]`).hidden = !there;
     this.legend();
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
       this.legend();
@@ -124,9 +127,9 @@ class Page {
       ['End', 'Time', 'the last instant; live: follow', () => this.toEnd(), false],
       ['s', 'Time', 'next speed', () => this.faster(), false],
       ['v', 'What is wrong', 'next FV: visible, not detected (unsafe)', () => this.jump('fv', 1), false, 'next-fv'],
-      ['Shift+v', 'What is wrong', 'FV before', () => this.jump('fv', -1), false],
+      ['x', 'What is wrong', 'FV before', () => this.jump('fv', -1), false],
       ['i', 'What is wrong', 'next FI: invisible, yet detected', () => this.jump('fi', 1), false, 'next-fi'],
-      ['Shift+i', 'What is wrong', 'FI before', () => this.jump('fi', -1), false],
+      ['u', 'What is wrong', 'FI before', () => this.jump('fi', -1), false],
       ['m', 'Shown', 'next map', () => this.choose((this.chosen + 1) % Math.max(1, this.names.length)), false],
       ['b', 'Shown', "the receiver's map beside the sender's", () => this.beside(), false, 'beside'],
       ['d', 'Shown', 'detections', toggle('detections'), false, 'detections'],
@@ -201,8 +204,7 @@ class Page {
   }
 
   show(instant) {
-    const isFirst = this.instant === null;
-    const first = isFirst || this.instant.maps.length !== instant.maps.length;
+    const first = this.instant === null || this.instant.maps.length !== instant.maps.length;
     Object.assign(this, { instant, number: instant.number, wanted: instant.number });
     const { x, y, velocity } = instant.points;
     this.layer = { across: x, up: y, size: sizes(velocity), colour: new Uint32Array(x.length).fill(inkColour()) };
@@ -212,7 +214,11 @@ class Page {
     showCounters(instant, this.about);
     showSenders(instant);
     this.redraw();
-    if (isFirst || (first && !this.touched)) this.fit();
+    // before a map has come there is nothing to fit
+    if (!this.fitted && instant.maps.length > 0) {
+      this.fitted = true;
+      this.fit();
+    }
     if (this.cell) this.ask();
     this.camera?.show(instant, this.mapsOf('plan')[0]);
   }

@@ -3,7 +3,6 @@
 pub mod csv;
 pub mod experiment;
 pub mod gantry_camera;
-pub mod html;
 pub mod json;
 pub mod notes;
 pub mod scenes;

@@ -1,7 +1,6 @@
 // What follows the mouse and the keys in the report's charts. The page is whole without it.
 'use strict';
 
-const SVG = 'http://www.w3.org/2000/svg';
 // Farthest from a point, in units of the chart, at which it is still meant.
 const REACH = 60;
 
@@ -17,7 +16,7 @@ function say(svg, point) {
   figure.querySelector('.says')?.remove();
   if (!point) return;
   const [x, y, text] = point;
-  const ring = document.createElementNS(SVG, 'circle');
+  const ring = document.createElementNS(svg.namespaceURI, 'circle');
   ring.setAttribute('class', 'here');
   for (const [name, value] of Object.entries({ cx: x, cy: y, r: 8 })) ring.setAttribute(name, value);
   svg.append(ring);
@@ -82,7 +81,7 @@ function threshold(group) {
         // curves are kept only where they move
         const here = all.filter((point) => point[3] !== null && point[3] <= least).pop();
         if (!here) continue;
-        const ring = document.createElementNS(SVG, 'circle');
+        const ring = document.createElementNS(svg.namespaceURI, 'circle');
         ring.setAttribute('class', 'here at');
         for (const [name, value] of Object.entries({ cx: here[0], cy: here[1], r: 7 })) ring.setAttribute(name, value);
         svg.append(ring);

@@ -16,7 +16,6 @@ use serde_json::json;
 use viewshed::unit::settings;
 use viewshed::wire::header::fingerprint;
 
-use super::{ORIGIN, json, notes, percent};
 use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::bootstrap::Interval;
@@ -25,6 +24,7 @@ use crate::evaluation::examples::Lasting;
 use crate::evaluation::mount_error::Sensitivity;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
+use crate::results::report::{ORIGIN, json, notes, percent};
 use charts::Shares;
 
 const STYLE: &str = include_str!("report.css");
