@@ -120,7 +120,12 @@ fn the_receivers_map_stands_beside_the_senders_and_the_page_is_readable() {
     page.until("Math.abs(viewshed.instant.sample.time_s - 7.6) < 0.2");
     page.size(1240, 900, 1.0);
     page.rests();
+    page.focus("plan");
     page.key("f");
+    page.rests();
+    // deep in the shadow of the lorry in the left lanes
+    page.click_plot("plan", 110.0, 14.0);
+    page.until("viewshed.told");
     page.rests();
     page.picture(&readme(&pictures).join("view.png"));
     page.key("b");

@@ -153,7 +153,10 @@ fn without_labels_it_says_what_is_missing_and_shows_the_map() {
     let folder = folder("unlabelled");
     let recording = unlabelled(&folder);
     let (file, text) = report(&folder, &recording, &[]);
-    assert!(text.contains("This recording has no labels") && text.contains("viewshed label RECORDING"), "{text}");
+    assert!(
+        text.contains("This recording has no labels") && text.contains("<code>viewshed label RECORDING</code>"),
+        "{text}"
+    );
     assert!(!text.contains("id=\"rates\"") && !text.contains("id=\"worst\""), "no empty sections");
     assert!(text.contains("What the map says over time") && text.contains("Nothing was compared"));
     let Some(browser) = Browser::start("report without labels") else { return };

@@ -80,6 +80,12 @@ pub fn escaped(text: &str) -> String {
     html
 }
 
+/// The same with what stands between backticks as code.
+fn with_code(text: &str) -> String {
+    let code = |(k, part)| if k % 2 == 1 { format!("<code>{}</code>", escaped(part)) } else { escaped(part) };
+    text.split('`').enumerate().map(code).collect()
+}
+
 /// Pictures as long as there is room for them.
 struct Room(usize);
 
@@ -182,7 +188,7 @@ impl Report<'_> {
             return format!(
                 "<section id=\"summary\" class=\"nothing\"><h2>This recording has no labels</h2>\n<p>So nobody can say how \
                  often its map is wrong, and this report lacks:</p>\n<ul>{list}</ul>\n<p>{}</p></section>\n",
-                escaped(notes::WITHOUT_LABELS)
+                with_code(notes::WITHOUT_LABELS)
             );
         };
         let i = &row.intervals;
@@ -450,7 +456,7 @@ fn figure(room: &mut Room, picture: &Picture) -> String {
 }
 
 fn list(lines: &[String]) -> String {
-    let items: String = lines.iter().map(|line| format!("<li>{}</li>\n", escaped(line.trim()))).collect();
+    let items: String = lines.iter().map(|line| format!("<li>{}</li>\n", with_code(line.trim()))).collect();
     if items.is_empty() { items } else { format!("<ul class=\"note\">\n{items}</ul>\n") }
 }
 
@@ -461,6 +467,11 @@ mod tests {
     #[test]
     fn text_cannot_become_markup() {
         assert_eq!(escaped("<a href='x'>\"&"), "&lt;a href=&#39;x&#39;&gt;&quot;&amp;");
+    }
+
+    #[test]
+    fn commands_in_a_text_are_code() {
+        assert_eq!(with_code("a `b <c>` d"), "a <code>b &lt;c&gt;</code> d");
     }
 
     #[test]
