@@ -22,6 +22,7 @@ use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 
+use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
 
 /// A visibility estimator as the harness drives it: one radar frame in, one map out.
@@ -40,6 +41,11 @@ pub trait Estimator: Send {
     /// The map's own polar cells, where it has any.
     fn polar(&self) -> Option<PolarCells<'_>> {
         None
+    }
+
+    /// The moving things it believes in, which cast the map's shadows; road frame.
+    fn obstacles(&self) -> Vec<Solid> {
+        Vec::new()
     }
 
     /// What was rejected or dropped since construction, by reason.
