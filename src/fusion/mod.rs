@@ -26,7 +26,7 @@
 //! [`Monitor`] can, where others see what it should.
 //!
 //! # Cost
-//! Some 20 instructions for each cell that a polar map reaches; other maps are asked for each cell.
+//! Some 22 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
 mod monitor;
 mod places;
