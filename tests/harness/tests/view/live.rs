@@ -59,7 +59,6 @@ impl Sent {
         for (at, bytes) in &self.pieces {
             std::thread::sleep(at.saturating_sub(begin.elapsed()));
             port.write_all(bytes).unwrap();
-            port.flush().unwrap();
             let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
             messages += bytes.iter().filter(|byte| **byte == 0).count();
             marks.push((now.as_secs_f64() * 1000.0, messages));
