@@ -252,7 +252,8 @@ fn from_port(path: &str, baud: u32, addresses: Addresses, key: Option<&Key>) -> 
                         // what is not a whole buffer was all there was
                         live.look(n < buffer.len())?;
                     }
-                    Ok(_) => std::thread::sleep(Duration::from_millis(1)),
+                    // it said that there is something to read, and there is nothing: the other side has hung up
+                    Ok(_) => bail!("{device}: the port is gone"),
                     Err(e)
                         if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) =>
                     {

@@ -5,6 +5,12 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use viewshed::fixed::time::Time;
+use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::wire::message::{Addresses, Epoch, Message, Packet};
+use viewshed_harness::bus::traffic::{A, Maps, W};
+use viewshed_harness::recording::can_log::{Content, Line};
+use viewshed_harness::recording::{ReadOptions, read};
 
 use crate::browser::Browser;
 use crate::server::{SHIPPED, Server, folder};
@@ -87,52 +93,79 @@ fn a_log_that_is_cut_in_the_middle_ends_there_and_what_is_cut_is_counted() {
     assert!(about.contains("1 lines are no frames"), "{about}");
 }
 
-#[test]
-fn of_another_version_nothing_is_shown_and_that_is_said() {
-    use viewshed::fixed::time::Time;
-    use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
-    use viewshed::wire::message::{Addresses, Epoch, Message, Packet};
-    use viewshed_harness::bus::traffic::{A, Maps, W};
-    use viewshed_harness::recording::{ReadOptions, read};
-
-    let folder = folder("version");
+/// A log of the maps of the shipped recording's first seconds, broadcast by several sensors, each later than the one
+/// before by a millisecond, and with something done to every message.
+fn written(folder: &Path, sensors: &[u8], change: impl Fn(Message, &mut Vec<u8>)) -> PathBuf {
     let reading = ReadOptions { to_s: Some(4.0), ..ReadOptions::default() };
     let recording = read(Path::new(SHIPPED), &reading).unwrap();
     let maps = Maps::new(&recording, &Default::default(), &|| ()).unwrap();
     let medium = Medium::CanFd(Addresses::STANDARD);
     let begin = maps.scans[0].measured;
-    let mut sender =
-        Broadcaster::<A, W>::new(BroadcastConfig::new(1, medium), maps.header, Epoch::new(1), begin).unwrap();
+    let start = |sensor: &u8| {
+        let config = BroadcastConfig::new(*sensor, medium);
+        Broadcaster::<A, W>::new(config, maps.header, Epoch::new(1), begin).unwrap()
+    };
+    let mut senders: Vec<_> = sensors.iter().map(start).collect();
     let mut text = String::new();
     for (k, scan) in maps.scans.iter().enumerate() {
-        let _ = sender.scan(scan.measured, scan);
+        for sender in &mut senders {
+            let _ = sender.scan(scan.measured, scan);
+        }
         let end = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_000, |next| next.measured.micros());
         for now in (scan.measured.micros()..end).step_by(1000) {
             let now = Time::from_micros(now);
-            let Some(packet) = sender.next_packet(now) else { continue };
-            // the same, as a later version would send it
-            let mut own = packet.bytes()[6..].to_vec();
-            if packet.message == Message::Header {
-                own[0] = own[0] & 0xF0 | 2;
+            for (sender, sensor) in senders.iter_mut().zip(sensors) {
+                let Some(packet) = sender.next_packet(now) else { continue };
+                let mut own = packet.bytes()[6..].to_vec();
+                change(packet.message, &mut own);
+                let changed = Packet::new(packet.packing, *sensor, packet.message, Epoch::new(1), &own);
+                let frame = changed.protect(packet.bytes()[2], None).frame(&Addresses::STANDARD).unwrap();
+                let time_ns = now.micros() as i64 * 1000;
+                let line = Line { time_ns, interface: "can0".into(), content: Content::Data(frame) };
+                text += &format!("{line}\n");
             }
-            let later =
-                Packet::new(packet.packing, 1, packet.message, Epoch::new(1), &own).protect(packet.bytes()[2], None);
-            let frame = later.frame(&Addresses::STANDARD).unwrap();
-            let line = viewshed_harness::recording::can_log::Line {
-                time_ns: now.micros() as i64 * 1000,
-                interface: "can0".into(),
-                content: viewshed_harness::recording::can_log::Content::Data(frame),
-            };
-            text += &format!("{line}\n");
         }
     }
-    let path = folder.join("later.log");
+    let path = folder.join("written.log");
     std::fs::write(&path, text).unwrap();
-    let server = Server::run([Path::new("view"), &path]);
+    path
+}
+
+#[test]
+fn of_another_version_nothing_is_shown_and_that_is_said() {
+    let later = |message, own: &mut Vec<u8>| {
+        if message == Message::Header {
+            own[0] = own[0] & 0xF0 | 2;
+        }
+    };
+    let server = Server::run([Path::new("view"), &written(&folder("version"), &[1], later)]);
     let overview = overview(&server);
     assert_eq!(most_visible(&overview), 0.0);
     let events = events(&overview);
     assert!(events.iter().any(|text| text.contains("another version")), "{events:?}");
+}
+
+#[test]
+fn maps_of_several_sensors_are_shown_each_and_together() {
+    let Some(browser) = Browser::start("several sensors") else { return };
+    let server = Server::run([Path::new("view"), &written(&folder("several"), &[1, 4], |_, _| ())]);
+    assert!(most_visible(&overview(&server)) > 0.3);
+    let page = browser.open(&server.url);
+    page.until("viewshed.source.done && viewshed.drawn.number >= 0");
+    page.key("End");
+    page.until("viewshed.number === viewshed.source.count - 1 && viewshed.instant.maps.length === 2");
+    let names = page.ask("viewshed.names");
+    assert_eq!(names, serde_json::json!(["all sensors together", "sensor 1", "sensor 4"]));
+    assert_eq!(page.ask("document.querySelectorAll('.sender').length"), 2);
+    page.until("document.getElementById('plan-title').textContent === 'all sensors together'");
+    // the same map twice is the same together
+    let painted = "(() => { const canvas = document.querySelector('#plan canvas.ground');
+        const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+        return bytes.reduce((sum, byte, k) => (sum * 31 + byte * (k % 7)) % 1000003, 7); })()";
+    let together = page.ask(painted);
+    page.key("m");
+    page.until("document.getElementById('plan-title').textContent === 'sensor 1'");
+    assert_eq!(page.ask(painted), together);
 }
 
 #[test]

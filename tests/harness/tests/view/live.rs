@@ -14,7 +14,7 @@ use viewshed_harness::estimators;
 use viewshed_harness::recording::{ReadOptions, read};
 
 use crate::browser::{Browser, Page};
-use crate::server::{SHIPPED, Server, folder};
+use crate::server::{SHIPPED, Server};
 
 /// Bytes that a board sends, with the time of each piece and where the scans' answers end.
 struct Sent {
@@ -59,7 +59,6 @@ impl Sent {
         for (at, bytes) in &self.pieces {
             std::thread::sleep(at.saturating_sub(begin.elapsed()));
             port.write_all(bytes).unwrap();
-            port.flush().unwrap();
             let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
             messages += bytes.iter().filter(|byte| **byte == 0).count();
             marks.push((now.as_secs_f64() * 1000.0, messages));
@@ -87,34 +86,6 @@ fn events(page: &Page) -> String {
 }
 
 #[test]
-fn a_unit_is_seen_live_and_its_stop_and_restart_are_told() {
-    let Some(browser) = Browser::start("live") else { return };
-    let (mut far, _near, server) = pair();
-    let page = opened(&browser, &server);
-    let folder = folder("live");
-    let first = sent(5.0, 0);
-    std::thread::scope(|scope| {
-        let player = scope.spawn(|| first.play(&mut far));
-        page.until("viewshed.instant?.senders[0]?.condition === 'ok' && viewshed.instant.sample.visible > 0.1");
-        page.rests();
-        page.picture(&folder.join("live.png"));
-        let ages = page.ask("viewshed.instant.maps[0].ages_ms.filter((age) => age !== null).length");
-        assert!(ages.as_f64().unwrap() > 10.0, "{ages}");
-        player.join().unwrap();
-    });
-    // silence: nothing is shown as it was
-    page.until("viewshed.instant.senders[0].condition === 'waiting' && viewshed.instant.sample.unknown === 1");
-    page.until("viewshed.source.events.some((event) => event.text.includes('has stopped'))");
-    page.rests();
-    page.picture(&folder.join("stopped.png"));
-    let again = sent(5.0, 2);
-    again.play(&mut far);
-    page.until("viewshed.source.events.some((event) => event.text.includes('has restarted'))");
-    assert!(events(&page).matches("is shown").count() >= 2, "{}", events(&page));
-    assert_eq!(page.console(), Vec::<String>::new());
-}
-
-#[test]
 fn two_senders_of_one_number_are_shown_as_a_conflict() {
     let Some(browser) = Browser::start("conflict") else { return };
     let (mut far, _near, server) = pair();
@@ -128,15 +99,6 @@ fn two_senders_of_one_number_are_shown_as_a_conflict() {
     }
     page.until("viewshed.source.events.some((event) => event.text.includes('two senders use the number'))");
     assert!(!events(&page).contains("error"), "{}", events(&page));
-}
-
-#[test]
-fn a_port_that_goes_away_is_said() {
-    let Some(browser) = Browser::start("port gone") else { return };
-    let (far, near, server) = pair();
-    let page = opened(&browser, &server);
-    drop((far, near));
-    page.until("document.getElementById('message').textContent.includes('the port is gone')");
 }
 
 /// From the last byte of a scan to the frame of the page that shows what it said; prints the median.

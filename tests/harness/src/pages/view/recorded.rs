@@ -117,7 +117,7 @@ fn receiver(recording: &Recording, settings: &Settings) -> Result<Option<Receive
     let line = |sent: &crate::bus::traffic::Sent| {
         let time_ns =
             i64::try_from(sent.at.micros()).unwrap_or(i64::MAX / 1000) * 1000 + (sent.duration_s * 1e9) as i64;
-        Some(Line { time_ns, interface: BUS.name.to_owned(), content: Content::Data(sent.frame.clone()?) })
+        Some(Line { time_ns, interface: BUS.name.to_owned(), content: Content::Data(sent.frame?) })
     };
     let lines: Vec<Line> = traffic.sent.iter().filter_map(line).collect();
     let listening = Listening::new(Addresses::STANDARD, None);

@@ -119,9 +119,9 @@ impl Report<'_> {
         html += "<main>\n";
         html += &self.summary();
         if let Some(picture) = self.pictures.first() {
-            let _ = write!(
+            let _ = writeln!(
                 html,
-                "<section id=\"map\"><h2>One frame from above</h2>\n{}</section>\n",
+                "<section id=\"map\"><h2>One frame from above</h2>\n{}</section>",
                 figure(&mut room, picture)
             );
         }
@@ -135,7 +135,7 @@ impl Report<'_> {
         }
         html += &self.trust();
         html += &self.made();
-        let _ = write!(html, "</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n");
+        let _ = writeln!(html, "</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>");
         html
     }
 
@@ -171,7 +171,7 @@ impl Report<'_> {
         }
         html += "</nav>\n</header>\n";
         if recording.sensor.synthetic {
-            let _ = write!(html, "<p class=\"banner\"><strong>Synthetic.</strong> {}</p>\n", escaped(ORIGIN));
+            let _ = writeln!(html, "<p class=\"banner\"><strong>Synthetic.</strong> {}</p>", escaped(ORIGIN));
         }
         html
     }
@@ -262,16 +262,16 @@ impl Report<'_> {
                  Hollow points are of fewer than 50 samples; triangles lead to the worst moments.</p>\n";
         html += &charts::of_rates(self.replay, self.shown, &marks);
         let broken_down = tables::breakdown(&self.replay.summary, self.shown);
-        let _ = write!(html, "<details><summary>By class, distance and occlusion</summary>\n{broken_down}</details>\n");
+        let _ = writeln!(html, "<details><summary>By class, distance and occlusion</summary>\n{broken_down}</details>");
         if let Some(sensitivities) = self.mount_error {
             html += &tables::mount_error(sensitivities);
         }
         html += "</section>\n";
         if let Some(camera) = &self.replay.camera {
             let shown = camera.summary.rows.first().map_or("", |row| row.name.as_str());
-            let _ = write!(
+            let _ = writeln!(
                 html,
-                "<section id=\"camera\"><h2>The camera beside the radar</h2>\n<p>{}</p>\n",
+                "<section id=\"camera\"><h2>The camera beside the radar</h2>\n<p>{}</p>",
                 escaped(&notes::heading(camera))
             );
             html += &tables::rates(&camera.summary, shown);
@@ -336,9 +336,9 @@ impl Report<'_> {
         );
         for (since_s, png) in &strip.tiles {
             let alt = format!("{} {since_s:+.1} s from its beginning", title(&strip.lasting));
-            let _ = write!(
+            let _ = writeln!(
                 html,
-                "<figure>{}<figcaption>{:.2} s ({since_s:+.2})</figcaption></figure>\n",
+                "<figure>{}<figcaption>{:.2} s ({since_s:+.2})</figcaption></figure>",
                 room.image(png, &alt),
                 begin_s + since_s
             );
