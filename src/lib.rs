@@ -62,6 +62,7 @@
 //! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`] |
 //! | a camera: its calibration, boxes of its pictures | [`Camera3d`], [`Camera3dConfig`], [`Camera3dParameters`], [`Calibration`], [`Intrinsics`], [`PointPair`], [`ImageBox`], [`VehicleClass`]; how it is installed: [`cameras`] |
 //! | what is known of the road | [`PolarMap`], [`RoadGrid`]; every map answers [`VisibilityMap`] and the [questions](query) |
+//! | several sensors as one map | [`fusion`] |
 //! | maps on CAN, CAN FD and serial lines | [`Broadcaster`], [`BroadcastConfig`], [`Medium`]; a [`Receiver`] gives maps back |
 //! | radars that are decoded, and boxes of a camera | [`Ars408`], [`Ti`], [`NativeReceiver`]; each is a [`Feed`] |
 //! | a unit: radar in, maps out | [`Unit`] joins [`Estimator`], [`Feed`] and [`MapSender`], by [`Settings`] |
@@ -89,6 +90,7 @@
 //! | `frame` | one radar frame: detections in, gated and counted, placed on the road; what a silent or blind sensor means |
 //! | `obstacles` | what moves is followed: place, length, width, height; solid boxes out |
 //! | `map` | what a map answers: the interface, the polar map, queries, the 1 m grid, the bitmap |
+//! | `fusion` | maps of several sensors in, one map of the road out: who sees what, and who contradicts whom |
 //! | `grid` | range x azimuth x slope: evidence and boxes in, lines of sight, shadows and a polar map out |
 //! | `estimator` | what a unit asks of an estimator, whatever its sensor and its map |
 //! | `radar_3d` | the estimator: all stages above, in order |
@@ -181,6 +183,7 @@ mod rooms {
     pub mod estimator;
     pub mod fixed;
     pub mod frame;
+    pub mod fusion;
     pub mod grid;
     pub mod inputs;
     pub mod map;
@@ -220,6 +223,10 @@ pub use map::polar::PolarMap;
 pub use map::query;
 pub use map::resample::RoadGrid;
 pub use map::{CellState, Visibility, VisibilityMap};
+
+// Maps of several sensors as one.
+#[cfg(not(feature = "bench"))]
+pub use rooms::fusion;
 
 // Maps on a bus: sender and receiver.
 pub use wire::broadcast::{BroadcastConfig, Broadcaster, Medium};

@@ -4,6 +4,7 @@
 //! takes to wrap (8.9 s at 480 MHz) is counted short.
 
 use crate::unit::Event;
+use crate::wire::status::FrameTime;
 
 /// A free-running counter of a board.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +76,12 @@ impl Timing {
                 self.took.frames = self.took.frames.saturating_add(1);
             }
         }
+    }
+
+    /// The last frame and the longest, as the status says them; not measured before the first frame.
+    pub fn frame_times(&self) -> [FrameTime; 2] {
+        let Took { hz, frames, frame, .. } = self.took;
+        if frames == 0 { Default::default() } else { [frame.last, frame.worst].map(|count| FrameTime::of(count, hz)) }
     }
 
     /// What was counted so far.

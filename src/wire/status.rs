@@ -11,9 +11,9 @@
 //! | 2 | fingerprint of the configuration |
 //! | 3 | radar frames lost, 2 bytes; azimuths of maps dropped on sending, 2 bytes |
 //! | 4 | frames received with failed protection, 2 bytes; times bus-off, 2 bytes |
-//! | 5 | cause of the last reset; 3 bytes kept free, 0 |
+//! | 5 | cause of the last reset, 1 byte; how long the last frame took and the longest since the start, 12 bits each, 0.1 ms |
 //!
-//! Counters stay at their largest value.
+//! Counters stay at their largest value. A time is rounded up; 0: not measured; 4095: 409.5 ms or more.
 
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
 
@@ -188,6 +188,32 @@ pub struct Status {
     pub e2e_errors: u16,
     /// Times the controller was bus-off.
     pub bus_off: u16,
+    /// How long it worked on the last frame and on the longest since the start.
+    pub frame_times: [FrameTime; 2],
+}
+
+/// How long the sender worked on a frame, in steps of 0.1 ms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FrameTime(u16);
+
+impl FrameTime {
+    /// The longest that can be said; what takes longer is said so.
+    pub const MOST: Self = Self(0xFFF);
+
+    /// Counts of a clock of so many counts a second, rounded up, so that no frame takes no time.
+    pub fn of(counts: u32, hz: u32) -> Self {
+        let steps = (u64::from(counts) * 10_000).div_ceil(u64::from(hz.max(1)));
+        u16::try_from(steps.max(1)).map_or(Self::MOST, |steps| Self(steps).min(Self::MOST))
+    }
+
+    /// Tenths of a millisecond; none if it is not measured.
+    pub const fn tenths_of_ms(self) -> Option<u16> {
+        match self.0 {
+            0 => None,
+            steps => Some(steps),
+        }
+    }
 }
 
 /// Why bytes are no status.
@@ -218,6 +244,7 @@ impl Status {
             dropped: 0,
             e2e_errors: 0,
             bus_off: 0,
+            frame_times: [FrameTime(0); 2],
         }
     }
 
@@ -230,7 +257,10 @@ impl Status {
             2 => self.fingerprint.to_be_bytes(),
             3 => pair(self.radar_lost, self.dropped),
             4 => pair(self.e2e_errors, self.bus_off),
-            _ => [self.reset_cause.number(), 0, 0, 0],
+            _ => {
+                let [last, longest] = self.frame_times.map(|FrameTime(steps)| u32::from(steps));
+                (u32::from(self.reset_cause.number()) << 24 | last << 12 | longest).to_be_bytes()
+            }
         }
     }
 
@@ -243,7 +273,11 @@ impl Status {
             2 => self.fingerprint = u32::from_be_bytes(bytes),
             3 => (self.radar_lost, self.dropped) = pair,
             4 => (self.e2e_errors, self.bus_off) = pair,
-            5 => self.reset_cause = ResetCause::from_number(a),
+            5 => {
+                self.reset_cause = ResetCause::from_number(a);
+                let (last, longest) = (u16::from_be_bytes([b, c]) >> 4, u16::from_be_bytes([c, d]) & 0xFFF);
+                self.frame_times = [FrameTime(last), FrameTime(longest)];
+            }
             // of a later version
             _ => {}
         }
@@ -309,17 +343,30 @@ mod tests {
         dropped: 0x3344,
         e2e_errors: 0x5566,
         bus_off: 7,
+        frame_times: [FrameTime(0x123), FrameTime(0x456)],
     };
 
     #[test]
     fn the_long_status_is_these_bytes() {
         let expected = [
-            2, 1, 1, 2, 3, 4, 1, 2, 3, 1, 0xCA, 0xFE, 0xF0, 0x0D, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0, 7, 4, 0, 0, 0,
+            2, 1, 1, 2, 3, 4, 1, 2, 3, 1, 0xCA, 0xFE, 0xF0, 0x0D, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0, 7, 4, 0x12,
+            0x34, 0x56,
         ];
         assert_eq!(STATUS.emit(), expected);
         let mut got = Status::starting(0);
         got.take(&expected).unwrap();
         assert_eq!(got, STATUS);
+    }
+
+    #[test]
+    fn a_time_is_rounded_up_and_ends_at_the_greatest() {
+        let tenths = |counts, hz| FrameTime::of(counts, hz).tenths_of_ms();
+        assert_eq!(tenths(480_000, 480_000_000), Some(10));
+        assert_eq!(tenths(480_001, 480_000_000), Some(11));
+        assert_eq!(tenths(0, 480_000_000), Some(1), "0 means that it is not measured");
+        assert_eq!(tenths(u32::MAX, 1_000), Some(4095));
+        assert_eq!(tenths(1, 0), Some(4095), "a clock that stands");
+        assert_eq!(FrameTime::default().tenths_of_ms(), None);
     }
 
     #[test]

@@ -13,7 +13,9 @@ mod traffic;
 
 mod configuration;
 mod detections;
+mod fusion;
 mod maps;
+mod monitor;
 mod radar_2d;
 mod radar_3d;
 mod stages;

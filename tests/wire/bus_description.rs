@@ -20,7 +20,7 @@ use viewshed::wire::header::{Header, WireMount};
 use viewshed::wire::map_message::{self, LIMITS, Plain};
 use viewshed::wire::message::{Addresses, Epoch, Message, Part, Plane, Received, Word};
 use viewshed::wire::scan_number::ScanNumber;
-use viewshed::wire::status::{Reason, ResetCause, UnitState};
+use viewshed::wire::status::{FrameTime, Reason, ResetCause, UnitState};
 use viewshed::wire::visible_range;
 
 const CLASSIC: Medium = Medium::Can(Addresses::STANDARD);
@@ -63,6 +63,7 @@ fn frames(medium: Medium) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
     (status.state, status.reason, status.reset_cause) =
         (UnitState::Degraded, Reason::IncompleteScans, ResetCause::Watchdog);
     (status.firmware, status.radar_lost, status.e2e_errors, status.bus_off) = ([1, 22, 3], 40_000, 515, 2);
+    status.frame_times = [3_100, 12_400].map(|us| FrameTime::of(us, 1_000_000));
     let mut shadows = Shadows::new(3);
     let (mut frames, mut maps) = (Vec::new(), Vec::new());
     for us in (0..3_000_000).step_by(100) {
@@ -119,6 +120,8 @@ fn header_and_status(medium: Medium) {
         ("State", 3.0),
         ("Reason", 4.0),
         ("Reset_Cause", 4.0),
+        ("Frame_Time", 3.1),
+        ("Frame_Time_Longest", 12.4),
         ("Firmware_Major", 1.0),
         ("Firmware_Minor", 22.0),
         ("Firmware_Patch", 3.0),

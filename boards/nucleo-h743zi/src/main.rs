@@ -20,6 +20,7 @@
 #![no_main]
 
 mod caches;
+mod tightly_coupled;
 
 use defmt_rtt as _;
 use embassy_executor::Spawner;
@@ -104,6 +105,7 @@ fn reset_flags(crash: bool) -> ResetFlags {
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
+    tightly_coupled::fill();
     let p = embassy_stm32::init(config());
     let mut core = cortex_m::Peripherals::take().expect("taken once");
     caches::enable(&mut core.MPU, &mut core.SCB, &mut core.CPUID);

@@ -324,6 +324,7 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         status.firmware = VERSION;
         status.bus_off = bus_off;
         status.radar_lost = u16::try_from(radar_lost).unwrap_or(u16::MAX);
+        status.frame_times = self.timing.as_ref().map_or_else(Default::default, Timing::frame_times);
         let first = *status;
         let second = maps.serial.status_mut();
         *second = Status { uptime_s: second.uptime_s, dropped: second.dropped, ..first };

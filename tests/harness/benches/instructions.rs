@@ -14,11 +14,13 @@ use viewshed::camera::map::{AZIMUTHS, CameraMap};
 use viewshed::camera::{Camera3dConfig, Camera3dParameters, CameraProfile, MOST_BOXES};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::fusion::{Fusion, FusionConfig};
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::noise::NoiseConfig;
+use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::Header;
@@ -38,8 +40,16 @@ const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
 const CAMERA: [(&str, &str); 2] = [("camera-3d", SCENES[0]), ("camera-3d", CROWDED)];
 const CROWDED: &str = "crowded";
 
-/// What is measured on the recording's maps only.
+/// Two of the recording's maps onto 200 m by 50 m of road, cells of one metre.
+const FUSION: &str = "fusion";
+
+/// Instructions that fusing two maps may take.
+const FUSION_BUDGET: u64 = 300_000;
+
+/// What is measured on the recording's maps only, or their sending and receiving.
 const WIRE: [&str; 6] = ["send-can", "receive-can", "send-fd", "receive-fd", "send-long", "receive-long"];
+
+type Road = Fusion<2, 200, 50>;
 
 /// Instructions a scan that sending and receiving may take, median, on every bus.
 const WIRE_BUDGET: u64 = 150_000;
@@ -49,6 +59,7 @@ fn measured(estimator: &str) -> &'static str {
     match estimator {
         "radar-2d" => "instructions::measured_frame_2d",
         "camera-3d" => "instructions::measured_frame_camera",
+        FUSION => "instructions::measured_fusion",
         "send-can" | "send-fd" | "send-long" => "instructions::measured_send",
         "receive-can" | "receive-fd" | "receive-long" => "instructions::measured_receive",
         _ => "instructions::measured_frame_3d",
@@ -74,7 +85,8 @@ fn main() -> ExitCode {
     println!("{:<16} {:<12} {:>9} {:>12} {:>12} {:>12}", "estimator", "scene", "frames", "mean", "median", "worst");
     let estimators = ESTIMATORS.iter().flat_map(|e| SCENES.map(|scene| (*e, scene)));
     let asked: Vec<&String> = args.iter().skip(1).filter(|a| !a.starts_with("--")).collect();
-    for (estimator, scene) in estimators.chain(CAMERA).chain(WIRE.map(|w| (w, SCENES[0]))) {
+    for (estimator, scene) in estimators.chain(CAMERA).chain([(FUSION, SCENES[0])]).chain(WIRE.map(|w| (w, SCENES[0])))
+    {
         if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
             continue;
         }
@@ -86,6 +98,10 @@ fn main() -> ExitCode {
         let mean = counts.iter().sum::<u64>() / counts.len() as u64;
         let median = counts[counts.len() / 2];
         println!("{estimator:<16} {scene:<12} {:>9} {mean:>12} {median:>12} {worst:>12}", counts.len());
+        if estimator == FUSION && median > FUSION_BUDGET {
+            eprintln!("fusing two maps takes {median} instructions, more than {FUSION_BUDGET}");
+            return ExitCode::FAILURE;
+        }
         if WIRE.contains(&estimator) && median > WIRE_BUDGET {
             eprintln!("{estimator} takes {median} instructions a scan, more than {WIRE_BUDGET}");
             return ExitCode::FAILURE;
@@ -151,6 +167,7 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
         "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
         "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),
         "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
+        FUSION => run_fusion(&sensor, &frames),
         "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &frames),
         _ => run_2d(&sensor, &frames),
     }
@@ -190,6 +207,28 @@ fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: us
     map: &mut PolarMap<R, A>,
 ) {
     black_box(state.process(parameters, now, detections, false, map));
+}
+
+/// Radar-3d's map as that of two sensors, a scan at a time.
+fn run_fusion(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
+    let parameters =
+        Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
+    let mut map = Box::new(parameters.map());
+    let mut road = Box::new(Road::NOWHERE);
+    road.set(RoadPoint::new(0, -2500), 100, FusionConfig::default()).expect("defaults are valid");
+    for (now, detections) in frames {
+        state.process(&parameters, *now, detections, false, &mut map);
+        measured_fusion(&mut road, *now, &map);
+    }
+    black_box(&road);
+}
+
+#[inline(never)]
+fn measured_fusion(road: &mut Road, now: Time, map: &PolarMap<200, 120>) {
+    for sensor in 0..2 {
+        let _ = black_box(road.offer_polar(sensor, now, now, map));
+    }
 }
 
 /// Radar-3d's maps from a sender to a receiver, a scan at a time.

@@ -103,6 +103,12 @@ fn frames_are_timed_in_all_and_by_stage() {
     assert!(took.stages.iter().all(|stage| stage.last >= 10 && stage.worst >= stage.last), "{took:?}");
     let stages: u32 = took.stages.iter().map(|stage| stage.last).sum();
     assert!(took.frame.last > stages, "the end is read once more: {took:?}");
+    // the status says so on both lines, where nobody asked
+    world.run(2000);
+    for status in world.status() {
+        let [last, longest] = status.frame_times.map(|time| time.tenths_of_ms().expect("measured"));
+        assert!(longest >= last && u32::from(last) >= 10 * stages / 2, "{last} {longest}");
+    }
 }
 
 #[test]

@@ -25,7 +25,7 @@ pub struct Section {
     pub stored: bool,
 }
 
-/// A function or a static.
+/// A function, a static, or an address that the linker named.
 #[derive(Debug, Clone)]
 pub struct Symbol {
     pub name: String,
@@ -55,7 +55,7 @@ impl Image {
                 stored: s.kind() != SectionKind::UninitializedData,
             })
         });
-        let symbols = file.symbols().filter(|s| s.is_definition()).map(|s| Symbol {
+        let symbols = file.symbols().filter(|s| !s.is_undefined()).map(|s| Symbol {
             name: s.name().unwrap_or_default().to_owned(),
             address: s.address(),
             bytes: s.size(),

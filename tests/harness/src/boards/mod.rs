@@ -4,6 +4,7 @@
 pub mod can;
 pub mod can_twin;
 pub mod check;
+pub mod cycles;
 pub mod firmware;
 pub mod host;
 pub mod image;

@@ -85,6 +85,8 @@ pub struct StatusSeen {
     pub dropped: u16,
     pub e2e_errors: u16,
     pub bus_off: u16,
+    /// Its own time for the last frame and for the longest, ms; none if it does not measure them.
+    pub frame_ms: [Option<f64>; 2],
 }
 
 /// What happened to its frames.
@@ -219,6 +221,7 @@ impl Listening {
             dropped: s.dropped,
             e2e_errors: s.e2e_errors,
             bus_off: s.bus_off,
+            frame_ms: s.frame_times.map(|time| time.tenths_of_ms().map(|tenths| f64::from(tenths) / 10.0)),
         });
         let c = sensor.counters();
         let counters = Counted {

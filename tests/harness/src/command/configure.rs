@@ -10,10 +10,13 @@ use viewshed::unit::profile::{reference, small};
 use viewshed::unit::settings::{BlockError, Settings};
 use viewshed::unit::timing::Count;
 
+use serde_json::{Map, Value, json};
+
 use super::print;
 use crate::configure::file::{self, EXAMPLE, UnitFile};
 use crate::configure::link::Link;
 use crate::configure::{Found, Stored, Wanted, find, name};
+use crate::results::files::OutputArgs;
 
 /// Write the configuration of a unit on a controller, over its serial port or its CAN bus
 ///
@@ -65,7 +68,15 @@ pub struct Args {
     /// How long to look for the unit, in seconds; in it its reset button may be pressed
     #[arg(long, value_name = "SECONDS", default_value_t = 3.0)]
     wait: f64,
+    /// Write what was found and done as JSON
+    #[arg(long, value_name = "FILE", conflicts_with = "example")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: OutputArgs,
 }
+
+/// What was found and done, for machines.
+type Told = Map<String, Value>;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -91,39 +102,59 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         print(EXAMPLE)?;
         return Ok(ExitCode::SUCCESS);
     }
+    let mut outputs = args.outputs.beside(args.file.clone());
+    let json = outputs.file("--json", args.json.as_deref())?;
+    let mut told = Told::new();
+    let code = carry_out(args, &mut told)?;
+    if let Some(file) = json {
+        file.write(serde_json::to_string_pretty(&told)? + "\n")?;
+        print(&outputs.told())?;
+    }
+    Ok(code)
+}
+
+fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
     ensure!(args.wait.is_finite() && args.wait > 0.0, "--wait {} is not above 0", args.wait);
     let file = args.file.as_deref().map(file::read).transpose()?;
     if let Some(file) = &file {
         left_out(file)?;
         if args.check && args.can.is_none() && args.port.is_none() {
-            return on_grids(&file.settings);
+            return on_grids(&file.settings, told);
         }
     }
     let mut link = open(args)?;
     let wanted = Wanted { sensor: args.sensor, chip: args.chip };
     let mut unit = find(&mut *link, wanted, Duration::from_secs_f64(args.wait))?;
+    let found = &unit.unit;
+    told.insert(
+        "unit".into(),
+        json!({"at": unit.place(), "board": found.board(), "sensor": found.sensor, "chip": format!("{:08X}", found.chip),
+            "firmware": found.firmware, "grid": found.grid, "test_bench": found.is_bench}),
+    );
     if !args.read {
         print(&format!("{}: {}\n", unit.place(), name(&unit.unit)))?;
     }
     if args.read {
-        return read(&mut unit);
+        return read(&mut unit, told);
     }
     if args.timing {
-        return timing(&mut unit);
+        return timing(&mut unit, told);
     }
     if args.factory {
         unit.clear()?;
         unit.restart()?;
+        told.insert("emptied".into(), true.into());
         print("emptied and restarted: it sends its status only, until it is configured\n")?;
         return Ok(ExitCode::SUCCESS);
     }
     if let (Some(file), true) = (&file, args.check) {
-        return compare(&mut unit, &file.settings);
+        return compare(&mut unit, &file.settings, told);
     }
     let mut written = None;
     if let Some(UnitFile { settings, .. }) = &file {
         unit.check(settings)?;
         written = Some(unit.write(settings)?);
+        told.insert("written".into(), written.into());
         print(&format!("written as block {}, and read back the same\n", written.unwrap_or(0)))?;
     }
     if !args.restart {
@@ -132,7 +163,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         )?;
         return Ok(ExitCode::SUCCESS);
     }
-    match (unit.restart()?, written) {
+    let runs_with = unit.restart()?;
+    told.insert("restarted_with".into(), runs_with.into());
+    match (runs_with, written) {
         (Some(sequence), None) => print(&format!("restarted with block {sequence}\n"))?,
         (Some(sequence), Some(wanted)) if sequence == wanted => print(&format!("restarted with block {sequence}\n"))?,
         (Some(sequence), Some(wanted)) => {
@@ -170,22 +203,20 @@ fn left_out(file: &UnitFile) -> Result<()> {
 }
 
 /// Whether a file can be used, without a unit.
-fn on_grids(settings: &Settings) -> Result<ExitCode> {
-    let mut any = false;
+fn on_grids(settings: &Settings, told: &mut Told) -> Result<ExitCode> {
+    let (mut any, mut refusals) = (false, Map::new());
     for (grid, check) in [("reference", reference::CHECK), ("small", small::CHECK)] {
-        match check.settings(settings) {
-            Ok(()) => {
-                any = true;
-                print(&format!("{grid} grid: can be used\n"))?;
-            }
-            Err(error) => print(&format!("{grid} grid: {error}\n"))?,
-        }
+        let refused = check.settings(settings).err().map(|error| error.to_string());
+        any |= refused.is_none();
+        print(&format!("{grid} grid: {}\n", refused.as_deref().unwrap_or("can be used")))?;
+        refusals.insert(grid.into(), refused.into());
     }
+    told.insert("refused_by_grid".into(), refusals.into());
     ensure!(any, "no unit can run with this");
     Ok(ExitCode::SUCCESS)
 }
 
-fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
+fn read(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
     let (in_use, newest) = (unit.in_use()?, unit.newest()?);
     let place = unit.place().to_owned();
     let head = |Stored { sequence, .. }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
@@ -196,9 +227,14 @@ fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
             )
         }
         (Err(error), Err(_)) => bail!("{place}: {error}"),
-        (Ok(stored), _) => print(&(head(stored) + &file::text(&stored.settings)?))?,
-        (Err(_), Ok(stored)) => print(&(head(stored) + &file::text(&stored.settings)?))?,
+        (Ok(stored), _) | (Err(_), Ok(stored)) => {
+            let text = file::text(&stored.settings)?;
+            told.insert("block".into(), stored.sequence.into());
+            told.insert("configuration".into(), toml::from_str(&text)?);
+            print(&(head(stored) + &text))?;
+        }
     }
+    told.insert("next_block".into(), newest.as_ref().ok().map(|stored| stored.sequence).into());
     match (in_use, newest) {
         (Ok(a), Ok(b)) if a == b => {}
         (_, Ok(newest)) => print(&format!("# block {} counts from its next start on\n", newest.sequence))?,
@@ -207,7 +243,7 @@ fn read(unit: &mut Found<'_>) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn timing(unit: &mut Found<'_>) -> Result<ExitCode> {
+fn timing(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
     let took = unit.timing()?;
     ensure!(
         took.frames > 0 && took.hz > 0,
@@ -223,6 +259,13 @@ fn timing(unit: &mut Found<'_>) -> Result<ExitCode> {
             micros(count.worst)
         )
     };
+    let cycles = |count: Count| json!({"last": count.last, "worst": count.worst});
+    let stages: Map<String, Value> =
+        Stage::ALL.iter().zip(took.stages).map(|(stage, count)| (stage.name().into(), cycles(count))).collect();
+    told.insert(
+        "timing".into(),
+        json!({"hz": took.hz, "frames": took.frames, "frame_cycles": cycles(took.frame), "stage_cycles": stages}),
+    );
     let mut text = format!("{} frames, a core of {} MHz\n", took.frames, took.hz / 1_000_000);
     text += &format!("{:<10}{:>12}{:>12}{:>12}{:>12}\n", "", "cycles last", "worst", "us last", "worst");
     text += &row("frame", took.frame);
@@ -233,13 +276,16 @@ fn timing(unit: &mut Found<'_>) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn compare(unit: &mut Found<'_>, settings: &Settings) -> Result<ExitCode> {
+fn compare(unit: &mut Found<'_>, settings: &Settings, told: &mut Told) -> Result<ExitCode> {
     unit.check(settings)?;
     let Ok(stored) = unit.newest()? else {
         print("the unit has no configuration; the file can be used\n")?;
         return Ok(ExitCode::FAILURE);
     };
     let found = file::differences(&stored.settings, settings)?;
+    told.insert("block".into(), stored.sequence.into());
+    let each = found.iter().map(|(key, has, wanted)| json!({"key": key, "unit": has, "file": wanted}));
+    told.insert("differences".into(), each.collect());
     if found.is_empty() {
         print(&format!("block {} is what the file says\n", stored.sequence))?;
         return Ok(ExitCode::SUCCESS);

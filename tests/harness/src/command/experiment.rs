@@ -15,11 +15,12 @@ use crate::evaluation::Settings;
 use crate::evaluation::replay::{Replay, steps};
 use crate::results::files::{OutputArgs, Outputs, Target};
 use crate::results::report::{
-    experiment as report, gantry_camera as camera_report, json as replay_json, scenes as scenes_report, table,
+    experiment as report, gantry_camera as camera_report, json as replay_json, scenes as scenes_report,
+    several_sensors as sensors_report, table,
 };
 use crate::studies::experiment::plan::{Day, Plan};
 use crate::studies::experiment::scenes::{self, Extent, Variant};
-use crate::studies::experiment::{Experiment, gantry_camera, total_steps};
+use crate::studies::experiment::{Experiment, gantry_camera, several_sensors, total_steps};
 use crate::{estimators, recording};
 
 /// Estimators that run, for the progress bar.
@@ -36,6 +37,10 @@ enum World {
     Queue,
     /// A camera on the motorway's gantry, with detectors from ideal to poor, in dense and in light traffic
     GantryCamera,
+    /// Two radars at opposite corners of a crossing, each alone and fused, four sites
+    TwoRadars,
+    /// A radar and a camera on the motorway's gantry, each alone and fused, five days
+    RadarCamera,
 }
 
 impl World {
@@ -45,6 +50,8 @@ impl World {
             Self::Crossing => "crossing",
             Self::Queue => "queue",
             Self::GantryCamera => "gantry-camera",
+            Self::TwoRadars => "two-radars",
+            Self::RadarCamera => "radar-camera",
         }
     }
 
@@ -54,6 +61,8 @@ impl World {
             Self::Crossing => "crossing/scenes.toml",
             Self::Queue => "queue/scenes.toml",
             Self::GantryCamera => "gantry-camera.toml",
+            Self::TwoRadars => "two-radars.toml",
+            Self::RadarCamera => "radar-camera.toml",
         }
     }
 }
@@ -65,7 +74,7 @@ impl World {
 /// greatest day. Crossing and queue: scenes of 150 s with a mount each (corner, side, far; 4 to 8 m), the first 60 s
 /// not counted, pooled with intervals by tracks; beside it without elevation and without warm-up, and every scene.
 /// Gantry-camera: a camera in the radar's place, its detector's misses step by step, and why vehicles that were not
-/// found were called visible.
+/// found were called visible. Two-radars and radar-camera: what each sensor and both together show of the road.
 ///
 /// Scenes, traffic, mounts and seeds stand in files that were fixed before any estimator ran on them; what is tuned
 /// is tuned on the training scenes or elsewhere.
@@ -80,7 +89,7 @@ pub struct Args {
     /// Run the training scenes in place of those that are reported (crossing, queue)
     #[arg(long)]
     train: bool,
-    /// Judge every Nth frame only, which is faster; estimators are given all frames (crossing, queue, gantry-camera)
+    /// Judge every Nth frame only, which is faster; estimators are given all frames (all but motorway)
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
     every: u16,
     /// Leave out the runs without elevation, which is faster (crossing, queue)
@@ -120,6 +129,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         World::Motorway => motorway(args, &path, &settings, &mut outputs)?,
         World::Crossing | World::Queue => several_scenes(args, &path, &settings, &mut outputs)?,
         World::GantryCamera => gantry_camera(args, &path, &settings, &mut outputs)?,
+        World::TwoRadars | World::RadarCamera => several_sensors(args, &path, &settings, &mut outputs)?,
     }
     print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
@@ -191,6 +201,23 @@ fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Ou
     if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
         file.write(camera_report::json(&sets, &plan, json_options(settings))?)?;
+    }
+    Ok(())
+}
+
+fn several_sensors(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
+    let asked = args.train || args.only_elevation || args.keep.is_some() || !args.beside.is_empty();
+    ensure!(!asked, "--train, --only-elevation, --keep and --beside do not go with --scene {}", args.scene.name());
+    let plan = several_sensors::Plan::read(path)?;
+    outputs.reads(plan.files()?);
+    let json_file = outputs.file("--json", args.json.as_deref())?;
+    let running = bar("simulating and replaying", plan.steps()?);
+    let all = several_sensors::run(&plan, settings, usize::from(args.every), &|| running.step())?;
+    drop(running);
+    print(&sensors_report::text(&all, table::Extent::of(args.wide)))?;
+    if let Some(file) = json_file {
+        let plan = json!({ "file": path.display().to_string(), "content": plan });
+        file.write(sensors_report::json(&all, &plan, json_options(settings))?)?;
     }
     Ok(())
 }

@@ -335,6 +335,9 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
                 s.e2e_errors,
                 s.bus_off
             );
+            if let [Some(last), Some(longest)] = s.frame_ms {
+                let _ = writeln!(text, "  frames: the last took it {last:.1} ms, the longest {longest:.1} ms");
+            }
         }
         let _ = writeln!(text, "  {}", used(&heard.counters));
         if let Some(m) = heard.maps.last() {

@@ -1,6 +1,7 @@
 //! The library's estimators, driven by recordings.
 
 pub mod camera_3d;
+pub mod fused;
 mod radar_2d;
 pub mod radar_3d;
 mod reference;

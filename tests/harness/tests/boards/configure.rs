@@ -97,6 +97,14 @@ fn a_unit_is_configured_compared_read_and_emptied() {
     let (code, text, _) = ask(&["unit.toml", "--check"]);
     assert_eq!(code, 1);
     assert!(text.contains("mount.height_m: 6.0 in the unit, 5.5 in the file"), "{text}");
+    let told = |arguments: &[&str]| -> serde_json::Value {
+        ask(&[arguments, &["--json", "told.json", "--force"]].concat());
+        serde_json::from_slice(&std::fs::read(folder.join("told.json")).unwrap()).unwrap()
+    };
+    let differs = told(&["unit.toml", "--check"]);
+    let height = serde_json::json!([{"key": "mount.height_m", "unit": "6.0", "file": "5.5"}]);
+    assert_eq!((&differs["unit"]["board"], &differs["differences"]), (&"this-computer".into(), &height));
+    assert_eq!(told(&["--read"])["configuration"]["mount"]["height_m"], 6.0);
     assert_eq!(ask(&["unit.toml"]).0, 0);
     let (_, text, _) = ask(&["--read"]);
     assert!(text.contains("height_m = 6.0") && text.contains("# block 2 counts from its next start on"), "{text}");

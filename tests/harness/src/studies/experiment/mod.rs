@@ -2,11 +2,15 @@
 //!
 //! A [`plan`] names the scene and the days; each day is simulated as a recording, read back like any other
 //! and replayed. Counts are pooled over the reporting days, and every rate is kept by day for its spread.
-//! [`scenes`] are crossings and queues, which have a mount each, [`gantry_camera`] is a camera's experiment.
+//! [`scenes`] are crossings and queues, which have a mount each, [`gantry_camera`] is a camera's experiment,
+//! [`several_sensors`] are two on one road.
 
 pub mod gantry_camera;
+pub mod monitoring;
+mod pair;
 pub mod plan;
 pub mod scenes;
+pub mod several_sensors;
 
 use std::io::Cursor;
 

@@ -1,0 +1,187 @@
+//! Who of several sensors is blind: others see what it should see by its own map, and it does not.
+//!
+//! # Model
+//! The view of the watched sensor is cut into sectors. Whatever another sensor detects there is held against the watched one's own map:
+//! where that says hidden or unknown, nothing follows, as a shadow explains why it sees nothing. Where it says visible, the watched
+//! sensor either detects it too, or has missed it. Each half second (`window_ms`) in which a sector has more misses than hits is a miss,
+//! any other with either is a hit; one weighs ln(blind_miss / usual_miss), the other ln((1 - blind_miss) / (1 - usual_miss)), a
+//! sequential probability ratio (Page 1954: never below 0). From `threshold` on the sector is blind, and it is so until its
+//! evidence is used up again, which is the hysteresis.
+//!
+//! [`watched`](Monitor::watched) is the sensor's map without its blind sectors, to be fused in its place.
+//!
+//! # Limits
+//! Silent where nothing moves that others see, and where no other sensor looks. Says that a sensor misses, not why. 16 bytes a sector.
+//!
+//! # References
+//! Page, "Continuous inspection schemes", Biometrika 41, 1954.
+
+use crate::fixed::angle::Angle;
+use crate::fixed::math;
+use crate::fixed::time::Time;
+use crate::fixed::trig;
+use crate::map::polar::column_place;
+use crate::map::{CellState, VisibilityMap};
+use crate::sensor::config::{ConfigError, above, within};
+use crate::sensor::mount::{Levelling, Mount};
+use crate::sensor::road::RoadPoint;
+
+/// When a sector is judged blind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
+pub struct MonitorConfig {
+    /// Share of the windows in which a sensor in order misses what it should see.
+    pub usual_miss: f32,
+    /// Share in which a blind one does.
+    pub blind_miss: f32,
+    /// Evidence from which a sector is blind, nats.
+    pub threshold: f32,
+    /// Length of a window, ms.
+    pub window_ms: u16,
+}
+
+impl Default for MonitorConfig {
+    fn default() -> Self {
+        Self { usual_miss: 0.5, blind_miss: 0.9, threshold: 8.0, window_ms: 500 }
+    }
+}
+
+/// What an observation was worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Observed {
+    /// Outside of the watched sensor's view.
+    Outside,
+    /// Its own map says that it cannot see the place.
+    Explained,
+    /// It should see it, and does.
+    Hit,
+    /// It should see it, and does not.
+    Miss,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Sector {
+    hits: u16,
+    misses: u16,
+    /// 2^-8 nats.
+    evidence: i32,
+    blind: bool,
+}
+
+/// Watches one sensor in `K` sectors from right to left.
+#[derive(Debug, Clone)]
+pub struct Monitor<const K: usize> {
+    levelling: Levelling,
+    right: Angle,
+    span: u16,
+    /// Of a window with a miss, of one with a hit: 2^-8 nats.
+    weights: [i32; 2],
+    threshold: i32,
+    window_us: u64,
+    began: Option<Time>,
+    sectors: [Sector; K],
+}
+
+impl<const K: usize> Monitor<K> {
+    /// For a sensor by its mount and the edges of its view from its heading, degrees, + left.
+    ///
+    /// # Errors
+    /// Names the parameter outside its limits.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within limits
+    pub fn new(mount: &Mount, azimuth_deg: [f32; 2], config: &MonitorConfig) -> Result<Self, ConfigError> {
+        const { assert!(K > 0 && K <= 64) }
+        let [right, left] = azimuth_deg;
+        let right = within("azimuth_deg[0]", right, -180.0, 179.0)?;
+        let left = within("azimuth_deg[1]", left, right + 1.0, 180.0)?;
+        let usual = within("monitor.usual_miss", config.usual_miss, 0.01, 0.98)?;
+        let blind = above("monitor.blind_miss", within("monitor.blind_miss", config.blind_miss, 0.02, 0.99)?, usual)?;
+        let threshold = within("monitor.threshold", config.threshold, 0.5, 50.0)?;
+        let window = within("monitor.window_ms", f32::from(config.window_ms), 50.0, 10_000.0)?;
+        let nats = |v: f32| math::round_i32(v * 256.0);
+        let ratio = |a: f32, b: f32| libm::logf(a / b);
+        Ok(Self {
+            levelling: mount.levelling()?,
+            right: Angle::from_degrees(right),
+            span: math::round_i32((left - right) * (65536.0 / 360.0)).clamp(1, i32::from(u16::MAX)) as u16,
+            weights: [nats(ratio(blind, usual)).max(1), nats(ratio(1.0 - blind, 1.0 - usual)).min(-1)],
+            threshold: nats(threshold),
+            window_us: 1000 * window as u64,
+            began: None,
+            sectors: [Sector { hits: 0, misses: 0, evidence: 0, blind: false }; K],
+        })
+    }
+
+    /// The sector of a place; none outside of the view.
+    pub fn sector(&self, at: RoadPoint) -> Option<usize> {
+        let (x, y) = self.levelling.place(at);
+        let columns = i32::try_from(K).ok()?;
+        let place = column_place(trig::bearing(x, y) - self.right, self.span, columns);
+        usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
+    }
+
+    /// Another sensor detects something at a place. `own` is what the watched sensor's map says of it, `detected` whether that
+    /// detects something there, too.
+    pub fn observe(&mut self, now: Time, at: RoadPoint, own: CellState, detected: bool) -> Observed {
+        self.advance(now);
+        let Some(sector) = self.sector(at).and_then(|k| self.sectors.get_mut(k)) else { return Observed::Outside };
+        if !own.visible() {
+            return Observed::Explained;
+        }
+        let (count, observed) =
+            if detected { (&mut sector.hits, Observed::Hit) } else { (&mut sector.misses, Observed::Miss) };
+        *count = count.saturating_add(1);
+        observed
+    }
+
+    /// Closes the window when it is over; [`observe`](Self::observe) does so as well. Time that steps back begins a new one.
+    pub fn advance(&mut self, now: Time) {
+        let Some(began) = self.began.filter(|began| now >= *began) else {
+            self.began = Some(now);
+            return;
+        };
+        if now.since(began).unwrap_or(0) < self.window_us {
+            return;
+        }
+        self.began = Some(now);
+        let [miss, hit] = self.weights;
+        for sector in &mut self.sectors {
+            let (hits, misses) = (core::mem::take(&mut sector.hits), core::mem::take(&mut sector.misses));
+            if hits == 0 && misses == 0 {
+                continue;
+            }
+            let evidence = sector.evidence + if misses > hits { miss } else { hit };
+            // no more than what is needed twice over, so that a mended sensor is trusted again soon
+            sector.evidence = evidence.clamp(0, 2 * self.threshold);
+            sector.blind = match sector.evidence {
+                0 => false,
+                evidence => sector.blind || evidence >= self.threshold,
+            };
+        }
+    }
+
+    /// Whether a sector is judged blind; not one that does not exist.
+    pub fn is_blind(&self, sector: usize) -> bool {
+        self.sectors.get(sector).is_some_and(|sector| sector.blind)
+    }
+
+    /// The sensor's map, unknown in its blind sectors.
+    pub fn watched<'m, M: VisibilityMap + ?Sized>(&'m self, map: &'m M) -> Watched<'m, M, K> {
+        Watched { monitor: self, map }
+    }
+}
+
+/// A map without the sectors that are judged blind.
+#[derive(Debug, Clone, Copy)]
+pub struct Watched<'m, M: ?Sized, const K: usize> {
+    monitor: &'m Monitor<K>,
+    map: &'m M,
+}
+
+impl<M: VisibilityMap + ?Sized, const K: usize> VisibilityMap for Watched<'_, M, K> {
+    fn at(&self, point: RoadPoint) -> CellState {
+        let blind = self.monitor.sector(point).is_some_and(|sector| self.monitor.is_blind(sector));
+        if blind { CellState::UNKNOWN } else { self.map.at(point) }
+    }
+}

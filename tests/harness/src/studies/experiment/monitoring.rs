@@ -1,0 +1,247 @@
+//! What visibility is worth to whoever watches sensors: the same monitor with the watched sensor's map, and without it.
+//!
+//! Each sensor of a site is watched by the other one, in order and with a third of its view gone dark. With its own map a miss counts
+//! only where that says visible; without, wherever the sensor looks.
+
+use anyhow::Result;
+use rayon::prelude::*;
+use serde::Serialize;
+use viewshed::fusion::{Monitor, MonitorConfig};
+use viewshed::map::{CellState, Visibility};
+use viewshed::sensor::mount::Mount;
+use viewshed::sensor::road::RoadPoint;
+
+use super::pair::{estimator, newest};
+use crate::estimators::camera_3d::{lifted, time};
+use crate::evaluation::Settings;
+use crate::geometry::pose::SensorPose;
+use crate::recording::{Frame, Recording};
+
+const SECTORS: usize = 6;
+/// Parts of the view that go dark one after another.
+const THIRDS: usize = 3;
+/// After the warm-up a sensor is in order for so long, seconds.
+const IN_ORDER_S: f64 = 20.0;
+/// What moves slower is no observation: it may be a fixture that one of them cannot see.
+const MOVING_MPS: f32 = 1.5;
+/// Two sensors see a vehicle at the same place if they see it this near, metres: they see other sides of it.
+const SAME_M: f64 = 6.0;
+
+/// What a monitor said of a sensor.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Alerts {
+    /// Sectors that went dark and in which the other sensor saw something move within 10 s, and how many of them were named at
+    /// all; how long that took, seconds, summed.
+    pub dark: u64,
+    pub named: u64,
+    pub named_after_s: f64,
+    pub slowest_s: f64,
+    /// Of them within 10 s.
+    pub within_10_s: u64,
+    /// Sensors in order: alerts, and the seconds they were watched for.
+    pub wrong: u64,
+    pub watched_s: f64,
+}
+
+impl std::ops::AddAssign for Alerts {
+    fn add_assign(&mut self, o: Self) {
+        self.dark += o.dark;
+        self.named += o.named;
+        self.named_after_s += o.named_after_s;
+        self.slowest_s = self.slowest_s.max(o.slowest_s);
+        self.within_10_s += o.within_10_s;
+        self.wrong += o.wrong;
+        self.watched_s += o.watched_s;
+    }
+}
+
+impl Alerts {
+    /// Wrong alerts in an hour of one sensor.
+    pub fn wrong_per_hour(&self) -> Option<f64> {
+        (self.watched_s > 0.0).then(|| self.wrong as f64 * 3600.0 / self.watched_s)
+    }
+}
+
+/// With visibility, and without.
+pub type Worth = [Alerts; 2];
+
+/// Watches both sensors of a site.
+///
+/// # Errors
+/// Parameters of estimators or monitors that cannot be.
+pub fn watch(both: &[Recording; 2], settings: &Settings) -> Result<Worth> {
+    let cases: Vec<(usize, Option<usize>)> =
+        (0..2).flat_map(|k| [(k, None)].into_iter().chain((0..THIRDS).map(move |t| (k, Some(t))))).collect();
+    let worth = cases.par_iter().map(|&(k, third)| one(&both[k], &both[1 - k], third, settings));
+    let mut sum = Worth::default();
+    for one in worth.collect::<Result<Vec<_>>>()? {
+        sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
+    }
+    Ok(sum)
+}
+
+/// One sensor, watched by another one.
+fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Settings) -> Result<Worth> {
+    let start = own.frames.first().map_or(0, |f| f.time_ns);
+    let since_s = |frame: &Frame| (frame.time_ns - start) as f64 * 1e-9;
+    let from_s = settings.evaluation.warm_up_s + IN_ORDER_S;
+    let broken = dark.map(|third| darkened(own, third, start + (from_s * 1e9) as i64));
+    let recording = broken.as_ref().unwrap_or(own);
+    let view = own.sensor.field_of_view.azimuth_rad.map(f64::to_degrees);
+    let new = || Monitor::<SECTORS>::new(&mount(&own.pose), view.map(|v| v as f32), &MonitorConfig::default());
+    let mut monitors = [new()?, new()?];
+    let mut worth = Worth::default();
+    let mut blind = [[false; SECTORS]; 2];
+    let mut named = [[None::<f64>; SECTORS]; 2];
+    let mut passed = [false; SECTORS];
+    let mut running = estimator(recording, settings)?;
+    for (k, frame) in recording.frames.iter().enumerate() {
+        running.step(frame);
+        let since = since_s(frame);
+        if since < settings.evaluation.warm_up_s {
+            continue;
+        }
+        let Some(theirs) = newest(other, frame.time_ns) else { continue };
+        let seen = places(recording, k, settings, 0.0)?;
+        let map = running.map();
+        for [x, y] in places(other, theirs, settings, MOVING_MPS)? {
+            let detected = seen.iter().any(|p| (p[0] - x).hypot(p[1] - y) <= SAME_M);
+            if !own.sensor.field_of_view.contains(own.pose.to_spherical([x, y, settings.evaluation.slice_height_m])) {
+                continue;
+            }
+            let at = RoadPoint::from_metres(x as f32, y as f32)?;
+            let anywhere = CellState { visibility: Visibility::Visible, grade: 255, occupancy: 0, occupied: false };
+            if let (true, Some(sector)) = ((from_s..from_s + 10.0).contains(&since), monitors[0].sector(at)) {
+                passed[sector] = true;
+            }
+            for (monitor, state) in monitors.iter_mut().zip([map.at(at), anywhere]) {
+                monitor.observe(time(frame.time_ns), at, state, detected);
+            }
+        }
+        for (w, monitor) in monitors.iter_mut().enumerate() {
+            monitor.advance(time(frame.time_ns));
+            for sector in 0..SECTORS {
+                let now = monitor.is_blind(sector);
+                let alert = now && !std::mem::replace(&mut blind[w][sector], now);
+                if dark.is_none() {
+                    worth[w].wrong += u64::from(alert);
+                } else if now && since >= from_s {
+                    named[w][sector].get_or_insert(since - from_s);
+                }
+            }
+        }
+    }
+    for (alerts, named) in worth.iter_mut().zip(named) {
+        let Some(third) = dark else {
+            alerts.watched_s = recording.frames.last().map_or(0.0, since_s) - settings.evaluation.warm_up_s;
+            continue;
+        };
+        for sector in (0..SECTORS).filter(|sector| sector * THIRDS / SECTORS == third && passed[*sector]) {
+            alerts.dark += 1;
+            if let Some(after) = named[sector] {
+                alerts.named += 1;
+                alerts.named_after_s += after;
+                alerts.slowest_s = alerts.slowest_s.max(after);
+                alerts.within_10_s += u64::from(after <= 10.0);
+            }
+        }
+    }
+    Ok(worth)
+}
+
+/// The recording with a third of its view dark from a time on.
+fn darkened(own: &Recording, third: usize, from_ns: i64) -> Recording {
+    let mut dark = own.clone();
+    let is_dark = |share: f64| (share * THIRDS as f64).floor() as i64 == third as i64;
+    let [right, left] = own.sensor.field_of_view.azimuth_rad;
+    for frame in dark.frames.iter_mut().filter(|f| f.time_ns >= from_ns) {
+        frame.detections.retain(|d| !is_dark((f64::from(d.azimuth_rad) - right) / (left - right)));
+    }
+    if let Some(camera) = &mut dark.camera {
+        let width = f64::from(camera.intrinsics.size_px[0]);
+        for frame in camera.frames.iter_mut().filter(|f| f.time_ns >= from_ns) {
+            // columns of the image run from left to right
+            frame.boxes.retain(|b| !is_dark(1.0 - (b.edges[0] + b.edges[2]) / 2.0 / width));
+        }
+    }
+    dark
+}
+
+/// Where a sensor detects something on the road, at least so fast along its line of sight where it measures that.
+fn places(recording: &Recording, frame: usize, settings: &Settings, least_mps: f32) -> Result<Vec<[f64; 2]>> {
+    if let Some(camera) = recording.of_camera() {
+        let Some(boxes) = camera.frames.get(frame) else { return Ok(Vec::new()) };
+        let solids = lifted(camera, boxes, &settings.estimators.camera_3d)?;
+        return Ok(solids.iter().map(|s| [s.center[0], s.center[1]]).collect());
+    }
+    let height = settings.evaluation.slice_height_m;
+    let place = |d: &crate::recording::RadarDetection| {
+        let [x, y, _] = d.road_position(&recording.pose, height);
+        [x, y]
+    };
+    let all = recording.frames.get(frame).map_or(&[][..], |f| &f.detections);
+    Ok(all.iter().filter(|d| d.radial_velocity_mps.abs() >= least_mps).map(place).collect())
+}
+
+fn mount(pose: &SensorPose) -> Mount {
+    let [x, y, z] = pose.position;
+    Mount {
+        x_m: x as f32,
+        y_m: y as f32,
+        height_m: z as f32,
+        yaw_deg: pose.yaw_rad().to_degrees() as f32,
+        pitch_deg: pose.pitch_rad().to_degrees() as f32,
+        roll_deg: pose.roll_rad().to_degrees() as f32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::samples::by_hand::recording;
+    use crate::recording::RadarDetection;
+
+    /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15 degrees to
+    /// the left of the first.
+    fn site() -> [Recording; 2] {
+        let mut both = [recording(1200, 1), recording(1200, 1)];
+        both[1].pose = SensorPose::new([60.0, 0.0, 6.0], std::f64::consts::PI, 0.0, 0.0);
+        for recording in &mut both {
+            let s = recording.pose.to_spherical([25.0, 6.7, 1.0]);
+            let detection = RadarDetection {
+                range_m: s.range_m as f32,
+                azimuth_rad: s.azimuth_rad as f32,
+                elevation_rad: Some(s.elevation_rad as f32),
+                radial_velocity_mps: -8.0,
+                rcs_dbsm: Some(10.0),
+                snr_db: Some(20.0),
+            };
+            recording.frames.iter_mut().for_each(|f| f.detections = vec![detection; 3]);
+        }
+        both
+    }
+
+    #[test]
+    fn a_third_that_goes_dark_is_named_and_sensors_in_order_are_not() {
+        let mut settings = Settings::default();
+        settings.evaluation.warm_up_s = 10.0;
+        let [with, without] = watch(&site(), &settings).unwrap();
+        // one sector of each sensor has the vehicle in it; nobody sees anything in the others
+        for alerts in [with, without] {
+            assert_eq!((alerts.dark, alerts.wrong), (2, 0), "{alerts:?}");
+            assert!((alerts.watched_s - 2.0 * 109.9).abs() < 0.2, "{alerts:?}");
+        }
+        assert_eq!((without.named, without.within_10_s), (2, 2), "{without:?}");
+        assert!(without.slowest_s > 2.0 && without.slowest_s < 4.0, "{without:?}");
+    }
+
+    #[test]
+    fn a_third_is_counted_from_right_to_left() {
+        let [own, _] = site();
+        let left = darkened(&own, 2, 0);
+        assert_eq!(left.frames[5].detections.len(), 3);
+        assert_eq!(darkened(&own, 1, 0).frames[5].detections.len(), 0);
+        assert_eq!(darkened(&own, 0, 0).frames[5].detections.len(), 3);
+        assert_eq!(darkened(&own, 1, 1_000_000_000).frames[5].detections.len(), 3, "not yet");
+    }
+}
