@@ -8,6 +8,8 @@ use crate::obstacles::solid::Solid;
 
 /// Greatest length of what is low, centimetres.
 pub(super) const LONGEST_LOW_CM: i32 = 900;
+/// Sine of the angle to the road's axis from which a thing goes across it, 2^-14: 14.5 degrees.
+const ACROSS: i32 = (1 << 14) / 4;
 
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
@@ -18,7 +20,7 @@ impl Obstacle {
         // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
         let may_be_low = size.length_cm < LONGEST_LOW_CM || self.profile.is_a_row_of_cars(&self.extent);
         let lid = if may_be_low { self.tallness.ceiling_cm() } else { i32::MAX };
-        let margin = if self.free_heading { t.own_way_margin_cm } else { 0 };
+        let margin = self.margin_cm(t);
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
         let hidden = (size.length_cm - seen).max(0) / 2;
@@ -34,6 +36,16 @@ impl Obstacle {
             half_length_cm: size.length_cm / 2,
             half_width_cm: size.width_cm / 2 + margin,
             height_cm: size.height_cm.min(lid).max(tall),
+        }
+    }
+
+    /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its
+    /// own way nearly along the road, whose axis it had for a heading until then.
+    fn margin_cm(&self, t: &Tracking) -> i32 {
+        match (self.free_heading, t.road.sine(self.heading).abs() > ACROSS) {
+            (false, _) => 0,
+            (true, false) => t.own_way_margin_cm / 2,
+            (true, true) => t.own_way_margin_cm,
         }
     }
 
@@ -131,7 +143,11 @@ mod tests {
         let mut o = Obstacle::new(&seen_at(5000, 0, 0), AHEAD, 2000);
         let along_the_road = o.solid(&t).half_width_cm;
         o.free_heading = true;
-        assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.own_way_margin_cm);
+        assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.own_way_margin_cm / 2);
+        for across in [AHEAD.left(), AHEAD.left().reversed(), Direction::of(-3, 1), Direction::of(3, -1)] {
+            o.heading = across;
+            assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.own_way_margin_cm, "{across:?}");
+        }
         assert!(t.own_way_margin_cm > 0);
     }
 

@@ -81,7 +81,8 @@ pub struct ObstacleConfig {
     /// Share of the way to the place seen that the outline of what goes its own way is moved in a frame.
     pub own_way_follow: f32,
     /// How much farther than its width the box of what goes its own way reaches to either side, metres: its place
-    /// across is known to so much, and what may be in the way is not drawn smaller.
+    /// across is known to so much, and what may be in the way is not drawn smaller. Half of it less than 14.5 degrees
+    /// off the road's axis.
     pub own_way_margin_m: f32,
     /// How long an outline must be longer until the box is, seconds.
     pub length_growth_s: f32,
@@ -119,7 +120,7 @@ impl Default for ObstacleConfig {
             outline_memory_s: 2.0,
             outline_min_hits: 2.5,
             outline_share: 0.06,
-            lateral_memory_s: 1.0,
+            lateral_memory_s: 0.8,
             drift_gain: 0.01,
             confirm_hits: 3.0,
             max_evidence: 12.0,
@@ -136,15 +137,15 @@ impl Default for ObstacleConfig {
             turning_noise_mps: 1.0,
             own_way_sigmas: 3.0,
             own_way_mps: 1.5,
-            own_way_share: 0.2,
-            own_way_follow: 0.05,
-            own_way_margin_m: 0.4,
+            own_way_share: 0.15,
+            own_way_follow: 0.1,
+            own_way_margin_m: 0.6,
             length_growth_s: 1.0,
             length_memory_s: 3.0,
             slow_mps: 4.0,
             heading_sigmas: 4.0,
             standing_speed_mps: 0.7,
-            standing_visible_loss_per_s: 3.0,
+            standing_visible_loss_per_s: 5.0,
             standing_hidden_loss_per_s: 0.1,
             sizes: SizeConfig::default(),
         }

@@ -67,6 +67,8 @@ fn length(v: Ground) -> f64 {
 
 /// How far beyond its outline an end of a vehicle may reflect.
 const END: f64 = 0.5;
+/// Sine of the angle to the road's axis from which a thing goes across it.
+const ACROSS: f64 = 0.25;
 /// Greatest length of what is low.
 const LONGEST_LOW: f64 = 9.0;
 
@@ -393,7 +395,12 @@ impl Obstacle {
             f64::INFINITY
         };
         let height = height.min(lid).max(tall);
-        let margin = if self.free_heading { rules.own_way_margin } else { 0.0 };
+        let across = along(left(rules.road), self.heading).abs() > ACROSS;
+        let margin = match (self.free_heading, across) {
+            (false, _) => 0.0,
+            (true, false) => rules.own_way_margin / 2.0,
+            (true, true) => rules.own_way_margin,
+        };
         let yaw_rad = self.heading[1].atan2(self.heading[0]);
         Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width + 2.0 * margin, height] }
     }
