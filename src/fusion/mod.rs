@@ -13,15 +13,18 @@
 //! | occupied | any that sees it says so, whatever the others say; where nobody sees it, any that knows of it |
 //! | in conflict | one sees it free, and nothing occupied beside it, where another sees it occupied |
 //!
-//! A map that is too old counts as unknown, and so does one that claims to be of the future. A newer map replaces all that its sensor
-//! said before. Maps of one sensor and one time are parts of the same scan, or repetitions: they are joined, and where both know a cell
-//! the worse of them counts. So neither the order in which maps come, nor repeating them, nor cutting them into parts makes a difference.
+//! A map that is late or claims to be of the future is refused; what is held of a sensor counts until it is too old. A newer map replaces
+//! all that its sensor said before. Maps of one sensor and one time are parts of the same scan, or repetitions: they are joined, and where
+//! both know a cell the worse of them counts. So as long as a sensor keeps its mount and its kind of map, neither the order in which
+//! maps come, nor repeating them, nor cutting them into parts makes a difference. Mount and kind are those of its first map until it is
+//! [forgotten](Fusion::forget), which is also due when it starts over: a map does not say so.
 //!
 //! [`fill`] puts it into the cells of a [`polar`] map around a place of one's choice, which a
 //! [`Broadcaster`](crate::wire::broadcast::Broadcaster) sends.
 //!
 //! # Limits
-//! At most 8 sensors; `NX * NY * (3 * S + 1)` bytes. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
+//! At most 8 sensors; `NX * NY * (3 * S + 1) + 4 * NX * S` bytes. What lies between the middles of cells is not looked at: cells are 2 m
+//! at most. Polar maps count up to 400 m from their sensor. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
 //! A sensor that sends its last picture again and again with new times cannot be told from a road on which nothing moves: its
 //! [`Monitor`] can, where others see what it should.
 //!
@@ -52,7 +55,7 @@ pub const MOST_SENSORS: usize = 8;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct FusionConfig {
-    /// Age from which a map is unknown, ms.
+    /// Age up to which a map counts, ms.
     pub max_age_ms: u16,
     /// How far clocks may differ, ms: a map from later than this is not taken.
     pub max_lead_ms: u16,
@@ -76,7 +79,7 @@ pub enum NotTaken {
     Early,
     /// It is too old to count: late, or its clock differs.
     Late,
-    /// Its cells lie elsewhere than those the sensor was placed with: another mount, grid or epoch.
+    /// Its cells lie elsewhere than those of the sensor's first map, or it is of another kind: another mount, grid or threshold.
     OtherGeometry,
 }
 
@@ -140,9 +143,9 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
     /// Forgets everything; the first cell's corner with the smallest coordinates lies at `origin`.
     ///
     /// # Errors
-    /// Cells smaller than 0.25 m or larger than 10 m, an age of no time or of more than 10 s.
+    /// Cells smaller than 0.25 m or larger than 2 m, an age of no time or of more than 10 s.
     pub fn set(&mut self, origin: RoadPoint, cell_cm: i32, config: FusionConfig) -> Result<(), ConfigError> {
-        within("fusion.cell_cm", cell_cm as f32, 25.0, 1000.0)?;
+        within("fusion.cell_cm", cell_cm as f32, 25.0, 200.0)?;
         within("fusion.max_age_ms", f32::from(config.max_age_ms), 1.0, 10_000.0)?;
         within("fusion.max_lead_ms", f32::from(config.max_lead_ms), 0.0, 10_000.0)?;
         (self.config, self.origin, self.cell_cm) = (config, origin, cell_cm);
@@ -225,7 +228,7 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         Ok(())
     }
 
-    /// Takes any map.
+    /// Takes any map, of a sensor none of whose polar maps was taken.
     ///
     /// # Errors
     /// Why it was not taken.
@@ -238,8 +241,13 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
     ) -> Result<(), NotTaken> {
         let (held, grades) =
             self.held.get_mut(sensor).zip(self.grades.get_mut(sensor)).ok_or(NotTaken::NoSuchSensor)?;
+        // a polar map of it would not reach all that this one does, and leave the rest behind
+        if self.places.get(sensor).is_some_and(Places::are_worked_out) {
+            held.taken.other_geometry = held.taken.other_geometry.saturating_add(1);
+            return Err(NotTaken::OtherGeometry);
+        }
         let join = held.admit(measured, now, self.config)?;
-        let (bit, from) = (bit(sensor), held.visible_from.max(2));
+        let (bit, from) = (bit(sensor), held.visible_from);
         let (origin, cell_cm) = (self.origin, self.cell_cm);
         for (i, (grades, occupied)) in (0..).zip(grades.iter_mut().zip(&mut self.occupied)) {
             for (j, (grade, occupied)) in (0..).zip(grades.iter_mut().zip(occupied)) {

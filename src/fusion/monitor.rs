@@ -94,7 +94,7 @@ impl<const K: usize> Monitor<K> {
         const { assert!(K > 0 && K <= 64) }
         let [right, left] = azimuth_deg;
         let right = within("azimuth_deg[0]", right, -180.0, 179.0)?;
-        let left = within("azimuth_deg[1]", left, right + 1.0, 180.0)?;
+        let left = within("azimuth_deg[1]", left, right + 1.0, right + 179.9)?;
         let usual = within("monitor.usual_miss", config.usual_miss, 0.01, 0.98)?;
         let blind = above("monitor.blind_miss", within("monitor.blind_miss", config.blind_miss, 0.02, 0.99)?, usual)?;
         let threshold = within("monitor.threshold", config.threshold, 0.5, 50.0)?;
@@ -121,7 +121,8 @@ impl<const K: usize> Monitor<K> {
         usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
     }
 
-    /// Another sensor detects something at a place. `own` is what the watched sensor's map says of it, `detected` whether that
+    /// Another sensor detects something at a place. `own` is what the watched sensor's map says of it
+    /// (before [`watched`](Self::watched), or a blind sector stays blind), `detected` whether that
     /// detects something there, too.
     pub fn observe(&mut self, now: Time, at: RoadPoint, own: CellState, detected: bool) -> Observed {
         self.advance(now);

@@ -140,7 +140,8 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
             return None;
         }
         for (x, y) in (0..9).map(|k| (i.wrapping_add(k / 3).wrapping_sub(1), j.wrapping_add(k % 3).wrapping_sub(1))) {
-            free &= !self.bits(x, y).1;
+            let (visible, occupied) = self.bits(x, y);
+            free &= !(visible & occupied);
         }
         let [x, y] = [i, j].map(|k| i32::try_from(k).unwrap_or(i32::MAX));
         let at = centre(self.fusion.origin, self.fusion.cell_cm, x, y);

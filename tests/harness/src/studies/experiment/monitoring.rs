@@ -22,7 +22,7 @@ const SECTORS: usize = 6;
 const THIRDS: usize = 3;
 /// After the warm-up a sensor is in order for so long, seconds.
 const IN_ORDER_S: f64 = 20.0;
-/// What moves slower is no observation: it may be a fixture that one of them cannot see.
+/// What a radar sees move slower is no observation: it may be a fixture that the other cannot see.
 const MOVING_MPS: f32 = 1.5;
 /// Two sensors see a vehicle at the same place if they see it this near, metres: they see other sides of it.
 const SAME_M: f64 = 6.0;
@@ -30,7 +30,7 @@ const SAME_M: f64 = 6.0;
 /// What a monitor said of a sensor.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Alerts {
-    /// Sectors that went dark and in which the other sensor saw something move within 10 s, and how many of them were named at
+    /// Sectors that went dark, were not judged blind before, and in which the other sensor saw something move within 10 s, and how many of them were named at
     /// all; how long that took, seconds, summed.
     pub dark: u64,
     pub named: u64,
@@ -94,6 +94,8 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
     let mut blind = [[false; SECTORS]; 2];
     let mut named = [[None::<f64>; SECTORS]; 2];
     let mut passed = [false; SECTORS];
+    // before it went dark: that is no finding
+    let mut blind_before = [[false; SECTORS]; 2];
     let mut running = estimator(recording, settings)?;
     for (k, frame) in recording.frames.iter().enumerate() {
         running.step(frame);
@@ -125,18 +127,22 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
                 let alert = now && !std::mem::replace(&mut blind[w][sector], now);
                 if dark.is_none() {
                     worth[w].wrong += u64::from(alert);
-                } else if now && since >= from_s {
+                } else if since < from_s {
+                    blind_before[w][sector] = now;
+                } else if alert {
                     named[w][sector].get_or_insert(since - from_s);
                 }
             }
         }
     }
+    // the same sectors for both, or their shares would be of different things
+    let counts = |sector: usize| passed[sector] && !blind_before.iter().any(|before| before[sector]);
     for (alerts, named) in worth.iter_mut().zip(named) {
         let Some(third) = dark else {
             alerts.watched_s = recording.frames.last().map_or(0.0, since_s) - settings.evaluation.warm_up_s;
             continue;
         };
-        for sector in (0..SECTORS).filter(|sector| sector * THIRDS / SECTORS == third && passed[*sector]) {
+        for sector in (0..SECTORS).filter(|sector| sector * THIRDS / SECTORS == third && counts(*sector)) {
             alerts.dark += 1;
             if let Some(after) = named[sector] {
                 alerts.named += 1;
