@@ -184,8 +184,7 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
             self.places.get_mut(sensor).zip(self.held.get_mut(sensor)).ok_or(NotTaken::NoSuchSensor)?;
         let grades = self.grades.get_mut(sensor).ok_or(NotTaken::NoSuchSensor)?;
         if !places.fit(map) && held.measured.is_some() {
-            held.taken.other_geometry = held.taken.other_geometry.saturating_add(1);
-            return Err(NotTaken::OtherGeometry);
+            return Err(held.refuse(NotTaken::OtherGeometry));
         }
         let join = held.admit(measured, now, self.config)?;
         if !places.fit(map) {
@@ -243,8 +242,7 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
             self.held.get_mut(sensor).zip(self.grades.get_mut(sensor)).ok_or(NotTaken::NoSuchSensor)?;
         // a polar map of it would not reach all that this one does, and leave the rest behind
         if self.places.get(sensor).is_some_and(Places::are_worked_out) {
-            held.taken.other_geometry = held.taken.other_geometry.saturating_add(1);
-            return Err(NotTaken::OtherGeometry);
+            return Err(held.refuse(NotTaken::OtherGeometry));
         }
         let join = held.admit(measured, now, self.config)?;
         let (bit, from) = (bit(sensor), held.visible_from);
@@ -309,30 +307,39 @@ impl Held {
 
     /// Whether a map of this time is taken, and joined to the one before.
     fn admit(&mut self, measured: Time, now: Time, config: FusionConfig) -> Result<bool, NotTaken> {
-        let count = |counter: &mut u32| *counter = counter.saturating_add(1);
         let (lead, age) = (measured.since(now).unwrap_or(0), now.since(measured).unwrap_or(0));
         if lead > 1000 * u64::from(config.max_lead_ms) {
-            count(&mut self.taken.early);
-            return Err(NotTaken::Early);
+            return Err(self.refuse(NotTaken::Early));
         }
         if age > 1000 * u64::from(config.max_age_ms) {
-            count(&mut self.taken.late);
-            return Err(NotTaken::Late);
+            return Err(self.refuse(NotTaken::Late));
         }
         match self.measured {
-            Some(newest) if measured < newest => {
-                count(&mut self.taken.older);
-                return Err(NotTaken::Older);
-            }
+            Some(newest) if measured < newest => Err(self.refuse(NotTaken::Older)),
             Some(newest) if measured == newest => {
-                count(&mut self.taken.joined);
-                return Ok(true);
+                self.taken.joined = self.taken.joined.saturating_add(1);
+                Ok(true)
             }
-            _ => {}
+            _ => {
+                self.taken.new = self.taken.new.saturating_add(1);
+                self.measured = Some(measured);
+                Ok(false)
+            }
         }
-        count(&mut self.taken.new);
-        self.measured = Some(measured);
-        Ok(false)
+    }
+
+    /// Counts a map that is not taken, under its reason.
+    fn refuse(&mut self, why: NotTaken) -> NotTaken {
+        let Taken { older, early, late, other_geometry, .. } = &mut self.taken;
+        let counter = match why {
+            NotTaken::NoSuchSensor => return why,
+            NotTaken::Older => older,
+            NotTaken::Early => early,
+            NotTaken::Late => late,
+            NotTaken::OtherGeometry => other_geometry,
+        };
+        *counter = counter.saturating_add(1);
+        why
     }
 
     /// Whether its newest map counts.

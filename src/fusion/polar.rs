@@ -21,24 +21,32 @@ const MOST_PLACES: i32 = 8;
 /// # Errors
 /// A mount that cannot be, edges in the wrong order or more than half a turn apart, cells smaller than 0.25 m, larger than 10 m or, all of
 /// them together, longer than 400 m.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within limits
 pub fn polar<const R: usize, const A: usize>(
     mount: &Mount,
     azimuth_deg: [f32; 2],
     cell_m: f32,
 ) -> Result<PolarMap<R, A>, ConfigError> {
-    let [right, left] = azimuth_deg;
-    let right = within("azimuth_deg[0]", right, -180.0, 179.0)?;
-    let left = within("azimuth_deg[1]", left, right + 1.0, right + 179.9)?;
+    let (azimuth_origin, azimuth_span) = edges(azimuth_deg)?;
     let cell = within("cell_m", cell_m, 0.25, (400.0 / R as f32).min(10.0))?;
-    let span = math::round_i32((left - right) * (65536.0 / 360.0)).clamp(1, i32::from(u16::MAX));
     let geometry = PolarGeometry {
         levelling: mount.levelling()?,
         cell_cm: math::round_i32(cell * 100.0),
-        azimuth_origin: Angle::from_degrees(right),
-        azimuth_span: span as u16,
+        azimuth_origin,
+        azimuth_span,
     };
     Ok(PolarMap::unknown(geometry, THRESHOLD, THRESHOLD))
+}
+
+/// Right edge of a view, and its width in 2^-16 turn, from both edges in degrees, + left.
+///
+/// # Errors
+/// Edges in the wrong order or more than half a turn apart.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within limits
+pub(super) fn edges([right, left]: [f32; 2]) -> Result<(Angle, u16), ConfigError> {
+    let right = within("azimuth_deg[0]", right, -180.0, 179.0)?;
+    let left = within("azimuth_deg[1]", left, right + 1.0, right + 179.9)?;
+    let span = math::round_i32((left - right) * (65536.0 / 360.0)).clamp(1, i32::from(u16::MAX));
+    Ok((Angle::from_degrees(right), span as u16))
 }
 
 /// Fills a polar map of [`polar`]: each cell has the worst of what is known at up to 8 by 8 places in it, a metre or more apart, and is

@@ -91,7 +91,7 @@ pub struct StatusSeen {
 }
 
 /// What happened to its frames.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Counted {
     pub accepted: u32,
     pub protection: u32,

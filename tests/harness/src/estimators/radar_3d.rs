@@ -124,6 +124,15 @@ mod tests {
     use super::*;
     use crate::recording::RadarDetection;
 
+    const VIEW: FieldOfView = FieldOfView {
+        azimuth_min_deg: -60.0,
+        azimuth_max_deg: 60.0,
+        elevation_min_deg: -16.0,
+        elevation_max_deg: 16.0,
+        range_min_m: 3.0,
+        range_max_m: 200.0,
+    };
+
     /// So many vehicles that come nearer, 6 m and 12 degrees apart.
     fn frame(k: i64, vehicles: usize) -> Frame {
         let detection = |n: usize| RadarDetection {
@@ -143,17 +152,9 @@ mod tests {
 
     #[test]
     fn an_obstacle_stands_on_the_road_where_its_reflections_are() {
-        let field_of_view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
         // looks back along the road, from (100, 20): what is to its left has the smaller y
         let mount = Mount { x_m: 100.0, y_m: 20.0, height_m: 6.0, yaw_deg: 180.0, pitch_deg: 0.0, roll_deg: 0.0 };
-        let sensor = Sensor { mount, field_of_view, noise: NoiseConfig::default() };
+        let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
         let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
         let mut one = frame(0, 1);
         one.detections[0].azimuth_rad = 0.1;
@@ -171,16 +172,8 @@ mod tests {
 
     #[test]
     fn a_list_of_obstacles_that_is_full_is_reported_with_its_limit() {
-        let field_of_view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 };
-        let sensor = Sensor { mount, field_of_view, noise: NoiseConfig::default() };
+        let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
         let no_room = |vehicles: usize| {
             let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
             (0..40).for_each(|k| estimator.step(&frame(k, vehicles)));

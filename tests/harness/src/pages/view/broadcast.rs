@@ -155,18 +155,7 @@ mod tests {
     use crate::bus::listening::Counted;
 
     fn heard(condition: &str, epoch: u8) -> Heard {
-        let counters = Counted {
-            accepted: 0,
-            protection: 0,
-            not_authentic: 0,
-            lost: 0,
-            repeated: 0,
-            out_of_sequence: 0,
-            late: 0,
-            epoch: 0,
-            early: 0,
-            malformed: 0,
-        };
+        let counters = Counted::default();
         let (condition, epoch) = (condition.to_owned(), Some(epoch));
         Heard { sensor: 3, condition, epoch, header: None, status: None, counters, maps: Vec::new() }
     }

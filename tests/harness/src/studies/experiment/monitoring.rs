@@ -8,13 +8,14 @@ use rayon::prelude::*;
 use serde::Serialize;
 use viewshed::fusion::{Monitor, MonitorConfig};
 use viewshed::map::{CellState, Visibility};
-use viewshed::sensor::mount::Mount;
 use viewshed::sensor::road::RoadPoint;
 
 use super::pair::{estimator, newest};
-use crate::estimators::camera_3d::{lifted, time};
+use crate::estimators::{
+    self,
+    camera_3d::{lifted, time},
+};
 use crate::evaluation::Settings;
-use crate::geometry::pose::SensorPose;
 use crate::recording::{Frame, Recording};
 
 const SECTORS: usize = 6;
@@ -88,7 +89,8 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
     let broken = dark.map(|third| darkened(own, third, start + (from_s * 1e9) as i64));
     let recording = broken.as_ref().unwrap_or(own);
     let view = own.sensor.field_of_view.azimuth_rad.map(f64::to_degrees);
-    let new = || Monitor::<SECTORS>::new(&mount(&own.pose), view.map(|v| v as f32), &MonitorConfig::default());
+    let new =
+        || Monitor::<SECTORS>::new(&estimators::mount(&own.pose), view.map(|v| v as f32), &MonitorConfig::default());
     let mut monitors = [new()?, new()?];
     let mut worth = Worth::default();
     let mut blind = [[false; SECTORS]; 2];
@@ -189,22 +191,11 @@ fn places(recording: &Recording, frame: usize, settings: &Settings, least_mps: f
     Ok(all.iter().filter(|d| d.radial_velocity_mps.abs() >= least_mps).map(place).collect())
 }
 
-fn mount(pose: &SensorPose) -> Mount {
-    let [x, y, z] = pose.position;
-    Mount {
-        x_m: x as f32,
-        y_m: y as f32,
-        height_m: z as f32,
-        yaw_deg: pose.yaw_rad().to_degrees() as f32,
-        pitch_deg: pose.pitch_rad().to_degrees() as f32,
-        roll_deg: pose.roll_rad().to_degrees() as f32,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::evaluation::samples::by_hand::recording;
+    use crate::geometry::pose::SensorPose;
     use crate::recording::RadarDetection;
 
     /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15 degrees to
