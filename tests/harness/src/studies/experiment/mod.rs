@@ -7,7 +7,6 @@
 
 pub mod gantry_camera;
 pub mod monitoring;
-mod pair;
 pub mod plan;
 pub mod scenes;
 pub mod several_sensors;
