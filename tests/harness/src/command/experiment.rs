@@ -1,6 +1,7 @@
 //! `viewshed experiment`: the paper's experiment on the digital twin, or crossings and queues of it; a table out.
 
 use std::collections::BTreeMap;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -21,6 +22,7 @@ use crate::results::report::{
 use crate::studies::experiment::plan::{Day, Plan};
 use crate::studies::experiment::scenes::{self, Extent, Variant};
 use crate::studies::experiment::{Experiment, gantry_camera, several_sensors, total_steps};
+use crate::twin::simulate::Simulation;
 use crate::{estimators, recording};
 
 /// Estimators that run, for the progress bar.
@@ -206,13 +208,20 @@ fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Ou
 }
 
 fn several_sensors(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.only_elevation || args.keep.is_some() || !args.beside.is_empty();
-    ensure!(!asked, "--train, --only-elevation, --keep and --beside do not go with --scene {}", args.scene.name());
+    let asked = args.train || args.only_elevation || !args.beside.is_empty();
+    ensure!(!asked, "--train, --only-elevation and --beside do not go with --scene {}", args.scene.name());
     let plan = several_sensors::Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
+    let file = |site: &str| site.replace(", ", "-");
+    let kept = kept(args, plan.site.iter().map(|site| file(&site.name())), outputs)?;
+    let keep = |site: &str, simulation: &Simulation| {
+        let Some(target) = kept.get(&file(site)) else { return Ok(()) };
+        let (bytes, _) = simulation.record(Cursor::new(Vec::new()), &|| ())?;
+        target.write(bytes.into_inner())
+    };
     let running = bar("simulating and replaying", plan.steps()?);
-    let all = several_sensors::run(&plan, settings, usize::from(args.every), &|| running.step())?;
+    let all = several_sensors::run(&plan, settings, usize::from(args.every), &keep, &|| running.step())?;
     drop(running);
     print(&sensors_report::text(&all, table::Extent::of(args.wide)))?;
     if let Some(file) = json_file {

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::monitoring::{self, Worth};
@@ -42,6 +42,14 @@ pub struct Site {
     pub duration_s: Option<f64>,
     /// A second radar like the first; without it the scene's camera is the second sensor.
     pub second_radar: Option<FurtherRadar>,
+}
+
+impl Site {
+    /// The scene's, and the traffic's where that is not its own.
+    pub fn name(&self) -> String {
+        let scene = self.scene.file_stem().unwrap_or_default().to_string_lossy();
+        self.fcd.as_ref().map_or(scene.to_string(), |fcd| format!("{scene}, {}", plan::name(fcd)))
+    }
 }
 
 impl Plan {
@@ -122,15 +130,22 @@ struct SiteResult {
     watched: Worth,
 }
 
-/// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged.
+/// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged. `keep` is given each site's
+/// name and what it is recorded with.
 ///
 /// # Errors
 /// Those of the scenes, the traffic and of the estimators' parameters.
-pub fn run(plan: &Plan, settings: &Settings, every: usize, progress: &(dyn Fn() + Sync)) -> Result<Vec<Counted>> {
+pub fn run(
+    plan: &Plan,
+    settings: &Settings,
+    every: usize,
+    keep: &dyn Fn(&str, &Simulation) -> Result<()>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Vec<Counted>> {
     let mut settings = settings.clone();
     settings.evaluation.warm_up_s = plan.warm_up_s;
     let one = |site: &Site| {
-        site_of(plan, site, &settings, every, progress).with_context(|| format!("site {}", site.scene.display()))
+        site_of(plan, site, &settings, every, keep, progress).with_context(|| format!("site {}", site.scene.display()))
     };
     let sites = plan.site.iter().map(one).collect::<Result<Vec<_>>>()?;
     let counted = |name: &str, sites: &[&SiteResult]| -> Option<Counted> {
@@ -147,26 +162,22 @@ pub fn run(plan: &Plan, settings: &Settings, every: usize, progress: &(dyn Fn() 
     Ok(pooled.chain(all.iter().filter_map(|site| counted(&site.name, &[site]))).collect())
 }
 
-/// Both sensors' recordings of the same traffic.
-fn recordings(plan: &Plan, site: &Site, settings: &Settings, progress: &(dyn Fn() + Sync)) -> Result<[Recording; 2]> {
-    let fcd = site.fcd.as_ref().map(|fcd| plan.folder.join(fcd));
-    let simulation = Simulation::new(plan.scene(site)?, fcd.as_deref())?;
-    let range_m = f64::from(settings.estimators.camera_3d.range_max_m);
-    let recordings = simulation.recordings(range_m, progress)?;
-    recordings.try_into().map_err(|_| anyhow::anyhow!("not two sensors"))
-}
-
 fn site_of(
     plan: &Plan,
     site: &Site,
     settings: &Settings,
     every: usize,
+    keep: &dyn Fn(&str, &Simulation) -> Result<()>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<SiteResult> {
-    let both = recordings(plan, site, settings, progress)?;
+    let fcd = site.fcd.as_ref().map(|fcd| plan.folder.join(fcd));
+    let simulation = Simulation::new(plan.scene(site)?, fcd.as_deref())?;
+    let name = site.name();
+    keep(&name, &simulation)?;
+    let range_m = f64::from(settings.estimators.camera_3d.range_max_m);
+    let recordings = simulation.recordings(range_m, progress)?;
+    let both: [Recording; 2] = recordings.try_into().map_err(|_| anyhow!("not two sensors"))?;
     let judged = sensor_set::judge(&both, settings, every, progress)?;
-    let name = site.scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let name = site.fcd.as_ref().map_or(name.clone(), |fcd| format!("{name}, {}", plan::name(fcd)));
     let watched = monitoring::watch(&both, settings)?;
     Ok(SiteResult { name, judged, watched })
 }
