@@ -102,9 +102,6 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
     for (k, frame) in recording.frames.iter().enumerate() {
         running.step(frame);
         let since = since_s(frame);
-        if since < settings.evaluation.warm_up_s {
-            continue;
-        }
         let Some(theirs) = newest(other, frame.time_ns) else { continue };
         let seen = places(recording, k, settings, 0.0)?;
         let map = running.map();
@@ -126,7 +123,12 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
             monitor.advance(time(frame.time_ns));
             for sector in 0..SECTORS {
                 let now = monitor.is_blind(sector);
-                let alert = now && !std::mem::replace(&mut blind[w][sector], now);
+                let before = std::mem::replace(&mut blind[w][sector], now);
+                let alert = now && !before;
+                // it learns what is usual meanwhile
+                if since < settings.evaluation.warm_up_s {
+                    continue;
+                }
                 if dark.is_none() {
                     worth[w].wrong += u64::from(alert);
                 } else if since < from_s {
