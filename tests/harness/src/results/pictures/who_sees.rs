@@ -129,7 +129,8 @@ mod tests {
         let colour = |x_m: i32| ground(&fusion.at(now).place(RoadPoint::new(100 * x_m + 50, 0)), 1, 1);
         assert_eq!(colour(5), palette::SEVERAL);
         assert_eq!(colour(15), palette::sensor(1));
-        let hidden = CellState { visibility: Visibility::Invisible, grade: 0, occupancy: 0, occupied: false };
+        // grades are held from 1 on: 0 is unknown
+        let hidden = CellState { visibility: Visibility::Invisible, grade: 1, occupancy: 0, occupied: false };
         assert_eq!(colour(25), palette::ground(&hidden, 1, 1));
         assert_ne!(palette::sensor(0), palette::sensor(1));
     }
