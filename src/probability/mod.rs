@@ -20,7 +20,8 @@ use crate::fixed::angle::Angle;
 use crate::fixed::{math, trig};
 use crate::map::polar::PolarMap;
 use crate::map::query::Footprint;
-use crate::map::{UNKNOWN, Visibility, VisibilityMap};
+use crate::map::{CellState, UNKNOWN, Visibility, VisibilityMap};
+use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
 
 /// Steps of the grade.
@@ -197,11 +198,15 @@ impl ProbabilityTable {
 
     /// Probability at a point of a map of the unit; unknown has none.
     pub fn at<const R: usize, const A: usize>(&self, map: &PolarMap<R, A>, point: RoadPoint) -> Option<Probability> {
-        let state = map.at(point);
+        self.of_cell(&map.geometry().levelling, map.at(point), point)
+    }
+
+    /// The same of what any map of the unit says of a point.
+    pub fn of_cell(&self, levelling: &Levelling, state: CellState, point: RoadPoint) -> Option<Probability> {
         if state.visibility == Visibility::Unknown {
             return None;
         }
-        let (x, y) = map.geometry().levelling.place(point);
+        let (x, y) = levelling.place(point);
         self.look_up(state.grade, math::length(x, y), trig::bearing(x, y))
     }
 

@@ -5,7 +5,7 @@
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
 //! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
 //! [`calibration`] judges probabilities, which [`probability`] fits,
-//! [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, [`over_time`] counts window by window, and
+//! [`paired`] compares two runs, [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, [`over_time`] counts window by window, and
 //! [`examples`] picks what is worth a picture.
 
 pub mod bootstrap;
@@ -20,6 +20,7 @@ pub mod curve;
 pub mod examples;
 pub mod mount_error;
 pub mod over_time;
+pub mod paired;
 pub mod pool;
 pub mod probability;
 pub mod rejected;

@@ -9,7 +9,7 @@ use viewshed::wire::header::fingerprint;
 
 use crate::evaluation::curve::{GRADE_SLOTS, Grades};
 
-/// A table and the samples it was fitted on, by what it says of them.
+/// A table and the samples it was fitted on, by what tables fitted without them say of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fitted {
     pub table: ProbabilityTable,
@@ -31,7 +31,7 @@ struct Content {
     azimuths: [i16; AZIMUTHS - 1],
     /// In 1/255: azimuths from right to left, ranges from near to far, steps of the grade.
     values: [[[u8; GRADES]; RANGES]; AZIMUTHS],
-    /// Of the samples of fitting: p in 1/255, detected, missed.
+    /// Of the samples of fitting, by tables fitted without them: p in 1/255, detected, missed.
     counted: Vec<[u64; 3]>,
 }
 

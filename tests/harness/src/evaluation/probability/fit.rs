@@ -15,6 +15,7 @@ use viewshed::fixed::angle::Angle;
 use viewshed::probability::{AZIMUTHS, Edges, GRADES, ProbabilityTable, RANGES};
 
 use super::samples::{Place, Places};
+use crate::evaluation::curve::{GRADE_SLOTS, Grades};
 
 /// Tracks that what a bin is drawn towards weighs as much as. Chosen on the days tables are fitted on, each left out
 /// in turn.
@@ -205,6 +206,32 @@ pub fn table(places: &Places, fingerprint: u32) -> Option<ProbabilityTable> {
     ProbabilityTable::new(edges, values, fingerprint).ok()
 }
 
+/// Parts that samples are left out in.
+const FOLDS: usize = 4;
+
+/// What tables say of samples they were not fitted on: units in [`FOLDS`] parts, in their order (days stay together, as
+/// far as they are alike long), each left out in turn. A threshold from these is not flattered by the fit. `None` where
+/// a part leaves nothing to fit on.
+pub fn left_out(places: &Places) -> Option<Grades> {
+    let folds = FOLDS.min(places.units.max(1));
+    let mut counted = Grades::default();
+    for fold in 0..folds {
+        let (out, kept): (Vec<Place>, Vec<Place>) =
+            places.all.iter().partition(|p| p.unit * folds / places.units.max(1) == fold);
+        if folds > 1 && out.is_empty() {
+            continue;
+        }
+        // one unit alone has no others
+        let kept = Places { all: if folds > 1 { kept } else { places.all.clone() }, ..*places };
+        let table = table(&kept, 0)?;
+        out.iter().for_each(|p| counted.add(p.detected, look_up(&table, p)));
+    }
+    // unknown is not of a table
+    let unknown = GRADE_SLOTS - 1;
+    (counted.positive[unknown], counted.negative[unknown]) = (0, 0);
+    Some(counted)
+}
+
 /// Steps and bins of [`offline`].
 const OFFLINE_PLACES: usize = 16;
 
@@ -257,7 +284,7 @@ mod tests {
                 all.push(Place { grade: Some(grade), range_cm, azimuth: Angle::from_raw(azimuth), detected, unit });
             }
         }
-        Places { all, units: tracks }
+        Places { all, units: tracks, kind: "tracks" }
     }
 
     #[test]
@@ -292,10 +319,29 @@ mod tests {
     }
 
     #[test]
+    fn what_was_left_out_is_not_said_by_a_table_that_knows_it() {
+        // every track has a place of its own and is always or never detected there: only its own samples tell
+        let place = |unit: usize| Place {
+            grade: Some(255),
+            range_cm: 100 + 200 * unit as i32,
+            azimuth: Angle::ZERO,
+            detected: unit % 2 == 0,
+            unit,
+        };
+        let all = (0..80).flat_map(|unit| [place(unit); 30]).collect();
+        let places = Places { all, units: 80, kind: "tracks" };
+        let counted = left_out(&places).unwrap();
+        let total: u64 = counted.positive.iter().chain(counted.negative.iter()).sum();
+        assert_eq!(total, 2400, "every sample once");
+        // a part without its even tracks would be seen here: base rates of the others stay near a half
+        assert!((0..60).chain(200..256).all(|p| counted.positive[p] + counted.negative[p] == 0), "{counted:?}");
+    }
+
+    #[test]
     fn without_a_known_grade_there_is_no_table() {
         let unknown = Place { grade: None, range_cm: 1, azimuth: Angle::ZERO, detected: true, unit: 0 };
-        assert!(table(&Places { all: vec![unknown], units: 1 }, 0).is_none());
+        assert!(table(&Places { all: vec![unknown], units: 1, kind: "tracks" }, 0).is_none());
         let one = Place { grade: Some(9), ..unknown };
-        assert!(table(&Places { all: vec![one], units: 1 }, 0).is_some());
+        assert!(table(&Places { all: vec![one], units: 1, kind: "tracks" }, 0).is_some());
     }
 }

@@ -3,7 +3,7 @@
 //! # Model
 //! Risk = P(not detected | called visible): of the vehicles that stand where the map says visible, the share that is
 //! missed. Called visible is what has p >= threshold. The threshold for a risk is the least whose risk was not above it
-//! among the samples the table was fitted on. It is not the FVR, which is of those that were missed.
+//! among the samples of fitting, each judged by a table that was fitted without it. It is not the FVR, which is of those that were missed.
 
 use serde::Serialize;
 

@@ -33,6 +33,8 @@ pub struct Place {
 pub struct Places {
     pub all: Vec<Place>,
     pub units: usize,
+    /// What units are: `tracks` or `frames`.
+    pub kind: &'static str,
 }
 
 impl Places {
@@ -47,7 +49,7 @@ impl Places {
                 all.push(Place { grade: verdict.grade, range_cm, azimuth, detected: sample.detected, unit });
             }
         }
-        Self { all, units: units.object_units }
+        Self { all, units: units.object_units, kind: units.kind }
     }
 
     /// Adds those of another recording.
@@ -55,6 +57,7 @@ impl Places {
         let known = self.units;
         self.all.extend(other.all.into_iter().map(|p| Place { unit: p.unit + known, ..p }));
         self.units += other.units;
+        self.kind = other.kind;
     }
 
     /// What a predictor says of every unit; `None` is unknown.

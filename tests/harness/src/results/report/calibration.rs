@@ -32,12 +32,13 @@ pub fn text(all: &[Judged], extent: Extent) -> String {
         );
     }
     text + "table: at most 1 kB, on the unit; grade: the grade as it is, over 255; offline: the same fit without limits of size.\n\
-            risk: of what is called visible, the share that is missed. n-sample KS over track means is no bar: even a\n\
+            risk: of what is called visible, the share that is missed. Two-sample KS over track means is no bar: even a\n\
             perfect probability has 0.25 to 0.5 there.\n"
 }
 
 fn counted(of: crate::studies::experiment::calibration::Extent) -> String {
-    format!("{} days, {} tracks, {} samples", of.days, of.units, of.samples)
+    let days = if of.days > 1 { format!("{} days, ", of.days) } else { String::new() };
+    format!("{days}{} {}, {} samples", of.units, of.kind, of.samples)
 }
 
 fn figure(figure: Figure) -> String {

@@ -11,8 +11,8 @@ use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::pair;
 use super::plan::{self, Day};
-use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::bootstrap::{Draws, Interval};
 use crate::evaluation::calibration::{Bin, ByTrack, Metrics, diagram};
@@ -25,9 +25,6 @@ use crate::evaluation::score::{Score, score};
 use crate::recording::{Recording, mcap};
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
-
-/// The estimator whose grades are turned into probabilities.
-pub const ESTIMATOR: &str = "radar-3d";
 
 /// Risks that are asked for.
 pub const RISKS: [f64; 3] = [0.05, 0.1, 0.2];
@@ -134,10 +131,11 @@ impl Plan {
 /// What a set of days has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Extent {
-    /// Days, or halves of a recording.
+    /// 1 for a half of a recording.
     pub days: usize,
-    /// Tracks; frames where frames are independent.
     pub units: usize,
+    /// What units are, `tracks` or `frames`.
+    pub kind: &'static str,
     pub samples: usize,
 }
 
@@ -237,9 +235,8 @@ fn scored(
     progress: &(dyn Fn() + Sync),
 ) -> Result<(Vec<FrameSamples>, Score)> {
     let samples = samples::collect(recording, &settings.evaluation, progress);
-    let mut running = estimators::all(recording, &settings.estimators)?;
-    let estimator = running.iter_mut().find(|e| e.name() == ESTIMATOR);
-    let estimator = estimator.with_context(|| format!("{} is of no radar", recording.name))?;
+    ensure!(recording.of_camera().is_none(), "{} is of a camera; probabilities are of radars", recording.name);
+    let mut estimator = pair::estimator(recording, settings)?;
     let score = score(estimator.as_mut(), recording, &samples, settings.evaluation.grid, &|| progress());
     Ok((samples, score))
 }
@@ -261,7 +258,7 @@ fn judge(
     let nothing = || format!("{name}: no object of known grade to fit on");
     let table = fit::table(&fit, configuration).with_context(nothing)?;
     let offline = fit::offline(&fit).with_context(nothing)?;
-    let counted = fit.said(|p| fit::look_up(&table, p)).total();
+    let counted = fit::left_out(&fit).with_context(nothing)?;
     let said = report.said(|p| fit::look_up(&table, p));
     let (grade, unlimited) = (report.said(|p| p.grade), report.said(|p| offline.p(p)));
     let draws = Draws::new(said.tracks(), settings.evaluation.bootstrap, settings.evaluation.seed);
@@ -292,7 +289,7 @@ fn judge(
         let drawn = draws.iter().map(|times| Kept::of(threshold, &said.drawn(times)).risk);
         Risk { asked, threshold, kept: Kept::of(threshold, &said.total()), interval: Interval::of(drawn) }
     };
-    let extent = |days, of: &Places| Extent { days, units: of.units, samples: of.all.len() };
+    let extent = |days, of: &Places| Extent { days, units: of.units, kind: of.kind, samples: of.all.len() };
     Ok(Judged {
         name: name.to_owned(),
         fit: extent(fit_days, &fit),
@@ -348,7 +345,7 @@ mod tests {
                 clear.chain(hidden).collect()
             };
             let samples = frames((from..from + 40).map(objects));
-            let score = crate::evaluation::score::by_hand::score(ESTIMATOR, &samples, |s| {
+            let score = crate::evaluation::score::by_hand::score("radar-3d", &samples, |s| {
                 Some(if s.slice_in_sight { 255 } else { 20 })
             });
             (1, Places::of(&recording(40, 40), &samples, &score))
