@@ -254,7 +254,7 @@ mod tests {
     fn adjacent_violators_are_pooled_by_weight() {
         assert_eq!(isotonic(&[0.1, 0.5, 0.3, 0.9], &[1.0, 1.0, 3.0, 1.0]), [0.1, 0.35, 0.35, 0.9]);
         // back to the first
-        assert_eq!(isotonic(&[0.6, 0.6, 0.0], &[1.0, 1.0, 1.0]), [0.4; 3]);
+        assert_eq!(isotonic(&[0.75, 0.5, 0.25], &[1.0, 1.0, 1.0]), [0.5; 3]);
         assert_eq!(isotonic(&[], &[]), [0.0; 0]);
     }
 
@@ -315,7 +315,8 @@ mod tests {
         places.units += 1;
         let bins = Bins { ranges_cm: vec![20_000], azimuths: vec![], ..Bins::new(&places, GRADES, 2, 1) };
         let p = f64::from(Fit::new(&places, bins).unwrap().p(&far).unwrap()) / 255.0;
-        assert!((0.6..0.87).contains(&p), "{p}");
+        // others say 0.9
+        assert!((0.6..0.885).contains(&p), "{p}");
     }
 
     #[test]

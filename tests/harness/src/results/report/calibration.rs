@@ -31,9 +31,10 @@ pub fn text(all: &[Judged], extent: Extent) -> String {
             risks(&judged.risks, extent)
         );
     }
-    text + "table: at most 1 kB, on the unit; grade: the grade as it is, over 255; offline: the same fit without limits of size.\n\
+    text += "table: at most 1 kB, on the unit; grade: the grade as it is, over 255; offline: the same fit without limits of size.\n\
             risk: of what is called visible, the share that is missed. Two-sample KS over track means is no bar: even a\n\
-            perfect probability has 0.25 to 0.5 there.\n"
+            perfect probability has 0.25 to 0.5 there.\n";
+    format!("{text}\n{ORIGIN}\n")
 }
 
 fn counted(of: crate::studies::experiment::calibration::Extent) -> String {
