@@ -326,7 +326,7 @@ mod tests {
             grade: Some(255),
             range_cm: 100 + 200 * unit as i32,
             azimuth: Angle::ZERO,
-            detected: unit % 2 == 0,
+            detected: unit.is_multiple_of(2),
             unit,
         };
         let all = (0..80).flat_map(|unit| [place(unit); 30]).collect();

@@ -340,8 +340,8 @@ mod tests {
     fn halves() -> ((usize, Places), (usize, Places)) {
         let of = |from: usize| {
             let objects = |k: usize| {
-                let clear = (0..20).map(move |t| sample(t, 20.0 + t as f64, (k + t) % 20 != 0, true));
-                let hidden = (20..40).map(move |t| sample(t, 20.0 + t as f64, (k + t) % 2 == 0, false));
+                let clear = (0..20).map(move |t| sample(t, 20.0 + t as f64, !(k + t).is_multiple_of(20), true));
+                let hidden = (20..40).map(move |t| sample(t, 20.0 + t as f64, (k + t).is_multiple_of(2), false));
                 clear.chain(hidden).collect()
             };
             let samples = frames((from..from + 40).map(objects));

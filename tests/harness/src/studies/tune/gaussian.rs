@@ -60,8 +60,8 @@ impl<'a> Process<'a> {
         let mean = values.iter().sum::<f64>() / n;
         let deviation = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-9);
         let standard: Vec<f64> = values.iter().map(|v| (v - mean) / deviation).collect();
-        let logarithmic = |[low, high]: [f64; 2], u: f64| low * (high / low as f64).powf(u);
-        let mut found: Option<(f64, Vec<f64>, Vec<Vec<f64>>, Vec<f64>)> = None;
+        let logarithmic = |[low, high]: [f64; 2], u: f64| low * (high / low).powf(u);
+        let (mut greatest, mut found) = (f64::NEG_INFINITY, None);
         for _ in 0..FITS {
             let lengths: Vec<f64> = (0..dimensions).map(|_| logarithmic(LENGTHS, uniform(random))).collect();
             let noise = logarithmic(NOISE, uniform(random));
@@ -72,12 +72,13 @@ impl<'a> Process<'a> {
             let half = forward(&lower, &standard);
             let fit = half.iter().map(|v| v * v).sum::<f64>() / 2.0;
             let likelihood = -fit - lower.iter().enumerate().map(|(i, row)| row[i].ln()).sum::<f64>();
-            if found.as_ref().is_none_or(|(best, ..)| likelihood > *best) {
+            if likelihood > greatest {
                 let weights = backward(&lower, &half);
-                found = Some((likelihood, lengths, lower, weights));
+                greatest = likelihood;
+                found = Some((lengths, lower, weights));
             }
         }
-        let (_, lengths, cholesky, weights) = found?;
+        let (lengths, cholesky, weights) = found?;
         let best = standard.iter().copied().fold(f64::INFINITY, f64::min);
         Some(Self { points, lengths, cholesky, weights, mean, deviation, best })
     }
