@@ -127,7 +127,11 @@ fn collect(value: &Value, within: &str, sets: &mut Vec<Set>) -> Result<()> {
                     sets.push(Set { name: name.clone(), units, estimators });
                 }
             }
-            map.iter().filter(|(key, _)| *key != "plan").try_for_each(|(_, inner)| collect(inner, &name, sets))
+            map.iter().filter(|(key, _)| *key != "plan").try_for_each(|(key, inner)| {
+                // the camera of a recording has no name of its own
+                let of_camera = format!("{name}, camera");
+                collect(inner, if key == "camera" { &of_camera } else { &name }, sets)
+            })
         }
         _ => Ok(()),
     }
@@ -204,9 +208,14 @@ mod tests {
     #[test]
     fn runs_are_found_wherever_they_lie_in_a_file() {
         let one = run_of("a", &["1", "2"], &["1 2 3 4", "5 6 7 8"]);
-        let nested = json!({ "variants": [{ "counted": "main", "pooled": one, "scenes": [one] }], "plan": one });
-        let found = sets(&nested).unwrap();
-        assert_eq!(found.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), ["main, a", "main, a"]);
+        let mut of_camera = run_of("c", &["9"], &["1 2 3 4"]);
+        of_camera.as_object_mut().unwrap().remove("recording");
+        let nested = json!({ "variants": [{ "counted": "main", "pooled": one, "scenes": [one] }], "plan": one,
+            "recording": "r", "camera": of_camera });
+        let mut found = sets(&nested).unwrap();
+        found.sort_by(|a, b| b.name.cmp(&a.name));
+        let names: Vec<&str> = found.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["r, main, a", "r, main, a", "r, camera"]);
         let counted = &found[0].estimators[0].1;
         assert_eq!(counted.by_unit[1], Counts { tv: 5, fv: 6, ti: 7, fi: 8 });
         assert_eq!(counted.by_block[0].blocked_visible, 1);

@@ -230,7 +230,7 @@ pub fn rates(all: &[Counted]) -> Rates {
     let all: Vec<_> = all.iter().map(of).collect();
     std::array::from_fn(|k| {
         let known: Vec<f64> = all.iter().filter_map(|rates| rates[k]).collect();
-        (!known.is_empty()).then(|| 100.0 * known.iter().sum::<f64>() / known.len() as f64)
+        (!known.is_empty()).then(|| short(100.0 * known.iter().sum::<f64>() / known.len() as f64))
     })
 }
 
@@ -239,7 +239,12 @@ fn loss(rates: &Rates, usual: &Rates) -> f64 {
         let above = own.zip(*usual).map_or(0.0, |(own, usual)| (own - usual).max(0.0));
         own.unwrap_or(0.0) + PENALTY * above
     };
-    rates.iter().zip(usual).map(one).sum()
+    short(rates.iter().zip(usual).map(one).sum())
+}
+
+/// Rounded to a millionth, so that it comes back from a file as it was.
+fn short(points: f64) -> f64 {
+    (points * 1e6).round() / 1e6
 }
 
 #[cfg(test)]
@@ -285,6 +290,12 @@ mod tests {
 
     #[test]
     fn a_search_goes_on_from_its_own_file_only() {
+        let mut long = state();
+        // more digits than a file gives back
+        long.evaluations[0].loss = loss(&[Some(38.345_864_661_654_13), Some(22.690_381_079_195_994), None, None], &[None; 4]);
+        let mut back = State { evaluations: Vec::new(), ..state() };
+        back.resume(&serde_json::to_string(&long).unwrap()).unwrap();
+        assert_eq!(back, long);
         let kept = serde_json::to_string(&state()).unwrap();
         let mut empty = State { evaluations: Vec::new(), ..state() };
         empty.resume(&kept).unwrap();

@@ -95,8 +95,9 @@ impl Space {
     /// Values of a point of the unit cube, in the parameters' order, rounded to what is worth writing down.
     pub fn values(&self, point: &[f64]) -> Vec<f64> {
         let value = |(p, x): (&Parameter, &f64)| {
-            let step = 10_f64.powf(((p.high - p.low).log10() - 3.0).floor());
-            ((p.low + x * (p.high - p.low)) / step).round() * step
+            // divided by a power of ten, a value is as short as it looks, and comes back from a file as it was
+            let parts = 10_f64.powi(3 - (p.high - p.low).log10().floor() as i32);
+            ((p.low + x * (p.high - p.low)) * parts).round() / parts
         };
         self.parameter.iter().zip(point).map(value).collect()
     }
