@@ -4,14 +4,18 @@
 //! The view of the watched sensor is cut into sectors. Whatever another sensor detects there is held against the watched one's own map:
 //! where that says hidden or unknown, nothing follows, as a shadow explains why it sees nothing. Where it says visible, the watched
 //! sensor either detects it too, or has missed it. Each half second (`window_ms`) in which a sector has more misses than hits is a miss,
-//! any other with either is a hit; one weighs ln(blind_miss / usual_miss), the other ln((1 - blind_miss) / (1 - usual_miss)), a
-//! sequential probability ratio (Page 1954: never below 0). From `threshold` on the sector is blind, and it is so until its
-//! evidence is used up again, which is the hysteresis.
+//! any other with either is a hit; one weighs ln(blind / usual), the other ln((1 - blind) / (1 - usual)), a sequential probability ratio
+//! (Page 1954: never below 0). From `threshold` on the sector is blind, and it is so until its evidence is used up again, which
+//! is the hysteresis.
+//!
+//! `blind` is `blind_miss`, the share of misses of a blind sector. `usual` is the sector's own share, learned over `learned_windows` of its windows, and
+//! at least `usual_miss`: behind a mast or at the far end of the view a sensor in order misses more than elsewhere. A sector
+//! that usually misses nearly as much as a blind one is not judged anew; one that is blind stays so until it sees.
 //!
 //! [`watched`](Monitor::watched) is the sensor's map without its blind sectors, to be fused in its place.
 //!
 //! # Limits
-//! Silent where nothing moves that others see, and where no other sensor looks. Says that a sensor misses, not why. 16 bytes a sector.
+//! Silent where nothing moves that others see, and where no other sensor looks. A sensor that loses its sight over hours is taken for usual. Says that a sensor misses, not why. 16 bytes a sector, and 128.
 //!
 //! # References
 //! Page, "Continuous inspection schemes", Biometrika 41, 1954.
@@ -33,7 +37,7 @@ use super::polar::edges;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct MonitorConfig {
-    /// Share of the windows in which a sensor in order misses what it should see.
+    /// Least share of the windows in which a sensor in order misses what it should see.
     pub usual_miss: f32,
     /// Share in which a blind one does.
     pub blind_miss: f32,
@@ -41,11 +45,13 @@ pub struct MonitorConfig {
     pub threshold: f32,
     /// Length of a window, ms.
     pub window_ms: u16,
+    /// Windows of a sector over which its usual share of misses is learned; 0: it is `usual_miss` everywhere.
+    pub learned_windows: u16,
 }
 
 impl Default for MonitorConfig {
     fn default() -> Self {
-        Self { usual_miss: 0.5, blind_miss: 0.9, threshold: 8.0, window_ms: 500 }
+        Self { usual_miss: 0.5, blind_miss: 0.97, threshold: 8.0, window_ms: 500, learned_windows: 200 }
     }
 }
 
@@ -69,8 +75,15 @@ struct Sector {
     misses: u16,
     /// 2^-8 nats.
     evidence: i32,
+    /// Usual share of windows with a miss, 2^-16.
+    usual: u32,
     blind: bool,
 }
+
+/// Usual shares of misses that weights are worked out for.
+const LEVELS: usize = 16;
+/// How much more than usual a blind sector has to miss for it to be judged.
+const LEAST_GAP: f32 = 0.05;
 
 /// Watches one sensor in `K` sectors from right to left.
 #[derive(Debug, Clone)]
@@ -78,8 +91,11 @@ pub struct Monitor<const K: usize> {
     levelling: Levelling,
     right: Angle,
     span: u16,
-    /// Of a window with a miss, of one with a hit: 2^-8 nats.
-    weights: [i32; 2],
+    /// Of a window with a miss, of one with a hit: 2^-8 nats, by the usual share of misses.
+    weights: [[i32; 2]; LEVELS],
+    /// Least usual share, 2^-16, and windows that it is learned over.
+    usual: u32,
+    learned_windows: u16,
     threshold: i32,
     window_us: u64,
     began: Option<Time>,
@@ -101,15 +117,24 @@ impl<const K: usize> Monitor<K> {
         let window = within("monitor.window_ms", f32::from(config.window_ms), 50.0, 10_000.0)?;
         let nats = |v: f32| math::round_i32(v * 256.0);
         let ratio = |a: f32, b: f32| libm::logf(a / b);
+        let mut weights = [[0; 2]; LEVELS];
+        for (level, weights) in (0_u16..).zip(&mut weights) {
+            let usual = ((f32::from(level) + 0.5) / LEVELS as f32).max(usual);
+            let miss = if usual + LEAST_GAP < blind { nats(ratio(blind, usual)) } else { 0 };
+            *weights = [miss, nats(ratio(1.0 - blind, 1.0 - usual.min(blind))).min(-1)];
+        }
+        let least = (usual * 65_536.0) as u32;
         Ok(Self {
             levelling: mount.levelling()?,
             right,
             span,
-            weights: [nats(ratio(blind, usual)).max(1), nats(ratio(1.0 - blind, 1.0 - usual)).min(-1)],
+            weights,
+            usual: least,
+            learned_windows: config.learned_windows,
             threshold: nats(threshold),
             window_us: 1000 * window as u64,
             began: None,
-            sectors: [Sector { hits: 0, misses: 0, evidence: 0, blind: false }; K],
+            sectors: [Sector { hits: 0, misses: 0, evidence: 0, usual: least, blind: false }; K],
         })
     }
 
@@ -146,13 +171,20 @@ impl<const K: usize> Monitor<K> {
             return;
         }
         self.began = Some(now);
-        let [miss, hit] = self.weights;
         for sector in &mut self.sectors {
             let (hits, misses) = (core::mem::take(&mut sector.hits), core::mem::take(&mut sector.misses));
             if hits == 0 && misses == 0 {
                 continue;
             }
-            let evidence = sector.evidence + if misses > hits { miss } else { hit };
+            let level = usize::try_from(sector.usual >> 12).unwrap_or(0).min(LEVELS - 1);
+            let [miss, hit] = self.weights.get(level).copied().unwrap_or_default();
+            let missed = misses > hits;
+            let evidence = sector.evidence + if missed { miss } else { hit };
+            // towards 1 or 0 by the same part of what is left
+            let target: u32 = if missed { 65_535 } else { 0 };
+            let step = target.abs_diff(sector.usual).checked_div(u32::from(self.learned_windows)).unwrap_or(0);
+            let learned = if missed { sector.usual.saturating_add(step) } else { sector.usual.saturating_sub(step) };
+            sector.usual = learned.max(self.usual);
             // no more than what is needed twice over, so that a mended sensor is trusted again soon
             sector.evidence = evidence.clamp(0, 2 * self.threshold);
             sector.blind = match sector.evidence {

@@ -44,7 +44,7 @@ fn sectors_run_from_right_to_left() {
 fn a_blind_sector_is_named_within_seconds_and_trusted_again_when_it_sees() {
     let mut monitor = monitor(MonitorConfig::default());
     let named = run(&mut monitor, 0, 10, Visibility::Visible, false).expect("blind");
-    // 14 windows of ln 1.8 nats, each of half a second and a frame
+    // 14 windows of ln(0.97 / 0.53) nats, each of half a second and a frame
     assert!((7000..8100).contains(&named), "{named} ms");
     assert!((0..6).all(|k| monitor.is_blind(k) == (k == 3)), "and no other");
     /// All of it visible.
@@ -58,9 +58,9 @@ fn a_blind_sector_is_named_within_seconds_and_trusted_again_when_it_sees() {
     assert_eq!(watched.at(AHEAD), CellState::UNKNOWN);
     assert!(watched.at(LEFT).visible());
     // one that sees again: not at once
-    run(&mut monitor, 10_000, 2, Visibility::Visible, true);
+    run(&mut monitor, 10_000, 1, Visibility::Visible, true);
     assert!(monitor.is_blind(3));
-    run(&mut monitor, 12_000, 4, Visibility::Visible, true);
+    run(&mut monitor, 11_000, 5, Visibility::Visible, true);
     assert!(!monitor.is_blind(3));
 }
 
@@ -87,6 +87,27 @@ fn misses_now_and_then_are_usual() {
     // a clock that steps back loses its window, nothing else
     monitor.observe(Time::from_micros(5), AHEAD, says(Visibility::Visible), false);
     assert!(!monitor.is_blind(3) && !monitor.is_blind(77));
+}
+
+#[test]
+fn what_a_sector_usually_misses_is_learned_and_its_darkness_named_all_the_same() {
+    let usual = MonitorConfig::default();
+    let [mut learned, mut fixed] = [usual, MonitorConfig { learned_windows: 0, ..usual }].map(monitor);
+    // 11 s without a hit, then 5 s with hits, for 20 minutes: behind a mast
+    let cycle = |monitor: &mut Monitor<6>, k: u64| {
+        let named = run(monitor, 16_000 * k, 11, Visibility::Visible, false);
+        run(monitor, 16_000 * k + 11_000, 5, Visibility::Visible, true);
+        named
+    };
+    let alerts = |monitor: &mut Monitor<6>| (0..75).map(|k| cycle(monitor, k)).collect::<Vec<_>>();
+    let (learned_alerts, fixed_alerts) = (alerts(&mut learned), alerts(&mut fixed));
+    assert!(fixed_alerts.iter().all(Option::is_some), "{fixed_alerts:?}");
+    assert!(learned_alerts[25..].iter().all(Option::is_none), "{learned_alerts:?}");
+    let named = run(&mut learned, 1_200_000, 60, Visibility::Visible, false).expect("dark");
+    assert!((8_000..30_000).contains(&named), "{named} ms");
+    // darkness is not learned: it lasts until the sensor sees
+    run(&mut learned, 1_260_000, 3600, Visibility::Visible, false);
+    assert!(learned.is_blind(3));
 }
 
 #[test]

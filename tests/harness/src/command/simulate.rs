@@ -70,6 +70,7 @@ More that a scene may have, each with defaults:
                                              parameter with its source)
   [[radar.interference]]                     from_s, to_s, noise_rise_db
   [[radar.outage]]                           from_s, to_s, frames = \"empty\" or \"missing\"
+  [[further_radar]]                          name, mount: like the first, elsewhere; any number
   [camera]                                   name, mount, rate_hz, image = { width_px, height_px, view_deg },
                                              detector = { ... }
   [[static]]                                 id, class (barrier, sign_gantry, or a vehicle's that is parked),

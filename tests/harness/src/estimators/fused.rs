@@ -1,8 +1,8 @@
 //! Several sensors' estimators, fused: `viewshed::fusion` over their maps.
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, anyhow, ensure};
 use viewshed::fixed::time::Time;
-use viewshed::fusion::{Fusion, FusionConfig};
+use viewshed::fusion::{FusedCell, Fusion, FusionConfig, MOST_SENSORS};
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 
@@ -10,10 +10,16 @@ use super::Estimator;
 use super::camera_3d::time;
 use crate::recording::Frame;
 
+/// Name of the fused map.
+pub const FUSED: &str = "fused";
+
 /// Cells of the road, of one metre.
 const CELLS: usize = 320;
 
-type Road = Fusion<2, CELLS, CELLS>;
+type Road = Fusion<MOST_SENSORS, CELLS, CELLS>;
+
+/// Stack that a road is made on, bytes: it is moved to the heap once it is there.
+const STACK: usize = 4 * size_of::<Road>() + (1 << 20);
 
 struct Member {
     estimator: Box<dyn Estimator>,
@@ -22,7 +28,8 @@ struct Member {
     taken: usize,
 }
 
-struct Fused {
+/// Estimators whose maps are fused.
+pub struct Fused {
     members: Vec<Member>,
     road: Box<Road>,
     now: Time,
@@ -30,30 +37,35 @@ struct Fused {
     steps: usize,
 }
 
-/// At most two estimators with their frames, on a grid around these cells of the road, metres. Maps are fused at each `every`-th frame, as no others are
+/// Estimators with their frames, on a grid around these cells of the road, metres. Maps are fused at each `every`-th frame, as no others are
 /// judged.
 ///
 /// # Errors
-/// A road larger than the grid.
-pub fn new(
-    members: Vec<(Box<dyn Estimator>, Vec<Frame>)>,
-    road: &[(i32, i32)],
-    every: usize,
-) -> Result<Box<dyn Estimator>> {
+/// More estimators than can be fused, a road larger than the grid.
+pub fn new(members: Vec<(Box<dyn Estimator>, Vec<Frame>)>, road: &[(i32, i32)], every: usize) -> Result<Box<Fused>> {
+    ensure!(members.len() <= MOST_SENSORS, "{} sensors; {MOST_SENSORS} can be fused", members.len());
     let ends =
         |of: fn(&(i32, i32)) -> i32| (road.iter().map(of).min().unwrap_or(0), road.iter().map(of).max().unwrap_or(0));
     let ((x, x_end), (y, y_end)) = (ends(|c| c.0), ends(|c| c.1));
     let long = [x_end - x, y_end - y].into_iter().max().unwrap_or(0) as usize;
     ensure!(long < CELLS, "the road is {long} m long or wide; {CELLS} m can be fused");
-    let mut fusion = Box::new(Road::NOWHERE);
+    let made = std::thread::Builder::new().stack_size(STACK).spawn(|| Box::new(Road::NOWHERE));
+    let mut fusion = made?.join().map_err(|_| anyhow!("a road of {} bytes cannot be made", size_of::<Road>()))?;
     fusion.set(RoadPoint::new(100 * x, 100 * y), 100, FusionConfig::default())?;
     let members = members.into_iter().map(|(estimator, frames)| Member { estimator, frames, taken: 0 }).collect();
     Ok(Box::new(Fused { members, road: fusion, now: Time::from_micros(0), every, steps: 0 }))
 }
 
+impl Fused {
+    /// What each of the estimators says of a place now.
+    pub fn place(&self, point: RoadPoint) -> FusedCell {
+        self.road.at(self.now).place(point)
+    }
+}
+
 impl Estimator for Fused {
     fn name(&self) -> &str {
-        "fused"
+        FUSED
     }
 
     fn reset(&mut self) {

@@ -28,6 +28,7 @@ pub mod replay;
 pub mod returns;
 pub mod samples;
 pub mod score;
+pub mod sensor_set;
 pub mod summary;
 pub mod units;
 

@@ -21,6 +21,17 @@ pub const TRUTH_TOPIC: &str = "/ground_truth/objects";
 pub const ROAD_FRAME: &str = "road";
 pub const SENSOR_METADATA: &str = "viewshed.sensor";
 
+/// Topic of one of several radars, by its name.
+pub fn points_topic(name: &str) -> String {
+    format!("/radar/{}/points", in_topics(name))
+}
+
+/// A name as topics, frames and records have it: small letters, digits and `_`.
+pub fn in_topics(name: &str) -> String {
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
+    name.chars().map(letter).collect::<String>().trim_matches('_').to_owned()
+}
+
 const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
 const DETECTIONS: &str = "vision_msgs/msg/Detection3DArray";
@@ -121,6 +132,20 @@ pub fn parse(bytes: &[u8], name: String, options: &ReadOptions) -> Result<Record
     reader.finish(name, options)
 }
 
+/// What a record says of a radar; one by the radar's name is of the topic of that name.
+fn of_sensor(record: mcap::records::Metadata) -> Option<BTreeMap<String, String>> {
+    let name = record.name.strip_prefix(SENSOR_METADATA)?;
+    let mut said = record.metadata;
+    match name.strip_prefix('.') {
+        None if name.is_empty() => {}
+        Some(name) if !name.is_empty() => {
+            said.entry("topic".to_owned()).or_insert_with(|| points_topic(name));
+        }
+        _ => return None,
+    }
+    Some(said)
+}
+
 impl Reader {
     fn records(&mut self, bytes: &[u8]) -> Result<()> {
         let options = mcap::read::Options::IgnoreEndMagic.into();
@@ -154,7 +179,7 @@ impl Reader {
                     });
                 }
                 Record::Message { header, data } => self.message(&header, &data),
-                Record::Metadata(m) if m.name == SENSOR_METADATA => self.metadata.push(m.metadata),
+                Record::Metadata(m) => self.metadata.extend(of_sensor(m)),
                 Record::DataEnd(_) => {
                     ended = true;
                 }
@@ -278,9 +303,12 @@ impl Reader {
     fn finish(mut self, name: String, options: &ReadOptions) -> Result<Recording> {
         if self.frames.is_empty() {
             // boxes of a camera without a radar are a recording of their own
+            let named_radar = |t: &Topic| t.is_of_a_radar() && t.name.starts_with("/radar/");
             let camera = match options.radar_topic {
-                None => std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems),
-                Some(_) => None,
+                None if !self.channels.values().any(named_radar) => {
+                    std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems)
+                }
+                _ => None,
             };
             if let Some(camera) = camera {
                 let truth = self.labelled.then(|| Truth::new(self.labels));

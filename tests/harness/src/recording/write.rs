@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result, anyhow};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Compression, WriteOptions, Writer};
 use serde::Serialize;
 
 use super::camera::{self, CAMERA_FRAME, CameraFrame, INFO_TOPIC, Intrinsics, OBJECTS_TOPIC, OPTICAL_FRAME};
-use super::mcap::{POINTS_TOPIC, ROAD_FRAME, SENSOR_METADATA, TRUTH_TOPIC};
+use super::mcap::{POINTS_TOPIC, ROAD_FRAME, SENSOR_METADATA, TRUTH_TOPIC, in_topics, points_topic};
 use super::ros::{
     Detection3D, Detection3DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose, PointCloud2, PointField, Pose,
     Quaternion, Stamp, TfMessage, Transform, TransformStamped, Vector3, encode,
@@ -41,14 +41,16 @@ const VIEWER_STEP_M: f64 = 1.0 / 8.0;
 /// Writes one recording, message by message, in the order of time.
 pub struct RecordingWriter<W: Write + Seek> {
     writer: Writer<W>,
-    channels: BTreeMap<&'static str, u16>,
+    /// Topic and frame of each radar.
+    radars: Vec<[String; 2]>,
+    channels: BTreeMap<String, u16>,
     sequence: u32,
 }
 
 impl<W: Write + Seek> RecordingWriter<W> {
     /// Begins a recording of a sensor mounted at `pose` since `start_ns`.
     pub fn new(sink: W, sensor: &Sensor, pose: &SensorPose, start_ns: i64) -> Result<Self> {
-        Self::begin(sink, Some(sensor), start_ns, &mount(pose, RADAR_FRAME, start_ns))
+        Self::of_several(sink, &[(sensor.clone(), *pose)], None, start_ns)
     }
 
     /// The same with a camera beside the radar.
@@ -59,34 +61,60 @@ impl<W: Write + Seek> RecordingWriter<W> {
         camera: &SensorPose,
         start_ns: i64,
     ) -> Result<Self> {
-        let mut mounts = mount(pose, RADAR_FRAME, start_ns);
-        mounts.transforms.extend(mount(camera, CAMERA_FRAME, start_ns).transforms);
-        mounts.transforms.push(optical(start_ns));
-        Self::begin(sink, Some(sensor), start_ns, &mounts)
+        Self::of_several(sink, &[(sensor.clone(), *pose)], Some(camera), start_ns)
     }
 
     /// Begins a recording of a camera without a radar.
     pub fn of_camera(sink: W, camera: &SensorPose, start_ns: i64) -> Result<Self> {
-        let mut mounts = mount(camera, CAMERA_FRAME, start_ns);
-        mounts.transforms.push(optical(start_ns));
-        Self::begin(sink, None, start_ns, &mounts)
+        Self::of_several(sink, &[], Some(camera), start_ns)
     }
 
-    fn begin(sink: W, sensor: Option<&Sensor>, start_ns: i64, mounts: &TfMessage) -> Result<Self> {
+    /// Begins a recording of any radars, with their mounts, and perhaps a camera. A single radar writes to [`POINTS_TOPIC`], each of
+    /// several to a topic, and with a frame, of its own name.
+    pub fn of_several(
+        sink: W,
+        radars: &[(Sensor, SensorPose)],
+        camera: Option<&SensorPose>,
+        start_ns: i64,
+    ) -> Result<Self> {
+        let names: Vec<Option<&str>> =
+            radars.iter().map(|(s, _)| (radars.len() > 1).then_some(s.name.as_str())).collect();
+        let topics = names.iter().map(|name| match name {
+            Some(name) => [points_topic(name), format!("{RADAR_FRAME}_{}", in_topics(name))],
+            None => [POINTS_TOPIC.to_owned(), RADAR_FRAME.to_owned()],
+        });
+        let topics: Vec<[String; 2]> = topics.collect();
+        let mut mounts = TfMessage { transforms: Vec::new() };
+        for ([_, frame], (_, pose)) in topics.iter().zip(radars) {
+            mounts.transforms.extend(mount(pose, frame, start_ns).transforms);
+        }
+        if let Some(camera) = camera {
+            mounts.transforms.extend(mount(camera, CAMERA_FRAME, start_ns).transforms);
+            mounts.transforms.push(optical(start_ns));
+        }
         let options = WriteOptions::new().profile("ros2").compression(Some(Compression::Zstd));
         // one thread whatever the machine: the bytes must not depend on its processors
         let options = options.compression_level(COMPRESSION_LEVEL).compression_threads(1).chunk_size(Some(CHUNK_BYTES));
         let mut writer = options.create(sink)?;
-        if let Some(sensor) = sensor {
-            writer.write_metadata(&sensor_metadata(sensor))?;
+        for ((sensor, _), name) in radars.iter().zip(&names) {
+            let Metadata { name: record, metadata } = sensor_metadata(sensor);
+            let name = name.map_or(record.clone(), |name| format!("{record}.{}", in_topics(name)));
+            writer.write_metadata(&Metadata { name, metadata })?;
         }
-        let mut recording = Self { writer, channels: BTreeMap::new(), sequence: 0 };
-        recording.message(TF_TOPIC, TF, start_ns, mounts)?;
+        let mut recording = Self { writer, radars: topics, channels: BTreeMap::new(), sequence: 0 };
+        recording.message(TF_TOPIC, TF, start_ns, &mounts)?;
         Ok(recording)
     }
 
+    /// A frame of the first radar.
     pub fn frame(&mut self, frame: &Frame) -> Result<()> {
-        self.message(POINTS_TOPIC, POINT_CLOUD, frame.time_ns, &cloud(frame))
+        self.frame_of(0, frame)
+    }
+
+    /// A frame of any radar, by its place among them.
+    pub fn frame_of(&mut self, radar: usize, frame: &Frame) -> Result<()> {
+        let [topic, frame_id] = self.radars.get(radar).context("a frame of no radar")?.clone();
+        self.message(&topic, POINT_CLOUD, frame.time_ns, &cloud(frame, &frame_id))
     }
 
     /// A camera's boxes, and the camera with them.
@@ -111,7 +139,7 @@ impl<W: Write + Seek> RecordingWriter<W> {
 
     fn message<T: Serialize>(
         &mut self,
-        topic: &'static str,
+        topic: &str,
         (schema, definition): (&str, &str),
         time_ns: i64,
         message: &T,
@@ -121,7 +149,7 @@ impl<W: Write + Seek> RecordingWriter<W> {
             None => {
                 let schema = self.writer.add_schema(schema, "ros2msg", definition.as_bytes())?;
                 let id = self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new())?;
-                self.channels.insert(topic, id);
+                self.channels.insert(topic.to_owned(), id);
                 id
             }
         };
@@ -203,7 +231,7 @@ pub fn sensor_metadata(sensor: &Sensor) -> Metadata {
     Metadata { name: SENSOR_METADATA.into(), metadata: map }
 }
 
-fn cloud(frame: &Frame) -> PointCloud2 {
+fn cloud(frame: &Frame, frame_id: &str) -> PointCloud2 {
     let point_step = 4 * FIELDS.len() as u32;
     let width = frame.detections.len() as u32;
     let field = |(name, offset): (&&str, u32)| PointField {
@@ -213,7 +241,7 @@ fn cloud(frame: &Frame) -> PointCloud2 {
         count: 1,
     };
     PointCloud2 {
-        header: Header { stamp: Stamp::from_nanoseconds(frame.time_ns), frame_id: RADAR_FRAME.into() },
+        header: Header { stamp: Stamp::from_nanoseconds(frame.time_ns), frame_id: frame_id.to_owned() },
         height: 1,
         width,
         fields: FIELDS.iter().zip((0..).step_by(4)).map(field).collect(),

@@ -15,18 +15,22 @@ use super::radar::disturbance::{Outage, noise_db, outage};
 use super::random::{Dice, Use, name};
 use super::scatter::{Scatterer, scatterers};
 use super::scene::structure::Piece;
-use super::scene::{Look, Scene};
+use super::scene::{Look, RadarSection, Scene};
 use super::traffic::types::Class;
 use super::traffic::{self, Region, Traffic};
 use super::world::{Body, Sides, World};
+use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording::camera::CameraFrame;
-use crate::recording::truth::Label;
+use crate::recording::camera::{CameraFrame, RecordedCamera};
+use crate::recording::problems::Problems;
+use crate::recording::truth::{Label, Truth};
 use crate::recording::write::RecordingWriter;
-use crate::recording::{Frame, RadarDetection, Sensor};
+use crate::recording::{Frame, RadarDetection, Recording, Sensor};
 
 /// Vehicles are known this far beyond the radar's range, metres: tracks begin before the field of view does.
 const BEYOND_M: f64 = 40.0;
+/// Draws of further radars are their own: their frames have numbers that no frame of the first has.
+const FURTHER_BITS: u32 = 32;
 /// Frames computed at once; what is in memory stays small however long the recording.
 const BATCH: usize = 256;
 /// Labels are written in steps of this, metres: nobody measures truth finer.
@@ -37,6 +41,8 @@ pub struct Simulation {
     pub scene: Scene,
     pub traffic: Traffic,
     pub radar: Radar,
+    /// Those beside the first.
+    pub further_radars: Vec<Radar>,
     vehicles: Vec<Prepared>,
     structures: Vec<Piece>,
 }
@@ -52,6 +58,8 @@ struct Prepared {
 pub struct Step {
     pub time_ns: i64,
     pub radar: Option<Frame>,
+    /// Of each further radar.
+    pub further: Vec<Frame>,
     pub labels: Vec<Label>,
     /// Vehicles whose middle lies in the radar's field of view, hidden or not.
     pub in_view: usize,
@@ -60,7 +68,7 @@ pub struct Step {
 /// What a recording has become.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Made {
-    /// Radar frames written; those of an outage may be missing.
+    /// Frames of all radars written; those of an outage may be missing.
     pub frames: u64,
     pub camera_frames: u64,
     pub detections: u64,
@@ -124,7 +132,8 @@ impl Simulation {
             })
             .collect();
         let structures = scene.structures.iter().flat_map(|s| s.pieces(scene.seed)).collect();
-        Ok(Self { radar: scene.radar.radar(), vehicles, structures, traffic, scene })
+        let further_radars = scene.radars().iter().skip(1).map(RadarSection::radar).collect();
+        Ok(Self { radar: scene.radar.radar(), further_radars, vehicles, structures, traffic, scene })
     }
 
     /// When the last vehicle leaves, seconds since the begin.
@@ -173,7 +182,11 @@ impl Simulation {
             }
         };
         let in_view = self.in_view(&labels);
-        Ok(Step { time_ns, radar: radar.map(|detections| Frame { time_ns, detections, refused: 0 }), labels, in_view })
+        let frame = |detections| Frame { time_ns, detections, refused: 0 };
+        let further = (1..).zip(&self.further_radars);
+        let further =
+            further.map(|(k, radar)| frame(self.scan(radar, since_s, number + (k << FURTHER_BITS)))).collect();
+        Ok(Step { time_ns, radar: radar.map(frame), further, labels, in_view })
     }
 
     /// What the camera sees at one of its frames.
@@ -280,7 +293,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What the recording says of the radar.
+    /// What the recording says of the first radar.
     pub fn sensor(&self) -> Sensor {
         Sensor {
             name: self.scene.radar.name.clone(),
@@ -293,18 +306,65 @@ impl Simulation {
         }
     }
 
+    /// What the recording says of each radar, and where it hangs.
+    pub fn radars(&self) -> Vec<(Sensor, SensorPose)> {
+        let first = self.sensor();
+        let further = self.scene.further_radars.iter().zip(&self.further_radars);
+        let further =
+            further.map(|(section, radar)| (Sensor { name: section.name.clone(), ..first.clone() }, radar.pose));
+        std::iter::once((first.clone(), self.radar.pose)).chain(further).collect()
+    }
+
+    /// Simulates everything, a recording a sensor: the radars, then the camera, whose view ends at `camera_range_m`. `progress` is
+    /// called after each radar frame.
+    ///
+    /// # Errors
+    /// Those of [`Simulation::step`].
+    pub fn recordings(&self, camera_range_m: f64, progress: &(dyn Fn() + Sync)) -> Result<Vec<Recording>> {
+        let steps = in_parallel(0..self.frames(), |number| {
+            progress();
+            self.step(number)
+        })?;
+        let radars = self.radars();
+        let mut frames = vec![Vec::new(); radars.len()];
+        let mut labels = Vec::new();
+        for step in steps {
+            labels.extend(step.labels);
+            if let Some((first, further)) = frames.split_first_mut() {
+                first.extend(step.radar);
+                further.iter_mut().zip(step.further).for_each(|(all, one)| all.push(one));
+            }
+        }
+        let truth = Some(Truth::new(labels));
+        let recording = |((sensor, pose), frames): ((Sensor, SensorPose), Vec<Frame>)| Recording {
+            name: sensor.name.clone(),
+            sensor,
+            pose,
+            frames,
+            truth: truth.clone(),
+            occlusion: Default::default(),
+            camera: None,
+            problems: Problems::default(),
+        };
+        let mut recordings: Vec<Recording> = radars.into_iter().zip(frames).map(recording).collect();
+        if let Some(section) = &self.scene.camera {
+            let camera = section.camera();
+            let frames = in_parallel(0..self.camera_frames(), |n| self.camera_step(&camera, section.rate_hz, n))?;
+            let recorded = RecordedCamera { pose: camera.pose, intrinsics: camera.intrinsics, frames, alone: true };
+            recordings.push(recorded.alone(section.name.clone(), self.sensor(), truth, camera_range_m));
+        }
+        Ok(recordings)
+    }
+
     /// Simulates everything and writes it. `progress` is called after each radar frame.
     ///
     /// # Errors
     /// Those of [`Simulation::step`], and a sink that takes no more.
     pub fn record<W: Write + Seek>(&self, sink: W, progress: &(dyn Fn() + Sync)) -> Result<(W, Made)> {
-        let (sensor, start_ns) = (self.sensor(), self.scene.start_ns());
+        let start_ns = self.scene.start_ns();
         let camera = self.scene.camera.as_ref().map(|section| (section.camera(), section.rate_hz));
-        let pose = &self.radar.pose;
-        let mut writer = match &camera {
-            Some((camera, _)) => RecordingWriter::with_camera(sink, &sensor, pose, &camera.pose, start_ns)?,
-            None => RecordingWriter::new(sink, &sensor, pose, start_ns)?,
-        };
+        let camera_pose = camera.as_ref().map(|(camera, _)| &camera.pose);
+        let mut writer = RecordingWriter::of_several(sink, &self.radars(), camera_pose, start_ns)?;
         let frames = self.frames();
         let mut made = Made { vehicles: self.traffic.vehicles.len(), ..Made::default() };
         let mut camera_first = 0;
@@ -335,10 +395,11 @@ impl Simulation {
                 until(step.time_ns, &mut writer)?;
                 made.vehicles_in_view += step.in_view as f64 / frames as f64;
                 made.most_vehicles_in_view = made.most_vehicles_in_view.max(step.in_view);
-                if let Some(frame) = &step.radar {
+                let further = (1..).zip(&step.further);
+                for (radar, frame) in step.radar.iter().map(|frame| (0, frame)).chain(further) {
                     made.frames += 1;
                     made.detections += frame.detections.len() as u64;
-                    writer.frame(frame)?;
+                    writer.frame_of(radar, frame)?;
                 }
                 writer.objects(step.time_ns, &step.labels)?;
             }

@@ -135,6 +135,54 @@ fn a_camera_beside_the_radar_has_rows_of_its_own() {
 }
 
 #[test]
+fn several_radars_in_one_recording_are_judged_each_and_as_one_map() {
+    let second = "[[further_radar]]\nname = \"Other end\"\n\
+                  mount = { x_m = 160.0, height_m = 6.0, yaw_deg = 180.0, pitch_deg = 4.0 }\n[[static]]";
+    let folder = prepared("several-radars", ["[[static]]", second], ["", ""]);
+    let output = simulate(&folder, "2", "r.mcap", &["--json", "made.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    // 40 of the first, 45 of the second
+    assert_eq!(json(&folder.join("made.json"))["made"]["frames"], 85);
+
+    let radars = recording::read_each(&folder.join("r.mcap"), &ReadOptions::default()).unwrap();
+    let known: Vec<(&str, usize, i64)> = radars
+        .iter()
+        .map(|(r, _)| (r.sensor.name.as_str(), r.frames.len(), r.pose.yaw_rad().to_degrees().round().abs() as i64))
+        .collect();
+    assert_eq!(known, [("gantry", 40, 0), ("Other end", 45, 180)]);
+
+    let output = replay(&folder, &["r.mcap", "--bootstrap", "0", "--json", "r.json", "--out", "out"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let reports = json(&folder.join("r.json"));
+    assert_eq!(reports.as_array().map(Vec::len), Some(2));
+    let rows = reports[0]["fused"]["rows"].as_array().unwrap();
+    let names: Vec<&str> = rows.iter().map(|row| row["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["radar-3d, gantry", "radar-3d, Other end", "camera-3d, camera", "fused"]);
+    let detected = |row: usize| rows[row]["on_the_road_of_any"]["detected"].as_u64().unwrap();
+    assert!(detected(3) > 0 && (0..3).all(|row| detected(3) >= detected(row)), "{rows:#?}");
+    assert!(reports[1]["fused"].is_null());
+    assert!(stdout(&output).contains("On the road that any of them looks at"), "{}", stdout(&output));
+    for file in ["fused.txt", "who-sees.png", "r-radar-gantry-points/table.txt", "r-radar-other_end-points/table.txt"] {
+        assert!(folder.join("out").join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn a_radar_and_its_camera_are_one_map_where_that_is_asked_for() {
+    let folder = prepared("fused-camera", ["", ""], ["", ""]);
+    assert!(simulate(&folder, "2", "r.mcap", &[]).status.success());
+    let output = replay(&folder, &["r.mcap", "--bootstrap", "0", "--json", "r.json", "--fused"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(json(&folder.join("r.json"))["fused"]["rows"].as_array().map(Vec::len), Some(3));
+    let without = SCENE.find("[camera]").unwrap()..SCENE.find("[[static]]").unwrap();
+    let folder = prepared("fused-alone", [&SCENE[without], ""], ["", ""]);
+    assert!(simulate(&folder, "2", "r.mcap", &[]).status.success());
+    let output = replay(&folder, &["r.mcap", "--bootstrap", "0", "--fused"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("--fused is for several radars in one recording"), "{}", stderr(&output));
+}
+
+#[test]
 fn what_cannot_be_simulated_is_told_with_its_place_and_leaves_no_recording() {
     let none = ["", ""];
     let car = "id=\"car.0\" x=\"20.00\" y=\"3.75\"";

@@ -1,6 +1,7 @@
 //! `viewshed replay`: recordings in, the paper's table out.
 
 mod board;
+mod fused;
 mod out;
 mod pictures;
 mod report;
@@ -11,7 +12,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Result, bail, ensure};
+use serde_json::Value;
 
+use self::fused::FusedReplay;
 use super::progress::bar;
 use super::{BAD_INPUT, complain, print};
 use crate::command::options::{SettingsArgs, finite};
@@ -19,7 +22,7 @@ use crate::evaluation::Settings;
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, camera_steps, steps};
-use crate::recording::{Frame, ReadOptions, Recording};
+use crate::recording::{Frame, ReadOptions, Recording, file};
 use crate::results::files::{OutputArgs, Target};
 use crate::results::foxglove;
 use crate::results::report::csv::SampleWriter;
@@ -76,6 +79,9 @@ pub struct Args {
     /// Print the rates by class and by distance too
     #[arg(long, help_heading = "Results")]
     breakdown: bool,
+    /// Judge radar and camera of a recording as one map, too; several radars in one recording always are
+    #[arg(long, help_heading = "Results")]
+    fused: bool,
     /// Print tables as wide as they are: all intervals, and distances to the bound geometry-slice, too
     #[arg(long, help_heading = "Results")]
     wide: bool,
@@ -164,6 +170,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             }
         };
         let several = radars.len() > 1;
+        let folder = folders.as_ref().and_then(|f| f.get(k));
+        let mut fused = fused(path, &radars, args, &settings).unwrap_or_else(|error| {
+            complain(&error);
+            failed = true;
+            None
+        });
+        let extent = table::Extent::of(args.wide);
+        let fused_text = fused.as_ref().map(|fused| fused.text(extent));
+        if let (Some(fused), Some(folder)) = (&fused, folder) {
+            fused.write(folder, extent)?;
+        }
         for (recording, reading) in radars {
             let settings = Settings { reading, ..settings.clone() };
             let one = match replay(path, recording, args, mcap.as_ref(), &settings) {
@@ -187,7 +204,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 };
                 csv.write(camera)?;
             }
-            if let Some(folder) = folders.as_ref().and_then(|f| f.get(k)) {
+            if let Some(folder) = folder {
                 let origin = if one.of_simulated_labels() { format!("\n{ORIGIN}\n") } else { String::new() };
                 let own = if several { folder.folder(&one.replay.recording.name) } else { folder.clone() };
                 out::write(&own, &(text + &origin), &one.replay, &one.examples, one.shown_frame, &settings)?;
@@ -195,7 +212,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             if let Some(target) = &page {
                 report::write(target, &one, &settings)?;
             }
-            reports.push(one.report(&settings));
+            // with the first of its sensors
+            let fused = fused.take().map(|fused| fused.json(&settings));
+            reports.push(one.report(fused, &settings));
+        }
+        if let Some(text) = fused_text {
+            print(&text)?;
         }
     }
     for csv in [samples.filter(|_| !reports.is_empty()), camera_samples].into_iter().flatten() {
@@ -237,6 +259,20 @@ fn radars(path: &Path, settings: &Settings, one_only: Option<&str>) -> Result<Ve
         );
     }
     Ok(radars)
+}
+
+/// All sensors of a file as one map, where that is asked for or the file has several radars.
+fn fused(
+    path: &Path,
+    radars: &[(Recording, ReadOptions)],
+    args: &Args,
+    settings: &Settings,
+) -> Result<Option<FusedReplay>> {
+    let radars: Vec<Recording> = radars.iter().map(|(recording, _)| recording.clone()).collect();
+    if !fused::is_due(&radars, args.fused)? {
+        return Ok(None);
+    }
+    FusedReplay::new(&file::stem(path), &radars, args.time, settings).map(Some)
 }
 
 fn replay(
@@ -373,13 +409,15 @@ impl Replayed {
         text
     }
 
-    fn report(&self, settings: &Settings) -> Report {
+    fn report(&self, fused: Option<Value>, settings: &Settings) -> Report {
         let options = json::Options {
             reading: &settings.reading,
             evaluation: &settings.evaluation,
             estimators: &settings.estimators,
         };
-        json::report(&self.replay, self.mount_error.as_deref(), &self.examples, options)
+        let mut report = json::report(&self.replay, self.mount_error.as_deref(), &self.examples, options);
+        report.fused = fused;
+        report
     }
 }
 

@@ -9,9 +9,14 @@ use super::palette;
 
 /// Fills the rectangle `x` x `y` (data units) with the colour of a cell, edges on whole pixels.
 pub fn fill(canvas: &mut Canvas, plot: &Plot, x: [f64; 2], y: [f64; 2], state: &CellState) {
+    shade(canvas, plot, x, y, |px, py| palette::ground(state, px, py));
+}
+
+/// The same with any colour.
+pub fn shade(canvas: &mut Canvas, plot: &Plot, x: [f64; 2], y: [f64; 2], colour: impl Fn(i32, i32) -> Colour) {
     let [left, right] = x.map(|v| plot.column(v).round() as i32);
     let [bottom, top] = y.map(|v| plot.row(v).round() as i32);
-    canvas.shade(Area::new(left, top, right - left, bottom - top), |px, py| palette::ground(state, px, py));
+    canvas.shade(Area::new(left, top, right - left, bottom - top), colour);
 }
 
 /// Visible, invisible, unknown, occupied.
@@ -32,16 +37,21 @@ pub fn legend() -> Vec<Entry> {
         swatch("visible (paler: lower grade)", 56, |f| 255 - (127.0 * f) as u8, Visibility::Visible),
         swatch("invisible (paler: higher grade)", 56, |f| (127.0 * f) as u8, Visibility::Invisible),
         swatch("unknown", 34, |_| 0, Visibility::Unknown),
-        Entry::new("occupied, over visible and invisible", 56, move |canvas, area| {
-            let half = Area { width: area.width / 2, ..area };
-            for (of, left) in [(Visibility::Visible, area.left), (Visibility::Invisible, area.left + half.width)] {
-                let sure = if of == Visibility::Visible { 255 } else { 0 };
-                let occupied = CellState { occupied: true, ..state(of, sure) };
-                canvas.shade(Area { left, ..half }, |px, py| palette::ground(&occupied, px, py));
-            }
-            border(canvas, area);
-        }),
+        occupied(),
     ]
+}
+
+/// The lattice over what is occupied.
+pub fn occupied() -> Entry {
+    Entry::new("occupied, over visible and invisible", 56, move |canvas, area| {
+        let half = Area { width: area.width / 2, ..area };
+        for (visibility, left) in [(Visibility::Visible, area.left), (Visibility::Invisible, area.left + half.width)] {
+            let grade = if visibility == Visibility::Visible { 255 } else { 0 };
+            let occupied = CellState { visibility, grade, occupancy: 0, occupied: true };
+            canvas.shade(Area { left, ..half }, |px, py| palette::ground(&occupied, px, py));
+        }
+        border(canvas, area);
+    })
 }
 
 fn border(canvas: &mut Canvas, area: Area) {

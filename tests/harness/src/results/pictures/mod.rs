@@ -15,6 +15,7 @@ pub mod returns;
 pub mod scene;
 pub mod site;
 pub mod tradeoff;
+pub mod who_sees;
 
 mod axes;
 mod cells;

@@ -106,19 +106,25 @@ pub mod samples {
     }
 
     pub fn boxes() -> Vec<Entry> {
-        let entry = |label: &str, outcome: Option<Outcome>| {
-            Entry::new(label, 36, move |canvas, area| {
-                let pen = outline(outcome);
-                let [left, right] = [area.left as f32 + 2.0, area.right() as f32 - 2.0];
-                let [top, bottom] = [area.top as f32 + 3.0, area.bottom() as f32 - 3.0];
-                canvas.polyline(&[[left, top], [right, top], [right, bottom], [left, bottom]], true, pen);
-                let centre = [(left + right) / 2.0, middle(area)];
-                canvas.line(centre, [right, centre[1]], Pen { dash: &[], ..pen });
-            })
-        };
-        let mut entries: Vec<Entry> = Outcome::ALL.iter().map(|&o| entry(o.meaning(), Some(o))).collect();
-        entries.push(entry("not counted", None));
+        let mut entries: Vec<Entry> = Outcome::ALL.iter().map(|&o| truth_box(o.meaning(), Some(o))).collect();
+        entries.push(truth_box("not counted", None));
         entries
+    }
+
+    /// A box, whatever became of it.
+    pub fn vehicle() -> Entry {
+        truth_box("labelled object", None)
+    }
+
+    fn truth_box(label: &str, outcome: Option<Outcome>) -> Entry {
+        Entry::new(label, 36, move |canvas, area| {
+            let pen = outline(outcome);
+            let [left, right] = [area.left as f32 + 2.0, area.right() as f32 - 2.0];
+            let [top, bottom] = [area.top as f32 + 3.0, area.bottom() as f32 - 3.0];
+            canvas.polyline(&[[left, top], [right, top], [right, bottom], [left, bottom]], true, pen);
+            let centre = [(left + right) / 2.0, middle(area)];
+            canvas.line(centre, [right, centre[1]], Pen { dash: &[], ..pen });
+        })
     }
 
     pub fn radar() -> Vec<Entry> {

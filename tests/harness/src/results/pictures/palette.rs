@@ -3,6 +3,7 @@
 //! Ground: blue is visible, orange invisible, hatched grey unknown; the surer the grade, the
 //! stronger the tone. A dark lattice over it is occupied. Outlines: the dash says "not detected", the hue says what the map said.
 
+use viewshed::fusion::Sensors;
 use viewshed::map::{CellState, Visibility};
 
 use super::canvas::{Colour, Pen};
@@ -28,9 +29,32 @@ const LATTICE_BAR_PX: i32 = 2;
 
 /// Colour of a cell at one pixel of the picture.
 pub fn ground(state: &CellState, x: i32, y: i32) -> Colour {
+    ground_of(state, VISIBLE[0].mix(VISIBLE[1], f32::from(state.grade) / 255.0), x, y)
+}
+
+/// Where several sensors see a place.
+pub const SEVERAL: Colour = Colour::hex(0x86C7AE);
+
+/// Hues of places that one of several sensors sees, by its number.
+const SENSORS: [Colour; 4] =
+    [Colour::hex(0x0072B2), Colour::hex(0xB04F8C), Colour::hex(0x8C7300), Colour::hex(0x3C434C)];
+
+/// Colour of a place that only this sensor sees.
+pub fn sensor(number: usize) -> Colour {
+    SENSORS[number % SENSORS.len()].mix(Colour::WHITE, 0.68)
+}
+
+/// Colour of a place by who sees it.
+pub fn seen_by(sensors: Sensors) -> Option<Colour> {
+    let first = sensors.numbers().next()?;
+    Some(if sensors.count() > 1 { SEVERAL } else { sensor(first) })
+}
+
+/// The same as [`ground`] with a colour of its own where it is visible.
+pub fn ground_of(state: &CellState, visible: Colour, x: i32, y: i32) -> Colour {
     let grade = f32::from(state.grade) / 255.0;
     let base = match state.visibility {
-        Visibility::Visible => VISIBLE[0].mix(VISIBLE[1], grade),
+        Visibility::Visible => visible,
         Visibility::Invisible => INVISIBLE[0].mix(INVISIBLE[1], grade),
         Visibility::Unknown => UNKNOWN[usize::from((x + y).rem_euclid(HATCH_PX) == 0)],
     };

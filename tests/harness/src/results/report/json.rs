@@ -48,6 +48,9 @@ pub struct Report {
     input: Input,
     options: Value,
     origin: Option<&'static str>,
+    /// Of all sensors of the file, with the first of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fused: Option<Value>,
 }
 
 /// The camera of a recording.
@@ -158,6 +161,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
             "estimators": options.estimators,
         }),
         origin: recording.sensor.synthetic.then_some(ORIGIN),
+        fused: None,
     }
 }
 

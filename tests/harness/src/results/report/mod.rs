@@ -8,6 +8,7 @@ pub mod gantry_camera;
 pub mod json;
 pub mod notes;
 pub mod scenes;
+pub mod sensor_set;
 pub mod several_sensors;
 pub mod site;
 pub mod table;

@@ -8,7 +8,6 @@
 pub mod calibration;
 pub mod gantry_camera;
 pub mod monitoring;
-mod pair;
 pub mod plan;
 pub mod scenes;
 pub mod several_sensors;

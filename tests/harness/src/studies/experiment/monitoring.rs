@@ -10,12 +10,12 @@ use viewshed::fusion::{Monitor, MonitorConfig};
 use viewshed::map::{CellState, Visibility};
 use viewshed::sensor::road::RoadPoint;
 
-use super::pair::{estimator, newest};
 use crate::estimators::{
     self,
     camera_3d::{lifted, time},
 };
 use crate::evaluation::Settings;
+use crate::evaluation::sensor_set::{estimator, newest};
 use crate::recording::{Frame, Recording};
 
 const SECTORS: usize = 6;

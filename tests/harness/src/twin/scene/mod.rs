@@ -20,6 +20,10 @@
 //! [radar.model]                   # twin::radar::model, each parameter with a default
 //! reference_snr_db = 35.0
 //!
+//! [[further_radar]]               # like the first, elsewhere; any number
+//! name = "opposite"
+//! mount = { x_m = 60.0, y_m = 14.0, height_m = 6.0, yaw_deg = 200.0, pitch_deg = 4.0 }
+//!
 //! [camera]                        # may be left out
 //! name = "camera"
 //! mount = { height_m = 6.0, pitch_deg = 6.0 }
@@ -53,7 +57,7 @@ use super::traffic::Source;
 use super::traffic::frame::RoadFrame;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording;
+use crate::recording::{self, mcap::in_topics};
 use structure::Structure;
 
 /// A scene as its file has it.
@@ -72,6 +76,9 @@ pub struct Scene {
     pub licence: Option<String>,
     pub traffic: Option<TrafficFile>,
     pub radar: RadarSection,
+    /// Radars beside the first.
+    #[serde(default, rename = "further_radar")]
+    pub further_radars: Vec<FurtherRadar>,
     pub camera: Option<CameraSection>,
     #[serde(default, rename = "static")]
     pub structures: Vec<Structure>,
@@ -243,6 +250,14 @@ impl RadarSection {
     }
 }
 
+/// A radar like the scene's first, without its interference and outages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FurtherRadar {
+    pub name: String,
+    pub mount: Mount,
+}
+
 /// A sector of the road plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
@@ -330,6 +345,17 @@ impl Scene {
             self.duration_s
         );
         self.radar.check().with_context(|| format!("radar `{}`", self.radar.name))?;
+        for radar in &self.further_radars {
+            radar.mount.check().with_context(|| format!("radar `{}`", radar.name))?;
+        }
+        let names: Vec<String> = self.radars().iter().map(|r| in_topics(&r.name)).collect();
+        for (k, name) in names.iter().enumerate().skip(1) {
+            ensure!(
+                !name.is_empty() && !names[..k].contains(name),
+                "radar `{}`: each needs a name of its own, of letters and digits",
+                self.further_radars[k - 1].name
+            );
+        }
         if let Some(camera) = &self.camera {
             camera.check().with_context(|| format!("camera `{}`", camera.name))?;
         }
@@ -348,21 +374,33 @@ impl Scene {
         Ok(())
     }
 
+    /// Every radar, the first first.
+    pub fn radars(&self) -> Vec<RadarSection> {
+        let further = self.further_radars.iter().map(|radar| RadarSection {
+            name: radar.name.clone(),
+            mount: radar.mount,
+            interference: Vec::new(),
+            outage: Vec::new(),
+            ..self.radar.clone()
+        });
+        std::iter::once(self.radar.clone()).chain(further).collect()
+    }
+
     /// Every sensor with its mount.
     pub fn mounts(&self) -> Vec<(String, Mount)> {
-        let radar = (format!("radar `{}`", self.radar.name), self.radar.mount);
+        let radars = self.radars().into_iter().map(|r| (format!("radar `{}`", r.name), r.mount));
         let camera = self.camera.as_ref().map(|c| (format!("camera `{}`", c.name), c.mount));
-        std::iter::once(radar).chain(camera).collect()
+        radars.chain(camera).collect()
     }
 
     /// Where each sensor looks, seen from above.
     pub fn looks(&self) -> Vec<Look> {
-        let radar = Look::new(&self.radar.mount, self.radar.field_of_view.azimuth_deg);
+        let radars = self.radars().into_iter().map(|r| Look::new(&r.mount, r.field_of_view.azimuth_deg));
         let camera = self.camera.as_ref().map(|c| {
             let view = c.image.intrinsics().field_of_view(0.0);
             Look::new(&c.mount, view.azimuth_rad.map(f64::to_degrees))
         });
-        std::iter::once(radar).chain(camera).collect()
+        radars.chain(camera).collect()
     }
 
     /// The traffic file, `--fcd` first.
@@ -461,6 +499,9 @@ rate_hz = 15.0
         assert!(error("duration_s = 10.0", "duration_s = nan").contains("duration_s is NaN"));
         let unknown = error("rate_hz = 15.0", "rate_hz = 15.0\nratte = 1");
         assert!(unknown.contains("line 9") && unknown.contains("ratte"), "{unknown}");
+        let twice =
+            error("rate_hz = 15.0", "rate_hz = 15.0\n[[further_radar]]\nname = \"R!\"\nmount = { height_m = 5.0 }");
+        assert!(twice.contains("radar `R!`: each needs a name of its own"), "{twice}");
         let model = error("rate_hz = 15.0", "rate_hz = 15.0\n[radar.model.resolution]\nrange_m = 0.0");
         assert!(model.contains("radar `r`") || model.contains("model.resolution.range_m is 0"), "{model}");
     }
