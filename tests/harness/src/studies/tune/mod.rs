@@ -292,7 +292,8 @@ mod tests {
     fn a_search_goes_on_from_its_own_file_only() {
         let mut long = state();
         // more digits than a file gives back
-        long.evaluations[0].loss = loss(&[Some(38.345_864_661_654_13), Some(22.690_381_079_195_994), None, None], &[None; 4]);
+        long.evaluations[0].loss =
+            loss(&[Some(38.345_864_661_654_13), Some(22.690_381_079_195_994), None, None], &[None; 4]);
         let mut back = State { evaluations: Vec::new(), ..state() };
         back.resume(&serde_json::to_string(&long).unwrap()).unwrap();
         assert_eq!(back, long);
