@@ -104,7 +104,7 @@ impl Footprint {
 
     /// Visits the centres of the 1 m cells that share area with the footprint; false, and no visit,
     /// if it is larger than 100 m or turned inside out.
-    fn each_cell(&self, mut visit: impl FnMut(RoadPoint)) -> bool {
+    pub(crate) fn each_cell(&self, mut visit: impl FnMut(RoadPoint)) -> bool {
         let limit = MAX_SIDE_M * 50;
         if !(1..=limit).contains(&self.half_length_cm) || !(1..=limit).contains(&self.half_width_cm) {
             return false;

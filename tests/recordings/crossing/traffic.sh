@@ -39,3 +39,8 @@ traffic skewed-1 skewed crossing 2003 80 0.9 150
 traffic skewed-2 skewed crossing 2004 90 0.9 150
 traffic tee-1 tee tee 2005 70 1.1 150
 traffic tee-2 tee tee 2006 90 1.2 150
+
+# days of the unit of wide-1, for calibration.toml
+for day in $(seq 1 14); do
+    traffic "wide-day-$day" wide crossing $((5000 + day)) 80 1.0 90
+done

@@ -37,3 +37,8 @@ traffic exit-1 exit 4001 1.0 150
 traffic exit-2 exit 4002 1.1 150
 traffic waves-1 waves 4003 1.0 150
 traffic waves-2 waves 4004 0.9 150
+
+# days of the unit of exit-1, for calibration.toml
+for day in $(seq 1 14); do
+    traffic "exit-day-$day" exit $((6000 + day)) 1.0 90
+done

@@ -15,13 +15,14 @@ use crate::command::options::JudgingArgs;
 use crate::evaluation::Settings;
 use crate::evaluation::replay::{Replay, steps};
 use crate::results::files::{OutputArgs, Outputs, Target};
+use crate::results::pictures::reliability::{self, Reliability};
 use crate::results::report::{
-    experiment as report, gantry_camera as camera_report, json as replay_json, scenes as scenes_report,
-    several_sensors as sensors_report, table,
+    calibration as calibration_report, experiment as report, gantry_camera as camera_report, json as replay_json,
+    scenes as scenes_report, several_sensors as sensors_report, table,
 };
 use crate::studies::experiment::plan::{Day, Plan};
 use crate::studies::experiment::scenes::{self, Extent, Variant};
-use crate::studies::experiment::{Experiment, gantry_camera, several_sensors, total_steps};
+use crate::studies::experiment::{Experiment, calibration, gantry_camera, several_sensors, total_steps};
 use crate::twin::simulate::Simulation;
 use crate::{estimators, recording};
 
@@ -88,6 +89,15 @@ pub struct Args {
     /// Where vehicles drive
     #[arg(long, value_enum, value_name = "NAME", default_value_t = World::Motorway)]
     scene: World,
+    /// Fit probabilities of detection on some days of each unit and judge them on others; motorway, crossing and queue
+    ///
+    /// PLAN is calibration.toml of the same folder. Recordings of --beside are fitted on the first half of their frames
+    /// and judged on the second.
+    #[arg(long, conflicts_with_all = ["scene", "train", "only_elevation", "keep"])]
+    calibration: bool,
+    /// Write each unit's table, NAME.probability.toml, and reliability diagram, NAME.png, into this folder
+    #[arg(long, value_name = "DIR", requires = "calibration", help_heading = "Results")]
+    tables: Option<PathBuf>,
     /// Run the training scenes in place of those that are reported (crossing, queue)
     #[arg(long)]
     train: bool,
@@ -123,11 +133,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.judging.settings()?;
     let path = match &args.plan {
         Some(path) => path.clone(),
+        None if args.calibration => shipped::file("calibration.toml")?,
         None => shipped::file(args.scene.plan())?,
     };
     let mut outputs = args.outputs.beside(args.beside.iter().flat_map(|path| recording::files(path)));
     outputs.reads(args.judging.files().chain([path.clone()]));
     match args.scene {
+        _ if args.calibration => calibration(args, &path, &settings, &mut outputs)?,
         World::Motorway => motorway(args, &path, &settings, &mut outputs)?,
         World::Crossing | World::Queue => several_scenes(args, &path, &settings, &mut outputs)?,
         World::GantryCamera => gantry_camera(args, &path, &settings, &mut outputs)?,
@@ -227,6 +239,41 @@ fn several_sensors(args: &Args, path: &Path, settings: &Settings, outputs: &mut 
     if let Some(file) = json_file {
         let plan = json!({ "file": path.display().to_string(), "content": plan });
         file.write(sensors_report::json(&all, &plan, json_options(settings))?)?;
+    }
+    Ok(())
+}
+
+fn calibration(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
+    ensure!(args.every == 1, "--every does not go with --calibration");
+    let plan = calibration::Plan::read(path)?;
+    outputs.reads(plan.files()?);
+    let json_file = outputs.file("--json", args.json.as_deref())?;
+    let folder = args.tables.as_deref().map(|path| outputs.folder("--tables", path)).transpose()?;
+    let running = bar("simulating, fitting and judging", plan.steps()?);
+    let mut all = calibration::run(&plan, settings, &|| running.step())?;
+    drop(running);
+    for path in &args.beside {
+        let recording = recording::read(path, &settings.reading).with_context(|| path.display().to_string())?;
+        let judging = bar(&format!("judging {}", recording.name), steps(&recording, 1));
+        all.push(calibration::run_halves(&recording, settings, &|| judging.step())?);
+    }
+    print(&calibration_report::text(&all, table::Extent::of(args.wide)))?;
+    for judged in &all {
+        let Some(folder) = &folder else { break };
+        folder.file(format!("{}.probability.toml", judged.name))?.write(judged.fitted.text()?)?;
+        let curve = |name: &str, bins: &[_]| Reliability { name: name.to_owned(), bins: bins.to_vec() };
+        let curves = [curve("table", &judged.diagram), curve("grade / 255", &judged.diagram_of_grade)];
+        let title = format!("{}: probability said against share detected", judged.name);
+        let picture = reliability::draw(
+            &curves,
+            &title,
+            "15 bins of equal count; on the diagonal a probability means what it says",
+        );
+        folder.file(format!("{}.png", judged.name))?.write(picture.png()?)?;
+    }
+    if let Some(file) = json_file {
+        let plan = json!({ "file": path.display().to_string(), "content": plan });
+        file.write(calibration_report::json(&all, &plan, json_options(settings))?)?;
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The `viewshed` command, one file or folder per subcommand.
 
 pub mod bus;
+pub mod compare;
 pub mod completions;
 pub mod configure;
 pub mod detect;
@@ -16,6 +17,7 @@ pub mod progress;
 pub mod replay;
 pub mod simulate;
 pub mod site;
+pub mod tune;
 #[cfg(feature = "pages")]
 pub mod view;
 
@@ -45,6 +47,8 @@ enum Command {
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
+    Compare(compare::Args),
+    Tune(Box<tune::Args>),
     Detect(detect::Args),
     Detections(Box<detections::Args>),
     Configure(Box<configure::Args>),
@@ -66,6 +70,8 @@ impl Cli {
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
+            Command::Tune(args) => tune::run(args),
+            Command::Compare(args) => compare::run(args),
             Command::Detect(args) => detect::run(args),
             Command::Detections(args) => detections::run(args),
             Command::Configure(args) => configure::run(args),

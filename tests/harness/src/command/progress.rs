@@ -19,6 +19,11 @@ impl Bar {
     pub fn step(&self) {
         self.0.inc(1);
     }
+
+    /// Says something else in front of the bar.
+    pub fn say(&self, what: &str) {
+        self.0.set_message(what.to_owned());
+    }
 }
 
 impl Drop for Bar {

@@ -1,5 +1,6 @@
 //! The library's estimators, driven by recordings.
 
+pub mod at_risk;
 pub mod camera_3d;
 pub mod fused;
 mod radar_2d;

@@ -4,12 +4,14 @@
 //! them ([`bounds`] are scores too), and [`summary`] makes rates ([`counts`], [`cells`]), intervals
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
 //! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
-//! [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, [`over_time`] counts window by window, and
+//! [`calibration`] judges probabilities, which [`probability`] fits,
+//! [`paired`] compares two runs, [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, [`over_time`] counts window by window, and
 //! [`examples`] picks what is worth a picture.
 
 pub mod bootstrap;
 pub mod bounds;
 pub mod breakdown;
+pub mod calibration;
 pub mod camera;
 pub mod cells;
 pub mod comparison;
@@ -18,7 +20,9 @@ pub mod curve;
 pub mod examples;
 pub mod mount_error;
 pub mod over_time;
+pub mod paired;
 pub mod pool;
+pub mod probability;
 pub mod rejected;
 pub mod replay;
 pub mod returns;

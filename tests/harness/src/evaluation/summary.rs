@@ -37,6 +37,9 @@ pub struct Row {
     /// Object-time-steps with no known cell under them.
     pub unknown: u64,
     pub counters: Vec<(String, u64)>,
+    /// Counts of each object unit, and of each block: what is drawn again.
+    pub by_unit: Vec<Counts>,
+    pub by_block: Vec<CellCounts>,
 }
 
 impl Row {
@@ -81,6 +84,8 @@ pub struct Summary {
     /// What was drawn again for object rates, `tracks` or `frames`, and how many there are.
     pub drawn: &'static str,
     pub drawn_units: usize,
+    /// What each of them is called.
+    pub unit_names: Vec<String>,
     /// Blocks of about one second drawn again for cell rates.
     pub blocks: usize,
     /// Estimators as delivered, then `geometry-slice` and `geometry-box`.
@@ -92,6 +97,8 @@ pub struct Summary {
 struct Drawn {
     objects: Vec<Counts>,
     cells: Vec<CellCounts>,
+    by_unit: Vec<Counts>,
+    by_block: Vec<CellCounts>,
 }
 
 impl Summary {
@@ -101,16 +108,17 @@ impl Summary {
         let object_draws = Draws::new(units.object_units, options.bootstrap, options.seed);
         let block_draws = Draws::new(units.block_units, options.bootstrap, options.seed.wrapping_add(BLOCK_SEED));
         let (slice, boxes) = (bounds::slice(samples), bounds::boxes(samples));
-        let drawn = |score: &Score| Drawn {
-            objects: object_draws.totals(&units.by_object(|counts: &mut Counts, frame, object| {
+        let drawn = |score: &Score| {
+            let by_unit = units.by_object(|counts: &mut Counts, frame, object| {
                 let detected = samples[frame].objects[object].detected;
                 counts.add(score.verdicts[frame][object].visible, detected);
-            })),
-            cells: block_draws.totals(&units.by_block(|counts: &mut CellCounts, frame| {
+            });
+            let by_block = units.by_block(|counts: &mut CellCounts, frame| {
                 if let Some(tally) = score.cells.get(frame) {
                     *counts += tally.counts;
                 }
-            })),
+            });
+            Drawn { objects: object_draws.totals(&by_unit), cells: block_draws.totals(&by_block), by_unit, by_block }
         };
         let (slice_draws, box_draws) = (drawn(&slice), drawn(&boxes));
         let row = |score: &Score, drawn: &Drawn| {
@@ -131,6 +139,8 @@ impl Summary {
                 cell_curve: if score.graded { trade_off(&cell_grades(score)) } else { Vec::new() },
                 unknown: if score.graded { unknown(score) } else { 0 },
                 counters: score.counters.clone(),
+                by_unit: drawn.by_unit.clone(),
+                by_block: drawn.by_block.clone(),
             }
         };
         let mut rows: Vec<Row> = scores.par_iter().map(|score| row(score, &drawn(score))).collect();
@@ -142,6 +152,7 @@ impl Summary {
             coverage_interval: Interval::of(slice_draws.objects.iter().map(Counts::coverage)),
             drawn: units.kind,
             drawn_units: units.object_units,
+            unit_names: units.names.clone(),
             blocks: units.block_units,
             rows,
             comparisons: compare(

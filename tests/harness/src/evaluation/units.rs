@@ -23,6 +23,8 @@ pub struct Units {
     pub block_units: usize,
     /// What an object unit is: `tracks` or `frames`.
     pub kind: &'static str,
+    /// What each object unit is called: the track's id, or the frame's number.
+    pub names: Vec<String>,
 }
 
 impl Units {
@@ -51,8 +53,13 @@ impl Units {
                 sample.counted.then(|| *blocks_seen.entry(second).or_insert(next))
             })
             .collect();
+        let mut names = vec![String::new(); object_units];
+        for (&key, &unit) in &units {
+            let track = recording.truth.as_ref().and_then(|t| t.tracks.get(key)).filter(|_| !independent);
+            names[unit] = track.map_or_else(|| key.to_string(), |t| t.id.clone());
+        }
         let kind = if independent { "frames" } else { "tracks" };
-        Self { objects, object_units, blocks, block_units: blocks_seen.len(), kind }
+        Self { objects, object_units, blocks, block_units: blocks_seen.len(), kind, names }
     }
 
     /// Sums what each sample contributes into one value per object unit.
@@ -91,6 +98,7 @@ mod tests {
         let recording = recording(25, 8);
         let units = Units::new(&recording, &samples);
         assert_eq!((units.object_units, units.block_units, units.kind), (3, 3, "tracks"));
+        assert_eq!(units.names, ["1", "7", "0"], "in the order they come");
         assert_eq!(units.by_object(|n: &mut u32, _, _| *n += 1).iter().sum::<u32>(), 48);
         assert_eq!(units.by_block(|n: &mut u32, _| *n += 1), [9, 10, 5]);
     }

@@ -5,6 +5,7 @@ mod fused;
 mod out;
 mod pictures;
 mod report;
+mod risk;
 pub mod shipped;
 
 use std::path::{Path, PathBuf};
@@ -99,6 +100,8 @@ pub struct Args {
     )]
     mount_error: Option<Extent>,
     #[command(flatten)]
+    risk: risk::RiskArgs,
+    #[command(flatten)]
     processor: board::BoardArgs,
     #[command(flatten)]
     outputs: OutputArgs,
@@ -127,7 +130,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
     let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
-    outputs.reads(args.settings.files());
+    outputs.reads(args.settings.files().chain(args.risk.files()));
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let out = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     if args.processor.board.is_some() || args.processor.port.is_some() {
@@ -189,7 +192,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 }
             };
             synthetic |= one.of_simulated_labels();
-            let text = one.text(args, &settings);
+            let text = one.text(args, &settings) + &args.risk.told(&one.replay)?;
             print(&text)?;
             if let Some(csv) = &mut samples {
                 csv.write(&one.replay)?;
@@ -281,6 +284,7 @@ fn replay(
 ) -> Result<Replayed> {
     let shown_frame = args.time.map(|time_s| frame_at(&recording, time_s)).transpose()?;
     let mut running = estimators::all(&recording, &settings.estimators)?;
+    args.risk.add(&mut running, &recording, settings)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
     let replaying = bar(&format!("replaying {name}"), passes + camera_steps(&recording));
     let replay = if recording.of_camera().is_some() {

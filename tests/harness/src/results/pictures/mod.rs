@@ -10,6 +10,7 @@ mod closeup;
 pub mod heatmap;
 pub mod palette;
 pub mod polar;
+pub mod reliability;
 pub mod returns;
 pub mod scene;
 pub mod site;

@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::ORIGIN;
 use crate::estimators;
 use crate::evaluation::breakdown::{Breakdown, band_name};
+use crate::evaluation::cells::CellCounts;
 use crate::evaluation::comparison::Comparison;
 use crate::evaluation::counts::Counts;
 use crate::evaluation::curve::CurvePoint;
@@ -41,6 +42,8 @@ pub struct Report {
     mount_error: Option<Vec<Sensitivity>>,
     examples: Vec<Example>,
     resampling: Resampling,
+    /// What was drawn again for object rates, in the order of `by_unit`.
+    units: Vec<String>,
     sensor: Value,
     input: Input,
     options: Value,
@@ -58,6 +61,7 @@ pub struct Camera {
     coverage_rate: Option<f64>,
     pub estimators: Vec<Estimator>,
     resampling: Resampling,
+    units: Vec<String>,
     sensor: Value,
 }
 
@@ -81,6 +85,10 @@ pub struct Estimator {
     curve: Vec<CurvePoint>,
     cell_curve: Vec<CurvePoint>,
     counters: Map<String, Value>,
+    /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
+    by_unit: Vec<String>,
+    /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s.
+    by_block: Vec<String>,
 }
 
 /// Counts and the rates made of them.
@@ -138,6 +146,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
         mount_error: mount_error.map(<[_]>::to_vec),
         examples: examples.to_vec(),
         resampling: resampling(summary),
+        units: summary.unit_names.clone(),
         sensor: sensor(recording),
         input: Input {
             frames: recording.frames.len(),
@@ -164,6 +173,7 @@ fn camera(replay: &Replay) -> Camera {
         coverage_rate: summary.coverage_rate,
         estimators: summary.rows.iter().map(estimator).collect(),
         resampling: resampling(summary),
+        units: summary.unit_names.clone(),
         sensor: sensor(&replay.recording),
     }
 }
@@ -194,7 +204,13 @@ pub(super) fn estimator(row: &Row) -> Estimator {
         curve: row.curve.clone(),
         cell_curve: row.cell_curve.clone(),
         counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
+        by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
+        by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }
+}
+
+fn block(c: &CellCounts) -> String {
+    format!("{} {} {} {}", c.blocked, c.blocked_visible, c.clear, c.clear_not_visible)
 }
 
 pub(super) fn rates(c: &Counts) -> Rates {

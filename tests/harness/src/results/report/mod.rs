@@ -1,5 +1,7 @@
 //! What people and programs get to see of a replay: a table, JSON, CSV.
 
+pub mod calibration;
+pub mod compare;
 pub mod csv;
 pub mod experiment;
 pub mod gantry_camera;

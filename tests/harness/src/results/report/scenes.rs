@@ -182,6 +182,7 @@ pub fn json(
             "estimators": summary.rows.iter().map(json::estimator).collect::<Vec<_>>(),
             "comparisons": summary.comparisons,
             "resampling": json::resampling(summary),
+            "units": summary.unit_names,
         })
     };
     let variant = |c: &Counted| {

@@ -3,8 +3,9 @@
 //! A [`plan`] names the scene and the days; each day is simulated as a recording, read back like any other
 //! and replayed. Counts are pooled over the reporting days, and every rate is kept by day for its spread.
 //! [`scenes`] are crossings and queues, which have a mount each, [`gantry_camera`] is a camera's experiment,
-//! [`several_sensors`] are two on one road.
+//! [`several_sensors`] are two on one road; [`calibration`] fits probabilities and judges them.
 
+pub mod calibration;
 pub mod gantry_camera;
 pub mod monitoring;
 pub mod plan;

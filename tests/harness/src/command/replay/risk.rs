@@ -1,0 +1,91 @@
+//! `--probability` and `--risk`: a row of the table whose bits keep a risk.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::estimators::at_risk::{AtRisk, NAME};
+use crate::estimators::{self, Estimator};
+use crate::evaluation::Settings;
+use crate::evaluation::counts::rate;
+use crate::evaluation::probability::file::Fitted;
+use crate::evaluation::probability::risk::Threshold;
+use crate::evaluation::probability::samples::fingerprint;
+use crate::evaluation::replay::Replay;
+use crate::recording::Recording;
+use crate::results::report::percent;
+
+/// A risk and the table it is judged by.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Probability")]
+pub struct RiskArgs {
+    /// Table of this unit's probabilities, NAME.probability.toml of `viewshed experiment --calibration --tables`
+    ///
+    /// It is of one mount and one configuration, and refused with others.
+    #[arg(long, value_name = "FILE", requires = "risk")]
+    probability: Option<PathBuf>,
+    /// Add a row radar-3d-risk: visible is where at most this share of vehicles is missed, above 0 to below 1
+    ///
+    /// Of the vehicles that stand where the map says visible, the share that the radar does not detect. This is not the
+    /// FVR, which is of those that were not detected.
+    #[arg(long, value_name = "SHARE", requires = "probability", value_parser = share)]
+    risk: Option<f64>,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let value = super::finite(text)?;
+    if value > 0.0 && value < 1.0 { Ok(value) } else { Err(format!("{value} is not between 0 and 1: 0.1 is 10 %")) }
+}
+
+impl RiskArgs {
+    /// The table's file, if there is one.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.probability.clone().into_iter()
+    }
+
+    fn asked(&self) -> Result<Option<(f64, Fitted)>> {
+        let read = |(path, risk): (&PathBuf, f64)| Ok((risk, Fitted::read(path)?));
+        self.probability.as_ref().zip(self.risk).map(read).transpose()
+    }
+
+    /// Adds the row behind that of `radar-3d`.
+    ///
+    /// # Errors
+    /// A table that cannot be read, or of another mount or configuration; a recording of no radar.
+    pub fn add(&self, running: &mut Vec<Box<dyn Estimator>>, recording: &Recording, settings: &Settings) -> Result<()> {
+        let Some((risk, fitted)) = self.asked()? else { return Ok(()) };
+        ensure!(recording.of_camera().is_none(), "--risk: {} is of a camera; tables are of radars", recording.name);
+        let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
+        let table = table.with_context(|| format!("--probability: {}", recording.name))?;
+        let least = match Threshold::keeping(risk, &fitted.counted) {
+            Threshold::Everything => Some(0),
+            Threshold::From(p) => Some(p),
+            Threshold::Nothing => None,
+        };
+        let levelling = estimators::mount(&recording.pose).levelling()?;
+        let own = |all: &[Box<dyn Estimator>]| all.iter().position(|e| e.name() == "radar-3d");
+        let mut again = estimators::all(recording, &settings.estimators)?;
+        let inner = own(&again).map(|k| again.swap_remove(k)).context("no estimator radar-3d")?;
+        let place = own(running).map_or(running.len(), |k| k + 1);
+        running.insert(place, Box::new(AtRisk::new(inner, table, levelling, least)));
+        Ok(())
+    }
+
+    /// What was asked, and what it came to on this recording.
+    ///
+    /// # Errors
+    /// Those of reading the table.
+    pub fn told(&self, replay: &Replay) -> Result<String> {
+        let Some((risk, fitted)) = self.asked()? else { return Ok(String::new()) };
+        let threshold = Threshold::keeping(risk, &fitted.counted).said();
+        let counts = replay.summary.row(NAME).map(|row| row.counts).unwrap_or_default();
+        let found = rate(counts.fv, counts.tv + counts.fv);
+        let share = rate(counts.tv + counts.fv, counts.total());
+        Ok(format!(
+            "{NAME}, asked for a risk of {}: visible is {threshold}. Here {} % of what it calls visible was missed, and it calls {} % visible.\n",
+            percent(Some(risk)) + " %",
+            percent(found),
+            percent(share)
+        ))
+    }
+}
