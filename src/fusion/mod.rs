@@ -13,20 +13,23 @@
 //! | occupied | any that sees it says so, whatever the others say; where nobody sees it, any that knows of it |
 //! | in conflict | one sees it free, and nothing occupied beside it, where another sees it occupied |
 //!
-//! A map that is too old counts as unknown, and so does one that claims to be of the future. A newer map replaces all that its sensor
-//! said before. Maps of one sensor and one time are parts of the same scan, or repetitions: they are joined, and where both know a cell
-//! the worse of them counts. So neither the order in which maps come, nor repeating them, nor cutting them into parts makes a difference.
+//! A map that is late or claims to be of the future is refused; what is held of a sensor counts until it is too old. A newer map replaces
+//! all that its sensor said before. Maps of one sensor and one time are parts of the same scan, or repetitions: they are joined, and where
+//! both know a cell the worse of them counts. So as long as a sensor keeps its mount and its kind of map, neither the order in which
+//! maps come, nor repeating them, nor cutting them into parts makes a difference. Mount and kind are those of its first map until it is
+//! [forgotten](Fusion::forget), which is also due when it starts over: a map does not say so.
 //!
 //! [`fill`] puts it into the cells of a [`polar`] map around a place of one's choice, which a
 //! [`Broadcaster`](crate::wire::broadcast::Broadcaster) sends.
 //!
 //! # Limits
-//! At most 8 sensors; `NX * NY * (3 * S + 2)` bytes. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
+//! At most 8 sensors; `NX * NY * (3 * S + 1) + 4 * NX * S` bytes. What lies between the middles of cells is not looked at: cells are 2 m
+//! at most. Polar maps count up to 400 m from their sensor. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
 //! A sensor that sends its last picture again and again with new times cannot be told from a road on which nothing moves: its
 //! [`Monitor`] can, where others see what it should.
 //!
 //! # Cost
-//! Some 15 instructions for each cell that a polar map reaches; other maps are asked for each cell.
+//! Some 22 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
 mod monitor;
 mod places;
@@ -35,12 +38,12 @@ mod view;
 
 use crate::fixed::time::Time;
 use crate::map::polar::PolarMap;
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::{Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
 pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
-use places::Places;
+use places::{Place, Places};
 pub use polar::{fill, polar};
 pub use view::{Conflict, Fused, FusedCell, Sensors};
 
@@ -52,7 +55,7 @@ pub const MOST_SENSORS: usize = 8;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(default, deny_unknown_fields))]
 pub struct FusionConfig {
-    /// Age from which a map is unknown, ms.
+    /// Age up to which a map counts, ms.
     pub max_age_ms: u16,
     /// How far clocks may differ, ms: a map from later than this is not taken.
     pub max_lead_ms: u16,
@@ -76,7 +79,7 @@ pub enum NotTaken {
     Early,
     /// It is too old to count: late, or its clock differs.
     Late,
-    /// Its cells lie elsewhere than those the sensor was placed with: another mount, grid or epoch.
+    /// Its cells lie elsewhere than those of the sensor's first map, or it is of another kind: another mount, grid or threshold.
     OtherGeometry,
 }
 
@@ -99,55 +102,12 @@ pub struct Taken {
 }
 
 /// What is held of a sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Held {
     measured: Option<Time>,
     taken: Taken,
-}
-
-/// What the sensors say of one place.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Cell<const S: usize> {
-    /// Grades, 0 where unknown.
-    grades: [u8; S],
-    /// Who sees it, a bit a sensor.
-    visible: u8,
-    /// Who says that it is occupied, whether or not they see it.
-    occupied: u8,
-}
-
-impl<const S: usize> Cell<S> {
-    const UNKNOWN: Self = Self { grades: [0; S], visible: 0, occupied: 0 };
-
-    /// What a sensor says now.
-    fn replace(&mut self, sensor: usize, state: CellState) {
-        let bit = 1_u8 << (sensor & 7);
-        let put = |bits: u8, on: bool| if on { bits | bit } else { bits & !bit };
-        if let Some(grade) = self.grades.get_mut(sensor) {
-            let known = state.visibility != Visibility::Unknown;
-            *grade = if known { state.grade.max(1) } else { 0 };
-            self.visible = put(self.visible, state.visible());
-            self.occupied = put(self.occupied, known && state.occupied);
-        }
-    }
-
-    /// What it says as well, of the same time: the worse counts where both are known.
-    fn join(&mut self, sensor: usize, state: CellState) {
-        let bit = 1_u8 << (sensor & 7);
-        match self.grades.get_mut(sensor) {
-            Some(0) => self.replace(sensor, state),
-            Some(grade) if state.visibility != Visibility::Unknown => {
-                *grade = (*grade).min(state.grade.max(1));
-                if !state.visible() {
-                    self.visible &= !bit;
-                }
-                if state.occupied {
-                    self.occupied |= bit;
-                }
-            }
-            _ => {}
-        }
-    }
+    /// Least grade that is visible.
+    visible_from: u8,
 }
 
 /// Maps of `S` sensors on `NX` cells along the road by `NY` across.
@@ -159,7 +119,10 @@ pub struct Fusion<const S: usize, const NX: usize, const NY: usize> {
     cell_cm: i32,
     held: [Held; S],
     places: [Places<NX, NY>; S],
-    cells: [[Cell<S>; NY]; NX],
+    /// What each sensor says, 0 where unknown.
+    grades: [[[u8; NY]; NX]; S],
+    /// Who says that a cell is occupied, whether or not they see it: a bit a sensor.
+    occupied: [[u8; NY]; NX],
 }
 
 impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
@@ -170,42 +133,40 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
             config: FusionConfig { max_age_ms: 0, max_lead_ms: 0 },
             origin: RoadPoint::new(0, 0),
             cell_cm: 100,
-            held: [Held {
-                measured: None,
-                taken: Taken { new: 0, joined: 0, older: 0, early: 0, late: 0, other_geometry: 0 },
-            }; S],
+            held: [Held::NOTHING; S],
             places: [const { Places::NONE }; S],
-            cells: [[Cell::UNKNOWN; NY]; NX],
+            grades: [[[0; NY]; NX]; S],
+            occupied: [[0; NY]; NX],
         }
     };
 
     /// Forgets everything; the first cell's corner with the smallest coordinates lies at `origin`.
     ///
     /// # Errors
-    /// Cells smaller than 0.25 m or larger than 10 m, an age of no time or of more than 10 s.
+    /// Cells smaller than 0.25 m or larger than 2 m, an age of no time or of more than 10 s.
     pub fn set(&mut self, origin: RoadPoint, cell_cm: i32, config: FusionConfig) -> Result<(), ConfigError> {
-        within("fusion.cell_cm", cell_cm as f32, 25.0, 1000.0)?;
+        within("fusion.cell_cm", cell_cm as f32, 25.0, 200.0)?;
         within("fusion.max_age_ms", f32::from(config.max_age_ms), 1.0, 10_000.0)?;
         within("fusion.max_lead_ms", f32::from(config.max_lead_ms), 0.0, 10_000.0)?;
         (self.config, self.origin, self.cell_cm) = (config, origin, cell_cm);
         for sensor in 0..S {
             self.forget(sensor);
         }
-        self.held = [Held::default(); S];
+        self.held = [Held::NOTHING; S];
         Ok(())
     }
 
     /// Everything a sensor said is unknown: its epoch changed, or it is not trusted any more.
     pub fn forget(&mut self, sensor: usize) {
-        if let Some(held) = self.held.get_mut(sensor) {
-            held.measured = None;
-        }
-        if let Some(places) = self.places.get_mut(sensor) {
-            *places = Places::NONE;
-        }
-        for cell in self.cells.iter_mut().flatten() {
-            cell.replace(sensor, CellState::UNKNOWN);
-        }
+        let Some(((held, places), grades)) =
+            self.held.get_mut(sensor).zip(self.places.get_mut(sensor)).zip(self.grades.get_mut(sensor))
+        else {
+            return;
+        };
+        (held.measured, held.visible_from) = (None, USUAL_THRESHOLD);
+        *places = Places::NONE;
+        *grades = [[0; NY]; NX];
+        self.occupied.iter_mut().flatten().for_each(|bits| *bits &= !bit(sensor));
     }
 
     /// Takes a polar map. Where its cells lie is worked out with the first one, and again after [`forget`](Self::forget).
@@ -219,29 +180,54 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         now: Time,
         map: &PolarMap<R, A>,
     ) -> Result<(), NotTaken> {
-        let (origin, cell_cm) = (self.origin, self.cell_cm);
-        let places = self.places.get_mut(sensor).ok_or(NotTaken::NoSuchSensor)?;
-        let held = self.held.get_mut(sensor).ok_or(NotTaken::NoSuchSensor)?;
+        let (places, held) =
+            self.places.get_mut(sensor).zip(self.held.get_mut(sensor)).ok_or(NotTaken::NoSuchSensor)?;
+        let grades = self.grades.get_mut(sensor).ok_or(NotTaken::NoSuchSensor)?;
         if !places.fit(map) && held.measured.is_some() {
-            held.taken.other_geometry = held.taken.other_geometry.saturating_add(1);
-            return Err(NotTaken::OtherGeometry);
+            return Err(held.refuse(NotTaken::OtherGeometry));
         }
         let join = held.admit(measured, now, self.config)?;
         if !places.fit(map) {
-            places.work_out(map, origin, cell_cm);
+            places.work_out(map, self.origin, self.cell_cm);
+            held.visible_from = map.visible_from();
         }
-        for ((row, places), (first, end)) in self.cells.iter_mut().zip(places.rows()).zip(places.spans()) {
+        let (bit, occupied_from) = (bit(sensor), map.occupied_from());
+        let (from, occupancy) = map.cells();
+        // as long as the other, which spares a check a cell
+        let occupancy = occupancy.get(..from.len()).unwrap_or_default();
+        let rows = places.rows().iter().zip(places.spans()).zip(grades.iter_mut().zip(&mut self.occupied));
+        for ((places, (first, end)), (grades, occupied)) in rows {
             let reached = usize::from(*first)..usize::from(*end);
-            let (Some(cells), Some(places)) = (row.get_mut(reached.clone()), places.get(reached)) else { continue };
-            for (cell, place) in cells.iter_mut().zip(places) {
-                let state = place.of(map);
-                if join { cell.join(sensor, state) } else { cell.replace(sensor, state) }
+            let (Some(places), Some(grades), Some(occupied)) =
+                (places.get(reached.clone()), grades.get_mut(reached.clone()), occupied.get_mut(reached))
+            else {
+                continue;
+            };
+            let cells = places.iter().zip(grades.iter_mut().zip(occupied));
+            // a place beyond the map is in neither
+            let said = |place: &Place| {
+                let place = usize::from(*place);
+                let said = from.get(place).copied().unwrap_or(0);
+                let occupancy = occupancy.get(place).copied().unwrap_or(0);
+                (said, (said != 0) & (occupancy >= occupied_from))
+            };
+            if join {
+                cells.for_each(|(place, (grade, occupied))| {
+                    let (said, is_occupied) = said(place);
+                    worse(grade, occupied, bit, said, is_occupied);
+                });
+            } else {
+                cells.for_each(|(place, (grade, occupied))| {
+                    let (said, is_occupied) = said(place);
+                    *grade = said;
+                    *occupied = (*occupied & !bit) | (bit * u8::from(is_occupied));
+                });
             }
         }
         Ok(())
     }
 
-    /// Takes any map.
+    /// Takes any map, of a sensor none of whose polar maps was taken.
     ///
     /// # Errors
     /// Why it was not taken.
@@ -252,12 +238,28 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         now: Time,
         map: &(impl VisibilityMap + ?Sized),
     ) -> Result<(), NotTaken> {
-        let join = self.held.get_mut(sensor).ok_or(NotTaken::NoSuchSensor)?.admit(measured, now, self.config)?;
+        let (held, grades) =
+            self.held.get_mut(sensor).zip(self.grades.get_mut(sensor)).ok_or(NotTaken::NoSuchSensor)?;
+        // a polar map of it would not reach all that this one does, and leave the rest behind
+        if self.places.get(sensor).is_some_and(Places::are_worked_out) {
+            return Err(held.refuse(NotTaken::OtherGeometry));
+        }
+        let join = held.admit(measured, now, self.config)?;
+        let (bit, from) = (bit(sensor), held.visible_from);
         let (origin, cell_cm) = (self.origin, self.cell_cm);
-        for (i, row) in (0..).zip(&mut self.cells) {
-            for (j, cell) in (0..).zip(row) {
+        for (i, (grades, occupied)) in (0..).zip(grades.iter_mut().zip(&mut self.occupied)) {
+            for (j, (grade, occupied)) in (0..).zip(grades.iter_mut().zip(occupied)) {
                 let state = map.at(centre(origin, cell_cm, i, j));
-                if join { cell.join(sensor, state) } else { cell.replace(sensor, state) }
+                // the grade is held to what the map says, whatever its own threshold
+                let (said, is_occupied) = match state.visibility {
+                    Visibility::Unknown => (0, false),
+                    Visibility::Invisible => (state.grade.clamp(1, from - 1), state.occupied),
+                    Visibility::Visible => (state.grade.max(from), state.occupied),
+                };
+                if !join {
+                    (*grade, *occupied) = (0, *occupied & !bit);
+                }
+                worse(grade, occupied, bit, said, is_occupied);
             }
         }
         Ok(())
@@ -274,6 +276,22 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
     }
 }
 
+/// Threshold of a sensor whose maps are not polar.
+const USUAL_THRESHOLD: u8 = 128;
+
+/// A sensor's bit; sensors are fewer than 8.
+fn bit(sensor: usize) -> u8 {
+    1 << (sensor & 7)
+}
+
+/// Joins what a map of the same time says as well: the worse counts where both are known.
+fn worse(grade: &mut u8, occupied: &mut u8, bit: u8, said: u8, is_occupied: bool) {
+    if said != 0 {
+        *grade = if *grade == 0 { said } else { said.min(*grade) };
+        *occupied |= if is_occupied { bit } else { 0 };
+    }
+}
+
 /// Middle of a cell.
 fn centre(origin: RoadPoint, cell_cm: i32, i: i32, j: i32) -> RoadPoint {
     let at = |from: i32, k: i32| from.saturating_add(k.saturating_mul(cell_cm)).saturating_add(cell_cm / 2);
@@ -281,32 +299,47 @@ fn centre(origin: RoadPoint, cell_cm: i32, i: i32, j: i32) -> RoadPoint {
 }
 
 impl Held {
+    const NOTHING: Self = Self {
+        measured: None,
+        taken: Taken { new: 0, joined: 0, older: 0, early: 0, late: 0, other_geometry: 0 },
+        visible_from: USUAL_THRESHOLD,
+    };
+
     /// Whether a map of this time is taken, and joined to the one before.
     fn admit(&mut self, measured: Time, now: Time, config: FusionConfig) -> Result<bool, NotTaken> {
-        let count = |counter: &mut u32| *counter = counter.saturating_add(1);
         let (lead, age) = (measured.since(now).unwrap_or(0), now.since(measured).unwrap_or(0));
         if lead > 1000 * u64::from(config.max_lead_ms) {
-            count(&mut self.taken.early);
-            return Err(NotTaken::Early);
+            return Err(self.refuse(NotTaken::Early));
         }
         if age > 1000 * u64::from(config.max_age_ms) {
-            count(&mut self.taken.late);
-            return Err(NotTaken::Late);
+            return Err(self.refuse(NotTaken::Late));
         }
         match self.measured {
-            Some(newest) if measured < newest => {
-                count(&mut self.taken.older);
-                return Err(NotTaken::Older);
-            }
+            Some(newest) if measured < newest => Err(self.refuse(NotTaken::Older)),
             Some(newest) if measured == newest => {
-                count(&mut self.taken.joined);
-                return Ok(true);
+                self.taken.joined = self.taken.joined.saturating_add(1);
+                Ok(true)
             }
-            _ => {}
+            _ => {
+                self.taken.new = self.taken.new.saturating_add(1);
+                self.measured = Some(measured);
+                Ok(false)
+            }
         }
-        count(&mut self.taken.new);
-        self.measured = Some(measured);
-        Ok(false)
+    }
+
+    /// Counts a map that is not taken, under its reason.
+    fn refuse(&mut self, why: NotTaken) -> NotTaken {
+        let Taken { older, early, late, other_geometry, .. } = &mut self.taken;
+        let counter = match why {
+            NotTaken::NoSuchSensor => return why,
+            NotTaken::Older => older,
+            NotTaken::Early => early,
+            NotTaken::Late => late,
+            NotTaken::OtherGeometry => other_geometry,
+        };
+        *counter = counter.saturating_add(1);
+        why
     }
 
     /// Whether its newest map counts.

@@ -26,6 +26,8 @@ use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
 
+use super::polar::edges;
+
 /// When a sector is judged blind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -92,9 +94,7 @@ impl<const K: usize> Monitor<K> {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within limits
     pub fn new(mount: &Mount, azimuth_deg: [f32; 2], config: &MonitorConfig) -> Result<Self, ConfigError> {
         const { assert!(K > 0 && K <= 64) }
-        let [right, left] = azimuth_deg;
-        let right = within("azimuth_deg[0]", right, -180.0, 179.0)?;
-        let left = within("azimuth_deg[1]", left, right + 1.0, 180.0)?;
+        let (right, span) = edges(azimuth_deg)?;
         let usual = within("monitor.usual_miss", config.usual_miss, 0.01, 0.98)?;
         let blind = above("monitor.blind_miss", within("monitor.blind_miss", config.blind_miss, 0.02, 0.99)?, usual)?;
         let threshold = within("monitor.threshold", config.threshold, 0.5, 50.0)?;
@@ -103,8 +103,8 @@ impl<const K: usize> Monitor<K> {
         let ratio = |a: f32, b: f32| libm::logf(a / b);
         Ok(Self {
             levelling: mount.levelling()?,
-            right: Angle::from_degrees(right),
-            span: math::round_i32((left - right) * (65536.0 / 360.0)).clamp(1, i32::from(u16::MAX)) as u16,
+            right,
+            span,
             weights: [nats(ratio(blind, usual)).max(1), nats(ratio(1.0 - blind, 1.0 - usual)).min(-1)],
             threshold: nats(threshold),
             window_us: 1000 * window as u64,
@@ -121,7 +121,8 @@ impl<const K: usize> Monitor<K> {
         usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
     }
 
-    /// Another sensor detects something at a place. `own` is what the watched sensor's map says of it, `detected` whether that
+    /// Another sensor detects something at a place. `own` is what the watched sensor's map says of it
+    /// (before [`watched`](Self::watched), or a blind sector stays blind), `detected` whether that
     /// detects something there, too.
     pub fn observe(&mut self, now: Time, at: RoadPoint, own: CellState, detected: bool) -> Observed {
         self.advance(now);

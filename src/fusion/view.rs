@@ -4,7 +4,7 @@ use crate::fixed::time::Time;
 use crate::map::{CellState, Visibility, VisibilityMap};
 use crate::sensor::road::RoadPoint;
 
-use super::{Cell, Fusion, Held, centre};
+use super::{Fusion, Held, bit, centre};
 
 /// Some of the sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -81,21 +81,11 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
 
     /// What is known of a cell, counted from the grid's origin; unknown outside.
     pub fn cell(&self, i: usize, j: usize) -> FusedCell {
-        self.held(i, j).map_or(self.judged(&Cell::UNKNOWN), |cell| self.judged(cell))
-    }
-
-    fn held(&self, i: usize, j: usize) -> Option<&'f Cell<S>> {
-        self.fusion.cells.get(i)?.get(j)
-    }
-
-    fn judged(&self, cell: &Cell<S>) -> FusedCell {
-        let fresh = |bits: u8| bits & self.fresh;
-        let visible = fresh(cell.visible);
-        let mut known = 0_u8;
-        let (mut best_seen, mut best) = (0, 0);
-        for (&grade, k) in cell.grades.iter().zip(0_u32..) {
-            let bit = fresh(1 << (k & 7));
-            if grade == 0 || bit == 0 {
+        let (visible, occupied) = self.bits(i, j);
+        let (mut known, mut best_seen, mut best) = (0_u8, 0, 0);
+        for (sensor, grade) in self.grades(i, j) {
+            let bit = bit(sensor);
+            if grade == 0 || self.fresh & bit == 0 {
                 continue;
             }
             known |= bit;
@@ -109,16 +99,31 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
             (0, _) => (Visibility::Invisible, best),
             _ => (Visibility::Visible, best_seen),
         };
-        let occupied = fresh(cell.occupied) & if visible == 0 { known } else { visible };
+        let occupied = occupied & if visible == 0 { known } else { visible };
         let is_occupied = occupied != 0;
-        let state =
-            CellState { visibility, grade, occupancy: if is_occupied { u8::MAX } else { 0 }, occupied: is_occupied };
+        let occupancy = if is_occupied { u8::MAX } else { 0 };
         FusedCell {
             seen_by: Sensors(visible),
             hidden_from: Sensors(known & !visible),
             occupied_by: Sensors(occupied),
-            state,
+            state: CellState { visibility, grade, occupancy, occupied: is_occupied },
         }
+    }
+
+    fn grades(&self, i: usize, j: usize) -> impl Iterator<Item = (usize, u8)> + '_ {
+        let grades =
+            self.fusion.grades.iter().map(move |rows| rows.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0));
+        grades.enumerate()
+    }
+
+    /// Fresh sensors that see a cell, and those that say that it is occupied.
+    fn bits(&self, i: usize, j: usize) -> (u8, u8) {
+        let sees = |(held, (sensor, grade)): (&Held, (usize, u8))| {
+            if grade != 0 && grade >= held.visible_from { bit(sensor) } else { 0 }
+        };
+        let visible = self.fusion.held.iter().zip(self.grades(i, j)).map(sees).fold(0, |all, bit| all | bit);
+        let occupied = self.fusion.occupied.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0);
+        (visible & self.fresh, occupied & self.fresh)
     }
 
     /// Where sensors contradict each other. What one sees free counts only if it sees nothing occupied in the eight cells around
@@ -129,14 +134,14 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
     }
 
     fn conflict(&self, i: usize, j: usize) -> Option<Conflict> {
-        let cell = self.held(i, j)?;
-        let occupied = cell.occupied & cell.visible & self.fresh;
-        let mut free = cell.visible & !cell.occupied & self.fresh;
+        let (visible, occupied) = self.bits(i, j);
+        let (occupied, mut free) = (occupied & visible, visible & !occupied);
         if occupied == 0 || free == 0 {
             return None;
         }
-        for near in (0..9).map(|k| (i.wrapping_add(k / 3).wrapping_sub(1), j.wrapping_add(k % 3).wrapping_sub(1))) {
-            free &= !self.held(near.0, near.1).map_or(0, |cell| cell.occupied);
+        for (x, y) in (0..9).map(|k| (i.wrapping_add(k / 3).wrapping_sub(1), j.wrapping_add(k % 3).wrapping_sub(1))) {
+            let (visible, occupied) = self.bits(x, y);
+            free &= !(visible & occupied);
         }
         let [x, y] = [i, j].map(|k| i32::try_from(k).unwrap_or(i32::MAX));
         let at = centre(self.fusion.origin, self.fusion.cell_cm, x, y);
@@ -149,9 +154,10 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
             let cells = at.checked_sub(from)?.checked_div_euclid(self.fusion.cell_cm)?;
             usize::try_from(cells).ok()
         };
-        let (origin, unknown) = (self.fusion.origin, self.judged(&Cell::UNKNOWN));
-        let i_j = index(point.x_cm, origin.x_cm).zip(index(point.y_cm, origin.y_cm));
-        i_j.map_or(unknown, |(i, j)| self.cell(i, j))
+        let origin = self.fusion.origin;
+        let outside = (NX, NY);
+        let (i, j) = index(point.x_cm, origin.x_cm).zip(index(point.y_cm, origin.y_cm)).unwrap_or(outside);
+        self.cell(i, j)
     }
 }
 

@@ -112,6 +112,11 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
         self.occupancy.get(azimuth)
     }
 
+    /// All grades and occupancies, azimuth by azimuth.
+    pub(crate) fn cells(&self) -> (&[u8], &[u8]) {
+        (self.grades.as_flattened(), self.occupancy.as_flattened())
+    }
+
     /// The cell a place of the levelled frame lies in.
     pub fn locate(&self, x_cm: i32, y_cm: i32) -> Option<(usize, usize)> {
         self.geometry.locate(x_cm, y_cm, R, A)

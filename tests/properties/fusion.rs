@@ -147,7 +147,7 @@ proptest! {
 }
 
 #[test]
-fn around_a_place_of_ones_own_each_cell_is_what_is_known_at_its_middle() {
+fn around_a_place_of_ones_own_cells_lie_where_they_are_read() {
     // 2 m to the left of x = 10 m it is visible, to the right hidden and occupied, behind the place unknown
     struct Sides;
     impl VisibilityMap for Sides {
@@ -164,10 +164,14 @@ fn around_a_place_of_ones_own_each_cell_is_what_is_known_at_its_middle() {
     }
     let mount = |yaw_deg| Mount { x_m: 10.0, y_m: 2.0, height_m: 1.0, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
     for yaw_deg in [0.0, 30.0, -45.0] {
-        let mut map = polar::<30, 72>(&mount(yaw_deg), [-180.0, 180.0], 1.0).unwrap();
+        let mut map = polar::<30, 35>(&mount(yaw_deg), [-87.5, 87.5], 1.0).unwrap();
         fill(&mut map, &Sides);
-        for azimuth in 0..72_u16 {
-            let bearing = (yaw_deg - 180.0 + 5.0 * (f32::from(azimuth) + 0.5) + 540.0).rem_euclid(360.0) - 180.0;
+        for azimuth in 0..35_u16 {
+            let bearing = (yaw_deg - 87.5 + 5.0 * (f32::from(azimuth) + 0.5) + 540.0).rem_euclid(360.0) - 180.0;
+            // those that hold an edge are as bad as their worse part
+            if [0.0, 90.0].iter().any(|edge| (bearing.abs() - edge).abs() < 2.6) {
+                continue;
+            }
             for range in [3, 12, 29] {
                 let cell = map.cell(azimuth.into(), range);
                 let expected = match bearing {
@@ -180,10 +184,31 @@ fn around_a_place_of_ones_own_each_cell_is_what_is_known_at_its_middle() {
             }
         }
     }
-    let refused = |azimuth_deg, cell_m| polar::<30, 72>(&mount(0.0), azimuth_deg, cell_m).unwrap_err().parameter;
+    let refused = |azimuth_deg, cell_m| polar::<30, 35>(&mount(0.0), azimuth_deg, cell_m).unwrap_err().parameter;
     assert_eq!(refused([-190.0, 0.0], 1.0), "azimuth_deg[0]");
     assert_eq!(refused([20.0, 10.0], 1.0), "azimuth_deg[1]");
+    assert_eq!(refused([-100.0, 100.0], 1.0), "azimuth_deg[1]", "more than half a turn");
     assert_eq!(refused([-20.0, 10.0], 0.0), "cell_m");
+    assert_eq!(polar::<100, 4>(&mount(0.0), [-20.0, 20.0], 5.0).unwrap_err().parameter, "cell_m", "beyond 400 m");
+}
+
+#[test]
+fn a_cell_of_ones_own_is_the_worst_of_what_it_covers() {
+    /// Visible, but for a strip of a metre across the view at 25 m, and one along it a little to the left.
+    struct Strips;
+    impl VisibilityMap for Strips {
+        fn at(&self, p: RoadPoint) -> CellState {
+            let hidden = (2500..2600).contains(&p.x_cm) || (150..250).contains(&p.y_cm);
+            if hidden { HIDDEN.at(p) } else { SEEN_FREE.at(p) }
+        }
+    }
+    let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+    let mut map = polar::<10, 2>(&mount, [-15.0, 15.0], 4.0).unwrap();
+    fill(&mut map, &Strips);
+    let seen = [0, 1].map(|azimuth| (0..10).filter(|range| map.cell(azimuth, *range).visible()).collect::<Vec<_>>());
+    // to the right all but 24 to 28 m; to the left what ends before the strip begins
+    assert_eq!(seen, [vec![0, 1, 2, 3, 4, 5, 7, 8, 9], vec![0]]);
+    assert!(map.cell(0, 6).occupied && !map.cell(0, 4).occupied);
 }
 
 /// The same everywhere.
@@ -294,6 +319,10 @@ fn a_mount_that_differs_is_named_until_the_sensor_is_forgotten() {
     assert_eq!(seen(&road), 0);
     road.offer_polar(0, ms(600), ms(600), &b).unwrap();
     assert!(seen(&road) > 200);
+    // nor are the two kinds of maps of one sensor mixed
+    assert_eq!(road.offer(0, ms(610), ms(610), &SEEN_FREE), Err(NotTaken::OtherGeometry));
+    road.offer(1, ms(610), ms(610), &SEEN_FREE).unwrap();
+    assert_eq!(road.offer_polar(1, ms(620), ms(620), &b), Err(NotTaken::OtherGeometry));
     // sites that do not overlap see nothing of each other's road
     let mut far = Box::new(Road::NOWHERE);
     far.set(RoadPoint::new(900_000, 0), 100, FusionConfig::default()).unwrap();
@@ -306,7 +335,7 @@ fn a_grid_that_cannot_be_is_refused_by_name() {
     let mut road = road();
     let usual = FusionConfig::default();
     let mut refused = |cell, config| road.set(ORIGIN, cell, config).unwrap_err().parameter;
-    assert_eq!(refused(24, usual), "fusion.cell_cm");
+    assert_eq!((refused(24, usual), refused(201, usual)), ("fusion.cell_cm", "fusion.cell_cm"));
     assert_eq!(refused(100, FusionConfig { max_age_ms: 0, ..usual }), "fusion.max_age_ms");
     assert_eq!(refused(100, FusionConfig { max_lead_ms: 60_000, ..usual }), "fusion.max_lead_ms");
 }

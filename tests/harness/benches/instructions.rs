@@ -40,7 +40,7 @@ const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
 const CAMERA: [(&str, &str); 2] = [("camera-3d", SCENES[0]), ("camera-3d", CROWDED)];
 const CROWDED: &str = "crowded";
 
-/// Two of the recording's maps onto 200 m by 50 m of road, cells of one metre.
+/// Two of the recording's maps onto 200 m by 32 m of road, cells of one metre.
 const FUSION: &str = "fusion";
 
 /// Instructions that fusing two maps may take.
@@ -49,7 +49,7 @@ const FUSION_BUDGET: u64 = 300_000;
 /// What is measured on the recording's maps only, or their sending and receiving.
 const WIRE: [&str; 6] = ["send-can", "receive-can", "send-fd", "receive-fd", "send-long", "receive-long"];
 
-type Road = Fusion<2, 200, 50>;
+type Road = Fusion<2, 200, 32>;
 
 /// Instructions a scan that sending and receiving may take, median, on every bus.
 const WIRE_BUDGET: u64 = 150_000;
@@ -216,7 +216,7 @@ fn run_fusion(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
     let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
     let mut map = Box::new(parameters.map());
     let mut road = Box::new(Road::NOWHERE);
-    road.set(RoadPoint::new(0, -2500), 100, FusionConfig::default()).expect("defaults are valid");
+    road.set(RoadPoint::new(0, -1600), 100, FusionConfig::default()).expect("defaults are valid");
     for (now, detections) in frames {
         state.process(&parameters, *now, detections, false, &mut map);
         measured_fusion(&mut road, *now, &map);

@@ -10,6 +10,7 @@ use viewshed::wire::receive::{ReceivedMap, ReceiverLimits, SenderCondition};
 use viewshed::wire::serial::Unstuffer;
 
 use super::ears::{Ears, Key};
+use super::logged::Logged;
 use crate::recording::can_log::Line;
 use crate::recording::serial_log::Chunk;
 
@@ -90,7 +91,7 @@ pub struct StatusSeen {
 }
 
 /// What happened to its frames.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Counted {
     pub accepted: u32,
     pub protection: u32,
@@ -125,6 +126,14 @@ impl Listening {
     /// Lets time pass in which nothing came: maps grow old.
     pub fn pass(&mut self, time_ns: i64) {
         self.last = Time::from_micros(u64::try_from(time_ns / 1000).unwrap_or(0));
+    }
+
+    /// Takes whatever a log holds.
+    pub fn take_logged(&mut self, logged: &Logged) {
+        match logged {
+            Logged::Frame(line) => self.take(line),
+            Logged::Chunk(chunk) => self.take_bytes(chunk),
+        }
     }
 
     /// Takes bytes of a serial line.

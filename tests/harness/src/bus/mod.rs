@@ -5,6 +5,7 @@ pub mod ears;
 pub mod entropy;
 pub mod listening;
 pub mod load;
+pub mod logged;
 pub mod loss;
 pub mod report;
 pub mod symbols;

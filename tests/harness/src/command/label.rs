@@ -77,7 +77,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// Opens an address in the user's browser; whether there is a program for that.
-fn open(url: &str) -> bool {
+pub fn open(url: &str) -> bool {
     let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
         "macos" => ("open", &[]),
         "windows" => ("rundll32", &["url.dll,FileProtocolHandler"]),

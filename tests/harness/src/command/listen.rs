@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 #[cfg(target_os = "linux")]
 use std::time::Duration;
@@ -14,10 +14,10 @@ use super::key::KeyArgs;
 use super::options::seconds;
 use super::print;
 use crate::bus::listening::{Counted, Heard, Listening, Moment, SENSORS, shown};
-use crate::recording::can_log::{self, FORMATS, Format, Line};
-use crate::recording::problems::Problems;
-use crate::recording::serial_log::Chunk;
-use crate::recording::{file, foreign};
+use crate::bus::logged::{self, Logged};
+#[cfg(target_os = "linux")]
+use crate::recording::can_log;
+use crate::recording::file;
 #[cfg(target_os = "linux")]
 use crate::results::files::until_ctrl_c;
 use crate::results::files::{Folder, OutputArgs, Target};
@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             (Cow::Borrowed(interface.as_str()), 0)
         }
         (None, Some(log)) => {
-            let (logged, unread) = logged(log, args.interface.as_deref())?;
+            let (logged, unread) = logged::read(log, args.interface.as_deref())?;
             for logged in &logged {
                 match logged {
                     Logged::Frame(line) => session.at(line.time_ns)?.take(line),
@@ -211,36 +211,6 @@ fn shares(m: &Moment) -> String {
     let share = |n: usize| 100.0 * n as f64 / all;
     let (visible, invisible, unknown) = (share(m.visible), share(m.invisible), share(m.unknown));
     format!("{visible:.1} % of the cells visible, {invisible:.1} % not, {unknown:.1} % unknown")
-}
-
-/// A line of a log.
-enum Logged {
-    Frame(Line),
-    Chunk(Chunk),
-}
-
-/// The lines of a log, and how many are none.
-fn logged(path: &Path, interface: Option<&str>) -> Result<(Vec<Logged>, u64)> {
-    let bytes = file::bytes(path)?;
-    if let Some(format) = Format::of(&bytes) {
-        let mut problems = Problems::default();
-        let lines = can_log::read(&bytes, format, interface, &mut problems)?;
-        return Ok((lines.into_iter().map(Logged::Frame).collect(), problems.count("line skipped")));
-    }
-    let text = String::from_utf8_lossy(&bytes);
-    let lines = text.lines().filter(|line| !line.trim().is_empty());
-    let (mut chunks, mut unread) = (Vec::new(), 0);
-    for line in lines {
-        match Chunk::parse(line) {
-            Ok(chunk) => chunks.push(Logged::Chunk(chunk)),
-            Err(_) => unread += 1,
-        }
-    }
-    if chunks.is_empty() {
-        let why = foreign::named(&bytes).unwrap_or_else(|| format!("it is no log of {FORMATS}, nor of a serial line"));
-        bail!("{} cannot be read: {why}", file::shown(path));
-    }
-    Ok((chunks, unread))
 }
 
 /// Counts, and draws, every sensor's map as it is now.

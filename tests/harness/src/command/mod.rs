@@ -16,6 +16,8 @@ pub mod progress;
 pub mod replay;
 pub mod simulate;
 pub mod site;
+#[cfg(feature = "pages")]
+pub mod view;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -49,6 +51,8 @@ enum Command {
     Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
+    #[cfg(feature = "pages")]
+    View(Box<view::Args>),
 }
 
 impl Cli {
@@ -68,6 +72,8 @@ impl Cli {
             Command::Completions(args) => completions::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),
+            #[cfg(feature = "pages")]
+            Command::View(args) => view::run(args),
         };
         outcome.unwrap_or_else(|error| {
             complain(&error);

@@ -175,15 +175,24 @@ fn is_wait(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
+/// Opens a port of this machine, and asks at one bit rate after the other.
+///
+/// # Errors
+/// Those of [`open_port`].
+#[cfg(unix)]
+pub fn open(path: &str, baud: Option<u32>) -> Result<SerialLink<serialport::TTYPort>> {
+    let rates = baud.map_or_else(|| RATES.to_vec(), |baud| vec![baud]);
+    Ok(SerialLink::new(open_port(path, rates[0])?, path, rates))
+}
+
 /// Opens a port of this machine.
 ///
 /// # Errors
 /// No such port, somebody else's, or one that may not be opened: with what to do.
 #[cfg(unix)]
-pub fn open(path: &str, baud: Option<u32>) -> Result<SerialLink<serialport::TTYPort>> {
-    let rates = baud.map_or_else(|| RATES.to_vec(), |baud| vec![baud]);
-    let builder = serialport::new(path, rates[0]).timeout(Duration::from_millis(20));
-    let port = serialport::TTYPort::open(&builder).map_err(|error| {
+pub fn open_port(path: &str, baud: u32) -> Result<serialport::TTYPort> {
+    let builder = serialport::new(path, baud).timeout(Duration::from_millis(20));
+    serialport::TTYPort::open(&builder).map_err(|error| {
         let what = match error.kind {
             serialport::ErrorKind::NoDevice => {
                 "somebody else has it open: a terminal program, ModemManager, the daemon?".to_owned()
@@ -197,8 +206,7 @@ pub fn open(path: &str, baud: Option<u32>) -> Result<SerialLink<serialport::TTYP
             _ => error.to_string(),
         };
         anyhow::anyhow!("{path}: {what}")
-    })?;
-    Ok(SerialLink::new(port, path, rates))
+    })
 }
 
 #[cfg(unix)]

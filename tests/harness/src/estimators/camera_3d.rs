@@ -12,11 +12,9 @@ use viewshed::fixed::time::Time;
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::VisibilityMap;
 use viewshed::map::query::Footprint;
-use viewshed::sensor::mount::Mount;
 use viewshed::sensor::road::RoadPoint;
 
 use super::Estimator;
-use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::Frame;
 use crate::recording::camera::{CameraFrame, RecordedCamera};
@@ -39,19 +37,7 @@ struct Driver {
 
 /// The camera as the library takes it.
 pub fn calibration(camera: &RecordedCamera) -> Calibration {
-    Calibration { intrinsics: camera.intrinsics.for_library(), mount: mount(&camera.pose) }
-}
-
-fn mount(pose: &SensorPose) -> Mount {
-    let [x, y, z] = pose.position;
-    Mount {
-        x_m: x as f32,
-        y_m: y as f32,
-        height_m: z as f32,
-        yaw_deg: pose.yaw_rad().to_degrees() as f32,
-        pitch_deg: pose.pitch_rad().to_degrees() as f32,
-        roll_deg: pose.roll_rad().to_degrees() as f32,
-    }
+    Calibration { intrinsics: camera.intrinsics.for_library(), mount: super::mount(&camera.pose) }
 }
 
 /// The estimator, and with truth its reference. Frames are found by their time.
@@ -172,6 +158,7 @@ fn standing(solid: &Solid) -> Option<LiftedBox> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::pose::SensorPose;
     use crate::recording::camera::{Box2d, Intrinsics};
     use crate::recording::truth::Label;
 

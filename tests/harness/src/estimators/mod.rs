@@ -22,6 +22,8 @@ use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 
+use crate::geometry::pose::SensorPose;
+use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
 
 /// A visibility estimator as the harness drives it: one radar frame in, one map out.
@@ -40,6 +42,11 @@ pub trait Estimator: Send {
     /// The map's own polar cells, where it has any.
     fn polar(&self) -> Option<PolarCells<'_>> {
         None
+    }
+
+    /// The moving things it believes in, which cast the map's shadows; road frame.
+    fn obstacles(&self) -> Vec<Solid> {
+        Vec::new()
     }
 
     /// What was rejected or dropped since construction, by reason.
@@ -147,17 +154,10 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
 
 /// The recording's sensor as the library takes it.
 pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
-    let (pose, view) = (recording.pose, recording.sensor.field_of_view);
+    let view = recording.sensor.field_of_view;
     let degrees = |v: f64| v.to_degrees() as f32;
     Sensor {
-        mount: Mount {
-            x_m: pose.position[0] as f32,
-            y_m: pose.position[1] as f32,
-            height_m: pose.position[2] as f32,
-            yaw_deg: degrees(pose.yaw_rad()),
-            pitch_deg: degrees(pose.pitch_rad()),
-            roll_deg: degrees(pose.roll_rad()),
-        },
+        mount: mount(&recording.pose),
         field_of_view: FieldOfView {
             azimuth_min_deg: degrees(view.azimuth_rad[0]),
             azimuth_max_deg: degrees(view.azimuth_rad[1]),
@@ -167,6 +167,19 @@ pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
             range_max_m: view.range_m[1] as f32,
         },
         noise: *noise,
+    }
+}
+
+/// Where a sensor hangs, as the library takes it.
+pub fn mount(pose: &SensorPose) -> Mount {
+    let [x, y, z] = pose.position;
+    Mount {
+        x_m: x as f32,
+        y_m: y as f32,
+        height_m: z as f32,
+        yaw_deg: pose.yaw_rad().to_degrees() as f32,
+        pitch_deg: pose.pitch_rad().to_degrees() as f32,
+        roll_deg: pose.roll_rad().to_degrees() as f32,
     }
 }
 

@@ -6,10 +6,12 @@ use viewshed::map::VisibilityMap;
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
+use viewshed::sensor::mount::Mount;
 use viewshed::unit::profile::reference::State;
 
 use super::{Estimator, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};
+use crate::geometry::solid::Solid;
 use crate::recording::Frame;
 
 /// Range cells, azimuths and elevations of the reference grid.
@@ -25,6 +27,7 @@ struct Driver<const D: usize> {
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
     state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
+    mount: Mount,
     intake: Intake,
     no_room: u32,
 }
@@ -60,7 +63,8 @@ impl<const D: usize> Driver<D> {
     fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self> {
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
-        Ok(Self { parameters, state: Box::new(Radar3d::new()), map, intake: Intake::default(), no_room: 0 })
+        let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
+        Ok(Self { parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
     }
 }
 
@@ -88,6 +92,24 @@ impl<const D: usize> Estimator for Driver<D> {
         Some(polar_cells(&self.map))
     }
 
+    fn obstacles(&self) -> Vec<Solid> {
+        let (sin, cos) = f64::from(self.mount.yaw_deg).to_radians().sin_cos();
+        let metres = |cm: i32| f64::from(cm) / 100.0;
+        // the levelled frame is the road's, moved to the sensor and turned to its heading
+        let on_road = |s: viewshed::obstacles::solid::Solid| {
+            let (ahead, left, height_m) = (metres(s.x_cm), metres(s.y_cm), metres(s.height_cm));
+            let x = f64::from(self.mount.x_m) + cos * ahead - sin * left;
+            let y = f64::from(self.mount.y_m) + sin * ahead + cos * left;
+            let turned = f64::from(s.heading.y).atan2(f64::from(s.heading.x));
+            Solid {
+                center: [x, y, height_m / 2.0],
+                yaw_rad: turned + f64::from(self.mount.yaw_deg).to_radians(),
+                size: [2.0 * metres(s.half_length_cm), 2.0 * metres(s.half_width_cm), height_m],
+            }
+        };
+        self.state.obstacles().solids(self.parameters.tracking()).map(on_road).collect()
+    }
+
     fn counters(&self) -> Vec<(&'static str, u64)> {
         let full = [(NO_ROOM, u64::from(self.no_room))].into_iter().filter(|(_, n)| *n > 0);
         self.intake.counters(self.state.rejections()).into_iter().chain(full).collect()
@@ -97,11 +119,19 @@ impl<const D: usize> Estimator for Driver<D> {
 #[cfg(test)]
 mod tests {
     use viewshed::sensor::field_of_view::FieldOfView;
-    use viewshed::sensor::mount::Mount;
     use viewshed::sensor::noise::NoiseConfig;
 
     use super::*;
     use crate::recording::RadarDetection;
+
+    const VIEW: FieldOfView = FieldOfView {
+        azimuth_min_deg: -60.0,
+        azimuth_max_deg: 60.0,
+        elevation_min_deg: -16.0,
+        elevation_max_deg: 16.0,
+        range_min_m: 3.0,
+        range_max_m: 200.0,
+    };
 
     /// So many vehicles that come nearer, 6 m and 12 degrees apart.
     fn frame(k: i64, vehicles: usize) -> Frame {
@@ -121,17 +151,29 @@ mod tests {
     }
 
     #[test]
+    fn an_obstacle_stands_on_the_road_where_its_reflections_are() {
+        // looks back along the road, from (100, 20): what is to its left has the smaller y
+        let mount = Mount { x_m: 100.0, y_m: 20.0, height_m: 6.0, yaw_deg: 180.0, pitch_deg: 0.0, roll_deg: 0.0 };
+        let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
+        let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
+        let mut one = frame(0, 1);
+        one.detections[0].azimuth_rad = 0.1;
+        for k in 0..20 {
+            one.time_ns = 1_000_000_000 + k * 66_000_000;
+            one.detections[0].range_m = 60.0 - 8.0 * 0.066 * k as f32;
+            estimator.step(&one);
+        }
+        let found = estimator.obstacles();
+        assert_eq!(found.len(), 1, "{found:?}");
+        let [x, y, _] = found[0].center;
+        // 50 m before the sensor, and the middle of the vehicle is some metres behind its face
+        assert!((40.0..52.0).contains(&x) && (13.0..17.5).contains(&y), "{found:?}");
+    }
+
+    #[test]
     fn a_list_of_obstacles_that_is_full_is_reported_with_its_limit() {
-        let field_of_view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 };
-        let sensor = Sensor { mount, field_of_view, noise: NoiseConfig::default() };
+        let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
         let no_room = |vehicles: usize| {
             let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
             (0..40).for_each(|k| estimator.step(&frame(k, vehicles)));

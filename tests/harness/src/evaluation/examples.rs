@@ -42,6 +42,16 @@ pub struct Example {
     pub slice_in_sight: bool,
 }
 
+/// An example with all frames of its situation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lasting {
+    pub example: Example,
+    /// Index into the truth's tracks.
+    pub track: usize,
+    pub first: usize,
+    pub last: usize,
+}
+
 /// Successive samples (frame, object) of one track with one outcome.
 struct Situation {
     outcome: Outcome,
@@ -80,12 +90,37 @@ fn follows(recording: &Recording, last: usize, next: usize) -> bool {
     (0..GAP_NS).contains(&time(next).saturating_sub(time(last)))
 }
 
+/// The situations of an outcome that say most, most telling first, one a track: what an outcome gets wrong worst, where
+/// it is a false one.
+pub fn most_telling(
+    recording: &Recording,
+    samples: &[FrameSamples],
+    score: &Score,
+    outcome: Outcome,
+    most: usize,
+) -> Vec<Lasting> {
+    let all = situations(recording, samples, score);
+    let ranked = ranked(recording, samples, &all, outcome);
+    let mut found: Vec<Lasting> = Vec::new();
+    for lasting in ranked {
+        if found.len() < most && found.iter().all(|other| other.track != lasting.track) {
+            found.push(lasting);
+        }
+    }
+    found
+}
+
 fn best(
     recording: &Recording,
     samples: &[FrameSamples],
     situations: &[Situation],
     outcome: Outcome,
 ) -> Option<Example> {
+    ranked(recording, samples, situations, outcome).into_iter().next().map(|lasting| lasting.example)
+}
+
+/// An outcome's situations, the preferred one first.
+fn ranked(recording: &Recording, samples: &[FrameSamples], situations: &[Situation], outcome: Outcome) -> Vec<Lasting> {
     let sample = |&(frame, object): &(usize, usize)| &samples[frame].objects[object];
     let rank = |situation: &Situation| {
         let suitable: Vec<_> = situation.members.iter().filter(|m| suits(recording, sample(m))).copied().collect();
@@ -93,23 +128,28 @@ fn best(
         let chosen = members[members.len() / 2];
         let telling = telling(outcome, sample(&chosen).slice_in_sight);
         let key = (telling, !suitable.is_empty(), members.len(), Reverse(chosen));
-        (key, chosen, situation.members.len())
+        let frames = (situation.members[0].0, situation.members[situation.members.len() - 1].0);
+        (key, chosen, situation.members.len(), frames)
     };
-    let (_, (frame, object), lasts) =
-        situations.iter().filter(|s| s.outcome == outcome).map(rank).max_by_key(|(key, ..)| *key)?;
-    let chosen = &samples[frame].objects[object];
-    let track = recording.truth.as_ref()?.tracks.get(chosen.track)?;
-    Some(Example {
-        outcome,
-        frame,
-        object,
-        time_ns: recording.frames.get(frame)?.time_ns,
-        object_id: track.id.clone(),
-        class: track.class.clone(),
-        distance_m: chosen.distance_m,
-        lasts,
-        slice_in_sight: chosen.slice_in_sight,
-    })
+    let mut ranked: Vec<_> = situations.iter().filter(|s| s.outcome == outcome).map(rank).collect();
+    ranked.sort_by_key(|(key, ..)| Reverse(*key));
+    let lasting = |(frame, object): (usize, usize), lasts, (first, last)| {
+        let chosen = &samples[frame].objects[object];
+        let track = recording.truth.as_ref()?.tracks.get(chosen.track)?;
+        let example = Example {
+            outcome,
+            frame,
+            object,
+            time_ns: recording.frames.get(frame)?.time_ns,
+            object_id: track.id.clone(),
+            class: track.class.clone(),
+            distance_m: chosen.distance_m,
+            lasts,
+            slice_in_sight: chosen.slice_in_sight,
+        };
+        Some(Lasting { example, track: chosen.track, first, last })
+    };
+    ranked.into_iter().filter_map(|(_, chosen, lasts, frames)| lasting(chosen, lasts, frames)).collect()
 }
 
 /// Whether exact geometry bears the outcome out: true ones agree with it, false ones contradict it.
@@ -153,6 +193,20 @@ mod tests {
         assert_eq!(ti.frame, 8, "the middle of frames 5 to 11, which lie at a good distance");
         assert_eq!(samples[ti.frame].objects[ti.object].track, 0);
         assert_eq!(found, find(&recording, &samples, &invisible));
+    }
+
+    #[test]
+    fn the_worst_are_one_a_vehicle_with_their_first_and_last_frames() {
+        // three vehicles that nobody detects and the map calls visible: for 20, 9 and 9 frames, the first one twice
+        let samples = frames((0..40).map(|k| {
+            let mut objects = vec![sample(0, 60.0, k == 20, false)];
+            objects.extend((k < 9).then(|| sample(1, 70.0, false, false)));
+            objects.extend((10..19).contains(&k).then(|| sample(2, 80.0, false, false)));
+            objects
+        }));
+        let found = most_telling(&recording(40, 3), &samples, &score("m", &samples, |_| Some(255)), Outcome::Fv, 3);
+        let told: Vec<_> = found.iter().map(|l| (l.track, l.first, l.last, l.example.lasts)).collect();
+        assert_eq!(told, [(0, 0, 19, 20), (1, 0, 8, 9), (2, 10, 18, 9)]);
     }
 
     #[test]

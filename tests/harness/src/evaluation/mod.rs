@@ -4,7 +4,8 @@
 //! them ([`bounds`] are scores too), and [`summary`] makes rates ([`counts`], [`cells`]), intervals
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
 //! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
-//! [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, and [`examples`] picks what is worth a picture.
+//! [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, [`over_time`] counts window by window, and
+//! [`examples`] picks what is worth a picture.
 
 pub mod bootstrap;
 pub mod bounds;
@@ -16,6 +17,7 @@ pub mod counts;
 pub mod curve;
 pub mod examples;
 pub mod mount_error;
+pub mod over_time;
 pub mod pool;
 pub mod rejected;
 pub mod replay;

@@ -82,6 +82,14 @@ impl Replay {
     pub fn score(&self, name: &str) -> Option<&Score> {
         self.scores.iter().find(|s| s.name == name)
     }
+
+    /// Whether an estimator called a track visible at a frame, and whether it was detected; `None` where it is not counted.
+    pub fn judged(&self, estimator: &str, frame: usize, track: usize) -> Option<(bool, bool)> {
+        let samples = self.samples.get(frame)?;
+        let index = samples.objects.iter().position(|s| s.track == track)?;
+        let verdict = self.score(estimator)?.verdicts.get(frame)?.get(index)?;
+        Some((verdict.visible, samples.objects.get(index)?.detected))
+    }
 }
 
 /// Steps that `progress` will be told of: each frame once for the samples and once an estimator.

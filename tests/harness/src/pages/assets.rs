@@ -28,7 +28,15 @@ static FILES: &[(&str, &[u8])] = &files![
     "saving.js",
     "session.js",
     "tracks.js",
+    "view.html",
     "view.js",
+    "viewer.css",
+    "viewer.js",
+    "viewer-camera.js",
+    "viewer-ground.js",
+    "viewer-marks.js",
+    "viewer-panel.js",
+    "viewer-source.js",
 ];
 
 /// The file of a name, and what kind it is.

@@ -33,6 +33,11 @@ impl Images {
         Self(std::fs::read(file).map(|bytes| sorted(read(&bytes))).unwrap_or_default())
     }
 
+    /// No pictures at all.
+    pub fn none() -> Self {
+        Self(Vec::new())
+    }
+
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

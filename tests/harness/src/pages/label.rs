@@ -9,13 +9,12 @@ use axum::extract::{DefaultBodyLimit, Path, State};
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
-use serde::Serialize;
 
 use super::labels::{Labels, NotSaved};
 use super::points::{self, Description};
 use super::server::Server;
 use super::visibility::Maps;
-use super::{assets, camera};
+use super::{as_json, assets, broken, camera, json};
 use crate::estimators::Options;
 use crate::labels::Site;
 use crate::labels::proposals::propose;
@@ -81,21 +80,6 @@ impl Labelling {
             .layer(DefaultBodyLimit::max(LABELS_BYTES))
             .with_state(self)
     }
-}
-
-fn json(value: &impl Serialize) -> Response {
-    match serde_json::to_vec(value) {
-        Ok(bytes) => as_json(bytes),
-        Err(error) => broken(&error.into()),
-    }
-}
-
-fn broken(error: &anyhow::Error) -> Response {
-    (StatusCode::INTERNAL_SERVER_ERROR, format!("{error:#}\n")).into_response()
-}
-
-fn as_json(bytes: Vec<u8>) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], bytes).into_response()
 }
 
 async fn recording(State(this): Shared) -> Response {

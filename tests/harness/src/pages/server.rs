@@ -10,6 +10,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 
 use super::guard::{self, Token};
+use super::patience::Patient;
 
 /// Only this machine.
 pub const LOOPBACK: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
@@ -65,7 +66,7 @@ impl Server {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         runtime.context("cannot start the server")?.block_on(async {
             listener.set_nonblocking(true)?;
-            axum::serve(tokio::net::TcpListener::from_std(listener)?, routes).await
+            axum::serve(Patient(tokio::net::TcpListener::from_std(listener)?), routes).await
         })?;
         Ok(())
     }

@@ -262,7 +262,7 @@ fn the_commands_that_are_written_down_are_understood_and_run_twice() {
             assert_eq!(error.kind(), clap::error::ErrorKind::DisplayHelp, "{command}: {error}");
         }
         let pictures = ["replay", "listen"].iter().any(|name| command.starts_with(name));
-        let names_a_file = ["--json ", "--csv ", "--mcap ", "--log ", "--detections ", "--keep "];
+        let names_a_file = ["--json ", "--csv ", "--mcap ", "--report ", "--log ", "--detections ", "--keep "];
         let names_a_file =
             names_a_file.iter().any(|o| command.contains(o)) || (!pictures && command.contains("--out "));
         assert_eq!(command.contains("--force"), names_a_file, "{command}");

@@ -9,8 +9,10 @@ use headless_chrome::protocol::cdp::Emulation::{MediaFeature, SetDeviceMetricsOv
 use headless_chrome::protocol::cdp::Input::{
     DispatchKeyEvent, DispatchKeyEventTypeOption, DispatchMouseEvent, DispatchMouseEventTypeOption, MouseButton,
 };
+use headless_chrome::protocol::cdp::Network;
 use headless_chrome::protocol::cdp::Page::CaptureScreenshotFormatOption;
 use headless_chrome::protocol::cdp::types::Event;
+use headless_chrome::types::PrintToPdfOptions;
 use headless_chrome::{LaunchOptions, Tab};
 use serde_json::Value;
 
@@ -62,16 +64,29 @@ impl Browser {
     pub fn open(&self, url: &str) -> Page {
         let tab = self.0.new_tab().unwrap();
         tab.set_default_timeout(PATIENCE);
-        let errors = Arc::<Mutex<Vec<String>>>::default();
-        let found = errors.clone();
-        let listener = move |event: &Event| {
-            if let Event::RuntimeExceptionThrown(thrown) = event {
+        let [errors, noted, requests] = [(); 3].map(|()| Arc::<Mutex<Vec<String>>>::default());
+        let (found, notes, asked) = (errors.clone(), noted.clone(), requests.clone());
+        let listener = move |event: &Event| match event {
+            Event::RuntimeExceptionThrown(thrown) => {
                 found.lock().unwrap().push(format!("{:?}", thrown.params.exception_details));
             }
+            Event::LogEntryAdded(added) => notes.lock().unwrap().push(format!("{:?}", added.params.entry)),
+            Event::RuntimeConsoleAPICalled(called) => notes.lock().unwrap().push(format!("{:?}", called.params)),
+            Event::NetworkRequestWillBeSent(sent) => asked.lock().unwrap().push(sent.params.request.url.clone()),
+            _ => {}
         };
         tab.add_event_listener(Arc::new(listener)).unwrap();
         tab.enable_runtime().unwrap();
-        let page = Page { tab, errors };
+        tab.enable_log().unwrap();
+        let network = Network::Enable {
+            max_total_buffer_size: None,
+            max_resource_buffer_size: None,
+            max_post_data_size: None,
+            report_direct_socket_traffic: None,
+            enable_durable_messages: None,
+        };
+        tab.call_method(network).unwrap();
+        let page = Page { tab, errors, noted, requests };
         page.size(1400, 1000, 1.0);
         page.goes_to(url);
         page
@@ -82,6 +97,8 @@ impl Browser {
 pub struct Page {
     tab: Arc<Tab>,
     errors: Arc<Mutex<Vec<String>>>,
+    noted: Arc<Mutex<Vec<String>>>,
+    requests: Arc<Mutex<Vec<String>>>,
 }
 
 impl Drop for Page {
@@ -97,6 +114,27 @@ impl Page {
         let _ = self.tab.evaluate("delete document.documentElement.dataset.ready", false);
         self.tab.navigate_to(url).unwrap();
         self.until("document.documentElement?.dataset.ready === 'true'");
+    }
+
+    /// Whatever stands in the console: what scripts write, and what the browser complains about.
+    pub fn console(&self) -> Vec<String> {
+        self.noted.lock().unwrap().clone()
+    }
+
+    /// Addresses of everything that was asked for.
+    pub fn requests(&self) -> Vec<String> {
+        self.requests.lock().unwrap().clone()
+    }
+
+    /// The page as it is printed, as PDF.
+    pub fn printed(&self) -> Vec<u8> {
+        let options = PrintToPdfOptions { print_background: Some(true), ..PrintToPdfOptions::default() };
+        self.tab.print_to_pdf(Some(options)).unwrap()
+    }
+
+    /// Shows the page as on paper.
+    pub fn paper(&self) {
+        self.tab.call_method(SetEmulatedMedia { media: Some("print".into()), features: None }).unwrap();
     }
 
     pub fn close(self) {
@@ -122,7 +160,8 @@ impl Page {
         while self.tab.evaluate(&format!("Boolean({expression})"), true).ok().and_then(|r| r.value) != Some(true.into())
         {
             if begin.elapsed() > PATIENCE {
-                let shown = self.ask("[document.getElementById('state')?.textContent, viewshed?.session.message]");
+                let shown =
+                    self.ask("['state', 'message'].map((id) => document.getElementById(id)?.textContent ?? null)");
                 panic!("waited in vain for {expression}; the page says {shown}");
             }
             std::thread::sleep(Duration::from_millis(20));

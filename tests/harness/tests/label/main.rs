@@ -4,7 +4,9 @@
 //! the one named in `VIEWSHED_BROWSER`; without any, the tests of the page say that they skipped.
 
 mod appearance;
+#[allow(dead_code, reason = "pages of other commands need more of it")]
 mod browser;
+mod looks;
 mod page;
 mod person;
 mod plots;

@@ -1,5 +1,6 @@
 //! A running `viewshed label`, and requests to it as bytes.
 
+use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
@@ -41,14 +42,22 @@ impl Server {
     }
 
     pub fn with(recording: &Path, options: &[&str]) -> Self {
+        let arguments = [OsStr::new("label"), recording.as_os_str()].into_iter().chain(options.iter().map(OsStr::new));
+        let mut server = Self::run(arguments);
+        server.labels = recording.with_extension("labels.csv");
+        server
+    }
+
+    /// Any command that serves pages.
+    pub fn run(arguments: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
-        command.args(["label", "--no-open"]).arg(recording).args(options);
+        command.args(arguments).arg("--no-open");
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let url = lines.find_map(|line| line.ok().filter(|line| line.starts_with("http://"))).expect("an address");
         // whatever else it prints has a reader
         std::thread::spawn(move || lines.for_each(drop));
-        Self { child, url, labels: recording.with_extension("labels.csv") }
+        Self { child, url, labels: PathBuf::new() }
     }
 
     /// Ends it as a crash does.

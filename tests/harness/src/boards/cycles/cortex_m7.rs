@@ -24,9 +24,9 @@ const REPEATED: u32 = 100;
 /// No `llvm-mca`, or one that does not understand an instruction.
 pub fn cycles(blocks: &[Block]) -> Result<Vec<Range>> {
     let mut text = String::from(".syntax unified\n.thumb\n");
-    for number in 0..blocks.len() {
+    for (number, block) in blocks.iter().enumerate() {
         let _ = writeln!(text, "@ LLVM-MCA-BEGIN {number}");
-        text.push_str(&assembly(&blocks[number].instructions));
+        text.push_str(&assembly(&block.instructions));
         text.push_str("@ LLVM-MCA-END\n");
     }
     let alone = analyse(&text, 1)?;

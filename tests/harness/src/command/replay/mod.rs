@@ -3,12 +3,13 @@
 mod board;
 mod out;
 mod pictures;
+mod report;
 pub mod shipped;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 
 use super::progress::bar;
 use super::{BAD_INPUT, complain, print};
@@ -40,7 +41,7 @@ const SHOWN_OF_CAMERA: &str = "camera-3d";
 /// geometry-box are exact lines of sight past the labelled boxes, the bounds of any such method. Cell FVR
 /// and FIR compare the map itself with exact lines of sight, wherever traffic passes.
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = LABELS)]
+#[command(after_long_help = LABELS, group = clap::ArgGroup::new("drawn").args(["out", "report"]).multiple(true))]
 pub struct Args {
     /// MCAP recordings, CAN logs (ARS408) of `candump`, Vector ASC or SavvyCAN, captures of a TI mmWave radar's data port or
     /// of the native format, a camera's boxes (NAME.boxes.csv beside NAME.camera.toml) [default: the MCAP files in tests/recordings]
@@ -56,17 +57,20 @@ pub struct Args {
     /// Write the input with an estimator's map beside it, to open in Foxglove or Lichtblick
     ///
     /// The map is a foxglove.Grid on /visibility/ESTIMATOR: blue is visible, orange invisible, dark occupied,
-    /// nothing unknown. Show it in a 3D panel with `road` as the fixed frame.
+    /// nothing unknown. FILE.layout.json beside it has the panels: import it as a layout.
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     mcap: Option<PathBuf>,
     /// Estimator whose map goes into --mcap
     #[arg(long, value_name = "NAME", default_value = SHOWN, help_heading = "Results")]
     mcap_estimator: String,
+    /// Write a report to send around: one HTML file with tables, curves, pictures and the worst moments, which opens offline
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    report: Option<PathBuf>,
     /// Write table and pictures into this folder, one subfolder a recording where there are several
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
     /// Draw the frame at this time after the first, in seconds [default: one with a hidden vehicle, or the middle]
-    #[arg(long, value_name = "SECONDS", requires = "out", value_parser = finite, allow_negative_numbers = true, help_heading = "Results")]
+    #[arg(long, value_name = "SECONDS", requires = "drawn", value_parser = finite, allow_negative_numbers = true, help_heading = "Results")]
     time: Option<f64>,
     /// Print the rates by class and by distance too
     #[arg(long, help_heading = "Results")]
@@ -121,15 +125,24 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let out = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     if args.processor.board.is_some() || args.processor.port.is_some() {
+        ensure!(
+            args.report.is_none(),
+            "--report has rates, and a comparison with a board has none; leave one of them out"
+        );
         let pictures = out.map_or_else(|| outputs.folder("--out", Path::new("out")), Ok)?;
         let ended = board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings)?;
         print(&outputs.told())?;
         return Ok(ended);
     }
-    if args.mcap.is_some() && paths.len() > 1 {
-        bail!("--mcap writes one recording and {} are to be replayed; name one", paths.len());
+    let one_only = args.mcap.as_ref().map(|_| "--mcap").or(args.report.as_ref().map(|_| "--report"));
+    if let Some(option) = one_only.filter(|_| paths.len() > 1) {
+        bail!("{option} writes one recording and {} are to be replayed; name one", paths.len());
     }
     let mcap = outputs.file("--mcap", args.mcap.as_deref())?;
+    let panels = args.mcap.as_deref().map(|path| path.with_extension("layout.json"));
+    let panels = outputs.file("--mcap", panels.as_deref())?;
+    let mcap = mcap.zip(panels);
+    let page = outputs.file("--report", args.report.as_deref())?;
     let csv = outputs.file("--csv", args.csv.as_deref())?;
     let camera_csv = args.csv.as_deref().map(of_camera);
     let camera_csv = outputs.file("--csv", camera_csv.as_deref())?;
@@ -139,7 +152,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut reports = Vec::new();
     let (mut failed, mut synthetic) = (false, false);
     for (k, path) in paths.iter().enumerate() {
-        let radars = match radars(path, &settings, mcap.is_some()) {
+        let radars = match radars(path, &settings, one_only) {
             Ok(radars) => radars,
             Err(error) => {
                 complain(&error);
@@ -176,6 +189,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 let own = if several { folder.folder(&one.replay.recording.name) } else { folder.clone() };
                 out::write(&own, &(text + &origin), &one.replay, &one.examples, one.shown_frame, &settings)?;
             }
+            if let Some(target) = &page {
+                report::write(target, &one, &settings)?;
+            }
             reports.push(one.report(&settings));
         }
     }
@@ -207,11 +223,15 @@ struct Replayed {
 }
 
 /// What each radar of a file recorded, and how it is read.
-fn radars(path: &Path, settings: &Settings, one_only: bool) -> Result<Vec<(Recording, ReadOptions)>> {
+fn radars(path: &Path, settings: &Settings, one_only: Option<&str>) -> Result<Vec<(Recording, ReadOptions)>> {
     let radars = recording::read_each(path, &settings.reading).map_err(|error| named(error, path))?;
-    if let (true, [_, _, ..]) = (one_only, &radars[..]) {
+    if let (Some(option), [_, _, ..]) = (one_only, &radars[..]) {
         let topics: Vec<&str> = radars.iter().filter_map(|(_, reading)| reading.radar_topic.as_deref()).collect();
-        bail!("--mcap writes one radar's map: {} has {}; choose with --radar-topic", path.display(), topics.join(", "));
+        bail!(
+            "{option} writes one radar's map: {} has {}; choose with --radar-topic",
+            path.display(),
+            topics.join(", ")
+        );
     }
     Ok(radars)
 }
@@ -220,7 +240,7 @@ fn replay(
     path: &Path,
     recording: Recording,
     args: &Args,
-    mcap: Option<&Target>,
+    mcap: Option<&(Target, Target)>,
     settings: &Settings,
 ) -> Result<Replayed> {
     let shown_frame = args.time.map(|time_s| frame_at(&recording, time_s)).transpose()?;
@@ -237,8 +257,8 @@ fn replay(
     drop(replaying);
     judged(&replay, settings)?;
 
-    if let Some(target) = mcap {
-        write_mcap(path, target, &args.mcap_estimator, &replay, settings)?;
+    if let Some((target, panels)) = mcap {
+        write_mcap(path, [target, panels], &args.mcap_estimator, &replay, settings)?;
     }
     let wrong = |extent: Extent| {
         let again = bar(&format!("replaying {name} with a wrong mount"), 4 * passes);
@@ -304,22 +324,30 @@ fn named(error: anyhow::Error, path: &Path) -> anyhow::Error {
     if format!("{error:#}").contains(&*stem) { error } else { error.context(path.display().to_string()) }
 }
 
-fn write_mcap(source: &Path, target: &Target, estimator: &str, replay: &Replay, settings: &Settings) -> Result<()> {
+fn write_mcap(
+    source: &Path,
+    targets: [&Target; 2],
+    estimator: &str,
+    replay: &Replay,
+    settings: &Settings,
+) -> Result<()> {
     let mut names = Vec::new();
     let mut found = None;
-    for recording in [Some(&replay.recording), replay.camera.as_deref().map(|c| &c.recording)].into_iter().flatten() {
-        for one in estimators::all(recording, &settings.estimators)? {
+    for replay in [Some(replay), replay.camera.as_deref()].into_iter().flatten() {
+        for one in estimators::all(&replay.recording, &settings.estimators)? {
             names.push(one.name().to_owned());
             if one.name() == estimator {
-                found = Some((recording, one));
+                found = Some((replay, one));
             }
         }
     }
-    let Some((recording, mut estimator)) = found else {
+    let Some((replay, mut estimator)) = found else {
         bail!("--mcap-estimator: no estimator `{estimator}`; there are {}", names.join(", "));
     };
-    let writing = bar(&format!("writing {}", target.path().display()), recording.frames.len() as u64);
-    foxglove::write(source, target, recording, &settings.reading, estimator.as_mut(), &|| writing.step())
+    let (recording, name) = (&replay.recording, estimator.name().to_owned());
+    let writing = bar(&format!("writing {}", targets[0].path().display()), recording.frames.len() as u64);
+    let boxes = |frame| pictures::boxes(replay, &name, frame);
+    foxglove::write(source, targets, recording, &settings.reading, estimator.as_mut(), &boxes, &|| writing.step())
 }
 
 impl Replayed {

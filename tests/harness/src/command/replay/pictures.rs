@@ -10,7 +10,6 @@ use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
 use crate::evaluation::examples::Example;
 use crate::evaluation::replay::{Replay, visit};
-use crate::evaluation::score::Score;
 use crate::evaluation::summary::Row;
 use crate::evaluation::{Grid, Settings, bounds};
 use crate::geometry::pose::SensorPose;
@@ -71,7 +70,7 @@ fn save(canvas: Option<Canvas>, folder: &Folder, name: &str) -> Result<()> {
 }
 
 /// The frame of the true invisible example, which has something to show; else the middle one.
-fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
+pub fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
     let telling = examples.iter().find(|e| e.outcome == Outcome::Ti).or(examples.first());
     telling.map_or(replay.recording.frames.len() / 2, |e| e.frame)
 }
@@ -98,7 +97,7 @@ fn shown_frame(
     Ok(())
 }
 
-fn title(replay: &Replay, name: &str, frame: usize) -> String {
+pub fn title(replay: &Replay, name: &str, frame: usize) -> String {
     let recording = &replay.recording;
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let time = recording.frames.get(frame).map_or(0, |f| f.time_ns.saturating_sub(start));
@@ -114,7 +113,8 @@ fn caption(replay: &Replay) -> Option<String> {
     })
 }
 
-fn from_above(
+/// A frame as an estimator has it, from above.
+pub fn from_above(
     replay: &Replay,
     estimator: &dyn Estimator,
     frame: usize,
@@ -122,12 +122,7 @@ fn from_above(
     settings: &Settings,
 ) -> Canvas {
     let recording = &replay.recording;
-    let objects =
-        recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default();
-    let boxes: Vec<TruthBox> = objects
-        .iter()
-        .map(|o| TruthBox { solid: o.solid, outcome: outcome(replay, estimator.name(), frame, o.track) })
-        .collect();
+    let objects = objects_at(replay, frame);
     let by_cells = settings.evaluation.grid == Grid::Cartesian;
     let seldom_visible = |o: &Object| {
         let seen = cells_in_sight(replay, estimator, frame, o.track);
@@ -150,20 +145,64 @@ fn from_above(
         );
         Some(Highlight::on(solid, &recording.pose, note))
     });
-    let scene = Scene {
+    let mut scene = scene(replay, estimator, frame, highlight, settings);
+    if by_cells && any_cell {
+        scene.caption = scene.caption.map(|said| format!("{said} · {ANY_CELL}"));
+    }
+    birdseye::draw(&scene)
+}
+
+/// What is about one labelled object at a frame, enlarged; `None` where it is not labelled then.
+pub fn about(
+    replay: &Replay,
+    estimator: &dyn Estimator,
+    frame: usize,
+    track: usize,
+    width_px: i32,
+    settings: &Settings,
+) -> Option<Canvas> {
+    let solid = objects_at(replay, frame).into_iter().find(|o| o.track == track)?.solid;
+    let highlight = Highlight::on(solid, &replay.recording.pose, "");
+    birdseye::tile(&scene(replay, estimator, frame, Some(highlight), settings), width_px)
+}
+
+fn objects_at(replay: &Replay, frame: usize) -> Vec<Object> {
+    let recording = &replay.recording;
+    recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default()
+}
+
+/// The labelled boxes of a frame, and what became of them by an estimator.
+pub fn boxes(replay: &Replay, estimator: &str, frame: usize) -> Vec<TruthBox> {
+    let outcome = |track| {
+        let (visible, detected) = replay.judged(estimator, frame, track)?;
+        Some(palette::Outcome::of(visible, detected))
+    };
+    let of = |o: &Object| TruthBox { solid: o.solid, outcome: outcome(o.track) };
+    objects_at(replay, frame).iter().map(of).collect()
+}
+
+/// Everything there is to be drawn of a frame.
+fn scene<'a>(
+    replay: &'a Replay,
+    estimator: &'a dyn Estimator,
+    frame: usize,
+    highlight: Option<Highlight>,
+    settings: &Settings,
+) -> Scene<'a> {
+    let recording = &replay.recording;
+    Scene {
         map: estimator.map(),
         pose: recording.pose,
         field_of_view: recording.sensor.field_of_view,
         slice_height_m: settings.evaluation.slice_height_m,
         window: window(replay),
         detections: recording.frames.get(frame).map_or(&[], |f| &f.detections),
-        boxes,
+        boxes: boxes(replay, estimator.name(), frame),
         road: &[],
         title: title(replay, estimator.name(), frame),
-        caption: caption(replay).map(|said| if by_cells && any_cell { format!("{said} · {ANY_CELL}") } else { said }),
+        caption: caption(replay),
         highlight,
-    };
-    birdseye::draw(&scene)
+    }
 }
 
 /// Said where a box called visible stands on cells of which most are not.
@@ -216,16 +255,7 @@ fn corners(pose: &SensorPose, view: &FieldOfView) -> impl Iterator<Item = [f64; 
     })
 }
 
-/// How an estimator's verdict on a track compares with its detection; `None` where it is not counted.
-fn outcome(replay: &Replay, name: &str, frame: usize, track: usize) -> Option<palette::Outcome> {
-    let samples = replay.samples.get(frame)?;
-    let index = samples.objects.iter().position(|s| s.track == track)?;
-    let score: &Score = replay.score(name)?;
-    let verdict = score.verdicts.get(frame)?.get(index)?;
-    Some(palette::Outcome::of(verdict.visible, samples.objects.get(index)?.detected))
-}
-
-fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
+pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
     let cells = estimator.polar()?;
     Some(polar::draw(&PolarGrid {
         azimuths: cells.azimuths,
@@ -239,7 +269,7 @@ fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Optio
 }
 
 /// A camera's picture of a frame, with what the estimator made of it.
-fn camera_view(
+pub fn camera_view(
     replay: &Replay,
     estimator: &dyn Estimator,
     frame: usize,

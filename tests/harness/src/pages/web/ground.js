@@ -14,6 +14,14 @@ export class Ground {
     this.cells = null;
     this.map = null;
     this.asked = -1;
+    // Colour of each value of the map; 0 is nothing.
+    this.colours = groundColours;
+  }
+
+  // Another map, and where its cells lie.
+  set(cells, map) {
+    if (JSON.stringify(cells) !== JSON.stringify(this.cells)) this.key = null;
+    Object.assign(this, { cells, map });
   }
 
   // The map of a frame, asked for where it is not here.
@@ -25,7 +33,8 @@ export class Ground {
       if (answer.status === 200) {
         const map = new Uint8Array(await answer.arrayBuffer());
         if (this.asked !== frame) return;
-        Object.assign(this, { frame, map, cells: JSON.parse(answer.headers.get('x-cells')) });
+        this.set(JSON.parse(answer.headers.get('x-cells')), map);
+        this.frame = frame;
         this.changed();
       } else if (answer.status === 202) {
         setTimeout(() => {
@@ -45,7 +54,7 @@ export class Ground {
   draw(pixels, width, height, view) {
     pixels.fill(0);
     if (!this.map) return;
-    const colours = groundColours();
+    const colours = this.colours();
     const [columns, rows] = [Math.ceil(width / BLOCK_PX), Math.ceil(height / BLOCK_PX)];
     const places = this.places(view, width, height, columns, rows);
     const line = new Uint32Array(width);

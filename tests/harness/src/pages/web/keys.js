@@ -69,8 +69,7 @@ export function named(event) {
 }
 
 // Carries out keys, except where text is written, and buttons that stand for one.
-export function listen(page) {
-  const keys = table(page);
+export function listen(page, keys = table(page)) {
   addEventListener('keydown', (event) => {
     if (document.querySelector('dialog[open]')) return;
     const writes = event.target.matches('input:not([type=range]), select');

@@ -55,7 +55,7 @@ export class Plot {
   resized() {
     const { width, height } = this.element.getBoundingClientRect();
     const em = parseFloat(getComputedStyle(this.element).fontSize);
-    const [left, bottom, rim, right] = [3.9 * em, 2.1 * em, 0.5 * em, 1.2 * em];
+    const [left, bottom, rim, right] = [3.9 * em, 2.4 * em, 0.5 * em, 1.2 * em];
     this.em = em;
     this.area = { left, top: rim, width: Math.max(width - left - right - 2, 10), height: Math.max(height - bottom - rim - 2, 10) };
     Object.assign(this.clip.style, { left: `${left}px`, top: `${rim}px`, width: `${this.area.width}px`, height: `${this.area.height}px` });

@@ -7,6 +7,7 @@ use serde::Serialize;
 use viewshed::map::{CellState, Visibility, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 
+use super::geometry::{Pose, Time};
 use crate::geometry::pose::Spherical;
 use crate::recording::Recording;
 use crate::recording::mcap::ROAD_FRAME;
@@ -65,33 +66,12 @@ impl Extent {
         );
         Ok(Self { corner: (i as i32, j as i32), columns: columns as i32, rows: rows as i32 })
     }
-}
 
-#[derive(Serialize)]
-struct Time {
-    sec: i64,
-    nsec: i64,
-}
-
-#[derive(Serialize)]
-struct Vector3 {
-    x: f64,
-    y: f64,
-    z: f64,
-}
-
-#[derive(Serialize)]
-struct Quaternion {
-    x: f64,
-    y: f64,
-    z: f64,
-    w: f64,
-}
-
-#[derive(Serialize)]
-struct Pose {
-    position: Vector3,
-    orientation: Quaternion,
+    /// Every cell, row by row.
+    pub fn cells(self) -> impl Iterator<Item = (i32, i32)> {
+        let (i, j) = self.corner;
+        (j..j + self.rows).flat_map(move |j| (i..i + self.columns).map(move |i| (i, j)))
+    }
 }
 
 #[derive(Serialize)]
@@ -125,16 +105,13 @@ struct Grid {
 /// The message as JSON.
 pub fn message(map: &dyn VisibilityMap, extent: Extent, time_ns: i64) -> Result<Vec<u8>> {
     let (i, j) = extent.corner;
-    let cells = (j..j + extent.rows).flat_map(|j| (i..i + extent.columns).map(move |i| RoadPoint::cell_centre(i, j)));
+    let cells = extent.cells().map(|(i, j)| RoadPoint::cell_centre(i, j));
     let data: Vec<u8> = cells.flat_map(|centre| colour(&map.at(centre))).collect();
     let stride = CHANNELS.len() as i32;
     let grid = Grid {
-        timestamp: Time { sec: time_ns.div_euclid(1_000_000_000), nsec: time_ns.rem_euclid(1_000_000_000) },
+        timestamp: Time::from_ns(time_ns),
         frame_id: ROAD_FRAME,
-        pose: Pose {
-            position: Vector3 { x: f64::from(i), y: f64::from(j), z: 0.0 },
-            orientation: Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 },
-        },
+        pose: Pose::new([f64::from(i), f64::from(j), 0.0], 0.0),
         column_count: extent.columns,
         cell_size: Vector2 { x: 1.0, y: 1.0 },
         row_stride: stride * extent.columns,

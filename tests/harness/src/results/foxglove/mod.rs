@@ -1,11 +1,15 @@
 //! A recording with an estimator's map beside it, as an MCAP file for Foxglove.
 //!
-//! Radar points or a camera's boxes, mount and ground truth are copied as they are; after each radar message comes the
-//! map of that frame as a `foxglove.Grid` (JSON) on `/visibility/ESTIMATOR`. In Foxglove: a 3D panel
-//! with fixed frame `road`, and the topic switched on.
+//! Radar points or a camera's boxes, its pictures, mount and ground truth are copied as they are; after each radar
+//! message comes the map of that frame as a `foxglove.Grid` (JSON) on `/visibility/ESTIMATOR`, the labelled boxes
+//! coloured by outcome on `/visibility/ESTIMATOR/boxes`, and figures to plot on `/visibility/ESTIMATOR/counts`. The
+//! [`layout`] beside the file opens panels for them.
 
+mod geometry;
 pub mod grid;
 pub mod input;
+pub mod layout;
+mod scene;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,11 +25,19 @@ use crate::recording::mcap::{POINTS_TOPIC, TRUTH_TOPIC};
 use crate::recording::write::{TF_TOPIC, mount_message, sensor_metadata};
 use crate::recording::{ReadOptions, Recording, Sensor};
 use crate::results::files::{Target, Unfinished};
+use crate::results::pictures::scene::TruthBox;
 use input::{Input, RawMessage};
+use layout::Topics;
 
 const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
+const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
+const IMAGES: [&str; 2] = ["sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"];
 
-/// Writes the estimator's maps over `recording`, read from `source` with `options`, to `target`.
+/// The labelled boxes of a frame.
+pub type Boxes<'a> = &'a dyn Fn(usize) -> Vec<TruthBox>;
+
+/// Writes the estimator's maps over `recording`, read from `source` with `options`, to `target`, and a layout that shows
+/// them to `layout`.
 ///
 /// `progress` is called after each frame.
 ///
@@ -33,10 +45,11 @@ const RADAR_SCAN: &str = "radar_msgs/msg/RadarScan";
 /// Files that cannot be read or written, and a field of view too large for a grid.
 pub fn write(
     source: &Path,
-    target: &Target,
+    [target, layout]: [&Target; 2],
     recording: &Recording,
     options: &ReadOptions,
     estimator: &mut dyn Estimator,
+    boxes: Boxes<'_>,
     progress: &dyn Fn(),
 ) -> Result<()> {
     let extent = grid::Extent::covering(recording)?;
@@ -54,7 +67,11 @@ pub fn write(
     let is_mount = |topic: &str| options.mount.is_none() && topic.ends_with("tf_static");
     let bytes = input::bytes(source, recording)?;
     let input = input::read(&bytes, |topic, schema| {
-        is_radar(topic, schema) || is_truth(topic) || is_mount(topic) || (of_camera && topic == INFO_TOPIC)
+        is_radar(topic, schema)
+            || is_truth(topic)
+            || is_mount(topic)
+            || (of_camera && topic == INFO_TOPIC)
+            || IMAGES.contains(&schema)
     })?;
     let radar =
         |m: &RawMessage| input.channels.get(&m.header.channel_id).is_some_and(|c| is_radar(&c.topic, &c.schema_name));
@@ -64,7 +81,8 @@ pub fn write(
         input.messages.iter().zip(&frames).filter(|(_, frame)| frame.is_some()).map(|(m, _)| m.header.log_time);
     let (first, last) = (played.clone().min().unwrap_or(0), played.max().unwrap_or(u64::MAX));
 
-    let mut output = Output::new(target.create()?, &input, &recording.sensor, estimator.name())?;
+    let own = topics(&input, estimator.name(), recording.truth.is_some());
+    let mut output = Output::new(target.create()?, &input, &recording.sensor, &own)?;
     if options.mount.is_some() {
         let seen = input.messages.iter().zip(&frames).find(|(_, frame)| frame.is_some());
         let frame_id = seen.and_then(|(m, _)| m.ros_header()).map_or_else(|| "radar".into(), |h| h.frame_id);
@@ -75,18 +93,42 @@ pub fn write(
             continue;
         }
         output.copy(message)?;
-        if let Some(frame) = frame.and_then(|k| recording.frames.get(k)) {
+        if let Some((k, frame)) = frame.and_then(|k| Some((k, recording.frames.get(k)?))) {
             if recording.sensor.frames_independent {
                 estimator.reset();
             }
             estimator.step(frame);
-            let data = grid::message(estimator.map(), extent, frame.time_ns)?;
-            output.grid(message.header.log_time, &data)?;
+            let (map, time_ns) = (estimator.map(), frame.time_ns);
+            let boxes = boxes(k);
+            output.say(Said::Map, message.header.log_time, &grid::message(map, extent, time_ns)?)?;
+            if own.boxes.is_some() {
+                output.say(Said::Boxes, message.header.log_time, &scene::boxes(&boxes, time_ns)?)?;
+            }
+            let counts = scene::counts(map, extent, &boxes, frame.detections.len(), time_ns)?;
+            output.say(Said::Counts, message.header.log_time, &counts)?;
             progress();
         }
     }
     output.writer.finish().with_context(|| format!("cannot write {}", target.path().display()))?;
-    output.writer.into_inner().finish()
+    output.writer.into_inner().finish()?;
+    let panels = layout::layout(&own, extent);
+    layout.write(serde_json::to_string_pretty(&panels).context("the layout as JSON")? + "\n")
+}
+
+/// What there will be to see.
+fn topics(input: &Input, estimator: &str, labelled: bool) -> Topics {
+    let map = format!("/visibility/{estimator}");
+    let of = |schemas: &[&str]| {
+        let own = input.channels.values().filter(|c| schemas.contains(&c.schema_name.as_str()));
+        own.map(|c| c.topic.clone()).collect()
+    };
+    Topics {
+        boxes: labelled.then(|| format!("{map}/boxes")),
+        counts: format!("{map}/counts"),
+        points: of(&[POINT_CLOUD, RADAR_SCAN]),
+        images: of(&IMAGES),
+        map,
+    }
 }
 
 /// Which frame each message became: frames are the readable radar messages, in their order.
@@ -107,13 +149,22 @@ struct Output {
     writer: Writer<Unfinished>,
     /// Channels of the input by its number.
     copied: BTreeMap<u16, u16>,
-    grids: u16,
+    /// Channels of what is said of each frame, in the order of [`Said`].
+    said: [u16; 3],
     sequence: u32,
+}
+
+/// What is said of each frame.
+#[derive(Clone, Copy)]
+enum Said {
+    Map,
+    Boxes,
+    Counts,
 }
 
 impl Output {
     /// The sensor as it was used goes along, so that the copy can be replayed too.
-    fn new(sink: Unfinished, input: &Input, sensor: &Sensor, estimator: &str) -> Result<Self> {
+    fn new(sink: Unfinished, input: &Input, sensor: &Sensor, own: &Topics) -> Result<Self> {
         let mut writer = WriteOptions::new().compression(Some(Compression::Zstd)).create(sink)?;
         writer.write_metadata(&sensor_metadata(sensor))?;
         let mut copied = BTreeMap::new();
@@ -124,9 +175,17 @@ impl Output {
             };
             copied.insert(id, writer.add_channel(schema, &c.topic, &c.message_encoding, &c.metadata)?);
         }
-        let schema = writer.add_schema(grid::SCHEMA_NAME, "jsonschema", grid::SCHEMA.as_bytes())?;
-        let grids = writer.add_channel(schema, &format!("/visibility/{estimator}"), "json", &BTreeMap::new())?;
-        Ok(Self { writer, copied, grids, sequence: 0 })
+        let mut channel = |name: &str, schema: &str, topic: Option<&str>| -> Result<u16> {
+            let Some(topic) = topic else { return Ok(0) };
+            let schema = writer.add_schema(name, "jsonschema", schema.as_bytes())?;
+            Ok(writer.add_channel(schema, topic, "json", &BTreeMap::new())?)
+        };
+        let said = [
+            channel(grid::SCHEMA_NAME, grid::SCHEMA, Some(&own.map))?,
+            channel(scene::SCENE_SCHEMA_NAME, scene::SCENE_SCHEMA, own.boxes.as_deref())?,
+            channel(scene::COUNTS_SCHEMA_NAME, scene::COUNTS_SCHEMA, Some(&own.counts))?,
+        ];
+        Ok(Self { writer, copied, said, sequence: 0 })
     }
 
     fn copy(&mut self, message: &RawMessage) -> Result<()> {
@@ -137,9 +196,9 @@ impl Output {
         Ok(())
     }
 
-    fn grid(&mut self, log_time: u64, data: &[u8]) -> Result<()> {
-        let header =
-            MessageHeader { channel_id: self.grids, sequence: self.sequence, log_time, publish_time: log_time };
+    fn say(&mut self, what: Said, log_time: u64, data: &[u8]) -> Result<()> {
+        let channel_id = self.said[what as usize];
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.sequence = self.sequence.wrapping_add(1);
         Ok(self.writer.write_to_known_channel(&header, data)?)
     }

@@ -19,6 +19,15 @@ const CELL_GRID_PX_PER_M: f64 = 14.0;
 const NOTE_PX: i32 = 40;
 const SIGHT: Pen = Pen::new(Colour::hex(0x1B1F24), 1.2).dashed(&[2.0, 4.0]);
 
+/// Draws what a highlight enlarges, and nothing around it: one frame of a strip.
+pub fn tile(scene: &Scene, width_px: i32) -> Option<Canvas> {
+    let highlight = scene.highlight.as_ref()?;
+    let plot = highlight.window.filling(width_px);
+    let mut canvas = Canvas::new(plot.area.width, plot.area.height);
+    panel(&mut canvas, scene, &plot, true);
+    Some(canvas)
+}
+
 struct Layout {
     surround: Surround,
     overview: Plot,
@@ -33,12 +42,18 @@ pub fn draw(scene: &Scene) -> Canvas {
     let mut canvas = Canvas::new(WIDTH_PX, layout.plots_bottom + layout.surround.below_px());
     layout.surround.draw(&mut canvas, layout.plots_bottom);
     panel(&mut canvas, scene, &layout.overview, false);
+    axes(&mut canvas, &layout.overview);
     if let (Some(plot), Some(highlight)) = (&layout.enlarged, &scene.highlight) {
         let at = [plot.area.left as f32, (plot.area.top - 12) as f32];
         canvas.text(at, &highlight.note, Style::new(16.0, INK).bold());
         panel(&mut canvas, scene, plot, true);
+        axes(&mut canvas, plot);
     }
     canvas
+}
+
+fn axes(canvas: &mut Canvas, plot: &Plot) {
+    plot.axes(canvas, "x, along the road (m)", "y, to the left (m)");
 }
 
 fn layout(scene: &Scene) -> Layout {
@@ -93,7 +108,6 @@ fn panel(canvas: &mut Canvas, scene: &Scene, plot: &Plot, enlarged: bool) {
             closeup::name_boxes(canvas, scene, plot);
         }
     });
-    plot.axes(canvas, "x, along the road (m)", "y, to the left (m)");
 }
 
 fn ground(canvas: &mut Canvas, map: &dyn VisibilityMap, plot: &Plot) {
@@ -214,6 +228,17 @@ mod tests {
         let marked = Scene { highlight: Some(highlight), ..scene(&map) };
         assert!(layout(&marked).enlarged.unwrap().shows([80.0, 4.0]));
         assert!(draw(&marked).height() > draw(&plain).height() + 200);
+    }
+
+    #[test]
+    fn a_tile_is_the_enlarged_part_and_nothing_else() {
+        let solid = Solid { center: [80.0, 4.0, 0.75], yaw_rad: 0.0, size: [4.6, 1.8, 1.5] };
+        let map = Half(|_| true);
+        let plain = scene(&map);
+        assert!(tile(&plain, 720).is_none(), "nothing is highlighted");
+        let tile = tile(&Scene { highlight: Some(Highlight::on(solid, &plain.pose, "note")), ..plain }, 720).unwrap();
+        assert_eq!((tile.width(), tile.height()), (720, 260), "72 m x 26 m");
+        assert_eq!(tile.pixel(3, 256), palette::ground(&CLEAR, 3, 256), "ground up to the corner");
     }
 
     #[test]

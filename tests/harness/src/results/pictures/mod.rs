@@ -21,3 +21,5 @@ mod labels;
 mod legend;
 mod overlay;
 mod text;
+
+pub use axes::Ticks;

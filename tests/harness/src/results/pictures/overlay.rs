@@ -2,7 +2,7 @@
 
 use super::axes::Plot;
 use super::canvas::{Canvas, Colour, Pen, Pixel};
-use super::palette::{INK, Outcome, outline};
+use super::palette::{DETECTION, INK, Outcome, outline};
 use crate::evaluation::samples::Cell;
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::geometry::solid::Solid;
@@ -13,7 +13,6 @@ pub const DOPPLER_PX_PER_MPS: f32 = 1.0;
 /// Slower detections get no tick, m/s.
 const DOPPLER_LEAST_MPS: f32 = 0.5;
 
-const DETECTION: Colour = Colour::hex(0x101216);
 const DETECTION_PX: f32 = 2.3;
 const SENSOR_PX: f32 = 11.0;
 const FIELD_OF_VIEW: Pen = Pen::new(Colour::hex(0x3C434C), 1.3).dashed(&[7.0, 5.0]);

@@ -10,6 +10,8 @@ use super::canvas::{Colour, Pen};
 pub const INK: Colour = Colour::hex(0x1B1F24);
 pub const FAINT_INK: Colour = Colour::hex(0x5A626B);
 pub const GRID: Colour = Colour::hex(0xDDE0E4);
+/// A detection's dot.
+pub const DETECTION: Colour = Colour::hex(0x101216);
 
 const VISIBLE: [Colour; 2] = [Colour::hex(0xE6F2FA), Colour::hex(0x9CCBEC)];
 /// From sure (grade 0) to doubtful (grade 255).

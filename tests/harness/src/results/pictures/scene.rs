@@ -35,6 +35,13 @@ impl Window {
         Self { x_m: side(x), y_m: side(y) }
     }
 
+    /// A picture of this width that shows the window and nothing around it.
+    pub(super) fn filling(&self, width_px: i32) -> Plot {
+        let depth = (self.y_m[1] - self.y_m[0]) / (self.x_m[1] - self.x_m[0]).max(1.0);
+        let height_px = (f64::from(width_px) * depth).round() as i32;
+        Plot { area: Area::new(0, 0, width_px, height_px), x: self.x_m, y: self.y_m }
+    }
+
     pub(super) fn plot(&self, top: i32) -> Plot {
         let (width, depth) = ((self.x_m[1] - self.x_m[0]).max(1.0), (self.y_m[1] - self.y_m[0]).max(1.0));
         let room = WIDTH_PX - LEFT_PX - RIGHT_PX;

@@ -255,7 +255,7 @@ fn field_of_view(view: &FieldOfView) -> Value {
 }
 
 /// Reading options as given; `null` where the file itself decided.
-fn reading(options: &ReadOptions) -> Value {
+pub fn reading(options: &ReadOptions) -> Value {
     let mount = options.mount.map(|[x, y, z, yaw, pitch, roll]| {
         json!({
             "x_m": x, "y_m": y, "z_m": z,

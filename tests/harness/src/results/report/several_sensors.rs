@@ -16,10 +16,10 @@ pub fn text(all: &[Counted], extent: Extent) -> String {
     let mut text = String::new();
     let shown = if extent == Extent::Wide { all } else { &all[..all.len().min(1)] };
     for counted in shown {
-        let Some((_, first)) = counted.rows.first() else { continue };
-        let summary = &first.summary;
+        let Some((_, fused)) = counted.rows.last() else { continue };
+        let summary = &fused.summary;
         text += &format!(
-            "{}: {} frames, {} trajectories\n{}\nOn the road of both:\n{}\n\nEach watched by the other, in order, and with a third of its \
+            "{}: {} frames, {} trajectories\n{}\nOn the road that either looks at:\n{}\n\nEach watched by the other, in order, and with a third of its \
              view dark:\n{}\n\n",
             counted.name,
             summary.frames,
@@ -118,7 +118,7 @@ fn by_site(sites: &[Counted], extent: Extent) -> String {
 pub fn json(all: &[Counted], plan: &Value, options: Options) -> Result<String> {
     let site = |counted: &Counted| {
         let rows = counted.rows.iter().zip(&counted.shown).map(|((name, replay), shown)| {
-            json!({"name": name, "report": replay_json::report(replay, None, &[], options), "on_the_road_of_both": shown})
+            json!({"name": name, "report": replay_json::report(replay, None, &[], options), "on_the_road_of_either": shown})
         });
         let [with, without] = counted.watched;
         let watched = json!({"with_visibility": with, "without": without});

@@ -64,7 +64,8 @@ fn with_interval(rate: Option<f64>, interval: Option<Interval>) -> String {
     percent(rate) + &spread.unwrap_or_default()
 }
 
-pub(super) fn signed(points: Option<f64>, interval: Option<Interval>) -> String {
+/// Points with their sign, and their interval.
+pub fn signed(points: Option<f64>, interval: Option<Interval>) -> String {
     let spread = interval.map(|Interval(low, high)| format!("\n{low:+.1}…{high:+.1}"));
     points.map_or_else(|| "n/a".into(), |p| format!("{p:+.1}")) + &spread.unwrap_or_default()
 }

@@ -104,11 +104,16 @@ impl Plan {
 }
 
 impl Day {
-    /// `day-1` of `motorway/day-1.fcd.xml.gz`.
+    /// That of its traffic.
     pub fn name(&self) -> String {
-        let file = self.fcd.file_name().unwrap_or_default().to_string_lossy();
-        file.split('.').next().unwrap_or_default().to_owned()
+        name(&self.fcd)
     }
+}
+
+/// `day-1` of `motorway/day-1.fcd.xml.gz`.
+pub(super) fn name(fcd: &Path) -> String {
+    let file = fcd.file_name().unwrap_or_default().to_string_lossy();
+    file.split('.').next().unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]

@@ -337,15 +337,9 @@ fn site_of(
     let names = [&first.name, &second.name];
     rows.iter_mut().zip(names).for_each(|((row, _), sensor)| *row = format!("{row}, {sensor}"));
     let name = site.scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let name = site.fcd.as_ref().map_or(name.clone(), |fcd| format!("{name}, {}", plan_name(fcd)));
+    let name = site.fcd.as_ref().map_or(name.clone(), |fcd| format!("{name}, {}", plan::name(fcd)));
     let watched = monitoring::watch(&both, settings)?;
     Ok(SiteResult { name, rows, shown, watched })
-}
-
-/// `day-1` of `motorway/day-1.fcd.xml.gz`.
-fn plan_name(fcd: &Path) -> String {
-    let file = fcd.file_name().unwrap_or_default().to_string_lossy();
-    file.split('.').next().unwrap_or_default().to_owned()
 }
 
 /// What the set is judged on at each of the first sensor's frames: all objects and cells that any sensor is judged on.

@@ -1,0 +1,136 @@
+//! Instants of a recording: what radar-3d says frame by frame, what a receiver on a bus has of it, and what the labels
+//! say of both.
+
+use anyhow::Result;
+use viewshed::wire::message::Addresses;
+
+use super::broadcast::Receiving;
+use super::instant::{Box3, Cells, Instant, Sample, Shown, mount};
+use super::instants::Instants;
+use crate::bus::listening::Listening;
+use crate::bus::logged::Logged;
+use crate::bus::traffic::{BUSES, Bus, Maps, Traffic};
+use crate::estimators::{self, radar_3d};
+use crate::evaluation::Settings;
+use crate::evaluation::counts::{Counts, Outcome};
+use crate::evaluation::replay::{Replay, visit};
+use crate::recording::Recording;
+use crate::recording::can_log::{Content, Line};
+
+/// The bus that a receiver is shown on.
+const BUS: Bus = BUSES[2];
+/// Its sender's number.
+const SENSOR: u8 = 1;
+const ESTIMATOR: &str = "radar-3d";
+
+/// Finds every instant of a recording.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn fill(instants: &Instants, recording: &Recording, settings: &Settings) -> Result<()> {
+    let sensor = estimators::sensor(recording, &settings.estimators.noise);
+    let mut running = vec![radar_3d::new(&sensor, &settings.estimators.radar_3d)?];
+    let frames = recording.frames.len();
+    instants.say(format!("comparing {frames} frames with the labels"));
+    // the figures have no intervals here
+    let evaluation = crate::evaluation::Options { bootstrap: 0, ..settings.evaluation.clone() };
+    let replay = Replay::new(recording.clone(), &mut running, &evaluation, &|| ());
+    instants.say("sending the maps over a bus");
+    let mut received = receiver(recording, settings)?;
+    instants.say(format!("{frames} frames"));
+    let mut estimator = radar_3d::new(&sensor, &settings.estimators.radar_3d)?;
+    let all: Vec<usize> = (0..frames).collect();
+    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+    let mut outcome = Ok(());
+    visit(recording, estimator.as_mut(), &all, |k, estimator| {
+        let (Some(frame), Some(polar)) = (recording.frames.get(k), estimator.polar()) else { return };
+        let cells = Cells {
+            azimuths: polar.azimuths,
+            ranges: polar.ranges,
+            azimuth_rad: polar.azimuth_rad,
+            cell_m: polar.cell_m,
+            mount: mount(&recording.pose),
+        };
+        let (own, shares) = Shown::new(ESTIMATOR, cells, |azimuth, range| (polar.cell)(azimuth, range));
+        let mut counts = Counts::default();
+        let objects = recording.truth.as_ref().map(|truth| truth.at(frame.time_ns)).unwrap_or_default();
+        let mut boxes = Vec::new();
+        for object in &objects {
+            let track = recording.truth.as_ref().and_then(|truth| truth.tracks.get(object.track));
+            let judged = replay.judged(ESTIMATOR, k, object.track);
+            if let Some((visible, detected)) = judged {
+                counts.add(visible, detected);
+            }
+            boxes.push(Box3 {
+                name: track.map(|track| format!("{} {}", track.class, track.id)),
+                outcome: judged.map(|(visible, detected)| Outcome::of(visible, detected).name().to_owned()),
+                ..Box3::of(&object.solid)
+            });
+        }
+        let next_ns = recording.frames.get(k + 1).map_or(frame.time_ns + 66_000_000, |next| next.time_ns);
+        let at_receiver = received.as_mut().and_then(|received| received.until(next_ns - 1_000_000));
+        let small = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        let detection = |d: &crate::recording::RadarDetection| {
+            let [x, y, _] = d.road_position(&recording.pose, settings.evaluation.slice_height_m);
+            [x as f32, y as f32, d.radial_velocity_mps]
+        };
+        let instant = Instant {
+            number: k,
+            sample: Sample {
+                time_s: frame.time_ns.saturating_sub(start) as f64 * 1e-9,
+                detections: frame.detections.len(),
+                tv: small(counts.tv),
+                fv: small(counts.fv),
+                ti: small(counts.ti),
+                fi: small(counts.fi),
+                ..shares
+            },
+            maps: [Some(own), at_receiver].into_iter().flatten().collect(),
+            detections: frame.detections.iter().map(detection).collect(),
+            boxes,
+            obstacles: estimator.obstacles().iter().map(Box3::of).collect(),
+            senders: Vec::new(),
+            counters: estimator.counters().into_iter().map(|(what, n)| (what.to_owned(), n)).collect(),
+        };
+        if outcome.is_ok() {
+            outcome = instants.add(instant);
+        }
+    });
+    outcome?;
+    instants.end(format!("{frames} frames"));
+    Ok(())
+}
+
+/// A receiver of what the recording's unit would send.
+struct Received {
+    receiving: Receiving,
+    lines: std::iter::Peekable<std::vec::IntoIter<Line>>,
+}
+
+/// `None` where frames are single: what is sent of one does not fit to the next.
+fn receiver(recording: &Recording, settings: &Settings) -> Result<Option<Received>> {
+    if recording.sensor.frames_independent || recording.frames.is_empty() {
+        return Ok(None);
+    }
+    let maps = Maps::new(recording, &settings.estimators, &|| ())?;
+    let traffic = Traffic::new(&maps, BUS, None, SENSOR, None)?;
+    let line = |sent: &crate::bus::traffic::Sent| {
+        let time_ns =
+            i64::try_from(sent.at.micros()).unwrap_or(i64::MAX / 1000) * 1000 + (sent.duration_s * 1e9) as i64;
+        Some(Line { time_ns, interface: BUS.name.to_owned(), content: Content::Data(sent.frame?) })
+    };
+    let lines: Vec<Line> = traffic.sent.iter().filter_map(line).collect();
+    let listening = Listening::new(Addresses::STANDARD, None);
+    Ok(Some(Received { receiving: Receiving::new(listening), lines: lines.into_iter().peekable() }))
+}
+
+impl Received {
+    /// What the receiver shows at a time.
+    fn until(&mut self, time_ns: i64) -> Option<Shown> {
+        while let Some(line) = self.lines.next_if(|line| line.time_ns <= time_ns) {
+            self.receiving.take(&Logged::Frame(line));
+        }
+        self.receiving.listening.pass(time_ns);
+        self.receiving.maps(|_| format!("receiver, {}", BUS.name)).into_iter().next().map(|(shown, _)| shown)
+    }
+}

@@ -1,0 +1,102 @@
+// The panels beside the map: the cell that was asked about, senders, events, counters.
+
+const element = (id) => document.getElementById(id);
+
+const STATES = ['unknown', 'invisible', 'visible'];
+const CONDITIONS = {
+  ok: 'its map is shown',
+  waiting: 'silent or late: all of its map is unknown',
+  'no header': 'heard, its header is not complete: unknown',
+  unusable: 'another version, or a map too large: all of it is unknown',
+  conflict: 'two senders use this number: all of it is unknown',
+};
+
+// Fills a list of terms.
+function define(list, rows) {
+  list.replaceChildren(...rows.filter(([, what]) => what !== null && what !== undefined && what !== '').flatMap(([name, what]) => {
+    const [term, text] = [document.createElement('dt'), document.createElement('dd')];
+    term.textContent = name;
+    text.textContent = what;
+    return [term, text];
+  }));
+}
+
+export function showCell(told, instant, name) {
+  element('cell-none').hidden = told !== null;
+  if (!told) {
+    define(element('cell'), []);
+    return;
+  }
+  const state = STATES[told.state & 3];
+  const since = told.since_begin ? 'the first instant' : `${told.since_s.toFixed(1)} s${told.or_longer ? ' or longer' : ''}`;
+  const obstacles = told.shadows.map((k) => {
+    const { center: [x, y], size: [length, , height] } = instant.obstacles[k];
+    return `obstacle at (${x.toFixed(0)}, ${y.toFixed(0)}) m, ${length.toFixed(1)} m long, ${height.toFixed(1)} m high`;
+  });
+  const shadow = obstacles.length > 0 ? obstacles.join('; ') : state === 'invisible' && told.age_ms === null && instant.obstacles.length > 0 ? 'none that moves: what stands, or the edge of the view' : '';
+  define(element('cell'), [
+    ['map', name],
+    ['state', `${state}${told.state & 4 ? ', occupied' : ''}`],
+    ['grade', `${told.grade} of 255`],
+    ['since', since],
+    ['place', `${told.x_m.toFixed(1)}, ${told.y_m.toFixed(1)} m; ${told.range_m.toFixed(0)} m away, ${told.azimuth_deg.toFixed(1)}°`],
+    ['sector’s age', told.age_ms === null ? '' : `${told.age_ms} ms`],
+    ['in the shadow of', shadow],
+    ['by the labels', told.hidden_by.map((k) => instant.boxes[k].name ?? 'a vehicle').join(', ') && `hidden by ${told.hidden_by.map((k) => instant.boxes[k].name ?? 'a vehicle').join(', ')}`],
+    ['on it stands', told.stands_on === null ? '' : `${instant.boxes[told.stands_on].name ?? 'a vehicle'}${instant.boxes[told.stands_on].outcome ? ` (${instant.boxes[told.stands_on].outcome})` : ''}`],
+  ]);
+}
+
+export function showSenders(instant) {
+  element('senders-section').hidden = instant.senders.length === 0;
+  const ages = (sensor) => {
+    const known = (instant.maps.find(({ name }) => name === `sensor ${sensor}`)?.ages_ms ?? []).filter((age) => age !== null);
+    return known.length > 0 ? `${Math.min(...known)} to ${Math.max(...known)} ms` : 'none is known';
+  };
+  element('senders').replaceChildren(...instant.senders.map((sender) => {
+    const box = document.createElement('div');
+    box.className = 'sender';
+    box.dataset.condition = sender.condition;
+    const title = document.createElement('p');
+    title.textContent = `Sensor ${sender.sensor}: ${CONDITIONS[sender.condition] ?? sender.condition}`;
+    const rows = document.createElement('dl');
+    const { counters: c, status, header } = sender;
+    const unused = ['protection', 'not_authentic', 'repeated', 'out_of_sequence', 'late', 'epoch', 'early', 'malformed'].filter((name) => c[name] > 0);
+    define(rows, [
+      ['epoch', sender.epoch],
+      ['sectors’ ages', ages(sender.sensor)],
+      ['messages', `${c.accepted} used, ${c.lost} lost`],
+      ['not used', unused.map((name) => `${c[name]} ${name.replaceAll('_', ' ')}`).join(', ')],
+      ['unit', status && `${status.state} (${status.reason}), up ${status.uptime_s} s`],
+      ['wire version', status?.wire_version],
+      ['fingerprint', header && header.fingerprint.toString(16).toUpperCase().padStart(8, '0')],
+    ]);
+    box.append(title, rows);
+    return box;
+  }));
+}
+
+export function showEvents(events) {
+  element('events-section').hidden = events.length === 0;
+  element('events').replaceChildren(...events.slice(-200).reverse().map(({ time_s: time, text }) => {
+    const [row, when] = [document.createElement('li'), document.createElement('time')];
+    when.textContent = `${time.toFixed(1)} s `;
+    row.append(when, text);
+    return row;
+  }));
+}
+
+export function showCounters(instant, about) {
+  const { sample } = instant;
+  const { labelled, source } = about;
+  const outcomes = labelled ? ['tv', 'fv', 'ti', 'fi'].map((key) => [key.toUpperCase(), sample[key]]) : [];
+  const detections = source === 'recording' ? [['detections', sample.detections], ['obstacles', instant.obstacles.length]] : [];
+  const shares = ['visible', 'invisible', 'unknown'].map((key) => [key, `${(100 * sample[key]).toFixed(1)} %`]);
+  const counted = instant.counters.map(([what, n]) => [source === 'recording' ? `left out: ${what}` : what, n]);
+  define(element('counters'), [...shares, ...detections, ...outcomes, ...counted]);
+}
+
+export function showNotes(about) {
+  const lines = [...about.notes, ...about.problems];
+  element('notes').replaceChildren(...lines.map((line) => Object.assign(document.createElement('li'), { textContent: line })));
+}

@@ -1,0 +1,186 @@
+//! The page over the log of a broadcast: what a receiver shows, also where the log is cut, or speaks another version.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use viewshed::fixed::time::Time;
+use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::wire::message::{Addresses, Epoch, Message, Packet};
+use viewshed_harness::bus::traffic::{A, Maps, W};
+use viewshed_harness::recording::can_log::{Content, Line};
+use viewshed_harness::recording::{ReadOptions, read};
+
+use crate::browser::Browser;
+use crate::server::{SHIPPED, Server, folder};
+
+/// A log of what the shipped recording's unit would send on CAN FD.
+fn log(folder: &Path) -> PathBuf {
+    let path = folder.join("bus.log");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+    command.args(["bus", SHIPPED, "--to", "5", "--bus", "fd-500k-2M", "--log"]).arg(&path);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    path
+}
+
+fn overview(server: &Server) -> Value {
+    let begin = Instant::now();
+    loop {
+        let (_, answer) = server.own("GET", "overview/0", &[], "");
+        let overview: Value =
+            serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap_or_default()).unwrap_or_default();
+        if overview["done"] == true {
+            return overview;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(120), "{answer}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+fn events(overview: &Value) -> Vec<String> {
+    overview["events"].as_array().unwrap().iter().map(|event| event["text"].as_str().unwrap().to_owned()).collect()
+}
+
+/// The greatest share of visible cells.
+fn most_visible(overview: &Value) -> f64 {
+    overview["samples"].as_array().unwrap().iter().map(|s| s["visible"].as_f64().unwrap()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_log_is_played_and_its_sender_described() {
+    let folder = folder("log");
+    let server = Server::run([Path::new("view"), &log(&folder)]);
+    let overview = overview(&server);
+    assert!((40..=60).contains(&overview["count"].as_u64().unwrap()), "{overview}");
+    assert!(most_visible(&overview) > 0.3, "{overview}");
+    let events = events(&overview);
+    assert!(events.iter().any(|text| text.contains("its map is shown")), "{events:?}");
+    let Some(browser) = Browser::start("log") else { return };
+    let page = browser.open(&server.url);
+    page.until("viewshed.source.done && viewshed.drawn.number >= 0");
+    page.key("End");
+    page.until("viewshed.number === viewshed.source.count - 1");
+    page.rests();
+    let sender = page.ask("document.querySelector('.sender')?.textContent");
+    let sender = sender.as_str().unwrap();
+    assert!(sender.contains("its map is shown") && sender.contains("fingerprint") && sender.contains("ms"), "{sender}");
+    page.focus("plan");
+    page.key("Enter");
+    page.until("viewshed.told !== null");
+    page.picture(&folder.join("log.png"));
+    assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
+fn a_log_that_is_cut_in_the_middle_ends_there_and_what_is_cut_is_counted() {
+    let folder = folder("cut");
+    let path = log(&folder);
+    let bytes = std::fs::read(&path).unwrap();
+    // within a line
+    let mut cut = bytes[..bytes.len() / 2].to_vec();
+    while cut.ends_with(b"\n") || cut.ends_with(b"#") {
+        cut.pop();
+    }
+    cut.extend(b"Z\n");
+    std::fs::write(&path, &cut).unwrap();
+    let server = Server::run([Path::new("view"), &path]);
+    let half = overview(&server);
+    let count = half["count"].as_u64().unwrap();
+    assert!((20..=32).contains(&count) && most_visible(&half) > 0.3, "{half}");
+    let (_, about) = server.own("GET", "about", &[], "");
+    assert!(about.contains("1 lines are no frames"), "{about}");
+}
+
+/// A log of the maps of the shipped recording's first seconds, broadcast by several sensors, each later than the one
+/// before by a millisecond, and with something done to every message.
+fn written(folder: &Path, sensors: &[u8], change: impl Fn(Message, &mut Vec<u8>)) -> PathBuf {
+    let reading = ReadOptions { to_s: Some(4.0), ..ReadOptions::default() };
+    let recording = read(Path::new(SHIPPED), &reading).unwrap();
+    let maps = Maps::new(&recording, &Default::default(), &|| ()).unwrap();
+    let medium = Medium::CanFd(Addresses::STANDARD);
+    let begin = maps.scans[0].measured;
+    let start = |sensor: &u8| {
+        let config = BroadcastConfig::new(*sensor, medium);
+        Broadcaster::<A, W>::new(config, maps.header, Epoch::new(1), begin).unwrap()
+    };
+    let mut senders: Vec<_> = sensors.iter().map(start).collect();
+    let mut text = String::new();
+    for (k, scan) in maps.scans.iter().enumerate() {
+        for sender in &mut senders {
+            let _ = sender.scan(scan.measured, scan);
+        }
+        let end = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_000, |next| next.measured.micros());
+        for now in (scan.measured.micros()..end).step_by(1000) {
+            let now = Time::from_micros(now);
+            for (sender, sensor) in senders.iter_mut().zip(sensors) {
+                let Some(packet) = sender.next_packet(now) else { continue };
+                let mut own = packet.bytes()[6..].to_vec();
+                change(packet.message, &mut own);
+                let changed = Packet::new(packet.packing, *sensor, packet.message, Epoch::new(1), &own);
+                let frame = changed.protect(packet.bytes()[2], None).frame(&Addresses::STANDARD).unwrap();
+                let time_ns = now.micros() as i64 * 1000;
+                let line = Line { time_ns, interface: "can0".into(), content: Content::Data(frame) };
+                text += &format!("{line}\n");
+            }
+        }
+    }
+    let path = folder.join("written.log");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn of_another_version_nothing_is_shown_and_that_is_said() {
+    let later = |message, own: &mut Vec<u8>| {
+        if message == Message::Header {
+            own[0] = own[0] & 0xF0 | 2;
+        }
+    };
+    let server = Server::run([Path::new("view"), &written(&folder("version"), &[1], later)]);
+    let overview = overview(&server);
+    assert_eq!(most_visible(&overview), 0.0);
+    let events = events(&overview);
+    assert!(events.iter().any(|text| text.contains("another version")), "{events:?}");
+}
+
+#[test]
+fn maps_of_several_sensors_are_shown_each_and_together() {
+    let Some(browser) = Browser::start("several sensors") else { return };
+    let server = Server::run([Path::new("view"), &written(&folder("several"), &[1, 4], |_, _| ())]);
+    assert!(most_visible(&overview(&server)) > 0.3);
+    let page = browser.open(&server.url);
+    page.until("viewshed.source.done && viewshed.drawn.number >= 0");
+    page.key("End");
+    page.until("viewshed.number === viewshed.source.count - 1 && viewshed.instant.maps.length === 2");
+    let names = page.ask("viewshed.names");
+    assert_eq!(names, serde_json::json!(["all sensors together", "sensor 1", "sensor 4"]));
+    assert_eq!(page.ask("document.querySelectorAll('.sender').length"), 2);
+    page.until("document.getElementById('plan-title').textContent === 'all sensors together'");
+    // the same map twice is the same together
+    let painted = "(() => { const canvas = document.querySelector('#plan canvas.ground');
+        const bytes = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+        return bytes.reduce((sum, byte, k) => (sum * 31 + byte * (k % 7)) % 1000003, 7); })()";
+    let together = page.ask(painted);
+    page.key("m");
+    page.until("document.getElementById('plan-title').textContent === 'sensor 1'");
+    assert_eq!(page.ask(painted), together);
+}
+
+#[test]
+fn what_is_no_source_is_refused_with_what_to_do() {
+    let folder = folder("nothing");
+    std::fs::write(folder.join("text.log"), "hello\n").unwrap();
+    for (arguments, said) in [
+        (&["view", "text.log"][..], "text.log: not an MCAP file"),
+        (&["view", "missing.mcap"], "missing.mcap"),
+        (&["view", "--port", "/dev/no-such-port"], "no such port"),
+        (&["view"], "required"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+        let output = command.current_dir(&folder).args(arguments).output().unwrap();
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && error.contains(said), "{arguments:?}: {error}");
+    }
+}

@@ -1,0 +1,230 @@
+//! The page over a recording: play, step, jump, ask about cells, and what it looks like.
+
+use std::io::Write;
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use crate::browser::{Browser, Page};
+use crate::looks::{contrast, is_readable, readme};
+use crate::server::{SHIPPED, Server, folder};
+
+/// The first seconds of the shipped recording.
+fn start() -> Server {
+    Server::run(["view", SHIPPED, "--to", "10"])
+}
+
+fn ready(browser: &Browser, server: &Server) -> Page {
+    let page = browser.open(&server.url);
+    page.until("viewshed.source.done && viewshed.drawn.number >= 0 && viewshed.instant.maps.length === 2");
+    page.rests();
+    page
+}
+
+fn number(page: &Page) -> f64 {
+    page.number("viewshed.number")
+}
+
+#[test]
+fn it_plays_steps_and_jumps_to_what_is_wrong() {
+    let Some(browser) = Browser::start("view") else { return };
+    let server = start();
+    let page = ready(&browser, &server);
+    // it begins where something is judged
+    assert!(page.number("viewshed.instant.sample.tv") > 0.0);
+    page.key("Home");
+    page.until("viewshed.number === 0");
+    page.key(".");
+    page.key(".");
+    page.until("viewshed.number === 2");
+    page.key(",");
+    page.until("viewshed.number === 1");
+    page.key("PageDown");
+    page.until("viewshed.number > 12");
+    let time = page.number("viewshed.instant.sample.time_s");
+    assert!((0.9..1.3).contains(&time), "{time}");
+    for (key, kind) in [("v", "fv"), ("i", "fi")] {
+        let before = number(&page);
+        page.key(key);
+        page.until(&format!("viewshed.number > {before}"));
+        assert!(page.number(&format!("viewshed.instant.sample.{kind}")) > 0.0);
+        let named =
+            page.ask(&format!("viewshed.instant.boxes.filter((b) => b.outcome === '{}').length", kind.to_uppercase()));
+        assert_eq!(named, page.ask(&format!("viewshed.instant.sample.{kind}")), "boxes and counts agree");
+    }
+    let before = number(&page);
+    page.key(" ");
+    page.until(&format!("viewshed.number > {before} + 10"));
+    page.key(" ");
+    assert_eq!(page.ask("viewshed.playing"), false);
+    page.key("End");
+    page.until("viewshed.number === viewshed.source.count - 1");
+    // a click into the figures over time goes there
+    page.click_plot("time", 5.0, 40.0);
+    page.until("Math.abs(viewshed.instant.sample.time_s - 5) < 0.2");
+    assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
+fn a_cell_says_what_it_is_since_when_and_in_whose_shadow() {
+    let Some(browser) = Browser::start("cells") else { return };
+    let server = start();
+    let page = ready(&browser, &server);
+    page.click_plot("time", 7.0, 40.0);
+    page.until("Math.abs(viewshed.instant.sample.time_s - 7) < 0.2");
+    // a place that is invisible behind an obstacle, far enough from it
+    let place = page.ask(
+        "(() => { const { instant } = viewshed; const [map] = instant.maps; const { cells, bytes } = map;
+           for (const { center: [x, y], size: [length] } of instant.obstacles) {
+             const [mx, my, , heading] = cells.mount; const far = Math.hypot(x - mx, y - my);
+             if (far < 30 || far > 120) continue;
+             const place = [x + ((x - mx) / far) * (length / 2 + 6), y + ((y - my) / far) * (length / 2 + 6)];
+             const range = Math.floor(Math.hypot(place[0] - mx, place[1] - my) / cells.cell_m);
+             const [right, left] = cells.azimuth_rad;
+             const azimuth = Math.floor(((Math.atan2(place[1] - my, place[0] - mx) - heading - right) / (left - right)) * cells.azimuths);
+             if (bytes[2 * (azimuth * cells.ranges + range) + 1] === 1) return place; }
+           return null; })()",
+    );
+    let [x, y] = [0, 1].map(|k| place[k].as_f64().expect("an invisible place behind an obstacle"));
+    page.click_plot("plan", x, y);
+    page.until("viewshed.told");
+    let told = page.ask("viewshed.told");
+    assert_eq!(told["state"], 1, "{told}");
+    assert!(!told["shadows"].as_array().unwrap().is_empty(), "{told}");
+    let now = page.number("viewshed.instant.sample.time_s");
+    assert!(told["since_s"].as_f64().unwrap() <= now, "{told}");
+    let text = page.ask("document.getElementById('cell').textContent");
+    let text = text.as_str().unwrap();
+    assert!(text.contains("invisible") && text.contains("in the shadow of") && text.contains("since"), "{text}");
+    // the receiver's cell has an age
+    page.key("m");
+    page.click_plot("plan", x, y);
+    page.until("viewshed.told?.age_ms !== null && viewshed.told?.age_ms !== undefined");
+    let age = page.number("viewshed.told.age_ms");
+    assert!((0.0..=300.0).contains(&age), "{age} ms");
+    page.key("Escape");
+    page.until("viewshed.told === null");
+    // with the keyboard alone
+    page.focus("plan");
+    page.key("ArrowRight");
+    page.key("Enter");
+    page.until("viewshed.told !== null");
+}
+
+#[test]
+fn the_receivers_map_stands_beside_the_senders_and_the_page_is_readable() {
+    let Some(browser) = Browser::start("appearance") else { return };
+    let server = start();
+    let page = ready(&browser, &server);
+    let pictures = folder("pictures");
+    page.click_plot("time", 7.6, 40.0);
+    page.until("Math.abs(viewshed.instant.sample.time_s - 7.6) < 0.2");
+    page.size(1240, 900, 1.0);
+    page.rests();
+    page.focus("plan");
+    page.key("f");
+    page.rests();
+    // deep in the shadow of the lorry in the left lanes
+    page.click_plot("plan", 110.0, 14.0);
+    page.until("viewshed.told");
+    page.rests();
+    page.picture(&readme(&pictures).join("view.png"));
+    page.key("b");
+    page.until("!document.getElementById('beside').hidden");
+    page.rests();
+    let title = page.ask("document.getElementById('second-title').textContent");
+    assert!(title.as_str().unwrap().contains("receiver") && title.as_str().unwrap().contains("cells"), "{title}");
+    // what a receiver on this bus shows is the sender's map, but for what changed within a scan
+    let differs: f64 = title.as_str().unwrap().split(": ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let all = page.number("viewshed.instant.maps[0].codes.length");
+    assert!(differs < 0.03 * all, "{differs} of {all}");
+    page.picture(&pictures.join("view-beside.png"));
+    page.key("?");
+    page.until("document.getElementById('help').open");
+    assert!(page.number("document.querySelectorAll('#keys dt').length") >= 20.0);
+    page.picture(&pictures.join("view-keys.png"));
+    page.ask("document.getElementById('help').close()");
+    for mode in ["light", "dark"] {
+        if mode == "dark" {
+            page.dark();
+            page.rests();
+            page.picture(&pictures.join("view-dark.png"));
+        }
+        is_readable(&page, 1240);
+        for selector in
+            ["h1", "#state", "#plan-title", "#legend span", "#counters dt", "#counters dd", "#play", "#now-text"]
+        {
+            let found = contrast(&page, selector);
+            assert!(found >= 4.5, "{mode}, {selector}: {found}");
+        }
+    }
+    page.size(620, 450, 2.0);
+    page.rests();
+    is_readable(&page, 620);
+    page.picture(&pictures.join("view-enlarged.png"));
+    assert_eq!(page.console(), Vec::<String>::new());
+}
+
+/// Waits until every instant is found.
+fn filled(server: &Server) -> serde_json::Value {
+    let begin = Instant::now();
+    loop {
+        let (status, answer) = server.own("GET", "overview/0", &[], "");
+        let body = answer.split("\r\n\r\n").nth(1).unwrap_or_default();
+        let overview: serde_json::Value = serde_json::from_str(body).unwrap_or_default();
+        if status == 200 && overview["done"] == true {
+            return overview;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(120), "{answer}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn ten_look_at_once_and_one_that_does_not_read_is_dropped_without_the_others_noticing() {
+    let server = Server::run(["view", SHIPPED, "--to", "4"]);
+    let overview = filled(&server);
+    assert_eq!(overview["count"], 61, "{}", overview["says"]);
+    // asks for everything again and again and reads nothing: at last its connection is closed
+    let mut deaf = TcpStream::connect(server.host()).unwrap();
+    deaf.set_write_timeout(Some(Duration::from_millis(200))).unwrap();
+    let request = format!("GET {} HTTP/1.1\r\nHost: {}\r\n\r\n", server.path("instant/30"), server.host());
+    let begin = Instant::now();
+    let dropped = loop {
+        match deaf.write(request.as_bytes()) {
+            Err(e) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {}
+            Err(_) => break true,
+            Ok(_) => {}
+        }
+        // the rest live on
+        if begin.elapsed() > Duration::from_millis(500) {
+            std::thread::scope(|scope| {
+                let server = &server;
+                let clients: Vec<_> = (0..10)
+                    .map(|k| scope.spawn(move || server.own("GET", &format!("instant/{}", 5 * k), &[], "").0))
+                    .collect();
+                clients.into_iter().for_each(|client| assert_eq!(client.join().unwrap(), 200));
+            });
+        }
+        if begin.elapsed() > Duration::from_secs(60) {
+            break false;
+        }
+    };
+    assert!(dropped, "it still hangs on after a minute");
+    assert_eq!(server.own("GET", "instant/60", &[], "").0, 200);
+    assert_eq!(server.own("GET", "instant/61", &[], "").0, 404);
+    assert_eq!(server.own("GET", "cell/59/0/9999/0", &[], "").0, 404);
+}
+
+#[test]
+fn only_its_own_pages_are_answered() {
+    let server = Server::run(["view", SHIPPED, "--to", "2"]);
+    let (get, host) = (format!("GET {} HTTP/1.1", server.path("about")), format!("Host: {}", server.host()));
+    assert_eq!(server.ask(&[&get, &host], "").0, 200);
+    for lines in [
+        vec![get.as_str(), "Host: evil.example"],
+        vec![&get, &host, "Origin: null"],
+        vec!["GET /about HTTP/1.1", &host],
+    ] {
+        assert!(matches!(server.ask(&lines, "").0, 400 | 403), "{lines:?}");
+    }
+}
