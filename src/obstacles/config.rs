@@ -1,5 +1,6 @@
 //! What can be set of obstacle tracking, in SI units.
 
+use super::lanes::Lanes;
 use super::profile::HIT;
 use super::size::SizeConfig;
 use super::tracking::Tracking;
@@ -226,6 +227,7 @@ impl ObstacleConfig {
             noise,
             road,
             limit_cm,
+            lanes: Lanes::default(),
         })
     }
 }

@@ -93,6 +93,8 @@ mod by_hand;
 pub mod config;
 mod gathered;
 mod joining;
+mod lane;
+pub mod lanes;
 pub mod motion;
 pub mod obstacle;
 mod own_way;
@@ -292,6 +294,7 @@ impl<const N: usize> Obstacles<N> {
             }
             room -= 1;
             let mut newborn = Obstacle::new(seed, heading, speed);
+            newborn.find_lane(t);
             newborn.absorb(seed, t);
             claimed.insert(i);
             let mut search = newborn.search(t);
