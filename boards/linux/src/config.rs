@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck};
 use viewshed::{
-    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Medium, Mount,
-    NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference, small,
+    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Lane, Medium,
+    Mount, NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference, small,
 };
 
 use crate::locate;
@@ -63,6 +63,19 @@ pub struct Config {
     pub visibility: VisibilityConfig,
     #[serde(default)]
     pub health: HealthConfig,
+    /// Which way traffic goes. Kept as long as the daemon runs.
+    #[serde(default, deserialize_with = "lanes")]
+    pub lanes: &'static [Lane],
+}
+
+fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [Lane], D::Error> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Table {
+        points: Vec<[f32; 2]>,
+    }
+    let tables = Vec::<Table>::deserialize(tables)?;
+    Ok(tables.into_iter().map(|lane| -> Lane { lane.points.leak() }).collect::<Vec<_>>().leak())
 }
 
 /// The radar.
@@ -330,7 +343,8 @@ impl Config {
     pub fn settings(&self) -> Option<Settings> {
         let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise: self.noise };
         let settings = Settings::of(sensor);
-        Some(Settings { gate: self.gate, visibility: self.visibility, health: self.health, ..settings })
+        let Self { gate, visibility, health, lanes, .. } = *self;
+        Some(Settings { gate, visibility, health, lanes, ..settings })
     }
 
     /// Which program the service says this is; its chip is the machine.
