@@ -1,6 +1,5 @@
 //! The box an obstacle fills: what was seen of it, and what that leaves unseen.
 
-use super::lane::NO_LANE;
 use super::obstacle::Obstacle;
 use super::size::Size;
 use super::tracking::Tracking;
@@ -43,7 +42,7 @@ impl Obstacle {
     /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its
     /// own way nearly along the road, whose axis it had for a heading until then, and a quarter on a lane.
     fn margin_cm(&self, t: &Tracking) -> i32 {
-        if self.lane != NO_LANE {
+        if self.is_on_lane(t) {
             return t.own_way_margin_cm / 4;
         }
         match (self.free_heading, t.road.sine(self.heading).abs() > ACROSS) {

@@ -81,7 +81,7 @@ impl Obstacle {
 
     /// Turns with the lane it is on; at its end, into the next.
     pub(super) fn keep_to_lane(&mut self, t: &Tracking) {
-        if self.lane == NO_LANE {
+        if !self.is_on_lane(t) {
             return;
         }
         if let Some(on) = t.lanes.along(self.lane, self.middle()) {
@@ -104,9 +104,15 @@ impl Obstacle {
         }
     }
 
+    /// Whether it follows a lane.
+    #[inline]
+    pub(super) fn is_on_lane(&self, t: &Tracking) -> bool {
+        !t.lanes.is_empty() && self.lane != NO_LANE
+    }
+
     /// How far to the left its middle is moved towards the middle of its lane, centimetres.
     pub(super) fn towards_lane(&self, place: (i32, i32), t: &Tracking) -> i32 {
-        if self.lane == NO_LANE {
+        if !self.is_on_lane(t) {
             return 0;
         }
         let Some(on) = t.lanes.along(self.lane, place) else { return 0 };

@@ -9,10 +9,12 @@
 //! fit below a limit is taken; off all lanes nothing changes.
 //!
 //! # Limits
-//! At most [`MOST_LANES`] lanes of [`MOST_SEGMENTS`] segments in all; what is wrong with one is refused by name.
+//! At most [`MOST_LANES`] lanes of [`MOST_SEGMENTS`] segments in all, none without the feature `lanes`; what is wrong with
+//! one is refused by name.
 
 use heapless::Vec;
 
+use super::tracking::LEAST_PROJECTION;
 use crate::fixed::math::{length, mul_shift};
 use crate::fixed::trig::{self, Direction};
 use crate::sensor::config::{ConfigError, Problem, within};
@@ -22,10 +24,12 @@ use crate::sensor::road::RoadPoint;
 /// A lane: a polyline in the direction of its traffic, metres in road coordinates, x along the road and y to the left.
 pub type Lane = &'static [[f32; 2]];
 
+/// Whether there is room for any.
+const ROOM: bool = cfg!(feature = "lanes");
 /// Most lanes.
-pub const MOST_LANES: usize = 64;
+pub const MOST_LANES: usize = if ROOM { 64 } else { 0 };
 /// Most segments of all lanes together.
-pub const MOST_SEGMENTS: usize = 128;
+pub const MOST_SEGMENTS: usize = if ROOM { 128 } else { 0 };
 
 /// Farthest that a point may lie from the sensor along either axis, centimetres: [`Levelling::place`] ends at 450 m.
 const FARTHEST_CM: i32 = 40_000;
@@ -109,8 +113,9 @@ impl Lanes {
     }
 
     /// Whether there are none.
+    #[inline]
     pub fn is_empty(&self) -> bool {
-        self.segments.is_empty()
+        !ROOM || self.segments.is_empty()
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // limits are checked
@@ -259,7 +264,7 @@ impl Motion {
 /// Speed along a heading that explains a radial one, cm/s; `None` nearly across it.
 pub(super) fn speed_along(heading: Direction, sight: Direction, radial: i32) -> Option<i32> {
     let c = sight.cosine(heading);
-    (c.abs() > (15 << 14) / 100).then(|| (radial << 14) / c)
+    if c.abs() < LEAST_PROJECTION { None } else { (radial << 14).checked_div(c) }
 }
 
 #[cfg(test)]

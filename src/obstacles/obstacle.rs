@@ -221,7 +221,7 @@ impl Obstacle {
                 self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
             }
             self.move_left(offset);
-            if self.age >= YOUNG_FRAMES && self.lane == NO_LANE {
+            if self.age >= YOUNG_FRAMES && !self.is_on_lane(t) {
                 self.turn(offset, step, t);
             }
         }
