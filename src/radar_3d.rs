@@ -99,13 +99,14 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         let view = sensor.field_of_view.limits()?;
         let noise = sensor.noise.noise()?;
         let axes = Axes::new(&levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
-        let lanes = Lanes::new(&levelling, config.lanes)?;
         let limit_cm = view.range_cm[1] + BEYOND_CM;
+        let mut tracking = config.obstacles.tracking(noise, levelling.road_axis(), limit_cm)?;
+        tracking.lanes = Lanes::new(&levelling, config.lanes)?;
         Ok(Self {
             levelling,
             gate: config.gate.gate(&view)?,
             noise,
-            tracking: Tracking { lanes, ..config.obstacles.tracking(noise, levelling.road_axis(), limit_cm)? },
+            tracking,
             inverse_sensor: config.evidence.inverse_sensor(&sensor.noise, &axes)?,
             health: config.health.limits()?,
             visible_from: threshold("visibility.visible_from", config.visibility.visible_from)?,

@@ -124,7 +124,6 @@ impl Tracking {
     /// Heading and speed of something that moves and shows this radial velocity: along the road, or along the line of
     /// sight where nothing drives so fast along the road that it would show that. `None` where it may be standing, or
     /// is slow and nearly crosses the line of sight.
-    #[inline(never)] // of three loops
     pub fn course(&self, r: &Reflection) -> Option<(Direction, i32)> {
         let along = self.road.along(i32::from(r.sight.x), i32::from(r.sight.y));
         let radial = i32::from(r.radial_velocity_cm_s);
