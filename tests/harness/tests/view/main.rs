@@ -7,7 +7,9 @@ mod broadcast;
 #[allow(dead_code, reason = "of the tests of another page")]
 #[path = "../label/browser.rs"]
 mod browser;
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
+mod emulated;
+#[cfg(target_os = "linux")]
 mod live;
 #[path = "../label/looks.rs"]
 mod looks;

@@ -175,11 +175,11 @@ async fn instant(State(this): Shared, Path(number): Path<usize>) -> Response {
     }
 }
 
-/// The newest instant when there are more than `after`; 204 when none came for a while, 410 when none will.
+/// The newest instant when there are more than `after`; 204 when none came for a while, `null` when none will.
 async fn newer(State(this): Shared, Path(after): Path<usize>) -> Response {
     match tokio::time::timeout(PATIENCE, this.instants.newer(after)).await {
         Ok(Some(bytes)) => packed(&bytes),
-        Ok(None) => (StatusCode::GONE, "the source has ended\n").into_response(),
+        Ok(None) => super::json(&()),
         Err(_) => StatusCode::NO_CONTENT.into_response(),
     }
 }

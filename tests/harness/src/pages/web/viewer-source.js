@@ -62,12 +62,14 @@ export class Source {
         this.on.gone('the server does not answer; start it again and reload');
         return;
       }
-      if (answer.status === 410) {
-        await this.update();
-        return;
-      }
       if (answer.status === 200) {
-        const instant = unpacked(await answer.json());
+        const found = await answer.json();
+        // the source has ended
+        if (found === null) {
+          await this.update();
+          return;
+        }
+        const instant = unpacked(found);
         after = instant.number + 1;
         this.keep(instant);
         this.samples[instant.number] = instant.sample;
