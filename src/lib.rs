@@ -59,7 +59,7 @@
 //! |---|---|
 //! | a sensor as it is installed, in SI units, checked once | [`Sensor`], [`Mount`], [`FieldOfView`], [`NoiseConfig`], [`RoadPoint`]; errors name the parameter: [`ConfigError`] |
 //! | a frame of it | [`Detection`], [`Measurement`], [`Angle`], [`Time`], [`FrameStatus`] |
-//! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`]; which way traffic goes: [`Lane`] |
+//! | the estimator, in two sizes or one of your own | [`reference`](mod@reference), [`small`], [`Radar3d`], [`Radar3dConfig`], [`Radar3dParameters`] |
 //! | a camera: its calibration, boxes of its pictures | [`Camera3d`], [`Camera3dConfig`], [`Camera3dParameters`], [`Calibration`], [`Intrinsics`], [`PointPair`], [`ImageBox`], [`VehicleClass`]; how it is installed: [`cameras`] |
 //! | what is known of the road | [`PolarMap`], [`RoadGrid`]; every map answers [`VisibilityMap`] and the [questions](query) |
 //! | several sensors as one map | [`fusion`] |
@@ -217,7 +217,6 @@ pub use frame::gate::GateConfig;
 pub use frame::health::HealthConfig;
 pub use grid::evidence::EvidenceConfig;
 pub use obstacles::config::ObstacleConfig;
-pub use obstacles::lanes::Lane;
 pub use radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters, VisibilityConfig};
 
 // Maps and questions to them.

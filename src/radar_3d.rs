@@ -47,7 +47,8 @@ pub struct Radar3dConfig {
     pub visibility: VisibilityConfig,
     /// When maps end.
     pub health: HealthConfig,
-    /// Which way traffic goes, where that is known; of a crossing, say. No part of a file's table.
+    /// Which way traffic goes, where that is known, of a crossing say: lanes as polylines in the direction of their
+    /// traffic, metres in road coordinates, x along the road and y to the left. No part of a file's table.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub lanes: &'static [Lane],
 }

@@ -1,14 +1,12 @@
 //! An obstacle that follows a lane.
 
-use super::lanes::{Motion, OnLane, speed_along};
+use super::lanes::{Motion, NO_LANE, OnLane};
 use super::motion::FreeMotion;
 use super::obstacle::{FRACTION, NEWBORN_PLACE, NEWBORN_SPEED, Obstacle};
-use super::tracking::Tracking;
+use super::tracking::{LEAST_PROJECTION, Tracking};
 use crate::fixed::math::mul_shift;
 use crate::fixed::trig::Direction;
 
-/// The segment of what follows no lane.
-pub(super) const NO_LANE: u8 = u8::MAX;
 /// Every how many frames an obstacle looks for a better lane.
 const LOOK_EVERY: u16 = 4;
 
@@ -118,6 +116,12 @@ impl Obstacle {
         let Some(on) = t.lanes.along(self.lane, place) else { return 0 };
         -mul_shift(on.left_cm.clamp(-MOST_ASIDE_CM, MOST_ASIDE_CM), TO_THE_MIDDLE, 8)
     }
+}
+
+/// Speed along a heading that explains a radial one, cm/s; `None` nearly across it.
+fn speed_along(heading: Direction, sight: Direction, radial: i32) -> Option<i32> {
+    let c = sight.cosine(heading);
+    if c.abs() < LEAST_PROJECTION { None } else { (radial << 14).checked_div(c) }
 }
 
 #[cfg(test)]

@@ -14,7 +14,6 @@
 
 use heapless::Vec;
 
-use super::tracking::LEAST_PROJECTION;
 use crate::fixed::math::{length, mul_shift};
 use crate::fixed::trig::{self, Direction};
 use crate::sensor::config::{ConfigError, Problem, within};
@@ -30,6 +29,9 @@ const ROOM: bool = cfg!(feature = "lanes");
 pub const MOST_LANES: usize = if ROOM { 64 } else { 0 };
 /// Most segments of all lanes together.
 pub const MOST_SEGMENTS: usize = if ROOM { 128 } else { 0 };
+
+/// The segment of what follows no lane.
+pub(super) const NO_LANE: u8 = u8::MAX;
 
 /// Farthest that a point may lie from the sensor along either axis, centimetres: [`Levelling::place`] ends at 450 m.
 const FARTHEST_CM: i32 = 40_000;
@@ -265,12 +267,6 @@ impl Motion {
         let turned = self.heading.map_or(0, |h| (trig::ONE - h.cosine(heading)) >> 6);
         Some(by_speed + turned)
     }
-}
-
-/// Speed along a heading that explains a radial one, cm/s; `None` nearly across it.
-pub(super) fn speed_along(heading: Direction, sight: Direction, radial: i32) -> Option<i32> {
-    let c = sight.cosine(heading);
-    if c.abs() < LEAST_PROJECTION { None } else { (radial << 14).checked_div(c) }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
 use super::gathered::Gathered;
-use super::lane::NO_LANE;
+use super::lanes::NO_LANE;
 use super::motion::FreeMotion;
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;

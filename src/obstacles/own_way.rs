@@ -4,7 +4,7 @@
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
 //! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
 
-use super::lane::NO_LANE;
+use super::lanes::NO_LANE;
 use super::motion::Seen;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck};
 use viewshed::{
-    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Lane, Medium,
-    Mount, NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference, small,
+    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Medium, Mount,
+    NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference, small,
 };
 
 use crate::locate;
@@ -65,17 +65,17 @@ pub struct Config {
     pub health: HealthConfig,
     /// Which way traffic goes. Kept as long as the daemon runs.
     #[serde(default, deserialize_with = "lanes")]
-    pub lanes: &'static [Lane],
+    pub lanes: &'static [&'static [[f32; 2]]],
 }
 
-fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [Lane], D::Error> {
+fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [&'static [[f32; 2]]], D::Error> {
     #[derive(Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Table {
         points: Vec<[f32; 2]>,
     }
     let tables = Vec::<Table>::deserialize(tables)?;
-    Ok(tables.into_iter().map(|lane| -> Lane { lane.points.leak() }).collect::<Vec<_>>().leak())
+    Ok(tables.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak())
 }
 
 /// The radar.

@@ -15,6 +15,7 @@ use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::polar::PolarMap;
 use viewshed::map::{CellState, VisibilityMap};
+use viewshed::obstacles::lanes;
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
@@ -94,8 +95,8 @@ pub struct Lane {
 }
 
 /// Lanes as the library takes them, kept as long as the program runs: they are few.
-fn kept(lanes: &[Lane]) -> &'static [viewshed::Lane] {
-    lanes.iter().map(|lane| -> viewshed::Lane { lane.points.clone().leak() }).collect::<Vec<_>>().leak()
+fn kept(given: &[Lane]) -> &'static [lanes::Lane] {
+    given.iter().map(|lane| -> lanes::Lane { lane.points.clone().leak() }).collect::<Vec<_>>().leak()
 }
 
 impl Default for Options {
