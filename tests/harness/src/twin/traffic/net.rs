@@ -106,7 +106,7 @@ fn shape(lane: &BytesStart) -> Result<Option<Vec<[f64; 2]>>> {
     let (allow, disallow) = (classes("allow")?, classes("disallow")?);
     let names = |text: &str, name: &str| text.split_whitespace().any(|word| word == name);
     let is_open = |class: &&str| if allow.is_empty() { !names(&disallow, class) } else { names(&allow, class) };
-    if names(&disallow, "all") || !MOTORS.iter().any(|class| names(&allow, "all") || is_open(&class)) {
+    if names(&disallow, "all") || !MOTORS.iter().any(|class| names(&allow, "all") || is_open(class)) {
         return Ok(None);
     }
     let text = opened::attribute(lane, "shape")?.unwrap_or_default();
