@@ -130,7 +130,7 @@ impl Lanes {
     fn add(&mut self, levelling: &Levelling, points: &[[f32; 2]]) -> Result<(), ConfigError> {
         let lane = self.lanes;
         let refuse = |problem| Err(ConfigError { parameter: "lanes", value: f32::from(lane), problem });
-        if usize::from(lane) >= MOST_LANES {
+        if MOST_LANES.checked_sub(usize::from(lane) + 1).is_none() {
             return refuse(Problem::TooManyLanes);
         }
         if points.len() < 2 {
@@ -197,7 +197,7 @@ impl Lanes {
         let mut k = segment;
         let mut here = self.segments.get(usize::from(k))?;
         // no farther than one lane has segments
-        for _ in 0..MOST_SEGMENTS {
+        for _ in &self.segments {
             let (along, left) = here.local(place);
             let step = if along > here.length_cm() {
                 1
