@@ -74,6 +74,7 @@
 //! | `board` | who builds a unit, on a controller or as a service | module `board`: the loop `Roadside` with a board's `CanPort`, `SerialPort` and `SettingsSlots`; sessions and services on a line or bus; settings that outlast a restart |
 //! | `defmt` | who reads a controller's log | `Format` on public types, and events |
 //! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
+//! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!

@@ -24,6 +24,7 @@ use crate::grid::shadow;
 use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
 use crate::obstacles::config::ObstacleConfig;
+use crate::obstacles::lanes::{Lane, Lanes};
 use crate::obstacles::tracking::Tracking;
 use crate::obstacles::{Claimed, Obstacles};
 use crate::sensor::Sensor;
@@ -46,6 +47,10 @@ pub struct Radar3dConfig {
     pub visibility: VisibilityConfig,
     /// When maps end.
     pub health: HealthConfig,
+    /// Which way traffic goes, where that is known, of a crossing say: lanes as polylines in the direction of their
+    /// traffic, metres in road coordinates, x along the road and y to the left. No part of a file's table.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub lanes: &'static [Lane],
 }
 
 /// How the result is read off the grid.
@@ -95,11 +100,14 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         let view = sensor.field_of_view.limits()?;
         let noise = sensor.noise.noise()?;
         let axes = Axes::new(&levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
+        let limit_cm = view.range_cm[1] + BEYOND_CM;
+        let mut tracking = config.obstacles.tracking(noise, levelling.road_axis(), limit_cm)?;
+        tracking.lanes = Lanes::new(&levelling, config.lanes)?;
         Ok(Self {
             levelling,
             gate: config.gate.gate(&view)?,
             noise,
-            tracking: config.obstacles.tracking(noise, levelling.road_axis(), view.range_cm[1] + BEYOND_CM)?,
+            tracking,
             inverse_sensor: config.evidence.inverse_sensor(&sensor.noise, &axes)?,
             health: config.health.limits()?,
             visible_from: threshold("visibility.visible_from", config.visibility.visible_from)?,

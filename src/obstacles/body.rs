@@ -25,10 +25,10 @@ impl Obstacle {
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
         let hidden = (size.length_cm - seen).max(0) / 2;
         let aside = self.beside_the_detections(&size, ahead, left);
-        let (x, y) = self.global(
-            self.extent.middle_cm() + if ahead >= 0 { hidden } else { -hidden },
-            if left >= 0 { aside } else { -aside },
-        );
+        let along = self.extent.middle_cm() + if ahead >= 0 { hidden } else { -hidden };
+        let aside = if left >= 0 { aside } else { -aside };
+        let aside = aside + self.towards_lane(self.global(along, aside), t);
+        let (x, y) = self.global(along, aside);
         Solid {
             x_cm: x,
             y_cm: y,
@@ -40,8 +40,11 @@ impl Obstacle {
     }
 
     /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its
-    /// own way nearly along the road, whose axis it had for a heading until then.
+    /// own way nearly along the road, whose axis it had for a heading until then, and a quarter on a lane.
     fn margin_cm(&self, t: &Tracking) -> i32 {
+        if self.is_on_lane(t) {
+            return t.own_way_margin_cm / 4;
+        }
         match (self.free_heading, t.road.sine(self.heading).abs() > ACROSS) {
             (false, _) => 0,
             (true, false) => t.own_way_margin_cm / 2,

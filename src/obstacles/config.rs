@@ -1,5 +1,6 @@
 //! What can be set of obstacle tracking, in SI units.
 
+use super::lanes::Lanes;
 use super::profile::HIT;
 use super::size::SizeConfig;
 use super::tracking::Tracking;
@@ -122,7 +123,7 @@ impl Default for ObstacleConfig {
             outline_share: 0.06,
             lateral_memory_s: 0.8,
             drift_gain: 0.01,
-            confirm_hits: 3.0,
+            confirm_hits: 2.25,
             max_evidence: 12.0,
             tentative_loss_per_s: 10.0,
             visible_loss_per_s: 9.0,
@@ -139,7 +140,7 @@ impl Default for ObstacleConfig {
             own_way_mps: 1.5,
             own_way_share: 0.15,
             own_way_follow: 0.1,
-            own_way_margin_m: 0.6,
+            own_way_margin_m: 0.7,
             length_growth_s: 1.0,
             length_memory_s: 3.0,
             slow_mps: 4.0,
@@ -226,6 +227,7 @@ impl ObstacleConfig {
             noise,
             road,
             limit_cm,
+            lanes: Lanes::default(),
         })
     }
 }

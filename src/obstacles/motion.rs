@@ -58,6 +58,11 @@ impl FreeMotion {
         speed * speed > mul_shift(self.variance[2], sigmas * sigmas, 8)
     }
 
+    /// Variance of the speed across the line of sight, (cm/s)^2.
+    pub fn speed_variance(&self) -> i32 {
+        self.variance[2]
+    }
+
     /// Moves on by a time step, over which the variance of the speed grows by `turning_noise` a second
     /// ((cm/s)^2).
     pub fn predict(&mut self, step: Step, turning_noise: i32) {

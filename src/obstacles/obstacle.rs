@@ -1,6 +1,7 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
 use super::gathered::Gathered;
+use super::lanes::NO_LANE;
 use super::motion::FreeMotion;
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tallness::Tallness;
@@ -51,6 +52,8 @@ pub struct Obstacle {
     pub(super) unexplained: u8,
     /// Whether it goes its own way, with speed and heading from `free`.
     pub(super) free_heading: bool,
+    /// Segment of the lane it follows, or [`NO_LANE`](super::lane::NO_LANE).
+    pub(super) lane: u8,
     /// What this frame's detections add up to.
     pub(super) gathered: Gathered,
 }
@@ -58,7 +61,7 @@ pub struct Obstacle {
 /// Variance of the place of a newborn, cm^2: somewhere on a car.
 pub(super) const NEWBORN_PLACE: i32 = 150 * 150;
 /// Variance of its speed across the line of sight, (cm/s)^2: as fast as traffic crosses.
-const NEWBORN_SPEED: i32 = 1000 * 1000;
+pub(super) const NEWBORN_SPEED: i32 = 1000 * 1000;
 /// Detections over which the spread to the sides is taken.
 const SPREAD_MEMORY: i32 = 40;
 /// Greatest weight of a lateral estimate: [`ratio`]'s limit.
@@ -81,6 +84,7 @@ impl Obstacle {
             free: FreeMotion::new(position, NEWBORN_PLACE, velocity, NEWBORN_SPEED),
             unexplained: 0,
             free_heading: false,
+            lane: NO_LANE,
             heading,
             profile: Profile::EMPTY,
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
@@ -136,6 +140,7 @@ impl Obstacle {
         self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
         self.gathered = Gathered::NONE;
         self.age = self.age.saturating_add(1);
+        self.keep_to_lane(t);
     }
 
     /// Whether it has moved far enough to be no fixture that clutter gave a speed.
@@ -216,7 +221,7 @@ impl Obstacle {
                 self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
             }
             self.move_left(offset);
-            if self.age >= YOUNG_FRAMES {
+            if self.age >= YOUNG_FRAMES && !self.is_on_lane(t) {
                 self.turn(offset, step, t);
             }
         }
@@ -224,6 +229,7 @@ impl Obstacle {
         let off = g.spread(self.heading).clamp(0, 4 * EVEN_SPREAD) - self.spread;
         self.spread += off * g.count / (g.count + SPREAD_MEMORY).max(1);
         self.question_heading(t);
+        self.look_for_lane(t);
         self.update_extent(t);
         self.remember_length(step, t);
         self.hits = self.hits.saturating_add(g.count as u16);

@@ -4,6 +4,7 @@
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
 //! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
 
+use super::lanes::NO_LANE;
 use super::motion::Seen;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};
@@ -74,7 +75,11 @@ impl Obstacle {
             self.unexplained = 0;
         }
         if self.unexplained >= OWN_WAY_FRAMES {
-            self.go_own_way();
+            self.lane = NO_LANE;
+            self.find_lane(t);
+            if !self.is_on_lane(t) {
+                self.go_own_way();
+            }
         }
     }
 

@@ -1,5 +1,6 @@
 //! Parameters of obstacle tracking, checked and in integers.
 
+use super::lanes::Lanes;
 use super::size::Sizes;
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
@@ -7,7 +8,7 @@ use crate::frame::reflection::Reflection;
 use crate::sensor::noise::Noise;
 
 /// [`ObstacleConfig`](super::config::ObstacleConfig) in integers; lengths in centimetres.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 #[allow(missing_docs)] // the fields are the configuration's, in the units below
 pub struct Tracking {
     pub min_speed_cm_s: i32,
@@ -88,6 +89,8 @@ pub struct Tracking {
     pub road: Direction,
     /// How far obstacles are followed.
     pub limit_cm: i32,
+    /// Which way traffic goes at a place, where that is given.
+    pub lanes: Lanes,
 }
 
 /// Frames an obstacle is young: its motion follows its detections quickly.
@@ -118,19 +121,24 @@ impl Tracking {
         Kept { lateral: step.keep(self.lateral_memory), outline: step.keep(self.outline_memory) }
     }
 
-    /// Heading and speed of something that moves along the road and shows this radial velocity;
-    /// `None` where it may be standing, or nearly crosses the line of sight.
+    /// Heading and speed of something that moves and shows this radial velocity: along the road, or along the line of
+    /// sight where nothing drives so fast along the road that it would show that. `None` where it may be standing, or
+    /// is slow and nearly crosses the line of sight.
     pub fn course(&self, r: &Reflection) -> Option<(Direction, i32)> {
         let along = self.road.along(i32::from(r.sight.x), i32::from(r.sight.y));
         let radial = i32::from(r.radial_velocity_cm_s);
-        // nearly broadside Doppler says nothing about motion along the road, and what stands still
-        // shows no more than the noise of its Doppler
-        if along.abs() < LEAST_PROJECTION || radial.abs() < 4 * self.noise.radial_velocity_cm_s {
+        // what stands still shows no more than the noise of its Doppler
+        if radial.abs() < 4 * self.noise.radial_velocity_cm_s {
             return None;
         }
-        let speed = (radial << 14).checked_div(along)?;
+        // nearly broadside Doppler says nothing about motion along the road
+        let speed = if along.abs() < LEAST_PROJECTION { i32::MAX } else { (radial << 14).checked_div(along)? };
+        if speed.abs() > FASTEST_ALONG_CM_S {
+            let heading = if radial > 0 { r.sight } else { r.sight.reversed() };
+            return (LEAST_RADIAL_CM_S..=FASTEST_CM_S).contains(&radial.abs()).then_some((heading, radial.abs()));
+        }
         let heading = if speed > 0 { self.road } else { self.road.reversed() };
-        (self.min_speed_cm_s..=FASTEST_CM_S).contains(&speed.abs()).then_some((heading, speed.abs()))
+        (speed.abs() >= self.min_speed_cm_s).then_some((heading, speed.abs()))
     }
 }
 
@@ -144,10 +152,16 @@ pub struct Kept {
 }
 
 /// Least share of a motion along the road that must show in its Doppler, 2^-14: 81 degrees off.
-const LEAST_PROJECTION: i32 = (15 << 14) / 100;
+pub(super) const LEAST_PROJECTION: i32 = (15 << 14) / 100;
 
 /// Speeds above this are no vehicle's.
 const FASTEST_CM_S: i32 = 7000;
+
+/// Faster than this, 160 km/h, nothing drives that is seen nearly from the side: it does not go along the road.
+const FASTEST_ALONG_CM_S: i32 = 4500;
+
+/// Least radial speed of what goes along the line of sight: slower, it may be going round a corner or be a wheel.
+const LEAST_RADIAL_CM_S: i32 = 300;
 
 #[cfg(test)]
 mod tests {
@@ -175,9 +189,19 @@ mod tests {
         // 60 degrees to the side half of the speed shows
         let (heading, speed) = at(2500, 4330, -1000).unwrap();
         assert!(heading == t.road.reversed() && (speed - 2000).abs() < 5);
-        assert_eq!(at(300, 5000, 500), None, "nearly broadside");
+        assert_eq!(at(300, 5000, 200), None, "nearly broadside, and slow");
+        for radial in [-800, 800] {
+            let (heading, speed) = at(300, 5000, radial).unwrap();
+            let ahead = heading.along(300, 5000);
+            assert!(
+                speed == 800 && ahead.signum() == i32::from(radial).signum(),
+                "towards the sensor, or away from it"
+            );
+        }
+        assert_eq!(at(1000, 5000, -800), Some((t.road.reversed(), 4079)), "nearly as fast as anything drives");
         assert_eq!(at(5000, 0, 55), None, "within the noise of what stands");
         assert_eq!(at(5000, 0, 120), None, "slower than what starts an obstacle");
         assert_eq!(at(5000, 0, 7100), None, "no vehicle's speed");
+        assert_eq!(at(5000, 0, 5000), Some((Direction::AHEAD, 5000)), "straight ahead, whatever the reason");
     }
 }

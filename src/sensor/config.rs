@@ -32,6 +32,18 @@ pub enum Problem {
         /// The neighbour's value.
         lower: f32,
     },
+    /// More lanes than there is room for.
+    TooManyLanes,
+    /// More segments of lanes than there is room for.
+    TooManyPoints,
+    /// A lane of fewer than two points.
+    OnePoint,
+    /// A lane with a point that is, or nearly is, the one before it.
+    PointTwice,
+    /// A lane with a point far outside of what any sensor reaches.
+    TooFar,
+    /// A lane that crosses itself.
+    CrossesItself,
     /// A bit rate that no divider of a controller's clock meets.
     NoDivider {
         /// The clock.
@@ -50,6 +62,12 @@ impl core::fmt::Display for ConfigError {
                 "{parameter} is {value}: with this mount no point at slice height is in view, check height and pitch"
             ),
             Problem::NotAscending { lower } => write!(f, "{parameter} is {value}, not above {lower}"),
+            Problem::TooManyLanes => write!(f, "{parameter}: lane {value} is one more than there is room for"),
+            Problem::TooManyPoints => write!(f, "{parameter}: lane {value} has more points than there is room for"),
+            Problem::OnePoint => write!(f, "{parameter}: lane {value} has fewer than two points"),
+            Problem::PointTwice => write!(f, "{parameter}: lane {value} has two points within half a metre"),
+            Problem::TooFar => write!(f, "{parameter}: lane {value} reaches farther than 400 m from the sensor"),
+            Problem::CrossesItself => write!(f, "{parameter}: lane {value} crosses itself"),
             Problem::NoDivider { clock_hz } => {
                 write!(f, "{parameter} is {value}, which no divider of {clock_hz} Hz meets")
             }

@@ -63,6 +63,19 @@ pub struct Config {
     pub visibility: VisibilityConfig,
     #[serde(default)]
     pub health: HealthConfig,
+    /// Which way traffic goes. Kept as long as the daemon runs.
+    #[serde(default, deserialize_with = "lanes")]
+    pub lanes: &'static [&'static [[f32; 2]]],
+}
+
+fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [&'static [[f32; 2]]], D::Error> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Table {
+        points: Vec<[f32; 2]>,
+    }
+    let tables = Vec::<Table>::deserialize(tables)?;
+    Ok(tables.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak())
 }
 
 /// The radar.
@@ -330,7 +343,8 @@ impl Config {
     pub fn settings(&self) -> Option<Settings> {
         let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise: self.noise };
         let settings = Settings::of(sensor);
-        Some(Settings { gate: self.gate, visibility: self.visibility, health: self.health, ..settings })
+        let Self { gate, visibility, health, lanes, .. } = *self;
+        Some(Settings { gate, visibility, health, lanes, ..settings })
     }
 
     /// Which program the service says this is; its chip is the machine.
@@ -497,6 +511,25 @@ mod tests {
     use std::fs;
 
     use super::*;
+
+    #[test]
+    fn lanes_are_a_part_of_the_settings_and_a_bad_one_is_named() {
+        let config = |points: &str| {
+            let text = format!(
+                "[input]\nradar = \"ars408\"\ninterface = \"can0\"\n[output]\nmedium = \"can\"\ninterface = \"can1\"\n\
+                 [mount]\nx_m = 0.0\ny_m = 0.0\nheight_m = 6.0\nyaw_deg = 0.0\npitch_deg = 4.0\nroll_deg = 0.0\n\
+                 [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
+                 elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n[[lanes]]\npoints = {points}\n"
+            );
+            toml::from_str::<Config>(&text).unwrap()
+        };
+        let lane = config("[[-50.0, 2.0], [50.0, 2.0]]").settings().unwrap();
+        assert_eq!(lane.lanes, [&[[-50.0, 2.0], [50.0, 2.0]][..]]);
+        let check = |points: &str| Grid::Reference.check().settings(&config(points).settings().unwrap());
+        assert!(check("[[-50.0, 2.0], [50.0, 2.0]]").is_ok());
+        let refused = check("[[-50.0, 2.0]]").unwrap_err().to_string();
+        assert_eq!(refused, "lanes: lane 0 has fewer than two points");
+    }
 
     #[test]
     fn a_log_that_is_an_input_is_refused_whatever_its_name() {

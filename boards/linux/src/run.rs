@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::board::{BlockError, Flow, StoredSettings};
-use viewshed::{PolarMap, Reason, Time, UnitState};
+use viewshed::{PolarMap, Reason, Settings, Time, UnitState};
 
 use super::input::{self, Input, Step, Work};
 use super::size::{CHECK, Map, Parameters, Sender, State};
@@ -38,7 +38,8 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let settings = config.settings();
     let mut slots = FileSlots::open(folder, settings.as_ref());
     let stored = StoredSettings::read(&slots, CHECK);
-    if config.has_service() && settings.is_some() && stored.settings().is_some_and(|s| Some(*s) != settings) {
+    let of_line = |stored: &StoredSettings| stored.settings().map(|s| Settings { lanes: config.lanes, ..*s });
+    if config.has_service() && settings.is_some() && of_line(&stored).is_some_and(|s| Some(s) != settings) {
         warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
     }
     let mut input = input::open(config)?;
@@ -55,7 +56,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         let stored = StoredSettings::read(&slots, CHECK);
         input.start(epoch, stored, &mut output);
         // where blocks are taken the newest that can run, else what the file says
-        let settings = if config.has_service() { stored.settings().copied() } else { config.settings() };
+        let settings = if config.has_service() { of_line(&stored) } else { config.settings() };
         let refused = stored.place().err().filter(|_| settings.is_none());
         if let Some(reason) = &refused {
             warn!("{reason}: safe state until a block is written");

@@ -4,6 +4,7 @@ use super::{BlockError, ConfigureRadar, Settings, UnitConfig};
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+use crate::obstacles::lanes::MOST_LANES;
 use crate::radar_3d::VisibilityConfig;
 use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, Problem};
@@ -40,12 +41,30 @@ impl Settings {
         block
     }
 
-    /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0.
+    /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
+    /// each lane together with the check sum so far; a lane begins with its number.
+    #[inline(never)] // once a start
     pub fn fingerprint(&self) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];
         self.write(1, 0, &mut block);
         // not of the check sum as well: a CRC over its own is the same for every block
-        block.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum))
+        let mut sum = block.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
+        // where there is no room for lanes, nothing runs with them
+        if MOST_LANES == 0 {
+            return sum;
+        }
+        let mut take = |what: [u32; 2]| {
+            let mut with = [0; 3 * SUM_LEN];
+            let mut w = Writer(&mut with);
+            w.put(sum.to_le_bytes());
+            what.iter().for_each(|word| w.put(word.to_le_bytes()));
+            sum = fingerprint(&with);
+        };
+        for (number, lane) in (1..).zip(self.lanes) {
+            take([number, 0]);
+            lane.iter().for_each(|point| take(point.map(f32::to_bits)));
+        }
+        sum
     }
 
     /// Fills a block that is as long as its layout asks for.
@@ -181,7 +200,7 @@ impl Settings {
         let (radar_bus, broadcast_bus) = (bus(r)?, bus(r)?);
         let unit = UnitConfig::default();
         let sensor = Sensor { mount, field_of_view, noise };
-        Some(Self { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit })
+        Some(Self { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit, lanes: &[] })
     }
 }
 
@@ -288,5 +307,16 @@ pub(super) mod tests {
         assert_eq!(a.fingerprint(), b.fingerprint());
         b.sensor.mount.height_m += 0.5;
         assert_ne!(a.fingerprint(), b.fingerprint());
+        // of lanes each point, each end and the order
+        let of = |lanes| Settings { lanes, ..a }.fingerprint();
+        let all = [
+            a.fingerprint(),
+            of(&[&[[0.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]]]),
+            of(&[&[[0.0, 1.0], [2.0, 3.0]], &[[4.0, 5.0], [6.0, 7.0]]]),
+            of(&[&[[4.0, 5.0], [6.0, 7.0]], &[[0.0, 1.0], [2.0, 3.0]]]),
+            of(&[&[[1.0, 0.0], [2.0, 3.0]], &[[4.0, 5.0], [6.0, 7.0]]]),
+            of(&[&[[0.0, 1.0], [2.0, 3.0]]]),
+        ];
+        assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:x?}");
     }
 }

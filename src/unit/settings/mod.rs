@@ -19,7 +19,7 @@
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
-//! What maps depend on is in layout 1, so the header's fingerprint is of that form.
+//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and of the lanes where there are any.
 
 mod block;
 mod flash;
@@ -34,6 +34,7 @@ pub use unit_config::{ConfigureRadar, UnitConfig};
 use crate::camera::Camera3dConfig;
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+use crate::obstacles::lanes::Lane;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
 use crate::sensor::Sensor;
 use crate::sensor::config::ConfigError;
@@ -67,6 +68,9 @@ pub struct Settings {
     /// Numbers and rates of the unit itself.
     #[cfg_attr(feature = "serde", serde(default))]
     pub unit: UnitConfig,
+    /// Which way traffic goes, where that is given; no block has it.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub lanes: &'static [Lane],
 }
 
 /// Why a block is not used.
@@ -125,6 +129,7 @@ impl Settings {
             radar_bus: BusConfig::default(),
             broadcast_bus: BusConfig::default(),
             unit: UnitConfig::default(),
+            lanes: &[],
         }
     }
 
@@ -138,7 +143,8 @@ impl Settings {
 
     /// The estimator's configuration; what an integrator does not set is the library's.
     pub fn radar_3d(&self) -> Radar3dConfig {
-        Radar3dConfig { gate: self.gate, visibility: self.visibility, health: self.health, ..Radar3dConfig::default() }
+        let Self { gate, visibility, health, lanes, .. } = *self;
+        Radar3dConfig { gate, visibility, health, lanes, ..Radar3dConfig::default() }
     }
 
     /// The newer of two slots that holds and is accepted: its number and settings, and the sequence to write

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the traffic of every crossing scene anew, NAME.fcd.xml.gz.
+# Makes the traffic of every crossing scene anew, NAME.fcd.xml.gz, and the net of every layout, LAYOUT.net.xml.gz.
 #
 #   pip install eclipse-sumo==1.28.0        # another version may give other traffic
 #   tests/recordings/crossing/traffic.sh
@@ -26,6 +26,7 @@ traffic() {
         --fcd-output "$work/fcd.xml" --fcd-output.filter-shapes view --fcd-output.attributes x,y,angle,type \
         --device.fcd.begin 198 --device.fcd.period 0.5 --precision 2 --no-step-log true >"$work/log" 2>&1 ||
         { cat "$work/log" >&2; exit 1; }
+    sed -e '/^<!--/,/^-->/d' "$work/net.xml" | gzip -9 --no-name >"$layout.net.xml.gz"
     # SUMO writes the hour and its command line into a comment; the traffic alone is what has to repeat
     sed -e '/^<!--/,/^-->/d' "$work/fcd.xml" | gzip -9 --no-name >"$name.fcd.xml.gz"
     echo "$name.fcd.xml.gz"

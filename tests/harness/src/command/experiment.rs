@@ -180,7 +180,10 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
-    let running = bar("simulating and replaying", scenes::total_steps(&all, extent, ESTIMATORS));
+    let running = bar(
+        "simulating and replaying",
+        scenes::total_steps(&all, extent, ESTIMATORS + u64::from(scenes::with_lanes(&all))),
+    );
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
     let results = scenes::run(&all, settings, extent, &keep, &|| running.step())?;
     drop(running);

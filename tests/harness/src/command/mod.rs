@@ -11,6 +11,7 @@ pub mod experiment;
 pub mod key;
 #[cfg(feature = "pages")]
 pub mod label;
+pub mod lanes;
 pub mod listen;
 pub mod options;
 pub mod progress;
@@ -52,6 +53,7 @@ enum Command {
     Detect(detect::Args),
     Detections(Box<detections::Args>),
     Configure(Box<configure::Args>),
+    Lanes(lanes::Args),
     Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
@@ -75,6 +77,7 @@ impl Cli {
             Command::Detect(args) => detect::run(args),
             Command::Detections(args) => detections::run(args),
             Command::Configure(args) => configure::run(args),
+            Command::Lanes(args) => lanes::run(args),
             Command::Completions(args) => completions::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),

@@ -45,6 +45,8 @@ struct Tables {
     input: Option<toml::Value>,
     #[serde(default, skip_serializing)]
     output: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    lanes: Option<toml::Value>,
 }
 
 /// What a file says.
@@ -79,9 +81,11 @@ fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
         ("grid", tables.grid.is_some()),
         ("[input]", tables.input.is_some()),
         ("[output]", tables.output.is_some()),
+        ("[[lanes]]", tables.lanes.is_some()),
     ];
     let left_out = keys.into_iter().filter(|(_, is_there)| *is_there).map(|(key, _)| key).collect();
-    Ok(UnitFile { settings: Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit }, left_out })
+    let settings = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
+    Ok(UnitFile { settings, left_out })
 }
 
 /// Settings as a file.
@@ -114,9 +118,9 @@ pub fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, String, St
 }
 
 fn tables(settings: &Settings) -> Tables {
-    let Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit } = *settings;
+    let Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit, lanes: _ } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
-    let (state_dir, grid, input, output) = (None, None, None, None);
+    let (state_dir, grid, input, output, lanes) = (None, None, None, None, None);
     Tables {
         unit,
         mount,
@@ -131,6 +135,7 @@ fn tables(settings: &Settings) -> Tables {
         grid,
         input,
         output,
+        lanes,
     }
 }
 

@@ -16,6 +16,7 @@ use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::polar::PolarMap;
 use viewshed::map::{CellState, VisibilityMap};
+use viewshed::obstacles::lanes;
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
@@ -81,6 +82,22 @@ pub struct Options {
     pub radar_2d: Radar2dConfig,
     pub radar_3d: Radar3dConfig,
     pub camera_3d: Camera3dConfig,
+    /// Which way traffic goes; where there are any, `radar-3d-lanes` runs beside `radar-3d`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lanes: Vec<Lane>,
+}
+
+/// A lane: a polyline in the direction of its traffic.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lane {
+    /// Metres in road coordinates.
+    pub points: Vec<[f32; 2]>,
+}
+
+/// Lanes as the library takes them, kept as long as the program runs: they are few.
+fn kept(given: &[Lane]) -> &'static [lanes::Lane] {
+    given.iter().map(|lane| -> lanes::Lane { lane.points.clone().leak() }).collect::<Vec<_>>().leak()
 }
 
 impl Default for Options {
@@ -92,6 +109,7 @@ impl Default for Options {
             radar_2d: Radar2dConfig::default(),
             radar_3d: Radar3dConfig::default(),
             camera_3d: Camera3dConfig::default(),
+            lanes: Vec::new(),
         }
     }
 }
@@ -147,6 +165,10 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
         radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
         radar_3d::new(&sensor, &radar_3d)?,
     ];
+    if !options.lanes.is_empty() {
+        radar_3d.lanes = kept(&options.lanes);
+        estimators.push(radar_3d::new(&sensor, &radar_3d)?);
+    }
     if let Some(truth) = &recording.truth {
         estimators.push(reference::new(recording, truth, &sensor, options)?);
     }

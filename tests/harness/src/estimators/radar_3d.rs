@@ -24,6 +24,7 @@ const NO_ROOM: &str = "no room in the list of 96 obstacles";
 const _: () = assert!(State::OBSTACLES == 96, "the report names the list's limit");
 
 struct Driver<const D: usize> {
+    name: &'static str,
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
     state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
@@ -64,13 +65,14 @@ impl<const D: usize> Driver<D> {
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
         let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
-        Ok(Self { parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
+        let name = if config.lanes.is_empty() { "radar-3d" } else { "radar-3d-lanes" };
+        Ok(Self { name, parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
     }
 }
 
 impl<const D: usize> Estimator for Driver<D> {
     fn name(&self) -> &str {
-        "radar-3d"
+        self.name
     }
 
     fn reset(&mut self) {

@@ -165,7 +165,13 @@ pub fn run(
     keep: &(dyn Fn(&str, &[u8]) -> Result<()> + Sync),
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<SceneResult>> {
+    let with_lanes = with_lanes(scenes);
     let one = |scene: &Scene| -> Result<SceneResult> {
+        let mut settings = settings.clone();
+        if with_lanes {
+            settings.estimators.lanes = scene.lanes()?;
+        }
+        let settings = &settings;
         let recording = record(scene, settings, keep, progress)?;
         let mut samples = samples::collect_every(&recording, &settings.evaluation, extent.every, progress);
         let with_elevation = seconds(recording, &samples, settings, progress)?;
@@ -182,6 +188,11 @@ pub fn run(
         Ok(SceneResult { scene: scene.clone(), with_elevation, without_elevation })
     };
     scenes.par_iter().map(|scene| one(scene).with_context(|| format!("scene `{}`", scene.name))).collect()
+}
+
+/// Whether estimators are run with lanes too: where every scene has the net of its traffic.
+pub fn with_lanes(scenes: &[Scene]) -> bool {
+    scenes.iter().all(|scene| scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some()))
 }
 
 fn record(

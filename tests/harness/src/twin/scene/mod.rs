@@ -55,6 +55,8 @@ use super::radar::disturbance::{NoiseInterval, OutageInterval};
 use super::radar::model::RadarModel;
 use super::traffic::Source;
 use super::traffic::frame::RoadFrame;
+use super::traffic::net::{self, Reach};
+use crate::estimators::Lane;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::{self, mcap::in_topics};
@@ -428,6 +430,18 @@ impl Scene {
                 net_offset: [0.0; 2],
             },
         })
+    }
+
+    /// Lanes of the net of its traffic, as far as the radar reaches.
+    ///
+    /// # Errors
+    /// No net is named, or what is wrong with it.
+    pub fn lanes(&self) -> Result<Vec<Lane>> {
+        let source = self.source(None)?;
+        let net = source.net.with_context(|| format!("scene `{}` names no net: [traffic] net", self.name))?;
+        let Mount { x_m, y_m, .. } = self.radar.mount;
+        let reach = Reach { from: [x_m, y_m], reach_m: self.radar.field_of_view.range_m[1] + Reach::MARGIN_M };
+        net::lanes(&net, &source.frame, &reach)
     }
 
     /// Every file the scene reads beside its own.

@@ -15,6 +15,7 @@
 pub mod fcd_csv;
 pub mod fcd_xml;
 pub mod frame;
+pub mod net;
 pub mod opened;
 pub mod trajectories;
 pub mod types;

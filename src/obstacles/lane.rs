@@ -1,0 +1,224 @@
+//! An obstacle that follows a lane.
+
+use super::lanes::{Motion, NO_LANE, OnLane};
+use super::motion::FreeMotion;
+use super::obstacle::{FRACTION, NEWBORN_PLACE, NEWBORN_SPEED, Obstacle};
+use super::tracking::{LEAST_PROJECTION, Tracking};
+use crate::fixed::math::mul_shift;
+use crate::fixed::trig::Direction;
+
+/// Every how many frames an obstacle looks for a better lane.
+const LOOK_EVERY: u16 = 4;
+
+/// Variance of where across its lane a vehicle is seen, cm^2: half of its width, and where in the lane it drives.
+const ASIDE_VARIANCE: i32 = 120 * 120;
+/// Variance of the speed beside the lane's direction that is left open, (cm/s)^2: what else a motion may do.
+const BESIDE_VARIANCE: i32 = 100 * 100;
+/// Share of the way to the middle of its lane by which a box is moved there, 2^-8, and the way that counts at most.
+const TO_THE_MIDDLE: i32 = 160;
+/// See [`TO_THE_MIDDLE`].
+const MOST_ASIDE_CM: i32 = 150;
+
+impl Obstacle {
+    /// Middle of what is seen of it, centimetres.
+    fn middle(&self) -> (i32, i32) {
+        self.global(self.extent.middle_cm(), 0)
+    }
+
+    /// Takes the lane that its motion fits best, if there is any.
+    pub(super) fn find_lane(&mut self, t: &Tracking) {
+        if t.lanes.is_empty() {
+            return;
+        }
+        let place = self.middle();
+        let sight = Direction::of(place.0, place.1);
+        let (vx, vy) = (self.free.velocity.0 >> FRACTION, self.free.velocity.1 >> FRACTION);
+        let newborn = self.age == 0;
+        let radial = sight.along(vx, vy);
+        let motion = Motion {
+            place,
+            place_variance: ASIDE_VARIANCE + self.gathered.across_cm * self.gathered.across_cm,
+            sight,
+            radial,
+            across: if newborn { 0 } else { sight.across(vx, vy) },
+            across_variance: if newborn { NEWBORN_SPEED } else { self.free.speed_variance() + BESIDE_VARIANCE },
+            heading: (self.lane != NO_LANE || self.free_heading).then_some(self.heading),
+        };
+        if let Some(on) = t.lanes.best(&motion) {
+            self.take(on, radial, sight);
+        }
+    }
+
+    fn take(&mut self, on: OnLane, radial: i32, sight: Direction) {
+        let speed = if self.lane == NO_LANE {
+            // what it showed along the line of sight, where that says anything
+            let along = on.heading.along(self.free.velocity.0, self.free.velocity.1);
+            speed_along(on.heading, sight, radial).map_or(along, |s| s.clamp(0, 7000) << FRACTION)
+        } else {
+            self.heading.along(self.velocity.0, self.velocity.1)
+        };
+        self.lane = on.segment;
+        self.free_heading = false;
+        self.unexplained = 0;
+        self.head(on.heading, speed);
+        if self.age == 0 {
+            self.free = FreeMotion::new(self.position, NEWBORN_PLACE, self.velocity, NEWBORN_SPEED);
+        }
+    }
+
+    /// Turns about its middle.
+    fn head(&mut self, heading: Direction, speed: i32) {
+        let part = |c: i16| mul_shift(speed, i32::from(c), 14);
+        let (x, y) = self.middle();
+        self.heading = heading;
+        self.velocity = (part(heading.x), part(heading.y));
+        let (turned_x, turned_y) = self.middle();
+        self.position.0 += (x - turned_x) << FRACTION;
+        self.position.1 += (y - turned_y) << FRACTION;
+    }
+
+    /// Turns with the lane it is on; at its end, into the next.
+    pub(super) fn keep_to_lane(&mut self, t: &Tracking) {
+        if !self.is_on_lane(t) {
+            return;
+        }
+        if let Some(on) = t.lanes.along(self.lane, self.middle()) {
+            let speed = self.heading.along(self.velocity.0, self.velocity.1);
+            self.lane = on.segment;
+            self.head(on.heading, speed);
+        } else {
+            let before = self.lane;
+            self.find_lane(t);
+            if self.lane == before {
+                self.lane = NO_LANE;
+            }
+        }
+    }
+
+    /// Looks for a better lane now and then.
+    pub(super) fn look_for_lane(&mut self, t: &Tracking) {
+        if !t.lanes.is_empty() && self.age % LOOK_EVERY == 1 {
+            self.find_lane(t);
+        }
+    }
+
+    /// Whether it follows a lane.
+    #[inline]
+    pub(super) fn is_on_lane(&self, t: &Tracking) -> bool {
+        !t.lanes.is_empty() && self.lane != NO_LANE
+    }
+
+    /// How far to the left its middle is moved towards the middle of its lane, centimetres.
+    pub(super) fn towards_lane(&self, place: (i32, i32), t: &Tracking) -> i32 {
+        if !self.is_on_lane(t) {
+            return 0;
+        }
+        let Some(on) = t.lanes.along(self.lane, place) else { return 0 };
+        -mul_shift(on.left_cm.clamp(-MOST_ASIDE_CM, MOST_ASIDE_CM), TO_THE_MIDDLE, 8)
+    }
+}
+
+/// Speed along a heading that explains a radial one, cm/s; `None` nearly across it.
+fn speed_along(heading: Direction, sight: Direction, radial: i32) -> Option<i32> {
+    let c = sight.cosine(heading);
+    if c.abs() < LEAST_PROJECTION { None } else { (radial << 14).checked_div(c) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Obstacles;
+    use super::super::by_hand::{PERIOD_S, Vehicle, car, rules};
+    use super::super::lanes::{Lane, Lanes};
+    use super::super::tracking::Tracking;
+    use super::*;
+    use crate::fixed::angle::Angle;
+    use crate::fixed::time::Step;
+    use crate::frame::by_range::ByRange;
+    use crate::frame::reflection::Reflection;
+    use crate::sensor::mount::Levelling;
+    use crate::sensor::road::RoadPoint;
+    use std::vec::Vec;
+
+    /// The default rules with lanes; the sensor stands at the origin and looks along x.
+    fn with_lanes(lanes: &[Lane]) -> Tracking {
+        let level = Levelling::on_road(RoadPoint::new(0, 0), 600, Angle::ZERO);
+        Tracking { lanes: Lanes::new(&level, lanes).unwrap(), ..rules() }
+    }
+
+    fn frame(list: &mut Obstacles<16>, seen: &[Reflection], t: &Tracking) {
+        let step = Step::from_micros((PERIOD_S * 1e6) as u64);
+        list.step(seen, &ByRange::<64>::sort(seen, t.limit_cm), step, t, |_, _| false);
+    }
+
+    fn follow(list: &mut Obstacles<16>, car: &mut Vehicle, frames: usize, t: &Tracking) {
+        for _ in 0..frames {
+            frame(list, &car.reflections(), t);
+            car.moved(PERIOD_S);
+        }
+    }
+
+    /// Heading of the obstacle with the most detections, degrees from x.
+    fn degrees(list: &Obstacles<16>) -> f64 {
+        let o = list.iter().max_by_key(|o| o.hits).unwrap();
+        f64::from(o.heading.y).atan2(f64::from(o.heading.x)).to_degrees()
+    }
+
+    const ACROSS: Lane = &[[40.0, -60.0], [40.0, 60.0]];
+
+    #[test]
+    fn on_a_lane_across_the_road_a_car_has_its_heading_in_the_first_frame() {
+        let first = |t: &Tracking| {
+            let (mut list, mut car) = (Obstacles::new(), car([40.0, -20.0], [0.0, 1.0], 9.0));
+            follow(&mut list, &mut car, 1, t);
+            degrees(&list)
+        };
+        assert!((first(&with_lanes(&[ACROSS])) - 90.0).abs() < 1.0);
+        assert!((first(&rules()) - 180.0).abs() < 1.0, "as it comes nearer, without a lane it comes along the road");
+    }
+
+    #[test]
+    fn hidden_in_a_bend_it_goes_round_the_bend() {
+        let t = with_lanes(&[&[[20.0, 0.0], [60.0, 0.0], [68.0, 3.0], [72.0, 11.0], [72.0, 60.0]]]);
+        let (mut list, mut car) = (Obstacles::new(), car([30.0, 0.0], [1.0, 0.0], 10.0));
+        follow(&mut list, &mut car, 30, &t);
+        for _ in 0..45 {
+            frame(&mut list, &[], &t);
+        }
+        let o = list.iter().next().unwrap();
+        let (x, y) = o.anchor();
+        assert!((degrees(&list) - 90.0).abs() < 1.0 && (x - 7200).abs() < 100 && y > 500, "{o:?}");
+    }
+
+    #[test]
+    fn what_turns_off_a_lane_goes_its_own_way() {
+        let t = with_lanes(&[ACROSS]);
+        let (mut list, mut car) = (Obstacles::new(), car([40.0, -25.0], [0.0, 1.0], 9.0));
+        follow(&mut list, &mut car, 15, &t);
+        assert_eq!(list.iter().next().unwrap().lane, 0);
+        (car.heading, car.velocity) = ([0.8, -0.6], [7.2, -5.4]);
+        follow(&mut list, &mut car, 25, &t);
+        let o = list.iter().max_by_key(|o| o.existence).unwrap();
+        assert_eq!(o.lane, NO_LANE);
+    }
+
+    #[test]
+    fn far_from_all_lanes_nothing_changes() {
+        let boxes = |t: &Tracking| {
+            let (mut list, mut car) = (Obstacles::new(), car([30.0, 12.0], [1.0, 0.0], 9.0));
+            follow(&mut list, &mut car, 20, t);
+            list.solids(t).collect::<Vec<_>>()
+        };
+        assert_eq!(boxes(&rules()), boxes(&with_lanes(&[&[[20.0, -30.0], [120.0, -30.0]]])));
+    }
+
+    #[test]
+    fn a_box_lies_nearer_to_the_middle_of_its_lane_than_what_is_seen() {
+        let middle = |t: &Tracking| {
+            let (mut list, mut car) = (Obstacles::new(), car([30.0, 11.0], [1.0, 0.0], 9.0));
+            follow(&mut list, &mut car, 20, t);
+            list.solids(t).next().unwrap().y_cm
+        };
+        let (off, on) = (middle(&rules()), middle(&with_lanes(&[&[[20.0, 10.0], [120.0, 10.0]]])));
+        assert!(off > 1050 && (off - on - (off - 1000) * TO_THE_MIDDLE / 256).abs() < 12, "{off} and {on}");
+    }
+}
