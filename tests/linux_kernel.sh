@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the daemon, and `viewshed listen` and `viewshed doctor`, on virtual CAN buses under Debian's kernel in QEMU: for
+# Runs the daemon, and `viewshed listen`, `view` and `doctor`, on virtual CAN buses under Debian's kernel in QEMU: for
 # machines whose own kernel has no CAN. Downloads 80 MB, once, into the target folder; takes about a minute then.
 #
 #   tests/linux_kernel.sh
@@ -70,7 +70,7 @@ chmod +x "$disk/init"
 log=$kernel/log
 timeout -k 5 300 qemu-system-x86_64 -m 512 -nographic -no-reboot -net none -kernel "$kernel"/files/boot/vmlinuz-* \
     -initrd "$kernel/disk.gz" -append "console=ttyS0 quiet panic=1" </dev/null 2>&1 | tr -d '\r' >"$log" || true
-grep -E '^kernel |frames, Counters|^listen --can' "$log" || true
+grep -E '^kernel |frames, Counters|^listen --can|^view --can' "$log" || true
 if ! grep '^test result: ok' "$log"; then
     cat "$log"
     exit 1

@@ -2,6 +2,8 @@
 //!
 //! Skipped, with a line that says why, where the kernel has none or this user may not make them.
 
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -240,7 +242,7 @@ fn play(log: &[u8], socket: &CanFdSocket, seconds: u64) -> usize {
     count
 }
 
-/// `viewshed doctor --can` and `viewshed listen --can`: `VIEWSHED` names the command, `BROADCAST` a log of a broadcast.
+/// `viewshed doctor --can`, `listen --can` and `view --can`: `VIEWSHED` names the command, `BROADCAST` a log of a broadcast.
 #[test]
 fn the_command_examines_and_shows_a_live_bus() {
     const LIVE: &str = "vslive";
@@ -303,6 +305,28 @@ fn the_command_examines_and_shows_a_live_bus() {
     assert!(text.contains("no broadcast among 0 frames"), "before: {text}");
     assert!(looks.last().is_some_and(|line| line.contains("all of its map is unknown")), "after: {text}");
     assert!(text.contains(&format!("frames: {played} came, ")) && text.contains("; 0 never came"), "{text}");
+
+    // the same in a page: shown, and then said to have stopped
+    let mut view = start("view --can vslive --no-open");
+    let mut lines = BufReader::new(view.stdout.take().unwrap()).lines();
+    let url = lines.find_map(|line| line.ok().filter(|line| line.starts_with("http://"))).expect("an address");
+    let played = play(&log, &socket, 3);
+    std::thread::sleep(Duration::from_secs(2));
+    let (host, token) = url.trim_start_matches("http://").trim_end_matches('/').split_once('/').unwrap();
+    let mut page = TcpStream::connect(host).unwrap();
+    write!(page, "GET /{token}/overview/0 HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut overview = String::new();
+    page.read_to_string(&mut overview).unwrap();
+    view.kill().unwrap();
+    view.wait().unwrap();
+    let shares = overview.split("\"visible\":").skip(1);
+    let shares = shares.filter_map(|rest| rest.split([',', '}']).next()?.parse::<f64>().ok());
+    let most = shares.fold(0.0, f64::max);
+    println!("view --can: {played} frames, {:.0} % visible at most", 100.0 * most);
+    assert!(most > 0.6, "{overview}");
+    for said in ["sensor 0 is heard; its map is shown", "sensor 0 has stopped; all of its map is unknown"] {
+        assert!(overview.contains(said), "`{said}` in: {overview}");
+    }
 
     // Ctrl-C ends it, and the report is there
     let listen = start("listen --can vslive");

@@ -26,7 +26,7 @@ use crate::pages::view::{About, Viewing, recorded};
 use crate::recording::can_log;
 #[cfg(unix)]
 use crate::recording::serial_log::Chunk;
-use crate::recording::{self, file};
+use crate::recording::{self, Recording, file};
 
 /// Look at the maps of a recording, of a broadcast's log, or of a unit that is running, in a browser on this machine
 ///
@@ -124,17 +124,20 @@ fn from_file(
             file::shown(path)
         );
     }
-    let recording = recording::read(path, &settings.reading).with_context(|| path.display().to_string())?;
+    let radars = recording::read_each(path, &settings.reading).with_context(|| path.display().to_string())?;
+    let radars: Vec<Recording> = radars.into_iter().map(|(radar, _)| radar).collect();
+    let recording = radars.first().context("no radar")?;
     ensure!(
         recording.of_camera().is_none(),
         "{}: a camera without a radar; `viewshed replay --report` shows what became of its boxes",
         recording.name
     );
-    let viewing = Viewing::recording(&recording, path, settings.evaluation.slice_height_m);
-    let says = format!("{}: {} radar frames", recording.name, recording.frames.len());
+    let viewing = Viewing::recording(&radars, path, settings.evaluation.slice_height_m);
+    let frames: Vec<String> = radars.iter().map(|radar| radar.frames.len().to_string()).collect();
+    let says = format!("{}: {} radar frames", file::stem(path), frames.join(" and "));
     let filling = viewing.clone();
     std::thread::spawn(move || {
-        if let Err(error) = recorded::fill(&filling.instants, &recording, &settings) {
+        if let Err(error) = recorded::fill(&filling.instants, &radars, &settings) {
             eprintln!("error: {error:#}");
             filling.instants.end(format!("failed: {error:#}"));
         }

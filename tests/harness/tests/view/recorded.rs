@@ -2,7 +2,11 @@
 
 use std::io::Write;
 use std::net::TcpStream;
+use std::path::Path;
 use std::time::{Duration, Instant};
+
+use viewshed_harness::recording::write::RecordingWriter;
+use viewshed_harness::recording::{ReadOptions, Sensor, read};
 
 use crate::browser::{Browser, Page};
 use crate::looks::{contrast, is_readable, readme};
@@ -177,6 +181,46 @@ fn filled(server: &Server) -> serde_json::Value {
         assert!(begin.elapsed() < Duration::from_secs(120), "{answer}");
         std::thread::sleep(Duration::from_millis(50));
     }
+}
+
+#[test]
+fn several_radars_of_a_recording_are_shown_each_and_together_and_a_silent_one_is_unknown() {
+    let Some(browser) = Browser::start("several radars") else { return };
+    let path = folder("several-radars").join("two.mcap");
+    let reading = ReadOptions { to_s: Some(4.0), ..ReadOptions::default() };
+    let recording = read(Path::new(SHIPPED), &reading).unwrap();
+    let named = |name: &str| (Sensor { name: name.into(), ..recording.sensor.clone() }, recording.pose);
+    let start_ns = recording.frames[0].time_ns;
+    let sink = std::fs::File::create(&path).unwrap();
+    let mut writer = RecordingWriter::of_several(sink, &[named("left"), named("right")], None, start_ns).unwrap();
+    for (k, frame) in recording.frames.iter().enumerate() {
+        writer.frame_of(0, frame).unwrap();
+        // the same, and silent from the middle on
+        if k < 30 {
+            writer.frame_of(1, frame).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+
+    let server = Server::run([Path::new("view"), &path]);
+    filled(&server);
+    let page = browser.open(&server.url);
+    page.until("viewshed.source.done && viewshed.drawn.number >= 0 && viewshed.instant.maps.length === 3");
+    let names = page.ask("viewshed.names");
+    assert_eq!(names, serde_json::json!(["all sensors together", "left", "receiver, fd-500k-2M", "right"]));
+    assert_eq!(page.ask("viewshed.about.sensor"), "left, right");
+    let visible = |name: &str| {
+        page.number(&format!(
+            "(viewshed.of('{name}')[0].bytes ?? []).filter((byte, k) => k % 2 === 1 && (byte & 3) === 2).length"
+        ))
+    };
+    page.ask("viewshed.goTo(25)");
+    page.until("viewshed.number === 25");
+    assert!(visible("left") > 1000.0 && visible("left") == visible("right"), "{}", visible("right"));
+    page.key("End");
+    page.until("viewshed.number === viewshed.source.count - 1");
+    assert!(visible("left") > 1000.0 && visible("right") == 0.0, "{}", visible("right"));
+    assert_eq!(page.console(), Vec::<String>::new());
 }
 
 #[test]

@@ -147,6 +147,12 @@ impl Shown {
         (Self { name: name.to_owned(), cells, bytes: Some(BASE64.encode(bytes)), ages_ms: None }, sample)
     }
 
+    /// Of a sensor that never said where its cells lie.
+    pub fn nothing(name: &str, mount: [f64; 4]) -> Self {
+        let cells = Cells { azimuths: 0, ranges: 0, azimuth_rad: [0.0; 2], cell_m: 1.0, mount };
+        Self { name: name.to_owned(), cells, bytes: None, ages_ms: None }
+    }
+
     /// A cell's grade and state; `None` outside, and where nothing is known of the map.
     pub fn cell(&self, azimuth: usize, range: usize) -> Option<(u8, u8)> {
         if azimuth >= self.cells.azimuths || range >= self.cells.ranges {

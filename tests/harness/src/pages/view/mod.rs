@@ -38,6 +38,8 @@ pub struct About {
     /// `recording`, `log` or `live`.
     pub source: &'static str,
     pub sensor: String,
+    /// How many sensors a recording has.
+    pub sensors: usize,
     /// Whose data it is, and whether it is synthetic.
     pub notes: Vec<String>,
     /// What was wrong with the input.
@@ -73,8 +75,10 @@ pub struct Viewing {
 type Shared = State<Arc<Viewing>>;
 
 impl About {
-    /// Of a recording.
-    pub fn recording(recording: &Recording, images: &Images, slice_height_m: f64) -> Self {
+    /// Of the radars of a recording; what is not of each is the first one's.
+    pub fn recording(radars: &[Recording], images: &Images, slice_height_m: f64) -> Self {
+        let sensors: Vec<&str> = radars.iter().map(|radar| radar.sensor.name.as_str()).collect();
+        let Some(recording) = radars.first() else { return Self::broadcast(String::new(), "recording", Vec::new()) };
         let start = recording.frames.first().map_or(0, |f| f.time_ns);
         let (pose, view) = (&recording.pose, &recording.sensor.field_of_view);
         let [right, left] = view.azimuth_rad;
@@ -96,7 +100,8 @@ impl About {
         Self {
             name: recording.name.clone(),
             source: "recording",
-            sensor: recording.sensor.name.clone(),
+            sensor: sensors.join(", "),
+            sensors: radars.len(),
             notes: synthetic.into_iter().chain(licence).collect(),
             problems: recording.problems.iter().map(|p| p.since(start)).collect(),
             labelled: recording.truth.is_some(),
@@ -112,6 +117,7 @@ impl About {
             name,
             source,
             sensor: String::new(),
+            sensors: 0,
             notes: Vec::new(),
             problems,
             labelled: false,
@@ -123,11 +129,11 @@ impl About {
 }
 
 impl Viewing {
-    /// Of a recording, with the pictures in its file.
-    pub fn recording(recording: &Recording, file: &std::path::Path, slice_height_m: f64) -> Arc<Self> {
+    /// Of the radars of a recording, with the pictures in its file.
+    pub fn recording(radars: &[Recording], file: &std::path::Path, slice_height_m: f64) -> Arc<Self> {
         let images = Images::of(file);
-        let about = About::recording(recording, &images, slice_height_m);
-        let times_ns = recording.frames.iter().map(|f| f.time_ns).collect();
+        let about = About::recording(radars, &images, slice_height_m);
+        let times_ns = radars.iter().take(1).flat_map(|radar| &radar.frames).map(|f| f.time_ns).collect();
         Arc::new(Self { about, instants: Instants::default(), images, times_ns })
     }
 

@@ -10,12 +10,14 @@ use super::instants::Instants;
 use crate::bus::listening::Listening;
 use crate::bus::logged::Logged;
 use crate::bus::traffic::{BUSES, Bus, Maps, Traffic};
-use crate::estimators::{self, radar_3d};
+use crate::estimators::{self, Estimator, PolarCells, radar_3d};
 use crate::evaluation::Settings;
 use crate::evaluation::counts::{Counts, Outcome};
 use crate::evaluation::replay::{Replay, visit};
-use crate::recording::Recording;
+use crate::evaluation::sensor_set::newest;
+use crate::geometry::pose::SensorPose;
 use crate::recording::can_log::{Content, Line};
+use crate::recording::{Frame, RadarDetection, Recording};
 
 /// The bus that a receiver is shown on.
 const BUS: Bus = BUSES[2];
@@ -23,11 +25,14 @@ const BUS: Bus = BUSES[2];
 const SENSOR: u8 = 1;
 const ESTIMATOR: &str = "radar-3d";
 
-/// Finds every instant of a recording.
+/// Finds every instant of a recording, at the frames of its first radar; labels are compared with that one's map.
 ///
 /// # Errors
 /// A parameter the library refuses, by name.
-pub fn fill(instants: &Instants, recording: &Recording, settings: &Settings) -> Result<()> {
+pub fn fill(instants: &Instants, radars: &[Recording], settings: &Settings) -> Result<()> {
+    let Some((recording, others)) = radars.split_first() else { return Ok(()) };
+    let mut others = others.iter().map(|other| Beside::new(other, settings)).collect::<Result<Vec<_>>>()?;
+    let name = if others.is_empty() { ESTIMATOR.to_owned() } else { recording.sensor.name.clone() };
     let sensor = estimators::sensor(recording, &settings.estimators.noise);
     let mut running = vec![radar_3d::new(&sensor, &settings.estimators.radar_3d)?];
     let frames = recording.frames.len();
@@ -44,14 +49,7 @@ pub fn fill(instants: &Instants, recording: &Recording, settings: &Settings) -> 
     let mut outcome = Ok(());
     visit(recording, estimator.as_mut(), &all, |k, estimator| {
         let (Some(frame), Some(polar)) = (recording.frames.get(k), estimator.polar()) else { return };
-        let cells = Cells {
-            azimuths: polar.azimuths,
-            ranges: polar.ranges,
-            azimuth_rad: polar.azimuth_rad,
-            cell_m: polar.cell_m,
-            mount: mount(&recording.pose),
-        };
-        let (own, shares) = Shown::new(ESTIMATOR, cells, |azimuth, range| (polar.cell)(azimuth, range));
+        let (own, shares) = shown(&name, recording, &polar);
         let mut counts = Counts::default();
         let objects = recording.truth.as_ref().map(|truth| truth.at(frame.time_ns)).unwrap_or_default();
         let mut boxes = Vec::new();
@@ -70,10 +68,17 @@ pub fn fill(instants: &Instants, recording: &Recording, settings: &Settings) -> 
         let next_ns = recording.frames.get(k + 1).map_or(frame.time_ns + 66_000_000, |next| next.time_ns);
         let at_receiver = received.as_mut().and_then(|received| received.until(next_ns - 1_000_000));
         let small = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
-        let detection = |d: &crate::recording::RadarDetection| {
-            let [x, y, _] = d.road_position(&recording.pose, settings.evaluation.slice_height_m);
-            [x as f32, y as f32, d.radial_velocity_mps]
-        };
+        let height_m = settings.evaluation.slice_height_m;
+        let mut detections = placed(&recording.pose, frame, height_m);
+        let mut obstacles: Vec<Box3> = estimator.obstacles().iter().map(Box3::of).collect();
+        let mut maps: Vec<Shown> = [Some(own), at_receiver].into_iter().flatten().collect();
+        for other in &mut others {
+            maps.push(other.at(frame.time_ns));
+            if let Some(now) = other.now(frame.time_ns) {
+                detections.extend(placed(&other.recording.pose, now, height_m));
+                obstacles.extend(other.estimator.obstacles().iter().map(Box3::of));
+            }
+        }
         let instant = Instant {
             number: k,
             sample: Sample {
@@ -85,10 +90,10 @@ pub fn fill(instants: &Instants, recording: &Recording, settings: &Settings) -> 
                 fi: small(counts.fi),
                 ..shares
             },
-            maps: [Some(own), at_receiver].into_iter().flatten().collect(),
-            detections: frame.detections.iter().map(detection).collect(),
+            maps,
+            detections,
             boxes,
-            obstacles: estimator.obstacles().iter().map(Box3::of).collect(),
+            obstacles,
             senders: Vec::new(),
             counters: estimator.counters().into_iter().map(|(what, n)| (what.to_owned(), n)).collect(),
         };
@@ -99,6 +104,59 @@ pub fn fill(instants: &Instants, recording: &Recording, settings: &Settings) -> 
     outcome?;
     instants.end(format!("{frames} frames"));
     Ok(())
+}
+
+/// A map as an estimator has it.
+fn shown(name: &str, recording: &Recording, polar: &PolarCells<'_>) -> (Shown, Sample) {
+    let cells = Cells {
+        azimuths: polar.azimuths,
+        ranges: polar.ranges,
+        azimuth_rad: polar.azimuth_rad,
+        cell_m: polar.cell_m,
+        mount: mount(&recording.pose),
+    };
+    Shown::new(name, cells, |azimuth, range| (polar.cell)(azimuth, range))
+}
+
+/// Detections on the road, with their radial velocities.
+fn placed(pose: &SensorPose, frame: &Frame, height_m: f64) -> Vec<[f32; 3]> {
+    let place = |d: &RadarDetection| {
+        let [x, y, _] = d.road_position(pose, height_m);
+        [x as f32, y as f32, d.radial_velocity_mps]
+    };
+    frame.detections.iter().map(place).collect()
+}
+
+/// Another radar of the same recording.
+struct Beside<'r> {
+    recording: &'r Recording,
+    estimator: Box<dyn Estimator>,
+    /// Frames it was given.
+    taken: usize,
+}
+
+impl<'r> Beside<'r> {
+    fn new(recording: &'r Recording, settings: &Settings) -> Result<Self> {
+        let sensor = estimators::sensor(recording, &settings.estimators.noise);
+        Ok(Self { recording, estimator: radar_3d::new(&sensor, &settings.estimators.radar_3d)?, taken: 0 })
+    }
+
+    /// Its frame at a time; `None` where it is silent.
+    fn now(&self, time_ns: i64) -> Option<&'r Frame> {
+        newest(self.recording, time_ns).and_then(|k| self.recording.frames.get(k))
+    }
+
+    /// Its map at a time, unknown where it is silent.
+    fn at(&mut self, time_ns: i64) -> Shown {
+        while let Some(frame) = self.recording.frames.get(self.taken).filter(|frame| frame.time_ns <= time_ns) {
+            self.estimator.step(frame);
+            self.taken += 1;
+        }
+        let name = &self.recording.sensor.name;
+        let map = self.estimator.polar().map(|polar| shown(name, self.recording, &polar).0);
+        let Some(map) = map else { return Shown::nothing(name, mount(&self.recording.pose)) };
+        if self.now(time_ns).is_some() { map } else { Shown { bytes: None, ..map } }
+    }
 }
 
 /// A receiver of what the recording's unit would send.

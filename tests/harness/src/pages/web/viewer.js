@@ -225,7 +225,7 @@ class Page {
 
   listMaps() {
     const { maps } = this.instant;
-    const together = this.about.source !== 'recording' && maps.length > 1;
+    const together = this.of(TOGETHER).length > 1;
     this.names = [...(together ? [TOGETHER] : []), ...maps.map(({ name }) => name)];
     element('map').replaceChildren(...this.names.map((name) => Object.assign(document.createElement('option'), { textContent: name })));
     this.chosen = Math.min(this.chosen, Math.max(0, this.names.length - 1));
@@ -238,7 +238,13 @@ class Page {
     const { instant, names } = this;
     if (!instant || !names?.length) return [];
     const name = plot === 'plan' ? names[this.chosen] : names[(this.chosen + 1) % names.length];
-    return name === TOGETHER ? instant.maps : instant.maps.filter((map) => map.name === name);
+    return this.of(name);
+  }
+
+  // The maps of a name. Of a recording's receiver, which has ages, nothing new is to be had.
+  of(name) {
+    if (name !== TOGETHER) return this.instant.maps.filter((map) => map.name === name);
+    return this.instant.maps.filter((map) => this.about.source !== 'recording' || !map.ages_ms);
   }
 
   redraw() {
@@ -428,6 +434,8 @@ class Page {
     ];
     if (this.about.source === 'recording') entries.push(['obstacle', { background: css('--quiet') }]);
     if (this.about.labelled) {
+      entries.push(['TV: visible and detected', { borderColor: css('--tv'), borderWidth: '2px' }]);
+      entries.push(['TI: invisible, not detected', { borderColor: css('--ti'), borderStyle: 'dashed', borderWidth: '2px' }]);
       entries.push(['▾ FV: visible, not detected', { borderColor: css('--fv'), borderStyle: 'dashed', borderWidth: '2px' }]);
       entries.push(['▪ FI: invisible, yet detected', { borderColor: css('--fi'), borderWidth: '2px' }]);
     }
