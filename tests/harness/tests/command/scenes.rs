@@ -24,6 +24,7 @@ fn prepared(test: &str, plan: impl Fn(&str) -> String) -> PathBuf {
         let cut = scene
             .replace("duration_s = 90.0", &format!("duration_s = {CUT_S:?}"))
             .replace(&format!("\"{name}.fcd"), &format!("\"{}/{name}.fcd", shipped.display()))
+            .replace("net = \"", &format!("net = \"{}/", shipped.display()))
             .replace("\"../motorway", &format!("\"{}/../motorway", shipped.display()))
             .replace("\"town", &format!("\"{}/town", shipped.display()));
         std::fs::write(folder.join(name).with_extension("toml"), cut).unwrap();
