@@ -7,7 +7,7 @@ mod radar_2d;
 pub mod radar_3d;
 mod reference;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use viewshed::camera::Camera3dConfig;
 use viewshed::fixed::time::Time;
@@ -137,6 +137,43 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     if let Some(camera) = recording.of_camera() {
         return camera_3d::all(camera, recording.truth.as_ref(), &options.camera_3d);
     }
+    let (sensor, max_detections) = radar(recording, options)?;
+    let mut radar_2d = options.radar_2d;
+    radar_2d.gate.max_detections = max_detections;
+    let mut radar_3d = options.radar_3d;
+    radar_3d.gate.max_detections = max_detections;
+    let mut estimators = vec![
+        radar_2d::new("radar-2d", Radar2dReading::Last, &sensor, &radar_2d)?,
+        radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
+        radar_3d::new(&sensor, &radar_3d)?,
+    ];
+    if !options.lanes.is_empty() {
+        radar_3d.lanes = kept(&options.lanes);
+        estimators.push(radar_3d::new(&sensor, &radar_3d)?);
+    }
+    if let Some(truth) = &recording.truth {
+        estimators.push(reference::new(recording, truth, &sensor, options)?);
+    }
+    Ok(estimators)
+}
+
+/// The estimator whose map a sensor sends: `radar-3d`, or `camera-3d` of a camera's own recording.
+///
+/// # Errors
+/// Those of [`all`].
+pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator>> {
+    if let Some(camera) = recording.of_camera() {
+        let all = camera_3d::all(camera, None, &options.camera_3d)?;
+        return all.into_iter().find(|e| e.name() == "camera-3d").context("no estimator for the camera");
+    }
+    let (sensor, max_detections) = radar(recording, options)?;
+    let mut radar_3d = options.radar_3d;
+    radar_3d.gate.max_detections = max_detections;
+    radar_3d::new(&sensor, &radar_3d)
+}
+
+/// A recording's radar, and how many detections of a frame are used.
+fn radar(recording: &Recording, options: &Options) -> Result<(Sensor, u16)> {
     let max_detections = match u16::try_from(options.max_detections) {
         Ok(n) if n > 0 && options.max_detections <= MOST_DETECTIONS => n,
         _ => bail!("--max-detections {} is outside 1 to {MOST_DETECTIONS}", options.max_detections),
@@ -155,24 +192,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
             view.range_m[0]
         );
     }
-    let sensor = sensor(recording, &options.noise);
-    let mut radar_2d = options.radar_2d;
-    radar_2d.gate.max_detections = max_detections;
-    let mut radar_3d = options.radar_3d;
-    radar_3d.gate.max_detections = max_detections;
-    let mut estimators = vec![
-        radar_2d::new("radar-2d", Radar2dReading::Last, &sensor, &radar_2d)?,
-        radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
-        radar_3d::new(&sensor, &radar_3d)?,
-    ];
-    if !options.lanes.is_empty() {
-        radar_3d.lanes = kept(&options.lanes);
-        estimators.push(radar_3d::new(&sensor, &radar_3d)?);
-    }
-    if let Some(truth) = &recording.truth {
-        estimators.push(reference::new(recording, truth, &sensor, options)?);
-    }
-    Ok(estimators)
+    Ok((sensor(recording, &options.noise), max_detections))
 }
 
 /// The recording's sensor as the library takes it.

@@ -110,16 +110,6 @@ impl SensorSet {
     }
 }
 
-/// What a sensor is looked at with.
-///
-/// # Errors
-/// Parameters that cannot be used.
-pub fn estimator(recording: &Recording, settings: &Settings) -> Result<Box<dyn Estimator>> {
-    let all = estimators::all(recording, &settings.estimators)?;
-    let own = ["radar-3d", "camera-3d"];
-    all.into_iter().find(|e| own.contains(&e.name())).context("no estimator for the sensor")
-}
-
 /// A sensor's newest frame at a time.
 pub fn newest(recording: &Recording, time_ns: i64) -> Option<usize> {
     let k = recording.frames.partition_point(|f| f.time_ns <= time_ns).checked_sub(1)?;
@@ -156,7 +146,9 @@ pub fn judge(all: &[Recording], settings: &Settings, every: usize, progress: &(d
     let alone: Vec<Score> = all
         .par_iter()
         .zip(&samples)
-        .map(|(recording, samples)| Ok(judge(&mut *estimator(recording, settings)?, recording, samples)))
+        .map(|(recording, samples)| {
+            Ok(judge(&mut *estimators::own(recording, &settings.estimators)?, recording, samples))
+        })
         .collect::<Result<_>>()?;
     // each on the road of the set, at the first sensor's times, and fused
     let road = road(&union);
@@ -182,7 +174,7 @@ pub fn judge(all: &[Recording], settings: &Settings, every: usize, progress: &(d
 /// # Errors
 /// More sensors than can be fused, a road that is too large, parameters of estimators that cannot be used.
 pub fn fuse(members: &[Recording], road: &[Cell], every: usize, settings: &Settings) -> Result<Box<fused::Fused>> {
-    let members = members.iter().map(|r| Ok((estimator(r, settings)?, r.frames.clone())));
+    let members = members.iter().map(|r| Ok((estimators::own(r, &settings.estimators)?, r.frames.clone())));
     fused::new(members.collect::<Result<_>>()?, road, every)
 }
 

@@ -63,10 +63,8 @@ impl RiskArgs {
             Threshold::Nothing => None,
         };
         let levelling = estimators::mount(&recording.pose).levelling()?;
-        let own = |all: &[Box<dyn Estimator>]| all.iter().position(|e| e.name() == "radar-3d");
-        let mut again = estimators::all(recording, &settings.estimators)?;
-        let inner = own(&again).map(|k| again.swap_remove(k)).context("no estimator radar-3d")?;
-        let place = own(running).map_or(running.len(), |k| k + 1);
+        let inner = estimators::own(recording, &settings.estimators)?;
+        let place = running.iter().position(|e| e.name() == inner.name()).map_or(running.len(), |k| k + 1);
         running.insert(place, Box::new(AtRisk::new(inner, table, levelling, least)));
         Ok(())
     }

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::plan::{self, Day};
+use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::bootstrap::{Draws, Interval};
 use crate::evaluation::calibration::{Bin, ByTrack, Metrics, diagram};
@@ -21,7 +22,6 @@ use crate::evaluation::probability::risk::{Kept, Threshold};
 use crate::evaluation::probability::samples::{Places, fingerprint};
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::{Score, score};
-use crate::evaluation::sensor_set;
 use crate::recording::{Recording, mcap};
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
@@ -236,7 +236,7 @@ fn scored(
 ) -> Result<(Vec<FrameSamples>, Score)> {
     let samples = samples::collect(recording, &settings.evaluation, progress);
     ensure!(recording.of_camera().is_none(), "{} is of a camera; probabilities are of radars", recording.name);
-    let mut estimator = sensor_set::estimator(recording, settings)?;
+    let mut estimator = estimators::own(recording, &settings.estimators)?;
     let score = score(estimator.as_mut(), recording, &samples, settings.evaluation.grid, &|| progress());
     Ok((samples, score))
 }

@@ -15,7 +15,7 @@ use crate::estimators::{
     camera_3d::{lifted, time},
 };
 use crate::evaluation::Settings;
-use crate::evaluation::sensor_set::{estimator, newest};
+use crate::evaluation::sensor_set::newest;
 use crate::recording::{Frame, Recording};
 
 const SECTORS: usize = 6;
@@ -98,7 +98,7 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
     let mut passed = [false; SECTORS];
     // before it went dark: that is no finding
     let mut blind_before = [[false; SECTORS]; 2];
-    let mut running = estimator(recording, settings)?;
+    let mut running = estimators::own(recording, &settings.estimators)?;
     for (k, frame) in recording.frames.iter().enumerate() {
         running.step(frame);
         let since = since_s(frame);

@@ -197,8 +197,7 @@ impl Prepared {
 /// A parameter the library refuses, by name.
 pub fn count(recordings: &[Prepared], options: &estimators::Options, settings: &Settings) -> Result<Vec<Counted>> {
     let one = |p: &Prepared| -> Result<Counted> {
-        let mut all = estimators::all(&p.recording, options)?;
-        let own = all.iter_mut().find(|e| e.name() == "radar-3d").context("no estimator radar-3d")?;
+        let mut own = estimators::own(&p.recording, options)?;
         let score = score(own.as_mut(), &p.recording, &p.samples, settings.evaluation.grid, &|| ());
         let by_unit = p.units.by_object(|counts: &mut Counts, frame, object| {
             counts.add(score.verdicts[frame][object].visible, p.samples[frame].objects[object].detected);
