@@ -12,12 +12,13 @@ use crate::command::options::SettingsArgs;
 use crate::evaluation::Settings;
 use crate::evaluation::paired::{Counted, differences};
 use crate::recording;
-use crate::results::files::{Folder, OutputArgs};
+use crate::results::files::{Folder, OutputArgs, Target};
 use crate::results::pictures::tradeoff::{
     self, Counted as Axes, Curve, CurvePoint, Marker, MarkerKind, Span, TradeOff,
 };
 use crate::results::report::compare::{self as report, Compared};
 use crate::results::report::table::Extent;
+use crate::studies::tune::plan::{Plan, Run};
 use crate::studies::tune::space::Space;
 use crate::studies::tune::{Evaluation, Prepared, Rates, Search, State, count, joined};
 
@@ -29,11 +30,17 @@ use crate::studies::tune::{Evaluation, Prepared, Rates, Search, State, count, jo
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Labelled recordings to tune on
-    #[arg(value_name = "TRAIN", required = true)]
+    #[arg(value_name = "TRAIN", required_unless_present = "plan")]
     train: Vec<PathBuf>,
     /// Labelled recordings to judge on, none of them trained on
-    #[arg(long, value_name = "TEST", required = true, num_args = 1..)]
+    #[arg(long, value_name = "TEST", required_unless_present = "plan", num_args = 1..)]
     test: Vec<PathBuf>,
+    /// Simulate both as this file says (TOML; tests/recordings/tuning.toml is one); its warm-up replaces --warm-up
+    #[arg(long, value_name = "FILE", requires = "unit", conflicts_with_all = ["train", "test"])]
+    plan: Option<PathBuf>,
+    /// Which of the plan's units: motorway, crossing or queue of the one that is shipped
+    #[arg(long, value_name = "NAME", requires = "plan")]
+    unit: Option<String>,
     /// Parameters and their limits (TOML) [default: 12 of radar-3d, which the results list]
     ///
     /// A table for each, at most 12:
@@ -53,6 +60,12 @@ pub struct Args {
     /// Seed of the search
     #[arg(long, value_name = "N", default_value_t = 1)]
     search_seed: u64,
+    /// Search with so many seeds both ways, and say how often the process found less loss than chance
+    ///
+    /// The seeds follow --search-seed, whose own search is the one that is judged. With --state, each search has a file of its own,
+    /// FILE.HOW-SEED.
+    #[arg(long, value_name = "SEEDS", value_parser = clap::value_parser!(u16).range(1..=100), conflicts_with = "search")]
+    against_random: Option<u16>,
     /// Keep the search in this file, and go on with it where the file has one
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     state: Option<PathBuf>,
@@ -70,7 +83,7 @@ pub struct Args {
 /// # Errors
 /// Recordings without labels or in both sets, a space that cannot be searched, a state of another search.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let settings = args.settings.settings()?;
+    let mut settings = args.settings.settings()?;
     let space = match &args.space {
         None => Space::default(),
         Some(path) => {
@@ -79,37 +92,31 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     };
     space.check(&settings.estimators)?;
+    let plan = args.plan.as_deref().map(Plan::read).transpose()?;
+    let unit = plan.as_ref().zip(args.unit.as_ref()).map(|(plan, name)| plan.unit(name)).transpose()?;
     let read = args.train.iter().chain(&args.test).flat_map(|path| recording::files(path));
-    let inputs: Vec<PathBuf> = read.chain(args.settings.files()).chain(args.space.clone()).collect();
+    let mut inputs: Vec<PathBuf> = read.chain(args.settings.files()).chain(args.space.clone()).collect();
+    if let (Some(plan), Some(unit)) = (&plan, unit) {
+        inputs.extend(args.plan.clone());
+        inputs.extend(plan.files(unit)?);
+        settings.evaluation.warm_up_s = unit.warm_up_s;
+    }
     let outputs = args.outputs.beside(inputs.iter().cloned());
     let folder = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
-    let known = args.state.as_deref().filter(|path| path.metadata().is_ok_and(|m| m.len() > 0));
-    let known =
-        known.map(|path| std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display())));
-    let known = known.transpose()?;
-    // a state that is gone on with is replaced; it was looked at before
-    let mut states = OutputArgs { force: true }.beside(inputs);
-    let state_file = states.file("--state", args.state.as_deref())?;
-    let (training, test) = (prepared(&args.train, &settings)?, prepared(&args.test, &settings)?);
+    let mut searches = Searches::open(args, &inputs)?;
+    let (training, test) = match (&plan, unit) {
+        (Some(plan), Some(unit)) => {
+            (simulated(plan, &unit.train, &settings)?, simulated(plan, &unit.report, &settings)?)
+        }
+        _ => (prepared(&args.train, &settings)?, prepared(&args.test, &settings)?),
+    };
     for (path, p) in args.train.iter().zip(&training) {
         let name = &p.recording.name;
         let also = test.iter().zip(&args.test).any(|(t, other)| t.recording.name == *name || other == path);
         ensure!(!also, "{name} is both trained and judged on; leave it out of one");
     }
-    let mut state = State::new(args.search, args.search_seed, space, &training, &settings);
-    if let (Some(text), Some(path)) = (&known, &args.state) {
-        state.resume(text).with_context(|| format!("--state {}", path.display()))?;
-    }
-    let wanted = usize::from(args.evaluations);
-    let searching = bar("tuning", wanted as u64);
-    state.evaluations.iter().take(wanted).for_each(|_| searching.step());
-    let save = |state: &State| -> Result<()> {
-        searching.step();
-        searching.say(&format!("tuning, best {:.1} of {:.1}", best(state), usual(state)));
-        state_file.as_ref().map_or(Ok(()), |file| file.write(serde_json::to_string(state)? + "\n"))
-    };
-    state.run(wanted, &training, &settings, &save)?;
-    drop(searching);
+    searches.run(usize::from(args.evaluations), &space, &training, &settings)?;
+    let state = searches.first()?;
     let found = state.best().context("no evaluation")?.clone();
     let tuned = state.space.apply(&settings.estimators, &found.values)?;
     let mut all = Vec::new();
@@ -117,13 +124,104 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let [before, after] = [&settings.estimators, &tuned].map(|o| count(set, o, &settings).map(|all| joined(&all)));
         all.push(compared(of, &before?, &after?, &settings));
     }
-    print(&text(&state, &found, &all))?;
+    print(&(text(state, &found, &all) + &searches.against_random()))?;
     if let Some(folder) = &folder {
-        folder.file("tuned.toml")?.write(toml(&state, &found, args)?)?;
-        pictures(folder, &state, &found)?;
+        folder.file("tuned.toml")?.write(toml(state, &found, test.len())?)?;
+        pictures(folder, state, &found)?;
     }
     print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Every search that is run, each with its file.
+struct Searches {
+    /// How, seed, file, and what the file had.
+    wanted: Vec<(Search, u64, Option<(PathBuf, Option<String>, Target)>)>,
+    done: Vec<State>,
+}
+
+impl Searches {
+    fn open(args: &Args, inputs: &[PathBuf]) -> Result<Self> {
+        // a state that is gone on with is replaced; it is looked at first
+        let mut outputs = OutputArgs { force: true }.beside(inputs.to_vec());
+        let mut file = |of: Option<PathBuf>| -> Result<_> {
+            let Some(path) = of else { return Ok(None) };
+            let full = path.metadata().is_ok_and(|m| m.len() > 0);
+            let read = || std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()));
+            let known = full.then(read).transpose()?;
+            let file = outputs.file("--state", Some(&path))?.context("no file")?;
+            Ok(Some((path, known, file)))
+        };
+        let mut wanted = Vec::new();
+        let seed = args.search_seed;
+        let Some(seeds) = args.against_random else {
+            return Ok(Self { wanted: vec![(args.search, seed, file(args.state.clone())?)], done: Vec::new() });
+        };
+        for seed in (0..u64::from(seeds)).map(|k| seed.wrapping_add(k)) {
+            for search in [Search::Bayes, Search::Random] {
+                let path = args.state.as_ref().map(|path| {
+                    let mut path = path.clone().into_os_string();
+                    path.push(format!(".{}-{seed}", search.name()));
+                    PathBuf::from(path)
+                });
+                wanted.push((search, seed, file(path)?));
+            }
+        }
+        Ok(Self { wanted, done: Vec::new() })
+    }
+
+    fn run(&mut self, evaluations: usize, space: &Space, training: &[Prepared], settings: &Settings) -> Result<()> {
+        let searching = bar("tuning", (evaluations * self.wanted.len()) as u64);
+        for (search, seed, file) in &self.wanted {
+            let mut state = State::new(*search, *seed, space.clone(), training, settings);
+            if let Some((path, Some(text), _)) = file {
+                state.resume(text).with_context(|| format!("--state {}", path.display()))?;
+            }
+            state.evaluations.iter().take(evaluations).for_each(|_| searching.step());
+            let save = |state: &State| -> Result<()> {
+                searching.step();
+                searching.say(&format!("tuning, best {:.1} of {:.1}", best(state), usual(state)));
+                file.as_ref().map_or(Ok(()), |(_, _, file)| file.write(serde_json::to_string(state)? + "\n"))
+            };
+            state.run(evaluations, training, settings, &save)?;
+            self.done.push(state);
+        }
+        Ok(())
+    }
+
+    /// The one that is judged.
+    fn first(&self) -> Result<&State> {
+        self.done.first().context("no search")
+    }
+
+    /// How often the process found less than chance; nothing where it was not asked.
+    fn against_random(&self) -> String {
+        let mut text = String::new();
+        let (mut won, mut seeds) = (0, 0);
+        for pair in self.done.chunks_exact(2) {
+            let [bayes, random] = [best(&pair[0]), best(&pair[1])];
+            text += &format!("  seed {}: loss {bayes:.2}, at random {random:.2}\n", pair[0].seed);
+            won += usize::from(bayes < random);
+            seeds += 1;
+        }
+        if seeds == 0 {
+            return text;
+        }
+        format!(
+            "The process found less loss than chance with {won} of {seeds} seeds, as many evaluations each:\n{text}"
+        )
+    }
+}
+
+/// Simulates recordings of a plan.
+fn simulated(plan: &Plan, runs: &[Run], settings: &Settings) -> Result<Vec<Prepared>> {
+    let one = |run: &Run| {
+        let frames = plan.frames(run)?;
+        let simulating = bar(&format!("simulating {}", run.scene.display()), 2 * frames);
+        let recording = plan.recording(run, settings, &|| simulating.step())?;
+        Prepared::new(recording, settings, &|| simulating.step())
+    };
+    runs.iter().map(one).collect()
 }
 
 fn prepared(paths: &[PathBuf], settings: &Settings) -> Result<Vec<Prepared>> {
@@ -160,10 +258,7 @@ fn compared(of: &str, before: &Counted, after: &Counted, settings: &Settings) ->
 }
 
 fn text(state: &State, found: &Evaluation, all: &[Compared]) -> String {
-    let how = match state.search {
-        Search::Bayes => "Bayesian",
-        Search::Random => "random",
-    };
+    let how = state.search.name();
     let mut text = format!(
         "{} evaluations ({how} search, seed {}): loss {:.2} of the usual parameters, {:.2} of the best\n",
         state.evaluations.len(),
@@ -190,7 +285,7 @@ fn text(state: &State, found: &Evaluation, all: &[Compared]) -> String {
 }
 
 /// The values as a configuration.
-fn toml(state: &State, found: &Evaluation, args: &Args) -> Result<String> {
+fn toml(state: &State, found: &Evaluation, judged: usize) -> Result<String> {
     let mut tables: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (p, v) in state.space.parameter.iter().zip(&found.values) {
         let (table, key) = p.key.rsplit_once('.').map_or(("", p.key.as_str()), |(t, k)| (t, k));
@@ -204,7 +299,7 @@ fn toml(state: &State, found: &Evaluation, args: &Args) -> Result<String> {
         state.evaluations.len(),
         state.training.join(", "),
         state.seed,
-        args.test.len()
+        judged
     );
     for (table, lines) in tables {
         text += &format!("\n[{table}]\n{}\n", lines.join("\n"));

@@ -109,7 +109,7 @@ fn a_search_is_judged_on_others_and_goes_on_where_it_stopped() {
     let tune = "tune a.mcap --test b.mcap --to 4 --bootstrap 50 --space space.toml --state s.json";
     done(&folder, &format!("{tune} --evaluations 3"));
     let text = done(&folder, &format!("{tune} --evaluations 5 --out o"));
-    assert!(text.contains("5 evaluations (Bayesian search, seed 1)") && text.contains("Gap: "), "{text}");
+    assert!(text.contains("5 evaluations (bayes search, seed 1)") && text.contains("Gap: "), "{text}");
     assert!(folder.join("o/front-cells.png").exists());
     let at_once = done(&folder, &tune.replace("s.json", "other.json").replace("--to", "--evaluations 5 --to"));
     assert_eq!(text.lines().next(), at_once.lines().next(), "a search that was stopped finds what one at once finds");
@@ -126,4 +126,33 @@ fn a_search_is_judged_on_others_and_goes_on_where_it_stopped() {
     std::fs::copy(log, folder.join("log.log")).unwrap();
     let unlabelled = "tune log.log --test b.mcap --mount 0,0,6,0,4,0 --fov=-60,60,-16,16,3,200 --sensor-id 0";
     assert!(refused(&folder, unlabelled).contains("log has no labels"), "{}", refused(&folder, unlabelled));
+}
+
+#[test]
+fn a_plan_is_simulated_tuned_and_judged_and_both_searches_are_compared() {
+    let folder = folder("tune-plan");
+    let run = |seed: u32, mount: &str| {
+        let at = shipped().display().to_string();
+        format!("{{ scene = \"{at}/motorway.toml\", seed = {seed}{mount} }}")
+    };
+    let unit = |name: &str, report: &str| {
+        let train = run(1, "");
+        format!("[[unit]]\nname = \"{name}\"\nwarm_up_s = 1.0\ntrain = [{train}]\nreport = [{report}]\n")
+    };
+    let side = run(2, ", mount = { y_m = -19.0, height_m = 5.0, yaw_deg = 5.0, pitch_deg = 4.0 }");
+    std::fs::write(folder.join("plan.toml"), unit("gantry", &side)).unwrap();
+    let tune = "tune --plan plan.toml --to 3 --bootstrap 50 --evaluations 2";
+    let text = done(&folder, &format!("{tune} --unit gantry --against-random 2 --state s --out o"));
+    assert!(text.contains("2 evaluations (bayes search, seed 1)"), "{text}");
+    let won = text.split("less loss than chance with ").nth(1).unwrap();
+    assert!(won.starts_with("0 of 2 seeds"), "one random point is the same for both: {won}");
+    for state in ["s.bayes-1", "s.random-1", "s.bayes-2", "s.random-2"] {
+        assert!(folder.join(state).exists(), "{state}");
+    }
+    let tuned = std::fs::read_to_string(folder.join("o/tuned.toml")).unwrap();
+    assert!(tuned.contains("on motorway-1; seed 1") && tuned.contains("Judged on 1 others"), "{tuned}");
+    assert!(refused(&folder, &format!("{tune} --unit tunnel")).contains("no unit `tunnel`, but gantry"));
+    std::fs::write(folder.join("plan.toml"), unit("gantry", &run(1, ""))).unwrap();
+    let refused = refused(&folder, &format!("{tune} --unit gantry"));
+    assert!(refused.contains("has the seed 1 of another recording"), "{refused}");
 }

@@ -4,7 +4,6 @@
 //! is given as well is fitted on the first half of its frames and judged on the second.
 
 use std::collections::BTreeSet;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -22,7 +21,7 @@ use crate::evaluation::probability::risk::{Kept, Threshold};
 use crate::evaluation::probability::samples::{Places, fingerprint};
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::{Score, score};
-use crate::recording::{Recording, mcap};
+use crate::recording::Recording;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 
@@ -194,9 +193,7 @@ pub struct Judged {
 pub fn run(plan: &Plan, settings: &Settings, progress: &(dyn Fn() + Sync)) -> Result<Vec<Judged>> {
     let one = |unit: &UnitPlan| -> Result<Judged> {
         let day = |day: &Day| -> Result<(Places, u32)> {
-            let (sink, _) = plan.simulation(unit, day)?.record(Cursor::new(Vec::new()), progress)?;
-            let recording = mcap::parse(&sink.into_inner(), day.name(), &settings.reading)
-                .with_context(|| format!("the simulated recording of {}", day.name()))?;
+            let (_, recording) = plan::recorded(&plan.simulation(unit, day)?, &day.name(), settings, progress)?;
             let mut settings = settings.clone();
             settings.evaluation.warm_up_s = unit.warm_up_s;
             let (samples, score) = scored(&recording, &settings, progress)?;

@@ -12,9 +12,7 @@ pub mod plan;
 pub mod scenes;
 pub mod several_sensors;
 
-use std::io::Cursor;
-
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use crate::estimators;
 use crate::evaluation::Settings;
@@ -23,7 +21,6 @@ use crate::evaluation::cells::CellCounts;
 use crate::evaluation::counts::{Counts, rate};
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
-use crate::recording::mcap;
 use plan::{Day, Plan};
 
 /// A row of the paper's table, in per cent (arXiv 2211.06308: its own 60 s of motorway).
@@ -110,11 +107,8 @@ impl Experiment {
     ) -> Result<Self> {
         let one = |day: &Day| -> Result<DayResult> {
             let simulation = plan.simulation(day)?;
-            let (sink, _) = simulation.record(Cursor::new(Vec::new()), progress)?;
-            let bytes = sink.into_inner();
+            let (bytes, recording) = plan::recorded(&simulation, &day.name(), settings, progress)?;
             keep(day, &bytes)?;
-            let recording = mcap::parse(&bytes, day.name(), &settings.reading)
-                .with_context(|| format!("the simulated recording of {}", day.name()))?;
             let mut running = estimators::all(&recording, &settings.estimators)?;
             let replay = Replay::new(recording, &mut running, &settings.evaluation, progress);
             Ok(DayResult { day: day.clone(), replay })

@@ -1,11 +1,14 @@
 //! The experiment's file (TOML): a scene, a training day, reporting days with their seeds.
 
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::evaluation::Settings;
+use crate::recording::{Recording, mcap};
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 
@@ -110,8 +113,24 @@ impl Day {
     }
 }
 
+/// What is simulated, as the bytes of a recording and read back like any other. `progress` is called after each frame.
+///
+/// # Errors
+/// Those of the traffic.
+pub fn recorded(
+    simulation: &Simulation,
+    name: &str,
+    settings: &Settings,
+    progress: &(dyn Fn() + Sync),
+) -> Result<(Vec<u8>, Recording)> {
+    let (sink, _) = simulation.record(Cursor::new(Vec::new()), progress)?;
+    let bytes = sink.into_inner();
+    let recording = mcap::parse(&bytes, name.to_owned(), &settings.reading);
+    Ok((bytes, recording.with_context(|| format!("the simulated recording of {name}"))?))
+}
+
 /// `day-1` of `motorway/day-1.fcd.xml.gz`.
-pub(super) fn name(fcd: &Path) -> String {
+pub fn name(fcd: &Path) -> String {
     let file = fcd.file_name().unwrap_or_default().to_string_lossy();
     file.split('.').next().unwrap_or_default().to_owned()
 }

@@ -4,7 +4,6 @@
 //! where asked, without; seconds are kept, so that the same run is counted after its warm-up and from its start.
 
 use std::collections::BTreeSet;
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -18,7 +17,7 @@ use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::score;
-use crate::recording::{Recording, mcap};
+use crate::recording::Recording;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 
@@ -201,10 +200,10 @@ fn record(
     keep: &dyn Fn(&str, &[u8]) -> Result<()>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Recording> {
-    let (sink, _) = Simulation::new(scene.clone(), None)?.record(Cursor::new(Vec::new()), progress)?;
-    let bytes = sink.into_inner();
+    let simulation = Simulation::new(scene.clone(), None)?;
+    let (bytes, recording) = plan::recorded(&simulation, &scene.name, settings, progress)?;
     keep(&scene.name, &bytes)?;
-    mcap::parse(&bytes, scene.name.clone(), &settings.reading).context("the simulated recording")
+    Ok(recording)
 }
 
 fn seconds(

@@ -8,6 +8,7 @@
 //! grid, and with it memory, is not searched; instructions hardly depend on what is.
 
 pub mod gaussian;
+pub mod plan;
 pub mod space;
 
 use anyhow::{Context, Result, ensure};
@@ -40,6 +41,15 @@ pub enum Search {
     Bayes,
     /// Anywhere, to compare with
     Random,
+}
+
+impl Search {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bayes => "bayes",
+            Self::Random => "random",
+        }
+    }
 }
 
 /// FVR, FIR, cell FVR, cell FIR in points, means over recordings; `None` where no recording has the rate.
