@@ -73,6 +73,14 @@ impl Default for EvidenceConfig {
     }
 }
 
+impl EvidenceConfig {
+    /// Every number of it, in the order of the fields, for fingerprints.
+    pub fn numbers(&self) -> [f32; 6] {
+        let &Self { gain, clearing, hidden_memory_s, visible_memory_s, height_prior_m, height_prior_sigma_m } = self;
+        [gain, clearing, hidden_memory_s, visible_memory_s, height_prior_m, height_prior_sigma_m]
+    }
+}
+
 /// Reflections of a body in one frame, and how far from one the others lie at most on either axis, centimetres.
 pub const BODY_REFLECTIONS: usize = 4;
 /// See [`BODY_REFLECTIONS`].

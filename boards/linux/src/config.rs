@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck};
 use viewshed::{
-    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, FieldOfView, GateConfig, HealthConfig, Medium, Mount,
-    NoiseConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect, TiFamily, VisibilityConfig, reference, small,
+    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, EvidenceConfig, FieldOfView, GateConfig,
+    HealthConfig, Medium, Mount, NoiseConfig, ObstacleConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect,
+    TiFamily, VisibilityConfig, reference, small,
 };
 
 use crate::locate;
@@ -63,9 +64,18 @@ pub struct Config {
     pub visibility: VisibilityConfig,
     #[serde(default)]
     pub health: HealthConfig,
-    /// Which way traffic goes. Kept as long as the daemon runs.
+    /// Tuned for the place. Kept as long as the daemon runs, like the lanes.
+    #[serde(default, deserialize_with = "kept")]
+    pub obstacles: Option<&'static ObstacleConfig>,
+    #[serde(default, deserialize_with = "kept")]
+    pub evidence: Option<&'static EvidenceConfig>,
+    /// Which way traffic goes.
     #[serde(default, deserialize_with = "lanes")]
     pub lanes: &'static [&'static [[f32; 2]]],
+}
+
+fn kept<'de, T: Deserialize<'de>, D: serde::Deserializer<'de>>(table: D) -> Result<Option<&'static T>, D::Error> {
+    Ok(Some(Box::leak(Box::new(T::deserialize(table)?))))
 }
 
 fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [&'static [[f32; 2]]], D::Error> {
@@ -342,9 +352,14 @@ impl Config {
     /// What the integrator set; `None` if that is left to a configuration block.
     pub fn settings(&self) -> Option<Settings> {
         let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise: self.noise };
-        let settings = Settings::of(sensor);
-        let Self { gate, visibility, health, lanes, .. } = *self;
-        Some(Settings { gate, visibility, health, lanes, ..settings })
+        let Self { gate, visibility, health, .. } = *self;
+        Some(self.of_place(Settings { gate, visibility, health, ..Settings::of(sensor) }))
+    }
+
+    /// Settings with what the file says of the place and no configuration block does.
+    pub fn of_place(&self, settings: Settings) -> Settings {
+        let Self { lanes, obstacles, evidence, .. } = *self;
+        Settings { lanes, obstacles, evidence, ..settings }
     }
 
     /// Which program the service says this is; its chip is the machine.
@@ -529,6 +544,28 @@ mod tests {
         assert!(check("[[-50.0, 2.0], [50.0, 2.0]]").is_ok());
         let refused = check("[[-50.0, 2.0]]").unwrap_err().to_string();
         assert_eq!(refused, "lanes: lane 0 has fewer than two points");
+    }
+
+    #[test]
+    fn tuned_parameters_are_a_part_of_the_settings_and_of_the_fingerprint_and_a_bad_one_is_named() {
+        let config = |tables: &str| {
+            let text = format!(
+                "[input]\nradar = \"ars408\"\ninterface = \"can0\"\n[output]\nmedium = \"can\"\ninterface = \"can1\"\n\
+                 [mount]\nx_m = 0.0\ny_m = 0.0\nheight_m = 6.0\nyaw_deg = 0.0\npitch_deg = 4.0\nroll_deg = 0.0\n\
+                 [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
+                 elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n{tables}"
+            );
+            toml::from_str::<Config>(&text).map(|config| config.settings().unwrap())
+        };
+        let (plain, tuned) =
+            (config("").unwrap(), config("[obstacles]\ngap_m = 5.0\n[evidence]\ngain = 0.4\n").unwrap());
+        let made = tuned.radar_3d();
+        assert_eq!((made.obstacles.gap_m, made.obstacles.headway_s), (5.0, plain.radar_3d().obstacles.headway_s));
+        assert_eq!(made.evidence.gain, 0.4);
+        assert_ne!(plain.fingerprint(), tuned.fingerprint());
+        assert!(config("[obstacles]\ngap = 5.0\n").unwrap_err().to_string().contains("unknown field `gap`"));
+        let refused = Grid::Reference.check().settings(&config("[obstacles]\ngap_m = -1.0\n").unwrap()).unwrap_err();
+        assert_eq!(refused.parameter, "obstacles.gap_m");
     }
 
     #[test]

@@ -38,7 +38,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let settings = config.settings();
     let mut slots = FileSlots::open(folder, settings.as_ref());
     let stored = StoredSettings::read(&slots, CHECK);
-    let of_line = |stored: &StoredSettings| stored.settings().map(|s| Settings { lanes: config.lanes, ..*s });
+    let of_line = |stored: &StoredSettings| stored.settings().map(|s| config.of_place(*s));
     if config.has_service() && settings.is_some() && of_line(&stored).is_some_and(|s| Some(s) != settings) {
         warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
     }

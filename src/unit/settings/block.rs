@@ -4,6 +4,8 @@ use super::{BlockError, ConfigureRadar, Settings, UnitConfig};
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+use crate::grid::evidence::EvidenceConfig;
+use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::MOST_LANES;
 use crate::radar_3d::VisibilityConfig;
 use crate::sensor::Sensor;
@@ -42,17 +44,14 @@ impl Settings {
     }
 
     /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
-    /// each lane together with the check sum so far; a lane begins with its number.
+    /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each tuned
+    /// number with its place, from 2^16 on for obstacles and from 2^17 on for evidence.
     #[inline(never)] // once a start
     pub fn fingerprint(&self) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];
         self.write(1, 0, &mut block);
         // not of the check sum as well: a CRC over its own is the same for every block
         let mut sum = block.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
-        // where there is no room for lanes, nothing runs with them
-        if MOST_LANES == 0 {
-            return sum;
-        }
         let mut take = |what: [u32; 2]| {
             let mut with = [0; 3 * SUM_LEN];
             let mut w = Writer(&mut with);
@@ -60,10 +59,15 @@ impl Settings {
             what.iter().for_each(|word| w.put(word.to_le_bytes()));
             sum = fingerprint(&with);
         };
-        for (number, lane) in (1..).zip(self.lanes) {
+        // where there is no room for lanes, nothing runs with them
+        for (number, lane) in (1..).zip(self.lanes).take(MOST_LANES) {
             take([number, 0]);
             lane.iter().for_each(|point| take(point.map(f32::to_bits)));
         }
+        let obstacles = self.obstacles.into_iter().flat_map(ObstacleConfig::numbers);
+        (1 << 16..).zip(obstacles).for_each(|(place, number)| take([place, number.to_bits()]));
+        let evidence = self.evidence.into_iter().flat_map(EvidenceConfig::numbers);
+        (1 << 17..).zip(evidence).for_each(|(place, number)| take([place, number.to_bits()]));
         sum
     }
 
@@ -198,9 +202,8 @@ impl Settings {
             Some(BusConfig { bit_rate: r.u32()?, sample_point_permille: r.u16()?, listen_first: r.u16()? != 0 })
         };
         let (radar_bus, broadcast_bus) = (bus(r)?, bus(r)?);
-        let unit = UnitConfig::default();
-        let sensor = Sensor { mount, field_of_view, noise };
-        Some(Self { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit, lanes: &[] })
+        let of = Self { radar_bus, broadcast_bus, ..Self::of(Sensor { mount, field_of_view, noise }) };
+        Some(Self { gate, visibility, health, ..of })
     }
 }
 
@@ -318,5 +321,40 @@ pub(super) mod tests {
             of(&[&[[0.0, 1.0], [2.0, 3.0]]]),
         ];
         assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:x?}");
+    }
+
+    #[test]
+    fn the_fingerprint_is_of_what_was_tuned_and_of_where_it_stands() {
+        let a = settings();
+        let obstacles = |change: fn(&mut ObstacleConfig)| {
+            let mut config = ObstacleConfig::default();
+            change(&mut config);
+            Settings { obstacles: Some(std::boxed::Box::leak(std::boxed::Box::new(config))), ..a }
+        };
+        static GAIN: EvidenceConfig = EvidenceConfig { gain: 0.25, clearing: 0.3, ..EVIDENCE };
+        static SWAPPED: EvidenceConfig = EvidenceConfig { gain: 0.3, clearing: 0.25, ..EVIDENCE };
+        const EVIDENCE: EvidenceConfig = EvidenceConfig {
+            gain: 0.0,
+            clearing: 0.0,
+            hidden_memory_s: 5.0,
+            visible_memory_s: 1.0,
+            height_prior_m: 0.5,
+            height_prior_sigma_m: 0.4,
+        };
+        let all = [
+            a,
+            obstacles(|_| ()),
+            obstacles(|c| c.min_speed_mps = 2.5),
+            obstacles(|c| c.gap_m = 2.5),
+            obstacles(|c| c.sizes.points[3].height_m = 3.9),
+            obstacles(|c| c.sizes.min_length_m = 3.0),
+            Settings { evidence: Some(&GAIN), ..a },
+            Settings { evidence: Some(&SWAPPED), ..a },
+        ];
+        let all = all.map(|settings| settings.fingerprint());
+        assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:x?}");
+        // and they are what the estimator runs with
+        assert_eq!(obstacles(|c| c.gap_m = 2.5).radar_3d().obstacles.gap_m, 2.5);
+        assert_eq!(Settings { evidence: Some(&GAIN), ..a }.radar_3d().evidence.clearing, 0.3);
     }
 }

@@ -19,7 +19,7 @@
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
-//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and of the lanes where there are any.
+//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes and of tuned parameters.
 
 mod block;
 mod flash;
@@ -34,6 +34,8 @@ pub use unit_config::{ConfigureRadar, UnitConfig};
 use crate::camera::Camera3dConfig;
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+use crate::grid::evidence::EvidenceConfig;
+use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::Lane;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
 use crate::sensor::Sensor;
@@ -71,6 +73,12 @@ pub struct Settings {
     /// Which way traffic goes, where that is given; no block has it.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub lanes: &'static [Lane],
+    /// How obstacles are tracked, where that was tuned for the place; no block has it.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub obstacles: Option<&'static ObstacleConfig>,
+    /// How evidence comes and goes, likewise.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub evidence: Option<&'static EvidenceConfig>,
 }
 
 /// Why a block is not used.
@@ -130,6 +138,8 @@ impl Settings {
             broadcast_bus: BusConfig::default(),
             unit: UnitConfig::default(),
             lanes: &[],
+            obstacles: None,
+            evidence: None,
         }
     }
 
@@ -144,7 +154,9 @@ impl Settings {
     /// The estimator's configuration; what an integrator does not set is the library's.
     pub fn radar_3d(&self) -> Radar3dConfig {
         let Self { gate, visibility, health, lanes, .. } = *self;
-        Radar3dConfig { gate, visibility, health, lanes, ..Radar3dConfig::default() }
+        let obstacles = self.obstacles.copied().unwrap_or_default();
+        let evidence = self.evidence.copied().unwrap_or_default();
+        Radar3dConfig { gate, obstacles, evidence, visibility, health, lanes }
     }
 
     /// The newer of two slots that holds and is accepted: its number and settings, and the sequence to write

@@ -25,7 +25,7 @@ use crate::studies::tune::{Evaluation, Prepared, Rates, Search, State, count, jo
 /// Find parameters of radar-3d on some recordings and judge them on others
 ///
 /// Each evaluation runs radar-3d over all training recordings. Loss: FVR + FIR + cell FVR + cell FIR in points, means
-/// over the recordings, and twice what any of them is above that of the usual parameters. A Gaussian process says which
+/// over the recordings, and twice what any of them lacks to half a point less than with the usual parameters. A Gaussian process says which
 /// values to try next. Both sets are reported, before and after, with paired intervals: believe the second.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -69,7 +69,8 @@ pub struct Args {
     /// Keep the search in this file, and go on with it where the file has one
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     state: Option<PathBuf>,
-    /// Write tuned.toml (for --config of replay and experiment) and fronts of FVR against FIR into this folder
+    /// Write tuned.toml (for --config of replay and experiment), daemon.toml (tables for the file of the Linux daemon) and fronts of FVR
+    /// against FIR into this folder
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -126,7 +127,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     print(&(text(state, &found, &all) + &searches.against_random()))?;
     if let Some(folder) = &folder {
-        folder.file("tuned.toml")?.write(toml(state, &found, test.len())?)?;
+        folder.file("tuned.toml")?.write(toml(state, &found, test.len(), ""))?;
+        folder.file("daemon.toml")?.write(toml(state, &found, test.len(), "estimators.radar_3d."))?;
         pictures(folder, state, &found)?;
     }
     print(&outputs.told())?;
@@ -284,27 +286,24 @@ fn text(state: &State, found: &Evaluation, all: &[Compared]) -> String {
     text
 }
 
-/// The values as a configuration.
-fn toml(state: &State, found: &Evaluation, judged: usize) -> Result<String> {
+/// The values as a configuration: tables of `--config` below `[estimators]`, or of the daemon's file.
+fn toml(state: &State, found: &Evaluation, judged: usize, of: &str) -> String {
     let mut tables: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (p, v) in state.space.parameter.iter().zip(&found.values) {
-        let (table, key) = p.key.rsplit_once('.').map_or(("", p.key.as_str()), |(t, k)| (t, k));
-        let table = [Some("estimators"), Some(table).filter(|t| !t.is_empty())];
-        let table = table.into_iter().flatten().collect::<Vec<_>>().join(".");
-        tables.entry(table).or_default().push(format!("{key} = {v:?}"));
+        let key = format!("estimators.{}", p.key);
+        let Some((table, key)) = key.strip_prefix(of).and_then(|key| key.rsplit_once('.')) else { continue };
+        tables.entry(table.to_owned()).or_default().push(format!("{key} = {v:?}"));
     }
     let mut text = format!(
-        "# Found by `viewshed tune` in {} evaluations on {}; seed {}. For `viewshed replay --config`.\n\
-         # Judged on {} others.\n",
+        "# Found by `viewshed tune` in {} evaluations on {}; seed {}.\n# Judged on {judged} others.\n",
         state.evaluations.len(),
         state.training.join(", "),
         state.seed,
-        judged
     );
     for (table, lines) in tables {
         text += &format!("\n[{table}]\n{}\n", lines.join("\n"));
     }
-    Ok(text)
+    text
 }
 
 fn pictures(folder: &Folder, state: &State, found: &Evaluation) -> Result<()> {

@@ -118,7 +118,18 @@ pub fn differences(a: &Settings, b: &Settings) -> Result<Vec<(String, String, St
 }
 
 fn tables(settings: &Settings) -> Tables {
-    let Settings { sensor, gate, visibility, health, radar_bus, broadcast_bus, unit, lanes: _ } = *settings;
+    let Settings {
+        sensor,
+        gate,
+        visibility,
+        health,
+        radar_bus,
+        broadcast_bus,
+        unit,
+        lanes: _,
+        obstacles: _,
+        evidence: _,
+    } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
     let (state_dir, grid, input, output, lanes) = (None, None, None, None, None);
     Tables {

@@ -77,8 +77,8 @@ fn place(pose: &SensorPose, [x, y]: [f64; 2]) -> (i32, Angle) {
     ((dx.hypot(dy) * 100.0).round() as i32, Angle::from_degrees(((turns - turns.round()) * 360.0) as f32))
 }
 
-/// Fingerprint of what a table depends on: the unit's settings, and where they are not the usual ones, the parameters
-/// of `radar-3d` that are no settings of a unit.
+/// Fingerprint of what a table depends on, that of a unit with these settings. Parameters of obstacles and evidence are
+/// among them where they are not the usual ones; they are kept for good then.
 pub fn fingerprint(recording: &Recording, options: &estimators::Options) -> u32 {
     let mut settings = Settings::of(estimators::sensor(recording, &options.noise));
     let config = options.radar_3d;
@@ -86,11 +86,13 @@ pub fn fingerprint(recording: &Recording, options: &estimators::Options) -> u32 
     settings.visibility = config.visibility;
     settings.health = config.health;
     let usual = viewshed::Radar3dConfig::default();
-    if (config.obstacles, config.evidence) == (usual.obstacles, usual.evidence) {
-        return settings.fingerprint();
+    if config.obstacles != usual.obstacles {
+        settings.obstacles = Some(Box::leak(Box::new(config.obstacles)));
     }
-    let others = format!("{:?}{:?}", config.obstacles, config.evidence);
-    settings.fingerprint() ^ viewshed::wire::header::fingerprint(others.as_bytes())
+    if config.evidence != usual.evidence {
+        settings.evidence = Some(Box::leak(Box::new(config.evidence)));
+    }
+    settings.fingerprint()
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 //!
 //! # Model
 //! Each evaluation runs `radar-3d` over all training recordings and takes the mean of each rate over them: FVR, FIR,
-//! cell FVR and cell FIR, in points. Loss = their sum, and twice what any of them is above that of the usual parameters:
-//! a rate is not bought with another. The first evaluation is of the usual parameters, [`INITIAL`] more of random ones,
+//! cell FVR and cell FIR, in points. Loss = their sum, and twice what any of them lacks to half a point less than
+//! with the usual parameters: a rate is not bought with another, nor with luck. The first evaluation is of the usual parameters, [`INITIAL`] more of random ones,
 //! the others where a Gaussian [`process`](gaussian) expects most, or at random throughout for comparison. Size of the
 //! grid, and with it memory, is not searched; instructions hardly depend on what is.
 
@@ -30,8 +30,10 @@ use space::Space;
 /// Random points before the process is asked.
 pub const INITIAL: usize = 12;
 
-/// Weight of what a rate is above the usual parameters'.
+/// Weight of what a rate lacks to [`MARGIN`] less than the usual parameters'.
 const PENALTY: f64 = 2.0;
+/// So much better a rate has to be in training for it not to be worse elsewhere, points.
+const MARGIN: f64 = 0.5;
 
 /// How the next point is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -245,7 +247,7 @@ pub fn rates(all: &[Counted]) -> Rates {
 
 fn loss(rates: &Rates, usual: &Rates) -> f64 {
     let one = |(own, usual): (&Option<f64>, &Option<f64>)| {
-        let above = own.zip(*usual).map_or(0.0, |(own, usual)| (own - usual).max(0.0));
+        let above = own.zip(*usual).map_or(0.0, |(own, usual)| (own - usual + MARGIN).max(0.0));
         own.unwrap_or(0.0) + PENALTY * above
     };
     short(rates.iter().zip(usual).map(one).sum())
@@ -284,10 +286,11 @@ mod tests {
     #[test]
     fn a_rate_is_not_bought_with_another() {
         let usual = [Some(20.0), Some(10.0), Some(8.0), None];
-        assert_eq!(loss(&usual, &usual), 38.0);
-        assert_eq!(loss(&[Some(15.0), Some(10.0), Some(8.0), None], &usual), 33.0);
+        // three rates half a point short of better
+        assert_eq!(loss(&usual, &usual), 41.0);
+        assert_eq!(loss(&[Some(15.0), Some(9.5), Some(7.5), None], &usual), 32.0);
         // 5 points better in one, 3 worse in another: no gain
-        assert_eq!(loss(&[Some(15.0), Some(13.0), Some(8.0), None], &usual), 42.0);
+        assert_eq!(loss(&[Some(15.0), Some(13.0), Some(8.0), None], &usual), 44.0);
     }
 
     #[test]

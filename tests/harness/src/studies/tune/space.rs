@@ -29,18 +29,18 @@ pub struct Space {
 impl Default for Space {
     fn default() -> Self {
         let all = [
-            ("visibility.visible_from", 0.3, 0.7),
-            ("obstacles.gap_m", 4.0, 10.0),
-            ("obstacles.headway_s", 0.2, 0.8),
-            ("obstacles.lateral_gate_m", 0.5, 1.6),
-            ("obstacles.gate_sigmas", 1.0, 3.5),
-            ("obstacles.outline_memory_s", 1.0, 4.0),
+            ("visibility.visible_from", 0.3, 0.9),
+            ("obstacles.headway_s", 0.05, 0.8),
+            ("obstacles.gate_sigmas", 0.5, 3.5),
+            ("obstacles.half_width_m", 0.3, 1.2),
+            ("obstacles.lateral_gate_m", 0.3, 1.6),
+            ("obstacles.outline_memory_s", 0.5, 5.0),
             ("obstacles.outline_share", 0.02, 0.12),
-            ("obstacles.lateral_memory_s", 0.3, 1.6),
-            ("obstacles.visible_loss_per_s", 4.0, 16.0),
-            ("obstacles.hidden_loss_per_s", 0.7, 4.0),
-            ("obstacles.outline_sigmas", 0.0, 1.4),
-            ("evidence.visible_memory_s", 0.4, 2.5),
+            ("obstacles.outline_sigmas", 0.0, 2.0),
+            ("obstacles.lateral_memory_s", 0.2, 1.6),
+            ("obstacles.visible_loss_per_s", 4.0, 25.0),
+            ("obstacles.hidden_loss_per_s", 0.3, 4.0),
+            ("evidence.visible_memory_s", 0.2, 3.0),
         ];
         let parameter =
             |(key, low, high): &(&str, f64, f64)| Parameter { key: format!("radar_3d.{key}"), low: *low, high: *high };
