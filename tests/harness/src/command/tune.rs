@@ -25,7 +25,7 @@ use crate::studies::tune::{Evaluation, Prepared, Rates, Search, State, count, jo
 /// Find parameters of radar-3d on some recordings and judge them on others
 ///
 /// Each evaluation runs radar-3d over all training recordings. Loss: FVR + FIR + cell FVR + cell FIR in points, means
-/// over the recordings, and twice what any of them lacks to half a point less than with the usual parameters. A Gaussian process says which
+/// over the recordings, and twice what each recording's is above that of the usual parameters. A Gaussian process says which
 /// values to try next. Both sets are reported, before and after, with paired intervals: believe the second.
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -2,8 +2,8 @@
 //!
 //! # Model
 //! Each evaluation runs `radar-3d` over all training recordings and takes the mean of each rate over them: FVR, FIR,
-//! cell FVR and cell FIR, in points. Loss = their sum, and twice what any of them lacks to half a point less than
-//! with the usual parameters: a rate is not bought with another, nor with luck. The first evaluation is of the usual parameters, [`INITIAL`] more of random ones,
+//! cell FVR and cell FIR, in points. Loss = their sum, and twice what each rate of each recording is above that of the
+//! usual parameters, in the mean over the recordings: a rate is not bought with another, nor a place with another. The first evaluation is of the usual parameters, [`INITIAL`] more of random ones,
 //! the others where a Gaussian [`process`](gaussian) expects most, or at random throughout for comparison. Size of the
 //! grid, and with it memory, is not searched; instructions hardly depend on what is.
 
@@ -30,10 +30,8 @@ use space::Space;
 /// Random points before the process is asked.
 pub const INITIAL: usize = 12;
 
-/// Weight of what a rate lacks to [`MARGIN`] less than the usual parameters'.
+/// Weight of what a recording's rate is above the usual parameters'.
 const PENALTY: f64 = 2.0;
-/// So much better a rate has to be in training for it not to be worse elsewhere, points.
-const MARGIN: f64 = 0.5;
 
 /// How the next point is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -54,13 +52,16 @@ impl Search {
     }
 }
 
-/// FVR, FIR, cell FVR, cell FIR in points, means over recordings; `None` where no recording has the rate.
+/// FVR, FIR, cell FVR, cell FIR in points; `None` where a recording, or all of them, has none.
 pub type Rates = [Option<f64>; 4];
 
 /// One set of values tried.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     pub values: Vec<f64>,
+    /// Of each recording.
+    pub each: Vec<Rates>,
+    /// Their means.
     pub rates: Rates,
     pub loss: f64,
 }
@@ -140,9 +141,9 @@ impl State {
             let point = if self.evaluations.is_empty() { usual.clone() } else { self.next() };
             let values = self.space.values(&point);
             let options = self.space.apply(&settings.estimators, &values)?;
-            let rates = rates(&count(training, &options, settings)?);
-            let loss = loss(&rates, self.evaluations.first().map_or(&rates, |first| &first.rates));
-            self.evaluations.push(Evaluation { values, rates, loss });
+            let each: Vec<Rates> = count(training, &options, settings)?.iter().map(rates).collect();
+            let loss = loss(&each, self.evaluations.first().map_or(&each, |first| &first.each));
+            self.evaluations.push(Evaluation { values, rates: means(&each), each, loss });
             save(self)?;
         }
         Ok(())
@@ -230,27 +231,28 @@ pub fn joined(all: &[Counted]) -> Counted {
     joined
 }
 
-/// Means of the recordings' rates, in points.
-pub fn rates(all: &[Counted]) -> Rates {
-    let of = |counted: &Counted| {
-        let (mut objects, mut cells) = (Counts::default(), CellCounts::default());
-        counted.by_unit.iter().for_each(|&c| objects += c);
-        counted.by_block.iter().for_each(|&c| cells += c);
-        [objects.fvr(), objects.fir(), cells.fvr(), cells.fir()]
-    };
-    let all: Vec<_> = all.iter().map(of).collect();
+/// Rates of a recording, in points.
+pub fn rates(counted: &Counted) -> Rates {
+    let (mut objects, mut cells) = (Counts::default(), CellCounts::default());
+    counted.by_unit.iter().for_each(|&c| objects += c);
+    counted.by_block.iter().for_each(|&c| cells += c);
+    [objects.fvr(), objects.fir(), cells.fvr(), cells.fir()].map(|rate| rate.map(|rate| short(100.0 * rate)))
+}
+
+/// Means over the recordings that have a rate.
+pub fn means(each: &[Rates]) -> Rates {
     std::array::from_fn(|k| {
-        let known: Vec<f64> = all.iter().filter_map(|rates| rates[k]).collect();
-        (!known.is_empty()).then(|| short(100.0 * known.iter().sum::<f64>() / known.len() as f64))
+        let known: Vec<f64> = each.iter().filter_map(|rates| rates[k]).collect();
+        (!known.is_empty()).then(|| short(known.iter().sum::<f64>() / known.len() as f64))
     })
 }
 
-fn loss(rates: &Rates, usual: &Rates) -> f64 {
-    let one = |(own, usual): (&Option<f64>, &Option<f64>)| {
-        let above = own.zip(*usual).map_or(0.0, |(own, usual)| (own - usual + MARGIN).max(0.0));
-        own.unwrap_or(0.0) + PENALTY * above
-    };
-    short(rates.iter().zip(usual).map(one).sum())
+fn loss(each: &[Rates], usual: &[Rates]) -> f64 {
+    let above =
+        |(own, usual): (&Option<f64>, &Option<f64>)| own.zip(*usual).map_or(0.0, |(own, usual)| (own - usual).max(0.0));
+    let worse: f64 = each.iter().zip(usual).flat_map(|(own, usual)| own.iter().zip(usual).map(above)).sum();
+    let sum: f64 = means(each).iter().flatten().sum();
+    short(sum + PENALTY * worse / each.len().max(1) as f64)
 }
 
 /// Rounded to a millionth, so that it comes back from a file as it was.
@@ -265,6 +267,7 @@ mod tests {
     fn state() -> State {
         let evaluation = |fvr: f64, fir: f64| Evaluation {
             values: vec![0.5; space::MOST],
+            each: vec![[Some(fvr), Some(fir), None, None]],
             rates: [Some(fvr), Some(fir), None, None],
             loss: fvr + fir,
         };
@@ -284,13 +287,16 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_is_not_bought_with_another() {
-        let usual = [Some(20.0), Some(10.0), Some(8.0), None];
-        // three rates half a point short of better
-        assert_eq!(loss(&usual, &usual), 41.0);
-        assert_eq!(loss(&[Some(15.0), Some(9.5), Some(7.5), None], &usual), 32.0);
+    fn a_rate_is_not_bought_with_another_nor_a_place_with_another() {
+        let usual = [[Some(20.0), Some(10.0), Some(8.0), None]];
+        assert_eq!(loss(&usual, &usual), 38.0);
+        assert_eq!(loss(&[[Some(15.0), Some(10.0), Some(8.0), None]], &usual), 33.0);
         // 5 points better in one, 3 worse in another: no gain
-        assert_eq!(loss(&[Some(15.0), Some(13.0), Some(8.0), None], &usual), 44.0);
+        assert_eq!(loss(&[[Some(15.0), Some(13.0), Some(8.0), None]], &usual), 42.0);
+        let of = |fvr: [f64; 2]| fvr.map(|fvr| [Some(fvr), Some(10.0), Some(8.0), None]);
+        // 10 points better at one place, 6 worse at another: 36, and half of twice 6
+        assert_eq!(loss(&of([10.0, 26.0]), &of([20.0, 20.0])), 42.0);
+        assert_eq!(loss(&of([18.0, 18.0]), &of([20.0, 20.0])), 36.0);
     }
 
     #[test]
@@ -305,7 +311,7 @@ mod tests {
         let mut long = state();
         // more digits than a file gives back
         long.evaluations[0].loss =
-            loss(&[Some(38.345_864_661_654_13), Some(22.690_381_079_195_994), None, None], &[None; 4]);
+            loss(&[[Some(38.345_864_661_654_13), Some(22.690_381_079_195_994), None, None]], &[[None; 4]]);
         let mut back = State { evaluations: Vec::new(), ..state() };
         back.resume(&serde_json::to_string(&long).unwrap()).unwrap();
         assert_eq!(back, long);
@@ -328,9 +334,10 @@ mod tests {
 
     #[test]
     fn rates_are_means_over_recordings_and_missing_ones_are_left_out() {
-        let of = |fv: u64, ti: u64| Counted { by_unit: vec![Counts { tv: 9, fi: 1, fv, ti }], by_block: Vec::new() };
+        let one = |fv: u64, ti: u64| Counted { by_unit: vec![Counts { tv: 9, fi: 1, fv, ti }], by_block: Vec::new() };
         // 1 of 10 and 30 of 60, the long recording no more than the short one
-        assert_eq!(rates(&[of(1, 9), of(30, 30)]), [Some(30.0), Some(10.0), None, None]);
-        assert_eq!(rates(&[of(1, 9), of(0, 0)])[0], Some(10.0));
+        let of = |all: [Counted; 2]| means(&all.each_ref().map(rates));
+        assert_eq!(of([one(1, 9), one(30, 30)]), [Some(30.0), Some(10.0), None, None]);
+        assert_eq!(of([one(1, 9), one(0, 0)])[0], Some(10.0));
     }
 }
