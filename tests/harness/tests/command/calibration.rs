@@ -142,7 +142,8 @@ fn a_plan_is_simulated_tuned_and_judged_and_both_searches_are_compared() {
     let side = run(2, ", mount = { y_m = -19.0, height_m = 5.0, yaw_deg = 5.0, pitch_deg = 4.0 }");
     std::fs::write(folder.join("plan.toml"), unit("gantry", &side)).unwrap();
     let tune = "tune --plan plan.toml --to 3 --bootstrap 50 --evaluations 2";
-    let text = done(&folder, &format!("{tune} --unit gantry --against-random 2 --state s --out o"));
+    let text = done(&folder, &format!("{tune} --unit gantry --against-random 2 --state s --out o --ablation"));
+    assert_eq!(text.matches(" again: ").count(), 12, "{text}");
     assert!(text.contains("2 evaluations (bayes search, seed 1)"), "{text}");
     let won = text.split("less loss than chance with ").nth(1).unwrap();
     assert!(won.starts_with("0 of 2 seeds"), "one random point is the same for both: {won}");
@@ -150,7 +151,9 @@ fn a_plan_is_simulated_tuned_and_judged_and_both_searches_are_compared() {
         assert!(folder.join(state).exists(), "{state}");
     }
     let tuned = std::fs::read_to_string(folder.join("o/tuned.toml")).unwrap();
-    assert!(tuned.contains("on motorway-1; seed 1") && tuned.contains("Judged on 1 others"), "{tuned}");
+    assert!(tuned.contains("on motorway-1; seed 1") && tuned.contains("[estimators.radar_3d.obstacles]"), "{tuned}");
+    let daemon = std::fs::read_to_string(folder.join("o/daemon.toml")).unwrap();
+    assert!(daemon.contains("\n[obstacles]\n") && daemon.contains("\n[visibility]\n"), "{daemon}");
     assert!(refused(&folder, &format!("{tune} --unit tunnel")).contains("no unit `tunnel`, but gantry"));
     std::fs::write(folder.join("plan.toml"), unit("gantry", &run(1, ""))).unwrap();
     let refused = refused(&folder, &format!("{tune} --unit gantry"));

@@ -1,5 +1,7 @@
 //! `viewshed tune`: parameters of `radar-3d` found on training recordings, and what they are worth on others.
 
+mod searches;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,9 +12,10 @@ use super::print;
 use super::progress::bar;
 use crate::command::options::SettingsArgs;
 use crate::evaluation::Settings;
+use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::paired::{Counted, differences};
 use crate::recording;
-use crate::results::files::{Folder, OutputArgs, Target};
+use crate::results::files::{Folder, OutputArgs};
 use crate::results::pictures::tradeoff::{
     self, Counted as Axes, Curve, CurvePoint, Marker, MarkerKind, Span, TradeOff,
 };
@@ -21,6 +24,7 @@ use crate::results::report::table::Extent;
 use crate::studies::tune::plan::{Plan, Run};
 use crate::studies::tune::space::Space;
 use crate::studies::tune::{Evaluation, Prepared, Rates, Search, State, count, joined};
+use searches::{Searches, usual};
 
 /// Find parameters of radar-3d on some recordings and judge them on others
 ///
@@ -66,6 +70,10 @@ pub struct Args {
     /// FILE.HOW-SEED.
     #[arg(long, value_name = "SEEDS", value_parser = clap::value_parser!(u16).range(1..=100), conflicts_with = "search")]
     against_random: Option<u16>,
+    /// Say what each parameter is worth: how the sum of the rates changes, on what is judged, with its usual value in
+    /// place of the tuned one
+    #[arg(long)]
+    ablation: bool,
     /// Keep the search in this file, and go on with it where the file has one
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     state: Option<PathBuf>,
@@ -125,7 +133,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let [before, after] = [&settings.estimators, &tuned].map(|o| count(set, o, &settings).map(|all| joined(&all)));
         all.push(compared(of, &before?, &after?, &settings));
     }
-    print(&(text(state, &found, &all) + &searches.against_random()))?;
+    let mut told = text(state, &found, &all);
+    if args.ablation {
+        told += &ablation(state, &found, &test, &settings)?;
+    }
+    print(&(told + &searches.against_random()))?;
     if let Some(folder) = &folder {
         folder.file("tuned.toml")?.write(toml(state, &found, test.len(), ""))?;
         folder.file("daemon.toml")?.write(toml(state, &found, test.len(), "estimators.radar_3d."))?;
@@ -133,86 +145,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Every search that is run, each with its file.
-struct Searches {
-    /// How, seed, file, and what the file had.
-    wanted: Vec<(Search, u64, Option<(PathBuf, Option<String>, Target)>)>,
-    done: Vec<State>,
-}
-
-impl Searches {
-    fn open(args: &Args, inputs: &[PathBuf]) -> Result<Self> {
-        // a state that is gone on with is replaced; it is looked at first
-        let mut outputs = OutputArgs { force: true }.beside(inputs.to_vec());
-        let mut file = |of: Option<PathBuf>| -> Result<_> {
-            let Some(path) = of else { return Ok(None) };
-            let full = path.metadata().is_ok_and(|m| m.len() > 0);
-            let read = || std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()));
-            let known = full.then(read).transpose()?;
-            let file = outputs.file("--state", Some(&path))?.context("no file")?;
-            Ok(Some((path, known, file)))
-        };
-        let mut wanted = Vec::new();
-        let seed = args.search_seed;
-        let Some(seeds) = args.against_random else {
-            return Ok(Self { wanted: vec![(args.search, seed, file(args.state.clone())?)], done: Vec::new() });
-        };
-        for seed in (0..u64::from(seeds)).map(|k| seed.wrapping_add(k)) {
-            for search in [Search::Bayes, Search::Random] {
-                let path = args.state.as_ref().map(|path| {
-                    let mut path = path.clone().into_os_string();
-                    path.push(format!(".{}-{seed}", search.name()));
-                    PathBuf::from(path)
-                });
-                wanted.push((search, seed, file(path)?));
-            }
-        }
-        Ok(Self { wanted, done: Vec::new() })
-    }
-
-    fn run(&mut self, evaluations: usize, space: &Space, training: &[Prepared], settings: &Settings) -> Result<()> {
-        let searching = bar("tuning", (evaluations * self.wanted.len()) as u64);
-        for (search, seed, file) in &self.wanted {
-            let mut state = State::new(*search, *seed, space.clone(), training, settings);
-            if let Some((path, Some(text), _)) = file {
-                state.resume(text).with_context(|| format!("--state {}", path.display()))?;
-            }
-            state.evaluations.iter().take(evaluations).for_each(|_| searching.step());
-            let save = |state: &State| -> Result<()> {
-                searching.step();
-                searching.say(&format!("tuning, best {:.1} of {:.1}", best(state), usual(state)));
-                file.as_ref().map_or(Ok(()), |(_, _, file)| file.write(serde_json::to_string(state)? + "\n"))
-            };
-            state.run(evaluations, training, settings, &save)?;
-            self.done.push(state);
-        }
-        Ok(())
-    }
-
-    /// The one that is judged.
-    fn first(&self) -> Result<&State> {
-        self.done.first().context("no search")
-    }
-
-    /// How often the process found less than chance; nothing where it was not asked.
-    fn against_random(&self) -> String {
-        let mut text = String::new();
-        let (mut won, mut seeds) = (0, 0);
-        for pair in self.done.chunks_exact(2) {
-            let [bayes, random] = [best(&pair[0]), best(&pair[1])];
-            text += &format!("  seed {}: loss {bayes:.2}, at random {random:.2}\n", pair[0].seed);
-            won += usize::from(bayes < random);
-            seeds += 1;
-        }
-        if seeds == 0 {
-            return text;
-        }
-        format!(
-            "The process found less loss than chance with {won} of {seeds} seeds, as many evaluations each:\n{text}"
-        )
-    }
 }
 
 /// Simulates recordings of a plan.
@@ -238,14 +170,6 @@ fn prepared(paths: &[PathBuf], settings: &Settings) -> Result<Vec<Prepared>> {
         ensure!(all[..k].iter().all(|other| other.recording.name != *name), "two recordings are called {name}");
     }
     Ok(all)
-}
-
-fn best(state: &State) -> f64 {
-    state.best().map_or(f64::NAN, |e| e.loss)
-}
-
-fn usual(state: &State) -> f64 {
-    state.evaluations.first().map_or(f64::NAN, |e| e.loss)
 }
 
 fn compared(of: &str, before: &Counted, after: &Counted, settings: &Settings) -> Compared {
@@ -286,6 +210,31 @@ fn text(state: &State, found: &Evaluation, all: &[Compared]) -> String {
     text
 }
 
+/// What is lost where one parameter has its usual value again.
+fn ablation(state: &State, found: &Evaluation, test: &[Prepared], settings: &Settings) -> Result<String> {
+    let usual = state.evaluations.first().context("no evaluation")?;
+    let counted = |values: &[f64]| -> Result<Counted> {
+        Ok(joined(&count(test, &state.space.apply(&settings.estimators, values)?, settings)?))
+    };
+    let tuned = counted(&found.values)?;
+    let putting_back = bar("putting back", state.space.parameter.len() as u64);
+    let mut text =
+        String::from("Sum of the rates judged, with the usual value of one parameter in place of the tuned one:\n");
+    for (k, p) in state.space.parameter.iter().enumerate() {
+        let mut values = found.values.clone();
+        values[k] = usual.values[k];
+        let options = &settings.evaluation;
+        let all = differences(&tuned, &counted(&values)?, options.bootstrap, options.seed);
+        let sum = all.iter().find(|d| d.rate == "sum").context("no sum")?;
+        let points = sum.points.map_or_else(|| "-".into(), |points| format!("{points:+.1}"));
+        let interval =
+            sum.interval.map_or_else(String::new, |Interval(low, high)| format!(" ({low:+.1} to {high:+.1})"));
+        text += &format!("  {} = {} again: {points}{interval}\n", p.key, usual.values[k]);
+        putting_back.step();
+    }
+    Ok(text)
+}
+
 /// The values as a configuration: tables of `--config` below `[estimators]`, or of the daemon's file.
 fn toml(state: &State, found: &Evaluation, judged: usize, of: &str) -> String {
     let mut tables: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -295,7 +244,7 @@ fn toml(state: &State, found: &Evaluation, judged: usize, of: &str) -> String {
         tables.entry(table.to_owned()).or_default().push(format!("{key} = {v:?}"));
     }
     let mut text = format!(
-        "# Found by `viewshed tune` in {} evaluations on {}; seed {}.\n# Judged on {judged} others.\n",
+        "# Found by `viewshed tune` in {} evaluations on {}; seed {}.\n# Others judged: {judged}.\n",
         state.evaluations.len(),
         state.training.join(", "),
         state.seed,
