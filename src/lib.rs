@@ -75,6 +75,7 @@
 //! | `defmt` | who reads a controller's log | `Format` on public types, and events |
 //! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
 //! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
+//! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!

@@ -73,6 +73,7 @@ impl Default for EvidenceConfig {
     }
 }
 
+#[cfg(feature = "tuned")]
 impl EvidenceConfig {
     /// Every number of it, in the order of the fields, for fingerprints.
     pub fn numbers(&self) -> [f32; 6] {

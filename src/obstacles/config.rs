@@ -2,7 +2,9 @@
 
 use super::lanes::Lanes;
 use super::profile::HIT;
-use super::size::{SizeConfig, SizePoint};
+use super::size::SizeConfig;
+#[cfg(feature = "tuned")]
+use super::size::SizePoint;
 use super::tracking::Tracking;
 use crate::fixed::math;
 use crate::fixed::trig::Direction;
@@ -154,6 +156,7 @@ impl Default for ObstacleConfig {
 }
 
 impl ObstacleConfig {
+    #[cfg(feature = "tuned")]
     /// Every number of it, in the order of the fields, for fingerprints.
     pub fn numbers(&self) -> impl Iterator<Item = f32> {
         // a field that is forgotten does not compile

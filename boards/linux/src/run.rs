@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::board::{BlockError, Flow, StoredSettings};
-use viewshed::{PolarMap, Reason, Settings, Time, UnitState};
+use viewshed::{PolarMap, Reason, Time, UnitState};
 
 use super::input::{self, Input, Step, Work};
 use super::size::{CHECK, Map, Parameters, Sender, State};

@@ -4,7 +4,9 @@ use super::{BlockError, ConfigureRadar, Settings, UnitConfig};
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+#[cfg(feature = "tuned")]
 use crate::grid::evidence::EvidenceConfig;
+#[cfg(feature = "tuned")]
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::MOST_LANES;
 use crate::radar_3d::VisibilityConfig;
@@ -60,14 +62,18 @@ impl Settings {
             sum = fingerprint(&with);
         };
         // where there is no room for lanes, nothing runs with them
-        for (number, lane) in (1..).zip(self.lanes).take(MOST_LANES) {
+        let lanes = if MOST_LANES == 0 { &[] } else { self.lanes };
+        for (number, lane) in (1..).zip(lanes) {
             take([number, 0]);
             lane.iter().for_each(|point| take(point.map(f32::to_bits)));
         }
-        let obstacles = self.obstacles.into_iter().flat_map(ObstacleConfig::numbers);
-        (1 << 16..).zip(obstacles).for_each(|(place, number)| take([place, number.to_bits()]));
-        let evidence = self.evidence.into_iter().flat_map(EvidenceConfig::numbers);
-        (1 << 17..).zip(evidence).for_each(|(place, number)| take([place, number.to_bits()]));
+        #[cfg(feature = "tuned")]
+        {
+            let obstacles = self.obstacles.into_iter().flat_map(ObstacleConfig::numbers);
+            (1 << 16..).zip(obstacles).for_each(|(place, number)| take([place, number.to_bits()]));
+            let evidence = self.evidence.into_iter().flat_map(EvidenceConfig::numbers);
+            (1 << 17..).zip(evidence).for_each(|(place, number)| take([place, number.to_bits()]));
+        }
         sum
     }
 

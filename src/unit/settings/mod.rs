@@ -34,7 +34,9 @@ pub use unit_config::{ConfigureRadar, UnitConfig};
 use crate::camera::Camera3dConfig;
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+#[cfg(feature = "tuned")]
 use crate::grid::evidence::EvidenceConfig;
+#[cfg(feature = "tuned")]
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::Lane;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
@@ -74,9 +76,11 @@ pub struct Settings {
     #[cfg_attr(feature = "serde", serde(skip))]
     pub lanes: &'static [Lane],
     /// How obstacles are tracked, where that was tuned for the place; no block has it.
+    #[cfg(feature = "tuned")]
     #[cfg_attr(feature = "serde", serde(skip))]
     pub obstacles: Option<&'static ObstacleConfig>,
     /// How evidence comes and goes, likewise.
+    #[cfg(feature = "tuned")]
     #[cfg_attr(feature = "serde", serde(skip))]
     pub evidence: Option<&'static EvidenceConfig>,
 }
@@ -138,7 +142,9 @@ impl Settings {
             broadcast_bus: BusConfig::default(),
             unit: UnitConfig::default(),
             lanes: &[],
+            #[cfg(feature = "tuned")]
             obstacles: None,
+            #[cfg(feature = "tuned")]
             evidence: None,
         }
     }
@@ -154,9 +160,14 @@ impl Settings {
     /// The estimator's configuration; what an integrator does not set is the library's.
     pub fn radar_3d(&self) -> Radar3dConfig {
         let Self { gate, visibility, health, lanes, .. } = *self;
-        let obstacles = self.obstacles.copied().unwrap_or_default();
-        let evidence = self.evidence.copied().unwrap_or_default();
-        Radar3dConfig { gate, obstacles, evidence, visibility, health, lanes }
+        let config = Radar3dConfig { gate, visibility, health, lanes, ..Radar3dConfig::default() };
+        #[cfg(feature = "tuned")]
+        let config = Radar3dConfig {
+            obstacles: self.obstacles.copied().unwrap_or_default(),
+            evidence: self.evidence.copied().unwrap_or_default(),
+            ..config
+        };
+        config
     }
 
     /// The newer of two slots that holds and is accepted: its number and settings, and the sequence to write
