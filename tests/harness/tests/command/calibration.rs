@@ -159,3 +159,20 @@ fn a_plan_is_simulated_tuned_and_judged_and_both_searches_are_compared() {
     let refused = refused(&folder, &format!("{tune} --unit gantry"));
     assert!(refused.contains("has the seed 1 of another recording"), "{refused}");
 }
+
+#[test]
+fn what_was_tuned_and_is_shipped_is_taken_by_a_replay() {
+    let folder = folder("tuned");
+    std::fs::copy(shipped().join("motorway.mcap"), folder.join("a.mcap")).unwrap();
+    let rates = |config: &str| {
+        done(&folder, &format!("replay a.mcap --to 3 --bootstrap 0 --force --json r.json{config}"));
+        let report = json(&folder.join("r.json"));
+        let rows = report["estimators"].as_array().unwrap().clone();
+        rows.into_iter().find(|row| row["name"] == "radar-3d").unwrap()["cells"].clone()
+    };
+    let usual = rates("");
+    for unit in ["motorway", "crossing", "queue"] {
+        let file = shipped().join(format!("tuned/{unit}.toml"));
+        assert_ne!(rates(&format!(" --config {}", file.display())), usual, "{unit}");
+    }
+}
