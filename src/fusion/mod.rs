@@ -31,6 +31,11 @@
 //! # Cost
 //! Some 22 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
+#[cfg(feature = "bench")]
+mod alignment;
+#[cfg(feature = "bench")]
+mod fixtures;
+mod followed;
 mod monitor;
 mod places;
 mod polar;
@@ -42,6 +47,10 @@ use crate::map::{Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
+#[cfg(feature = "bench")]
+pub use alignment::{Alignment, AlignmentConfig};
+#[cfg(feature = "bench")]
+pub use fixtures::{Fixtures, FixturesConfig};
 pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
 use places::{Place, Places};
 pub use polar::{fill, polar};

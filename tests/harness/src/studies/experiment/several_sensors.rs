@@ -76,7 +76,7 @@ impl Plan {
         Ok(())
     }
 
-    fn scene(&self, site: &Site) -> Result<Scene> {
+    pub fn scene(&self, site: &Site) -> Result<Scene> {
         let mut scene = Scene::read(&self.folder.join(&site.scene))?;
         scene.seed = site.seed;
         scene.duration_s = site.duration_s.unwrap_or(scene.duration_s);
