@@ -151,6 +151,8 @@ struct Sector {
     /// Windows without any fixture, less those with.
     missed: u16,
     blind: bool,
+    /// Whether enough were expected in the last window.
+    expects: bool,
 }
 
 /// A mean difference, and whether it is believed in.
@@ -230,7 +232,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             began: None,
             windows: 0,
             fixtures: heapless::Vec::new(),
-            sectors: [Sector { missed: 0, blind: false }; K],
+            sectors: [Sector { missed: 0, blind: false, expects: false }; K],
             levels: [turned, turned, weaker].map(Level::new),
             missing: Level::new(fewer),
         })
@@ -279,7 +281,8 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         for fixture in self.fixtures.iter_mut().filter(|f| f.count > 0) {
             fixture.seen = fixture.seen.saturating_add(1);
             // a mean over all windows in which it was seen
-            let part = |shift: i16| shift.checked_div(i16::try_from(fixture.seen).unwrap_or(i16::MAX).min(16)).unwrap_or(0);
+            let part =
+                |shift: i16| shift.checked_div(i16::try_from(fixture.seen).unwrap_or(i16::MAX).min(16)).unwrap_or(0);
             let [azimuth, elevation, strength] = fixture.mean().map(part);
             fixture.azimuth = fixture.azimuth.wrapping_add(azimuth);
             fixture.elevation = fixture.elevation.map(|v| v.wrapping_add(elevation));
@@ -312,7 +315,8 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             }
         }
         for (sector, (expected, seen)) in self.sectors.iter_mut().zip(expected.iter().zip(&seen)) {
-            if *expected < EXPECTED {
+            sector.expects = *expected >= EXPECTED;
+            if !sector.expects {
                 continue;
             }
             // twice what is needed at most, so that a mended sensor is trusted again soon
@@ -351,6 +355,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     /// Whether nothing of what stands in a sector is seen; not of one that does not exist.
     pub fn is_blind(&self, sector: usize) -> bool {
         self.sectors.get(sector).is_some_and(|sector| sector.blind)
+    }
+
+    /// Whether a sector has enough that stands and is not in a shadow for it to be judged.
+    pub fn expects(&self, sector: usize) -> bool {
+        self.sectors.get(sector).is_some_and(|sector| sector.expects)
     }
 
     /// How far it was turned to the left since it was learned, if that is to be named.

@@ -33,8 +33,7 @@ struct One {
 pub(super) struct Followed([One; MOST]);
 
 impl Followed {
-    pub(super) const NONE: Self =
-        Self([One { at: RoadPoint::new(0, 0), speed: (0, 0), last: None, by_both: 0 }; MOST]);
+    pub(super) const NONE: Self = Self([One { at: RoadPoint::new(0, 0), speed: (0, 0), last: None, by_both: 0 }; MOST]);
 
     /// An obstacle is observed, by both sensors or by the other alone; in how many frames both have, before this one.
     pub(super) fn take(&mut self, now: Time, at: RoadPoint, both: bool) -> u8 {
@@ -90,7 +89,10 @@ mod tests {
         // 20 m/s along y, another one 8 m behind it, 15 frames a second
         for k in 0..30 {
             let y = 133 * k;
-            assert_eq!(followed.take(ms(66 * u64::try_from(k).unwrap()), RoadPoint::new(500, y), true), u8::try_from(k).unwrap());
+            assert_eq!(
+                followed.take(ms(66 * u64::try_from(k).unwrap()), RoadPoint::new(500, y), true),
+                u8::try_from(k).unwrap()
+            );
             assert_eq!(followed.take(ms(66 * u64::try_from(k).unwrap()), RoadPoint::new(500, y - 800), false), 0);
         }
         // where the first will be after three frames without it

@@ -59,14 +59,7 @@ pub struct MonitorConfig {
 
 impl Default for MonitorConfig {
     fn default() -> Self {
-        Self {
-            usual_miss: 0.3,
-            blind_miss: 0.97,
-            threshold: 6.0,
-            window_ms: 500,
-            learned_windows: 200,
-            confirmed: 8,
-        }
+        Self { usual_miss: 0.3, blind_miss: 0.97, threshold: 6.0, window_ms: 500, learned_windows: 200, confirmed: 8 }
     }
 }
 
