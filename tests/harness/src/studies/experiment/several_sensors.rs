@@ -203,7 +203,8 @@ fn site_of(
 ) -> Result<SiteResult> {
     let fcd = site.fcd.as_ref().map(|fcd| plan.folder.join(fcd));
     let scene = plan.scene(site)?;
-    let lanes = if scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some()) { scene.lanes()? } else { Vec::new() };
+    let lanes =
+        if scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some()) { scene.lanes()? } else { Vec::new() };
     let simulation = Simulation::new(scene, fcd.as_deref())?;
     let name = site.name();
     keep(&name, &simulation)?;
