@@ -20,7 +20,7 @@
 //!
 //! # Limits
 //! Silent where nothing moves that both have seen before, and where no other sensor looks. A sensor that loses its sight over hours is
-//! taken for usual. Says that a sensor misses, not why. Follows 48 obstacles at once, the latest. 16 bytes a sector, and 1.7 kB.
+//! taken for usual. Says that a sensor misses, not why. Follows 48 obstacles at once, the latest. 2.2 kB with six sectors.
 //!
 //! # References
 //! Page, "Continuous inspection schemes", Biometrika 41, 1954.

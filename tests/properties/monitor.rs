@@ -165,3 +165,10 @@ fn a_monitor_that_cannot_be_is_refused_by_name() {
     let error = Monitor::<6>::new(&MOUNT, [60.0, -60.0], &usual).unwrap_err();
     assert_eq!(error.parameter, "azimuth_deg[1]");
 }
+
+#[test]
+fn what_watches_a_sensor_is_as_small_as_its_page_says() {
+    use viewshed::fusion::{Alignment, Fixtures};
+    let bytes = [size_of::<Monitor<6>>(), size_of::<Alignment<3>>(), size_of::<Fixtures<64, 6>>()];
+    assert_eq!(bytes, [2240, 312, 1584]);
+}
