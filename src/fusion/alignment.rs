@@ -1,21 +1,24 @@
-//! Whether sensors place the same obstacles at the same bearings: a mount that was turned, or is not as it was configured.
+//! Whether sensors place the same obstacles at the same bearings: a mount that was turned, or is not as it was
+//! configured.
 //!
 //! # Model
-//! Two sensors follow the same vehicle. Seen from the first, the other one's place for it lies at another bearing than its own: that is
-//! the residual, of both signs from vehicle to vehicle, as they see other sides of it, and of one sign where a mount is turned. The
-//! median of it is followed by its sign alone: each window (`window_ms`) the median moves by `step_deg`, times the share of residuals
-//! above it less the share below, so that wrong pairs weigh as much as any. A turn is known in the frame of the sensor that is turned
-//! and of the one that is not, where it is smaller or larger with the distances.
+//! Two sensors follow the same vehicle. Seen from the first, the other one's place for it lies at another bearing than
+//! its own: that is the residual, of both signs from vehicle to vehicle, as they see other sides of it, and of one sign
+//! where a mount is turned. The median of it is followed by its sign alone: each window (`window_ms`) the median moves
+//! by `step_deg`, times the share of residuals above it less the share below, so that wrong pairs weigh as much as any.
+//! A turn is known in the frame of the sensor that is turned and of the one that is not, where it is smaller or larger
+//! with the distances.
 //!
-//! A pair disagrees from `limit_deg` on, in the frame of either, until both have sunk to `release_deg`. Who of them is turned, a third
-//! one tells: a sensor is turned if it disagrees with at least two others that agree with each other. The road is such a third one
-//! where its lanes are known: the place it gives for a vehicle is the nearest on the middle of a lane that goes its way. So `S` are
-//! all sensors, and one more for the road if it is asked.
+//! A pair disagrees from `limit_deg` on, in the frame of either, until both have sunk to `release_deg`. Who of them is
+//! turned, a third one tells: a sensor is turned if it disagrees with at least two others that agree with each other.
+//! The road is such a third one where its lanes are known: the place it gives for a vehicle is the nearest on the
+//! middle of a lane that goes its way. So `S` are all sensors, and one more for the road if it is asked.
 //!
 //! # Limits
-//! Bearings of what is 15 to 120 m away; nearer, the sides of a vehicle are degrees apart. A turn of more than a lane at that
-//! distance is another lane's to the road, and to a sensor what is more than 4 m apart is not the same. Vehicles that all drive the same way, and are
-//! all seen from one side, leave half a degree in order. 0.3 kB for three.
+//! Bearings of what is 15 to 120 m away; nearer, the sides of a vehicle are degrees apart. A turn of more than a lane
+//! at that distance is another lane's to the road, and to a sensor what is more than 4 m apart is not the same.
+//! Vehicles that all drive the same way, and are all seen from one side, leave half a degree in order. 0.3 kB for
+//! three.
 
 use crate::fixed::angle::Angle;
 use crate::fixed::math;

@@ -1,23 +1,26 @@
 //! What usually stands where a sensor looks: missing, weaker or elsewhere, something is wrong with the sensor.
 //!
 //! # Model
-//! Posts, masts and signs reflect in every frame, whether or not anything drives. What does not move and is seen in most windows
-//! (`window_ms`) of the learning time becomes a fixture, with the place and strength it then has; what is learned stays, so that a
-//! slow change is not taken for usual. From then on, each window, of the fixtures that the sensor's own map calls visible:
+//! Posts, masts and signs reflect in every frame, whether or not anything drives. What does not move and is seen in
+//! most windows (`window_ms`) of the learning time becomes a fixture, with the place and strength it then has; what is
+//! learned stays, so that a slow change is not taken for usual. From then on, each window, of the fixtures that the
+//! sensor's own map calls visible:
 //!
 //! | what | is said of | from |
 //! |---|---|---|
-//! | blind | a sector | `blind_windows` more windows in which none of its fixtures is seen where two or more should be, than any is |
+//! | blind | a sector | `blind_windows` more windows without any of its fixtures, where two should be, than with one |
 //! | weaker | the sensor | the mean fall of their strength, over some minutes |
 //! | fewer | the sensor | the share of them that is seen, against the share usually seen |
 //! | turned, tilted | the sensor | the mean shift of their azimuths, of their elevations |
 //!
-//! A difference counts up to four times its limit, so that one wrong match weighs little, and is believed in until it has sunk to half
-//! the limit, which is the hysteresis. A fixture in a shadow, as behind a lorry that waits, is not asked for.
+//! A difference counts up to four times its limit, so that one wrong match weighs little, and is believed in until it
+//! has sunk to half the limit, which is the hysteresis. A fixture in a shadow, as behind a lorry that waits, is not
+//! asked for.
 //!
 //! # Limits
-//! `N` fixtures, the most often seen; 1.6 kB with 64 of them and six sectors. A mount that is wrong from the first day is learned as it is: other
-//! sensors tell ([`Alignment`](super::Alignment)). Learning should see some minutes of a sensor in order.
+//! `N` fixtures, the most often seen; 1.6 kB with 64 of them and six sectors. A mount that is wrong from the first day
+//! is learned as it is: other sensors tell ([`Alignment`](super::Alignment)). Learning should see some minutes of a
+//! sensor in order.
 
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
@@ -256,7 +259,8 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         }
     }
 
-    /// Closes the window when it is over; `sees` is what the sensor's own map says of a place. Time that steps back begins a new one.
+    /// Closes the window when it is over; `sees` is what the sensor's own map says of a place. Time that steps back
+    /// begins a new one.
     pub fn advance(&mut self, now: Time, sees: impl Fn(RoadPoint) -> bool) {
         let Some(began) = self.began.filter(|began| now >= *began) else {
             self.began = Some(now);

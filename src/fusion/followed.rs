@@ -1,9 +1,9 @@
 //! Which observations of moving obstacles are of the same one, and how often two sensors have agreed on it.
 //!
 //! # Model
-//! Each obstacle is looked for where the one before would be by now, at its speed between the last observations, smoothed. What lies
-//! within 2.5 m of that and was not observed in this frame yet is the same one; anything else is new. What was not observed for half a
-//! second is forgotten.
+//! Each obstacle is looked for where the one before would be by now, at its speed between the last observations,
+//! smoothed. What lies within 2.5 m of that and was not observed in this frame yet is the same one; anything else is
+//! new. What was not observed for half a second is forgotten.
 
 use crate::fixed::math;
 use crate::fixed::time::Time;

@@ -1,26 +1,29 @@
 //! Who of several sensors is blind: others see what it should see by its own map, and it does not.
 //!
 //! # Model
-//! The view of the watched sensor is cut into sectors. Whatever moving obstacle another sensor follows there is held against the watched
-//! one's own map: where that says hidden or unknown, nothing follows, as a shadow explains why it sees nothing. Where it says visible, the
-//! watched sensor either detects it too, or has missed it. A miss counts only of an obstacle that both have detected before, in
-//! `confirmed` frames: mirror images and other ghosts of one sensor are hardly ever in the other's. Which observations are of
-//! one obstacle is told by where the one before would be by now.
+//! The view of the watched sensor is cut into sectors. Whatever moving obstacle another sensor follows there is held
+//! against the watched one's own map: where that says hidden or unknown, nothing follows, as a shadow explains why it
+//! sees nothing. Where it says visible, the watched sensor either detects it too, or has missed it. A miss counts only
+//! of an obstacle that both have detected before, in `confirmed` frames: few of the mirror images and other ghosts of one
+//! sensor pass that. Which observations are of one obstacle is told by where the one before would be by
+//! now.
 //!
-//! Each half second (`window_ms`) in which a sector has more misses than hits is a miss,
-//! any other with either is a hit; one weighs ln(blind / usual), the other ln((1 - blind) / (1 - usual)), a sequential probability ratio
-//! (Page 1954: never below 0). From `threshold` on the sector is blind, and it is so until its evidence is used up again, which
-//! is the hysteresis.
+//! Each half second (`window_ms`) in which a sector has more misses than hits is a miss, any other with either is a
+//! hit; one weighs ln(blind / usual), the other ln((1 - blind) / (1 - usual)), a sequential probability ratio (Page
+//! 1954: never below 0). From `threshold` on the sector is blind, and it is so until its evidence is used up again,
+//! which is the hysteresis.
 //!
-//! `blind` is `blind_miss`, the share of misses of a blind sector. `usual` is the sector's own share, learned over `learned_windows`
-//! of its windows, and at least `usual_miss`: behind a mast or at the far end of the view a sensor in order misses more than elsewhere.
-//! A sector that usually misses nearly as much as a blind one is not judged anew; one that is blind stays so until it sees.
+//! `blind` is `blind_miss`, the share of misses of a blind sector. `usual` is the sector's own share, learned over
+//! `learned_windows` of its windows, and at least `usual_miss`: behind a mast or at the far end of the view a sensor in
+//! order misses more than elsewhere. A sector that usually misses nearly as much as a blind one is not judged anew; one
+//! that is blind stays so until it sees.
 //!
 //! [`watched`](Monitor::watched) is the sensor's map without its blind sectors, to be fused in its place.
 //!
 //! # Limits
-//! Silent where nothing moves that both have seen before, and where no other sensor looks. A sensor that loses its sight over hours is
-//! taken for usual. Says that a sensor misses, not why. Follows 48 obstacles at once, the latest. 2.2 kB with six sectors.
+//! Silent where nothing moves that both have seen before, and where no other sensor looks. A sensor that loses its
+//! sight over hours is taken for usual. Says that a sensor misses, not why. Follows 48 obstacles at once, the latest.
+//! 2.2 kB with six sectors.
 //!
 //! # References
 //! Page, "Continuous inspection schemes", Biometrika 41, 1954.
@@ -160,9 +163,9 @@ impl<const K: usize> Monitor<K> {
         usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
     }
 
-    /// Another sensor follows an obstacle whose middle is here. `own` is what the watched sensor's map says of the place
-    /// (before [`watched`](Self::watched), or a blind sector stays blind), `detected` whether that
-    /// detects something there, too. One observation an obstacle and frame.
+    /// Another sensor follows an obstacle whose middle is here. `own` is what the watched sensor's map says of the
+    /// place (before [`watched`](Self::watched), or a blind sector stays blind), `detected` whether that detects
+    /// something there, too. One observation an obstacle and frame.
     pub fn observe(&mut self, now: Time, at: RoadPoint, own: CellState, detected: bool) -> Observed {
         self.advance(now);
         let seen_by_both = self.followed.take(now, at, detected);
@@ -179,7 +182,8 @@ impl<const K: usize> Monitor<K> {
         observed
     }
 
-    /// Closes the window when it is over; [`observe`](Self::observe) does so as well. Time that steps back begins a new one.
+    /// Closes the window when it is over; [`observe`](Self::observe) does so as well. Time that steps back begins a new
+    /// one.
     pub fn advance(&mut self, now: Time) {
         let Some(began) = self.began.filter(|began| now >= *began) else {
             self.began = Some(now);

@@ -49,7 +49,8 @@ const FUSION: &str = "fusion";
 /// Instructions that fusing two maps may take.
 const FUSION_BUDGET: u64 = 300_000;
 
-/// Two sensors watched by each other's obstacles, and what stands in the view of one: monitors, alignment and fixtures together.
+/// Two sensors watched by each other's obstacles, and what stands in the view of one: monitors, alignment and fixtures
+/// together.
 const MONITOR: &str = "monitor";
 
 /// What is measured on the recording's maps only, or their sending and receiving.

@@ -1,7 +1,7 @@
 //! Two sensors on one road, each alone and fused: two radars at a crossing, or a radar and a camera on a gantry.
 //!
-//! Both sensors look at the same traffic at the same time, and are judged as any [set](crate::evaluation::sensor_set) is. Then each
-//! watches the other.
+//! Both sensors look at the same traffic at the same time, and are judged as any [set](crate::evaluation::sensor_set)
+//! is. Then each watches the other.
 
 use std::path::{Path, PathBuf};
 
@@ -159,8 +159,8 @@ struct SiteResult {
     watched: Watched,
 }
 
-/// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged. `keep` is given each site's
-/// name and what it is recorded with.
+/// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged. `keep` is given each
+/// site's name and what it is recorded with.
 ///
 /// # Errors
 /// Those of the scenes, the traffic and of the estimators' parameters.

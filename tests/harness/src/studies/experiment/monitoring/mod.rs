@@ -1,8 +1,8 @@
 //! What visibility is worth to whoever watches sensors: the same monitor with the watched sensor's map, and without it.
 //!
-//! Each sensor of a site is watched by the others, in order and with a third of its view gone dark. With its own map a miss counts
-//! only where that says visible; without, wherever the sensor looks. [`turned`] turns mounts, [`standing`] asks what usually stands
-//! where a radar looks.
+//! Each sensor of a site is watched by the others, in order and with a third of its view gone dark. With its own map a
+//! miss counts only where that says visible; without, wherever the sensor looks. [`turned`] turns mounts, [`standing`]
+//! asks what usually stands where a radar looks.
 
 pub mod standing;
 pub mod turned;
@@ -28,15 +28,15 @@ const SECTORS: usize = 6;
 const THIRDS: usize = 3;
 /// After the warm-up a sensor is in order for so long, seconds.
 const IN_ORDER_S: f64 = 20.0;
-/// A sensor detects what another one follows if it detects something in its outline or so near to it, metres: ends that neither
-/// has seen are guessed.
+/// A sensor detects what another one follows if it detects something in its outline or so near to it, metres: ends that
+/// neither has seen are guessed.
 const SAME_M: f64 = 3.0;
 
 /// What a monitor said of a sensor.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Alerts {
-    /// Sectors that went dark, were not judged blind before, and in which another sensor followed within 10 s what both had seen
-    /// before, and how many of them were named at all; how long that took, seconds, summed.
+    /// Sectors that went dark, were not judged blind before, and in which another sensor followed within 10 s what both
+    /// had seen before, and how many of them were named at all; how long that took, seconds, summed.
     pub dark: u64,
     pub named: u64,
     pub named_after_s: f64,
@@ -235,8 +235,8 @@ mod tests {
     use crate::geometry::pose::SensorPose;
     use crate::recording::RadarDetection;
 
-    /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15 degrees to
-    /// the left of the first.
+    /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15
+    /// degrees to the left of the first.
     fn site() -> [Recording; 2] {
         let mut both = [recording(1200, 1), recording(1200, 1)];
         both[1].pose = SensorPose::new([60.0, 0.0, 6.0], std::f64::consts::PI, 0.0, 0.0);

@@ -1,9 +1,9 @@
-//! What usually stands where a radar looks: a third of its view that goes dark, a mount that is turned, and dirt, without any traffic
-//! that another sensor would see.
+//! What usually stands where a radar looks: a third of its view that goes dark, a mount that is turned, and dirt,
+//! without any traffic that another sensor would see.
 //!
-//! A radar learns for [`LEARNED_S`] seconds from the beginning of its recording. Then, each in a run of its own: nothing happens; a third of its view goes dark;
-//! it is turned by a degree to either side; dirt grows, [`DIRT_DB`] in half of what is left of the recording, and what
-//! falls below the weakest that was detected before is lost.
+//! A radar learns for [`LEARNED_S`] seconds from the beginning of its recording. Then, each in a run of its own:
+//! nothing happens; a third of its view goes dark; it is turned by a degree to either side; dirt grows, [`DIRT_DB`] in
+//! half of what is left of the recording, and what falls below the weakest that was detected before is lost.
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -32,7 +32,8 @@ pub struct Stood {
     pub radars: u64,
     /// What they learned to stand.
     pub fixtures: u64,
-    /// Sectors that went dark with two fixtures or more in them, and how many of them were named, and within 10 s; seconds, summed.
+    /// Sectors that went dark with two fixtures or more in them, and how many of them were named, and within 10 s;
+    /// seconds, summed.
     pub dark: u64,
     pub dark_named: u64,
     pub within_10_s: u64,

@@ -1,7 +1,7 @@
 //! Mounts that are turned against what is configured: who disagrees with whom, and who of them is wrong.
 //!
-//! Each sensor of a site in turn hangs a degree to the left, and a degree to the right, of what its configuration says, and sensors are
-//! compared by what they follow. The lanes of the road are a third sensor where they are known.
+//! Each sensor of a site in turn hangs a degree to the left, and a degree to the right, of what its configuration says,
+//! and sensors are compared by what they follow. The lanes of the road are a third sensor where they are known.
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -31,7 +31,8 @@ const ALONG: f64 = 0.94;
 /// What comparing sensors said.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Turned {
-    /// Mounts that were turned; how many were named as a pair with another one, how many within 30 s, and after how many seconds, summed.
+    /// Mounts that were turned; how many were named as a pair with another one, how many within 30 s, and after how
+    /// many seconds, summed.
     pub turned: u64,
     pub pairs: u64,
     pub within_30_s: u64,
