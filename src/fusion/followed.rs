@@ -42,7 +42,7 @@ impl Followed {
             let ms = i32::try_from(since_us / 1000).ok()?;
             let off = |now: i32, then: i32, speed: i32| now.saturating_sub(then).saturating_sub(speed * ms / 1000);
             let (x, y) = (off(at.x_cm, one.at.x_cm, one.speed.0), off(at.y_cm, one.at.y_cm, one.speed.1));
-            let near = x.abs() <= GATE_CM && y.abs() <= GATE_CM;
+            let near = x.unsigned_abs().max(y.unsigned_abs()) <= GATE_CM.unsigned_abs();
             near.then(|| math::length(x, y)).filter(|d| *d <= GATE_CM)
         };
         let known = self.0.iter_mut().filter_map(|one| Some((distance(one)?, one))).min_by_key(|(d, _)| *d);

@@ -241,5 +241,17 @@ mod tests {
         assert_eq!(fixed("two-radars.toml"), radars);
         let camera: Vec<_> = (5201..5206).map(|seed| ("motorway.toml".to_owned(), seed, false)).collect();
         assert_eq!(fixed("radar-camera.toml"), camera);
+        let long: Vec<_> = (5301..5306).map(|seed| ("motorway.toml".to_owned(), seed, false)).collect();
+        assert_eq!(fixed("monitoring-motorway.toml"), long);
+        let queues = ["exit-1", "exit-2", "waves-1", "waves-2"];
+        let queues: Vec<_> =
+            queues.iter().zip(5401..).map(|(s, seed)| (format!("queue/{s}.toml"), seed, true)).collect();
+        assert_eq!(fixed("monitoring-queues.toml"), queues);
+        let three = ["crossing/wide-1", "crossing/wide-2", "motorway", "motorway"];
+        let three: Vec<_> = three.iter().zip(5501..).map(|(s, seed)| (format!("{s}.toml"), seed, true)).collect();
+        assert_eq!(fixed("three-radars.toml"), three);
+        // what is tuned on is none of these
+        let training = shipped("monitoring-train.toml");
+        assert!(training.site.iter().all(|site| (6101..6200).contains(&site.seed)));
     }
 }

@@ -159,11 +159,11 @@ fn one(
         }
         alignment.advance(time(frame.time_ns));
         for a in 0..sensors {
-            for b in a + 1..sensors {
+            for (b, disagreed) in disagreed[a].iter_mut().enumerate().take(sensors).skip(a + 1) {
                 let is_one = turned.is_none_or(|(k, _)| k == a || k == b);
                 if alignment.disagree(a, b) && is_one {
                     pair_named.get_or_insert(since);
-                    disagreed[a][b] = true;
+                    *disagreed = true;
                 }
             }
             if let Some(by) = alignment.turned(a) {
