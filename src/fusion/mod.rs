@@ -1,9 +1,9 @@
-//! Maps of several sensors as one map of the road: who sees each place, what is hidden from all of them, and where they contradict
-//! each other.
+//! Maps of several sensors as one map of the road: who sees each place, what is hidden from all of them, and where they
+//! contradict each other.
 //!
 //! # Model
-//! The road is a grid of square cells. Of each sensor it holds what its newest map says of each cell's centre: the nearest cell of that
-//! map, never a better one. A place is
+//! The road is a grid of square cells. Of each sensor it holds what its newest map says of each cell's centre: the
+//! nearest cell of that map, never a better one. A place is
 //!
 //! | it is | if, among the sensors whose newest map is fresh, |
 //! |---|---|
@@ -13,24 +13,30 @@
 //! | occupied | any that sees it says so, whatever the others say; where nobody sees it, any that knows of it |
 //! | in conflict | one sees it free, and nothing occupied beside it, where another sees it occupied |
 //!
-//! A map that is late or claims to be of the future is refused; what is held of a sensor counts until it is too old. A newer map replaces
-//! all that its sensor said before. Maps of one sensor and one time are parts of the same scan, or repetitions: they are joined, and where
-//! both know a cell the worse of them counts. So as long as a sensor keeps its mount and its kind of map, neither the order in which
-//! maps come, nor repeating them, nor cutting them into parts makes a difference. Mount and kind are those of its first map until it is
-//! [forgotten](Fusion::forget), which is also due when it starts over: a map does not say so.
+//! A map that is late or claims to be of the future is refused; what is held of a sensor counts until it is too old. A
+//! newer map replaces all that its sensor said before. Maps of one sensor and one time are parts of the same scan, or
+//! repetitions: they are joined, and where both know a cell the worse of them counts. So as long as a sensor keeps its
+//! mount and its kind of map, neither the order in which maps come, nor repeating them, nor cutting them into parts
+//! makes a difference. Mount and kind are those of its first map until it is [forgotten](Fusion::forget), which is also
+//! due when it starts over: a map does not say so.
 //!
 //! [`fill`] puts it into the cells of a [`polar`] map around a place of one's choice, which a
 //! [`Broadcaster`](crate::wire::broadcast::Broadcaster) sends.
 //!
 //! # Limits
-//! At most 8 sensors; `NX * NY * (3 * S + 1) + 4 * NX * S` bytes. What lies between the middles of cells is not looked at: cells are 2 m
-//! at most. Polar maps count up to 400 m from their sensor. Clocks are the caller's: times of all sensors, and `now`, are of one clock.
-//! A sensor that sends its last picture again and again with new times cannot be told from a road on which nothing moves: its
-//! [`Monitor`] can, where others see what it should.
+//! At most 8 sensors; `NX * NY * (3 * S + 1) + 4 * NX * S` bytes. What lies between the middles of cells is not looked
+//! at: cells are 2 m at most. Polar maps count up to 400 m from their sensor. Clocks are the caller's: times of all
+//! sensors, and `now`, are of one clock. A sensor that sends its last picture again and again with new times cannot be
+//! told from a road on which nothing moves: its [`Monitor`] can, where others see what it should.
 //!
 //! # Cost
 //! Some 22 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
+#[cfg(feature = "bench")]
+mod alignment;
+#[cfg(feature = "bench")]
+mod fixtures;
+mod followed;
 mod monitor;
 mod places;
 mod polar;
@@ -42,6 +48,10 @@ use crate::map::{Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
+#[cfg(feature = "bench")]
+pub use alignment::{Alignment, AlignmentConfig};
+#[cfg(feature = "bench")]
+pub use fixtures::{Fixtures, FixturesConfig};
 pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
 use places::{Place, Places};
 pub use polar::{fill, polar};
@@ -79,7 +89,8 @@ pub enum NotTaken {
     Early,
     /// It is too old to count: late, or its clock differs.
     Late,
-    /// Its cells lie elsewhere than those of the sensor's first map, or it is of another kind: another mount, grid or threshold.
+    /// Its cells lie elsewhere than those of the sensor's first map, or it is of another kind: another mount, grid or
+    /// threshold.
     OtherGeometry,
 }
 
@@ -169,7 +180,8 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         self.occupied.iter_mut().flatten().for_each(|bits| *bits &= !bit(sensor));
     }
 
-    /// Takes a polar map. Where its cells lie is worked out with the first one, and again after [`forget`](Self::forget).
+    /// Takes a polar map. Where its cells lie is worked out with the first one, and again after
+    /// [`forget`](Self::forget).
     ///
     /// # Errors
     /// Why it was not taken.

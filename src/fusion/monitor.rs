@@ -1,21 +1,29 @@
 //! Who of several sensors is blind: others see what it should see by its own map, and it does not.
 //!
 //! # Model
-//! The view of the watched sensor is cut into sectors. Whatever another sensor detects there is held against the watched one's own map:
-//! where that says hidden or unknown, nothing follows, as a shadow explains why it sees nothing. Where it says visible, the watched
-//! sensor either detects it too, or has missed it. Each half second (`window_ms`) in which a sector has more misses than hits is a miss,
-//! any other with either is a hit; one weighs ln(blind / usual), the other ln((1 - blind) / (1 - usual)), a sequential probability ratio
-//! (Page 1954: never below 0). From `threshold` on the sector is blind, and it is so until its evidence is used up again, which
-//! is the hysteresis.
+//! The view of the watched sensor is cut into sectors. Whatever moving obstacle another sensor follows there is held
+//! against the watched one's own map: where that says hidden or unknown, nothing follows, as a shadow explains why it
+//! sees nothing. Where it says visible, the watched sensor either detects it too, or has missed it. A miss counts only
+//! of an obstacle that both have detected before, in `confirmed` frames: few of the mirror images and other ghosts of one
+//! sensor pass that. Which observations are of one obstacle is told by where the one before would be by
+//! now.
 //!
-//! `blind` is `blind_miss`, the share of misses of a blind sector. `usual` is the sector's own share, learned over `learned_windows` of its windows, and
-//! at least `usual_miss`: behind a mast or at the far end of the view a sensor in order misses more than elsewhere. A sector
-//! that usually misses nearly as much as a blind one is not judged anew; one that is blind stays so until it sees.
+//! Each half second (`window_ms`) in which a sector has more misses than hits is a miss, any other with either is a
+//! hit; one weighs ln(blind / usual), the other ln((1 - blind) / (1 - usual)), a sequential probability ratio (Page
+//! 1954: never below 0). From `threshold` on the sector is blind, and it is so until its evidence is used up again,
+//! which is the hysteresis.
+//!
+//! `blind` is `blind_miss`, the share of misses of a blind sector. `usual` is the sector's own share, learned over
+//! `learned_windows` of its windows, and at least `usual_miss`: behind a mast or at the far end of the view a sensor in
+//! order misses more than elsewhere. A sector that usually misses nearly as much as a blind one is not judged anew; one
+//! that is blind stays so until it sees.
 //!
 //! [`watched`](Monitor::watched) is the sensor's map without its blind sectors, to be fused in its place.
 //!
 //! # Limits
-//! Silent where nothing moves that others see, and where no other sensor looks. A sensor that loses its sight over hours is taken for usual. Says that a sensor misses, not why. 16 bytes a sector, and 128.
+//! Silent where nothing moves that both have seen before, and where no other sensor looks. A sensor that loses its
+//! sight over hours is taken for usual. Says that a sensor misses, not why. Follows 48 obstacles at once, the latest.
+//! 2.2 kB with six sectors.
 //!
 //! # References
 //! Page, "Continuous inspection schemes", Biometrika 41, 1954.
@@ -30,6 +38,7 @@ use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
 
+use super::followed::Followed;
 use super::polar::edges;
 
 /// When a sector is judged blind.
@@ -47,11 +56,13 @@ pub struct MonitorConfig {
     pub window_ms: u16,
     /// Windows of a sector over which its usual share of misses is learned; 0: it is `usual_miss` everywhere.
     pub learned_windows: u16,
+    /// Frames in which both sensors have detected an obstacle before a miss of it counts; 0: any counts.
+    pub confirmed: u8,
 }
 
 impl Default for MonitorConfig {
     fn default() -> Self {
-        Self { usual_miss: 0.5, blind_miss: 0.97, threshold: 8.0, window_ms: 500, learned_windows: 200 }
+        Self { usual_miss: 0.3, blind_miss: 0.97, threshold: 6.0, window_ms: 500, learned_windows: 200, confirmed: 8 }
     }
 }
 
@@ -63,6 +74,8 @@ pub enum Observed {
     Outside,
     /// Its own map says that it cannot see the place.
     Explained,
+    /// It does not see it, but has not often enough seen it before: it may be a ghost of the other sensor.
+    Unconfirmed,
     /// It should see it, and does.
     Hit,
     /// It should see it, and does not.
@@ -100,6 +113,8 @@ pub struct Monitor<const K: usize> {
     window_us: u64,
     began: Option<Time>,
     sectors: [Sector; K],
+    confirmed: u8,
+    followed: Followed,
 }
 
 impl<const K: usize> Monitor<K> {
@@ -135,6 +150,8 @@ impl<const K: usize> Monitor<K> {
             window_us: 1000 * window as u64,
             began: None,
             sectors: [Sector { hits: 0, misses: 0, evidence: 0, usual: least, blind: false }; K],
+            confirmed: config.confirmed,
+            followed: Followed::NONE,
         })
     }
 
@@ -146,14 +163,18 @@ impl<const K: usize> Monitor<K> {
         usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
     }
 
-    /// Another sensor detects something at a place. `own` is what the watched sensor's map says of it
-    /// (before [`watched`](Self::watched), or a blind sector stays blind), `detected` whether that
-    /// detects something there, too.
+    /// Another sensor follows an obstacle whose middle is here. `own` is what the watched sensor's map says of the
+    /// place (before [`watched`](Self::watched), or a blind sector stays blind), `detected` whether that detects
+    /// something there, too. One observation an obstacle and frame.
     pub fn observe(&mut self, now: Time, at: RoadPoint, own: CellState, detected: bool) -> Observed {
         self.advance(now);
+        let seen_by_both = self.followed.take(now, at, detected);
         let Some(sector) = self.sector(at).and_then(|k| self.sectors.get_mut(k)) else { return Observed::Outside };
         if !own.visible() {
             return Observed::Explained;
+        }
+        if !detected && seen_by_both < self.confirmed {
+            return Observed::Unconfirmed;
         }
         let (count, observed) =
             if detected { (&mut sector.hits, Observed::Hit) } else { (&mut sector.misses, Observed::Miss) };
@@ -161,7 +182,8 @@ impl<const K: usize> Monitor<K> {
         observed
     }
 
-    /// Closes the window when it is over; [`observe`](Self::observe) does so as well. Time that steps back begins a new one.
+    /// Closes the window when it is over; [`observe`](Self::observe) does so as well. Time that steps back begins a new
+    /// one.
     pub fn advance(&mut self, now: Time) {
         let Some(began) = self.began.filter(|began| now >= *began) else {
             self.began = Some(now);

@@ -14,13 +14,13 @@ const THRESHOLD: u8 = 128;
 /// Most places of a cell that are looked at, along it and across.
 const MOST_PLACES: i32 = 8;
 
-/// An unknown map of `A` azimuths by `R` ranges around a place that stands for a sensor: a mount, the right and the left edge of all
-/// azimuths from its heading in degrees, and the length of a cell in metres. Its [`Header`](crate::wire::header::Header) is made of
-/// the same mount.
+/// An unknown map of `A` azimuths by `R` ranges around a place that stands for a sensor: a mount, the right and the
+/// left edge of all azimuths from its heading in degrees, and the length of a cell in metres. Its
+/// [`Header`](crate::wire::header::Header) is made of the same mount.
 ///
 /// # Errors
-/// A mount that cannot be, edges in the wrong order or more than half a turn apart, cells smaller than 0.25 m, larger than 10 m or, all of
-/// them together, longer than 400 m.
+/// A mount that cannot be, edges in the wrong order or more than half a turn apart, cells smaller than 0.25 m, larger
+/// than 10 m or, all of them together, longer than 400 m.
 pub fn polar<const R: usize, const A: usize>(
     mount: &Mount,
     azimuth_deg: [f32; 2],
@@ -49,8 +49,8 @@ pub(super) fn edges([right, left]: [f32; 2]) -> Result<(Angle, u16), ConfigError
     Ok((Angle::from_degrees(right), span as u16))
 }
 
-/// Fills a polar map of [`polar`]: each cell has the worst of what is known at up to 8 by 8 places in it, a metre or more apart, and is
-/// occupied if any of them is. So it is never better than what it covers.
+/// Fills a polar map of [`polar`]: each cell has the worst of what is known at up to 8 by 8 places in it, a metre or
+/// more apart, and is occupied if any of them is. So it is never better than what it covers.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // cell numbers; angles wrap
 pub fn fill<const R: usize, const A: usize>(map: &mut PolarMap<R, A>, with: &(impl VisibilityMap + ?Sized)) {
     let geometry = *map.geometry();

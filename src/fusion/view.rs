@@ -126,8 +126,8 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
         (visible & self.fresh, occupied & self.fresh)
     }
 
-    /// Where sensors contradict each other. What one sees free counts only if it sees nothing occupied in the eight cells around
-    /// either: their times and their edges differ by some.
+    /// Where sensors contradict each other. What one sees free counts only if it sees nothing occupied in the eight
+    /// cells around either: their times and their edges differ by some.
     pub fn conflicts(&self) -> impl Iterator<Item = Conflict> + '_ {
         let cells = (0..NX).flat_map(|i| (0..NY).map(move |j| (i, j)));
         cells.filter_map(|(i, j)| self.conflict(i, j))

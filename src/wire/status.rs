@@ -67,6 +67,12 @@ pub enum Reason {
     Overrun,
     /// Points keep coming, but none that can be used: not finite, or all outside the field of view.
     UnusablePoints,
+    /// Other sensors see what it should see, or what stands there is not seen any more: a part of its maps is unknown.
+    SectorBlind,
+    /// The mount is turned or tilted, or is not as it was configured: maps lie beside what they show.
+    Misaligned,
+    /// It sees less of what stands there, or sees it weaker, than it did: dirt, snow.
+    Weaker,
     /// A number given by the integrator, or by a later version.
     Other(u8),
 }
@@ -86,6 +92,9 @@ impl Reason {
             Self::BusOff => 8,
             Self::Overrun => 9,
             Self::UnusablePoints => 10,
+            Self::SectorBlind => 11,
+            Self::Misaligned => 12,
+            Self::Weaker => 13,
             Self::Other(number) => number,
         }
     }
@@ -104,6 +113,9 @@ impl Reason {
             8 => Self::BusOff,
             9 => Self::Overrun,
             10 => Self::UnusablePoints,
+            11 => Self::SectorBlind,
+            12 => Self::Misaligned,
+            13 => Self::Weaker,
             other => Self::Other(other),
         }
     }
@@ -383,8 +395,8 @@ mod tests {
     #[test]
     fn of_a_page_of_a_later_version_state_and_reason_count() {
         let mut got = STATUS;
-        assert_eq!(got.take(&[0x63, 12, 1, 2, 3, 4]), Ok(()));
-        assert_eq!(got, Status { state: UnitState::Degraded, reason: Reason::Other(12), ..STATUS });
+        assert_eq!(got.take(&[0x63, 99, 1, 2, 3, 4]), Ok(()));
+        assert_eq!(got, Status { state: UnitState::Degraded, reason: Reason::Other(99), ..STATUS });
     }
 
     #[test]

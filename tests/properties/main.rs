@@ -11,8 +11,10 @@ use proptest::test_runner::{Config, RngSeed};
 mod setup;
 mod traffic;
 
+mod alignment;
 mod configuration;
 mod detections;
+mod fixtures;
 mod fusion;
 mod maps;
 mod monitor;

@@ -14,7 +14,10 @@ use viewshed::camera::map::{AZIMUTHS, CameraMap};
 use viewshed::camera::{Camera3dConfig, Camera3dParameters, CameraProfile, MOST_BOXES};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement};
-use viewshed::fusion::{Fusion, FusionConfig};
+use viewshed::fusion::{
+    Alignment, AlignmentConfig, Fixtures, FixturesConfig, Fusion, FusionConfig, Monitor, MonitorConfig,
+};
+use viewshed::map::VisibilityMap;
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
@@ -46,6 +49,10 @@ const FUSION: &str = "fusion";
 /// Instructions that fusing two maps may take.
 const FUSION_BUDGET: u64 = 300_000;
 
+/// Two sensors watched by each other's obstacles, and what stands in the view of one: monitors, alignment and fixtures
+/// together.
+const MONITOR: &str = "monitor";
+
 /// What is measured on the recording's maps only, or their sending and receiving.
 const WIRE: [&str; 6] = ["send-can", "receive-can", "send-fd", "receive-fd", "send-long", "receive-long"];
 
@@ -60,6 +67,7 @@ fn measured(estimator: &str) -> &'static str {
         "radar-2d" => "instructions::measured_frame_2d",
         "camera-3d" => "instructions::measured_frame_camera",
         FUSION => "instructions::measured_fusion",
+        MONITOR => "instructions::measured_monitor",
         "send-can" | "send-fd" | "send-long" => "instructions::measured_send",
         "receive-can" | "receive-fd" | "receive-long" => "instructions::measured_receive",
         _ => "instructions::measured_frame_3d",
@@ -85,8 +93,8 @@ fn main() -> ExitCode {
     println!("{:<16} {:<12} {:>9} {:>12} {:>12} {:>12}", "estimator", "scene", "frames", "mean", "median", "worst");
     let estimators = ESTIMATORS.iter().flat_map(|e| SCENES.map(|scene| (*e, scene)));
     let asked: Vec<&String> = args.iter().skip(1).filter(|a| !a.starts_with("--")).collect();
-    for (estimator, scene) in estimators.chain(CAMERA).chain([(FUSION, SCENES[0])]).chain(WIRE.map(|w| (w, SCENES[0])))
-    {
+    let several = [FUSION, MONITOR].into_iter().chain(WIRE).map(|estimator| (estimator, SCENES[0]));
+    for (estimator, scene) in estimators.chain(CAMERA).chain(several) {
         if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
             continue;
         }
@@ -168,6 +176,7 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
         "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),
         "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
         FUSION => run_fusion(&sensor, &frames),
+        MONITOR => run_monitor(&sensor, &frames),
         "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &frames),
         _ => run_2d(&sensor, &frames),
     }
@@ -229,6 +238,58 @@ fn measured_fusion(road: &mut Road, now: Time, map: &PolarMap<200, 120>) {
     for sensor in 0..2 {
         let _ = black_box(road.offer_polar(sensor, now, now, map));
     }
+}
+
+/// What watches two sensors that hang at the same place.
+struct Watch {
+    monitors: [Monitor<6>; 2],
+    alignment: Alignment<2>,
+    fixtures: Fixtures<64, 6>,
+}
+
+/// Radar-3d's obstacles as those of two sensors, a scan at a time.
+fn run_monitor(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
+    let parameters =
+        Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
+    let mut map = Box::new(parameters.map());
+    let levelling = sensor.mount.levelling().expect("the recording's mount");
+    let view = [sensor.field_of_view.azimuth_min_deg, sensor.field_of_view.azimuth_max_deg];
+    let monitor = || Monitor::new(&sensor.mount, view, &MonitorConfig::default()).expect("defaults are valid");
+    let config = FixturesConfig { learned_windows: 20, ..FixturesConfig::default() };
+    let mut watch = Watch {
+        monitors: [monitor(), monitor()],
+        alignment: Alignment::new(&[Some(sensor.mount); 2], &AlignmentConfig::default()).expect("defaults are valid"),
+        fixtures: Fixtures::new(&sensor.mount, view, &config).expect("defaults are valid"),
+    };
+    for (now, detections) in frames {
+        state.process(&parameters, *now, detections, false, &mut map);
+        let solids = state.obstacles().solids(parameters.tracking());
+        let places: Vec<RoadPoint> = solids.map(|s| levelling.unplace(s.x_cm, s.y_cm)).collect();
+        measured_monitor(&mut watch, *now, &places, detections, &map);
+    }
+    let [one, _] = &watch.monitors;
+    black_box((one.is_blind(0), watch.fixtures.learned()));
+}
+
+#[inline(never)]
+fn measured_monitor(
+    watch: &mut Watch,
+    now: Time,
+    places: &[RoadPoint],
+    detections: &[Detection],
+    map: &PolarMap<200, 120>,
+) {
+    for place in places {
+        for monitor in &mut watch.monitors {
+            black_box(monitor.observe(now, *place, map.at(*place), true));
+        }
+        watch.alignment.observe(0, *place, 1, *place);
+    }
+    detections.iter().for_each(|detection| watch.fixtures.observe(detection));
+    watch.monitors.iter_mut().for_each(|monitor| monitor.advance(now));
+    watch.alignment.advance(now);
+    watch.fixtures.advance(now, |place| map.at(place).visible());
 }
 
 /// Radar-3d's maps from a sender to a receiver, a scan at a time.

@@ -37,8 +37,8 @@ pub struct Fused {
     steps: usize,
 }
 
-/// Estimators with their frames, on a grid around these cells of the road, metres. Maps are fused at each `every`-th frame, as no others are
-/// judged.
+/// Estimators with their frames, on a grid around these cells of the road, metres. Maps are fused at each `every`-th
+/// frame, as no others are judged.
 ///
 /// # Errors
 /// More estimators than can be fused, a road larger than the grid.

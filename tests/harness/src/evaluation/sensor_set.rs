@@ -1,8 +1,8 @@
 //! Several sensors on one road: each alone, and their maps fused.
 //!
-//! Each is judged alone, on what lies in its own view; the fused map is judged on what lies in any of theirs, at the times of the first,
-//! and an object is detected if any detects it. Beside the rates stands what the set shows of the road and what each
-//! sensor shows of the same: cells seen, and objects detected.
+//! Each is judged alone, on what lies in its own view; the fused map is judged on what lies in any of theirs, at the
+//! times of the first, and an object is detected if any detects it. Beside the rates stands what the set shows of the
+//! road and what each sensor shows of the same: cells seen, and objects detected.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,18 +1,20 @@
 //! Two sensors on one road, each alone and fused: two radars at a crossing, or a radar and a camera on a gantry.
 //!
-//! Both sensors look at the same traffic at the same time, and are judged as any [set](crate::evaluation::sensor_set) is. Then each
-//! watches the other.
+//! Both sensors look at the same traffic at the same time, and are judged as any [set](crate::evaluation::sensor_set)
+//! is. Then each watches the other.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::monitoring::{self, Worth};
+use super::monitoring::standing::{self, Stood};
+use super::monitoring::turned::{self, Turned};
+use super::monitoring::{self, Follows, Worth};
 use super::plan;
 use crate::evaluation::Settings;
 use crate::evaluation::sensor_set::{self, Judged, SensorSet};
-use crate::recording::Recording;
 use crate::twin::scene::{FurtherRadar, Scene};
 use crate::twin::simulate::Simulation;
 
@@ -22,10 +24,20 @@ use crate::twin::simulate::Simulation;
 pub struct Plan {
     /// Start of each site that is not counted, seconds.
     pub warm_up_s: f64,
+    /// Otherwise sensors are watched only, which is faster.
+    #[serde(default = "yes")]
+    pub judged: bool,
+    /// Otherwise sensors are watched in order only, which is faster: for long runs.
+    #[serde(default = "yes")]
+    pub broken: bool,
     pub site: Vec<Site>,
     /// Folder of the file.
     #[serde(skip)]
     pub folder: PathBuf,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// A scene and its second sensor.
@@ -42,6 +54,8 @@ pub struct Site {
     pub duration_s: Option<f64>,
     /// A second radar like the first; without it the scene's camera is the second sensor.
     pub second_radar: Option<FurtherRadar>,
+    /// A third one, which watches with them.
+    pub third_radar: Option<FurtherRadar>,
 }
 
 impl Site {
@@ -81,7 +95,7 @@ impl Plan {
         scene.seed = site.seed;
         scene.duration_s = site.duration_s.unwrap_or(scene.duration_s);
         if let Some(second) = &site.second_radar {
-            scene.further_radars = vec![second.clone()];
+            scene.further_radars = [second.clone()].into_iter().chain(site.third_radar.clone()).collect();
             scene.camera = None;
         } else {
             scene.further_radars.clear();
@@ -110,28 +124,43 @@ impl Plan {
     /// # Errors
     /// Those of the scenes.
     pub fn steps(&self) -> Result<u64> {
-        // looked at, each sensor's samples, each sensor twice, fused
-        let frames = |site| Ok((self.scene(site)?.duration_s * self.scene(site)?.radar.rate_hz).ceil() as u64);
-        self.site.iter().map(|site| frames(site).map(|n: u64| 8 * n)).sum()
+        let steps = |site: &Site| -> Result<u64> {
+            let scene = self.scene(site)?;
+            let frames = (scene.duration_s * scene.radar.rate_hz).ceil() as u64;
+            let sensors = 2 + u64::from(site.third_radar.is_some());
+            // looked at; each sensor's samples, each sensor twice, and fused
+            Ok(frames * if self.judged { 2 + 3 * sensors } else { 1 })
+        };
+        self.site.iter().map(steps).sum()
     }
 }
 
 /// One site, or all of them pooled.
 #[derive(Debug)]
 pub struct Counted {
-    pub set: SensorSet,
-    /// Each sensor watched by the other.
-    pub watched: Worth,
+    pub name: String,
+    /// None where sensors were watched only.
+    pub set: Option<SensorSet>,
+    pub watched: Watched,
+}
+
+/// What monitors said.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Watched {
+    /// Each sensor watched by the others.
+    pub blind: Worth,
+    pub turned: Turned,
+    pub standing: Stood,
 }
 
 struct SiteResult {
     name: String,
-    judged: Judged,
-    watched: Worth,
+    judged: Option<Judged>,
+    watched: Watched,
 }
 
-/// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged. `keep` is given each site's
-/// name and what it is recorded with.
+/// Simulates and judges every site; the pooled result comes first. `every`-th frames are judged. `keep` is given each
+/// site's name and what it is recorded with.
 ///
 /// # Errors
 /// Those of the scenes, the traffic and of the estimators' parameters.
@@ -148,18 +177,20 @@ pub fn run(
         site_of(plan, site, &settings, every, keep, progress).with_context(|| format!("site {}", site.scene.display()))
     };
     let sites = plan.site.iter().map(one).collect::<Result<Vec<_>>>()?;
-    let counted = |name: &str, sites: &[&SiteResult]| -> Option<Counted> {
-        let judged: Vec<&Judged> = sites.iter().map(|site| &site.judged).collect();
-        let set = SensorSet::pooled(name, &judged, &settings.evaluation)?;
-        let mut watched = Worth::default();
+    let counted = |name: &str, sites: &[&SiteResult]| {
+        let judged: Option<Vec<&Judged>> = sites.iter().map(|site| site.judged.as_ref()).collect();
+        let set = judged.and_then(|judged| SensorSet::pooled(name, &judged, &settings.evaluation));
+        let mut watched = Watched::default();
         for site in sites {
-            watched.iter_mut().zip(site.watched).for_each(|(sum, one)| *sum += one);
+            watched.blind.iter_mut().zip(site.watched.blind).for_each(|(sum, one)| *sum += one);
+            watched.turned += site.watched.turned;
+            watched.standing += site.watched.standing;
         }
-        Some(Counted { set, watched })
+        Counted { name: name.to_owned(), set, watched }
     };
     let all: Vec<&SiteResult> = sites.iter().collect();
-    let pooled = counted("pooled", &all).into_iter();
-    Ok(pooled.chain(all.iter().filter_map(|site| counted(&site.name, &[site]))).collect())
+    let pooled = std::iter::once(counted("pooled", &all));
+    Ok(pooled.chain(all.iter().map(|site| counted(&site.name, &[site]))).collect())
 }
 
 fn site_of(
@@ -171,14 +202,21 @@ fn site_of(
     progress: &(dyn Fn() + Sync),
 ) -> Result<SiteResult> {
     let fcd = site.fcd.as_ref().map(|fcd| plan.folder.join(fcd));
-    let simulation = Simulation::new(plan.scene(site)?, fcd.as_deref())?;
+    let scene = plan.scene(site)?;
+    let lanes =
+        if scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some()) { scene.lanes()? } else { Vec::new() };
+    let simulation = Simulation::new(scene, fcd.as_deref())?;
     let name = site.name();
     keep(&name, &simulation)?;
     let range_m = f64::from(settings.estimators.camera_3d.range_max_m);
-    let recordings = simulation.recordings(range_m, progress)?;
-    let both: [Recording; 2] = recordings.try_into().map_err(|_| anyhow!("not two sensors"))?;
-    let judged = sensor_set::judge(&both, settings, every, progress)?;
-    let watched = monitoring::watch(&both, settings)?;
+    let all = simulation.recordings(range_m, progress)?;
+    let judged = plan.judged.then(|| sensor_set::judge(&all, settings, every, progress)).transpose()?;
+    let follows: Vec<Follows> = all.par_iter().map(|r| monitoring::follow(r, settings)).collect::<Result<_>>()?;
+    let watched = Watched {
+        blind: monitoring::watch(&all, &follows, settings, plan.broken)?,
+        turned: turned::compare(&all, &follows, &lanes, settings, plan.broken)?,
+        standing: standing::stand(&all, settings, plan.broken)?,
+    };
     Ok(SiteResult { name, judged, watched })
 }
 
@@ -203,5 +241,17 @@ mod tests {
         assert_eq!(fixed("two-radars.toml"), radars);
         let camera: Vec<_> = (5201..5206).map(|seed| ("motorway.toml".to_owned(), seed, false)).collect();
         assert_eq!(fixed("radar-camera.toml"), camera);
+        let long: Vec<_> = (5301..5306).map(|seed| ("motorway.toml".to_owned(), seed, false)).collect();
+        assert_eq!(fixed("monitoring-motorway.toml"), long);
+        let queues = ["exit-1", "exit-2", "waves-1", "waves-2"];
+        let queues: Vec<_> =
+            queues.iter().zip(5401..).map(|(s, seed)| (format!("queue/{s}.toml"), seed, true)).collect();
+        assert_eq!(fixed("monitoring-queues.toml"), queues);
+        let three = ["crossing/wide-1", "crossing/wide-2", "motorway", "motorway"];
+        let three: Vec<_> = three.iter().zip(5501..).map(|(s, seed)| (format!("{s}.toml"), seed, true)).collect();
+        assert_eq!(fixed("three-radars.toml"), three);
+        // what is tuned on is none of these
+        let training = shipped("monitoring-train.toml");
+        assert!(training.site.iter().all(|site| (6101..6200).contains(&site.seed)));
     }
 }

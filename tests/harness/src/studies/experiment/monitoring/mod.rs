@@ -1,12 +1,16 @@
 //! What visibility is worth to whoever watches sensors: the same monitor with the watched sensor's map, and without it.
 //!
-//! Each sensor of a site is watched by the other one, in order and with a third of its view gone dark. With its own map a miss counts
-//! only where that says visible; without, wherever the sensor looks.
+//! Each sensor of a site is watched by the others, in order and with a third of its view gone dark. With its own map a
+//! miss counts only where that says visible; without, wherever the sensor looks. [`turned`] turns mounts, [`standing`]
+//! asks what usually stands where a radar looks.
+
+pub mod standing;
+pub mod turned;
 
 use anyhow::Result;
 use rayon::prelude::*;
 use serde::Serialize;
-use viewshed::fusion::{Monitor, MonitorConfig};
+use viewshed::fusion::{Monitor, MonitorConfig, Observed};
 use viewshed::map::{CellState, Visibility};
 use viewshed::sensor::road::RoadPoint;
 
@@ -16,6 +20,7 @@ use crate::estimators::{
 };
 use crate::evaluation::Settings;
 use crate::evaluation::sensor_set::newest;
+use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
 
 const SECTORS: usize = 6;
@@ -23,16 +28,15 @@ const SECTORS: usize = 6;
 const THIRDS: usize = 3;
 /// After the warm-up a sensor is in order for so long, seconds.
 const IN_ORDER_S: f64 = 20.0;
-/// What a radar sees move slower is no observation: it may be a fixture that the other cannot see.
-const MOVING_MPS: f32 = 1.5;
-/// Two sensors see a vehicle at the same place if they see it this near, metres: they see other sides of it.
-const SAME_M: f64 = 6.0;
+/// A sensor detects what another one follows if it detects something in its outline or so near to it, metres: ends that
+/// neither has seen are guessed.
+const SAME_M: f64 = 3.0;
 
 /// What a monitor said of a sensor.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Alerts {
-    /// Sectors that went dark, were not judged blind before, and in which the other sensor saw something move within 10 s, and how many of them were named at
-    /// all; how long that took, seconds, summed.
+    /// Sectors that went dark, were not judged blind before, and in which another sensor followed within 10 s what both
+    /// had seen before, and how many of them were named at all; how long that took, seconds, summed.
     pub dark: u64,
     pub named: u64,
     pub named_after_s: f64,
@@ -66,14 +70,34 @@ impl Alerts {
 /// With visibility, and without.
 pub type Worth = [Alerts; 2];
 
-/// Watches both sensors of a site.
+/// What a sensor follows at each of its frames: a radar's confirmed obstacles, a camera's vehicles.
+pub type Follows = Vec<Vec<Solid>>;
+
+/// Runs a sensor's estimator.
+///
+/// # Errors
+/// Parameters of estimators that cannot be.
+pub fn follow(recording: &Recording, settings: &Settings) -> Result<Follows> {
+    if let Some(camera) = recording.of_camera() {
+        return camera.frames.iter().map(|frame| lifted(camera, frame, &settings.estimators.camera_3d)).collect();
+    }
+    let mut running = estimators::own(recording, &settings.estimators)?;
+    let obstacles = recording.frames.iter().map(|frame| {
+        running.step(frame);
+        running.obstacles()
+    });
+    Ok(obstacles.collect())
+}
+
+/// Watches every sensor of a site by the others; `broken` with thirds of them gone dark, too.
 ///
 /// # Errors
 /// Parameters of estimators or monitors that cannot be.
-pub fn watch(both: &[Recording; 2], settings: &Settings) -> Result<Worth> {
+pub fn watch(all: &[Recording], follows: &[Follows], settings: &Settings, broken: bool) -> Result<Worth> {
+    let thirds = if broken { THIRDS } else { 0 };
     let cases: Vec<(usize, Option<usize>)> =
-        (0..2).flat_map(|k| [(k, None)].into_iter().chain((0..THIRDS).map(move |t| (k, Some(t))))).collect();
-    let worth = cases.par_iter().map(|&(k, third)| one(&both[k], &both[1 - k], third, settings));
+        (0..all.len()).flat_map(|k| [(k, None)].into_iter().chain((0..thirds).map(move |t| (k, Some(t))))).collect();
+    let worth = cases.par_iter().map(|&(k, third)| one(all, k, follows, third, settings));
     let mut sum = Worth::default();
     for one in worth.collect::<Result<Vec<_>>>()? {
         sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
@@ -81,8 +105,15 @@ pub fn watch(both: &[Recording; 2], settings: &Settings) -> Result<Worth> {
     Ok(sum)
 }
 
-/// One sensor, watched by another one.
-fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Settings) -> Result<Worth> {
+/// One sensor, watched by the others.
+fn one(
+    all: &[Recording],
+    watched: usize,
+    follows: &[Follows],
+    dark: Option<usize>,
+    settings: &Settings,
+) -> Result<Worth> {
+    let own = &all[watched];
     let start = own.frames.first().map_or(0, |f| f.time_ns);
     let since_s = |frame: &Frame| (frame.time_ns - start) as f64 * 1e-9;
     let from_s = settings.evaluation.warm_up_s + IN_ORDER_S;
@@ -91,7 +122,11 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
     let view = own.sensor.field_of_view.azimuth_rad.map(f64::to_degrees);
     let new =
         || Monitor::<SECTORS>::new(&estimators::mount(&own.pose), view.map(|v| v as f32), &MonitorConfig::default());
-    let mut monitors = [new()?, new()?];
+    // a monitor for each that watches: an obstacle that two of them follow would be two
+    let mut watching = Vec::new();
+    for other in (0..all.len()).filter(|other| *other != watched) {
+        watching.push((other, [new()?, new()?]));
+    }
     let mut worth = Worth::default();
     let mut blind = [[false; SECTORS]; 2];
     let mut named = [[None::<f64>; SECTORS]; 2];
@@ -101,28 +136,32 @@ fn one(own: &Recording, other: &Recording, dark: Option<usize>, settings: &Setti
     let mut running = estimators::own(recording, &settings.estimators)?;
     for (k, frame) in recording.frames.iter().enumerate() {
         running.step(frame);
-        let since = since_s(frame);
-        let Some(theirs) = newest(other, frame.time_ns) else { continue };
-        let seen = places(recording, k, settings, 0.0)?;
+        let (since, now) = (since_s(frame), time(frame.time_ns));
+        let seen = places(recording, k, settings)?;
         let map = running.map();
-        for [x, y] in places(other, theirs, settings, MOVING_MPS)? {
-            let detected = seen.iter().any(|p| (p[0] - x).hypot(p[1] - y) <= SAME_M);
-            if !own.sensor.field_of_view.contains(own.pose.to_spherical([x, y, settings.evaluation.slice_height_m])) {
-                continue;
+        for (other, monitors) in &mut watching {
+            let Some(theirs) = newest(&all[*other], frame.time_ns) else { continue };
+            for solid in follows[*other].get(theirs).into_iter().flatten() {
+                let [x, y, _] = solid.center;
+                let place = own.pose.to_spherical([x, y, settings.evaluation.slice_height_m]);
+                if !own.sensor.field_of_view.contains(place) {
+                    continue;
+                }
+                let detected = seen.iter().any(|p| solid.footprint_distance(*p) <= SAME_M);
+                let at = RoadPoint::from_metres(x as f32, y as f32)?;
+                let anywhere = CellState { visibility: Visibility::Visible, grade: 255, occupancy: 0, occupied: false };
+                let [with, without] = monitors;
+                with.observe(now, at, map.at(at), detected);
+                let observed = without.observe(now, at, anywhere, detected);
+                if let (true, Some(sector)) = ((from_s..from_s + 10.0).contains(&since), without.sector(at)) {
+                    passed[sector] |= observed == Observed::Miss;
+                }
             }
-            let at = RoadPoint::from_metres(x as f32, y as f32)?;
-            let anywhere = CellState { visibility: Visibility::Visible, grade: 255, occupancy: 0, occupied: false };
-            if let (true, Some(sector)) = ((from_s..from_s + 10.0).contains(&since), monitors[0].sector(at)) {
-                passed[sector] = true;
-            }
-            for (monitor, state) in monitors.iter_mut().zip([map.at(at), anywhere]) {
-                monitor.observe(time(frame.time_ns), at, state, detected);
-            }
+            monitors.iter_mut().for_each(|monitor| monitor.advance(now));
         }
-        for (w, monitor) in monitors.iter_mut().enumerate() {
-            monitor.advance(time(frame.time_ns));
+        for w in 0..2 {
             for sector in 0..SECTORS {
-                let now = monitor.is_blind(sector);
+                let now = watching.iter().any(|(_, monitors)| monitors[w].is_blind(sector));
                 let before = std::mem::replace(&mut blind[w][sector], now);
                 let alert = now && !before;
                 // it learns what is usual meanwhile
@@ -177,20 +216,16 @@ fn darkened(own: &Recording, third: usize, from_ns: i64) -> Recording {
     dark
 }
 
-/// Where a sensor detects something on the road, at least so fast along its line of sight where it measures that.
-fn places(recording: &Recording, frame: usize, settings: &Settings, least_mps: f32) -> Result<Vec<[f64; 2]>> {
+/// Where a sensor detects something on the road.
+fn places(recording: &Recording, frame: usize, settings: &Settings) -> Result<Vec<[f64; 2]>> {
     if let Some(camera) = recording.of_camera() {
         let Some(boxes) = camera.frames.get(frame) else { return Ok(Vec::new()) };
         let solids = lifted(camera, boxes, &settings.estimators.camera_3d)?;
         return Ok(solids.iter().map(|s| [s.center[0], s.center[1]]).collect());
     }
     let height = settings.evaluation.slice_height_m;
-    let place = |d: &crate::recording::RadarDetection| {
-        let [x, y, _] = d.road_position(&recording.pose, height);
-        [x, y]
-    };
     let all = recording.frames.get(frame).map_or(&[][..], |f| &f.detections);
-    Ok(all.iter().filter(|d| d.radial_velocity_mps.abs() >= least_mps).map(place).collect())
+    Ok(all.iter().map(|d| d.road_position(&recording.pose, height)).map(|[x, y, _]| [x, y]).collect())
 }
 
 #[cfg(test)]
@@ -200,8 +235,8 @@ mod tests {
     use crate::geometry::pose::SensorPose;
     use crate::recording::RadarDetection;
 
-    /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15 degrees to
-    /// the left of the first.
+    /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15
+    /// degrees to the left of the first.
     fn site() -> [Recording; 2] {
         let mut both = [recording(1200, 1), recording(1200, 1)];
         both[1].pose = SensorPose::new([60.0, 0.0, 6.0], std::f64::consts::PI, 0.0, 0.0);
@@ -224,14 +259,19 @@ mod tests {
     fn a_third_that_goes_dark_is_named_and_sensors_in_order_are_not() {
         let mut settings = Settings::default();
         settings.evaluation.warm_up_s = 10.0;
-        let [with, without] = watch(&site(), &settings).unwrap();
+        let site = site();
+        // both follow one vehicle that stands and still moves towards them
+        let solid = Solid { center: [25.0, 6.7, 0.8], yaw_rad: 0.0, size: [4.0, 2.0, 1.6] };
+        let follows = [0, 1].map(|k| vec![vec![solid]; site[k].frames.len()]);
+        let [with, without] = watch(&site, &follows, &settings, true).unwrap();
         // one sector of each sensor has the vehicle in it; nobody sees anything in the others
         for alerts in [with, without] {
             assert_eq!((alerts.dark, alerts.wrong), (2, 0), "{alerts:?}");
             assert!((alerts.watched_s - 2.0 * 109.9).abs() < 0.2, "{alerts:?}");
         }
         assert_eq!((without.named, without.within_10_s), (2, 2), "{without:?}");
-        assert!(without.slowest_s > 6.0 && without.slowest_s < 9.0, "{without:?}");
+        assert!(without.slowest_s > 2.0 && without.slowest_s < 9.0, "{without:?}");
+        assert_eq!(watch(&site, &follows, &settings, false).unwrap()[1].dark, 0, "in order only");
     }
 
     #[test]
