@@ -75,7 +75,7 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     progress(0.8);
     let paths = joining::through_gaps(paths, &instants);
     let paths = exclusion::without_images(paths);
-    let paths: Vec<Path> = paths.into_par_iter().map(|path| standing::stood(path, &instants)).collect();
+    let paths = joining::through_gaps(standing::stood(paths, &instants), &instants);
     progress(0.9);
     let mut scored: Vec<(f64, &Path)> = paths
         .iter()
