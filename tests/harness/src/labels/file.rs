@@ -17,8 +17,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use super::Site;
-use super::near_face::{BoxStep, boxes, headings, nears};
-use super::simplify::simplify;
+use super::near_face::{self, BoxStep, boxes, headings};
 use super::tracks::{LabelPoint, LabelTrack, check_all};
 use crate::recording::beside;
 use crate::recording::labels::{LabelRow, at_line, label, read_rows};
@@ -139,7 +138,7 @@ fn track(path: &Path, rows: &[&(u64, LabelRow)], site: &Site) -> Result<LabelTra
     let mut track =
         LabelTrack { id: first.object_id.clone(), class: first.class.clone(), size_m, points: drawn.collect() };
     if track.points.is_empty() {
-        track.points = simplify(&nears(&steps(&rows), track.size(), site.sensor), TOLERANCE_M);
+        track.points = near_face::drawn(&steps(&rows), track.size(), site.sensor, TOLERANCE_M);
     }
     Ok(track)
 }

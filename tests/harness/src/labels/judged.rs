@@ -14,9 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::Result;
 
 use super::Site;
-use super::near_face::{BoxStep, boxes, nears};
+use super::near_face::{self, BoxStep, boxes};
 use super::proposals::Proposal;
-use super::simplify::simplify;
 use super::tracks::{LabelPoint, LabelTrack};
 use crate::estimators;
 use crate::evaluation::Options;
@@ -309,7 +308,7 @@ fn nears_of(instants: &[Instant], vehicle: usize, size: [f64; 3], site: &Site) -
             Some(BoxStep { time_s, center: [solid.center[0], solid.center[1]], heading_rad: solid.yaw_rad })
         })
         .collect();
-    simplify(&nears(&steps, size, site.sensor), DRAWN_M)
+    near_face::drawn(&steps, size, site.sensor, DRAWN_M)
 }
 
 /// What a person who sees the vehicle would draw.

@@ -10,22 +10,30 @@
 //! ```
 //!
 //! with `sat` a limit to -1..1. So both directions of travel and both sides of the road have their signs from the
-//! geometry, and between end and flank the point slides without a jump. The heading is that of the centres' path; a
-//! vehicle that stands keeps the heading it came with, or leaves with, and one that never moves looks along the road.
+//! geometry, and between end and flank the point slides without a jump. Between two points of a track the centre moves
+//! in a straight line, not the near face: that slides along a vehicle that passes the sensor, the faster the closer it
+//! passes. The heading is that of the centres' path; a vehicle that stands keeps the heading it came with, or leaves
+//! with, and one that never moves looks along the road.
 //!
 //! # Limits
 //! In a turn the heading is the mean over the few metres it is taken over; a test has 0.12 rad and 0.3 m for a car.
 
 use serde::{Deserialize, Serialize};
 
+use super::simplify::{error, kept};
 use super::tracks::{LabelPoint, LabelTrack};
 
 /// Time between two boxes of a track, seconds.
 pub const STEP_S: f64 = 0.1;
 /// The heading is taken between the places this far behind and ahead, metres.
 const HEADING_BASE_M: f64 = 4.0;
+/// How often the near face is computed anew, and how often halved: to a tenth of a millimetre.
+const ROUNDS: usize = 40;
+const HALVINGS: usize = 20;
 /// A track that nowhere gets this far from its start stands, metres.
 const STANDS_M: f64 = 0.5;
+/// How far the drawn line may be from the near face between two points, metres.
+const LINE_M: f64 = 2.0;
 /// Cosine of the aspect from which on the near face is the rear or the front.
 const END_COS: f64 = 0.5;
 /// Sine of the aspect from which on it is the flank.
@@ -73,31 +81,83 @@ pub fn center(near: [f64; 2], heading_rad: f64, size: [f64; 3], sensor: [f64; 2]
     [near[0] + o[0], near[1] + o[1]]
 }
 
-/// The near face of a box: the inverse of [`center`], to a millimetre where the sensor is not beside or in the box.
+/// The near face of a box: the inverse of [`center`], to a millimetre where the sensor is not in the box.
 pub fn near(center: [f64; 2], heading_rad: f64, size: [f64; 3], sensor: [f64; 2]) -> [f64; 2] {
-    // the offset depends on where the near face is seen; half steps keep the search from swinging
-    let mut near = center;
-    for _ in 0..60 {
-        let o = offset(near, heading_rad, size, sensor);
-        near = [0, 1].map(|k| 0.5 * near[k] + 0.5 * (center[k] - o[k]));
+    // in coordinates along the heading and to its left, from the sensor on
+    let (s, c) = heading_rad.sin_cos();
+    let [dx, dy] = [center[0] - sensor[0], center[1] - sensor[1]];
+    let [along, left] = [dx * c + dy * s, -dx * s + dy * c];
+    let [half_length, half_width] = [size[0] / 2.0, size[1] / 2.0];
+    // each is found alone, the other being known, and again until neither changes
+    let mut near = [along, left];
+    for _ in 0..ROUNDS {
+        let before = near;
+        near[0] =
+            rising(along, half_length, |a| half_length * (a / a.hypot(near[1]).max(1e-6) / END_COS).clamp(-1.0, 1.0));
+        near[1] =
+            rising(left, half_width, |l| half_width * (l / l.hypot(near[0]).max(1e-6) / FLANK_SIN).clamp(-1.0, 1.0));
+        if (near[0] - before[0]).hypot(near[1] - before[1]) < 1e-4 {
+            break;
+        }
     }
-    near
+    [sensor[0] + near[0] * c - near[1] * s, sensor[1] + near[0] * s + near[1] * c]
 }
 
-/// The boxes of a track: at its points and every [`STEP_S`] between the first and the last.
+/// The value that is `sum` with its offset added, which rises with it and is at most `most`: by halving.
+fn rising(sum: f64, most: f64, offset: impl Fn(f64) -> f64) -> f64 {
+    let [mut low, mut high] = [sum - most, sum + most];
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if middle + offset(middle) < sum { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The boxes of a track: at its points and every [`STEP_S`] between the first and the last. Between two points the
+/// centre moves in a straight line at constant speed: the near face slides along a vehicle that passes the sensor.
 pub fn boxes(track: &LabelTrack, sensor: [f64; 2]) -> Vec<BoxStep> {
-    let times = times(&track.points);
-    let nears: Vec<[f64; 2]> = times.iter().filter_map(|t| track.near_at(*t)).collect();
+    let (times, at) = times(&track.points);
+    let nears: Vec<[f64; 2]> = track.points.iter().map(|p| [p.x_m, p.y_m]).collect();
     let size = track.size();
-    let mut centers = nears.clone();
+    let mut centers = between(&nears, &times, &at);
     let mut headings = headings(&centers);
     // the heading is that of the centres, which depend on it
-    for _ in 0..3 {
-        centers = nears.iter().zip(&headings).map(|(near, h)| center(*near, *h, size, sensor)).collect();
+    for _ in 0..4 {
+        let own: Vec<[f64; 2]> =
+            nears.iter().zip(&at).map(|(near, k)| center(*near, headings[*k], size, sensor)).collect();
+        centers = between(&own, &times, &at);
         headings = self::headings(&centers);
     }
     let all = times.into_iter().zip(centers).zip(headings);
     all.map(|((time_s, center), heading_rad)| BoxStep { time_s, center, heading_rad }).collect()
+}
+
+/// Places at all times, from those at the times with these numbers.
+fn between(places: &[[f64; 2]], times: &[f64], at: &[usize]) -> Vec<[f64; 2]> {
+    let mut all = Vec::with_capacity(times.len());
+    for (k, from) in places.iter().enumerate() {
+        let (Some(to), Some(next)) = (places.get(k + 1), at.get(k + 1)) else {
+            all.push(*from);
+            continue;
+        };
+        let [a, b] = [times[at[k]], times[*next]];
+        let mix = |t: f64| [0, 1].map(|i| from[i] + (to[i] - from[i]) * (t - a) / (b - a));
+        all.extend(times[at[k]..*next].iter().map(|t| mix(*t)));
+    }
+    all
+}
+
+/// The fewest points to draw whose boxes are nowhere farther than `tolerance_m` from these, and whose line is
+/// near enough to the near face to be recognised.
+pub fn drawn(steps: &[BoxStep], size: [f64; 3], sensor: [f64; 2], tolerance_m: f64) -> Vec<LabelPoint> {
+    let nears = nears(steps, size, sensor);
+    let centers: Vec<LabelPoint> =
+        steps.iter().map(|b| LabelPoint { time_s: b.time_s, x_m: b.center[0], y_m: b.center[1] }).collect();
+    let wrong = |a: usize, b: usize, k: usize| {
+        let center = error(centers[a], centers[b], centers[k]) / tolerance_m;
+        center.max(error(nears[a], nears[b], nears[k]) / LINE_M)
+    };
+    kept(nears.len(), &wrong).into_iter().map(|k| nears[k]).collect()
 }
 
 /// Near faces of boxes.
@@ -109,17 +169,20 @@ pub fn nears(steps: &[BoxStep], size: [f64; 3], sensor: [f64; 2]) -> Vec<LabelPo
     steps.iter().map(point).collect()
 }
 
-/// Times of the points, and every step between.
-fn times(points: &[LabelPoint]) -> Vec<f64> {
-    let mut times = Vec::new();
-    for pair in points.windows(2) {
-        let [a, b] = [pair[0].time_s, pair[1].time_s];
-        // a microsecond longer than a step is a step
-        let parts = ((b - a - 1e-6) / STEP_S).ceil().clamp(1.0, 1e6);
-        times.extend((0..parts as u32).map(|k| a + (b - a) * f64::from(k) / parts));
+/// Times of the points and every step between, and the number of each point's.
+fn times(points: &[LabelPoint]) -> (Vec<f64>, Vec<usize>) {
+    let (mut times, mut at) = (Vec::new(), Vec::new());
+    for (k, point) in points.iter().enumerate() {
+        at.push(times.len());
+        let a = point.time_s;
+        times.push(a);
+        if let Some(b) = points.get(k + 1).map(|p| p.time_s) {
+            // a microsecond longer than a step is a step
+            let parts = ((b - a - 1e-6) / STEP_S).ceil().clamp(1.0, 1e6);
+            times.extend((1..parts as u32).map(|k| a + (b - a) * f64::from(k) / parts));
+        }
     }
-    times.extend(points.last().map(|p| p.time_s));
-    times
+    (times, at)
 }
 
 /// Heading at each place of a path: from the place behind to the place ahead, each the nearest in time that is far
@@ -222,6 +285,34 @@ mod tests {
                 assert!((step.center[0] - near - 8.25).abs() < 0.05, "{step:?}");
                 assert!((step.heading_rad - heading).cos().abs() < 1.0 + 1e-9);
                 assert!((step.heading_rad - heading).sin().abs() < 0.02 && (step.heading_rad - heading).cos() > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_truck_that_passes_the_sensor_keeps_its_speed_although_its_near_face_slides_along_it() {
+        for (speed, left) in [(20.0, 5.0), (-20.0, -5.0)] {
+            let truth: Vec<BoxStep> = (0..=60)
+                .map(|k| f64::from(k) * 0.1)
+                .map(|t| BoxStep {
+                    time_s: t,
+                    center: [speed * (t - 3.0), left],
+                    heading_rad: if speed > 0.0 { 0.0 } else { PI },
+                })
+                .collect();
+            let points = drawn(&truth, TRUCK, [0.0, 0.0], 0.4);
+            assert!(points.len() < 10, "{} points", points.len());
+            let steps = boxes(&LabelTrack { points, ..track("truck", &[]) }, [0.0, 0.0]);
+            for pair in steps.windows(2) {
+                let mps = (pair[1].center[0] - pair[0].center[0]) / (pair[1].time_s - pair[0].time_s);
+                assert!((mps - speed).abs() < 0.5, "{mps} m/s at {} s", pair[0].time_s);
+                close(pair[0].center, [speed * (pair[0].time_s - 3.0), left], 0.4);
+            }
+            // two points, at front and rear, are enough for the boxes
+            let ends = [truth[0], truth[60]];
+            let two = LabelTrack { points: nears(&ends, TRUCK, [0.0, 0.0]), ..track("truck", &[]) };
+            for (a, b) in truth.iter().zip(boxes(&two, [0.0, 0.0])) {
+                close(a.center, b.center, 0.1);
             }
         }
     }

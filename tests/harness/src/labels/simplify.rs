@@ -6,28 +6,27 @@
 
 use super::tracks::LabelPoint;
 
-/// The fewest of these points, chosen greedily, whose polyline is nowhere more than `tolerance_m` away from one of
-/// them at its time. First and last stay.
-pub fn simplify(points: &[LabelPoint], tolerance_m: f64) -> Vec<LabelPoint> {
-    let Some(last) = points.len().checked_sub(1) else { return Vec::new() };
-    let mut kept = vec![false; points.len()];
+/// Which of `count` points stay, the fewest, chosen greedily; first and last always. Without those between `a` and `b`, `wrong(a, b, k)` tells how wrong `k` is; up to 1
+/// it may be left out.
+pub fn kept(count: usize, wrong: &dyn Fn(usize, usize, usize) -> f64) -> Vec<usize> {
+    let Some(last) = count.checked_sub(1) else { return Vec::new() };
+    let mut kept = vec![false; count];
     (kept[0], kept[last]) = (true, true);
     let mut spans = vec![(0, last)];
     while let Some((a, b)) = spans.pop() {
-        let farthest =
-            (a + 1..b).map(|k| (k, error(points[a], points[b], points[k]))).max_by(|x, y| x.1.total_cmp(&y.1));
-        if let Some((k, error)) = farthest
-            && error > tolerance_m
+        let farthest = (a + 1..b).map(|k| (k, wrong(a, b, k))).max_by(|x, y| x.1.total_cmp(&y.1));
+        if let Some((k, wrong)) = farthest
+            && wrong > 1.0
         {
             kept[k] = true;
             spans.extend([(a, k), (k, b)]);
         }
     }
-    points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(p, _)| *p).collect()
+    (0..count).filter(|k| kept[*k]).collect()
 }
 
 /// Distance of `p` from where the line from `a` to `b` is at its time.
-fn error(a: LabelPoint, b: LabelPoint, p: LabelPoint) -> f64 {
+pub fn error(a: LabelPoint, b: LabelPoint, p: LabelPoint) -> f64 {
     let f = (p.time_s - a.time_s) / (b.time_s - a.time_s);
     (a.x_m + f * (b.x_m - a.x_m) - p.x_m).hypot(a.y_m + f * (b.y_m - a.y_m) - p.y_m)
 }
@@ -35,6 +34,11 @@ fn error(a: LabelPoint, b: LabelPoint, p: LabelPoint) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn simplify(points: &[LabelPoint], tolerance_m: f64) -> Vec<LabelPoint> {
+        let wrong = |a: usize, b: usize, k: usize| error(points[a], points[b], points[k]) / tolerance_m;
+        kept(points.len(), &wrong).into_iter().map(|k| points[k]).collect()
+    }
 
     fn points(all: &[[f64; 3]]) -> Vec<LabelPoint> {
         all.iter().map(|p| (*p).into()).collect()
@@ -46,7 +50,7 @@ mod tests {
         let stop: Vec<[f64; 3]> = (0..20).map(|k| at(f64::from(k))).collect();
         let few = simplify(&points(&stop), 0.1);
         assert_eq!(few, points(&[[0.0, 0.0, 0.0], [5.0, 20.0, 0.0], [19.0, 20.0, 0.0]]));
-        assert_eq!(simplify(&few[..2], 0.0), few[..2]);
+        assert_eq!(simplify(&few[..2], 0.1), few[..2]);
         assert!(simplify(&[], 1.0).is_empty());
     }
 

@@ -1,7 +1,7 @@
 //! Label tracks: a class and a polyline of where a vehicle's near face was, over time.
 //!
 //! What is drawn are the reflections' near edge, since nothing else is seen of a vehicle; [`super::near_face`] tells
-//! what box stands behind it. Between two points the near face moves in a straight line at constant speed, before the
+//! what box stands behind it. Between two points the vehicle moves in a straight line at constant speed, before the
 //! first and after the last there is no label.
 
 use serde::{Deserialize, Serialize};

@@ -15,6 +15,12 @@ const GAP_S: f64 = 10.0;
 /// Longest gap in which it may have changed lanes, seconds, and how far that is at most, metres.
 const CHANGES_S: f64 = 3.0;
 const LANE_M: f64 = 4.2;
+/// Share of the shorter path's time in which both may be seen, and how far apart they are then, metres.
+const OVER_SHARE: f64 = 0.35;
+const OVER_M: f64 = 1.5;
+/// Longest gap in a turn, seconds, and speed at most, m/s.
+const TURN_GAP_S: f64 = 5.0;
+const TURN_MPS: f64 = 10.0;
 /// Longest gap in which something that stands is waited for, seconds.
 const STANDING_GAP_S: f64 = 90.0;
 /// Speed below which vehicles may keep so close together that they look like one, m/s.
@@ -167,6 +173,10 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
     if after.last() <= before.last() || after.first <= before.first {
         return None;
     }
+    let fast = before.motions.last()?.1.speed().max(after.motions.first()?.1.speed()) > TURN_MPS;
+    if after.first <= before.last() && !fast {
+        return overlaps(before, after);
+    }
     let (from_s, from) = before.motions.last()?;
     let (to_s, to) = after.motions.first()?;
     let gap_s = to_s - from_s;
@@ -182,7 +192,7 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
     }
     let change = (v[0] - u[0]).hypot(v[1] - u[1]);
     if gap_s > GAP_S || change > 2.0 + 1.5 * gap_s.max(0.0) {
-        return None;
+        return turns(way, u, v, gap_s);
     }
     let speed = mean[0].hypot(mean[1]);
     let [c, s] = if speed > 1.0 { mean.map(|v| v / speed) } else { [1.0, 0.0] };
@@ -198,6 +208,35 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
     (along < 1.0 && left < 1.0).then_some(along + left + wait / 5.0)
 }
 
+/// How badly a turn explains a gap: half of the time with each velocity.
+fn turns(way: [f64; 2], u: [f64; 2], v: [f64; 2], gap_s: f64) -> Option<f64> {
+    let [before, after] = [u, v].map(|v| v[0].hypot(v[1]));
+    let turned = u[0] * v[0] + u[1] * v[1] > -0.3 * before * after;
+    if !(0.0..=TURN_GAP_S).contains(&gap_s) || before.max(after) > TURN_MPS || !turned {
+        return None;
+    }
+    let rest = [0, 1].map(|k| way[k] - 0.5 * (u[k] + v[k]) * gap_s);
+    let wrong = rest[0].hypot(rest[1]) / (2.0 + 1.0 * gap_s);
+    (wrong < 1.0).then_some(1.0 + wrong + gap_s / 5.0)
+}
+
+/// How far two paths are apart while one goes over into the other; `None` where they are not one.
+fn overlaps(before: &Path, after: &Path) -> Option<f64> {
+    let frames = after.first..=before.last();
+    let shorter = before.motions.len().min(after.motions.len());
+    let common = before.last() + 1 - after.first;
+    if common as f64 > OVER_SHARE * shorter as f64 {
+        return None;
+    }
+    let length_m = (before.reach[1] - before.reach[0]).max(after.reach[1] - after.reach[0]).clamp(0.0, LONGEST_M);
+    let mut away_m = 0.0;
+    for frame in frames {
+        let ([a, b], [c, d]) = (before.at(frame)?.place(), after.at(frame)?.place());
+        away_m += (a - c).hypot(b - d) / common as f64;
+    }
+    (away_m < OVER_M + 0.3 * length_m).then_some(away_m / (OVER_M + 0.3 * length_m))
+}
+
 /// Whether they keep to different lanes.
 fn differ(a: &Path, b: &Path) -> bool {
     a.lane.as_ref().zip(b.lane.as_ref()).is_some_and(|(a, b)| !Arc::ptr_eq(a, b))
@@ -206,4 +245,40 @@ fn differ(a: &Path, b: &Path) -> bool {
 /// The lane of both; none if they differ.
 fn common(a: &Path, b: &Path) -> Option<Arc<Lane>> {
     if differ(a, b) { None } else { a.lane.clone().or_else(|| b.lane.clone()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::motion::Motion;
+    use super::*;
+
+    /// A path along x from a frame on, ten frames a second.
+    fn path(first: usize, frames: usize, speed: f64, left_m: f64) -> Path {
+        let motion = |frame: usize| {
+            let t = frame as f64 * 0.1;
+            (t, Motion::new([speed * t, left_m], [speed, 0.0], 0.1, [1.0, 0.0], [0.1; 2]))
+        };
+        let motions: Vec<(f64, Motion)> = (first..first + frames).map(motion).collect();
+        let headings_rad = vec![0.0; frames];
+        Path { members: vec![(first, 0)], first, motions, headings_rad, reach: [-2.0, 2.0], top_m: 1.5, lane: None }
+    }
+
+    #[test]
+    fn pieces_that_overlap_for_a_while_in_one_place_are_one_and_neighbours_are_not() {
+        let before = path(0, 60, 3.0, 0.0);
+        assert!(follows(&before, &path(45, 60, 3.0, 0.8)).is_some());
+        assert_eq!(follows(&before, &path(45, 60, 3.0, 3.5)), None);
+        // most of the time beside one another: two vehicles, or pieces of a long one
+        assert_eq!(follows(&before, &path(20, 60, 3.0, 0.8)), None);
+    }
+
+    #[test]
+    fn a_turn_joins_what_comes_with_what_leaves_where_it_may_get_to() {
+        let (east, north) = ([6.0, 0.0], [0.0, 6.0]);
+        assert!(turns([6.0, 6.0], east, north, 2.0).is_some());
+        assert_eq!(turns([-6.0, 6.0], east, north, 2.0), None);
+        assert_eq!(turns([6.0, 6.0], east, [-6.0, 0.0], 2.0), None);
+        assert_eq!(turns([18.0, 18.0], east, north, 6.0), None);
+        assert_eq!(turns([20.0, 20.0], [20.0, 0.0], [0.0, 20.0], 2.0), None);
+    }
 }

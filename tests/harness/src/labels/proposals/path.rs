@@ -15,7 +15,7 @@ const STOOD_S: f64 = 2.0;
 const HEADED_MPS: f64 = 3.0;
 
 /// Within this distance heights are trusted, if there are so many, metres.
-const HEIGHT_WITHIN_M: f64 = 80.0;
+pub const HEIGHT_WITHIN_M: f64 = 80.0;
 const ENOUGH: usize = 10;
 
 /// Reflections of a road user, and where it was from the first to the last of them.
@@ -149,13 +149,13 @@ impl Path {
         all.collect()
     }
 
-    /// 85 % of the heights, those nearby where there are enough: farther away they are vague.
+    /// 85 % of the heights nearby; where there are too few, the median of all, since farther away they are vague.
     fn top(&self, instants: &[Instant]) -> Option<f64> {
         let heights = |within_m: f64| -> Vec<f64> {
             self.reflections(instants).filter(|(_, r)| r.distance_m < within_m).map(|(_, r)| r.height_m).collect()
         };
         let near = heights(HEIGHT_WITHIN_M);
-        quantile(&if near.len() < ENOUGH { heights(f64::INFINITY) } else { near }, 0.85)
+        if near.len() < ENOUGH { quantile(&heights(f64::INFINITY), 0.5) } else { quantile(&near, 0.85) }
     }
 
     fn reached(&self, instants: &[Instant]) -> [f64; 2] {

@@ -1,9 +1,8 @@
 //! What stands around the reflections of a path: class by extent, and the box centres.
 
-use super::path::{Path, quantile};
+use super::path::{HEIGHT_WITHIN_M, Path, quantile};
 use super::reflections::Instant;
-use crate::labels::near_face::{BoxStep, nears};
-use crate::labels::simplify::simplify;
+use crate::labels::near_face::{BoxStep, drawn};
 use crate::labels::tracks::LabelTrack;
 use crate::recording::Recording;
 use crate::recording::labels::class_size;
@@ -19,6 +18,11 @@ const STEP_S: f64 = 0.25;
 const FAST_MPS: f64 = 10.0;
 /// Extents that only buses have, metres: a truck that is seen well is longer.
 const BUS_M: std::ops::RangeInclusive<f64> = 12.6..=13.8;
+/// Cars are not higher than this, by so many reflections, metres.
+const LOW_M: f64 = 1.7;
+const WELL: usize = 60;
+/// How long a car looks at most with reflections of another one, metres.
+const BESIDES_M: f64 = 12.5;
 /// Fewest reflections an end is told by.
 const FEWEST: usize = 5;
 
@@ -32,6 +36,8 @@ pub struct Extent {
     pub reach: [f64; 2],
     /// Height of the higher ones.
     pub top_m: f64,
+    /// Seen well enough to know that nothing of it is high.
+    pub low: bool,
 }
 
 impl Extent {
@@ -49,7 +55,12 @@ impl Extent {
             }
         }
         let end = |values: &[f64], share: f64| quantile(values, share).filter(|_| values.len() >= FEWEST);
-        Self { rear: end(&behind, 0.1), front: end(&ahead, 0.9), reach: path.reach, top_m: path.top_m }
+        let near = path.reflections(instants).filter(|(_, r)| r.distance_m < HEIGHT_WITHIN_M);
+        let heights: Vec<f64> = near.map(|(_, r)| r.height_m).collect();
+        // a radar without elevation gives all reflections one height
+        let measured = heights.iter().any(|h| (h - heights[0]).abs() > 1e-6);
+        let low = heights.len() >= WELL && measured && path.top_m < LOW_M;
+        Self { rear: end(&behind, 0.1), front: end(&ahead, 0.9), reach: path.reach, top_m: path.top_m, low }
     }
 
     /// The class whose size is nearest to what is seen.
@@ -59,6 +70,8 @@ impl Extent {
             _ => self.reach[1] - self.reach[0],
         };
         match () {
+            // with the reflections of the car behind it it looks long
+            () if self.low && length_m < BESIDES_M => "car",
             () if BUS_M.contains(&length_m) => "bus",
             () if length_m > 7.2 || (self.top_m > 2.9 && length_m > 5.5) => "truck",
             () if length_m > 5.5 || self.top_m > 2.4 => "van",
@@ -136,6 +149,27 @@ pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: Strin
         }
     }
     steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    let points = simplify(&nears(&steps, size, sensor), TOLERANCE_M);
+    let points = drawn(&steps, size, sensor, TOLERANCE_M);
     LabelTrack { id, class: class.to_owned(), size_m: None, points }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn extent(reach: [f64; 2], top_m: f64, low: bool) -> Extent {
+        Extent { rear: Some(reach[0]), front: None, reach, top_m, low }
+    }
+
+    #[test]
+    fn length_and_height_tell_the_class_and_what_is_surely_low_is_a_car() {
+        assert_eq!(extent([-2.0, 2.2], 1.4, true).class(), "car");
+        assert_eq!(extent([-3.0, 3.2], 2.0, false).class(), "van");
+        assert_eq!(extent([-8.0, 7.5], 2.2, false).class(), "truck");
+        assert_eq!(extent([-6.5, 6.5], 2.2, false).class(), "bus");
+        // two cars in one path: low all along; a truck that reflects low is longer than that
+        assert_eq!(extent([-4.0, 7.0], 1.4, true).class(), "car");
+        assert_eq!(extent([-4.0, 7.0], 1.4, false).class(), "truck");
+        assert_eq!(extent([-8.0, 8.0], 1.6, true).class(), "truck");
+    }
 }
