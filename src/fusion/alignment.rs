@@ -28,6 +28,8 @@ use crate::sensor::config::{ConfigError, within};
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
 
+use super::window::Window;
+
 /// When a pair disagrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -80,8 +82,7 @@ pub struct Alignment<const S: usize> {
     limit: i32,
     release: i32,
     step: i32,
-    window_us: u64,
-    began: Option<Time>,
+    window: Window,
     pairs: [[Residual; S]; S],
 }
 
@@ -96,7 +97,7 @@ impl<const S: usize> Alignment<S> {
         let limit = within("alignment.limit_deg", config.limit_deg, 0.1, 10.0)?;
         let release = within("alignment.release_deg", config.release_deg, 0.0, limit)?;
         let step = within("alignment.step_deg", config.step_deg, 0.01, 1.0)?;
-        let window = within("alignment.window_ms", f32::from(config.window_ms), 100.0, 60_000.0)?;
+        within("alignment.window_ms", f32::from(config.window_ms), 100.0, 60_000.0)?;
         let mut sensors = [None; S];
         for (to, mount) in sensors.iter_mut().zip(mounts) {
             *to = mount.as_ref().map(Mount::levelling).transpose()?;
@@ -106,8 +107,7 @@ impl<const S: usize> Alignment<S> {
             limit: turns(limit),
             release: turns(release),
             step: turns(step),
-            window_us: 1000 * window as u64,
-            began: None,
+            window: Window::of_ms(config.window_ms),
             pairs: [[Residual { median: 0, above: 0, below: 0, windows: 0, disagrees: false }; S]; S],
         })
     }
@@ -138,14 +138,9 @@ impl<const S: usize> Alignment<S> {
 
     /// Closes the window when it is over. Time that steps back begins a new one.
     pub fn advance(&mut self, now: Time) {
-        let Some(began) = self.began.filter(|began| now >= *began) else {
-            self.began = Some(now);
-            return;
-        };
-        if now.since(began).unwrap_or(0) < self.window_us {
+        if !self.window.is_over(now) {
             return;
         }
-        self.began = Some(now);
         for residual in self.pairs.iter_mut().flatten() {
             let (above, below) = (i64::from(residual.above), i64::from(residual.below));
             if above + below < i64::from(LEAST) {

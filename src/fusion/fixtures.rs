@@ -33,6 +33,7 @@ use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
 
 use super::polar::edges;
+use super::window::Window;
 
 /// What is learned, and from when a difference is named.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -190,13 +191,12 @@ pub struct Fixtures<const N: usize, const K: usize> {
     levelling: Levelling,
     right: Angle,
     span: u16,
-    window_us: u64,
+    window: Window,
     learned_windows: u16,
     least_seen: u16,
     blind_windows: u16,
     /// Largest differences of one detection that count.
     most: [i16; 3],
-    began: Option<Time>,
     windows: u16,
     fixtures: heapless::Vec<Fixture, N>,
     sectors: [Sector; K],
@@ -214,7 +214,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     pub fn new(mount: &Mount, azimuth_deg: [f32; 2], config: &FixturesConfig) -> Result<Self, ConfigError> {
         const { assert!(K > 0 && K <= 64) }
         let (right, span) = edges(azimuth_deg)?;
-        let window = within("fixtures.window_ms", f32::from(config.window_ms), 100.0, 60_000.0)?;
+        within("fixtures.window_ms", f32::from(config.window_ms), 100.0, 60_000.0)?;
         let windows = within("fixtures.learned_windows", f32::from(config.learned_windows), 8.0, 10_000.0)?;
         let share = within("fixtures.least_share", config.least_share, 0.1, 1.0)?;
         within("fixtures.blind_windows", f32::from(config.blind_windows), 2.0, 1000.0)?;
@@ -227,12 +227,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             levelling: mount.levelling()?,
             right,
             span,
-            window_us: 1000 * window as u64,
+            window: Window::of_ms(config.window_ms),
             learned_windows: config.learned_windows,
             least_seen: math::round_i32(share * windows) as u16,
             blind_windows: config.blind_windows,
             most,
-            began: None,
             windows: 0,
             fixtures: heapless::Vec::new(),
             sectors: [Sector { missed: 0, blind: false, expects: false }; K],
@@ -262,14 +261,9 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     /// Closes the window when it is over; `sees` is what the sensor's own map says of a place. Time that steps back
     /// begins a new one.
     pub fn advance(&mut self, now: Time, sees: impl Fn(RoadPoint) -> bool) {
-        let Some(began) = self.began.filter(|began| now >= *began) else {
-            self.began = Some(now);
-            return;
-        };
-        if now.since(began).unwrap_or(0) < self.window_us {
+        if !self.window.is_over(now) {
             return;
         }
-        self.began = Some(now);
         if self.is_learning() {
             self.learn();
         } else {

@@ -41,6 +41,7 @@ mod monitor;
 mod places;
 mod polar;
 mod view;
+mod window;
 
 use crate::fixed::time::Time;
 use crate::map::polar::PolarMap;

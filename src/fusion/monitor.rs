@@ -40,6 +40,7 @@ use crate::sensor::road::RoadPoint;
 
 use super::followed::Followed;
 use super::polar::edges;
+use super::window::Window;
 
 /// When a sector is judged blind.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,8 +111,7 @@ pub struct Monitor<const K: usize> {
     usual: u32,
     learned_windows: u16,
     threshold: i32,
-    window_us: u64,
-    began: Option<Time>,
+    window: Window,
     sectors: [Sector; K],
     confirmed: u8,
     followed: Followed,
@@ -129,7 +129,7 @@ impl<const K: usize> Monitor<K> {
         let usual = within("monitor.usual_miss", config.usual_miss, 0.01, 0.98)?;
         let blind = above("monitor.blind_miss", within("monitor.blind_miss", config.blind_miss, 0.02, 0.99)?, usual)?;
         let threshold = within("monitor.threshold", config.threshold, 0.5, 50.0)?;
-        let window = within("monitor.window_ms", f32::from(config.window_ms), 50.0, 10_000.0)?;
+        within("monitor.window_ms", f32::from(config.window_ms), 50.0, 10_000.0)?;
         let nats = |v: f32| math::round_i32(v * 256.0);
         let ratio = |a: f32, b: f32| libm::logf(a / b);
         let mut weights = [[0; 2]; LEVELS];
@@ -147,8 +147,7 @@ impl<const K: usize> Monitor<K> {
             usual: least,
             learned_windows: config.learned_windows,
             threshold: nats(threshold),
-            window_us: 1000 * window as u64,
-            began: None,
+            window: Window::of_ms(config.window_ms),
             sectors: [Sector { hits: 0, misses: 0, evidence: 0, usual: least, blind: false }; K],
             confirmed: config.confirmed,
             followed: Followed::NONE,
@@ -185,14 +184,9 @@ impl<const K: usize> Monitor<K> {
     /// Closes the window when it is over; [`observe`](Self::observe) does so as well. Time that steps back begins a new
     /// one.
     pub fn advance(&mut self, now: Time) {
-        let Some(began) = self.began.filter(|began| now >= *began) else {
-            self.began = Some(now);
-            return;
-        };
-        if now.since(began).unwrap_or(0) < self.window_us {
+        if !self.window.is_over(now) {
             return;
         }
-        self.began = Some(now);
         for sector in &mut self.sectors {
             let (hits, misses) = (core::mem::take(&mut sector.hits), core::mem::take(&mut sector.misses));
             if hits == 0 && misses == 0 {

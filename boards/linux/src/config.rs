@@ -527,17 +527,19 @@ mod tests {
 
     use super::*;
 
+    /// A file with these tables at its end.
+    fn with(tables: &str) -> Result<Config, toml::de::Error> {
+        toml::from_str(&format!(
+            "[input]\nradar = \"ars408\"\ninterface = \"can0\"\n[output]\nmedium = \"can\"\ninterface = \"can1\"\n\
+             [mount]\nx_m = 0.0\ny_m = 0.0\nheight_m = 6.0\nyaw_deg = 0.0\npitch_deg = 4.0\nroll_deg = 0.0\n\
+             [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
+             elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n{tables}"
+        ))
+    }
+
     #[test]
     fn lanes_are_a_part_of_the_settings_and_a_bad_one_is_named() {
-        let config = |points: &str| {
-            let text = format!(
-                "[input]\nradar = \"ars408\"\ninterface = \"can0\"\n[output]\nmedium = \"can\"\ninterface = \"can1\"\n\
-                 [mount]\nx_m = 0.0\ny_m = 0.0\nheight_m = 6.0\nyaw_deg = 0.0\npitch_deg = 4.0\nroll_deg = 0.0\n\
-                 [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
-                 elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n[[lanes]]\npoints = {points}\n"
-            );
-            toml::from_str::<Config>(&text).unwrap()
-        };
+        let config = |points: &str| with(&format!("[[lanes]]\npoints = {points}\n")).unwrap();
         let lane = config("[[-50.0, 2.0], [50.0, 2.0]]").settings().unwrap();
         assert_eq!(lane.lanes, [&[[-50.0, 2.0], [50.0, 2.0]][..]]);
         let check = |points: &str| Grid::Reference.check().settings(&config(points).settings().unwrap());
@@ -548,15 +550,7 @@ mod tests {
 
     #[test]
     fn tuned_parameters_are_a_part_of_the_settings_and_of_the_fingerprint_and_a_bad_one_is_named() {
-        let config = |tables: &str| {
-            let text = format!(
-                "[input]\nradar = \"ars408\"\ninterface = \"can0\"\n[output]\nmedium = \"can\"\ninterface = \"can1\"\n\
-                 [mount]\nx_m = 0.0\ny_m = 0.0\nheight_m = 6.0\nyaw_deg = 0.0\npitch_deg = 4.0\nroll_deg = 0.0\n\
-                 [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
-                 elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n{tables}"
-            );
-            toml::from_str::<Config>(&text).map(|config| config.settings().unwrap())
-        };
+        let config = |tables: &str| with(tables).map(|config| config.settings().unwrap());
         let (plain, tuned) =
             (config("").unwrap(), config("[obstacles]\ngap_m = 5.0\n[evidence]\ngain = 0.4\n").unwrap());
         let made = tuned.radar_3d();

@@ -13,7 +13,7 @@ use viewshed::camera::boxes::ImageBox;
 use viewshed::camera::map::{AZIMUTHS, CameraMap};
 use viewshed::camera::{Camera3dConfig, Camera3dParameters, CameraProfile, MOST_BOXES};
 use viewshed::fixed::time::Time;
-use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::frame::detection::Detection;
 use viewshed::fusion::{
     Alignment, AlignmentConfig, Fixtures, FixturesConfig, Fusion, FusionConfig, Monitor, MonitorConfig,
 };
@@ -183,15 +183,7 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
 }
 
 fn detection(d: &viewshed_harness::recording::RadarDetection) -> Option<Detection> {
-    Detection::new(&Measurement {
-        range_m: d.range_m,
-        azimuth_rad: d.azimuth_rad,
-        elevation_rad: d.elevation_rad,
-        radial_velocity_mps: d.radial_velocity_mps,
-        rcs_dbsm: d.rcs_dbsm,
-        snr_db: d.snr_db,
-    })
-    .ok()
+    Detection::new(&estimators::measurement(d)).ok()
 }
 
 fn run_3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(

@@ -26,7 +26,7 @@ use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording::{Frame, Recording};
+use crate::recording::{Frame, RadarDetection, Recording};
 
 /// A visibility estimator as the harness drives it: one radar frame in, one map out.
 pub trait Estimator: Send {
@@ -245,6 +245,18 @@ pub const NOT_FINITE: &str = "not finite";
 pub const NO_RANGE: &str = "range not measurable";
 pub const ABSURD: &str = "absurd";
 
+/// A recorded detection as the library takes it.
+pub fn measurement(d: &RadarDetection) -> Measurement {
+    Measurement {
+        range_m: d.range_m,
+        azimuth_rad: d.azimuth_rad,
+        elevation_rad: d.elevation_rad,
+        radial_velocity_mps: d.radial_velocity_mps,
+        rcs_dbsm: d.rcs_dbsm,
+        snr_db: d.snr_db,
+    }
+}
+
 /// Turns recorded frames into the library's input and counts what cannot be.
 #[derive(Debug, Default)]
 pub(crate) struct Intake {
@@ -261,15 +273,7 @@ impl Intake {
         let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
         self.dropped += frame.refused;
         for d in &frame.detections {
-            let measurement = Measurement {
-                range_m: d.range_m,
-                azimuth_rad: d.azimuth_rad,
-                elevation_rad: d.elevation_rad,
-                radial_velocity_mps: d.radial_velocity_mps,
-                rcs_dbsm: d.rcs_dbsm,
-                snr_db: d.snr_db,
-            };
-            let why = match Detection::new(&measurement) {
+            let why = match Detection::new(&measurement(d)) {
                 Ok(d) => {
                     self.detections.push(d);
                     continue;

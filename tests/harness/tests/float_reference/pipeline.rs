@@ -9,7 +9,7 @@ use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
 use viewshed::sensor::road::RoadPoint;
-use viewshed_harness::estimators::{Estimator, PolarCells};
+use viewshed_harness::estimators::{Estimator, PolarCells, measurement};
 use viewshed_harness::recording::Frame;
 
 use crate::evidence::{InverseSensor, around};
@@ -139,18 +139,7 @@ impl Estimator for Pipeline {
     }
 
     fn step(&mut self, frame: &Frame) {
-        let measurements: Vec<Measurement> = frame
-            .detections
-            .iter()
-            .map(|d| Measurement {
-                range_m: d.range_m,
-                azimuth_rad: d.azimuth_rad,
-                elevation_rad: d.elevation_rad,
-                radial_velocity_mps: d.radial_velocity_mps,
-                rcs_dbsm: d.rcs_dbsm,
-                snr_db: d.snr_db,
-            })
-            .collect();
+        let measurements: Vec<Measurement> = frame.detections.iter().map(measurement).collect();
         self.process(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &measurements);
     }
 

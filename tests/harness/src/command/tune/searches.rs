@@ -13,9 +13,17 @@ use crate::studies::tune::{Prepared, Search, State};
 
 /// Every search that is run, each with its file.
 pub struct Searches {
-    /// How, seed, file, and what the file had.
-    wanted: Vec<(Search, u64, Option<(PathBuf, Option<String>, Target)>)>,
+    /// How, and with which seed.
+    wanted: Vec<(Search, u64, Option<StateFile>)>,
     done: Vec<State>,
+}
+
+/// Where a search is kept.
+struct StateFile {
+    path: PathBuf,
+    /// What it had.
+    known: Option<String>,
+    target: Target,
 }
 
 impl Searches {
@@ -27,8 +35,8 @@ impl Searches {
             let full = path.metadata().is_ok_and(|m| m.len() > 0);
             let read = || std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()));
             let known = full.then(read).transpose()?;
-            let file = outputs.file("--state", Some(&path))?.context("no file")?;
-            Ok(Some((path, known, file)))
+            let target = outputs.file("--state", Some(&path))?.context("no file")?;
+            Ok(Some(StateFile { path, known, target }))
         };
         let mut wanted = Vec::new();
         let seed = args.search_seed;
@@ -52,14 +60,14 @@ impl Searches {
         let searching = bar("tuning", (evaluations * self.wanted.len()) as u64);
         for (search, seed, file) in &self.wanted {
             let mut state = State::new(*search, *seed, space.clone(), training, settings);
-            if let Some((path, Some(text), _)) = file {
-                state.resume(text).with_context(|| format!("--state {}", path.display()))?;
+            if let Some(StateFile { path, known: Some(known), .. }) = file {
+                state.resume(known).with_context(|| format!("--state {}", path.display()))?;
             }
             state.evaluations.iter().take(evaluations).for_each(|_| searching.step());
             let save = |state: &State| -> Result<()> {
                 searching.step();
                 searching.say(&format!("tuning, best {:.1} of {:.1}", best(state), usual(state)));
-                file.as_ref().map_or(Ok(()), |(_, _, file)| file.write(serde_json::to_string(state)? + "\n"))
+                file.as_ref().map_or(Ok(()), |file| file.target.write(serde_json::to_string(state)? + "\n"))
             };
             state.run(evaluations, training, settings, &save)?;
             self.done.push(state);

@@ -9,13 +9,13 @@ use anyhow::Result;
 use rayon::prelude::*;
 use serde::Serialize;
 use viewshed::fixed::time::Time;
-use viewshed::frame::detection::{Detection, Measurement};
+use viewshed::frame::detection::Detection;
 use viewshed::fusion::{Fixtures, FixturesConfig};
 
 use super::{SECTORS, THIRDS, darkened};
 use crate::estimators::{self, camera_3d::time};
 use crate::evaluation::Settings;
-use crate::recording::{RadarDetection, Recording};
+use crate::recording::Recording;
 
 const LEARNED_S: u16 = 40;
 /// Attenuation there and back, dB.
@@ -126,7 +126,8 @@ fn one(own: &Recording, case: Case, settings: &Settings) -> Result<Stood> {
     for frame in &recording.frames {
         running.step(frame);
         let now: Time = time(frame.time_ns);
-        frame.detections.iter().filter_map(detection).for_each(|d| standing.observe(&d));
+        let detections = frame.detections.iter().filter_map(|d| Detection::new(&estimators::measurement(d)).ok());
+        detections.for_each(|d| standing.observe(&d));
         let map = running.map();
         standing.advance(now, |at| map.at(at).visible());
         let since = (frame.time_ns - from_ns) as f64 * 1e-9;
@@ -199,16 +200,4 @@ fn dirty(own: &Recording, from_ns: i64, end_ns: i64) -> Recording {
         frame.detections.retain(|d| d.snr_db.is_none_or(|v| v >= weakest));
     }
     dirty
-}
-
-fn detection(d: &RadarDetection) -> Option<Detection> {
-    let measured = Measurement {
-        range_m: d.range_m,
-        azimuth_rad: d.azimuth_rad,
-        elevation_rad: d.elevation_rad,
-        radial_velocity_mps: d.radial_velocity_mps,
-        rcs_dbsm: d.rcs_dbsm,
-        snr_db: d.snr_db,
-    };
-    Detection::new(&measured).ok()
 }
