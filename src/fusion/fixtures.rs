@@ -27,7 +27,7 @@ use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
 use crate::frame::detection::Detection;
-use crate::map::polar::column_place;
+use crate::map::polar::column;
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
@@ -340,9 +340,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     }
 
     fn sector_of(&self, azimuth: Angle) -> Option<usize> {
-        let columns = i32::try_from(K).ok()?;
-        let place = column_place(azimuth - self.right, self.span, columns);
-        usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
+        column(azimuth - self.right, self.span, K)
     }
 
     /// Fixtures that were learned; none while they are.

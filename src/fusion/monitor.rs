@@ -32,7 +32,7 @@ use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
-use crate::map::polar::column_place;
+use crate::map::polar::column;
 use crate::map::{CellState, VisibilityMap};
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::mount::{Levelling, Mount};
@@ -157,9 +157,7 @@ impl<const K: usize> Monitor<K> {
     /// The sector of a place; none outside of the view.
     pub fn sector(&self, at: RoadPoint) -> Option<usize> {
         let (x, y) = self.levelling.place(at);
-        let columns = i32::try_from(K).ok()?;
-        let place = column_place(trig::bearing(x, y) - self.right, self.span, columns);
-        usize::try_from(place >> 8).ok().filter(|sector| *sector < K)
+        column(trig::bearing(x, y) - self.right, self.span, K)
     }
 
     /// Another sensor follows an obstacle whose middle is here. `own` is what the watched sensor's map says of the

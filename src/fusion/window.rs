@@ -14,8 +14,8 @@ impl Window {
         Self { length_us: 1000 * length_ms as u64, began: None }
     }
 
-    /// Whether the window is over; the next one has begun then. So has one at the first time, and where time steps back,
-    /// of which the one before says nothing.
+    /// Whether the window is over; the next one has begun then. So has one at the first time, and where time steps
+    /// back, of which the one before says nothing.
     pub(super) fn is_over(&mut self, now: Time) -> bool {
         let since = self.began.and_then(|began| now.since(began));
         let over = since.is_some_and(|us| us >= self.length_us);

@@ -38,6 +38,8 @@ use crate::grid::axes::Axes;
 use crate::grid::raycast::BLOCKED;
 use crate::grid::spherical::{Column, SphericalGrid};
 use crate::map::polar::PolarMap;
+#[cfg(feature = "tuned")]
+use crate::sensor::config::numbers;
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::noise::NoiseConfig;
 
@@ -77,8 +79,7 @@ impl Default for EvidenceConfig {
 impl EvidenceConfig {
     /// Every number of it, in the order of the fields, for fingerprints.
     pub fn numbers(&self) -> [f32; 6] {
-        let &Self { gain, clearing, hidden_memory_s, visible_memory_s, height_prior_m, height_prior_sigma_m } = self;
-        [gain, clearing, hidden_memory_s, visible_memory_s, height_prior_m, height_prior_sigma_m]
+        numbers!(self => Self: gain, clearing, hidden_memory_s, visible_memory_s, height_prior_m, height_prior_sigma_m)
     }
 }
 

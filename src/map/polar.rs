@@ -26,12 +26,18 @@ pub(crate) fn column_place(from_origin: Angle, span: u16, columns: i32) -> i32 {
     i32::from(from_origin.raw()) * (columns * 64) / (i32::from(span) / 4).max(1)
 }
 
+/// The column of a bearing among so many, from right to left; none outside.
+#[inline]
+pub(crate) fn column(from_origin: Angle, span: u16, columns: usize) -> Option<usize> {
+    let place = column_place(from_origin, span, i32::try_from(columns).ok()?);
+    usize::try_from(place >> 8).ok().filter(|column| *column < columns)
+}
+
 impl PolarGeometry {
     /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size.
     pub fn locate(&self, x_cm: i32, y_cm: i32, ranges: usize, azimuths: usize) -> Option<(usize, usize)> {
         let from_origin = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
-        let place = column_place(from_origin, self.azimuth_span, i32::try_from(azimuths).ok()?);
-        let azimuth = usize::try_from(place >> 8).ok().filter(|a| *a < azimuths)?;
+        let azimuth = column(from_origin, self.azimuth_span, azimuths)?;
         let range = usize::try_from(math::length(x_cm, y_cm) / self.cell_cm.max(1)).ok()?;
         (range < ranges).then_some((azimuth, range))
     }

@@ -8,6 +8,8 @@ use super::size::SizePoint;
 use super::tracking::Tracking;
 use crate::fixed::math;
 use crate::fixed::trig::Direction;
+#[cfg(feature = "tuned")]
+use crate::sensor::config::numbers;
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::noise::Noise;
 
@@ -156,103 +158,23 @@ impl Default for ObstacleConfig {
 }
 
 impl ObstacleConfig {
-    #[cfg(feature = "tuned")]
     /// Every number of it, in the order of the fields, for fingerprints.
+    #[cfg(feature = "tuned")]
     pub fn numbers(&self) -> impl Iterator<Item = f32> {
-        // a field that is forgotten does not compile
-        let &Self {
-            min_speed_mps,
-            doppler_gate_mps,
-            gap_m,
-            headway_s,
-            coupled_headway_s,
-            coupled_way_m,
-            coupled_speed_mps,
-            standstill_m,
-            lateral_gate_m,
-            gate_sigmas,
-            max_length_m,
-            outline_memory_s,
-            outline_min_hits,
-            outline_share,
-            lateral_memory_s,
-            drift_gain,
-            confirm_hits,
-            max_evidence,
-            tentative_loss_per_s,
-            visible_loss_per_s,
-            hidden_loss_per_s,
-            merge_lateral_m,
-            abreast_m,
-            merge_speed_mps,
-            half_width_m,
-            mover_way_m,
-            turning_speed_mps,
-            outline_sigmas,
-            turning_noise_mps,
-            own_way_sigmas,
-            own_way_mps,
-            own_way_share,
-            own_way_follow,
-            own_way_margin_m,
-            length_growth_s,
-            length_memory_s,
-            slow_mps,
-            heading_sigmas,
-            standing_speed_mps,
-            standing_visible_loss_per_s,
-            standing_hidden_loss_per_s,
-            sizes,
-        } = self;
-        let SizeConfig { points, min_length_m } = sizes;
-        let sizes =
-            points.into_iter().flat_map(|SizePoint { length_m, width_m, height_m }| [length_m, width_m, height_m]);
-        [
-            min_speed_mps,
-            doppler_gate_mps,
-            gap_m,
-            headway_s,
-            coupled_headway_s,
-            coupled_way_m,
-            coupled_speed_mps,
-            standstill_m,
-            lateral_gate_m,
-            gate_sigmas,
-            max_length_m,
-            outline_memory_s,
-            outline_min_hits,
-            outline_share,
-            lateral_memory_s,
-            drift_gain,
-            confirm_hits,
-            max_evidence,
-            tentative_loss_per_s,
-            visible_loss_per_s,
-            hidden_loss_per_s,
-            merge_lateral_m,
-            abreast_m,
-            merge_speed_mps,
-            half_width_m,
-            mover_way_m,
-            turning_speed_mps,
-            outline_sigmas,
-            turning_noise_mps,
-            own_way_sigmas,
-            own_way_mps,
-            own_way_share,
-            own_way_follow,
-            own_way_margin_m,
-            length_growth_s,
-            length_memory_s,
-            slow_mps,
-            heading_sigmas,
-            standing_speed_mps,
-            standing_visible_loss_per_s,
-            standing_hidden_loss_per_s,
-        ]
-        .into_iter()
-        .chain(sizes)
-        .chain([min_length_m])
+        let own = numbers!(self => Self:
+            min_speed_mps, doppler_gate_mps, gap_m, headway_s, coupled_headway_s, coupled_way_m,
+            coupled_speed_mps, standstill_m, lateral_gate_m, gate_sigmas, max_length_m,
+            outline_memory_s, outline_min_hits, outline_share, lateral_memory_s, drift_gain,
+            confirm_hits, max_evidence, tentative_loss_per_s, visible_loss_per_s, hidden_loss_per_s,
+            merge_lateral_m, abreast_m, merge_speed_mps, half_width_m, mover_way_m, turning_speed_mps,
+            outline_sigmas, turning_noise_mps, own_way_sigmas, own_way_mps, own_way_share,
+            own_way_follow, own_way_margin_m, length_growth_s, length_memory_s, slow_mps,
+            heading_sigmas, standing_speed_mps, standing_visible_loss_per_s, standing_hidden_loss_per_s;
+            but sizes
+        );
+        let SizeConfig { points, min_length_m } = self.sizes;
+        let sizes = points.into_iter().flat_map(|point| numbers!(&point => SizePoint: length_m, width_m, height_m));
+        own.into_iter().chain(sizes).chain([min_length_m])
     }
 
     /// Checks the parameters and rounds them. `road` is the road's axis in the levelled frame, and

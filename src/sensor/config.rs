@@ -1,5 +1,17 @@
 //! Checking a configuration in SI units, once, before the loop.
 
+/// The numbers of a configuration, in the order in which its fields are named. A field that is not named does not compile;
+/// what is no number comes last and is left out.
+#[cfg(feature = "tuned")]
+macro_rules! numbers {
+    ($of:expr => $config:ident: $($number:ident),+ $(; but $other:ident)?) => {{
+        let &$config { $($number,)+ $($other: _,)? } = $of;
+        [$($number),+]
+    }};
+}
+#[cfg(feature = "tuned")]
+pub(crate) use numbers;
+
 /// A parameter that cannot be worked with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

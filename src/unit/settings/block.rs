@@ -46,8 +46,8 @@ impl Settings {
     }
 
     /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
-    /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each tuned
-    /// number with its place, from 2^16 on for obstacles and from 2^17 on for evidence.
+    /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each
+    /// tuned number with its place, from 2^16 on for obstacles and from 2^17 on for evidence.
     #[inline(never)] // once a start
     pub fn fingerprint(&self) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];

@@ -19,7 +19,8 @@
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
-//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes and of tuned parameters.
+//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes
+//! and of tuned parameters.
 
 mod block;
 mod flash;

@@ -182,10 +182,10 @@ struct EstimatorArgs {
     /// How well the radar measures, from its data sheet: standard deviations of range, azimuth, elevation and radial
     /// velocity [default: 0.25,0.5,1,0.15]
     ///
-    /// Metres, degrees, degrees, m/s. Vehicles side by side are told apart by it: a radar of 0.15 degrees that is taken for one of half a degree
-    /// costs points of every rate.
+    /// Metres, degrees, degrees, m/s. Vehicles side by side are told apart by it: a radar of 0.15 degrees that is taken
+    /// for one of half a degree costs points of every rate.
     #[arg(long, value_name = "M,DEG,DEG,M/S", value_parser = noise)]
-    noise: Option<[f64; 4]>,
+    noise: Option<NoiseConfig>,
 }
 
 impl SettingsArgs {
@@ -278,10 +278,10 @@ impl EstimatorArgs {
     fn apply(&self, options: &mut estimators::Options) {
         set(self.max_detections, &mut options.max_detections);
         set(self.reference_share, &mut options.reference_share);
-        if let Some([range, azimuth, elevation, velocity]) = self.noise.map(|all| all.map(|v| v as f32)) {
-            let noise = &mut options.noise;
-            (noise.range_m, noise.azimuth_deg) = (range, azimuth);
-            (noise.elevation_deg, noise.radial_velocity_mps) = (elevation, velocity);
+        if let Some(noise) = self.noise {
+            // which is no accuracy, and in no data sheet
+            let reflector_height_m = options.noise.reflector_height_m;
+            options.noise = NoiseConfig { reflector_height_m, ..noise };
         }
     }
 }
@@ -341,17 +341,10 @@ fn period(text: &str) -> Result<f64, String> {
     if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
 }
 
-fn noise(text: &str) -> Result<[f64; 4], String> {
-    let all: [f64; 4] = numbers(text)?;
-    let [range, azimuth, elevation, velocity] = all.map(|v| v as f32);
-    let config = NoiseConfig {
-        range_m: range,
-        azimuth_deg: azimuth,
-        elevation_deg: elevation,
-        radial_velocity_mps: velocity,
-        ..NoiseConfig::default()
-    };
-    config.noise().map(|_| all).map_err(|e| e.to_string())
+fn noise(text: &str) -> Result<NoiseConfig, String> {
+    let [range_m, azimuth_deg, elevation_deg, radial_velocity_mps] = numbers(text)?.map(|v| v as f32);
+    let config = NoiseConfig { range_m, azimuth_deg, elevation_deg, radial_velocity_mps, ..NoiseConfig::default() };
+    config.noise().map(|_| config).map_err(|e| e.to_string())
 }
 
 fn mount(text: &str) -> Result<[f64; 6], String> {

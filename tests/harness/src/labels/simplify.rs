@@ -6,8 +6,8 @@
 
 use super::tracks::LabelPoint;
 
-/// Which of `count` points stay, the fewest, chosen greedily; first and last always. Without those between `a` and `b`, `wrong(a, b, k)` tells how wrong `k` is; up to 1
-/// it may be left out.
+/// Which of `count` points stay, the fewest, chosen greedily; first and last always. Without those between `a` and `b`,
+/// `wrong(a, b, k)` tells how wrong `k` is; up to 1 it may be left out.
 pub fn kept(count: usize, wrong: &dyn Fn(usize, usize, usize) -> f64) -> Vec<usize> {
     let Some(last) = count.checked_sub(1) else { return Vec::new() };
     let mut kept = vec![false; count];

@@ -29,8 +29,8 @@ use searches::{Searches, usual};
 /// Find parameters of radar-3d on some recordings and judge them on others
 ///
 /// Each evaluation runs radar-3d over all training recordings. Loss: FVR + FIR + cell FVR + cell FIR in points, means
-/// over the recordings, and twice what each recording's is above that of the usual parameters. A Gaussian process says which
-/// values to try next. Both sets are reported, before and after, with paired intervals: believe the second.
+/// over the recordings, and twice what each recording's is above that of the usual parameters. A Gaussian process says
+/// which values to try next. Both sets are reported, before and after, with paired intervals: believe the second.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Labelled recordings to tune on
@@ -66,8 +66,8 @@ pub struct Args {
     search_seed: u64,
     /// Search with so many seeds both ways, and say how often the process found less loss than chance
     ///
-    /// The seeds follow --search-seed, whose own search is the one that is judged. With --state, each search has a file of its own,
-    /// FILE.HOW-SEED.
+    /// The seeds follow --search-seed, whose own search is the one that is judged. With --state, each search has a file
+    /// of its own, FILE.HOW-SEED.
     #[arg(long, value_name = "SEEDS", value_parser = clap::value_parser!(u16).range(1..=100), conflicts_with = "search")]
     against_random: Option<u16>,
     /// Say what each parameter is worth: how the sum of the rates changes, on what is judged, with its usual value in
@@ -77,8 +77,8 @@ pub struct Args {
     /// Keep the search in this file, and go on with it where the file has one
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     state: Option<PathBuf>,
-    /// Write tuned.toml (for --config of replay and experiment), daemon.toml (tables for the file of the Linux daemon) and fronts of FVR
-    /// against FIR into this folder
+    /// Write tuned.toml (for --config of replay and experiment), daemon.toml (tables for the file of the Linux daemon)
+    /// and fronts of FVR against FIR into this folder
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -102,10 +102,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     space.check(&settings.estimators)?;
     let plan = args.plan.as_deref().map(Plan::read).transpose()?;
-    let unit = plan.as_ref().zip(args.unit.as_ref()).map(|(plan, name)| plan.unit(name)).transpose()?;
+    let of_plan = plan.as_ref().zip(args.unit.as_ref());
+    let of_plan = of_plan.map(|(plan, name)| plan.unit(name).map(|unit| (plan, unit))).transpose()?;
     let read = args.train.iter().chain(&args.test).flat_map(|path| recording::files(path));
     let mut inputs: Vec<PathBuf> = read.chain(args.settings.files()).chain(args.space.clone()).collect();
-    if let (Some(plan), Some(unit)) = (&plan, unit) {
+    if let Some((plan, unit)) = of_plan {
         inputs.extend(args.plan.clone());
         inputs.extend(plan.files(unit)?);
         settings.evaluation.warm_up_s = unit.warm_up_s;
@@ -113,11 +114,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let outputs = args.outputs.beside(inputs.iter().cloned());
     let folder = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
     let mut searches = Searches::open(args, &inputs)?;
-    let (training, test) = match (&plan, unit) {
-        (Some(plan), Some(unit)) => {
-            (simulated(plan, &unit.train, &settings)?, simulated(plan, &unit.report, &settings)?)
-        }
-        _ => (prepared(&args.train, &settings)?, prepared(&args.test, &settings)?),
+    let (training, test) = match of_plan {
+        Some((plan, unit)) => (simulated(plan, &unit.train, &settings)?, simulated(plan, &unit.report, &settings)?),
+        None => (prepared(&args.train, &settings)?, prepared(&args.test, &settings)?),
     };
     for (path, p) in args.train.iter().zip(&training) {
         let name = &p.recording.name;
@@ -128,14 +127,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let state = searches.first()?;
     let found = state.best().context("no evaluation")?.clone();
     let tuned = state.space.apply(&settings.estimators, &found.values)?;
-    let mut all = Vec::new();
-    for (of, set) in [("training", &training), ("judged", &test)] {
-        let [before, after] = [&settings.estimators, &tuned].map(|o| count(set, o, &settings).map(|all| joined(&all)));
-        all.push(compared(of, &before?, &after?, &settings));
-    }
+    let counted = |set: &[Prepared], options| count(set, options, &settings).map(|all| joined(&all));
+    let both = |set: &[Prepared]| Ok::<_, anyhow::Error>([counted(set, &settings.estimators)?, counted(set, &tuned)?]);
+    let [of_training, of_test] = [both(&training)?, both(&test)?];
+    let all = [("training", &of_training), ("judged", &of_test)];
+    let all = all.map(|(of, [before, after])| compared(of, before, after, &settings));
     let mut told = text(state, &found, &all);
     if args.ablation {
-        told += &ablation(state, &found, &test, &settings)?;
+        told += &ablation(state, &found, &of_test[1], &test, &settings)?;
     }
     print(&(told + &searches.against_random()))?;
     if let Some(folder) = &folder {
@@ -210,21 +209,24 @@ fn text(state: &State, found: &Evaluation, all: &[Compared]) -> String {
     text
 }
 
-/// What is lost where one parameter has its usual value again.
-fn ablation(state: &State, found: &Evaluation, test: &[Prepared], settings: &Settings) -> Result<String> {
+/// What of `tuned` is lost where one parameter has its usual value again.
+fn ablation(
+    state: &State,
+    found: &Evaluation,
+    tuned: &Counted,
+    test: &[Prepared],
+    settings: &Settings,
+) -> Result<String> {
     let usual = state.evaluations.first().context("no evaluation")?;
-    let counted = |values: &[f64]| -> Result<Counted> {
-        Ok(joined(&count(test, &state.space.apply(&settings.estimators, values)?, settings)?))
-    };
-    let tuned = counted(&found.values)?;
     let putting_back = bar("putting back", state.space.parameter.len() as u64);
     let mut text =
         String::from("Sum of the rates judged, with the usual value of one parameter in place of the tuned one:\n");
     for (k, p) in state.space.parameter.iter().enumerate() {
         let mut values = found.values.clone();
         values[k] = usual.values[k];
+        let without = joined(&count(test, &state.space.apply(&settings.estimators, &values)?, settings)?);
         let options = &settings.evaluation;
-        let all = differences(&tuned, &counted(&values)?, options.bootstrap, options.seed);
+        let all = differences(tuned, &without, options.bootstrap, options.seed);
         let sum = all.iter().find(|d| d.rate == "sum").context("no sum")?;
         let points = sum.points.map_or_else(|| "-".into(), |points| format!("{points:+.1}"));
         let interval =

@@ -106,7 +106,7 @@ fn blind(counted: &Counted, extent: Extent) -> String {
         let mean = mean(a.named_after_s, a.named);
         let slowest = (a.named > 0).then_some(a.slowest_s);
         let counts = [a.dark, a.named, a.within_10_s].map(|n| n.to_string());
-        let rest = [mean, slowest, a.wrong_per_hour()].map(number);
+        let rest = [mean, slowest, per_hour(a.wrong, a.watched_s)].map(number);
         [name.to_owned()].into_iter().chain(counts).chain(rest).collect::<Vec<_>>()
     };
     let names = ["where its map says visible", "wherever it looks"];

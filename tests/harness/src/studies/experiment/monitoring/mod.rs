@@ -60,13 +60,6 @@ impl std::ops::AddAssign for Alerts {
     }
 }
 
-impl Alerts {
-    /// Wrong alerts in an hour of one sensor.
-    pub fn wrong_per_hour(&self) -> Option<f64> {
-        (self.watched_s > 0.0).then(|| self.wrong as f64 * 3600.0 / self.watched_s)
-    }
-}
-
 /// With visibility, and without.
 pub type Worth = [Alerts; 2];
 

@@ -83,26 +83,20 @@ pub fn compare(
     let sides = if broken { &[1.0, -1.0][..] } else { &[] };
     let cases: Vec<(usize, f64)> =
         (0..all.len().min(ROAD)).flat_map(|k| sides.iter().map(move |side| (k, *side))).collect();
-    let mut sum = one(all, follows, &pieces, None, settings)?;
+    let poses: Vec<SensorPose> = all.iter().map(|r| r.pose).collect();
+    let follows: Vec<&Follows> = follows.iter().collect();
+    let mut sum = one(all, &poses, &follows, &pieces, None, settings)?;
     let turned = cases.par_iter().map(|&(k, side)| {
         let recording = turned(&all[k], side * TURN_DEG);
-        let mut follows = follows.to_vec();
-        follows[k] = follow(&recording, settings)?;
-        let mut all: Vec<Recording> = all.iter().map(without_frames).collect();
-        all[k] = without_frames(&recording);
-        one(&all, &follows, &pieces, Some((k, side)), settings)
+        let own = follow(&recording, settings)?;
+        let (mut poses, mut follows) = (poses.clone(), follows.clone());
+        (poses[k], follows[k]) = (recording.pose, &own);
+        one(all, &poses, &follows, &pieces, Some((k, side)), settings)
     });
     for one in turned.collect::<Result<Vec<_>>>()? {
         sum += one;
     }
     Ok(sum)
-}
-
-/// Only when its frames were, and how it hangs.
-fn without_frames(recording: &Recording) -> Recording {
-    let mut bare = recording.clone();
-    bare.frames.iter_mut().for_each(|f| f.detections.clear());
-    bare
 }
 
 /// The recording of a sensor that hangs so many degrees to the left of what its configuration says.
@@ -118,17 +112,18 @@ fn turned(recording: &Recording, left_deg: f64) -> Recording {
     turned
 }
 
-/// Compares all sensors from the warm-up on.
+/// Compares all sensors from the warm-up on; poses and what is followed may be other than the recordings'.
 fn one(
     all: &[Recording],
-    follows: &[Follows],
+    poses: &[SensorPose],
+    follows: &[&Follows],
     lanes: &Pieces,
     turned: Option<(usize, f64)>,
     settings: &Settings,
 ) -> Result<Turned> {
     let sensors = all.len().min(ROAD);
     let mut mounts = [None; PLACES];
-    mounts.iter_mut().zip(all).take(sensors).for_each(|(to, r)| *to = Some(estimators::mount(&r.pose)));
+    mounts.iter_mut().zip(poses).take(sensors).for_each(|(to, pose)| *to = Some(estimators::mount(pose)));
     let mut alignment = Alignment::<PLACES>::new(&mounts, &AlignmentConfig::default())?;
     let Some(first) = all.first() else { return Ok(Turned::default()) };
     let start = first.frames.first().map_or(0, |f| f.time_ns);
