@@ -168,8 +168,9 @@ impl Record {
                 bytes: [r.u32()?, r.u32()?, r.u32()?],
             }),
             b'F' => {
-                use Condition::{Blind, Healthy, Stale, Starting, Unusable};
-                let condition = [Starting, Healthy, Blind, Stale, Unusable].into_iter().find(|c| *c as u8 == detail)?;
+                use Condition::{Blind, Healthy, Misaligned, SectorBlind, Stale, Starting, Unusable, Weaker};
+                let all = [Starting, Healthy, Blind, Stale, Unusable, SectorBlind, Misaligned, Weaker];
+                let condition = all.into_iter().find(|c| *c as u8 == detail)?;
                 let (frame, fingerprint) = (r.u32()?, r.u64()?);
                 let mut ticks = [0; Stage::COUNT];
                 for t in &mut ticks {

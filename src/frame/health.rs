@@ -70,6 +70,19 @@ pub enum Condition {
     Stale,
     /// Points keep coming, but none that can be used: not finite, or outside the field of view.
     Unusable,
+    /// Evidence, but not of all sectors: nothing is seen of what stands in one, and it is unknown on the map.
+    SectorBlind,
+    /// Evidence, but what stands has moved: the mount is turned or tilted.
+    Misaligned,
+    /// Evidence, but less is seen of what stands, or weaker, as through dirt or snow.
+    Weaker,
+}
+
+impl Condition {
+    /// Whether there is a map.
+    pub const fn has_map(self) -> bool {
+        matches!(self, Self::Healthy | Self::SectorBlind | Self::Misaligned | Self::Weaker)
+    }
 }
 
 /// What a frame says besides its detections.

@@ -58,7 +58,10 @@ const TO_CM: i32 = 12_000;
 const SAME_CM: i32 = 400;
 /// Least residuals of a window that moves the median.
 const LEAST: u16 = 5;
-/// Windows after which a pair that does not disagree agrees.
+/// Windows until which the median moves faster than by `step_deg`, and how much faster.
+const FIRST: [(u16, i64); 2] = [(3, 4), (6, 2)];
+/// Windows before which no pair disagrees, and after which one that does not agrees.
+const SETTLED: u16 = 6;
 const ENOUGH: u16 = 10;
 /// Fraction bits of a median.
 const FRACTION: u32 = 8;
@@ -147,12 +150,14 @@ impl<const S: usize> Alignment<S> {
                 // too few tell nothing; they wait for more
                 continue;
             }
-            let moved = i64::from(self.step) * (above - below) / (above + below);
+            // faster at first, when it has farthest to go
+            let (_, faster) = FIRST.into_iter().find(|(until, _)| residual.windows < *until).unwrap_or((0, 1));
+            let moved = faster * i64::from(self.step) * (above - below) / (above + below);
             residual.median += i32::try_from(moved).unwrap_or(0);
             (residual.above, residual.below) = (0, 0);
             residual.windows = residual.windows.saturating_add(1);
             let limit = if residual.disagrees { self.release } else { self.limit };
-            residual.disagrees = residual.median.abs() >= limit;
+            residual.disagrees = residual.windows >= SETTLED && residual.median.abs() >= limit;
         }
     }
 

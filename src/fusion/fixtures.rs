@@ -8,10 +8,13 @@
 //!
 //! | what | is said of | from |
 //! |---|---|---|
-//! | blind | a sector | `blind_windows` more windows without any of its fixtures, where two should be, than with one |
+//! | blind | a sector | `blind_windows` more windows without any of its fixtures, where two should be, nor much else, than with |
 //! | weaker | the sensor | the mean fall of their strength, over some minutes |
 //! | fewer | the sensor | the share of them that is seen, against the share usually seen |
 //! | turned, tilted | the sensor | the mean shift of their azimuths, of their elevations |
+//!
+//! Where a sensor detects anything a few times in a window, it is not blind there: what was learned as standing may have
+//! been a vehicle that waited, and has left.
 //!
 //! A difference counts up to four times its limit, so that one wrong match weighs little, and is believed in until it
 //! has sunk to half the limit, which is the hysteresis. A fixture in a shadow, as behind a lorry that waits, is not
@@ -70,12 +73,24 @@ impl Default for FixturesConfig {
     }
 }
 
+#[cfg(feature = "monitoring")]
+impl FixturesConfig {
+    /// Every number of it, in the order of the fields, for fingerprints.
+    pub(crate) fn numbers(&self) -> [f32; 7] {
+        let &Self { window_ms, learned_windows, least_share, blind_windows, weaker_db, fewer_share, turned_deg } = self;
+        let [window, learned, blind] = [window_ms, learned_windows, blind_windows].map(f32::from);
+        [window, learned, least_share, blind, weaker_db, fewer_share, turned_deg]
+    }
+}
+
 /// What is slower along the line of sight may stand, cm/s.
 const STANDS_CM_S: u16 = 25;
 /// A reflection this near to a fixture is of it: along the line of sight, centimetres.
 const SAME_RANGE_CM: u16 = 120;
 /// The same across it, 2^-16 turns: 2.5 degrees, more than any turn that is to be found.
 const SAME_AZIMUTH: i16 = 455;
+/// Detections of whatever else in a window that show a sector not to be blind; fewer may be false alarms.
+const OTHERS: u8 = 3;
 /// Fixtures that have to be expected in a sector for their absence to mean anything, 2^-8.
 const EXPECTED: u32 = 2 << 8;
 /// Fraction bits of the means.
@@ -154,6 +169,8 @@ fn strength(d: &Detection) -> Option<i16> {
 struct Sector {
     /// Windows without any fixture, less those with.
     missed: u16,
+    /// Detections of anything else in the running window, saturating.
+    others: u8,
     blind: bool,
     /// Whether enough were expected in the last window.
     expects: bool,
@@ -234,7 +251,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             most,
             windows: 0,
             fixtures: heapless::Vec::new(),
-            sectors: [Sector { missed: 0, blind: false, expects: false }; K],
+            sectors: [Sector { missed: 0, others: 0, blind: false, expects: false }; K],
             levels: [turned, turned, weaker].map(Level::new),
             missing: Level::new(fewer),
         })
@@ -242,14 +259,21 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
 
     /// Takes one detection of a frame.
     pub fn observe(&mut self, detection: &Detection) {
-        if detection.radial_velocity_cm_s.unsigned_abs() > STANDS_CM_S {
-            return;
-        }
+        let stands = detection.radial_velocity_cm_s.unsigned_abs() <= STANDS_CM_S;
         // of several, the nearest along the line of sight: posts stand in rows
-        let near = self.fixtures.iter_mut().filter(|f| f.is_near(detection));
+        let near = self.fixtures.iter_mut().filter(|f| stands && f.is_near(detection));
         if let Some(fixture) = near.min_by_key(|f| f.range_cm.abs_diff(detection.range_cm)) {
             fixture.take(detection, self.most);
-        } else if self.is_learning() && self.fixtures.push(Fixture::of(detection)).is_err() {
+            return;
+        }
+        let sector = self.sector_of(detection.azimuth);
+        if let Some(sector) = sector.and_then(|k| self.sectors.get_mut(k)) {
+            sector.others = sector.others.saturating_add(1);
+        }
+        if !stands {
+            return;
+        }
+        if self.is_learning() && self.fixtures.push(Fixture::of(detection)).is_err() {
             // no room: the one that was seen least goes, if it is not one of this window
             let least = self.fixtures.iter_mut().filter(|f| f.count == 0).min_by_key(|f| f.seen);
             if let Some(least) = least.filter(|f| u32::from(f.seen) * 4 < u32::from(self.windows)) {
@@ -272,6 +296,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         for fixture in &mut self.fixtures {
             (fixture.count, fixture.shifts) = (0, [0; 3]);
         }
+        self.sectors.iter_mut().for_each(|sector| sector.others = 0);
     }
 
     fn learn(&mut self) {
@@ -318,7 +343,8 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
                 continue;
             }
             // twice what is needed at most, so that a mended sensor is trusted again soon
-            let missed = if *seen == 0 { sector.missed + 1 } else { sector.missed.saturating_sub(2) };
+            let missed =
+                if *seen == 0 && sector.others < OTHERS { sector.missed + 1 } else { sector.missed.saturating_sub(2) };
             sector.missed = missed.min(2 * self.blind_windows);
             sector.blind = sector.missed >= self.blind_windows || (sector.blind && sector.missed > 0);
         }
@@ -351,6 +377,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     /// Whether nothing of what stands in a sector is seen; not of one that does not exist.
     pub fn is_blind(&self, sector: usize) -> bool {
         self.sectors.get(sector).is_some_and(|sector| sector.blind)
+    }
+
+    /// Whether the sector of a bearing from the sensor's heading is; not outside of the view.
+    pub fn is_blind_at(&self, bearing: Angle) -> bool {
+        self.sector_of(bearing).is_some_and(|sector| self.is_blind(sector))
     }
 
     /// Whether a sector has enough that stands and is not in a shadow for it to be judged.

@@ -32,14 +32,13 @@
 //! # Cost
 //! Some 22 instructions for each cell that a polar map reaches; other maps are asked for each cell.
 
-#[cfg(feature = "bench")]
 mod alignment;
-#[cfg(feature = "bench")]
 mod fixtures;
 mod followed;
 mod monitor;
 mod places;
 mod polar;
+mod supervised;
 mod view;
 mod window;
 
@@ -49,13 +48,15 @@ use crate::map::{Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
-#[cfg(feature = "bench")]
+#[cfg(feature = "monitoring")]
 pub use alignment::{Alignment, AlignmentConfig};
-#[cfg(feature = "bench")]
+#[cfg(feature = "monitoring")]
 pub use fixtures::{Fixtures, FixturesConfig};
 pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
 use places::{Place, Places};
 pub use polar::{fill, polar};
+#[cfg(feature = "monitoring")]
+pub use supervised::{Supervised, Supervision};
 pub use view::{Conflict, Fused, FusedCell, Sensors};
 
 /// Most sensors.

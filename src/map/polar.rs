@@ -34,6 +34,14 @@ pub(crate) fn column(from_origin: Angle, span: u16, columns: usize) -> Option<us
 }
 
 impl PolarGeometry {
+    /// Bearing of the middle of one of so many azimuths, from the boresight's heading.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most a turn; angles wrap
+    pub(crate) fn middle_of(&self, azimuth: usize, azimuths: usize) -> Angle {
+        let doubled = (2 * azimuth as u64 + 1) * u64::from(self.azimuth_span);
+        let from_origin = doubled.checked_div(2 * azimuths as u64).unwrap_or(0);
+        self.azimuth_origin + Angle::from_raw(from_origin as u16 as i16)
+    }
+
     /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size.
     pub fn locate(&self, x_cm: i32, y_cm: i32, ranges: usize, azimuths: usize) -> Option<(usize, usize)> {
         let from_origin = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
@@ -85,6 +93,13 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
     pub fn forget(&mut self) {
         self.grades = [[UNKNOWN; R]; A];
         self.occupancy = [[0; R]; A];
+    }
+
+    /// Makes an azimuth unknown.
+    pub(crate) fn forget_azimuth(&mut self, azimuth: usize) {
+        if let Some((grades, occupancy)) = self.rows_mut(azimuth) {
+            (*grades, *occupancy) = ([UNKNOWN; R], [0; R]);
+        }
     }
 
     /// Where the cells lie.

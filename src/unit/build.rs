@@ -4,7 +4,11 @@ use crate::camera::calibration::Calibration;
 use crate::camera::map::AZIMUTHS;
 use crate::camera::{Camera3d, Camera3dConfig};
 use crate::estimator::Estimator;
-use crate::map::polar::PolarGeometry;
+#[cfg(feature = "monitoring")]
+use crate::frame::detection::Detection;
+#[cfg(feature = "monitoring")]
+use crate::fusion::Supervised;
+use crate::map::polar::{PolarGeometry, PolarMap};
 use crate::radar_3d::Radar3d;
 use crate::sensor::config::{ConfigError, Problem};
 use crate::unit::sender::MapSender;
@@ -80,6 +84,27 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let view = axes.view(A / 2);
         let geometry = axes.polar(parameters.levelling());
         header::<R, A>(settings, &geometry, Known::new(view.start, view.end))
+    }
+}
+
+/// A radar's unit, supervised where its settings say so.
+#[cfg(feature = "monitoring")]
+impl<E, const R: usize, const A: usize> InUnit for Supervised<E>
+where
+    E: InUnit + Estimator<Input = [Detection], Map = PolarMap<R, A>>,
+{
+    fn config(settings: &Settings) -> Self::Config {
+        let view = &settings.sensor.field_of_view;
+        let azimuth_deg = [view.azimuth_min_deg, view.azimuth_max_deg];
+        (E::config(settings), settings.fixtures.map(|fixtures| (settings.sensor.mount, azimuth_deg, *fixtures)))
+    }
+
+    fn check(settings: &Settings) -> Result<(), ConfigError> {
+        E::check(settings)
+    }
+
+    fn header(settings: &Settings, (parameters, _): &Self::Parameters) -> Result<Header, ConfigError> {
+        E::header(settings, parameters)
     }
 }
 

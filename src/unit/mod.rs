@@ -163,7 +163,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         let condition = self.state.expire(self.parameters, now, self.map);
         self.set_status(condition, now);
         let due = self.offered.is_none_or(|last| now.since(last).is_none_or(|us| us >= UNKNOWN_EVERY_US));
-        if condition != Condition::Healthy && due {
+        if !condition.has_map() && due {
             self.offer(now);
         }
         condition
@@ -208,7 +208,11 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             (Condition::Starting, _) => (UnitState::Starting, Reason::None),
             (Condition::Blind, _) => (UnitState::Blind, Reason::None),
             (Condition::Unusable, _) => (UnitState::Blind, Reason::UnusablePoints),
-            (Condition::Healthy, Some(reason)) => (UnitState::Degraded, reason),
+            // what is wrong with the sensor lasts; what happened just now comes again
+            (Condition::SectorBlind, _) => (UnitState::Degraded, Reason::SectorBlind),
+            (Condition::Misaligned, _) => (UnitState::Degraded, Reason::Misaligned),
+            (Condition::Weaker, None) => (UnitState::Degraded, Reason::Weaker),
+            (Condition::Healthy | Condition::Weaker, Some(reason)) => (UnitState::Degraded, reason),
             (Condition::Healthy, None) => (UnitState::Ok, Reason::None),
         };
     }

@@ -113,6 +113,24 @@ fn a_lorry_that_waits_before_the_posts_is_no_fault() {
 }
 
 #[test]
+fn where_anything_else_is_detected_a_sector_is_not_blind() {
+    // what was learned to the left were vehicles that waited: they leave, and others drive through
+    let dark = |d: Detection| (d.azimuth.raw() < Angle::from_degrees(30.0).raw()).then_some(d);
+    for (moving, blind) in [(Some(-900), false), (Some(0), false), (None, true)] {
+        let mut standing = learned();
+        for second in 32..44 {
+            run(&mut standing, second, 1, everywhere, dark);
+            for _ in 0..3 {
+                let other =
+                    moving.map(|radial_velocity_cm_s| Detection { radial_velocity_cm_s, ..post(70.0, 45.0, 10) });
+                standing_observe(&mut standing, other);
+            }
+        }
+        assert_eq!(standing.is_blind(5), blind, "{moving:?}");
+    }
+}
+
+#[test]
 fn a_turned_mount_is_named_with_its_side_and_a_tilted_one_with_its_own() {
     for (left, up) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
         let mut standing = learned();

@@ -21,6 +21,7 @@ mod monitor;
 mod radar_2d;
 mod radar_3d;
 mod stages;
+mod supervised;
 
 /// So many cases, unless the environment asks for others.
 fn cases(cases: u32) -> Config {

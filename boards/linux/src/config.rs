@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck};
+use viewshed::fusion::FixturesConfig;
 use viewshed::{
     Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, EvidenceConfig, FieldOfView, GateConfig,
     HealthConfig, Medium, Mount, NoiseConfig, ObstacleConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect,
@@ -29,8 +30,8 @@ impl Grid {
     /// Whether a unit of this size can run with settings.
     fn check(self) -> SettingsCheck {
         match self {
-            Self::Reference => reference::CHECK,
-            Self::Small => small::CHECK,
+            Self::Reference => reference::SUPERVISED_CHECK,
+            Self::Small => small::SUPERVISED_CHECK,
         }
     }
 
@@ -69,6 +70,9 @@ pub struct Config {
     pub obstacles: Option<&'static ObstacleConfig>,
     #[serde(default, deserialize_with = "kept")]
     pub evidence: Option<&'static EvidenceConfig>,
+    /// What stands in the view tells whether the radar is in order.
+    #[serde(default, deserialize_with = "kept")]
+    pub fixtures: Option<&'static FixturesConfig>,
     /// Which way traffic goes.
     #[serde(default, deserialize_with = "lanes")]
     pub lanes: &'static [&'static [[f32; 2]]],
@@ -358,8 +362,8 @@ impl Config {
 
     /// Settings with what the file says of the place and no configuration block does.
     pub fn of_place(&self, settings: Settings) -> Settings {
-        let Self { lanes, obstacles, evidence, .. } = *self;
-        Settings { lanes, obstacles, evidence, ..settings }
+        let Self { lanes, obstacles, evidence, fixtures, .. } = *self;
+        Settings { lanes, obstacles, evidence, fixtures, ..settings }
     }
 
     /// Which program the service says this is; its chip is the machine.

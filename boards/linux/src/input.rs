@@ -12,7 +12,7 @@ use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, Identity, RadarClock, Seria
 use viewshed::{BusConfig, CanFrame, Epoch, Reason, Ti, Time};
 
 use super::run::Unit;
-use super::size::{Radar as Decoder, State};
+use super::size::{Radar as Decoder, State as Radar3d};
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;
@@ -267,7 +267,7 @@ impl Input for Log {
 struct TiPort {
     port: Serial,
     hearing: Hearing,
-    decoder: Ti<{ State::DETECTIONS }>,
+    decoder: Ti<{ Radar3d::DETECTIONS }>,
 }
 
 impl Input for TiPort {
@@ -304,7 +304,7 @@ struct NativePort {
     sensor: u8,
     identity: Identity,
     hearing: Hearing,
-    session: Option<SerialSession<{ State::DETECTIONS }>>,
+    session: Option<SerialSession<{ Radar3d::DETECTIONS }>>,
     clock: RadarClock,
     /// What came after a restart.
     rest: Vec<u8>,

@@ -7,14 +7,16 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::board::{BlockError, Flow, StoredSettings};
-use viewshed::{PolarMap, Reason, Time, UnitState};
+use viewshed::{Estimator, PolarMap, Reason, Time, UnitState};
 
 use super::input::{self, Input, Step, Work};
-use super::size::{CHECK, Map, Parameters, Sender, State};
+use super::size::{Map, SUPERVISED_CHECK as CHECK, Sender, State as Radar3d, Supervised as State};
 use crate::config::{ClockSource, Config};
 use crate::output::{Output, version};
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
+
+type Parameters = <State as Estimator>::Parameters;
 
 /// The daemon's unit: radar-3d on the grid of this module.
 pub type Unit<'u> = viewshed::Unit<'u, State, Sender>;
@@ -44,7 +46,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     }
     let mut input = input::open(config)?;
     let mut output = Output::new(config)?;
-    let mut state = Box::new(State::new());
+    let mut state = Box::new(State::new(Radar3d::new()));
     let mut map: Box<Map> = Box::new(PolarMap::NOWHERE);
     let mut clock = Clock::new(config, input.begins());
     let mut systemd = Systemd::new();
@@ -183,6 +185,8 @@ struct Watch {
     /// Messages of the safe state.
     said: u64,
     shown: Option<(UnitState, Reason)>,
+    /// What is wrong with the radar, as it was said last.
+    found: Option<Reason>,
     /// Why there is no unit.
     refused: Option<BlockError>,
 }
@@ -197,8 +201,13 @@ impl Watch {
         };
         let status = unit.broadcast().status_mut();
         let shown = (status.state, status.reason);
-        // what one frame does not say the next does: only states are worth a line
-        if self.shown.is_none_or(|before| before.0 != shown.0) {
+        // what one frame does not say the next does: only states are worth a line, and what is wrong for long
+        let lasts = matches!(shown.1, Reason::SectorBlind | Reason::Misaligned | Reason::Weaker);
+        let found = lasts && self.found.replace(shown.1) != Some(shown.1);
+        if shown.0 == UnitState::Ok {
+            self.found = None;
+        }
+        if found || self.shown.is_none_or(|before| before.0 != shown.0) {
             let reason = if shown.1 == Reason::None { String::new() } else { format!(": {:?}", shown.1) };
             match shown.0 {
                 UnitState::Starting | UnitState::Ok => info!("radar {:?}{reason}", shown.0),

@@ -4,6 +4,8 @@ use super::{BlockError, ConfigureRadar, Settings, UnitConfig};
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+#[cfg(feature = "monitoring")]
+use crate::fusion::FixturesConfig;
 #[cfg(feature = "tuned")]
 use crate::grid::evidence::EvidenceConfig;
 #[cfg(feature = "tuned")]
@@ -47,7 +49,8 @@ impl Settings {
 
     /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
     /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each
-    /// tuned number with its place, from 2^16 on for obstacles and from 2^17 on for evidence.
+    /// tuned number with its place, from 2^16 on for obstacles, from 2^17 on for evidence and from 2^18 on
+    /// for fixtures.
     #[inline(never)] // once a start
     pub fn fingerprint(&self) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];
@@ -73,6 +76,11 @@ impl Settings {
             (1 << 16..).zip(obstacles).for_each(|(place, number)| take([place, number.to_bits()]));
             let evidence = self.evidence.into_iter().flat_map(EvidenceConfig::numbers);
             (1 << 17..).zip(evidence).for_each(|(place, number)| take([place, number.to_bits()]));
+        }
+        #[cfg(feature = "monitoring")]
+        {
+            let fixtures = self.fixtures.into_iter().flat_map(FixturesConfig::numbers);
+            (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
         }
         sum
     }

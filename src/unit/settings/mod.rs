@@ -19,8 +19,8 @@
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
-//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes
-//! and of tuned parameters.
+//! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes,
+//! of tuned parameters and of what is said of fixtures.
 
 mod block;
 mod flash;
@@ -35,6 +35,8 @@ pub use unit_config::{ConfigureRadar, UnitConfig};
 use crate::camera::Camera3dConfig;
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
+#[cfg(feature = "monitoring")]
+use crate::fusion::FixturesConfig;
 #[cfg(feature = "tuned")]
 use crate::grid::evidence::EvidenceConfig;
 #[cfg(feature = "tuned")]
@@ -84,6 +86,10 @@ pub struct Settings {
     #[cfg(feature = "tuned")]
     #[cfg_attr(feature = "serde", serde(skip))]
     pub evidence: Option<&'static EvidenceConfig>,
+    /// When what stands in the view tells that something is wrong with the radar; not asked without it. No block has it.
+    #[cfg(feature = "monitoring")]
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub fixtures: Option<&'static FixturesConfig>,
 }
 
 /// Why a block is not used.
@@ -147,6 +153,8 @@ impl Settings {
             obstacles: None,
             #[cfg(feature = "tuned")]
             evidence: None,
+            #[cfg(feature = "monitoring")]
+            fixtures: None,
         }
     }
 

@@ -129,6 +129,7 @@ fn tables(settings: &Settings) -> Tables {
         lanes: _,
         obstacles: _,
         evidence: _,
+        fixtures: _,
     } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
     let (state_dir, grid, input, output, lanes) = (None, None, None, None, None);

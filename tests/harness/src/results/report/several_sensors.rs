@@ -8,9 +8,8 @@ use super::sensor_set;
 use super::table::{Extent, tables};
 use super::{ORIGIN, percent};
 use crate::evaluation::sensor_set::Shown;
-use crate::studies::experiment::monitoring::Alerts;
-use crate::studies::experiment::monitoring::standing::Stood;
 use crate::studies::experiment::monitoring::turned::Turned;
+use crate::studies::experiment::monitoring::{Finding, Judge, Judged, Sight};
 use crate::studies::experiment::several_sensors::{Counted, Watched};
 
 /// The experiment as text.
@@ -24,11 +23,11 @@ pub fn text(all: &[Counted], extent: Extent) -> String {
             text += &format!("{}\n\n", counted.name);
         }
         text += &format!(
-            "Each watched by the others, in order, and with a third of its view dark:\n{}\n\nMounts turned by a degree:\n{}\n\n\
-             What stands in a radar's view, by itself:\n{}\n\n",
-            blind(counted, extent),
-            turned(&counted.watched.turned, extent),
-            standing(&counted.watched.standing, extent)
+            "Each sensor in order, and with faults that come while it runs:\n{}\n{}\n\nMounts turned by a degree from the first \
+             day on:\n{}\n\n",
+            judged(&counted.watched.judged, extent),
+            told(&counted.watched.judged),
+            turned(&counted.watched.turned, extent)
         );
     }
     if all.len() > 1 && all.iter().all(|counted| counted.set.is_some()) {
@@ -72,46 +71,58 @@ fn turned(t: &Turned, extent: Extent) -> String {
     tables(&heading, &[row], 0, extent)
 }
 
-fn standing(s: &Stood, extent: Extent) -> String {
-    let heading = ["", "cases", "named", "within\n10 s", "after s,\nmean", "at dB,\nmean", "in order: alerts\nan hour"];
-    let counts = |n: [u64; 2]| n.map(|n| n.to_string());
-    let row = |name: String, n: [u64; 2], rest: [String; 4]| -> Vec<String> {
-        [name].into_iter().chain(counts(n)).chain(rest).collect()
-    };
-    let none = String::new;
-    let dark = [s.within_10_s.to_string(), number(mean(s.dark_after_s, s.dark_named)), none(), none()];
-    let turned = [none(), number(mean(s.turned_after_s, s.turned_named)), none(), none()];
-    let dirt = [none(), none(), number(mean(s.dirty_at_db, s.dirty_named)), none()];
-    let order = [none(), none(), none(), number(per_hour(s.wrong, s.watched_s))];
-    let rows = [
-        row("sectors dark".into(), [s.dark, s.dark_named], dark),
-        row("radars turned by a degree".into(), [s.turned, s.turned_named], turned),
-        row("radars with dirt".into(), [s.dirty, s.dirty_named], dirt),
-        row(format!("radars in order, {} fixtures", s.fixtures), [s.radars, s.wrong], order),
-    ];
-    tables(&heading, &rows, 1, extent)
-}
-
-fn blind(counted: &Counted, extent: Extent) -> String {
+fn judged(j: &Judged, extent: Extent) -> String {
     let heading = [
-        "a miss counts",
-        "sectors\ndark",
+        "what is wrong",
+        "judged by",
+        "cases",
         "named",
-        "within\n10 s",
+        "in time",
         "after s,\nmean",
         "slowest\ns",
-        "wrong alerts\nan hour",
+        "wrong alerts\nin order",
+        "an hour",
+        "without visibility:\nnamed",
+        "in time",
+        "wrong",
     ];
-    let row = |(name, a): (&str, &Alerts)| {
-        let mean = mean(a.named_after_s, a.named);
-        let slowest = (a.named > 0).then_some(a.slowest_s);
-        let counts = [a.dark, a.named, a.within_10_s].map(|n| n.to_string());
-        let rest = [mean, slowest, per_hour(a.wrong, a.watched_s)].map(number);
-        [name.to_owned()].into_iter().chain(counts).chain(rest).collect::<Vec<_>>()
-    };
-    let names = ["where its map says visible", "wherever it looks"];
-    let rows: Vec<Vec<String>> = names.into_iter().zip(&counted.watched.blind).map(row).collect();
-    tables(&heading, &rows, 1, extent)
+    let faults = ["a third of the view dark", "turned by a degree", "tilted by a degree", "10 dB of dirt"];
+    let judges = ["other sensors", "what stands", "either"];
+    let mut rows = Vec::new();
+    for (finding, fault) in Finding::ALL.into_iter().zip(faults) {
+        for (judge, by) in Judge::ALL.into_iter().zip(judges) {
+            // of tilts and dirt only one can tell
+            if matches!(finding, Finding::Tilted | Finding::Weaker) && judge != Judge::Standing {
+                continue;
+            }
+            let [with, without] = Sight::ALL.map(|sight| j.of(finding, judge, sight));
+            let in_order_s = if judge == Judge::Standing { j.radars_s } else { j.sensors_s };
+            let counts = |n: &[u64]| n.iter().map(ToString::to_string).collect::<Vec<_>>();
+            let times = [mean(with.after_s, with.named), (with.named > 0).then_some(with.slowest_s)].map(number);
+            let row = [fault.to_owned(), by.to_owned()]
+                .into_iter()
+                .chain(counts(&[with.cases, with.named, with.in_time]))
+                .chain(times)
+                .chain([with.wrong.to_string(), number(per_hour(with.wrong, in_order_s))])
+                .chain(counts(&[without.named, without.in_time, without.wrong]));
+            rows.push(row.collect::<Vec<_>>());
+        }
+    }
+    tables(&heading, &rows, 2, extent)
+}
+
+/// What the table is of.
+fn told(j: &Judged) -> String {
+    let [others, standing, either] = j.could_tell;
+    let dirt = j.of(Finding::Weaker, Judge::Standing, Sight::With).named;
+    format!(
+        "In time: within 10 s, and 30 s of mounts and dirt. Thirds with anything to tell by: other sensors {others}, what \
+         stands {standing}, either {either}. {} fixtures of {} radars. Dirt when named: {} dB. In order: {:.0} minutes of sensors.",
+        j.fixtures,
+        j.radars,
+        number(mean(j.dirt_db, dirt)),
+        j.sensors_s / 60.0
+    )
 }
 
 fn by_site(sites: &[Counted], extent: Extent) -> String {
@@ -150,8 +161,8 @@ fn by_site(sites: &[Counted], extent: Extent) -> String {
 /// None that a caller could mend.
 pub fn json(all: &[Counted], plan: &Value, options: Options) -> Result<String> {
     let site = |counted: &Counted| {
-        let Watched { blind: [with, without], turned, standing } = counted.watched;
-        let watched = json!({"with_visibility": with, "without": without, "turned": turned, "standing": standing});
+        let Watched { judged, turned } = counted.watched;
+        let watched = json!({ "while_it_runs": judged, "from_the_first_day": turned });
         let mut site =
             counted.set.as_ref().map_or_else(|| json!({ "name": counted.name }), |set| sensor_set::json(set, options));
         site["watched"] = watched;

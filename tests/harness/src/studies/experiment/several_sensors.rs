@@ -9,9 +9,8 @@ use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::monitoring::standing::{self, Stood};
 use super::monitoring::turned::{self, Turned};
-use super::monitoring::{self, Follows, Worth};
+use super::monitoring::{self, Follows};
 use super::plan;
 use crate::evaluation::Settings;
 use crate::evaluation::sensor_set::{self, Judged, SensorSet};
@@ -147,10 +146,10 @@ pub struct Counted {
 /// What monitors said.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Watched {
-    /// Each sensor watched by the others.
-    pub blind: Worth,
+    /// Each sensor, with faults that come while it runs.
+    pub judged: monitoring::Judged,
+    /// With mounts that are wrong from the first day.
     pub turned: Turned,
-    pub standing: Stood,
 }
 
 struct SiteResult {
@@ -182,9 +181,8 @@ pub fn run(
         let set = judged.and_then(|judged| SensorSet::pooled(name, &judged, &settings.evaluation));
         let mut watched = Watched::default();
         for site in sites {
-            watched.blind.iter_mut().zip(site.watched.blind).for_each(|(sum, one)| *sum += one);
+            watched.judged += site.watched.judged;
             watched.turned += site.watched.turned;
-            watched.standing += site.watched.standing;
         }
         Counted { name: name.to_owned(), set, watched }
     };
@@ -203,8 +201,8 @@ fn site_of(
 ) -> Result<SiteResult> {
     let fcd = site.fcd.as_ref().map(|fcd| plan.folder.join(fcd));
     let scene = plan.scene(site)?;
-    let lanes =
-        if scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some()) { scene.lanes()? } else { Vec::new() };
+    let has_net = scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some());
+    let lanes = turned::pieces(&if has_net { scene.lanes()? } else { Vec::new() });
     let simulation = Simulation::new(scene, fcd.as_deref())?;
     let name = site.name();
     keep(&name, &simulation)?;
@@ -213,9 +211,8 @@ fn site_of(
     let judged = plan.judged.then(|| sensor_set::judge(&all, settings, every, progress)).transpose()?;
     let follows: Vec<Follows> = all.par_iter().map(|r| monitoring::follow(r, settings)).collect::<Result<_>>()?;
     let watched = Watched {
-        blind: monitoring::watch(&all, &follows, settings, plan.broken)?,
+        judged: monitoring::judge(&all, &follows, &lanes, settings, plan.broken)?,
         turned: turned::compare(&all, &follows, &lanes, settings, plan.broken)?,
-        standing: standing::stand(&all, settings, plan.broken)?,
     };
     Ok(SiteResult { name, judged, watched })
 }

@@ -3,17 +3,21 @@
 use std::path::Path;
 use std::process::Command;
 
+use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
+use viewshed::fusion::FixturesConfig;
 use viewshed::inputs::ars408::Ars408Config;
 use viewshed::map::polar::PolarMap;
 use viewshed::unit::Unit;
-use viewshed::unit::profile::reference::{Parameters, Radar, Sender, State};
+use viewshed::unit::profile::reference::{Radar, Sender, State, Supervised};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
-use viewshed::wire::message::{Addresses, Epoch};
+use viewshed::wire::message::{Addresses, Epoch, Plane};
 use viewshed_harness::boards::can_twin::clusters;
 use viewshed_harness::boards::machine::Folder;
+use viewshed_harness::boards::scans::Scan;
+use viewshed_harness::bus::listening::Listening;
 use viewshed_harness::recording::can_log::{Content, Line, candump};
 
 use super::daemon::{Daemon, tables};
@@ -27,10 +31,10 @@ type Sent = Vec<(u64, CanFrame)>;
 
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second after the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
-    let mut parameters: Option<Parameters> = None;
-    let header = settings.build::<State>(&mut parameters).unwrap();
+    let mut parameters: Option<<Supervised as Estimator>::Parameters> = None;
+    let header = settings.build::<Supervised>(&mut parameters).unwrap();
     let parameters = parameters.unwrap();
-    let mut state = Box::new(State::new());
+    let mut state = Box::new(Supervised::new(State::new()));
     let mut map = Box::new(PolarMap::NOWHERE);
     let (first, last) = (log.first().unwrap().0, log.last().unwrap().0);
     let at = Time::from_micros;
@@ -40,7 +44,7 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     unit.broadcast().status_mut().firmware = [0, 1, 0];
     let mut decoder = Radar::new(Ars408Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
-    let flush = |unit: &mut Unit<'_, State, Sender>, now: u64, sent: &mut Sent| {
+    let flush = |unit: &mut Unit<'_, Supervised, Sender>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
     };
     loop {
@@ -78,7 +82,23 @@ fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> String {
          [output]\nmedium = \"{medium}\"\ncandump = \"FOLDER/maps.log\"\n{}",
         log.display(),
         tables(settings)
-    )
+    ) + &settings
+        .fixtures
+        .map_or_else(String::new, |f| format!("[fixtures]\nlearned_windows = {}\n", f.learned_windows))
+}
+
+/// The scans as the log of an ARS408.
+fn log_of(scans: &[Scan]) -> String {
+    let mut text = String::new();
+    for scan in clusters(scans, scans.len(), 240) {
+        // as they come on a bus of 500 kbit/s, four in a millisecond
+        for (n, frame) in scan.frames.into_iter().enumerate() {
+            let micros = 1_700_000_000_000_000 + scan.time.micros() as i64 + 250 * n as i64;
+            let line = Line { time_ns: 1000 * micros, interface: "can0".into(), content: Content::Data(frame) };
+            text += &format!("{line}\n");
+        }
+    }
+    text
 }
 
 /// Runs the daemon over a log and compares every frame and its time.
@@ -119,16 +139,7 @@ fn linux_every_frame_of_the_motorway_is_the_same_and_listen_decodes_all() {
     let (settings, scans) = shipped(20.0);
     let folder = Folder::new().unwrap();
     let log = folder.0.join("motorway.log");
-    let mut text = String::new();
-    for scan in clusters(&scans, scans.len(), 240) {
-        // as they come on a bus of 500 kbit/s, four in a millisecond
-        for (n, frame) in scan.frames.into_iter().enumerate() {
-            let micros = 1_700_000_000_000_000 + scan.time.micros() as i64 + 250 * n as i64;
-            let line = Line { time_ns: 1000 * micros, interface: "can0".into(), content: Content::Data(frame) };
-            text += &format!("{line}\n");
-        }
-    }
-    std::fs::write(&log, text).unwrap();
+    std::fs::write(&log, log_of(&scans)).unwrap();
     let (daemon, sent) = same(&settings, &log, 0, "can", Medium::Can(Addresses::STANDARD));
     assert!(sent.len() > 15 * scans.len(), "{} frames of {} scans", sent.len(), scans.len());
 
@@ -155,4 +166,41 @@ fn linux_every_frame_of_the_motorway_is_the_same_and_listen_decodes_all() {
     let visible = |k: usize| maps[k]["visible"].as_u64().unwrap();
     assert!(visible(10) > 5000, "{:?}", maps[10]);
     assert_eq!(visible(maps.len() - 1), 0, "and its last map says unknown");
+}
+
+#[test]
+#[ignore = "needs the daemon"]
+fn linux_a_sector_that_goes_dark_is_unknown_to_receivers_and_its_status_says_so() {
+    let fixtures = &*Box::leak(Box::new(FixturesConfig { learned_windows: 12, ..FixturesConfig::default() }));
+    let (settings, mut scans) = shipped(32.0);
+    let settings = Settings { fixtures: Some(fixtures), ..settings };
+    let begin = scans[0].time.micros();
+    for scan in scans.iter_mut().filter(|scan| scan.time.micros() > begin + 15_000_000) {
+        // the left third
+        scan.detections.retain(|d| d.azimuth.radians().to_degrees() < 20.0);
+    }
+    let folder = Folder::new().unwrap();
+    let log = folder.0.join("dark.log");
+    std::fs::write(&log, log_of(&scans)).unwrap();
+    let (daemon, sent) = same(&settings, &log, 0, "can", Medium::Can(Addresses::STANDARD));
+    assert!(daemon.log().contains("radar Degraded: SectorBlind"), "{}", daemon.log());
+
+    let mut heard = Listening::new(Addresses::STANDARD, None);
+    let mut known = Vec::new();
+    for (micros, frame) in &sent {
+        let line = Line { time_ns: 1000 * *micros as i64, interface: "can0".into(), content: Content::Data(*frame) };
+        heard.take(&line);
+        let map = heard.map(0);
+        let Some(header) = map.header() else { continue };
+        let of = |azimuth: u8| map.ray(Plane::Visibility, usize::from(azimuth)).known.end();
+        let status = heard.heard(0, Vec::new()).and_then(|heard| heard.status).map(|s| (s.state, s.reason));
+        let ends = [header.azimuths / 12, header.azimuths - header.azimuths / 12].map(of);
+        known.push((micros - sent[0].0, ends, status.unwrap_or_default()));
+    }
+    let at = |s: u64| known.iter().find(|(micros, ..)| *micros > s * 1_000_000).unwrap();
+    let (_, [right, left], (state, reason)) = at(14);
+    assert!(*right > 0 && *left > 0 && state == "Ok", "both sides are known: {:?}", at(14));
+    let (_, [right, left_dark], status) = at(28);
+    assert!(*right > 0 && *left_dark == 0, "the left one is unknown: {:?}", at(28));
+    assert_eq!(*status, ("Degraded".to_owned(), "SectorBlind".to_owned()), "before: {state} {reason}");
 }

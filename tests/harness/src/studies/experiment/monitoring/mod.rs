@@ -1,67 +1,133 @@
-//! What visibility is worth to whoever watches sensors: the same monitor with the watched sensor's map, and without it.
+//! Who of several sensors is wrong: what others that look there say of each, what usually stands in its view says, and
+//! both; and what visibility is worth to them.
 //!
-//! Each sensor of a site is watched by the others, in order and with a third of its view gone dark. With its own map a
-//! miss counts only where that says visible; without, wherever the sensor looks. [`turned`] turns mounts, [`standing`]
-//! asks what usually stands where a radar looks.
+//! Every sensor of a site runs in order, and with each [fault](fault) from a moment on. [With its own map](Sight) a miss
+//! counts only where that says visible, and a fixture is asked for only there; without it, wherever the sensor looks.
+//! [`turned`] is of mounts that are wrong from the first day.
 
-pub mod standing;
+pub mod fault;
+mod judges;
 pub mod turned;
 
 use anyhow::Result;
 use rayon::prelude::*;
 use serde::Serialize;
-use viewshed::fusion::{Monitor, MonitorConfig, Observed};
-use viewshed::map::{CellState, Visibility};
-use viewshed::sensor::road::RoadPoint;
 
-use crate::estimators::{
-    self,
-    camera_3d::{lifted, time},
-};
+use self::fault::{Fault, THIRDS, dirt_db};
+use self::judges::{Judges, LEARNED_S, SECTORS, Said};
+use self::turned::Pieces;
+use crate::estimators::{self, camera_3d::lifted};
 use crate::evaluation::Settings;
-use crate::evaluation::sensor_set::newest;
 use crate::geometry::solid::Solid;
-use crate::recording::{Frame, Recording};
+use crate::recording::Recording;
 
-const SECTORS: usize = 6;
-/// Parts of the view that go dark one after another.
-const THIRDS: usize = 3;
-/// After the warm-up a sensor is in order for so long, seconds.
+/// After the warm-up a sensor is in order for so long at least, seconds.
 const IN_ORDER_S: f64 = 20.0;
-/// A sensor detects what another one follows if it detects something in its outline or so near to it, metres: ends that
-/// neither has seen are guessed.
-const SAME_M: f64 = 3.0;
 
-/// What a monitor said of a sensor.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Alerts {
-    /// Sectors that went dark, were not judged blind before, and in which another sensor followed within 10 s what both
-    /// had seen before, and how many of them were named at all; how long that took, seconds, summed.
-    pub dark: u64,
-    pub named: u64,
-    pub named_after_s: f64,
-    pub slowest_s: f64,
-    /// Of them within 10 s.
-    pub within_10_s: u64,
-    /// Sensors in order: alerts, and the seconds they were watched for.
-    pub wrong: u64,
-    pub watched_s: f64,
+/// Who says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judge {
+    Others,
+    Standing,
+    Either,
 }
 
-impl std::ops::AddAssign for Alerts {
-    fn add_assign(&mut self, o: Self) {
-        self.dark += o.dark;
-        self.named += o.named;
-        self.named_after_s += o.named_after_s;
-        self.slowest_s = self.slowest_s.max(o.slowest_s);
-        self.within_10_s += o.within_10_s;
-        self.wrong += o.wrong;
-        self.watched_s += o.watched_s;
+impl Judge {
+    pub const ALL: [Self; 3] = [Self::Others, Self::Standing, Self::Either];
+}
+
+/// Whether the sensor's own map counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sight {
+    With,
+    Without,
+}
+
+impl Sight {
+    pub const ALL: [Self; 2] = [Self::With, Self::Without];
+}
+
+/// What is said to be wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finding {
+    Blind,
+    Turned,
+    Tilted,
+    Weaker,
+}
+
+impl Finding {
+    pub const ALL: [Self; 4] = [Self::Blind, Self::Turned, Self::Tilted, Self::Weaker];
+
+    /// Within how many seconds it should be said.
+    pub const fn in_time_s(self) -> f64 {
+        if matches!(self, Self::Blind) { 10.0 } else { 30.0 }
     }
 }
 
-/// With visibility, and without.
-pub type Worth = [Alerts; 2];
+/// What one judge said of one kind of fault.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Tally {
+    /// Faults; how many were named, and in time; after how many seconds, summed; and the slowest.
+    pub cases: u64,
+    pub named: u64,
+    pub in_time: u64,
+    pub after_s: f64,
+    pub slowest_s: f64,
+    /// Of sensors in order.
+    pub wrong: u64,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, o: Self) {
+        self.cases += o.cases;
+        self.named += o.named;
+        self.in_time += o.in_time;
+        self.after_s += o.after_s;
+        self.slowest_s = self.slowest_s.max(o.slowest_s);
+        self.wrong += o.wrong;
+    }
+}
+
+/// What all judges said.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Judged {
+    /// By finding, judge and sight.
+    pub tallies: [[[Tally; 2]; 3]; 4],
+    /// Thirds gone dark in which something that both had seen was missed within 10 s, enough stands, or either.
+    pub could_tell: [u64; 3],
+    /// dB of dirt when it was named, summed.
+    pub dirt_db: f64,
+    /// Fixtures learned, of how many radars.
+    pub fixtures: u64,
+    pub radars: u64,
+    /// How long sensors in order were judged, and of them radars, seconds.
+    pub sensors_s: f64,
+    pub radars_s: f64,
+}
+
+impl Judged {
+    pub fn of(&self, finding: Finding, judge: Judge, sight: Sight) -> &Tally {
+        &self.tallies[finding as usize][judge as usize][sight as usize]
+    }
+
+    fn of_mut(&mut self, finding: Finding, judge: Judge, sight: Sight) -> &mut Tally {
+        &mut self.tallies[finding as usize][judge as usize][sight as usize]
+    }
+}
+
+impl std::ops::AddAssign for Judged {
+    fn add_assign(&mut self, o: Self) {
+        let tallies = self.tallies.as_flattened_mut().as_flattened_mut();
+        tallies.iter_mut().zip(o.tallies.as_flattened().as_flattened()).for_each(|(sum, one)| *sum += *one);
+        self.could_tell.iter_mut().zip(o.could_tell).for_each(|(sum, one)| *sum += one);
+        self.dirt_db += o.dirt_db;
+        self.fixtures += o.fixtures;
+        self.radars += o.radars;
+        self.sensors_s += o.sensors_s;
+        self.radars_s += o.radars_s;
+    }
+}
 
 /// What a sensor follows at each of its frames: a radar's confirmed obstacles, a camera's vehicles.
 pub type Follows = Vec<Vec<Solid>>;
@@ -82,131 +148,185 @@ pub fn follow(recording: &Recording, settings: &Settings) -> Result<Follows> {
     Ok(obstacles.collect())
 }
 
-/// Watches every sensor of a site by the others; `broken` with thirds of them gone dark, too.
+/// Judges every sensor of a site; `broken` with every fault, too.
 ///
 /// # Errors
 /// Parameters of estimators or monitors that cannot be.
-pub fn watch(all: &[Recording], follows: &[Follows], settings: &Settings, broken: bool) -> Result<Worth> {
-    let thirds = if broken { THIRDS } else { 0 };
-    let cases: Vec<(usize, Option<usize>)> =
-        (0..all.len()).flat_map(|k| [(k, None)].into_iter().chain((0..thirds).map(move |t| (k, Some(t))))).collect();
-    let worth = cases.par_iter().map(|&(k, third)| one(all, k, follows, third, settings));
-    let mut sum = Worth::default();
-    for one in worth.collect::<Result<Vec<_>>>()? {
-        sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += one);
+pub fn judge(
+    all: &[Recording],
+    follows: &[Follows],
+    lanes: &Pieces,
+    settings: &Settings,
+    broken: bool,
+) -> Result<Judged> {
+    let faults = [Fault::None].into_iter().chain(broken.then(Fault::all).into_iter().flatten());
+    let cases: Vec<(usize, Fault)> = faults.flat_map(|fault| (0..all.len()).map(move |k| (k, fault))).collect();
+    let site = Site { all, follows, lanes, settings };
+    let mut sum = Judged::default();
+    for one in cases.par_iter().map(|&(k, fault)| site.case(k, fault)).collect::<Result<Vec<_>>>()? {
+        sum += one;
     }
     Ok(sum)
 }
 
-/// One sensor, watched by the others.
-fn one(
-    all: &[Recording],
-    watched: usize,
-    follows: &[Follows],
-    dark: Option<usize>,
-    settings: &Settings,
-) -> Result<Worth> {
-    let own = &all[watched];
-    let start = own.frames.first().map_or(0, |f| f.time_ns);
-    let since_s = |frame: &Frame| (frame.time_ns - start) as f64 * 1e-9;
-    let from_s = settings.evaluation.warm_up_s + IN_ORDER_S;
-    let broken = dark.map(|third| darkened(own, third, start + (from_s * 1e9) as i64));
-    let recording = broken.as_ref().unwrap_or(own);
-    let view = own.sensor.field_of_view.azimuth_rad.map(f64::to_degrees);
-    let new =
-        || Monitor::<SECTORS>::new(&estimators::mount(&own.pose), view.map(|v| v as f32), &MonitorConfig::default());
-    // a monitor for each that watches: an obstacle that two of them follow would be two
-    let mut watching = Vec::new();
-    for other in (0..all.len()).filter(|other| *other != watched) {
-        watching.push((other, [new()?, new()?]));
-    }
-    let mut worth = Worth::default();
-    let mut blind = [[false; SECTORS]; 2];
-    let mut named = [[None::<f64>; SECTORS]; 2];
-    let mut passed = [false; SECTORS];
-    // before it went dark: that is no finding
-    let mut blind_before = [[false; SECTORS]; 2];
-    let mut running = estimators::own(recording, &settings.estimators)?;
-    for (k, frame) in recording.frames.iter().enumerate() {
-        running.step(frame);
-        let (since, now) = (since_s(frame), time(frame.time_ns));
-        let seen = places(recording, k, settings)?;
-        let map = running.map();
-        for (other, monitors) in &mut watching {
-            let Some(theirs) = newest(&all[*other], frame.time_ns) else { continue };
-            for solid in follows[*other].get(theirs).into_iter().flatten() {
-                let [x, y, _] = solid.center;
-                let place = own.pose.to_spherical([x, y, settings.evaluation.slice_height_m]);
-                if !own.sensor.field_of_view.contains(place) {
-                    continue;
-                }
-                let detected = seen.iter().any(|p| solid.footprint_distance(*p) <= SAME_M);
-                let at = RoadPoint::from_metres(x as f32, y as f32)?;
-                let anywhere = CellState { visibility: Visibility::Visible, grade: 255, occupancy: 0, occupied: false };
-                let [with, without] = monitors;
-                with.observe(now, at, map.at(at), detected);
-                let observed = without.observe(now, at, anywhere, detected);
-                if let (true, Some(sector)) = ((from_s..from_s + 10.0).contains(&since), without.sector(at)) {
-                    passed[sector] |= observed == Observed::Miss;
-                }
-            }
-            monitors.iter_mut().for_each(|monitor| monitor.advance(now));
-        }
-        for w in 0..2 {
-            for sector in 0..SECTORS {
-                let now = watching.iter().any(|(_, monitors)| monitors[w].is_blind(sector));
-                let before = std::mem::replace(&mut blind[w][sector], now);
-                let alert = now && !before;
-                // it learns what is usual meanwhile
-                if since < settings.evaluation.warm_up_s {
-                    continue;
-                }
-                if dark.is_none() {
-                    worth[w].wrong += u64::from(alert);
-                } else if since < from_s {
-                    blind_before[w][sector] = now;
-                } else if alert {
-                    named[w][sector].get_or_insert(since - from_s);
-                }
-            }
-        }
-    }
-    // the same sectors for both, or their shares would be of different things
-    let counts = |sector: usize| passed[sector] && !blind_before.iter().any(|before| before[sector]);
-    for (alerts, named) in worth.iter_mut().zip(named) {
-        let Some(third) = dark else {
-            alerts.watched_s = recording.frames.last().map_or(0.0, since_s) - settings.evaluation.warm_up_s;
-            continue;
-        };
-        for sector in (0..SECTORS).filter(|sector| sector * THIRDS / SECTORS == third && counts(*sector)) {
-            alerts.dark += 1;
-            if let Some(after) = named[sector] {
-                alerts.named += 1;
-                alerts.named_after_s += after;
-                alerts.slowest_s = alerts.slowest_s.max(after);
-                alerts.within_10_s += u64::from(after <= 10.0);
-            }
-        }
-    }
-    Ok(worth)
+struct Site<'a> {
+    all: &'a [Recording],
+    follows: &'a [Follows],
+    lanes: &'a Pieces,
+    settings: &'a Settings,
 }
 
-/// The recording with a third of its view dark from a time on.
-fn darkened(own: &Recording, third: usize, from_ns: i64) -> Recording {
-    let mut dark = own.clone();
-    let is_dark = |share: f64| (share * THIRDS as f64).floor() as i64 == third as i64;
-    let [right, left] = own.sensor.field_of_view.azimuth_rad;
-    for frame in dark.frames.iter_mut().filter(|f| f.time_ns >= from_ns) {
-        frame.detections.retain(|d| !is_dark((f64::from(d.azimuth_rad) - right) / (left - right)));
-    }
-    if let Some(camera) = &mut dark.camera {
-        let width = f64::from(camera.intrinsics.size_px[0]);
-        for frame in camera.frames.iter_mut().filter(|f| f.time_ns >= from_ns) {
-            // columns of the image run from left to right
-            frame.boxes.retain(|b| !is_dark(1.0 - (b.edges[0] + b.edges[2]) / 2.0 / width));
+/// When something was first named after the fault came.
+type First = Option<f64>;
+
+/// Of one sight.
+#[derive(Debug, Clone, Copy, Default)]
+struct Watched {
+    before: Said,
+    blind: [[First; SECTORS]; 3],
+    turned: [First; 3],
+    tilted: First,
+    weaker: First,
+    wrong: [[u64; 3]; 4],
+}
+
+impl Watched {
+    /// Takes what is said `since` the fault.
+    fn take(&mut self, now: &Said, since: f64) {
+        let before = std::mem::replace(&mut self.before, *now);
+        let mut each = |finding: Finding, judge: usize, first: &mut First, now: bool, before: bool| {
+            if now && !before {
+                self.wrong[finding as usize][judge] += 1;
+                if since >= 0.0 {
+                    first.get_or_insert(since);
+                }
+            }
+        };
+        for judge in 0..Judge::ALL.len() {
+            for k in 0..SECTORS {
+                each(Finding::Blind, judge, &mut self.blind[judge][k], now.blind[judge][k], before.blind[judge][k]);
+            }
+            each(Finding::Turned, judge, &mut self.turned[judge], now.turned[judge], before.turned[judge]);
+        }
+        for judge in [Judge::Standing as usize, Judge::Either as usize] {
+            each(Finding::Tilted, judge, &mut self.tilted, now.tilted, before.tilted);
+            each(Finding::Weaker, judge, &mut self.weaker, now.weaker, before.weaker);
         }
     }
-    dark
+}
+
+impl Site<'_> {
+    /// One sensor with one fault, or in order.
+    fn case(&self, k: usize, fault: Fault) -> Result<Judged> {
+        let Self { all, settings, .. } = *self;
+        let own = &all[k];
+        let is_radar = own.of_camera().is_none();
+        let start = own.frames.first().map_or(0, |f| f.time_ns);
+        let end = own.frames.last().map_or(start, |f| f.time_ns);
+        let after = |s: f64| start + (s * 1e9) as i64;
+        // a window more than learning takes
+        let warm_s = settings.evaluation.warm_up_s.max(f64::from(LEARNED_S) + 2.0);
+        let from_ns = after(warm_s.max(settings.evaluation.warm_up_s + IN_ORDER_S));
+        let broken = (fault != Fault::None).then(|| fault.of(own, from_ns));
+        let recording = broken.as_ref().unwrap_or(own);
+        let mut followed = match broken {
+            Some(_) => follow(recording, settings)?,
+            None => Vec::new(),
+        };
+        // a camera's recording is with the fault from its beginning
+        let whole = own.frames.iter().position(|f| f.time_ns >= from_ns).unwrap_or(0);
+        if !followed.is_empty() && !is_radar {
+            followed.iter_mut().zip(&self.follows[k]).take(whole).for_each(|(to, own)| to.clone_from(own));
+        }
+        let follows = (0..all.len()).map(|s| if s == k && broken.is_some() { &followed } else { &self.follows[s] });
+        let aligned_from = after(settings.evaluation.warm_up_s);
+        let slice_m = settings.evaluation.slice_height_m;
+        let mut judges = Judges::new(all, follows.collect(), k, self.lanes, slice_m, aligned_from)?;
+        let mut running = estimators::own(recording, &settings.estimators)?;
+        let mut watched = [Watched::default(); 2];
+        let (mut missed, mut expected) = ([false; SECTORS], [false; SECTORS]);
+        for (n, frame) in recording.frames.iter().enumerate() {
+            running.step(frame);
+            let misses = judges.step(frame, running.map(), &places(recording, n, settings)?)?;
+            let since = (frame.time_ns - from_ns) as f64 * 1e-9;
+            for (watched, sight) in watched.iter_mut().zip(Sight::ALL) {
+                if frame.time_ns < after(warm_s) {
+                    // it learns what is usual meanwhile
+                    watched.before = judges.said(sight);
+                } else {
+                    watched.take(&judges.said(sight), since);
+                }
+            }
+            if since >= 0.0 {
+                (0..SECTORS).for_each(|s| {
+                    missed[s] |= misses[s] && since <= Finding::Blind.in_time_s();
+                    expected[s] |= judges.expects(s);
+                });
+            }
+        }
+        let mut judged = Judged::default();
+        for (watched, sight) in watched.iter().zip(Sight::ALL) {
+            for judge in Judge::ALL {
+                // only what stands tells of tilts and dirt, and only a radar has that
+                let tells = is_radar || judge != Judge::Standing;
+                let mut case = |finding: Finding, first: First| {
+                    judged.of_mut(finding, judge, sight).add(first, finding);
+                };
+                let j = judge as usize;
+                match fault {
+                    Fault::None => {
+                        for finding in Finding::ALL {
+                            judged.of_mut(finding, judge, sight).wrong = watched.wrong[finding as usize][j];
+                        }
+                    }
+                    Fault::Dark(third) if tells => {
+                        let firsts = (0..SECTORS).filter(|s| in_third(*s, third)).filter_map(|s| watched.blind[j][s]);
+                        case(Finding::Blind, firsts.min_by(f64::total_cmp));
+                    }
+                    Fault::Turned(_) if tells => case(Finding::Turned, watched.turned[j]),
+                    Fault::Tilted(_) if is_radar && judge != Judge::Others => case(Finding::Tilted, watched.tilted),
+                    Fault::Dirt if is_radar && judge != Judge::Others => case(Finding::Weaker, watched.weaker),
+                    _ => {}
+                }
+            }
+        }
+        let seconds = (end - after(warm_s)).max(0) as f64 * 1e-9;
+        match fault {
+            Fault::None => {
+                judged.sensors_s = seconds;
+                if is_radar {
+                    (judged.radars, judged.radars_s, judged.fixtures) = (1, seconds, judges.fixtures());
+                }
+            }
+            Fault::Dark(third) => {
+                let any = |of: &[bool]| (0..SECTORS).any(|s| in_third(s, third) && of[s]);
+                let [others, standing] = [any(&missed), any(&expected)];
+                judged.could_tell = [others, standing, others || standing].map(u64::from);
+            }
+            Fault::Dirt => {
+                let named = watched[Sight::With as usize].weaker;
+                judged.dirt_db = named.map_or(0.0, |s| dirt_db(from_ns + (s * 1e9) as i64, from_ns, end));
+            }
+            Fault::Turned(_) | Fault::Tilted(_) => {}
+        }
+        Ok(judged)
+    }
+}
+
+impl Tally {
+    fn add(&mut self, first: First, finding: Finding) {
+        self.cases += 1;
+        if let Some(after) = first {
+            self.named += 1;
+            self.in_time += u64::from(after <= finding.in_time_s());
+            self.after_s += after;
+            self.slowest_s = self.slowest_s.max(after);
+        }
+    }
+}
+
+fn in_third(sector: usize, third: usize) -> bool {
+    sector * THIRDS / SECTORS == third
 }
 
 /// Where a sensor detects something on the road.
@@ -229,51 +349,74 @@ mod tests {
     use crate::recording::RadarDetection;
 
     /// A vehicle that comes nearer, 25 m ahead of a sensor at the origin and 35 m of one 60 m away that looks back, 15
-    /// degrees to the left of the first.
+    /// degrees to the left of the first; two posts beside it.
     fn site() -> [Recording; 2] {
         let mut both = [recording(1200, 1), recording(1200, 1)];
         both[1].pose = SensorPose::new([60.0, 0.0, 6.0], std::f64::consts::PI, 0.0, 0.0);
         for recording in &mut both {
-            let s = recording.pose.to_spherical([25.0, 6.7, 1.0]);
-            let detection = RadarDetection {
-                range_m: s.range_m as f32,
-                azimuth_rad: s.azimuth_rad as f32,
-                elevation_rad: Some(s.elevation_rad as f32),
-                radial_velocity_mps: -8.0,
-                rcs_dbsm: Some(10.0),
-                snr_db: Some(20.0),
+            let detection = |x: f64, y: f64, radial_velocity_mps: f32| {
+                let s = recording.pose.to_spherical([x, y, 1.0]);
+                RadarDetection {
+                    range_m: s.range_m as f32,
+                    azimuth_rad: s.azimuth_rad as f32,
+                    elevation_rad: Some(s.elevation_rad as f32),
+                    radial_velocity_mps,
+                    rcs_dbsm: Some(10.0),
+                    snr_db: Some(20.0),
+                }
             };
-            recording.frames.iter_mut().for_each(|f| f.detections = vec![detection; 3]);
+            let vehicle = detection(25.0, 6.7, -8.0);
+            let all = vec![vehicle, vehicle, vehicle, detection(20.0, 8.0, 0.0), detection(33.0, 12.0, 0.0)];
+            recording.frames.iter_mut().for_each(|f| f.detections.clone_from(&all));
         }
         both
     }
 
-    #[test]
-    fn a_third_that_goes_dark_is_named_and_sensors_in_order_are_not() {
+    fn judged(broken: bool) -> Judged {
         let mut settings = Settings::default();
         settings.evaluation.warm_up_s = 10.0;
         let site = site();
         // both follow one vehicle that stands and still moves towards them
         let solid = Solid { center: [25.0, 6.7, 0.8], yaw_rad: 0.0, size: [4.0, 2.0, 1.6] };
         let follows = [0, 1].map(|k| vec![vec![solid]; site[k].frames.len()]);
-        let [with, without] = watch(&site, &follows, &settings, true).unwrap();
-        // one sector of each sensor has the vehicle in it; nobody sees anything in the others
-        for alerts in [with, without] {
-            assert_eq!((alerts.dark, alerts.wrong), (2, 0), "{alerts:?}");
-            assert!((alerts.watched_s - 2.0 * 109.9).abs() < 0.2, "{alerts:?}");
-        }
-        assert_eq!((without.named, without.within_10_s), (2, 2), "{without:?}");
-        assert!(without.slowest_s > 2.0 && without.slowest_s < 9.0, "{without:?}");
-        assert_eq!(watch(&site, &follows, &settings, false).unwrap()[1].dark, 0, "in order only");
+        judge(&site, &follows, &Vec::new(), &settings, broken).unwrap()
     }
 
     #[test]
-    fn a_third_is_counted_from_right_to_left() {
-        let [own, _] = site();
-        let left = darkened(&own, 2, 0);
-        assert_eq!(left.frames[5].detections.len(), 3);
-        assert_eq!(darkened(&own, 1, 0).frames[5].detections.len(), 0);
-        assert_eq!(darkened(&own, 0, 0).frames[5].detections.len(), 3);
-        assert_eq!(darkened(&own, 1, 1_000_000_000).frames[5].detections.len(), 3, "not yet");
+    fn what_goes_wrong_is_named_by_who_can_tell_and_sensors_in_order_are_not() {
+        let judged = judged(true);
+        for finding in Finding::ALL {
+            for judge in Judge::ALL {
+                for sight in Sight::ALL {
+                    assert_eq!(judged.of(finding, judge, sight).wrong, 0, "{finding:?} {judge:?} {sight:?}");
+                }
+            }
+        }
+        assert!((judged.sensors_s - 2.0 * 77.9).abs() < 0.2 && judged.sensors_s == judged.radars_s, "{judged:?}");
+        assert_eq!((judged.radars, judged.fixtures), (2, 4));
+        // of three thirds of each sensor one has the vehicle in it, and the posts
+        assert_eq!(judged.could_tell, [2, 2, 2], "{judged:?}");
+        let of = |finding, judge| judged.of(finding, judge, Sight::Without);
+        let others = of(Finding::Blind, Judge::Others);
+        assert_eq!((others.cases, others.named, others.in_time), (6, 2, 2), "{others:?}");
+        assert!(others.slowest_s > 2.0 && others.slowest_s < 9.0, "{others:?}");
+        let either = of(Finding::Blind, Judge::Either);
+        assert_eq!((either.cases, either.named), (6, 2));
+        assert!(either.after_s <= others.after_s, "the first of both counts");
+        for finding in [Finding::Turned, Finding::Tilted] {
+            let by = of(finding, Judge::Standing);
+            assert_eq!((by.cases, by.named), (4, 4), "{finding:?} {by:?}");
+        }
+        let dirt = of(Finding::Weaker, Judge::Standing);
+        assert_eq!((dirt.cases, of(Finding::Weaker, Judge::Others).cases), (2, 0));
+        assert_eq!(dirt.named, 2);
+        assert!(judged.dirt_db > 2.0 && judged.dirt_db < 20.0, "{}", judged.dirt_db);
+    }
+
+    #[test]
+    fn in_order_only_asks_for_no_faults() {
+        let judged = judged(false);
+        assert_eq!(judged.of(Finding::Blind, Judge::Either, Sight::With).cases, 0);
+        assert!(judged.sensors_s > 0.0);
     }
 }

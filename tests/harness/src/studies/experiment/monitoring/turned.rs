@@ -1,4 +1,4 @@
-//! Mounts that are turned against what is configured: who disagrees with whom, and who of them is wrong.
+//! Mounts that are turned against what is configured from the first day on: who disagrees with whom, and who of them is wrong.
 //!
 //! Each sensor of a site in turn hangs a degree to the left, and a degree to the right, of what its configuration says,
 //! and sensors are compared by what they follow. The lanes of the road are a third sensor where they are known.
@@ -9,6 +9,7 @@ use serde::Serialize;
 use viewshed::fusion::{Alignment, AlignmentConfig};
 use viewshed::sensor::road::RoadPoint;
 
+use super::fault::{TURN_DEG, misplaced};
 use super::{Follows, follow};
 use crate::estimators::{self, Lane, camera_3d::time};
 use crate::evaluation::Settings;
@@ -18,10 +19,8 @@ use crate::geometry::solid::Solid;
 use crate::recording::Recording;
 
 /// Up to three sensors, and the road.
-const PLACES: usize = 4;
+pub(super) const PLACES: usize = 4;
 const ROAD: usize = PLACES - 1;
-/// How far mounts are turned, degrees.
-const TURN_DEG: f64 = 1.0;
 /// Two sensors follow the same vehicle if it is nearest to both and no farther away, metres.
 const SAME_M: f64 = 4.0;
 /// A vehicle keeps to a lane whose middle is no farther away, metres, and that goes its way within 20 degrees.
@@ -65,7 +64,13 @@ impl std::ops::AddAssign for Turned {
 }
 
 /// A lane's middle, in pieces: from, to.
-type Pieces = Vec<[[f64; 2]; 2]>;
+pub type Pieces = Vec<[[f64; 2]; 2]>;
+
+/// The middles of lanes.
+pub fn pieces(lanes: &[Lane]) -> Pieces {
+    let metres = |p: [f32; 2]| p.map(f64::from);
+    lanes.iter().flat_map(|l| l.points.windows(2).map(|w| [metres(w[0]), metres(w[1])])).collect()
+}
 
 /// Turns every sensor of a site in turn; `broken`: otherwise they are compared in order only.
 ///
@@ -74,24 +79,22 @@ type Pieces = Vec<[[f64; 2]; 2]>;
 pub fn compare(
     all: &[Recording],
     follows: &[Follows],
-    lanes: &[Lane],
+    lanes: &Pieces,
     settings: &Settings,
     broken: bool,
 ) -> Result<Turned> {
-    let metres = |p: [f32; 2]| p.map(f64::from);
-    let pieces: Pieces = lanes.iter().flat_map(|l| l.points.windows(2).map(|w| [metres(w[0]), metres(w[1])])).collect();
     let sides = if broken { &[1.0, -1.0][..] } else { &[] };
     let cases: Vec<(usize, f64)> =
         (0..all.len().min(ROAD)).flat_map(|k| sides.iter().map(move |side| (k, *side))).collect();
     let poses: Vec<SensorPose> = all.iter().map(|r| r.pose).collect();
     let follows: Vec<&Follows> = follows.iter().collect();
-    let mut sum = one(all, &poses, &follows, &pieces, None, settings)?;
+    let mut sum = one(all, &poses, &follows, lanes, None, settings)?;
     let turned = cases.par_iter().map(|&(k, side)| {
-        let recording = turned(&all[k], side * TURN_DEG);
+        let recording = misplaced(&all[k], side * TURN_DEG, 0.0);
         let own = follow(&recording, settings)?;
         let (mut poses, mut follows) = (poses.clone(), follows.clone());
         (poses[k], follows[k]) = (recording.pose, &own);
-        one(all, &poses, &follows, &pieces, Some((k, side)), settings)
+        one(all, &poses, &follows, lanes, Some((k, side)), settings)
     });
     for one in turned.collect::<Result<Vec<_>>>()? {
         sum += one;
@@ -99,17 +102,46 @@ pub fn compare(
     Ok(sum)
 }
 
-/// The recording of a sensor that hangs so many degrees to the left of what its configuration says.
-fn turned(recording: &Recording, left_deg: f64) -> Recording {
-    let mut turned = recording.clone();
-    let to = |pose: &SensorPose| {
-        SensorPose::new(pose.position, pose.yaw_rad() - left_deg.to_radians(), pose.pitch_rad(), pose.roll_rad())
+/// Of sensors by their poses, and the road.
+///
+/// # Errors
+/// Mounts that cannot be.
+pub(super) fn alignment(poses: &[SensorPose]) -> Result<Alignment<PLACES>> {
+    let mut mounts = [None; PLACES];
+    mounts.iter_mut().zip(poses).take(ROAD).for_each(|(to, pose)| *to = Some(estimators::mount(pose)));
+    Ok(Alignment::new(&mounts, &AlignmentConfig::default())?)
+}
+
+/// Compares what all sensors follow at a time, with each other and with the lanes.
+///
+/// # Errors
+/// Places that are none.
+pub(super) fn observe(
+    alignment: &mut Alignment<PLACES>,
+    all: &[Recording],
+    follows: &[&Follows],
+    lanes: &Pieces,
+    time_ns: i64,
+) -> Result<()> {
+    let sensors = all.len().min(ROAD);
+    let now = |(r, follows): (&Recording, &&Follows)| -> Vec<Solid> {
+        newest(r, time_ns).and_then(|k| follows.get(k)).cloned().unwrap_or_default()
     };
-    turned.pose = to(&recording.pose);
-    if let Some(camera) = &mut turned.camera {
-        camera.pose = to(&camera.pose);
+    let now: Vec<Vec<Solid>> = all.iter().zip(follows).map(now).collect();
+    for a in 0..sensors {
+        for b in a + 1..sensors {
+            for (own, theirs) in the_same(&now[a], &now[b]) {
+                alignment.observe(a, point(own)?, b, point(theirs)?);
+            }
+        }
+        for solid in &now[a] {
+            if let Some(at) = on_lane(solid, lanes) {
+                alignment.observe(a, point([solid.center[0], solid.center[1]])?, ROAD, point(at)?);
+            }
+        }
     }
-    turned
+    alignment.advance(time(time_ns));
+    Ok(())
 }
 
 /// Compares all sensors from the warm-up on; poses and what is followed may be other than the recordings'.
@@ -122,9 +154,7 @@ fn one(
     settings: &Settings,
 ) -> Result<Turned> {
     let sensors = all.len().min(ROAD);
-    let mut mounts = [None; PLACES];
-    mounts.iter_mut().zip(poses).take(sensors).for_each(|(to, pose)| *to = Some(estimators::mount(pose)));
-    let mut alignment = Alignment::<PLACES>::new(&mounts, &AlignmentConfig::default())?;
+    let mut alignment = alignment(poses)?;
     let Some(first) = all.first() else { return Ok(Turned::default()) };
     let start = first.frames.first().map_or(0, |f| f.time_ns);
     let mut pair_named = None;
@@ -135,24 +165,7 @@ fn one(
         if since < 0.0 {
             continue;
         }
-        let now: Vec<&[Solid]> = all
-            .iter()
-            .zip(follows)
-            .map(|(r, follows)| newest(r, frame.time_ns).and_then(|k| follows.get(k)).map_or(&[][..], Vec::as_slice))
-            .collect();
-        for a in 0..sensors {
-            for b in a + 1..sensors {
-                for (own, theirs) in the_same(now[a], now[b]) {
-                    alignment.observe(a, point(own)?, b, point(theirs)?);
-                }
-            }
-            for solid in now[a] {
-                if let Some(at) = on_lane(solid, lanes) {
-                    alignment.observe(a, point([solid.center[0], solid.center[1]])?, ROAD, point(at)?);
-                }
-            }
-        }
-        alignment.advance(time(frame.time_ns));
+        observe(&mut alignment, all, follows, lanes, frame.time_ns)?;
         for a in 0..sensors {
             for (b, disagreed) in disagreed[a].iter_mut().enumerate().take(sensors).skip(a + 1) {
                 let is_one = turned.is_none_or(|(k, _)| k == a || k == b);

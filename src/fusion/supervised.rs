@@ -1,0 +1,128 @@
+//! An estimator that watches its own radar by what usually stands in its view.
+//!
+//! # Model
+//! The estimator works as it does alone. Then [`Fixtures`] are asked: a sector in which nothing of what stands is seen
+//! becomes unknown on the map before anybody gets it, and the condition says that it is so, that the mount has moved, or
+//! that everything reflects less. Of several the first in this order. What the estimator takes from its last map it
+//! takes from the one with unknown sectors: evidence there does not fade while the radar is blind.
+//!
+//! # Limits
+//! Those of [`Fixtures`]. What was learned is forgotten with the map: a unit that starts over learns anew, and what is
+//! wrong by then is taken for usual.
+
+use crate::estimator::{Estimator, Progress};
+use crate::fixed::time::Time;
+use crate::frame::detection::Detection;
+use crate::frame::health::{Condition, FrameStatus};
+use crate::map::VisibilityMap;
+use crate::map::polar::PolarMap;
+use crate::sensor::config::ConfigError;
+use crate::sensor::mount::Mount;
+
+use super::fixtures::{Fixtures, FixturesConfig};
+
+/// What there is room for.
+const FIXTURES: usize = 64;
+/// Sectors of the view.
+const SECTORS: usize = 6;
+
+type Standing = Fixtures<FIXTURES, SECTORS>;
+
+/// What watches a radar: its mount, the edges of its view in degrees, and when something is wrong.
+pub type Supervision = (Mount, [f32; 2], FixturesConfig);
+
+/// An estimator, supervised if its configuration says so.
+#[derive(Debug)]
+pub struct Supervised<E> {
+    estimator: E,
+    standing: Option<Standing>,
+}
+
+impl<E> Supervised<E> {
+    /// To be placed in static memory.
+    pub const fn new(estimator: E) -> Self {
+        Self { estimator, standing: None }
+    }
+
+    /// The estimator itself.
+    pub const fn estimator(&self) -> &E {
+        &self.estimator
+    }
+
+    /// What was learned to stand, and what is wrong with it; none before the first frame, and of a radar that is not
+    /// supervised.
+    pub const fn standing(&self) -> Option<&Standing> {
+        self.standing.as_ref()
+    }
+
+    /// What is to be said of a radar that is healthy otherwise.
+    fn condition(&self, own: Condition) -> Condition {
+        let Some(standing) = self.standing.as_ref().filter(|_| own == Condition::Healthy) else { return own };
+        if (0..SECTORS).any(|sector| standing.is_blind(sector)) {
+            Condition::SectorBlind
+        } else if standing.turned().is_some() || standing.tilted().is_some() {
+            Condition::Misaligned
+        } else if standing.weaker_half_db().is_some() || standing.fewer().is_some() {
+            Condition::Weaker
+        } else {
+            own
+        }
+    }
+}
+
+impl<E, const R: usize, const A: usize> Estimator for Supervised<E>
+where
+    E: Estimator<Input = [Detection], Map = PolarMap<R, A>>,
+{
+    type Config = (E::Config, Option<Supervision>);
+    type Parameters = (E::Parameters, Option<Standing>);
+    type Input = [Detection];
+    type Map = PolarMap<R, A>;
+
+    fn parameters((config, supervision): &Self::Config) -> Result<Self::Parameters, ConfigError> {
+        let fixtures = |(mount, azimuth_deg, config): &Supervision| Fixtures::new(mount, *azimuth_deg, config);
+        Ok((E::parameters(config)?, supervision.as_ref().map(fixtures).transpose()?))
+    }
+
+    fn prepare((parameters, _): &Self::Parameters, map: &mut Self::Map) {
+        E::prepare(parameters, map);
+    }
+
+    fn forget(&mut self, map: &mut Self::Map) {
+        self.estimator.forget(map);
+        self.standing = None;
+    }
+
+    fn process(
+        &mut self,
+        (parameters, standing): &Self::Parameters,
+        measured: Time,
+        input: &[Detection],
+        status: FrameStatus,
+        map: &mut Self::Map,
+        ended: &mut impl FnMut(),
+    ) -> Progress {
+        let progress = self.estimator.process(parameters, measured, input, status, map, ended);
+        if self.standing.is_none() {
+            self.standing.clone_from(standing);
+        }
+        if let Some(standing) = &mut self.standing {
+            input.iter().for_each(|detection| standing.observe(detection));
+            // a radar that is blind or silent as a whole says nothing of what stands
+            if progress.condition == Condition::Healthy {
+                standing.advance(measured, |at| map.at(at).visible());
+            }
+            for azimuth in 0..A {
+                if standing.is_blind_at(map.geometry().middle_of(azimuth, A)) {
+                    map.forget_azimuth(azimuth);
+                }
+            }
+        }
+        Progress { condition: self.condition(progress.condition), ..progress }
+    }
+
+    fn expire(&mut self, (parameters, _): &Self::Parameters, now: Time, map: &mut Self::Map) -> Condition {
+        let own = self.estimator.expire(parameters, now, map);
+        self.condition(own)
+    }
+}
