@@ -76,6 +76,7 @@
 //! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
 //! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
+//! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!
