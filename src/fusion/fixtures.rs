@@ -30,7 +30,7 @@ use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
 use crate::frame::detection::Detection;
-use crate::map::polar::column;
+use crate::map::polar::{column, nearest_column};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
@@ -151,7 +151,8 @@ impl Fixture {
             difference(strength(d), self.strength),
         ];
         for ((sum, new), most) in self.shifts.iter_mut().zip(new).zip(most) {
-            *sum = sum.saturating_add(new.clamp(-most, most));
+            // not `clamp`, which asks whether the limits are in order
+            *sum = sum.saturating_add(new.max(most.saturating_neg()).min(most));
         }
     }
 
@@ -202,18 +203,56 @@ impl Level {
     }
 }
 
-/// What stands in the view of one sensor, in `K` sectors from right to left.
-#[derive(Debug, Clone)]
-pub struct Fixtures<const N: usize, const K: usize> {
+/// A sensor's mount and view, and from when a difference is named, checked and in integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FixturesLimits {
     levelling: Levelling,
     right: Angle,
     span: u16,
-    window: Window,
+    window_ms: u16,
     learned_windows: u16,
     least_seen: u16,
     blind_windows: u16,
-    /// Largest differences of one detection that count.
-    most: [i16; 3],
+    /// Of turns and tilts, 2^-16 turns, and of the strength, half dB.
+    levels: [i16; 3],
+    /// 2^-8.
+    fewer: i16,
+}
+
+impl FixturesLimits {
+    /// For a sensor by its mount and the edges of its view from its heading, degrees, + left.
+    ///
+    /// # Errors
+    /// Names the parameter outside its limits.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within limits
+    pub fn new(mount: &Mount, azimuth_deg: [f32; 2], config: &FixturesConfig) -> Result<Self, ConfigError> {
+        let (right, span) = edges(azimuth_deg)?;
+        within("fixtures.window_ms", f32::from(config.window_ms), 100.0, 60_000.0)?;
+        let windows = within("fixtures.learned_windows", f32::from(config.learned_windows), 8.0, 10_000.0)?;
+        let share = within("fixtures.least_share", config.least_share, 0.1, 1.0)?;
+        within("fixtures.blind_windows", f32::from(config.blind_windows), 2.0, 1000.0)?;
+        let weaker = 2.0 * within("fixtures.weaker_db", config.weaker_db, 1.0, 30.0)?;
+        let fewer = 256.0 * within("fixtures.fewer_share", config.fewer_share, 0.1, 0.9)?;
+        let turned = 65_536.0 / 360.0 * within("fixtures.turned_deg", config.turned_deg, 0.1, 2.0)?;
+        Ok(Self {
+            levelling: mount.levelling()?,
+            right,
+            span,
+            window_ms: config.window_ms,
+            learned_windows: config.learned_windows,
+            least_seen: math::round_i32(share * windows) as u16,
+            blind_windows: config.blind_windows,
+            levels: [turned, turned, weaker].map(|limit| math::round_i32(limit) as i16),
+            fewer: math::round_i32(fewer) as i16,
+        })
+    }
+}
+
+/// What stands in the view of one sensor, in `K` sectors from right to left.
+#[derive(Debug, Clone)]
+pub struct Fixtures<const N: usize, const K: usize> {
+    limits: FixturesLimits,
+    window: Window,
     windows: u16,
     fixtures: heapless::Vec<Fixture, N>,
     sectors: [Sector; K],
@@ -223,38 +262,47 @@ pub struct Fixtures<const N: usize, const K: usize> {
 }
 
 impl<const N: usize, const K: usize> Fixtures<N, K> {
+    /// Of no radar: nothing is learned. All bytes are 0.
+    pub(super) const NOTHING: Self = Self {
+        limits: FixturesLimits {
+            levelling: Levelling::NOWHERE,
+            right: Angle::ZERO,
+            span: 0,
+            window_ms: 0,
+            learned_windows: 0,
+            least_seen: 0,
+            blind_windows: 0,
+            levels: [0; 3],
+            fewer: 0,
+        },
+        window: Window::of_ms(0),
+        windows: 0,
+        fixtures: heapless::Vec::new(),
+        sectors: [Sector { missed: 0, others: 0, blind: false, expects: false }; K],
+        levels: [Level::new(0); 3],
+        missing: Level::new(0),
+    };
+
     /// For a sensor by its mount and the edges of its view from its heading, degrees, + left.
     ///
     /// # Errors
     /// Names the parameter outside its limits.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within limits
     pub fn new(mount: &Mount, azimuth_deg: [f32; 2], config: &FixturesConfig) -> Result<Self, ConfigError> {
+        let mut new = Self::NOTHING;
+        new.begin(&FixturesLimits::new(mount, azimuth_deg, config)?);
+        Ok(new)
+    }
+
+    /// Begins to learn what stands in the view of a sensor, in its place: on a controller it is large.
+    pub(super) fn begin(&mut self, limits: &FixturesLimits) {
         const { assert!(K > 0 && K <= 64) }
-        let (right, span) = edges(azimuth_deg)?;
-        within("fixtures.window_ms", f32::from(config.window_ms), 100.0, 60_000.0)?;
-        let windows = within("fixtures.learned_windows", f32::from(config.learned_windows), 8.0, 10_000.0)?;
-        let share = within("fixtures.least_share", config.least_share, 0.1, 1.0)?;
-        within("fixtures.blind_windows", f32::from(config.blind_windows), 2.0, 1000.0)?;
-        let weaker = math::round_i32(2.0 * within("fixtures.weaker_db", config.weaker_db, 1.0, 30.0)?);
-        let fewer = math::round_i32(256.0 * within("fixtures.fewer_share", config.fewer_share, 0.1, 0.9)?);
-        let turned = within("fixtures.turned_deg", config.turned_deg, 0.1, 2.0)? / 360.0;
-        let turned = math::round_i32(turned * 65_536.0);
-        let most = [turned, turned, weaker].map(|limit| i16::try_from(4 * limit).unwrap_or(i16::MAX));
-        Ok(Self {
-            levelling: mount.levelling()?,
-            right,
-            span,
-            window: Window::of_ms(config.window_ms),
-            learned_windows: config.learned_windows,
-            least_seen: math::round_i32(share * windows) as u16,
-            blind_windows: config.blind_windows,
-            most,
-            windows: 0,
-            fixtures: heapless::Vec::new(),
-            sectors: [Sector { missed: 0, others: 0, blind: false, expects: false }; K],
-            levels: [turned, turned, weaker].map(Level::new),
-            missing: Level::new(fewer),
-        })
+        self.limits = *limits;
+        self.window = Window::of_ms(limits.window_ms);
+        self.windows = 0;
+        self.fixtures.clear();
+        self.sectors = [Sector { missed: 0, others: 0, blind: false, expects: false }; K];
+        self.levels = limits.levels.map(|limit| Level::new(i32::from(limit)));
+        self.missing = Level::new(i32::from(limits.fewer));
     }
 
     /// Takes one detection of a frame.
@@ -263,7 +311,8 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         // of several, the nearest along the line of sight: posts stand in rows
         let near = self.fixtures.iter_mut().filter(|f| stands && f.is_near(detection));
         if let Some(fixture) = near.min_by_key(|f| f.range_cm.abs_diff(detection.range_cm)) {
-            fixture.take(detection, self.most);
+            // differences of one detection count up to four times what is named
+            fixture.take(detection, self.limits.levels.map(|limit| limit.saturating_mul(4)));
             return;
         }
         let sector = self.sector_of(detection.azimuth);
@@ -312,7 +361,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             fixture.strength = fixture.strength.map(|v| v.wrapping_add(strength));
         }
         if !self.is_learning() {
-            let least = self.least_seen;
+            let least = self.limits.least_seen;
             self.fixtures.retain(|f| f.seen >= least);
         }
     }
@@ -324,7 +373,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             let direction = trig::direction(Angle::from_raw(fixture.azimuth));
             let ahead = |part: i16| (i32::from(fixture.range_cm) * i32::from(part)) >> 14;
             let sector = self.sector_of(Angle::from_raw(fixture.azimuth));
-            if !sees(self.levelling.unplace(ahead(direction.x), ahead(direction.y))) {
+            if !sees(self.limits.levelling.unplace(ahead(direction.x), ahead(direction.y))) {
                 continue;
             }
             let share = (u32::from(fixture.seen) << 8).checked_div(u32::from(self.windows)).unwrap_or(0);
@@ -345,8 +394,8 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
             // twice what is needed at most, so that a mended sensor is trusted again soon
             let missed =
                 if *seen == 0 && sector.others < OTHERS { sector.missed + 1 } else { sector.missed.saturating_sub(2) };
-            sector.missed = missed.min(2 * self.blind_windows);
-            sector.blind = sector.missed >= self.blind_windows || (sector.blind && sector.missed > 0);
+            sector.missed = missed.min(2 * self.limits.blind_windows);
+            sector.blind = sector.missed >= self.limits.blind_windows || (sector.blind && sector.missed > 0);
         }
         if found > 0 {
             let memories = [TURN_MEMORY, TURN_MEMORY, STRENGTH_MEMORY];
@@ -362,11 +411,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     }
 
     fn is_learning(&self) -> bool {
-        self.windows < self.learned_windows
+        self.windows < self.limits.learned_windows
     }
 
     fn sector_of(&self, azimuth: Angle) -> Option<usize> {
-        column(azimuth - self.right, self.span, K)
+        column(azimuth - self.limits.right, self.limits.span, K)
     }
 
     /// Fixtures that were learned; none while they are.
@@ -379,9 +428,9 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         self.sectors.get(sector).is_some_and(|sector| sector.blind)
     }
 
-    /// Whether the sector of a bearing from the sensor's heading is; not outside of the view.
+    /// Whether the sector of a bearing from the sensor's heading is, or outside of the view the one at that edge.
     pub fn is_blind_at(&self, bearing: Angle) -> bool {
-        self.sector_of(bearing).is_some_and(|sector| self.is_blind(sector))
+        self.is_blind(nearest_column(bearing - self.limits.right, self.limits.span, K))
     }
 
     /// Whether a sector has enough that stands and is not in a shadow for it to be judged.

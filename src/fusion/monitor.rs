@@ -32,7 +32,7 @@ use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
-use crate::map::polar::column;
+use crate::map::polar::{column, nearest_column};
 use crate::map::{CellState, VisibilityMap};
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::mount::{Levelling, Mount};
@@ -200,7 +200,7 @@ impl<const K: usize> Monitor<K> {
             let learned = if missed { sector.usual.saturating_add(step) } else { sector.usual.saturating_sub(step) };
             sector.usual = learned.max(self.usual);
             // no more than what is needed twice over, so that a mended sensor is trusted again soon
-            sector.evidence = evidence.clamp(0, 2 * self.threshold);
+            sector.evidence = evidence.min(2 * self.threshold).max(0);
             sector.blind = match sector.evidence {
                 0 => false,
                 evidence => sector.blind || evidence >= self.threshold,
@@ -219,7 +219,7 @@ impl<const K: usize> Monitor<K> {
     }
 }
 
-/// A map without the sectors that are judged blind.
+/// A map without the sectors that are judged blind; what of it lies outside of the view goes with the sector at that edge.
 #[derive(Debug, Clone, Copy)]
 pub struct Watched<'m, M: ?Sized, const K: usize> {
     monitor: &'m Monitor<K>,
@@ -228,7 +228,8 @@ pub struct Watched<'m, M: ?Sized, const K: usize> {
 
 impl<M: VisibilityMap + ?Sized, const K: usize> VisibilityMap for Watched<'_, M, K> {
     fn at(&self, point: RoadPoint) -> CellState {
-        let blind = self.monitor.sector(point).is_some_and(|sector| self.monitor.is_blind(sector));
-        if blind { CellState::UNKNOWN } else { self.map.at(point) }
+        let (x, y) = self.monitor.levelling.place(point);
+        let sector = nearest_column(trig::bearing(x, y) - self.monitor.right, self.monitor.span, K);
+        if self.monitor.is_blind(sector) { CellState::UNKNOWN } else { self.map.at(point) }
     }
 }

@@ -19,7 +19,7 @@ use crate::map::polar::PolarMap;
 use crate::sensor::config::ConfigError;
 use crate::sensor::mount::Mount;
 
-use super::fixtures::{Fixtures, FixturesConfig};
+use super::fixtures::{Fixtures, FixturesConfig, FixturesLimits};
 
 /// What there is room for.
 const FIXTURES: usize = 64;
@@ -35,13 +35,15 @@ pub type Supervision = (Mount, [f32; 2], FixturesConfig);
 #[derive(Debug)]
 pub struct Supervised<E> {
     estimator: E,
-    standing: Option<Standing>,
+    standing: Standing,
+    /// Whether `standing` is of this radar; a flag, so that all bytes of a new state are 0 and it takes none of the flash.
+    is_watched: bool,
 }
 
 impl<E> Supervised<E> {
     /// To be placed in static memory.
     pub const fn new(estimator: E) -> Self {
-        Self { estimator, standing: None }
+        Self { estimator, standing: Standing::NOTHING, is_watched: false }
     }
 
     /// The estimator itself.
@@ -51,13 +53,13 @@ impl<E> Supervised<E> {
 
     /// What was learned to stand, and what is wrong with it; none before the first frame, and of a radar that is not
     /// supervised.
-    pub const fn standing(&self) -> Option<&Standing> {
-        self.standing.as_ref()
+    pub fn standing(&self) -> Option<&Standing> {
+        self.is_watched.then_some(&self.standing)
     }
 
     /// What is to be said of a radar that is healthy otherwise.
     fn condition(&self, own: Condition) -> Condition {
-        let Some(standing) = self.standing.as_ref().filter(|_| own == Condition::Healthy) else { return own };
+        let Some(standing) = self.standing().filter(|_| own == Condition::Healthy) else { return own };
         if (0..SECTORS).any(|sector| standing.is_blind(sector)) {
             Condition::SectorBlind
         } else if standing.turned().is_some() || standing.tilted().is_some() {
@@ -75,12 +77,12 @@ where
     E: Estimator<Input = [Detection], Map = PolarMap<R, A>>,
 {
     type Config = (E::Config, Option<Supervision>);
-    type Parameters = (E::Parameters, Option<Standing>);
+    type Parameters = (E::Parameters, Option<FixturesLimits>);
     type Input = [Detection];
     type Map = PolarMap<R, A>;
 
     fn parameters((config, supervision): &Self::Config) -> Result<Self::Parameters, ConfigError> {
-        let fixtures = |(mount, azimuth_deg, config): &Supervision| Fixtures::new(mount, *azimuth_deg, config);
+        let fixtures = |(mount, azimuth_deg, config): &Supervision| FixturesLimits::new(mount, *azimuth_deg, config);
         Ok((E::parameters(config)?, supervision.as_ref().map(fixtures).transpose()?))
     }
 
@@ -90,12 +92,12 @@ where
 
     fn forget(&mut self, map: &mut Self::Map) {
         self.estimator.forget(map);
-        self.standing = None;
+        self.is_watched = false;
     }
 
     fn process(
         &mut self,
-        (parameters, standing): &Self::Parameters,
+        (parameters, limits): &Self::Parameters,
         measured: Time,
         input: &[Detection],
         status: FrameStatus,
@@ -103,10 +105,12 @@ where
         ended: &mut impl FnMut(),
     ) -> Progress {
         let progress = self.estimator.process(parameters, measured, input, status, map, ended);
-        if self.standing.is_none() {
-            self.standing.clone_from(standing);
+        if let Some(limits) = limits.as_ref().filter(|_| !self.is_watched) {
+            self.standing.begin(limits);
+            self.is_watched = true;
         }
-        if let Some(standing) = &mut self.standing {
+        if self.is_watched {
+            let standing = &mut self.standing;
             input.iter().for_each(|detection| standing.observe(detection));
             // a radar that is blind or silent as a whole says nothing of what stands
             if progress.condition == Condition::Healthy {

@@ -33,6 +33,12 @@ pub(crate) fn column(from_origin: Angle, span: u16, columns: usize) -> Option<us
     usize::try_from(place >> 8).ok().filter(|column| *column < columns)
 }
 
+/// The column of a bearing, that of the nearer edge outside: a map of a pitched sensor reaches beyond its view's edges.
+pub(crate) fn nearest_column(from_origin: Angle, span: u16, columns: usize) -> usize {
+    let last = columns.saturating_sub(1);
+    column(from_origin, span, columns).unwrap_or(if from_origin.raw() < 0 { 0 } else { last })
+}
+
 impl PolarGeometry {
     /// Bearing of the middle of one of so many azimuths, from the boresight's heading.
     #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most a turn; angles wrap

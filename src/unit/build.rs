@@ -96,7 +96,7 @@ where
     fn config(settings: &Settings) -> Self::Config {
         let view = &settings.sensor.field_of_view;
         let azimuth_deg = [view.azimuth_min_deg, view.azimuth_max_deg];
-        (E::config(settings), settings.fixtures.map(|fixtures| (settings.sensor.mount, azimuth_deg, *fixtures)))
+        (E::config(settings), settings.fixtures().map(|fixtures| (settings.sensor.mount, azimuth_deg, fixtures)))
     }
 
     fn check(settings: &Settings) -> Result<(), ConfigError> {

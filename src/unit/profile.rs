@@ -17,22 +17,34 @@ macro_rules! size {
             pub type Parameters = <State as Estimator>::Parameters;
             /// Its map.
             pub type Map = <State as Estimator>::Map;
-            /// The estimator, supervised by what stands in its view where the settings say so; the map is the same.
-            #[cfg(feature = "monitoring")]
-            pub type Supervised = crate::fusion::Supervised<State>;
             /// Who sends it.
             pub type Sender = Broadcaster<$azimuths, WORDS>;
             /// A radar of the ARS408 family with as many detections.
             #[cfg(feature = "board")]
             pub type Radar = crate::inputs::ars408::Ars408<$detections>;
-            /// Whether a unit of a supervised radar can run with settings.
-            #[cfg(all(feature = "board", feature = "monitoring"))]
-            pub const SUPERVISED_CHECK: crate::unit::settings::SettingsCheck =
-                crate::unit::settings::SettingsCheck::of::<Supervised, Sender>();
             /// Whether a unit of this size can run with settings.
             #[cfg(feature = "board")]
             pub const CHECK: crate::unit::settings::SettingsCheck =
                 crate::unit::settings::SettingsCheck::of::<State, Sender>();
+
+            /// The same, supervised by what stands in the radar's view where the settings say so.
+            #[cfg(feature = "monitoring")]
+            pub mod supervised {
+                use crate::estimator::Estimator;
+
+                pub use super::{Map, Sender};
+
+                /// The estimator.
+                pub type State = crate::fusion::Supervised<super::State>;
+                /// What it works with.
+                pub type Parameters = <State as Estimator>::Parameters;
+                #[cfg(feature = "board")]
+                pub use super::Radar;
+                /// Whether a unit of this size can run with settings.
+                #[cfg(feature = "board")]
+                pub const CHECK: crate::unit::settings::SettingsCheck =
+                    crate::unit::settings::SettingsCheck::of::<State, Sender>();
+            }
         }
     };
 }

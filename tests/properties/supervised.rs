@@ -9,7 +9,7 @@ use viewshed::fusion::{FixturesConfig, Supervised, Supervision};
 use viewshed::map::VisibilityMap;
 use viewshed::map::polar::PolarMap;
 use viewshed::sensor::road::RoadPoint;
-use viewshed::unit::profile::small::{Map, Parameters, State};
+use viewshed::unit::profile::small::{Map, State};
 
 use crate::setup::Setup;
 
@@ -17,7 +17,7 @@ use crate::setup::Setup;
 const POSTS: [(u16, f32); 6] = [(2000, -50.0), (3500, -48.0), (2000, 50.0), (3500, 48.0), (4000, 5.0), (6000, 8.0)];
 
 struct Watched {
-    parameters: (Parameters, Option<viewshed::fusion::Fixtures<64, 6>>),
+    parameters: <Supervised<State> as Estimator>::Parameters,
     state: Box<Supervised<State>>,
     map: Box<Map>,
     frame: u64,
@@ -25,7 +25,8 @@ struct Watched {
 
 impl Watched {
     fn new(supervised: bool) -> Self {
-        let setup = Setup::default();
+        let mut setup = Setup::default();
+        setup.sensor.mount.pitch_deg = 12.0;
         let config = FixturesConfig { learned_windows: 20, ..FixturesConfig::default() };
         let watch: Supervision = (setup.sensor.mount, [-60.0, 60.0], config);
         let config = ((setup.sensor, setup.radar_3d), supervised.then_some(watch));
@@ -42,7 +43,7 @@ impl Watched {
             let posts = POSTS.map(|(range_cm, azimuth)| Detection {
                 range_cm,
                 azimuth: Angle::from_degrees(azimuth),
-                elevation: Some(Angle::from_degrees(-5.0)),
+                elevation: Some(Angle::from_degrees(-15.0)),
                 radial_velocity_cm_s: 0,
                 rcs_half_dbsm: Some(20),
                 snr_half_db: None,
@@ -83,6 +84,15 @@ fn a_sector_without_what_stands_in_it_is_unknown_until_it_is_back() {
     assert!(places.iter().all(|(x, y)| watched.knows(*x, *y)));
     assert_eq!(watched.run(12, left_dark), Condition::SectorBlind);
     assert_eq!(places.map(|(x, y)| watched.knows(x, y)), [false, true, true], "the left one only");
+    // every azimuth whose middle lies in the sector, and no other
+    let unknown = |azimuth| watched.map.grades(azimuth).unwrap().iter().all(|grade| *grade == 0);
+    let geometry = watched.map.geometry();
+    let middle_deg = |azimuth: usize| {
+        let right = f64::from(geometry.azimuth_origin.radians()).to_degrees();
+        right + (azimuth as f64 + 0.5) / 64.0 * f64::from(geometry.azimuth_span) / 65_536.0 * 360.0
+    };
+    assert!(middle_deg(63) > 60.0, "beyond the view's edge: it is pitched");
+    assert!((0..64).all(|azimuth| unknown(azimuth) == (middle_deg(azimuth) > 40.0)));
     // it stays so while no frame comes, and while the radar is silent nothing is known at all
     let last = Time::from_micros(100_000 * watched.frame);
     assert_eq!(watched.state.expire(&watched.parameters, last, &mut watched.map), Condition::SectorBlind);

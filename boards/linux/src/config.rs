@@ -30,8 +30,8 @@ impl Grid {
     /// Whether a unit of this size can run with settings.
     fn check(self) -> SettingsCheck {
         match self {
-            Self::Reference => reference::SUPERVISED_CHECK,
-            Self::Small => small::SUPERVISED_CHECK,
+            Self::Reference => reference::supervised::CHECK,
+            Self::Small => small::supervised::CHECK,
         }
     }
 

@@ -7,16 +7,15 @@ use anyhow::{Context, Result, anyhow};
 use log::{info, warn};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::board::{BlockError, Flow, StoredSettings};
-use viewshed::{Estimator, PolarMap, Reason, Time, UnitState};
+use viewshed::{PolarMap, Reason, Time, UnitState};
 
 use super::input::{self, Input, Step, Work};
-use super::size::{Map, SUPERVISED_CHECK as CHECK, Sender, State as Radar3d, Supervised as State};
+use super::size::State as Radar3d;
+use super::size::supervised::{CHECK, Map, Parameters, Sender, State};
 use crate::config::{ClockSource, Config};
 use crate::output::{Output, version};
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
-
-type Parameters = <State as Estimator>::Parameters;
 
 /// The daemon's unit: radar-3d on the grid of this module.
 pub type Unit<'u> = viewshed::Unit<'u, State, Sender>;

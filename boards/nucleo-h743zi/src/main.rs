@@ -38,7 +38,7 @@ use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
 use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
 use cortex_m::peripheral::DWT;
-use viewshed::reference::{CHECK, Radar};
+use viewshed::reference::supervised::{CHECK, Radar};
 use viewshed::{Ars408Config, Epoch};
 
 const CAN_CLOCK_HZ: u32 = 80_000_000;

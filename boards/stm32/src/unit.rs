@@ -71,10 +71,14 @@ macro_rules! memory {
             receiver.run(&RADAR_QUEUE).await
         }
 
-        fn memory() -> viewshed::board::RoadsideMemory<'static, viewshed::$size::State, viewshed::$size::Sender> {
+        fn memory() -> viewshed::board::RoadsideMemory<
+            'static,
+            viewshed::$size::supervised::State,
+            viewshed::$size::supervised::Sender,
+        > {
             use static_cell::{ConstStaticCell, StaticCell};
-            use viewshed::$size::{Map, Parameters, Sender, State};
-            static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
+            use viewshed::$size::supervised::{Map, Parameters, Sender, State};
+            static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new(viewshed::$size::State::new()));
             static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
             static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(None);
             static BROADCAST: StaticCell<Option<Sender>> = StaticCell::new();

@@ -4,8 +4,6 @@ use super::{BlockError, ConfigureRadar, Settings, UnitConfig};
 use crate::fixed::bytes::{Reader, Writer};
 use crate::frame::gate::GateConfig;
 use crate::frame::health::HealthConfig;
-#[cfg(feature = "monitoring")]
-use crate::fusion::FixturesConfig;
 #[cfg(feature = "tuned")]
 use crate::grid::evidence::EvidenceConfig;
 #[cfg(feature = "tuned")]
@@ -79,7 +77,7 @@ impl Settings {
         }
         #[cfg(feature = "monitoring")]
         {
-            let fixtures = self.fixtures.into_iter().flat_map(FixturesConfig::numbers);
+            let fixtures = self.fixtures().into_iter().flat_map(|fixtures| fixtures.numbers());
             (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
         }
         sum
@@ -106,7 +104,7 @@ impl Settings {
             w.put([self.unit.sensor, self.unit.radar_id]);
             w.put(self.unit.max_delay_ms.to_le_bytes());
             w.put(self.unit.serial_baud.to_le_bytes());
-            w.put([self.unit.configure_radar as u8, 0, 0, 0]);
+            w.put([self.unit.configure_radar as u8, u8::from(self.unit.supervise), 0, 0]);
         }
         if let Some((body, sum)) = block.split_last_chunk_mut::<SUM_LEN>() {
             *sum = fingerprint(body).to_le_bytes();
@@ -248,11 +246,19 @@ fn layout(block: &[u8]) -> Option<u16> {
 fn unit(r: &mut Reader) -> Option<Result<UnitConfig, ConfigError>> {
     let [sensor, radar_id] = r.take()?;
     let (max_delay_ms, serial_baud) = (r.u16()?, r.u32()?);
-    let [number, _, _, _] = r.take()?;
-    let problem = Problem::OutOfLimits { min: 0.0, max: 2.0 };
-    let refused = ConfigError { parameter: "unit.configure_radar", value: f32::from(number), problem };
-    let made = |configure_radar| UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar };
-    Some(ConfigureRadar::from_number(number).map(made).ok_or(refused))
+    let [number, supervise, _, _] = r.take()?;
+    let refused = |parameter, number, max| {
+        let problem = Problem::OutOfLimits { min: 0.0, max };
+        Err(ConfigError { parameter, value: f32::from(number), problem })
+    };
+    let Some(configure_radar) = ConfigureRadar::from_number(number) else {
+        return Some(refused("unit.configure_radar", number, 2.0));
+    };
+    if supervise > 1 {
+        return Some(refused("unit.supervise", supervise, 1.0));
+    }
+    let supervise = supervise == 1;
+    Some(Ok(UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar, supervise }))
 }
 
 #[cfg(test)]
@@ -282,7 +288,8 @@ pub(super) mod tests {
         s.gate.max_detections = 176;
         s.broadcast_bus.bit_rate = 250_000;
         let configure_radar = ConfigureRadar::Objects;
-        s.unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600, configure_radar };
+        let unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600, ..s.unit };
+        s.unit = UnitConfig { configure_radar, supervise: true, ..unit };
         s
     }
 
@@ -319,9 +326,13 @@ pub(super) mod tests {
     #[test]
     fn the_fingerprint_is_of_what_maps_depend_on() {
         let (a, mut b) = (settings(), settings());
-        assert_eq!(a.fingerprint(), fingerprint(&layout_1(&a, 0)[..LAYOUT_1_LEN - SUM_LEN]));
-        b.unit = UnitConfig::default();
+        let plain = Settings { unit: UnitConfig::default(), ..a };
+        assert_eq!(plain.fingerprint(), fingerprint(&layout_1(&a, 0)[..LAYOUT_1_LEN - SUM_LEN]));
+        b.unit = UnitConfig { supervise: true, ..UnitConfig::default() };
         assert_eq!(a.fingerprint(), b.fingerprint());
+        b.unit.supervise = false;
+        assert_ne!(a.fingerprint(), b.fingerprint(), "which sectors are known");
+        b.unit.supervise = true;
         b.sensor.mount.height_m += 0.5;
         assert_ne!(a.fingerprint(), b.fingerprint());
         // of lanes each point, each end and the order

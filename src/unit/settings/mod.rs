@@ -15,7 +15,7 @@
 //! | 4 | sequence: the newer slot has the higher one, modulo 2^32 |
 //! | 4 x 29 | `f32`: mount, field of view, noise, gate, visibility, health, each in the order of its fields |
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
-//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), 0 (3 bytes) |
+//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), whether it is supervised by what stands in its view (1 byte: 0 or 1), 0 (2 bytes) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
@@ -86,7 +86,8 @@ pub struct Settings {
     #[cfg(feature = "tuned")]
     #[cfg_attr(feature = "serde", serde(skip))]
     pub evidence: Option<&'static EvidenceConfig>,
-    /// When what stands in the view tells that something is wrong with the radar; not asked without it. No block has it.
+    /// When what stands in the view tells that something is wrong with the radar; where the unit is only told to
+    /// [`supervise`](UnitConfig::supervise), it is by default. No block has it.
     #[cfg(feature = "monitoring")]
     #[cfg_attr(feature = "serde", serde(skip))]
     pub fixtures: Option<&'static FixturesConfig>,
@@ -164,6 +165,12 @@ impl Settings {
         let visible_from = Camera3dConfig::default().visible_share;
         let visibility = VisibilityConfig { visible_from, ..VisibilityConfig::default() };
         Self { visibility, ..Self::of(Sensor { mount, field_of_view, noise: NoiseConfig::default() }) }
+    }
+
+    /// What is asked of what stands in the view, if the radar is supervised.
+    #[cfg(feature = "monitoring")]
+    pub fn fixtures(&self) -> Option<FixturesConfig> {
+        self.fixtures.copied().or_else(|| self.unit.supervise.then(FixturesConfig::default))
     }
 
     /// The estimator's configuration; what an integrator does not set is the library's.

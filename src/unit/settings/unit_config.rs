@@ -53,6 +53,8 @@ pub struct UnitConfig {
     pub serial_baud: u32,
     /// Whether an ARS408 is configured over its bus.
     pub configure_radar: ConfigureRadar,
+    /// Whether what usually stands in the view tells that the radar is in order; by firmware with the feature `monitoring`.
+    pub supervise: bool,
 }
 
 impl Default for UnitConfig {
@@ -63,6 +65,7 @@ impl Default for UnitConfig {
             max_delay_ms: 100,
             serial_baud: Self::SERVICE_BAUD,
             configure_radar: ConfigureRadar::No,
+            supervise: false,
         }
     }
 }
@@ -91,7 +94,9 @@ impl UnitConfig {
         within("unit.sensor", f32::from(self.sensor), 0.0, 7.0)?;
         within("unit.radar_id", f32::from(self.radar_id), 0.0, 7.0)?;
         within("unit.max_delay_ms", f32::from(self.max_delay_ms), 40.0, 500.0)?;
-        within("unit.serial_baud", self.serial_baud as f32, 57_600.0, 1_000_000.0).map(|_| ())
+        within("unit.serial_baud", self.serial_baud as f32, 57_600.0, 1_000_000.0)?;
+        let most = if cfg!(feature = "monitoring") { 1.0 } else { 0.0 };
+        within("unit.supervise", f32::from(u8::from(self.supervise)), 0.0, most).map(|_| ())
     }
 }
 

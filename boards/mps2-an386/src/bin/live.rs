@@ -4,7 +4,8 @@
 
 use cortex_m_rt::entry;
 use mps2_an386::SHAPE;
-use mps2_an386::profile::{CHECK, Map, Parameters, Sender, State};
+use mps2_an386::profile::State as Radar3d;
+use mps2_an386::profile::supervised::{CHECK, Map, Parameters, Sender, State};
 use mps2_an386::stack;
 use mps2_an386::timer::{TICKS_PER_256, Timer};
 use mps2_an386::uart::{PATIENCE, Uart};
@@ -24,7 +25,7 @@ use viewshed::wire::message::Epoch;
 /// The emulator has no number of its own: letters of the board's name.
 const CHIP: u32 = 0x4D50_5332;
 
-static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
+static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new(Radar3d::new()));
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
 static SENDER: StaticCell<Option<Sender>> = StaticCell::new();
 
@@ -50,9 +51,9 @@ impl SerialLine for Lines {
 
 /// Apart, so that what this takes of the stack is free again.
 #[inline(never)]
-fn session(epoch: Epoch, flash: &Flash, lines: &mut Lines) -> SerialSession<{ State::DETECTIONS }> {
+fn session(epoch: Epoch, flash: &Flash, lines: &mut Lines) -> SerialSession<{ Radar3d::DETECTIONS }> {
     let stored = StoredSettings::read(flash, CHECK);
-    let grid = [State::RANGES as u8, State::AZIMUTHS as u8];
+    let grid = [Radar3d::RANGES as u8, Radar3d::AZIMUTHS as u8];
     let identity = Identity { board: "mps2-an386", chip: CHIP, is_bench: true, grid };
     SerialSession::start(stored.unit().sensor, identity, epoch, stored, lines)
 }

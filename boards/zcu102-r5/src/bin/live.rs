@@ -18,7 +18,8 @@ use viewshed::unit::{Flow, Unit};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Addresses;
 use zcu102_r5::can::Can;
-use zcu102_r5::profile::{CHECK, Map, Parameters, Radar, Sender, State};
+use zcu102_r5::profile::State as Radar3d;
+use zcu102_r5::profile::supervised::{CHECK, Map, Parameters, Radar, Sender, State};
 use zcu102_r5::stack;
 
 /// The radar's own number on this bench, whatever the block says.
@@ -30,7 +31,7 @@ const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 /// Clock of the CAN controllers, by the boot loader's default.
 const CAN_CLOCK_HZ: u32 = 100_000_000;
 
-static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new());
+static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new(Radar3d::new()));
 static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
 static SENDER: StaticCell<Option<Sender>> = StaticCell::new();
 
@@ -40,7 +41,7 @@ extern "C" fn main() -> ! {
         exit(4)
     };
     let mut flash = FlashFile::<HostFile>::open();
-    let grid = [State::RANGES as u8, State::AZIMUTHS as u8];
+    let grid = [Radar3d::RANGES as u8, Radar3d::AZIMUTHS as u8];
     let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid };
     let mut session = CanBench::new(Radar::new(Ars408Config::sensor(RADAR)));
     let (mut starts, mut has_time) = (0, false);

@@ -12,7 +12,8 @@ use viewshed::inputs::ars408::Ars408Config;
 use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::identity::Identity;
-use viewshed::unit::profile::reference::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
+use viewshed::unit::profile::reference::State as Radar3d;
+use viewshed::unit::profile::reference::supervised::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
 use viewshed::unit::settings::{Settings, StoredSettings};
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::frame::{CanFrame, CanId};
@@ -94,7 +95,7 @@ impl<I: Iterator<Item = (usize, CanFrame)>> CanPort for Scripted<I> {
 /// What a board with the reference grid sends, from the moment it has power.
 pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid: Profile::Reference.grid() };
-    let mut state = Box::new(State::new());
+    let mut state = Box::new(State::new(Radar3d::new()));
     let mut map = Box::new(PolarMap::NOWHERE);
     let mut sender: Box<Option<Sender>> = Box::new(None);
     let mut session = CanBench::new(Radar::new(Ars408Config::sensor(SENSOR)));

@@ -6,10 +6,12 @@ use std::{iter, mem};
 
 use viewshed::bench::flash::Flash;
 use viewshed::bench::start;
+use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
+use viewshed::fusion::Supervised;
 use viewshed::inputs::native::{NativeMedium, NativeSender};
 use viewshed::map::polar::PolarMap;
-use viewshed::radar_3d::{Radar3d, Radar3dParameters};
+use viewshed::radar_3d::Radar3d;
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::serial_service::SerialLine;
@@ -85,13 +87,19 @@ fn run(
     after: After<'_>,
 ) {
     match profile {
-        Profile::Reference => work(&mut *Box::new(reference::State::new()), is_bench, bytes, send, after),
-        Profile::Small => work(&mut *Box::new(small::State::new()), is_bench, bytes, send, after),
+        Profile::Reference => {
+            work(&mut Box::new(Supervised::new(reference::State::new())), is_bench, bytes, send, after)
+        }
+        Profile::Small => work(&mut Box::new(Supervised::new(small::State::new())), is_bench, bytes, send, after),
     }
 }
 
+/// Radar-3d of any size, supervised where its settings say so.
+type Watched<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> =
+    Supervised<Radar3d<R, A, E, W, N, D>>;
+
 fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
-    state: &mut Radar3d<R, A, E, W, N, D>,
+    state: &mut Watched<R, A, E, W, N, D>,
     is_bench: bool,
     bytes: &mut dyn Iterator<Item = u8>,
     send: &mut dyn FnMut(&[u8]),
@@ -103,14 +111,14 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
     'start: loop {
         let epoch = flash.start();
-        let stored = StoredSettings::read(&flash, SettingsCheck::of::<Radar3d<R, A, E, W, N, D>, Broadcaster<A, W>>());
+        let stored = StoredSettings::read(&flash, SettingsCheck::of::<Watched<R, A, E, W, N, D>, Broadcaster<A, W>>());
         // of this computer: a real board names itself
         #[allow(clippy::cast_possible_truncation)] // at most 200
         let identity = Identity { board: "this-computer", chip: 0, is_bench, grid: [R as u8, A as u8] };
         let mut session = SerialSession::<D>::start(stored.unit().sensor, identity, epoch, stored, &mut line);
-        let mut parameters: Option<Radar3dParameters<R, A, E>> = None;
+        let mut parameters: Option<<Watched<R, A, E, W, N, D> as Estimator>::Parameters> = None;
         let (settings, now) = (session.settings(), session.now());
-        start::<Radar3d<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
+        start::<Watched<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut *state, &mut *map, sender));
         let mut last = None;

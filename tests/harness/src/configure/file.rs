@@ -47,6 +47,12 @@ struct Tables {
     output: Option<toml::Value>,
     #[serde(default, skip_serializing)]
     lanes: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    obstacles: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    evidence: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    fixtures: Option<toml::Value>,
 }
 
 /// What a file says.
@@ -82,6 +88,9 @@ fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
         ("[input]", tables.input.is_some()),
         ("[output]", tables.output.is_some()),
         ("[[lanes]]", tables.lanes.is_some()),
+        ("[obstacles]", tables.obstacles.is_some()),
+        ("[evidence]", tables.evidence.is_some()),
+        ("[fixtures]", tables.fixtures.is_some()),
     ];
     let left_out = keys.into_iter().filter(|(_, is_there)| *is_there).map(|(key, _)| key).collect();
     let settings = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
@@ -132,7 +141,8 @@ fn tables(settings: &Settings) -> Tables {
         fixtures: _,
     } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
-    let (state_dir, grid, input, output, lanes) = (None, None, None, None, None);
+    let (state_dir, grid, input, output) = (None, None, None, None);
+    let (lanes, obstacles, evidence, fixtures) = (None, None, None, None);
     Tables {
         unit,
         mount,
@@ -148,6 +158,9 @@ fn tables(settings: &Settings) -> Tables {
         input,
         output,
         lanes,
+        obstacles,
+        evidence,
+        fixtures,
     }
 }
 

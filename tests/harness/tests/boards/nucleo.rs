@@ -29,7 +29,7 @@ const H743: Board = Board {
     ram: 0x2400_0000..0x2407_F000,
     dma: 0x2407_F000..0x2408_0000,
     coupled: Some([0x20..0x1_0000, 0x2000_0000..0x2002_0000]),
-    most_flash: 139_264,
+    most_flash: 147_456,
     most_ram: 512_000,
     least_stack: 64_000,
 };
@@ -40,8 +40,8 @@ const G474: Board = Board {
     ram: 0x2000_0800..0x2002_0000,
     dma: 0x2000_0000..0x2000_0800,
     coupled: None,
-    most_flash: 155_648,
-    most_ram: 102_400,
+    most_flash: 172_032,
+    most_ram: 104_448,
     least_stack: 24_000,
 };
 

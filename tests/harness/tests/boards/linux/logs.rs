@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::process::Command;
 
-use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
 use viewshed::fusion::FixturesConfig;
 use viewshed::inputs::ars408::Ars408Config;
 use viewshed::map::polar::PolarMap;
 use viewshed::unit::Unit;
-use viewshed::unit::profile::reference::{Radar, Sender, State, Supervised};
+use viewshed::unit::profile::reference::State as Radar3d;
+use viewshed::unit::profile::reference::supervised::{Parameters, Radar, Sender, State};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
@@ -31,10 +31,10 @@ type Sent = Vec<(u64, CanFrame)>;
 
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second after the log's end.
 fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
-    let mut parameters: Option<<Supervised as Estimator>::Parameters> = None;
-    let header = settings.build::<Supervised>(&mut parameters).unwrap();
+    let mut parameters: Option<Parameters> = None;
+    let header = settings.build::<State>(&mut parameters).unwrap();
     let parameters = parameters.unwrap();
-    let mut state = Box::new(Supervised::new(State::new()));
+    let mut state = Box::new(State::new(Radar3d::new()));
     let mut map = Box::new(PolarMap::NOWHERE);
     let (first, last) = (log.first().unwrap().0, log.last().unwrap().0);
     let at = Time::from_micros;
@@ -44,7 +44,7 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     unit.broadcast().status_mut().firmware = [0, 1, 0];
     let mut decoder = Radar::new(Ars408Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
-    let flush = |unit: &mut Unit<'_, Supervised, Sender>, now: u64, sent: &mut Sent| {
+    let flush = |unit: &mut Unit<'_, State, Sender>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
     };
     loop {

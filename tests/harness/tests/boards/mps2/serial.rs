@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use viewshed::bench::record::{RECORD_LEN, Record};
+use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
+use viewshed::frame::detection::Detection;
 use viewshed::map::Visibility;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, Settings};
@@ -171,6 +173,49 @@ fn a_radar_that_stops_makes_the_map_unknown_and_the_status_blind() {
     assert!((0..120 * 200).all(|k| map.cell(k / 200, k % 200).visibility == Visibility::Unknown));
     let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
     assert_eq!((status.state, status.reason), (UnitState::Blind, Reason::RadarSilent));
+}
+
+/// Posts that stand to the right, ahead and to the left of a radar, of which the left ones vanish.
+fn posts(seconds: f64, left: bool) -> Scan {
+    let post = |range_cm: u16, degrees: f32| Detection {
+        range_cm,
+        azimuth: Angle::from_degrees(degrees),
+        elevation: Some(Angle::from_degrees(-5.0)),
+        radial_velocity_cm_s: 0,
+        rcs_half_dbsm: Some(20),
+        snr_half_db: Some(40),
+    };
+    let right = [post(2000, -50.0), post(3500, -48.0), post(6000, 5.0)];
+    let left = [post(2000, 50.0), post(3500, 48.0)].into_iter().filter(|_| left);
+    Scan {
+        time: Time::from_micros(5_000_000 + (seconds * 1e6) as u64),
+        reset: false,
+        detections: right.into_iter().chain(left).collect(),
+    }
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn a_supervised_radar_that_goes_blind_to_the_left_is_unknown_there_and_its_status_says_so() {
+    let (mut settings, _) = shipped(1.0);
+    settings.unit.supervise = true;
+    // a scan in a second, so that two minutes of learning take 125 of them; then as usual, for the receiver
+    (settings.health.hold_s, settings.health.reset_gap_s) = (2.0, 5.0);
+    let slow = (0..140).map(|k| posts(1.05 * f64::from(k), k < 128));
+    let scans: Vec<Scan> = slow.chain((0..20).map(|k| posts(147.1 + 0.1 * f64::from(k), false))).collect();
+    let board = same(Profile::Reference, &script(&settings, &scans));
+    let now = on_the_line(scans.last().unwrap().time, scans[0].time);
+    let far = listen(board.expected.as_ref().unwrap());
+    let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
+    assert_eq!((status.state, status.reason), (UnitState::Degraded, Reason::SectorBlind));
+    let map = far.map(SENSOR, now);
+    let known = |azimuths: std::ops::Range<usize>| {
+        let cells = azimuths.flat_map(|a| (0..200).map(move |r| (a, r)));
+        cells.filter(|(a, r)| map.cell(*a, *r).visibility != Visibility::Unknown).count()
+    };
+    // six sectors of 20 azimuths, from right to left
+    assert!((0..5).all(|sector| known(20 * sector..20 * sector + 20) > 1000));
+    assert_eq!((100..120).map(|a| known(a..a + 1)).collect::<Vec<_>>(), [0; 20]);
 }
 
 #[test]
