@@ -19,6 +19,15 @@ fn says(visibility: Visibility) -> CellState {
     CellState { visibility, grade: 200, occupancy: 0, occupied: false }
 }
 
+/// All of it visible.
+struct Clear;
+
+impl VisibilityMap for Clear {
+    fn at(&self, _: RoadPoint) -> CellState {
+        says(Visibility::Visible)
+    }
+}
+
 /// So many seconds at 15 Hz, each time the same; when the sector became blind.
 fn run(monitor: &mut Monitor<6>, from_ms: u64, seconds: u64, own: Visibility, detected: bool) -> Option<u64> {
     let mut named = None;
@@ -49,13 +58,6 @@ fn a_blind_sector_is_named_within_seconds_and_trusted_again_when_it_sees() {
     // 6 windows of ln(0.97 / 0.3) nats, each of half a second and a frame
     assert!((3000..4500).contains(&named), "{named} ms");
     assert!((0..6).all(|k| monitor.is_blind(k) == (k == 3)), "and no other");
-    /// All of it visible.
-    struct Clear;
-    impl VisibilityMap for Clear {
-        fn at(&self, _: RoadPoint) -> CellState {
-            says(Visibility::Visible)
-        }
-    }
     let watched = monitor.watched(&Clear);
     assert_eq!(watched.at(AHEAD), CellState::UNKNOWN);
     assert!(watched.at(LEFT).visible());
@@ -64,6 +66,24 @@ fn a_blind_sector_is_named_within_seconds_and_trusted_again_when_it_sees() {
     assert!(monitor.is_blind(3));
     run(&mut monitor, 11_000, 5, Visibility::Visible, true);
     assert!(!monitor.is_blind(3));
+}
+
+#[test]
+fn what_of_the_map_lies_beyond_the_views_edge_is_unknown_with_the_sector_there() {
+    let mut monitor = monitor(MonitorConfig::default());
+    // 59 and 62 degrees to the left of a sensor that looks along y
+    let [inside, outside] = [59.0_f64, 62.0].map(|degrees| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        RoadPoint::from_metres((5.0 - 20.0 * sin) as f32, (-3.0 + 20.0 * cos) as f32).unwrap()
+    });
+    assert_eq!((monitor.sector(inside), monitor.sector(outside)), (Some(5), None));
+    for k in 0..200_u64 {
+        monitor.observe(Time::from_micros(66_667 * k), inside, says(Visibility::Visible), k < 15);
+    }
+    assert!(monitor.is_blind(5));
+    let watched = monitor.watched(&Clear);
+    assert_eq!([inside, outside].map(|at| watched.at(at)), [CellState::UNKNOWN; 2]);
+    assert!(watched.at(AHEAD).visible());
 }
 
 #[test]
