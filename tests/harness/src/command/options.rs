@@ -179,6 +179,10 @@ struct EstimatorArgs {
     /// Share of a cell that boxes must fill for `reference` to call it occupied [default: 0.5, above 0 to 1]
     #[arg(long, allow_negative_numbers = true, value_name = "SHARE")]
     reference_share: Option<f64>,
+    /// Grid of radar-3d: on the small one, radar-3d-small runs beside radar-3d in tables, and is what is tuned, watched and
+    /// fused [default: reference]
+    #[arg(long, value_name = "SIZE")]
+    grid_size: Option<estimators::Grid>,
     /// How well the radar measures, from its data sheet: standard deviations of range, azimuth, elevation and radial
     /// velocity [default: 0.25,0.5,1,0.15]
     ///
@@ -278,6 +282,7 @@ impl EstimatorArgs {
     fn apply(&self, options: &mut estimators::Options) {
         set(self.max_detections, &mut options.max_detections);
         set(self.reference_share, &mut options.reference_share);
+        set(self.grid_size, &mut options.grid);
         if let Some(noise) = self.noise {
             // which is no accuracy, and in no data sheet
             let reflector_height_m = options.noise.reflector_height_m;

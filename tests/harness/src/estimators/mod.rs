@@ -77,6 +77,9 @@ pub struct Options {
     pub max_detections: usize,
     /// Share of a cell that boxes must fill for `reference` to call it occupied.
     pub reference_share: f64,
+    /// The grid of the estimator that is tuned, watched or drawn; on the small one, it runs beside `radar-3d` in tables.
+    #[serde(skip_serializing_if = "Grid::is_reference")]
+    pub grid: Grid,
     /// How well the sensor measures.
     pub noise: NoiseConfig,
     pub radar_2d: Radar2dConfig,
@@ -105,6 +108,7 @@ impl Default for Options {
         Self {
             max_detections: 256,
             reference_share: 0.5,
+            grid: Grid::Reference,
             noise: NoiseConfig::default(),
             radar_2d: Radar2dConfig::default(),
             radar_3d: Radar3dConfig::default(),
@@ -128,6 +132,7 @@ impl Options {
 pub const MOST_DETECTIONS: usize = 4096;
 
 pub use radar_2d::MOST_RANGE_M;
+pub use radar_3d::Grid;
 
 /// Every estimator for a recording, in the order of the table. `reference` needs ground truth.
 ///
@@ -147,6 +152,9 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
         radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
         radar_3d::new(&sensor, &radar_3d)?,
     ];
+    if !options.grid.is_reference() {
+        estimators.push(radar_3d::on(options.grid, &sensor, &radar_3d)?);
+    }
     if !options.lanes.is_empty() {
         radar_3d.lanes = kept(&options.lanes);
         estimators.push(radar_3d::new(&sensor, &radar_3d)?);
@@ -169,7 +177,7 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
     let (sensor, max_detections) = radar(recording, options)?;
     let mut radar_3d = options.radar_3d;
     radar_3d.gate.max_detections = max_detections;
-    radar_3d::new(&sensor, &radar_3d)
+    radar_3d::on(options.grid, &sensor, &radar_3d)
 }
 
 /// A recording's radar, and how many detections of a frame are used.

@@ -1,13 +1,14 @@
-//! `radar-3d` on the reference grid.
+//! `radar-3d` on the reference grid, or on the small one.
 
 use anyhow::Result;
+use serde::{Deserialize, Serialize};
 use viewshed::fixed::time::Time;
 use viewshed::map::VisibilityMap;
 use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::mount::Mount;
-use viewshed::unit::profile::reference::State;
+use viewshed::unit::profile::{reference::State, small};
 
 use super::{Estimator, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};
@@ -20,25 +21,76 @@ pub const AZIMUTHS: usize = State::AZIMUTHS;
 pub const ELEVATIONS: usize = State::ELEVATIONS;
 
 /// Vehicles for which the list had no room, as reports say it.
-const NO_ROOM: &str = "no room in the list of 96 obstacles";
-const _: () = assert!(State::OBSTACLES == 96, "the report names the list's limit");
+const NO_ROOM: [&str; 2] = ["no room in the list of 96 obstacles", "no room in the list of 28 obstacles"];
+const _: () = assert!(State::OBSTACLES == 96 && small::State::OBSTACLES == 28, "the report names the list's limit");
 
-struct Driver<const D: usize> {
+/// A size of the grid, and of the lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grid {
+    /// 200 x 120 x 16 cells, for parts with 512 kB
+    #[default]
+    Reference,
+    /// 100 x 64 x 8 cells, 28 vehicles and 176 detections a frame, for parts with 128 kB
+    Small,
+}
+
+impl Grid {
+    pub(super) fn is_reference(&self) -> bool {
+        *self == Self::Reference
+    }
+
+    /// As files have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Reference => "reference",
+            Self::Small => "small",
+        }
+    }
+}
+
+struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> {
     name: &'static str,
-    parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
-    state: Box<Radar3d<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>>,
-    map: Box<PolarMap<RANGES, AZIMUTHS>>,
+    parameters: Box<Radar3dParameters<R, A, E>>,
+    state: Box<Radar3d<R, A, E, W, N, D>>,
+    map: Box<PolarMap<R, A>>,
     mount: Mount,
     intake: Intake,
     no_room: u32,
 }
 
-/// The estimator; storage for 256 detections unless more are asked for.
+type OfReference<const D: usize> = Driver<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>;
+type OfSmall = Driver<
+    { small::State::RANGES },
+    { small::State::AZIMUTHS },
+    { small::State::ELEVATIONS },
+    { small::State::WORDS },
+    { small::State::OBSTACLES },
+    { small::State::DETECTIONS },
+>;
+
+/// The estimator on the reference grid; storage for 256 detections unless more are asked for.
 pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
     if config.gate.max_detections <= 256 {
-        Ok(Box::new(Driver::<256>::new(sensor, config)?))
+        Ok(Box::new(OfReference::<256>::new(sensor, config)?))
     } else {
-        Ok(Box::new(Driver::<MOST_DETECTIONS>::new(sensor, config)?))
+        Ok(Box::new(OfReference::<MOST_DETECTIONS>::new(sensor, config)?))
+    }
+}
+
+/// The estimator on a grid of one's choice; the small one has room for so many detections of a frame.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn on(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
+    match grid {
+        Grid::Reference => new(sensor, config),
+        Grid::Small => {
+            let mut config = *config;
+            config.gate.max_detections = config.gate.max_detections.min(small::State::DETECTIONS as u16);
+            let name = "radar-3d-small";
+            Ok(Box::new(OfSmall { name, ..OfSmall::new(sensor, &config)? }))
+        }
     }
 }
 
@@ -52,7 +104,7 @@ pub fn maps(
     config: &Radar3dConfig,
     mut visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>),
 ) -> Result<()> {
-    let mut driver = Driver::<256>::new(sensor, config)?;
+    let mut driver = OfReference::<256>::new(sensor, config)?;
     for frame in frames {
         driver.step(frame);
         visit(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &driver.map);
@@ -60,7 +112,9 @@ pub fn maps(
     Ok(())
 }
 
-impl<const D: usize> Driver<D> {
+impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
+    Driver<R, A, E, W, N, D>
+{
     fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self> {
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
@@ -70,7 +124,9 @@ impl<const D: usize> Driver<D> {
     }
 }
 
-impl<const D: usize> Estimator for Driver<D> {
+impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> Estimator
+    for Driver<R, A, E, W, N, D>
+{
     fn name(&self) -> &str {
         self.name
     }
@@ -113,7 +169,8 @@ impl<const D: usize> Estimator for Driver<D> {
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {
-        let full = [(NO_ROOM, u64::from(self.no_room))].into_iter().filter(|(_, n)| *n > 0);
+        let no_room = NO_ROOM[usize::from(N != State::OBSTACLES)];
+        let full = [(no_room, u64::from(self.no_room))].into_iter().filter(|(_, n)| *n > 0);
         self.intake.counters(self.state.rejections()).into_iter().chain(full).collect()
     }
 }

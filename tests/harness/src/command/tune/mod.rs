@@ -22,7 +22,7 @@ use crate::results::pictures::tradeoff::{
 use crate::results::report::compare::{self as report, Compared};
 use crate::results::report::table::Extent;
 use crate::studies::tune::plan::{Plan, Run};
-use crate::studies::tune::space::Space;
+use crate::studies::tune::space::{GRID, Space};
 use crate::studies::tune::{Evaluation, Prepared, Rates, Search, State, count, joined};
 use searches::{Searches, usual};
 
@@ -243,7 +243,7 @@ fn toml(state: &State, found: &Evaluation, judged: usize, of: &str) -> String {
     for (p, v) in state.space.parameter.iter().zip(&found.values) {
         let key = format!("estimators.{}", p.key);
         let Some((table, key)) = key.strip_prefix(of).and_then(|key| key.rsplit_once('.')) else { continue };
-        tables.entry(table.to_owned()).or_default().push(format!("{key} = {v:?}"));
+        tables.entry(table.to_owned()).or_default().push(format!("{key} = {}", p.written(*v)));
     }
     let mut text = format!(
         "# Found by `viewshed tune` in {} evaluations on {}; seed {}.\n# Others judged: {judged}.\n",
@@ -251,6 +251,10 @@ fn toml(state: &State, found: &Evaluation, judged: usize, of: &str) -> String {
         state.training.join(", "),
         state.seed,
     );
+    let grid = state.space.parameter.iter().zip(&found.values).find(|(p, _)| p.key == GRID);
+    if let Some((p, v)) = grid.filter(|_| !of.is_empty()) {
+        text += &format!("\n{GRID} = {}\n", p.written(*v));
+    }
     for (table, lines) in tables {
         text += &format!("\n[{table}]\n{}\n", lines.join("\n"));
     }

@@ -4,8 +4,8 @@
 //! Each evaluation runs `radar-3d` over all training recordings and takes the mean of each rate over them: FVR, FIR,
 //! cell FVR and cell FIR, in points. Loss = their sum, and twice what each rate of each recording is above that of the
 //! usual parameters, in the mean over the recordings: a rate is not bought with another, nor a place with another. The first evaluation is of the usual parameters, [`INITIAL`] more of random ones,
-//! the others where a Gaussian [`process`](gaussian) expects most, or at random throughout for comparison. Size of the
-//! grid, and with it memory, is not searched; instructions hardly depend on what is.
+//! the others where a Gaussian [`process`](gaussian) expects most, or at random throughout for comparison. The size of the
+//! grid, and with it memory, is searched where a space names `grid`: a choice of two. Instructions hardly depend on the rest.
 
 pub mod gaussian;
 pub mod plan;

@@ -4,10 +4,13 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::estimators;
+use crate::estimators::{self, Grid};
 
 /// Most parameters of a space.
 pub const MOST: usize = 12;
+
+/// The key that is a choice, not a number: 0 stands for the reference grid, 1 for the small one.
+pub const GRID: &str = "grid";
 
 /// One key of `[estimators]` and its limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,6 +27,18 @@ pub struct Parameter {
 #[serde(deny_unknown_fields)]
 pub struct Space {
     pub parameter: Vec<Parameter>,
+}
+
+impl Parameter {
+    /// A value as a file of the configuration has it.
+    pub fn written(&self, value: f64) -> String {
+        if self.key == GRID { format!("\"{}\"", grid(value).name()) } else { format!("{value:?}") }
+    }
+}
+
+/// The grid of a value.
+fn grid(value: f64) -> Grid {
+    if value < 0.5 { Grid::Reference } else { Grid::Small }
 }
 
 impl Default for Space {
@@ -75,6 +90,10 @@ impl Space {
             );
             let value = value(usual, key)?;
             ensure!(
+                key != GRID || (p.low, p.high) == (0.0, 1.0),
+                "`{GRID}` is a choice from 0 (reference) to 1 (small)"
+            );
+            ensure!(
                 (p.low..=p.high).contains(&value),
                 "`{key}` is {value} without tuning, outside {} to {}: the search begins there",
                 p.low,
@@ -96,6 +115,9 @@ impl Space {
     pub fn values(&self, point: &[f64]) -> Vec<f64> {
         let value = |(p, x): (&Parameter, &f64)| {
             // divided by a power of ten, a value is as short as it looks, and comes back from a file as it was
+            if p.key == GRID {
+                return f64::from(u8::from(*x >= 0.5));
+            }
             let parts = 10_f64.powi(3 - (p.high - p.low).log10().floor() as i32);
             ((p.low + x * (p.high - p.low)) * parts).round() / parts
         };
@@ -109,9 +131,15 @@ impl Space {
     pub fn apply(&self, usual: &estimators::Options, values: &[f64]) -> Result<estimators::Options> {
         let mut all = serde_json::to_value(usual)?;
         for (p, v) in self.parameter.iter().zip(values) {
-            *all.pointer_mut(&pointer(&p.key)).with_context(|| no_key(&p.key))? = Value::from(*v);
+            if p.key != GRID {
+                *all.pointer_mut(&pointer(&p.key)).with_context(|| no_key(&p.key))? = Value::from(*v);
+            }
         }
-        Ok(serde_json::from_value(all)?)
+        let mut options: estimators::Options = serde_json::from_value(all)?;
+        if let Some((_, v)) = self.parameter.iter().zip(values).find(|(p, _)| p.key == GRID) {
+            options.grid = grid(*v);
+        }
+        Ok(options)
     }
 }
 
@@ -124,6 +152,9 @@ fn no_key(key: &str) -> String {
 }
 
 fn value(options: &estimators::Options, key: &str) -> Result<f64> {
+    if key == GRID {
+        return Ok(f64::from(u8::from(options.grid == Grid::Small)));
+    }
     let all = serde_json::to_value(options)?;
     match all.pointer(&pointer(key)) {
         // a value of 32 bits as it is written, not as it is stored
@@ -165,6 +196,19 @@ mod tests {
         let mut expected = usual.clone();
         expected.radar_3d.obstacles.gap_m = 5.5;
         assert_eq!(space.apply(&usual, &[5.5]).unwrap(), expected);
+    }
+
+    #[test]
+    fn the_grid_is_a_choice() {
+        let usual = estimators::Options::default();
+        let space = Space::parse(&one("grid", 0.0, 1.0), &usual).unwrap();
+        assert_eq!((space.values(&[0.49]), space.values(&[0.5])), (vec![0.0], vec![1.0]));
+        assert_eq!(space.usual(&usual).unwrap(), [0.0]);
+        let small = space.apply(&usual, &[1.0]).unwrap();
+        assert_eq!(small, estimators::Options { grid: Grid::Small, ..usual.clone() });
+        assert_eq!(space.usual(&small).unwrap(), [1.0], "and back");
+        assert_eq!([0.0, 1.0].map(|v| space.parameter[0].written(v)), ["\"reference\"", "\"small\""]);
+        assert!(refused(&one("grid", 0.0, 2.0)).contains("a choice"));
     }
 
     #[test]
