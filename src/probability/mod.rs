@@ -9,12 +9,21 @@
 //! [`GRADES`] of the grade, in each of [`AZIMUTHS`] x [`RANGES`] bins of place, and p never falls as the grade rises.
 //! An unknown cell has no probability.
 //!
+//! [`Threshold`] makes a bit of it, so that an accepted risk is kept. [`Quantiser`] makes two bits of a map's cells for
+//! the wire, and [`Levels`] is what these say to a receiver.
+//!
 //! # Limits
 //! [`BLOCK_LEN`] bytes stored, no more in memory than twice that. A look-up takes at most 25 comparisons.
 
 mod block;
+mod levels;
+mod quantiser;
+mod threshold;
 
 pub use block::BLOCK_LEN;
+pub use levels::Levels;
+pub use quantiser::Quantiser;
+pub use threshold::{Counted, Threshold};
 
 use crate::fixed::angle::Angle;
 use crate::fixed::{math, trig};
@@ -219,15 +228,20 @@ impl ProbabilityTable {
         map: &PolarMap<R, A>,
         area: &Footprint,
     ) -> Option<Probability> {
-        let (mut cells, mut missed) = (0_u32, 0_u32);
-        let complete = area.each_cell(|cell| {
-            cells = cells.saturating_add(1);
-            let p = self.at(map, cell).map_or(0, Probability::raw);
-            missed = missed.saturating_add(u32::from(u8::MAX - p));
-        });
-        let mean = missed.div_ceil(cells.max(1));
-        u8::try_from(mean).ok().filter(|_| complete && cells > 0).map(Probability)
+        expected_missed(area, |cell| self.at(map, cell))
     }
+}
+
+/// mean(1 - p) over an area's cells, rounded up; what has no probability counts as missed. `None` for an area larger
+/// than queries look at.
+pub(crate) fn expected_missed(area: &Footprint, at: impl Fn(RoadPoint) -> Option<Probability>) -> Option<Probability> {
+    let (mut cells, mut missed) = (0_u32, 0_u32);
+    let complete = area.each_cell(|cell| {
+        cells = cells.saturating_add(1);
+        missed = missed.saturating_add(u32::from(u8::MAX - at(cell).map_or(0, Probability::raw)));
+    });
+    let mean = missed.div_ceil(cells.max(1));
+    u8::try_from(mean).ok().filter(|_| complete && cells > 0).map(Probability)
 }
 
 #[cfg(test)]

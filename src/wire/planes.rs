@@ -6,6 +6,7 @@ use crate::camera::map::{CameraMap, Layer};
 use crate::fixed::bits::Bits;
 use crate::map::bitmap::VisibilityBitmap;
 use crate::map::polar::PolarMap;
+use crate::probability::Quantiser;
 
 /// A map of one or more planes.
 pub trait Planes<const W: usize> {
@@ -25,6 +26,27 @@ impl<const R: usize, const A: usize, const W: usize> Planes<W> for PolarMap<R, A
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let Some((grades, occupancy)) = self.grades(azimuth).zip(self.occupancy(azimuth)) else { return Ray::UNKNOWN };
         ray_of(plane, grades, self.visible_from(), || at_least(occupancy, self.occupied_from()))
+    }
+}
+
+/// A polar map whose bits are by a table of probabilities.
+#[derive(Debug, Clone, Copy)]
+pub struct Quantised<'a, const R: usize, const A: usize> {
+    /// The map.
+    pub map: &'a PolarMap<R, A>,
+    /// The table.
+    pub quantiser: &'a Quantiser,
+}
+
+impl<const R: usize, const A: usize, const W: usize> Planes<W> for Quantised<'_, R, A> {
+    fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
+        let finer = match plane {
+            Plane::Visibility => false,
+            Plane::Grade => true,
+            Plane::Occupancy => return self.map.ray(plane, azimuth),
+        };
+        let known = self.map.grades(azimuth).map_or(Known::NONE, |grades| known_of(grades));
+        Ray::new(known, self.quantiser.along(self.map, azimuth, finer))
     }
 }
 
@@ -48,10 +70,10 @@ impl<const NX: usize, const NY: usize, const W: usize> Planes<W> for CameraMap<N
 /// The ray of one azimuth's grades and, where it is asked for, its occupied cells.
 #[inline]
 fn ray_of<const W: usize>(plane: Plane, grades: &[u8], visible: u8, occupied: impl FnOnce() -> Bits<W>) -> Ray<W> {
-    let known = match first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0)) {
-        Some((near, last)) => Known::new(near, last + 1),
-        None => return Ray::UNKNOWN,
-    };
+    let known = known_of(grades);
+    if known.is_empty() {
+        return Ray::UNKNOWN;
+    }
     let bits = match plane {
         // above unknown, so known
         Plane::Visibility => return Ray::within(known, at_least(grades, visible)),
@@ -68,6 +90,13 @@ fn ray_of<const W: usize>(plane: Plane, grades: &[u8], visible: u8, occupied: im
         Plane::Occupancy => occupied(),
     };
     Ray::new(known, bits)
+}
+
+/// From the first known cell to the last.
+#[inline]
+fn known_of(grades: &[u8]) -> Known {
+    let limits = first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0));
+    limits.map_or(Known::NONE, |(near, last)| Known::new(near, last + 1))
 }
 
 /// The first cell whose value is above 0, eight at a time.

@@ -37,6 +37,7 @@ pub fn header() -> Header {
         usual: Known::new(2, RANGES),
         planes: 1,
         fingerprint: 0xDEAD_BEEF,
+        probability: None,
     }
 }
 

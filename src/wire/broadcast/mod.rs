@@ -35,7 +35,7 @@ use self::config::within;
 use self::outgoing_plane::{Next, OutgoingPlane};
 use self::pace::Every;
 use super::frame::{CanFrame, fd_length};
-use super::header::{GROUPS, Header};
+use super::header::Header;
 use super::message::{Epoch, Message, Packet, Packing, Plane};
 use super::planes::Planes;
 use super::scan_number::ScanNumber;
@@ -169,7 +169,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
         Self::fits(&header)?;
-        self.header = Header { planes: planes(P), ..header };
+        self.header = Header { planes: planes(P.min(usize::from(self.config.planes))), ..header };
         self.status.fingerprint = header.fingerprint;
         self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / u64::from(self.header_messages()));
         self.quiet(now);
@@ -181,7 +181,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     /// Messages that the whole header takes.
     fn header_messages(&self) -> u8 {
-        if self.packing().is_classic() { GROUPS } else { 1 }
+        if self.packing().is_classic() { self.header.count() } else { 1 }
     }
 
     fn quiet_us(&self) -> u64 {
@@ -272,7 +272,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             self.refreshed = None;
         }
         let azimuths = usize::from(self.header.azimuths);
-        for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL) {
+        for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL).take(usize::from(self.config.planes)) {
             outgoing.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
         }
         let refreshed = self.refreshed.map(ScanNumber::at);

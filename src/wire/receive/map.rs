@@ -4,7 +4,9 @@ use super::measure::ReceiverLimits;
 use super::sensor::SensorReceiver;
 use crate::fixed::time::Time;
 use crate::map::polar::PolarGeometry;
+use crate::map::query::Footprint;
 use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::probability::{self, Probability};
 use crate::sensor::road::RoadPoint;
 use crate::wire::code::ray::Ray;
 use crate::wire::header::Header;
@@ -38,16 +40,55 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
         self.shown.as_ref().map(|(_, header, _)| *header)
     }
 
+    fn current(&self, plane: Plane, azimuth: usize) -> Option<(Ray<W>, ScanNumber)> {
+        let (sensor, ..) = self.shown.as_ref()?;
+        sensor.current(plane, azimuth, self.now, &self.limits)
+    }
+
     /// An azimuth of a plane; unknown where it is not sent or not current.
     pub fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
-        let ray = self.shown.as_ref().and_then(|(sensor, ..)| sensor.current(plane, azimuth, self.now, &self.limits));
-        ray.map_or(Ray::UNKNOWN, |(ray, _)| ray)
+        self.current(plane, azimuth).map_or(Ray::UNKNOWN, |(ray, _)| ray)
     }
 
     /// The scan an azimuth's visibility is of; `None` where it is unknown.
     pub fn scan(&self, azimuth: usize) -> Option<ScanNumber> {
-        let (sensor, ..) = self.shown.as_ref()?;
-        sensor.current(Plane::Visibility, azimuth, self.now, &self.limits).map(|(_, scan)| scan)
+        self.current(Plane::Visibility, azimuth).map(|(_, scan)| scan)
+    }
+
+    /// The probability that the sensor would detect a vehicle in a cell, rounded down to what the cell's bits say:
+    /// never above the sender's table for its map of the scan that the azimuth's visibility is of, at any point of
+    /// the cell. `None` where the cell is unknown, and where the sender says nothing of probabilities.
+    ///
+    /// The finer bit counts where it is of the same scan; of another it would say something of another visible bit.
+    pub fn probability(&self, azimuth: usize, range: usize) -> Option<Probability> {
+        let levels = self.header()?.probability?;
+        let (ray, scan) = self.current(Plane::Visibility, azimuth).filter(|(ray, _)| ray.known.contains(range))?;
+        let finer = self.current(Plane::Grade, azimuth).filter(|(_, of)| *of == scan);
+        let finer = finer.filter(|(finer, _)| finer.known.contains(range)).map(|(finer, _)| finer.get(range));
+        Some(levels.of(ray.get(range), finer))
+    }
+
+    /// The same of a point of the road.
+    pub fn probability_at(&self, point: RoadPoint) -> Option<Probability> {
+        let (azimuth, range) = self.locate(point)?;
+        self.probability(azimuth, range)
+    }
+
+    /// Of vehicles that are somewhere in an area, the share that is expected to be missed: mean(1 - p) over its cells,
+    /// rounded up. Unknown cells count as missed, and so does everything where the sender says nothing of
+    /// probabilities. `None` for an area larger than queries look at.
+    ///
+    /// It is an upper bound of what the sender's table says, because p comes rounded down. It is not the FVR: it is of
+    /// all vehicles, the FVR of those that were missed.
+    pub fn expected_missed(&self, area: &Footprint) -> Option<Probability> {
+        probability::expected_missed(area, |point| self.probability_at(point))
+    }
+
+    /// The cell a point lies in, azimuth and range.
+    fn locate(&self, point: RoadPoint) -> Option<(usize, usize)> {
+        let (_, header, geometry) = self.shown.as_ref()?;
+        let (x, y) = geometry.levelling.place(point);
+        geometry.locate(x, y, usize::from(header.ranges), usize::from(header.azimuths))
     }
 
     /// Whether a plane is sent.
@@ -84,10 +125,7 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
 
 impl<const A: usize, const W: usize, const P: usize> VisibilityMap for ReceivedMap<'_, A, W, P> {
     fn at(&self, point: RoadPoint) -> CellState {
-        let Some((_, header, geometry)) = &self.shown else { return CellState::UNKNOWN };
-        let (x, y) = geometry.levelling.place(point);
-        let cell = geometry.locate(x, y, usize::from(header.ranges), usize::from(header.azimuths));
-        cell.map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))
+        self.locate(point).map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))
     }
 }
 

@@ -84,7 +84,10 @@ impl Maker {
         let group = 1 + random.below(6) as u8;
         let mut own = match self.bus {
             Bus::Can => header.emit_group(&clock, group).to_vec(),
-            Bus::CanFd | Bus::Serial => header.emit(&clock).to_vec(),
+            Bus::CanFd | Bus::Serial => {
+                let (own, length) = header.emit(&clock);
+                own[..length].to_vec()
+            }
         };
         match random.below(6) {
             // another wire version, seldom, as it blanks

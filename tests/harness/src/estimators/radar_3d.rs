@@ -3,7 +3,7 @@
 use anyhow::Result;
 use viewshed::fixed::time::Time;
 use viewshed::map::VisibilityMap;
-use viewshed::map::polar::PolarMap;
+use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::mount::Mount;
@@ -40,6 +40,15 @@ pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>
     } else {
         Ok(Box::new(Driver::<MOST_DETECTIONS>::new(sensor, config)?))
     }
+}
+
+/// Where the cells of its map lie.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn geometry(sensor: &Sensor, config: &Radar3dConfig) -> Result<PolarGeometry> {
+    let parameters = Radar3dParameters::<RANGES, AZIMUTHS, ELEVATIONS>::new(sensor, config)?;
+    Ok(parameters.axes().polar(parameters.levelling()))
 }
 
 /// Runs the estimator over frames and shows its map after each, with the frame's time.

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
+use viewshed::probability::Quantiser;
 
 use crate::estimators::at_risk::{AtRisk, NAME};
 use crate::estimators::{self, Estimator};
 use crate::evaluation::Settings;
 use crate::evaluation::counts::rate;
 use crate::evaluation::probability::file::Fitted;
-use crate::evaluation::probability::risk::Threshold;
+use crate::evaluation::probability::risk::keeping;
 use crate::evaluation::probability::samples::fingerprint;
 use crate::evaluation::replay::Replay;
 use crate::recording::Recording;
@@ -57,15 +58,12 @@ impl RiskArgs {
         ensure!(recording.of_camera().is_none(), "--risk: {} is of a camera; tables are of radars", recording.name);
         let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
         let table = table.with_context(|| format!("--probability: {}", recording.name))?;
-        let least = match Threshold::keeping(risk, &fitted.counted) {
-            Threshold::Everything => Some(0),
-            Threshold::From(p) => Some(p),
-            Threshold::Nothing => None,
-        };
-        let levelling = estimators::mount(&recording.pose).levelling()?;
+        let threshold = keeping(risk, &fitted.counted);
         let inner = estimators::own(recording, &settings.estimators)?;
+        let grid = estimators::own_grid(recording, &settings.estimators)?;
+        let quantiser = Quantiser::new(table, Some(threshold), 0);
         let place = running.iter().position(|e| e.name() == inner.name()).map_or(running.len(), |k| k + 1);
-        running.insert(place, Box::new(AtRisk::new(inner, table, levelling, least)));
+        running.insert(place, Box::new(AtRisk::new(inner, quantiser, grid)));
         Ok(())
     }
 
@@ -75,7 +73,7 @@ impl RiskArgs {
     /// Those of reading the table.
     pub fn told(&self, replay: &Replay) -> Result<String> {
         let Some((risk, fitted)) = self.asked()? else { return Ok(String::new()) };
-        let threshold = Threshold::keeping(risk, &fitted.counted).said();
+        let threshold = keeping(risk, &fitted.counted);
         let counts = replay.summary.row(NAME).map(|row| row.counts).unwrap_or_default();
         let found = rate(counts.fv, counts.tv + counts.fv);
         let share = rate(counts.tv + counts.fv, counts.total());
