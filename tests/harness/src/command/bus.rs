@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for path in &paths {
         let recording = recording::read(path, &settings.reading)?;
         let progress = bar(&format!("replaying {}", recording.name), recording.frames.len() as u64);
-        let maps = Maps::new(&recording, &settings.estimators, &|| progress.step())?;
+        let maps = Maps::new(&recording, &settings.estimators, None, &|| progress.step())?;
         drop(progress);
         if args.count_symbols {
             count(&mut symbols, &maps);
