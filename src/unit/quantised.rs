@@ -37,6 +37,11 @@ impl<const A: usize, const W: usize> QuantisedSender<A, W> {
         Ok(Self { broadcast: Broadcaster::new(BroadcastConfig { planes, ..config }, header, epoch, now)?, quantiser })
     }
 
+    /// What is said of the sender.
+    pub fn status_mut(&mut self) -> &mut Status {
+        self.broadcast.status_mut()
+    }
+
     /// Whether everything of the last map is handed out or dropped.
     pub fn idle(&self) -> bool {
         self.broadcast.idle()
