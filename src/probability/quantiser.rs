@@ -216,3 +216,88 @@ fn least_lost(of: impl Iterator<Item = u8> + Clone, anyway: u8) -> u8 {
     };
     of.clone().max_by_key(|level| gain(*level)).unwrap_or(anyway).max(anyway)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{edges, values};
+    use super::*;
+    use crate::fixed::angle::Angle;
+    use crate::map::polar::column;
+    use crate::sensor::mount::Levelling;
+
+    fn geometry(azimuth_origin: i16, azimuth_span: u16) -> PolarGeometry {
+        let (azimuth_origin, levelling) = (Angle::from_raw(azimuth_origin), Levelling::NOWHERE);
+        PolarGeometry { levelling, cell_cm: 250, azimuth_origin, azimuth_span }
+    }
+
+    fn quantiser(threshold: Option<Threshold>) -> Quantiser {
+        Quantiser::new(ProbabilityTable::new(edges(), values(), 7).unwrap(), threshold, 128)
+    }
+
+    #[test]
+    fn an_azimuth_touches_the_bins_of_all_bearings_in_it() {
+        let quantiser = quantiser(None);
+        for (origin, span, azimuths) in
+            [(-10_000, 20_000, 40), (-10_967, 21_935, 120), (-3001, 6002, 7), (-4000, 9997, 128), (20_000, 30_000, 30)]
+        {
+            let (geometry, mut seen) = (geometry(origin, span), 0);
+            for raw in i16::MIN..=i16::MAX {
+                let bearing = Angle::from_raw(raw);
+                let Some(azimuth) = column(bearing - geometry.azimuth_origin, span, azimuths) else { continue };
+                let [first, last] = quantiser.azimuth_bins(&geometry, azimuth, azimuths);
+                let (bin, _, _) = quantiser.table.edges().locate(1, 0, bearing);
+                assert!((first..=last).contains(&bin), "{raw} in azimuth {azimuth} of {azimuths}, bin {bin}");
+                seen += 1;
+            }
+            assert!(seen > usize::from(span.min(30_000) / 2), "{seen} bearings of {span}");
+        }
+    }
+
+    #[test]
+    fn a_cell_has_the_least_probability_of_the_bins_it_touches() {
+        let quantiser = quantiser(None);
+        // rises with the grade and the azimuth, falls with range
+        let p = |azimuths, ranges, grade| quantiser.of_cell(azimuths, ranges, grade).map(Probability::raw);
+        assert_eq!(p([3, 3], [2, 2], 255), Some(values()[3][2][GRADES - 1]));
+        assert_eq!(p([3, 4], [2, 3], 255), Some(values()[3][3][GRADES - 1]));
+        assert_eq!(p([3, 4], [2, 3], 1), Some(values()[3][3][0]));
+        assert_eq!(p([0, 7], [0, 7], UNKNOWN), None);
+    }
+
+    #[test]
+    fn a_level_is_where_least_is_lost_by_rounding_down() {
+        // 4 * 50, 2 * 120, 1 * 200 above 0; above 100 only the last gains much
+        assert_eq!(least_lost([50, 60, 120, 200].into_iter(), 0), 120);
+        assert_eq!(least_lost([50, 60, 120, 200].into_iter(), 100), 200);
+        assert_eq!(least_lost([50, 60].into_iter(), 100), 100, "all have more anyway");
+        assert_eq!(least_lost([].into_iter(), 3), 3);
+    }
+
+    #[test]
+    fn with_a_risk_the_classes_lie_on_both_sides_of_its_threshold() {
+        let all = || values().into_iter().flatten().flatten();
+        let of = |threshold| {
+            let [hidden, visible, clear, ..] = quantiser(Some(threshold)).levels().to_bytes();
+            [hidden, visible, clear]
+        };
+        let [hidden, visible, clear] = of(Threshold::From(180));
+        assert!(hidden < 180 && hidden > 0, "{hidden}");
+        assert_eq!(visible, all().filter(|p| *p >= 180).min().unwrap());
+        assert!(clear > visible, "{clear} {visible}");
+        assert_eq!(of(Threshold::Everything)[1], all().min().unwrap());
+        let [hidden, visible, clear] = of(Threshold::Nothing);
+        assert!(hidden == clear && visible == clear && clear > 0);
+    }
+
+    #[test]
+    fn without_a_risk_visible_is_what_the_grade_says() {
+        let quantiser = quantiser(None);
+        // 128 begins a step
+        let least = values().iter().flatten().map(|steps| steps[6]).min().unwrap();
+        assert_eq!(quantiser.levels().to_bytes()[1], least);
+        assert_eq!(quantiser.least_grades([0, 0], [0, 0])[0], 128);
+        let [a, b, _, _] = quantiser.table().check_sum().to_be_bytes();
+        assert_ne!([a, b], [0, 0]);
+        assert_eq!(u32::from(quantiser.levels().table()), quantiser.table().check_sum() & 0xFFFF);
+    }
+}

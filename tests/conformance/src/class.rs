@@ -59,8 +59,7 @@ pub enum Class {
 use Class::{
     ClockJumps, Cuts, DelayPasses, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, HeaderFaults, Jitter, Late1,
     LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, Others, Probabilities,
-    ReceiverRestarts,
-    Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
+    ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
 };
 
 impl Class {

@@ -136,9 +136,15 @@ mod tests {
 
     #[test]
     fn lines_are_read_as_they_are_written() {
-        for line in
-            ["start canfd 7", "frame 123 40A 00FF", "frame 1 400 -", "bytes 9 0102", "look 5", "cells 9007199254740991", "probability 6"]
-        {
+        for line in [
+            "start canfd 7",
+            "frame 123 40A 00FF",
+            "frame 1 400 -",
+            "bytes 9 0102",
+            "look 5",
+            "cells 9007199254740991",
+            "probability 6",
+        ] {
             assert_eq!(line.parse::<Input>().unwrap().to_string(), line);
         }
         for line in

@@ -73,10 +73,12 @@ impl Maps {
         radar_3d::maps(&recording.frames, &sensor, &options.radar_3d, |measured, map| {
             geometry = Some(*map.geometry());
             let plane = |plane| -> Vec<Ray<W>> {
-                let ray = |azimuth| quantiser.map_or_else(
-                    || map.ray(plane, azimuth),
-                    |quantiser| Quantised { map, quantiser }.ray(plane, azimuth),
-                );
+                let ray = |azimuth| {
+                    quantiser.map_or_else(
+                        || map.ray(plane, azimuth),
+                        |quantiser| Quantised { map, quantiser }.ray(plane, azimuth),
+                    )
+                };
                 (0..A).map(ray).collect()
             };
             let rays = plane(Plane::Visibility);

@@ -172,13 +172,13 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
     radar_3d::new(&sensor, &radar_3d)
 }
 
-/// The grid of the map of [`own`], of a radar.
+/// The grid of the map of [`own`], of a radar, and its least visible grade.
 ///
 /// # Errors
 /// As for [`own`].
-pub fn own_grid(recording: &Recording, options: &Options) -> Result<PolarGeometry> {
+pub fn own_grid(recording: &Recording, options: &Options) -> Result<(PolarGeometry, u8)> {
     let (sensor, _) = radar(recording, options)?;
-    radar_3d::geometry(&sensor, &options.radar_3d)
+    radar_3d::grid(&sensor, &options.radar_3d)
 }
 
 /// A recording's radar, and how many detections of a frame are used.

@@ -42,13 +42,13 @@ pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>
     }
 }
 
-/// Where the cells of its map lie.
+/// Where the cells of its map lie, and from which grade on they are visible.
 ///
 /// # Errors
 /// A parameter the library refuses, by name.
-pub fn geometry(sensor: &Sensor, config: &Radar3dConfig) -> Result<PolarGeometry> {
+pub fn grid(sensor: &Sensor, config: &Radar3dConfig) -> Result<(PolarGeometry, u8)> {
     let parameters = Radar3dParameters::<RANGES, AZIMUTHS, ELEVATIONS>::new(sensor, config)?;
-    Ok(parameters.axes().polar(parameters.levelling()))
+    Ok((parameters.axes().polar(parameters.levelling()), parameters.visible_from()))
 }
 
 /// Runs the estimator over frames and shows its map after each, with the frame's time.

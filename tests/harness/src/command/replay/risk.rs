@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
+use viewshed::map::polar::PolarGeometry;
 use viewshed::probability::Quantiser;
 
 use crate::estimators::at_risk::{AtRisk, NAME};
@@ -15,6 +16,23 @@ use crate::evaluation::probability::samples::fingerprint;
 use crate::evaluation::replay::Replay;
 use crate::recording::Recording;
 use crate::results::report::percent;
+
+/// What a unit of a recording makes of a table, and where the cells of its maps lie.
+///
+/// # Errors
+/// A table of another mount or configuration.
+pub fn quantiser(
+    fitted: Fitted,
+    risk: Option<f64>,
+    recording: &Recording,
+    settings: &Settings,
+) -> Result<(Quantiser, PolarGeometry)> {
+    let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
+    let table = table.with_context(|| format!("--probability: {}", recording.name))?;
+    let (grid, visible_from) = estimators::own_grid(recording, &settings.estimators)?;
+    let threshold = risk.map(|risk| keeping(risk, &fitted.counted));
+    Ok((Quantiser::new(table, threshold, visible_from), grid))
+}
 
 /// A risk and the table it is judged by.
 #[derive(Debug, Clone, clap::Args)]
@@ -33,7 +51,7 @@ pub struct RiskArgs {
     risk: Option<f64>,
 }
 
-fn share(text: &str) -> Result<f64, String> {
+pub fn share(text: &str) -> Result<f64, String> {
     let value = super::finite(text)?;
     if value > 0.0 && value < 1.0 { Ok(value) } else { Err(format!("{value} is not between 0 and 1: 0.1 is 10 %")) }
 }
@@ -56,12 +74,8 @@ impl RiskArgs {
     pub fn add(&self, running: &mut Vec<Box<dyn Estimator>>, recording: &Recording, settings: &Settings) -> Result<()> {
         let Some((risk, fitted)) = self.asked()? else { return Ok(()) };
         ensure!(recording.of_camera().is_none(), "--risk: {} is of a camera; tables are of radars", recording.name);
-        let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
-        let table = table.with_context(|| format!("--probability: {}", recording.name))?;
-        let threshold = keeping(risk, &fitted.counted);
+        let (quantiser, grid) = quantiser(fitted, Some(risk), recording, settings)?;
         let inner = estimators::own(recording, &settings.estimators)?;
-        let grid = estimators::own_grid(recording, &settings.estimators)?;
-        let quantiser = Quantiser::new(table, Some(threshold), 0);
         let place = running.iter().position(|e| e.name() == inner.name()).map_or(running.len(), |k| k + 1);
         running.insert(place, Box::new(AtRisk::new(inner, quantiser, grid)));
         Ok(())

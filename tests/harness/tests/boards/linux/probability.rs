@@ -65,8 +65,11 @@ fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
         let first = sent.iter().zip(&expected).position(|(a, b)| a != b);
         assert_eq!((first, sent.len()), (None, expected.len()), "{risk}: first frame that differs, and how many came");
 
-        let mut receiver =
-            Receiver::<1, { State::AZIMUTHS }, { State::WORDS }, 2>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+        let mut receiver = Receiver::<1, { State::AZIMUTHS }, { State::WORDS }, 2>::new(
+            [0],
+            Addresses::STANDARD,
+            ReceiverLimits::DEFAULT,
+        );
         let mut given = 0_usize;
         for (at, frame) in &sent {
             let _ = receiver.frame(Time::from_micros(*at), frame);
@@ -103,9 +106,8 @@ fn linux_a_table_that_cannot_be_used_is_refused_by_its_reason_and_maps_are_by_gr
     std::fs::write(&log, log_of(&scans)).unwrap();
     let good = fitted(settings.fingerprint()).text().unwrap();
     let expected = twin(&settings, None, &read(&log), 0, MEDIUM);
-    let maps = |sent: &Sent| -> Vec<CanFrame> {
-        sent.iter().map(|(_, frame)| *frame).filter(|frame| is_map(frame)).collect()
-    };
+    let maps =
+        |sent: &Sent| -> Vec<CanFrame> { sent.iter().map(|(_, frame)| *frame).filter(|frame| is_map(frame)).collect() };
     let cases = [
         (fitted(settings.fingerprint() ^ 1).text().unwrap(), "was fitted with configuration"),
         (good[..good.len() / 2].to_owned(), "TOML parse error"),
@@ -116,10 +118,16 @@ fn linux_a_table_that_cannot_be_used_is_refused_by_its_reason_and_maps_are_by_gr
     for (table, why) in cases {
         let (daemon, sent) = sent(&settings, &log, &table, "risk = 0.05");
         let said = daemon.log();
-        assert!(said.contains("t.probability.toml") && said.contains(why) && said.contains("maps are by grades"), "{said}");
+        assert!(
+            said.contains("t.probability.toml") && said.contains(why) && said.contains("maps are by grades"),
+            "{said}"
+        );
         assert_eq!(maps(&sent), maps(&expected), "{why}");
-        let mut receiver =
-            Receiver::<1, { State::AZIMUTHS }, { State::WORDS }, 2>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+        let mut receiver = Receiver::<1, { State::AZIMUTHS }, { State::WORDS }, 2>::new(
+            [0],
+            Addresses::STANDARD,
+            ReceiverLimits::DEFAULT,
+        );
         let mut told = 0;
         for (at, frame) in &sent {
             let _ = receiver.frame(Time::from_micros(*at), frame);
