@@ -12,8 +12,8 @@ use viewshed::{
 };
 
 use crate::locate;
-use crate::probability::{Given, Table};
 use crate::one_file::is_one_file;
+use crate::probability::{Given, Table};
 use crate::state;
 
 /// Size of the grid.

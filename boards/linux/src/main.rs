@@ -71,7 +71,9 @@ fn main() -> ExitCode {
     };
     if args.check {
         let mut missing = config.missing_files();
-        missing.extend(config.table().and_then(Result::err).map(|e| format!("{e:#}; a daemon that runs goes on with grades")));
+        missing.extend(
+            config.table().and_then(Result::err).map(|e| format!("{e:#}; a daemon that runs goes on with grades")),
+        );
         missing.iter().for_each(|problem| error!("{}: {problem}", args.config.display()));
         println!("{}", config.summary(&args.config, missing.is_empty()));
         return if missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) };
