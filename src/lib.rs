@@ -100,8 +100,8 @@
 //! | `radar_3d` | the estimator: all stages above, in order |
 //! | `radar_2d` | the flat baseline, as an estimator of its own |
 //! | `camera` | boxes of a camera's detector in, lifted onto the road, into voxels and lines of sight; the same maps out |
+//! | `probability` | a grade and a place in, the probability out that a vehicle there is detected; a map's cells as bits by it; a table fitted on a PC |
 //! | `wire` | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
-//! | `probability` | a grade and a place in, the probability out that a vehicle there is detected; a table fitted on a PC |
 //! | `inputs` | a radar's bytes to scans: ARS408 family, TI mmWave, the native format; that for a camera's boxes too |
 //! | `unit` | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
 //! | `bench` | the same scans on a controller and on a PC, compared, stage by stage |
