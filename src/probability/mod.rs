@@ -26,11 +26,9 @@ pub use quantiser::Quantiser;
 pub use threshold::{Counted, Threshold};
 
 use crate::fixed::angle::Angle;
-use crate::fixed::{math, trig};
-use crate::map::polar::PolarMap;
+use crate::map::polar::{PolarGeometry, PolarMap};
 use crate::map::query::Footprint;
-use crate::map::{CellState, UNKNOWN, Visibility, VisibilityMap};
-use crate::sensor::mount::Levelling;
+use crate::map::{UNKNOWN, VisibilityMap};
 use crate::sensor::road::RoadPoint;
 
 /// Steps of the grade.
@@ -205,18 +203,23 @@ impl ProbabilityTable {
         self.values.get(a)?.get(r)?.get(g).copied().map(Probability)
     }
 
-    /// Probability at a point of a map of the unit; unknown has none.
+    /// Probability at a point of a map of the unit, that of the cell it lies in; unknown has none.
     pub fn at<const R: usize, const A: usize>(&self, map: &PolarMap<R, A>, point: RoadPoint) -> Option<Probability> {
-        self.of_cell(&map.geometry().levelling, map.at(point), point)
+        self.of_point(map.geometry(), [R, A], map.at(point).grade, point)
     }
 
-    /// The same of what any map of the unit says of a point.
-    pub fn of_cell(&self, levelling: &Levelling, state: CellState, point: RoadPoint) -> Option<Probability> {
-        if state.visibility == Visibility::Unknown {
-            return None;
-        }
-        let (x, y) = levelling.place(point);
-        self.look_up(state.grade, math::length(x, y), trig::bearing(x, y))
+    /// The same at a grade that a map on this grid of ranges by azimuths has at a point: p at the middle of its cell.
+    pub(crate) fn of_point(
+        &self,
+        geometry: &PolarGeometry,
+        [ranges, azimuths]: [usize; 2],
+        grade: u8,
+        point: RoadPoint,
+    ) -> Option<Probability> {
+        let (x, y) = geometry.levelling.place(point);
+        let (azimuth, range) = geometry.locate(x, y, ranges, azimuths)?;
+        let middle_cm = i32::try_from(range).ok()? * geometry.cell_cm + geometry.cell_cm / 2;
+        self.look_up(grade, middle_cm, geometry.middle_of(azimuth, azimuths))
     }
 
     /// Of vehicles that are somewhere in an area, the share that is expected to be missed, mean(1 - p) over its cells,

@@ -40,13 +40,19 @@ pub struct Quantised<'a, const R: usize, const A: usize> {
 
 impl<const R: usize, const A: usize, const W: usize> Planes<W> for Quantised<'_, R, A> {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
-        let finer = match plane {
+        let clear = match plane {
             Plane::Visibility => false,
             Plane::Grade => true,
             Plane::Occupancy => return self.map.ray(plane, azimuth),
         };
-        let known = self.map.grades(azimuth).map_or(Known::NONE, |grades| known_of(grades));
-        Ray::new(known, self.quantiser.along(self.map, azimuth, finer))
+        // what is known has a probability: beyond an unknown cell nothing counts as known
+        let known = self.map.grades(azimuth).map_or(Known::NONE, |grades| {
+            let known = known_of(grades);
+            let hole =
+                grades.get(known.near()..known.end()).and_then(|known| known.iter().position(|grade| *grade == 0));
+            hole.map_or(known, |hole| Known::new(known.near(), known.near() + hole))
+        });
+        Ray::new(known, self.quantiser.along(self.map, azimuth, clear))
     }
 }
 

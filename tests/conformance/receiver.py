@@ -645,7 +645,7 @@ class Sensor:
                 self.header = Header(b"".join(self.groups[1:]))
             except ValueError:
                 self.groups = [None] * 7
-        if levels and levels[2] > 0 and max(levels[:2]) <= levels[2]:
+        if levels and levels[2] > 0 and levels[0] <= levels[1] <= levels[2]:
             self.levels = levels if self.levels in (None, levels) else b""
         if clock:
             self.group_0(t, int.from_bytes(clock, "big") * 1000)
@@ -771,7 +771,7 @@ class Sensor:
     # Rule 5
 
     def shown(self, t):
-        """Of both planes the rays that are shown, each with its scan; None if nothing is."""
+        """Of both planes the rays that are shown; None if nothing is."""
         if self.session is None or self.header is None or not self.has_measure or not self.has_clock:
             return None
         smallest = self.smallest_lag(t)
@@ -781,24 +781,23 @@ class Sensor:
                 or not self.fits(t)
                 or self.signed(self.conflict, t) or self.signed(self.other_version, t)):
             return None
-        return [[held if held and (lag(t, held[0]) - smallest) % P + 25_000 <= A else (None, NO_CELLS)
+        return [[held[1] if held and (lag(t, held[0]) - smallest) % P + 25_000 <= A else NO_CELLS
                  for held in plane.rays[:self.header.azimuths]] for plane in self.planes]
 
     def look(self, t):
         planes = self.shown(t)
-        return planes and [states_of(ray, self.header.ranges) for _, ray in planes[0]]
+        return planes and [states_of(ray, self.header.ranges) for ray in planes[0]]
 
     def probabilities(self, t):
         """How many cells have one, and the least of every cell, azimuth by azimuth; 0 for none."""
         planes = self.shown(t) if self.levels else None
         known, all_cells = 0, bytearray()
-        for (scan, (near, end, visible)), (of, (n, e, finer)) in zip(*planes) if planes else ():
-            finer = finer & cells_between(n, e) if of == scan else 0
+        for (near, end, visible), (n, e, clear) in zip(*planes) if planes else ():
+            clear &= visible & cells_between(n, e)
             cells = bytearray(self.header.ranges)
             for cell in range(near, end):
                 known += 1
-                bits = 2 * (visible >> cell & 1) + (finer >> cell & 1)
-                cells[cell] = (0, *self.levels[:3])[bits]
+                cells[cell] = self.levels[(visible >> cell & 1) + (clear >> cell & 1)]
             all_cells += cells
         return known, bytes(all_cells)
 

@@ -23,7 +23,7 @@
 #define SENSORS 8
 #define AZIMUTHS 128
 #define CELLS 256
-#define PLANES 2       /* visibility, and the finer bits that a header's probabilities go with */
+#define PLANES 2       /* visibility and, of senders with a table of probabilities, that of probability */
 #define WAITING 36     /* words that wait for others of their blocks */
 #define PERIOD 5120000 /* us, of the scan numbers */
 #define CLOCK (UINT64_C(1099511627776) * 1000) /* us, of the header's clock */
@@ -523,13 +523,10 @@ static bool shown(const sensor_t *s, const plane_t *p, uint64_t now, int a) {
 
 /* The probability of a cell that is shown, 1/255; -1 for none. */
 static int probability(const sensor_t *s, uint64_t now, int a, int c) {
-    const plane_t *visible = &s->plane[0], *finer = &s->plane[1];
-    const ray_t *ray = &visible->now[a], *other = &finer->now[a];
-    if (s->levels_are != SAID || !shown(s, visible, now, a) || c < ray->near || c >= ray->end) return -1;
-    bool same_scan = shown(s, finer, now, a) && finer->now_scan[a] == visible->now_scan[a];
-    bool bit = same_scan && c >= other->near && c < other->end && other->bit[c];
-    if (ray->bit[c]) return s->levels[bit ? 2 : 1];
-    return bit ? s->levels[0] : 0;
+    const ray_t *ray = &s->plane[0].now[a], *other = &s->plane[1].now[a];
+    if (s->levels_are != SAID || !shown(s, &s->plane[0], now, a) || c < ray->near || c >= ray->end) return -1;
+    bool bit = shown(s, &s->plane[1], now, a) && c >= other->near && c < other->end && other->bit[c];
+    return s->levels[!ray->bit[c] ? 0 : bit ? 2 : 1];
 }
 
 /* Nothing heard. */
@@ -562,7 +559,7 @@ static bool header_holds(uint8_t group[7][5]) {
 
 /* Group 7; it changes nothing of what is visible. */
 static void levels(sensor_t *s, const uint8_t group[5]) {
-    if (group[2] == 0 || group[0] > group[2] || group[1] > group[2]) return;
+    if (group[2] == 0 || group[0] > group[1] || group[1] > group[2]) return;
     bool other = s->levels_are != UNSAID && memcmp(s->levels, group, 5);
     if (s->levels_are == UNSAID || other) s->levels_are = other ? CONTRADICTED : SAID;
     if (!other) memcpy(s->levels, group, 5);

@@ -150,9 +150,9 @@ fn header_and_status(medium: Medium) {
         ("Usual_First", USUAL.near() as f64),
         ("Usual_Last", (USUAL.end() - 1) as f64),
         ("Fingerprint", f64::from(0xDEAD_BEEF_u32)),
-        ("Probability_Hidden_Finer", 51.0 / 255.0),
+        ("Probability_Known", 51.0 / 255.0),
         ("Probability_Visible", 178.0 / 255.0),
-        ("Probability_Visible_Finer", 242.0 / 255.0),
+        ("Probability_Clear", 242.0 / 255.0),
         ("Table_Check_Sum", f64::from(0xABCD_u16)),
     ];
     for (name, value) in expected {

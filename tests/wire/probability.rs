@@ -92,7 +92,8 @@ struct Sending {
 
 impl Sending {
     fn new(medium: Medium, quantiser: &Quantiser) -> Self {
-        let config = BroadcastConfig::new(SENSOR, medium);
+        // random tables cost more than fitted ones
+        let config = BroadcastConfig { gap_us: 400, ..BroadcastConfig::new(SENSOR, medium) };
         let now = Time::from_micros(0);
         let sender = QuantisedSender::new(config, header(1), Some(quantiser.clone()), Epoch::new(3), now).unwrap();
         let receiver = Receiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
@@ -135,15 +136,19 @@ impl Sending {
 }
 
 #[test]
-fn without_loss_a_receiver_knows_each_cells_level_and_no_point_of_the_cell_has_less() {
+fn without_loss_a_receiver_knows_each_cells_level_and_the_table_says_no_less() {
     for (medium, rule) in MEDIA.into_iter().flat_map(|medium| RULES.map(|rule| (medium, rule))) {
         let mut random = Random::new(11);
         let table = table(&mut random);
         let quantiser = Quantiser::new(table.clone(), rule, VISIBLE_FROM);
         let (mut sending, mut shadows) = (Sending::new(medium, &quantiser), Shadows::new(5));
         let (mut cells, mut given, mut of_table, mut compared) = (0, 0_u64, 0_u64, 0);
-        for scan in 0..60 {
-            let map = graded(&mut shadows, &mut random);
+        let mut map = graded(&mut shadows, &mut random);
+        for scan in 0..90 {
+            // each map stays for three scans: the plane of probability goes out with every second
+            if scan % 3 == 0 {
+                map = graded(&mut shadows, &mut random);
+            }
             let start = 67_000 * scan;
             sending.offer(Time::from_micros(start), &map);
             for now in (start..start + 66_500).step_by(500).map(Time::from_micros) {
@@ -151,7 +156,7 @@ fn without_loss_a_receiver_knows_each_cells_level_and_no_point_of_the_cell_has_l
                     sending.deliver(now, &bytes);
                 }
             }
-            if start < 1_500_000 || !sending.sender.idle() {
+            if start < 1_500_000 || !sending.sender.idle() || scan % 3 != 2 {
                 continue;
             }
             compared += 1;
@@ -159,11 +164,11 @@ fn without_loss_a_receiver_knows_each_cells_level_and_no_point_of_the_cell_has_l
             assert_eq!(received.header().unwrap().probability, Some(quantiser.levels()));
             let sent = Quantised { map: &map, quantiser: &quantiser };
             for (azimuth, range) in (0..A).flat_map(|azimuth| (0..R).map(move |range| (azimuth, range))) {
-                let rays: [Ray<W>; 2] = [Plane::Visibility, Plane::Grade].map(|plane| sent.ray(plane, azimuth));
-                let known = rays[0].known.contains(range);
-                let expected = known.then(|| quantiser.levels().of(rays[0].get(range), Some(rays[1].get(range))));
-                let got = received.probability(azimuth, range);
-                assert_eq!(got, expected, "{medium:?} {rule:?}: {azimuth}, {range}");
+                let [visible, clear]: [Ray<W>; 2] =
+                    [Plane::Visibility, Plane::Grade].map(|plane| sent.ray(plane, azimuth));
+                let known = visible.known.contains(range);
+                let expected = known.then(|| quantiser.levels().of(visible.get(range), clear.get(range)));
+                assert_eq!(received.probability(azimuth, range), expected, "{medium:?} {rule:?}: {azimuth}, {range}");
                 let at = point(azimuth, range, &mut random);
                 let Some((p, most)) = received.probability_at(at).zip(table.at(&map, at)) else { continue };
                 assert!(p <= most, "{medium:?} {rule:?}: {p:?} at {at:?}, where the sender has {most:?}");
@@ -182,7 +187,7 @@ fn without_loss_a_receiver_knows_each_cells_level_and_no_point_of_the_cell_has_l
         // a random table loses more than a fitted one; a receiver that says 0 is safe and useless
         let share = given as f64 / of_table as f64;
         println!("{medium:?} {rule:?}: {:.0} % of p arrives", 100.0 * share);
-        assert!(share > 0.4, "{medium:?} {rule:?}: {share}");
+        assert!(share > if rule == Some(Threshold::Nothing) { 0.1 } else { 0.4 }, "{medium:?} {rule:?}: {share}");
     }
 }
 
@@ -200,9 +205,13 @@ fn visible_is_what_keeps_the_risk_on_the_wire_as_anywhere() {
             let Some((azimuth, range)) = map.locate(x, y) else { continue };
             let (state, p) = quantiser.of_point(map.geometry(), [R, A], map.at(at), at);
             let sent: Ray<W> = Quantised { map: &map, quantiser: &quantiser }.ray(Plane::Visibility, azimuth);
+            if !sent.known.contains(range) {
+                // beyond an unknown cell nothing is sent
+                continue;
+            }
             assert_eq!(state.visible(), sent.get(range), "{rule:?} {azimuth} {range}");
             assert_eq!(p.is_none(), state.visibility == Visibility::Unknown);
-            assert!(p.unwrap_or(Probability::from_raw(0)) <= at_most(&table, &map, at));
+            assert_eq!(p, table.at(&map, at));
             if rule == Some(Threshold::From(190)) && state.visible() {
                 assert!(table.at(&map, at).unwrap().raw() >= 190);
             }
@@ -223,6 +232,7 @@ fn lossy(medium: Medium, rule: Option<Threshold>, loss: f64, seed: u64) -> u64 {
     let table = table(&mut random);
     let quantiser = Quantiser::new(table.clone(), rule, VISIBLE_FROM);
     let (mut sending, mut shadows) = (Sending::new(medium, &quantiser), Shadows::new(seed));
+    let geometry = header(1).geometry();
     let mut history: VecDeque<(ScanNumber, u64, Map)> = VecDeque::new();
     let (mut on_its_way, mut looked): (OnItsWay, u64) = (Vec::new(), 0);
     for scan in 0..150 {
@@ -257,16 +267,23 @@ fn lossy(medium: Medium, rule: Option<Threshold>, loss: f64, seed: u64) -> u64 {
             let received = sending.map(now);
             for azimuth in 0..A {
                 let Some(scan) = received.scan(azimuth) else { continue };
-                let (_, measured, sent) = history.iter().rev().find(|(number, ..)| *number == scan).unwrap();
-                assert!(us - measured <= 400_000, "{} us old", us - measured);
                 let range = random.below(R as u64) as usize;
                 let at = point(azimuth, range, &mut random);
-                let (Some(p), most) = (received.probability_at(at), at_most(&table, sent, at)) else { continue };
-                let place = sent.geometry().levelling.place(at);
-                if sent.locate(place.0, place.1).is_none_or(|(found, _)| found != azimuth) {
-                    continue;
-                }
+                let (x, y) = geometry.levelling.place(at);
+                let cell = geometry.locate(x, y, R, A);
+                let (Some(p), Some((azimuth, range))) = (received.probability_at(at), cell) else { continue };
+                // of the maps that may be shown: the newest that is marked with the scan, and what was before it
+                let lately = history.iter().rev().filter(|(_, measured, _)| us - measured <= 400_000);
+                let most = lately.map(|(.., sent)| at_most(&table, sent, at)).max().unwrap();
                 assert!(p <= most, "{medium:?} {rule:?} {seed}: {p:?} at {at:?}, the sender had {most:?}");
+                // and what visibility says is never older than what it says
+                let visible = received.ray(Plane::Visibility, azimuth).get(range);
+                if received.scan(azimuth) == Some(scan) {
+                    let of_scan = history.iter().rev().find(|(number, ..)| *number == scan).unwrap();
+                    let then = at_most(&table, &of_scan.2, at);
+                    assert!(quantiser.levels().of(visible, false) <= then, "{medium:?} {rule:?} {seed}: {at:?}");
+                }
+                assert!(visible || p == quantiser.levels().of(false, true), "not visible any more: {p:?}");
                 looked += 1;
             }
         }
@@ -309,7 +326,7 @@ fn a_receiver_of_one_plane_says_what_the_visible_bit_says() {
     let mut seen = [0; 2];
     for (azimuth, range) in (0..A).flat_map(|azimuth| (0..R).map(move |range| (azimuth, range))) {
         let ray = received.ray(Plane::Visibility, azimuth);
-        let expected = ray.known.contains(range).then(|| levels.of(ray.get(range), None));
+        let expected = ray.known.contains(range).then(|| levels.of(ray.get(range), false));
         assert_eq!(received.probability(azimuth, range), expected);
         seen[usize::from(ray.get(range))] += 1;
     }

@@ -122,10 +122,10 @@ fn the_example_is_what_is_sent() {
     assert!(wrong.is_empty(), "what is sent is, instead of the page's\n{}", wrong.join("\n"));
 }
 
-/// Visible as in one picture, the finer bit as in another.
-struct Finer(Picture, Picture);
+/// Visible as in one picture, probable as in another.
+struct Probable(Picture, Picture);
 
-impl Planes<1> for Finer {
+impl Planes<1> for Probable {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<1> {
         let picture = if plane == Plane::Visibility { &self.0 } else { &self.1 };
         picture.0.get(azimuth).copied().unwrap_or(Ray::UNKNOWN)
@@ -136,18 +136,18 @@ impl Planes<1> for Finer {
 fn probabilities_are_a_group_of_the_header_and_a_second_plane() {
     let levels = Levels::from_bytes([51, 178, 242, 0xAB, 0xCD]).unwrap();
     let header = Header { probability: Some(levels), ..header() };
-    let (medium, start) = (Medium::Can(Addresses::STANDARD), Time::from_micros(measured(0x21).micros() - 1_000_000));
+    let (medium, start) = (Medium::Can(Addresses::STANDARD), Time::from_micros(measured(0x21).micros() - 1_200_000));
     let mut sender = Broadcaster::<AZIMUTHS, 1, 2>::new(BroadcastConfig::new(0, medium), header, EPOCH, start).unwrap();
     let limits = ReceiverLimits::DEFAULT;
     let mut receiver = Receiver::<1, AZIMUTHS, 1, 2>::new([0], Addresses::STANDARD, limits);
     let (mut group, mut plane) = (None, Vec::new());
-    let finer = Finer(picture(0x21), picture(0x24));
+    let probable = Probable(picture(0x21), picture(0x24));
     let end = measured(0x21).micros() + 40_000;
     for us in (start.micros()..end).step_by(1000) {
         let now = Time::from_micros(us);
-        // nine maps before this one make a measure, and every third is a refresh
-        if us >= end - 40_000 - 540_000 && (end - 40_000 - us).is_multiple_of(60_000) {
-            let _ = sender.scan(now, &finer);
+        // every third is a refresh, and every second with probabilities
+        if us >= end - 40_000 - 720_000 && (end - 40_000 - us).is_multiple_of(60_000) {
+            let _ = sender.scan(now, &probable);
         }
         let Some(packet) = sender.next_packet(now) else { continue };
         let frame = packet.frame(&Addresses::STANDARD).unwrap();
@@ -163,7 +163,7 @@ fn probabilities_are_a_group_of_the_header_and_a_second_plane() {
     assert_eq!(page_frames("probability"), expected, "what is sent is, instead of the page's\n{}", expected.join("\n"));
     let map = receiver.map(0, Time::from_micros(end));
     let p = |cell| map.probability(1, cell).map(|p| p.raw());
-    assert_eq!([1, 2, 11, 12, 17, 18].map(p), [None, Some(242), Some(178), Some(0), Some(51), Some(242)]);
+    assert_eq!([1, 2, 11, 12, 17, 18].map(p), [None, Some(242), Some(178), Some(51), Some(51), Some(242)]);
 }
 
 #[test]

@@ -11,6 +11,9 @@
 //! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
 //! round all the time, so who joins late has everything within a second.
 //!
+//! *Probability.* With levels in the header the second plane is that of probability, and goes out with a scan that is
+//! 120 ms younger than the last one it went with.
+//!
 //! *What is dropped.* A new map ends the one before: what of that was not handed out is dropped, and
 //! the new one begins at the azimuth where the old one broke off, so that on a bus too narrow every
 //! azimuth has its turn. What of a map is not handed out within [`BroadcastConfig::stale_ms`] of its
@@ -48,6 +51,10 @@ use crate::sensor::config::ConfigError;
 
 /// Age of the last whole refresh at which the next is due, ticks of 20 ms.
 const REFRESH_TICKS: u8 = 9;
+
+/// Age of the last plane of probability at which the next is due: it costs more than visibility, and a receiver holds it
+/// for the greatest age, so that one may be lost.
+const PROBABILITY_US: u64 = 120_000;
 
 /// Why a map is not sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,6 +101,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     last: Option<Time>,
     /// The last scan that began to refresh everything.
     refreshed: Option<Time>,
+    /// The last scan with a plane of probability.
+    probable: Option<Time>,
     /// Where the next map begins.
     from: usize,
     started: Time,
@@ -130,6 +139,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             scan: None,
             last: None,
             refreshed: None,
+            probable: None,
             from: 0,
             started: now,
             quiet_until: now,
@@ -196,7 +206,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.drop_scan();
         self.overloaded = overloaded;
         self.planes.iter_mut().for_each(OutgoingPlane::forget);
-        (self.last, self.refreshed, self.from) = (None, None, 0);
+        (self.last, self.refreshed, self.probable, self.from) = (None, None, None, 0);
         self.quiet_until = Time::from_micros(now.micros() + self.quiet_us());
     }
 
@@ -273,6 +283,13 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         }
         let azimuths = usize::from(self.header.azimuths);
         for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL).take(usize::from(self.config.planes)) {
+            if plane == Plane::Grade && self.header.probability.is_some() {
+                let lately = self.probable.and_then(|last| measured.since(last));
+                if lately.is_some_and(|us| us < PROBABILITY_US) {
+                    continue;
+                }
+                self.probable = Some(measured);
+            }
             outgoing.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
         }
         let refreshed = self.refreshed.map(ScanNumber::at);

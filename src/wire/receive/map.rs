@@ -40,32 +40,29 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
         self.shown.as_ref().map(|(_, header, _)| *header)
     }
 
-    fn current(&self, plane: Plane, azimuth: usize) -> Option<(Ray<W>, ScanNumber)> {
-        let (sensor, ..) = self.shown.as_ref()?;
-        sensor.current(plane, azimuth, self.now, &self.limits)
-    }
-
     /// An azimuth of a plane; unknown where it is not sent or not current.
     pub fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
-        self.current(plane, azimuth).map_or(Ray::UNKNOWN, |(ray, _)| ray)
+        let ray = self.shown.as_ref().and_then(|(sensor, ..)| sensor.current(plane, azimuth, self.now, &self.limits));
+        ray.map_or(Ray::UNKNOWN, |(ray, _)| ray)
     }
 
     /// The scan an azimuth's visibility is of; `None` where it is unknown.
     pub fn scan(&self, azimuth: usize) -> Option<ScanNumber> {
-        self.current(Plane::Visibility, azimuth).map(|(_, scan)| scan)
+        let (sensor, ..) = self.shown.as_ref()?;
+        sensor.current(Plane::Visibility, azimuth, self.now, &self.limits).map(|(_, scan)| scan)
     }
 
-    /// The probability that the sensor would detect a vehicle in a cell, rounded down to what the cell's bits say:
-    /// never above the sender's table for its map of the scan that the azimuth's visibility is of, at any point of
-    /// the cell. `None` where the cell is unknown, and where the sender says nothing of probabilities.
-    ///
-    /// The finer bit counts where it is of the same scan; of another it would say something of another visible bit.
+    /// The probability that the sensor would detect a vehicle in a cell, rounded down to what the cell's bits say: never
+    /// above what the sender's table said of its map, measured at most `A + D` ago, and no frame of a newer scan that was
+    /// accepted says otherwise. `None` where the cell is unknown, and where the sender says nothing of probabilities.
     pub fn probability(&self, azimuth: usize, range: usize) -> Option<Probability> {
         let levels = self.header()?.probability?;
-        let (ray, scan) = self.current(Plane::Visibility, azimuth).filter(|(ray, _)| ray.known.contains(range))?;
-        let finer = self.current(Plane::Grade, azimuth).filter(|(_, of)| *of == scan);
-        let finer = finer.filter(|(finer, _)| finer.known.contains(range)).map(|(finer, _)| finer.get(range));
-        Some(levels.of(ray.get(range), finer))
+        let visibility = self.ray(Plane::Visibility, azimuth);
+        if !visibility.known.contains(range) {
+            return None;
+        }
+        // bits outside the known cells are not set
+        Some(levels.of(visibility.get(range), self.ray(Plane::Grade, azimuth).get(range)))
     }
 
     /// The same of a point of the road.

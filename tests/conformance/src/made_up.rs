@@ -129,17 +129,17 @@ pub fn maps(like: &Maps, random: &mut Random) -> Maps {
             let wide = ray(&rays[from], ranges, random);
             rays[from..(from + 20).min(azimuths)].fill(wide);
         }
-        scans.push(Scan { measured: scan.measured, rays: rays.clone(), finer: Vec::new() });
+        scans.push(Scan { measured: scan.measured, rays: rays.clone(), probable: Vec::new() });
     }
     Maps { header: like.header, scans, holes: 0 }
 }
 
-/// The same maps with finer bits, which are those of a map some scans later.
+/// The same maps with a plane of probability, whose bits are those of a map some scans later.
 pub fn with_probabilities(like: &Maps) -> Maps {
     let later = like.scans.iter().cycle().skip(5);
     let scan = |(scan, later): (&Scan, &Scan)| {
-        let finer = scan.rays.iter().zip(&later.rays).map(|(ray, later)| Ray::new(ray.known, *later.bits()));
-        Scan { finer: finer.collect(), ..scan.clone() }
+        let probable = scan.rays.iter().zip(&later.rays).map(|(ray, later)| Ray::new(ray.known, *later.bits()));
+        Scan { probable: probable.collect(), ..scan.clone() }
     };
     let header = Header { probability: Levels::from_bytes([61, 178, 242, 0xAB, 0xCD]), ..like.header };
     Maps { header, scans: like.scans.iter().zip(later).map(scan).collect(), holes: 0 }

@@ -82,7 +82,7 @@ pub struct Mounted {
 /// What a cell's bits say of its probability at least.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LevelsSeen {
-    /// Not visible with the finer bit; visible; visible with it.
+    /// Known; visible; visible with the bit of the plane of probability.
     pub least: [f64; 3],
     /// Lowest 16 bits of the table's check sum.
     pub table: u16,
@@ -238,8 +238,8 @@ impl Listening {
                 cell_m: f64::from(h.cell_cm) / 100.0,
                 fingerprint: h.fingerprint,
                 probability: h.probability.map(|levels| {
-                    let bits = [(false, true), (true, false), (true, true)];
-                    let least = bits.map(|(visible, finer)| levels.of(visible, Some(finer)));
+                    let bits = [(false, false), (true, false), (true, true)];
+                    let least = bits.map(|(visible, clear)| levels.of(visible, clear));
                     LevelsSeen { least: least.map(|p| f64::from(p.raw()) / 255.0), table: levels.table() }
                 }),
             }

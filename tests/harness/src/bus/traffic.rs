@@ -48,8 +48,8 @@ pub const AUTHENTICATED: [Bus; 2] =
 pub struct Scan {
     pub measured: Time,
     pub rays: Vec<Ray<W>>,
-    /// Those of the finer plane, where probabilities are sent.
-    pub finer: Vec<Ray<W>>,
+    /// Those of the plane of probability, where it is sent.
+    pub probable: Vec<Ray<W>>,
 }
 
 /// The maps of a recording, and what they are of.
@@ -83,8 +83,8 @@ impl Maps {
             };
             let rays = plane(Plane::Visibility);
             holes += holes_of(map, &rays);
-            let finer = if quantiser.is_some() { plane(Plane::Grade) } else { Vec::new() };
-            scans.push(Scan { measured, rays, finer });
+            let probable = if quantiser.is_some() { plane(Plane::Grade) } else { Vec::new() };
+            scans.push(Scan { measured, rays, probable });
             step();
         })?;
         let geometry = geometry.ok_or_else(|| anyhow!("{} has no radar frames", recording.name))?;
@@ -142,7 +142,7 @@ impl Planes<W> for Scan {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let rays = match plane {
             Plane::Visibility => &self.rays,
-            Plane::Grade => &self.finer,
+            Plane::Grade => &self.probable,
             Plane::Occupancy => return Ray::UNKNOWN,
         };
         rays.get(azimuth).copied().unwrap_or(Ray::UNKNOWN)

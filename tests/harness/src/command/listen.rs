@@ -289,10 +289,10 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
                 h.fingerprint
             );
             if let Some(p) = &h.probability {
-                let [hidden, visible, clear] = p.least;
+                let [known, visible, clear] = p.least;
                 let _ = writeln!(
                     text,
-                    "  probabilities by a table whose check sum ends in {:04x}: not visible 0 or {hidden:.2}, visible {visible:.2} or {clear:.2}",
+                    "  probabilities by a table whose check sum ends in {:04x}: known {known:.2}, visible {visible:.2} or {clear:.2}",
                     p.table
                 );
             }
