@@ -167,6 +167,7 @@ mod tests {
     use crate::fixed::angle::Angle;
     use crate::map::Visibility;
     use crate::map::polar::PolarGeometry;
+    use crate::probability::{Edges, ProbabilityTable, Threshold};
     use crate::sensor::mount::Levelling;
     use crate::sensor::road::RoadPoint;
 
@@ -211,6 +212,23 @@ mod tests {
             assert_eq!(first_above_0(&cells), Some(first));
         }
         assert_eq!((first_above_0(&[0; 20]), first_above_0(&[])), (None, None));
+    }
+
+    #[test]
+    fn with_a_table_nothing_counts_as_known_beyond_an_unknown_cell() {
+        let edges = Edges {
+            grades: core::array::from_fn(|k| 60 + k as u8),
+            ranges_cm: core::array::from_fn(|k| 30_000 + k as u16),
+            azimuths: core::array::from_fn(|k| k as i16 - 7),
+        };
+        let table = ProbabilityTable::new(edges, [[[10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 120]; 8]; 8], 0);
+        let quantiser = Quantiser::new(table.unwrap(), Some(Threshold::From(60)), 0);
+        let map = map();
+        let ray = |plane| Planes::<2>::ray(&Quantised { map: &map, quantiser: &quantiser }, plane, 1);
+        // grades 1, 64, 65, 128, 255 from cell 3 on, and 192 in cell 33
+        let cells = |plane| -> std::vec::Vec<usize> { ray(plane).bits().iter().collect() };
+        assert_eq!(ray(Plane::Visibility).known, Known::new(3, 8));
+        assert_eq!((cells(Plane::Visibility), cells(Plane::Grade)), (std::vec![4, 5, 6, 7], std::vec![6, 7]));
     }
 
     #[test]

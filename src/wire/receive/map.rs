@@ -15,7 +15,7 @@ use crate::wire::scan_number::ScanNumber;
 
 /// The map of one sensor at a moment. Everything is unknown that is not known to be current.
 ///
-/// Grades come in four steps where the grade plane is sent, else they are 0 and 255. Occupancy needs
+/// Grades come in four steps where the grade plane is sent and no probabilities go with it, else they are 0 and 255. Occupancy needs
 /// its plane; without it nothing is said to be free.
 #[derive(Debug, Clone, Copy)]
 pub struct ReceivedMap<'a, const A: usize, const W: usize, const P: usize> {
@@ -104,7 +104,8 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
             let ray = Some(self.ray(plane, azimuth)).filter(|_| self.has(plane));
             ray.filter(|ray| ray.known.contains(range)).map(|ray| ray.get(range))
         };
-        let grade = match (visible, bit(Plane::Grade)) {
+        let graded = self.header().is_some_and(|header| header.probability.is_none());
+        let grade = match (visible, bit(Plane::Grade).filter(|_| graded)) {
             (true, None | Some(true)) => u8::MAX,
             (true, Some(false)) => 170,
             (false, Some(true)) => 85,
