@@ -145,7 +145,7 @@ fn without_loss_a_receiver_knows_each_cells_level_and_the_table_says_no_less() {
         let (mut cells, mut given, mut of_table, mut compared) = (0, 0_u64, 0_u64, 0);
         let mut map = graded(&mut shadows, &mut random);
         for scan in 0..90 {
-            // each map stays for three scans: the plane of probability goes out with every second
+            // each map stays for three scans: halves of the plane of probability go out in turn
             if scan % 3 == 0 {
                 map = graded(&mut shadows, &mut random);
             }

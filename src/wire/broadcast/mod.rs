@@ -11,8 +11,8 @@
 //! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
 //! round all the time, so who joins late has everything within a second.
 //!
-//! *Probability.* With levels in the header the second plane is that of probability, and goes out with a scan that is
-//! 120 ms younger than the last one it went with.
+//! *Probability.* With levels in the header the second plane is that of probability. It goes out by halves, right and left in
+//! turn, each with a scan that is 60 ms younger than the last one that brought a half.
 //!
 //! *What is dropped.* A new map ends the one before: what of that was not handed out is dropped, and
 //! the new one begins at the azimuth where the old one broke off, so that on a bus too narrow every
@@ -52,9 +52,9 @@ use crate::sensor::config::ConfigError;
 /// Age of the last whole refresh at which the next is due, ticks of 20 ms.
 const REFRESH_TICKS: u8 = 9;
 
-/// Age of the last plane of probability at which the next is due: it costs more than visibility, and a receiver holds it
-/// for the greatest age, so that one may be lost.
-const PROBABILITY_US: u64 = 120_000;
+/// Age of the last half of the plane of probability at which the other is due: it costs more than visibility, and a
+/// receiver holds it for the greatest age, so that one of the same half may be lost.
+const PROBABILITY_US: u64 = 60_000;
 
 /// Why a map is not sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,8 +101,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     last: Option<Time>,
     /// The last scan that began to refresh everything.
     refreshed: Option<Time>,
-    /// The last scan with a plane of probability.
-    probable: Option<Time>,
+    /// The last scan with half of the plane of probability, and whether it was the left one.
+    probable: Option<(Time, bool)>,
     /// Where the next map begins.
     from: usize,
     started: Time,
@@ -283,14 +283,16 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         }
         let azimuths = usize::from(self.header.azimuths);
         for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL).take(usize::from(self.config.planes)) {
+            let mut part = 0..azimuths;
             if plane == Plane::Grade && self.header.probability.is_some() {
-                let lately = self.probable.and_then(|last| measured.since(last));
-                if lately.is_some_and(|us| us < PROBABILITY_US) {
+                let (last, left) = self.probable.map_or((None, true), |(last, left)| (Some(last), left));
+                if last.and_then(|last| measured.since(last)).is_some_and(|us| us < PROBABILITY_US) {
                     continue;
                 }
-                self.probable = Some(measured);
+                self.probable = Some((measured, !left));
+                part = if left { 0..azimuths / 2 } else { azimuths / 2..azimuths };
             }
-            outgoing.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
+            outgoing.offer(number, part, |azimuth| map.ray(plane, azimuth));
         }
         let refreshed = self.refreshed.map(ScanNumber::at);
         let all = refreshed.is_none_or(|refreshed| number.ticks_after(refreshed) >= REFRESH_TICKS);

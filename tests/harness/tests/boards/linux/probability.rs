@@ -65,9 +65,8 @@ fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
         let first = sent.iter().zip(&expected).position(|(a, b)| a != b);
         assert_eq!((first, sent.len()), (None, expected.len()), "{risk}: first frame that differs, and how many came");
 
-        // when it still sends maps
-        let (last, _) = sent.iter().rev().find(|(_, frame)| is_map(frame)).unwrap();
-        let now = Time::from_micros(last - 1_000_000);
+        // while its radar is heard
+        let now = Time::from_micros(sent[0].0 + 3_000_000);
         let mut receiver = ears();
         for (at, frame) in sent.iter().filter(|(at, _)| *at <= now.micros()) {
             let _ = receiver.frame(Time::from_micros(*at), frame);
