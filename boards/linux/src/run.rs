@@ -81,7 +81,8 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
                     None
                 }
             };
-            let new = Sender::new(config.broadcast(medium), header, quantiser, epoch, now).map_err(|e| anyhow!("{e}"))?;
+            let new =
+                Sender::new(config.broadcast(medium), header, quantiser, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
         }
         let mut unit =
