@@ -52,16 +52,17 @@ fn graded(shadows: &mut Shadows, random: &mut Random) -> Map {
     let mut map = PolarMap::unknown(header(1).geometry(), VISIBLE_FROM, 128);
     for (azimuth, ray) in shadows.next().0.iter().enumerate() {
         let (grades, _) = map.rows_mut(azimuth).unwrap();
-        for cell in ray.known.near()..ray.known.end() {
+        let known = ray.known.near()..ray.known.end();
+        for (cell, grade) in grades.iter_mut().enumerate().take(known.end).skip(known.start) {
             let partly = (azimuth * 7 + cell / 5) % 3;
-            grades[cell] = match (ray.get(cell), partly) {
+            *grade = match (ray.get(cell), partly) {
                 (true, 0) => 150,
                 (true, _) => 255,
                 (false, 0) => 100,
                 (false, _) => 1,
             };
             if random.chance(0.002) {
-                grades[cell] = 0;
+                *grade = 0;
             }
         }
     }

@@ -98,8 +98,7 @@ fn linux_a_table_that_cannot_be_used_is_refused_by_its_reason_and_maps_are_by_gr
     std::fs::write(&log, log_of(&scans)).unwrap();
     let good = fitted(settings.fingerprint()).text().unwrap();
     let expected = twin(&settings, None, &read(&log), 0, MEDIUM);
-    let maps =
-        |sent: &Sent| -> Vec<CanFrame> { sent.iter().map(|(_, frame)| *frame).filter(|frame| is_map(frame)).collect() };
+    let maps = |sent: &Sent| -> Vec<CanFrame> { sent.iter().map(|(_, frame)| *frame).filter(is_map).collect() };
     let cases = [
         (fitted(settings.fingerprint() ^ 1).text().unwrap(), "was fitted with configuration"),
         (good[..good.len() / 2].to_owned(), "TOML parse error"),
