@@ -77,7 +77,7 @@
 //! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
-//! | `probability` | units with a table of probabilities, and receivers of theirs | module `probability`: the table, thresholds of an accepted risk, what goes on the wire; `QuantisedSender` of [`reference`] and [`small`], for units that have one |
+//! | `probability` | units with a table of probabilities, and receivers of theirs | module `probability`: the table, thresholds of an accepted risk, what goes on the wire; `QuantisedSender` of the two grids, for units that have one |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!
