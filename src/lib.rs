@@ -77,6 +77,7 @@
 //! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
+//! | `probability` | units with a table of probabilities, and receivers of theirs | module `probability`: the table, thresholds of an accepted risk, what goes on the wire; `QuantisedSender` of the two grids, for units that have one |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!
@@ -99,8 +100,8 @@
 //! | `radar_3d` | the estimator: all stages above, in order |
 //! | `radar_2d` | the flat baseline, as an estimator of its own |
 //! | `camera` | boxes of a camera's detector in, lifted onto the road, into voxels and lines of sight; the same maps out |
+//! | `probability` | a grade and a place in, the probability out that a vehicle there is detected; a map's cells as bits by it; a table fitted on a PC |
 //! | `wire` | maps to bytes for CAN, CAN FD and serial lines, and back in a receiver |
-//! | `probability` | a grade and a place in, the probability out that a vehicle there is detected; a table fitted on a PC |
 //! | `inputs` | a radar's bytes to scans: ARS408 family, TI mmWave, the native format; that for a camera's boxes too |
 //! | `unit` | a whole unit: sessions on its lines, stored settings, buses, the loop of a board |
 //! | `bench` | the same scans on a controller and on a PC, compared, stage by stage |
@@ -232,6 +233,10 @@ pub use map::{CellState, Visibility, VisibilityMap};
 // Maps of several sensors as one.
 #[cfg(not(feature = "bench"))]
 pub use rooms::fusion;
+
+// What a map says of the probability that a vehicle is detected.
+#[cfg(all(feature = "probability", not(feature = "bench")))]
+pub use rooms::probability;
 
 // Maps on a bus: sender and receiver.
 pub use wire::broadcast::{BroadcastConfig, Broadcaster, Medium};

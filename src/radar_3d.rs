@@ -133,6 +133,11 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         self.axes.range_cell(i32::from(r.ground_cm)).is_some_and(|cell| cell < end)
     }
 
+    /// Least grade that counts as visible.
+    pub fn visible_from(&self) -> u8 {
+        self.visible_from
+    }
+
     /// The grid's axes.
     pub fn axes(&self) -> &Axes<R, A, E> {
         &self.axes

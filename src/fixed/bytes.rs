@@ -1,4 +1,14 @@
-//! Little-endian numbers off and onto the front of byte slices.
+//! Little-endian numbers off and onto the front of byte slices, and a fingerprint of bytes.
+
+use crc::{Crc, NoTable};
+
+/// Bit by bit: run at starts only, where a table would take a kilobyte of stack or flash.
+static CRC_32: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&crc::CRC_32_ISO_HDLC);
+
+/// A fingerprint of a configuration's bytes: CRC-32, to see that two are the same.
+pub fn fingerprint(bytes: &[u8]) -> u32 {
+    CRC_32.checksum(bytes)
+}
 
 /// What is left of a message.
 pub(crate) struct Reader<'a>(pub &'a [u8]);

@@ -13,8 +13,7 @@
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 
 use super::{AZIMUTHS, Edges, GRADES, ProbabilityTable, RANGES, TableError};
-use crate::fixed::bytes::{Reader, Writer};
-use crate::wire::header::fingerprint;
+use crate::fixed::bytes::{Reader, Writer, fingerprint};
 
 const MAGIC: [u8; 4] = *b"VSPT";
 #[allow(clippy::cast_possible_truncation)] // 12, 8, 8
@@ -43,6 +42,13 @@ impl ProbabilityTable {
             *sum = fingerprint(body).to_le_bytes();
         }
         block
+    }
+
+    /// By which it is known: the check sum of its bytes without the block's own, over which one is the same for
+    /// every table.
+    pub fn check_sum(&self) -> u32 {
+        let block = self.to_block();
+        fingerprint(block.split_last_chunk::<SUM_LEN>().map_or(&[], |(body, _)| body))
     }
 
     /// Reads a table; bytes after it do not matter.

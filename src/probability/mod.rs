@@ -9,19 +9,26 @@
 //! [`GRADES`] of the grade, in each of [`AZIMUTHS`] x [`RANGES`] bins of place, and p never falls as the grade rises.
 //! An unknown cell has no probability.
 //!
+//! [`Threshold`] makes a bit of it, so that an accepted risk is kept. [`Quantiser`] makes two bits of a map's cells for
+//! the wire, and [`Levels`] is what these say to a receiver.
+//!
 //! # Limits
 //! [`BLOCK_LEN`] bytes stored, no more in memory than twice that. A look-up takes at most 25 comparisons.
 
 mod block;
+mod levels;
+mod quantiser;
+mod threshold;
 
 pub use block::BLOCK_LEN;
+pub use levels::Levels;
+pub use quantiser::Quantiser;
+pub use threshold::{Counted, Threshold};
 
 use crate::fixed::angle::Angle;
-use crate::fixed::{math, trig};
-use crate::map::polar::PolarMap;
+use crate::map::polar::{PolarGeometry, PolarMap};
 use crate::map::query::Footprint;
-use crate::map::{CellState, UNKNOWN, Visibility, VisibilityMap};
-use crate::sensor::mount::Levelling;
+use crate::map::{UNKNOWN, VisibilityMap};
 use crate::sensor::road::RoadPoint;
 
 /// Steps of the grade.
@@ -196,18 +203,23 @@ impl ProbabilityTable {
         self.values.get(a)?.get(r)?.get(g).copied().map(Probability)
     }
 
-    /// Probability at a point of a map of the unit; unknown has none.
+    /// Probability at a point of a map of the unit, that of the cell it lies in; unknown has none.
     pub fn at<const R: usize, const A: usize>(&self, map: &PolarMap<R, A>, point: RoadPoint) -> Option<Probability> {
-        self.of_cell(&map.geometry().levelling, map.at(point), point)
+        self.of_point(map.geometry(), [R, A], map.at(point).grade, point)
     }
 
-    /// The same of what any map of the unit says of a point.
-    pub fn of_cell(&self, levelling: &Levelling, state: CellState, point: RoadPoint) -> Option<Probability> {
-        if state.visibility == Visibility::Unknown {
-            return None;
-        }
-        let (x, y) = levelling.place(point);
-        self.look_up(state.grade, math::length(x, y), trig::bearing(x, y))
+    /// The same at a grade that a map on this grid of ranges by azimuths has at a point: p at the middle of its cell.
+    pub(crate) fn of_point(
+        &self,
+        geometry: &PolarGeometry,
+        [ranges, azimuths]: [usize; 2],
+        grade: u8,
+        point: RoadPoint,
+    ) -> Option<Probability> {
+        let (x, y) = geometry.levelling.place(point);
+        let (azimuth, range) = geometry.locate(x, y, ranges, azimuths)?;
+        let middle_cm = i32::try_from(range).ok()? * geometry.cell_cm + geometry.cell_cm / 2;
+        self.look_up(grade, middle_cm, geometry.middle_of(azimuth, azimuths))
     }
 
     /// Of vehicles that are somewhere in an area, the share that is expected to be missed, mean(1 - p) over its cells,
@@ -219,15 +231,20 @@ impl ProbabilityTable {
         map: &PolarMap<R, A>,
         area: &Footprint,
     ) -> Option<Probability> {
-        let (mut cells, mut missed) = (0_u32, 0_u32);
-        let complete = area.each_cell(|cell| {
-            cells = cells.saturating_add(1);
-            let p = self.at(map, cell).map_or(0, Probability::raw);
-            missed = missed.saturating_add(u32::from(u8::MAX - p));
-        });
-        let mean = missed.div_ceil(cells.max(1));
-        u8::try_from(mean).ok().filter(|_| complete && cells > 0).map(Probability)
+        expected_missed(area, |cell| self.at(map, cell))
     }
+}
+
+/// mean(1 - p) over an area's cells, rounded up; what has no probability counts as missed. `None` for an area larger
+/// than queries look at.
+pub(crate) fn expected_missed(area: &Footprint, at: impl Fn(RoadPoint) -> Option<Probability>) -> Option<Probability> {
+    let (mut cells, mut missed) = (0_u32, 0_u32);
+    let complete = area.each_cell(|cell| {
+        cells = cells.saturating_add(1);
+        missed = missed.saturating_add(u32::from(u8::MAX - at(cell).map_or(0, Probability::raw)));
+    });
+    let mean = missed.div_ceil(cells.max(1));
+    u8::try_from(mean).ok().filter(|_| complete && cells > 0).map(Probability)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! | around it | modules |
 //! |---|---|
 //! | what an estimator needs to be in a unit, and the two sizes of radar-3d | [`build`](mod@build), [`profile`] |
+//! | who sends maps, and with a table of probabilities | [`sender`], `quantised` |
 //! | settings: the checked block, two slots of it, in flash | [`settings`] |
 //! | the integrator: asked for and written over serial lines and CAN, what a unit answers, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`said`], [`identity`], `safe_state` |
 //! | native scans and the integrator on serial lines, and whose clock it is | [`session`], [`radar_clock`] |
@@ -21,6 +22,8 @@ pub mod can_service;
 pub mod frame_queue;
 pub mod identity;
 pub mod profile;
+#[cfg(feature = "probability")]
+pub mod quantised;
 pub mod radar_clock;
 pub mod roadside;
 mod safe_state;

@@ -19,6 +19,9 @@ macro_rules! size {
             pub type Map = <State as Estimator>::Map;
             /// Who sends it.
             pub type Sender = Broadcaster<$azimuths, WORDS>;
+            /// Who sends it where there may be a table of probabilities.
+            #[cfg(feature = "probability")]
+            pub type QuantisedSender = crate::unit::quantised::QuantisedSender<$azimuths, WORDS>;
             /// A radar of the ARS408 family with as many detections.
             #[cfg(feature = "board")]
             pub type Radar = crate::inputs::ars408::Ars408<$detections>;

@@ -1,9 +1,9 @@
 //! What a sender's maps are of: mount, geometry, configuration; and its clock.
 //!
 //! # Model
-//! Seven groups of five bytes. Group 0 is the sender's clock; groups 1 to 6 stay the same for a whole
-//! epoch. A long message carries them one after another, a classic one carries one of them, so a
-//! receiver collects six and keeps them. All numbers are big-endian.
+//! Seven groups of five bytes, and an eighth of senders that have a table of probabilities. Group 0 is the sender's
+//! clock; the others stay the same for a whole epoch. A long message carries them one after another, a classic one
+//! carries one of them, so a receiver collects six and keeps them. All numbers are big-endian.
 //!
 //! | group | bytes |
 //! |---|---|
@@ -14,43 +14,41 @@
 //! | 4 | right edge of the first azimuth from the boresight's heading, 2^-16 turn; width of all azimuths together, 2^-16 turn; azimuths less one |
 //! | 5 | length of a range cell, cm; range cells less one; first and last cell usually known (1 and 0: none) |
 //! | 6 | fingerprint of the configuration, 4 bytes; CRC-8 of profile 11 over the 29 bytes before it |
+//! | 7 | least probabilities by a cell's bits, 3 bytes; lowest 16 bits of the table's check sum |
 //!
 //! # Limits
 //! 128 azimuths (their start takes seven bits of a classic frame), 256 range cells, positions within
 //! 83 km of the road's origin.
 
-use crc::{Crc, NoTable};
+use crc::Crc;
 
 use super::code::block::Context;
 use super::code::interval::Form;
 use super::code::ray::Known;
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
 use crate::fixed::angle::Angle;
+pub use crate::fixed::bytes::fingerprint;
 use crate::map::polar::PolarGeometry;
+use crate::probability::Levels;
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
 
-/// Groups of a header.
+/// Groups every header has.
 pub const GROUPS: u8 = 7;
+
+/// The group after them, which says what a cell's bits say of its probability.
+const LEVELS: u8 = 7;
 
 /// Bytes of a group.
 const GROUP: usize = 5;
 
-/// Own bytes of a long header: flags, then the groups.
-pub const LONG: usize = 1 + GROUPS as usize * GROUP;
+/// Most own bytes of a long header: flags, then the groups.
+pub const LONG: usize = 1 + (GROUPS as usize + 1) * GROUP;
 
 /// Most azimuths of a map on the wire.
 pub const MOST_AZIMUTHS: usize = 128;
 
 static CRC_8: Crc<u8> = Crc::<u8>::new(&crc::CRC_8_GSM_A);
-
-/// Bit by bit: run at starts only, where a table would take a kilobyte of stack or flash.
-static CRC_32: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&crc::CRC_32_ISO_HDLC);
-
-/// A fingerprint of a configuration's bytes: CRC-32, to see that two are the same.
-pub fn fingerprint(bytes: &[u8]) -> u32 {
-    CRC_32.checksum(bytes)
-}
 
 /// The sender's clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,6 +98,8 @@ pub struct Header {
     pub planes: u8,
     /// Fingerprint of the configuration.
     pub fingerprint: u32,
+    /// Least probabilities by a cell's bits, of a sender that has a table.
+    pub probability: Option<Levels>,
 }
 
 /// Why there is no header.
@@ -155,7 +155,13 @@ impl Header {
             usual,
             planes,
             fingerprint,
+            probability: None,
         })
+    }
+
+    /// Groups it has.
+    pub fn count(&self) -> u8 {
+        GROUPS + u8::from(self.probability.is_some())
     }
 
     /// Where the cells lie on the road, for queries.
@@ -234,25 +240,28 @@ impl Header {
             usual,
             planes,
             fingerprint: u32::from_be_bytes([f1, f2, f3, f4]),
+            probability: None,
         };
         let empty = header.cell_cm == 0 || header.azimuth_span == 0;
         if empty || usual.end() > usize::from(ranges) { Err(NotAHeader::Range) } else { Ok(header) }
     }
 
-    /// Own bytes of a long message.
-    pub fn emit(&self, clock: &Clock) -> [u8; LONG] {
+    /// Own bytes of a long message, and how many they are.
+    pub fn emit(&self, clock: &Clock) -> ([u8; LONG], usize) {
         let mut bytes = [0; LONG];
-        let groups = [clock.group()].into_iter().chain(self.groups());
+        let levels = self.probability.map(|levels| levels.to_bytes());
+        let groups = [clock.group()].into_iter().chain(self.groups()).chain(levels);
         let all = [flags(clock, 0)].into_iter().chain(groups.flatten());
         bytes.iter_mut().zip(all).for_each(|(to, from)| *to = from);
-        bytes
+        (bytes, 1 + usize::from(self.count()) * GROUP)
     }
 
-    /// Own bytes of the classic message that carries a group, 0 to 6.
+    /// Own bytes of the classic message that carries a group, 0 to 7.
     pub fn emit_group(&self, clock: &Clock, group: u8) -> [u8; CLASSIC_BYTES] {
         let groups = self.groups();
-        let place = usize::from(group).checked_sub(1).and_then(|place| groups.get(place));
-        let [a, b, c, d, e] = place.copied().unwrap_or_else(|| clock.group());
+        let place = usize::from(group).checked_sub(1).and_then(|place| groups.get(place).copied());
+        let levels = self.probability.filter(|_| group == LEVELS).map(|levels| levels.to_bytes());
+        let [a, b, c, d, e] = place.or(levels).unwrap_or_else(|| clock.group());
         [flags(clock, group), a, b, c, d, e]
     }
 }
@@ -300,6 +309,17 @@ pub struct Collector {
     /// Which of them are there, a bit each.
     there: u8,
     header: Option<Header>,
+    levels: Said,
+}
+
+/// What an epoch said of probabilities. It never changes what is visible, so that receivers which do not know of it
+/// show the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Said {
+    Nothing,
+    Once(Levels),
+    /// One thing and another: neither is believed any more.
+    Contradicting,
 }
 
 impl Default for Collector {
@@ -310,7 +330,8 @@ impl Default for Collector {
 
 impl Collector {
     /// Nothing yet.
-    pub const NEW: Self = Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, header: None };
+    pub const NEW: Self =
+        Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, header: None, levels: Said::Nothing };
 
     /// The header, once complete.
     pub fn header(&self) -> Option<&Header> {
@@ -332,8 +353,10 @@ impl Collector {
         if bytes.len() < usize::from(GROUPS) * GROUP {
             return match flags >> 4 & 7 {
                 0 => Ok(Brought::Clock(Clock::parse(synchronised, first))),
-                // of a later version, which says so itself if that matters
-                GROUPS.. => Ok(Brought::Group),
+                LEVELS.. => {
+                    self.take_levels(first);
+                    Ok(Brought::Group)
+                }
                 group => self.take_group(usize::from(group) - 1, first),
             };
         }
@@ -344,13 +367,37 @@ impl Collector {
         if self.there != 0 && self.contradicts(&groups) {
             return Ok(Brought::Contradiction);
         }
-        *self = Self { groups, there: 0x3F, header: Some(header) };
+        (self.groups, self.there, self.header) = (groups, 0x3F, Some(header));
+        if let Some(levels) = rest.get(groups.as_flattened().len()..).and_then(<[u8]>::first_chunk) {
+            self.take_levels(*levels);
+        }
+        self.with_levels();
         Ok(Brought::Clock(Clock::parse(synchronised, first)))
     }
 
     fn contradicts(&self, groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> bool {
         let mut both = self.groups.iter().zip(groups).enumerate();
         both.any(|(i, (old, new))| self.there >> i & 1 == 1 && old != new)
+    }
+
+    /// Takes group 7; one that does not hold says nothing.
+    fn take_levels(&mut self, group: [u8; GROUP]) {
+        let Some(new) = Levels::from_bytes(group) else { return };
+        self.levels = match self.levels {
+            Said::Nothing => Said::Once(new),
+            Said::Once(levels) if levels == new => return,
+            _ => Said::Contradicting,
+        };
+        self.with_levels();
+    }
+
+    fn with_levels(&mut self) {
+        if let Some(header) = &mut self.header {
+            header.probability = match self.levels {
+                Said::Once(levels) => Some(levels),
+                Said::Nothing | Said::Contradicting => None,
+            };
+        }
     }
 
     fn take_group(&mut self, place: usize, group: [u8; GROUP]) -> Result<Brought, NotAHeader> {
@@ -367,11 +414,12 @@ impl Collector {
         match Header::parse(&self.groups) {
             Ok(header) => {
                 self.header = Some(header);
+                self.with_levels();
                 Ok(Brought::Complete)
             }
             Err(error) => {
                 // some group was wrong, none says which
-                *self = Self::NEW;
+                *self = Self { levels: self.levels, ..Self::NEW };
                 Err(error)
             }
         }
@@ -399,7 +447,13 @@ mod tests {
             usual: Known::new(15, 200),
             planes: 1,
             fingerprint: 0xDEAD_BEEF,
+            probability: None,
         }
+    }
+
+    fn emit(header: &Header) -> std::vec::Vec<u8> {
+        let (bytes, length) = header.emit(&CLOCK);
+        bytes[..length].to_vec()
     }
 
     const CLOCK: Clock = Clock { time_ms: 0x01_0203_0405, synchronised: true };
@@ -416,7 +470,7 @@ mod tests {
             0x00, 0x64, 199, 15, 199, // cells
             0xDE, 0xAD, 0xBE, 0xEF, 0xD2, // fingerprint, check
         ];
-        assert_eq!(header().emit(&CLOCK), expected);
+        assert_eq!(emit(&header()), expected);
     }
 
     #[test]
@@ -431,9 +485,9 @@ mod tests {
         assert_eq!(c.header(), Some(&header()));
         let other = Header { azimuths: 119, ..header() };
         assert_eq!(c.take(&other.emit_group(&CLOCK, 4)), Ok(Brought::Contradiction));
-        assert_eq!(c.take(&other.emit(&CLOCK)), Ok(Brought::Contradiction));
+        assert_eq!(c.take(&emit(&other)), Ok(Brought::Contradiction));
         let mut c = Collector::NEW;
-        assert_eq!(c.take(&header().emit(&CLOCK)), Ok(Brought::Clock(CLOCK)));
+        assert_eq!(c.take(&emit(&header())), Ok(Brought::Clock(CLOCK)));
         assert_eq!(c.header(), Some(&header()));
     }
 
@@ -448,17 +502,60 @@ mod tests {
         assert_eq!(c, Collector::NEW);
     }
 
+    const LEVELS_7: [u8; 5] = [60, 200, 240, 0xAB, 0xCD];
+
+    fn with_levels(bytes: [u8; 5]) -> Header {
+        Header { probability: Levels::from_bytes(bytes), ..header() }
+    }
+
+    #[test]
+    fn probabilities_are_an_eighth_group_that_comes_at_any_time() {
+        let sent = with_levels(LEVELS_7);
+        assert!(sent.probability.is_some());
+        assert_eq!((emit(&sent).len(), &emit(&sent)[36..]), (41, &LEVELS_7[..]));
+        let mut c = Collector::NEW;
+        c.take(&emit(&sent)).unwrap();
+        assert_eq!(c.header(), Some(&sent));
+        for first in 0..8 {
+            let mut c = Collector::NEW;
+            (0..8).for_each(|k| _ = c.take(&sent.emit_group(&CLOCK, (first + k) % 8)).unwrap());
+            assert_eq!(c.header(), Some(&sent), "from group {first} on");
+        }
+        // zeros fill a frame up
+        let mut filled = emit(&header());
+        filled.resize(42, 0);
+        let mut c = Collector::NEW;
+        c.take(&filled).unwrap();
+        assert_eq!(c.header(), Some(&header()));
+    }
+
+    #[test]
+    fn probabilities_that_contradict_are_believed_no_more_and_nothing_else_changes() {
+        let (one, other) = (with_levels(LEVELS_7), with_levels([60, 200, 241, 0xAB, 0xCD]));
+        let mut c = Collector::NEW;
+        c.take(&emit(&one)).unwrap();
+        assert_eq!(c.take(&emit(&other)), Ok(Brought::Clock(CLOCK)), "no conflict");
+        assert_eq!(c.header(), Some(&header()));
+        c.take(&emit(&one)).unwrap();
+        assert_eq!(c.header(), Some(&header()), "for the rest of the epoch");
+        let mut c = Collector::NEW;
+        assert_eq!(c.take(&one.emit_group(&CLOCK, 7)), Ok(Brought::Group));
+        assert_eq!(c.take(&other.emit_group(&CLOCK, 7)), Ok(Brought::Group));
+        (1..7).for_each(|group| _ = c.take(&one.emit_group(&CLOCK, group)).unwrap());
+        assert_eq!(c.header(), Some(&header()));
+    }
+
     #[test]
     fn unknown_versions_and_impossible_sizes_are_refused() {
         let take = |bytes: &[u8]| Collector::default().take(bytes);
-        let mut bytes = header().emit(&CLOCK);
+        let mut bytes = emit(&header());
         bytes[0] = 0x82;
         assert_eq!(take(&bytes), Err(NotAHeader::Version { version: 2 }));
         assert_eq!(take(&[0x01, 0, 0]), Err(NotAHeader::TooShort));
         let wide = Header { usual: Known::new(0, 201), ..header() };
-        assert_eq!(take(&wide.emit(&CLOCK)), Err(NotAHeader::Range));
+        assert_eq!(take(&emit(&wide)), Err(NotAHeader::Range));
         let flat = Header { cell_cm: 0, ..header() };
-        assert_eq!(take(&flat.emit(&CLOCK)), Err(NotAHeader::Range));
+        assert_eq!(take(&emit(&flat)), Err(NotAHeader::Range));
     }
 
     #[test]

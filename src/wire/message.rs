@@ -55,7 +55,7 @@ pub enum Plane {
     /// Visible or not.
     Visibility,
     /// The finer half of a two-bit grade: clear rather than just visible, nearly visible rather
-    /// than blocked.
+    /// than blocked. With levels of probability in the header: whether p reaches the upper one.
     Grade,
     /// Occupied at slice height or not.
     Occupancy,

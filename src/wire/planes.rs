@@ -6,6 +6,7 @@ use crate::camera::map::{CameraMap, Layer};
 use crate::fixed::bits::Bits;
 use crate::map::bitmap::VisibilityBitmap;
 use crate::map::polar::PolarMap;
+use crate::probability::Quantiser;
 
 /// A map of one or more planes.
 pub trait Planes<const W: usize> {
@@ -25,6 +26,33 @@ impl<const R: usize, const A: usize, const W: usize> Planes<W> for PolarMap<R, A
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
         let Some((grades, occupancy)) = self.grades(azimuth).zip(self.occupancy(azimuth)) else { return Ray::UNKNOWN };
         ray_of(plane, grades, self.visible_from(), || at_least(occupancy, self.occupied_from()))
+    }
+}
+
+/// A polar map whose bits are by a table of probabilities.
+#[derive(Debug, Clone, Copy)]
+pub struct Quantised<'a, const R: usize, const A: usize> {
+    /// The map.
+    pub map: &'a PolarMap<R, A>,
+    /// The table.
+    pub quantiser: &'a Quantiser,
+}
+
+impl<const R: usize, const A: usize, const W: usize> Planes<W> for Quantised<'_, R, A> {
+    fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
+        let clear = match plane {
+            Plane::Visibility => false,
+            Plane::Grade => true,
+            Plane::Occupancy => return self.map.ray(plane, azimuth),
+        };
+        // what is known has a probability: beyond an unknown cell nothing counts as known
+        let known = self.map.grades(azimuth).map_or(Known::NONE, |grades| {
+            let known = known_of(grades);
+            let hole =
+                grades.get(known.near()..known.end()).and_then(|known| known.iter().position(|grade| *grade == 0));
+            hole.map_or(known, |hole| Known::new(known.near(), known.near() + hole))
+        });
+        Ray::new(known, self.quantiser.along(self.map, azimuth, clear))
     }
 }
 
@@ -48,10 +76,10 @@ impl<const NX: usize, const NY: usize, const W: usize> Planes<W> for CameraMap<N
 /// The ray of one azimuth's grades and, where it is asked for, its occupied cells.
 #[inline]
 fn ray_of<const W: usize>(plane: Plane, grades: &[u8], visible: u8, occupied: impl FnOnce() -> Bits<W>) -> Ray<W> {
-    let known = match first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0)) {
-        Some((near, last)) => Known::new(near, last + 1),
-        None => return Ray::UNKNOWN,
-    };
+    let known = known_of(grades);
+    if known.is_empty() {
+        return Ray::UNKNOWN;
+    }
     let bits = match plane {
         // above unknown, so known
         Plane::Visibility => return Ray::within(known, at_least(grades, visible)),
@@ -68,6 +96,13 @@ fn ray_of<const W: usize>(plane: Plane, grades: &[u8], visible: u8, occupied: im
         Plane::Occupancy => occupied(),
     };
     Ray::new(known, bits)
+}
+
+/// From the first known cell to the last.
+#[inline]
+fn known_of(grades: &[u8]) -> Known {
+    let limits = first_above_0(grades).zip(grades.iter().rposition(|grade| *grade > 0));
+    limits.map_or(Known::NONE, |(near, last)| Known::new(near, last + 1))
 }
 
 /// The first cell whose value is above 0, eight at a time.
@@ -132,6 +167,7 @@ mod tests {
     use crate::fixed::angle::Angle;
     use crate::map::Visibility;
     use crate::map::polar::PolarGeometry;
+    use crate::probability::{Edges, ProbabilityTable, Threshold};
     use crate::sensor::mount::Levelling;
     use crate::sensor::road::RoadPoint;
 
@@ -176,6 +212,23 @@ mod tests {
             assert_eq!(first_above_0(&cells), Some(first));
         }
         assert_eq!((first_above_0(&[0; 20]), first_above_0(&[])), (None, None));
+    }
+
+    #[test]
+    fn with_a_table_nothing_counts_as_known_beyond_an_unknown_cell() {
+        let edges = Edges {
+            grades: core::array::from_fn(|k| 60 + k as u8),
+            ranges_cm: core::array::from_fn(|k| 30_000 + k as u16),
+            azimuths: core::array::from_fn(|k| k as i16 - 7),
+        };
+        let table = ProbabilityTable::new(edges, [[[10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 120]; 8]; 8], 0);
+        let quantiser = Quantiser::new(table.unwrap(), Some(Threshold::From(60)), 0);
+        let map = map();
+        let ray = |plane| Planes::<2>::ray(&Quantised { map: &map, quantiser: &quantiser }, plane, 1);
+        // grades 1, 64, 65, 128, 255 from cell 3 on, and 192 in cell 33
+        let cells = |plane| -> std::vec::Vec<usize> { ray(plane).bits().iter().collect() };
+        assert_eq!(ray(Plane::Visibility).known, Known::new(3, 8));
+        assert_eq!((cells(Plane::Visibility), cells(Plane::Grade)), (std::vec![4, 5, 6, 7], std::vec![6, 7]));
     }
 
     #[test]

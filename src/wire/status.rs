@@ -73,6 +73,8 @@ pub enum Reason {
     Misaligned,
     /// It sees less of what stands there, or sees it weaker, than it did: dirt, snow.
     Weaker,
+    /// The table of probabilities that was given is not used: maps are by grades.
+    NoProbabilities,
     /// A number given by the integrator, or by a later version.
     Other(u8),
 }
@@ -95,6 +97,7 @@ impl Reason {
             Self::SectorBlind => 11,
             Self::Misaligned => 12,
             Self::Weaker => 13,
+            Self::NoProbabilities => 14,
             Self::Other(number) => number,
         }
     }
@@ -116,6 +119,7 @@ impl Reason {
             11 => Self::SectorBlind,
             12 => Self::Misaligned,
             13 => Self::Weaker,
+            14 => Self::NoProbabilities,
             other => Self::Other(other),
         }
     }

@@ -35,9 +35,9 @@ static uint32_t crc32_of(uint32_t sum, const uint8_t *bytes, int n) {
 
 /* The states of an azimuth: 0 unknown, 1 not visible, 2 visible. */
 static void states_of(const sensor_t *s, uint64_t now, int a, uint8_t *states) {
-    const ray_t *ray = &s->now[a];
+    const ray_t *ray = &s->plane[0].now[a];
     memset(states, 0, (size_t)s->ranges);
-    if (shown(s, now, a))
+    if (shown(s, &s->plane[0], now, a))
         for (int c = ray->near; c < ray->end && c < s->ranges; c++) states[c] = 1 + ray->bit[c];
 }
 
@@ -74,6 +74,25 @@ static void answer(const sensor_t *s, uint64_t asked, bool cells) {
         printf("%" PRIu64 " %d %d %08" PRIx32 "\n", asked, visible, known - visible, nothing ? 0 : ~sum);
 }
 
+/* Answers `probability`. */
+static void answer_probability(const sensor_t *s, uint64_t asked) {
+    uint64_t now = watch(asked);
+    uint8_t of_cell[CELLS];
+    int cells = 0, azimuths = trusted(s, now) ? s->azimuths : 0;
+    long total = 0;
+    uint32_t sum = 0xFFFFFFFF;
+    for (int a = 0; a < azimuths; a++) {
+        for (int c = 0; c < s->ranges; c++) {
+            int p = probability(s, now, a, c);
+            cells += p >= 0;
+            of_cell[c] = (uint8_t)(p > 0 ? p : 0);
+            total += of_cell[c];
+        }
+        sum = crc32_of(sum, of_cell, s->ranges);
+    }
+    printf("%" PRIu64 " p %d %ld %08" PRIx32 "\n", asked, cells, total, cells == 0 ? 0 : ~sum);
+}
+
 int main(void) {
     static char line[4096];
     char bus[16] = "", data[2049];
@@ -95,6 +114,8 @@ int main(void) {
             answer(&sensors[sensor], now, false);
         } else if (sscanf(line, "cells %llu", &now) == 1) {
             answer(&sensors[sensor], now, true);
+        } else if (sscanf(line, "probability %llu", &now) == 1) {
+            answer_probability(&sensors[sensor], now);
         } else {
             fprintf(stderr, "no line of tests/conformance/README.md: %s", line);
             return 2;

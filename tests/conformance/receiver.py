@@ -2,7 +2,8 @@
 """A receiver of the visibility broadcast, wire format version 1.
 
 Written from two pages: "The wire format, version 1" (the rules, whose numbers and names are used here) and "Does a receiver
-conform?" (what comes in on standard input and what goes out on standard output). Plane 0, visibility; without authentication.
+conform?" (what comes in on standard input and what goes out on standard output). Plane 0, visibility, and plane 1 for
+probabilities; without authentication.
 
     gzip -dc logs/can-lossless.in.gz | python3 receiver.py
 """
@@ -18,7 +19,7 @@ P = 5_120_000            # scan numbers come again
 M = 2**40 * 1000         # the sender's clock comes again
 TICK = 20_000
 BASE = 0x400             # of the identifiers
-PLANE = 0                # the plane that is held
+PLANES = 2               # planes that are held, from 0 on
 WIRE_VERSION = 1
 ROOM_OF_WORDS = 36
 
@@ -275,9 +276,9 @@ STOP_ROWS = tables("""153, 103
 STOP = [STOP_ROWS[sum(room >= least for least in (8, 12, 16, 20, 26, 34))] for room in range(49)]  # by room, 48 and more as one
 
 
-def read_block(sensor, delta, scan, first, numbers):
-    """Reads the rays of a block and hands each to the sensor. Returns when the block is complete; raises Missing or Malformed."""
-    azimuths, ranges = sensor.header.azimuths, sensor.header.ranges
+def read_block(plane, delta, scan, first, numbers):
+    """Reads the rays of a block and hands each to the plane. Returns when the block is complete; raises Missing or Malformed."""
+    azimuths, ranges = plane.header.azimuths, plane.header.ranges
     named = scan - numbers.plain(4) - 1 & 255 if delta else None
     went_before = 0                     # the pair of rows of RAY
     ray = refresh = None                # of the azimuth before
@@ -287,16 +288,16 @@ def read_block(sensor, delta, scan, first, numbers):
             if room < 4 or numbers.symbol(STOP[min(room, 48)]):
                 return
         if delta:
-            if sensor.refreshes[azimuth] is None or sensor.refreshes[azimuth][0] != named:
+            if plane.refreshes[azimuth] is None or plane.refreshes[azimuth][0] != named:
                 raise Missing
-            refresh_before, refresh = refresh, sensor.refreshes[azimuth][1]
+            refresh_before, refresh = refresh, plane.refreshes[azimuth][1]
             near, end, bits = expected = refresh
             if azimuth != first and ray != refresh_before:
                 not_as_it_was = ray[2] ^ refresh_before[2]
                 bits = (bits & ~not_as_it_was | ray[2] & not_as_it_was) & cells_between(near, end)
                 expected = (near, end, bits)
         else:
-            expected = sensor.header.usual if azimuth == first else ray
+            expected = plane.header.usual if azimuth == first else ray
         edges = edges_of(expected)
 
         told_by = numbers.symbol(RAY[6 * delta + 2 * went_before + (edges != 0)])
@@ -315,7 +316,7 @@ def read_block(sensor, delta, scan, first, numbers):
                 ray = NO_CELLS
             else:
                 raise Malformed
-        sensor.ray_of_block(azimuth, scan, ray, delta)
+        plane.ray_of_block(azimuth, scan, ray, delta)
         went_before = 1 + (ray != expected) + (2 * (ray != refresh) if delta else 0)
 
 
@@ -428,12 +429,116 @@ class Receiver:
         t = self.time(t)                # first: it may put another in the sensor's place
         return self.sensor.look(t)
 
+    def probabilities(self, t):
+        t = self.time(t)
+        return self.sensor.probabilities(t)
+
+
+class Plane:
+    """What is held of a plane: rule 4 a to d."""
+
+    def __init__(self):
+        self.header = None
+        self.empty()
+
+    def empty(self):
+        self.rays = [None] * 128        # of each azimuth: scan, ray
+        self.refreshes = [None] * 128   # of each azimuth: scan, ray
+        self.words = {}                 # (scan, first azimuth, which): (word, delta); in the order they came in
+
+    def drop(self, old):                                                                                 # e
+        self.rays = [None if held and held[0] in old else held for held in self.rays]
+        self.refreshes = [None if held and held[0] in old else held for held in self.refreshes]
+        self.words = {key: word for key, word in self.words.items() if key[0] not in old}
+
+    def ray_of_block(self, azimuth, scan, ray, delta):                                                   # a
+        held = self.rays[azimuth]
+        if held is None or scan == held[0] or newer(scan, held[0]):
+            if held is not None and held[1][:2] != ray[:2]:
+                self.refreshes[azimuth] = None
+            held = self.rays[azimuth] = (scan, ray)
+        refresh = self.refreshes[azimuth]
+        if not delta and held[1][:2] == ray[:2] and (refresh is None or not newer(refresh[0], scan)):
+            self.refreshes[azimuth] = (scan, ray)
+
+    def ray_of_cells(self, azimuth, scan):
+        """Rule 4 b up to the first and last known cell: the held ray the cells go to, or None."""
+        held = self.rays[azimuth]
+        if held is None or newer(scan, held[0]):
+            held = self.rays[azimuth] = (scan, NO_CELLS)
+            self.refreshes[azimuth] = None
+        return held[1] if held[0] == scan else None
+
+    def put_cells(self, azimuth, scan, ray, near, end, bits):
+        if ray[:2] != (near, end):
+            self.refreshes[azimuth] = None
+        self.rays[azimuth] = (scan, (near, end, bits & cells_between(near, end)))
+
+    def known_cells(self, first, last):
+        """near and end, or None if malformed."""
+        if (first, last) == (1, 0):
+            return 1, 0
+        return (first, last + 1) if first <= last < self.header.ranges else None
+
+    def classic_cells(self, scan, azimuth, segment, content):                                            # b
+        if segment == 15:
+            known = self.known_cells(content >> 21, content >> 13 & 255)
+            ray = known and self.ray_of_cells(azimuth, scan)
+            if ray:
+                self.put_cells(azimuth, scan, ray, *known, ray[2])
+        elif segment <= 8:
+            ray = self.ray_of_cells(azimuth, scan)
+            if ray:
+                cells = int(format(content, "029b")[::-1], 2) << 29 * segment
+                self.put_cells(azimuth, scan, ray, ray[0], ray[1], ray[2] | cells)
+
+    def long_cells(self, scan, azimuth, content):                                                        # b
+        known = self.known_cells(*content[:2]) if len(content) >= 2 else None
+        if known and len(content) - 2 >= (known[1] + 7) // 8:
+            ray = self.ray_of_cells(azimuth, scan)
+            if ray:
+                cells = "".join(format(byte, "08b") for byte in content[2:])
+                self.put_cells(azimuth, scan, ray, *known, int("0" + cells[::-1], 2))
+
+    def long_block(self, scan, azimuth, delta, content):                                                 # c
+        words = [int.from_bytes(content[at:at + 4], "big") for at in range(0, min(len(content) // 4, 14) * 4, 4)]
+        if words:
+            try:
+                read_block(self, delta, scan, azimuth, Numbers(words, 32, 14))
+            except (Missing, Malformed):
+                pass
+
+    def word(self, scan, azimuth, which, word, delta):                                                   # d
+        if self.words.pop((scan, azimuth, which), None):
+            self.words[scan, azimuth, which] = (word, delta)
+            return
+        if len(self.words) == ROOM_OF_WORDS:
+            del self.words[next(iter(self.words))]
+        self.words[scan, azimuth, which] = (word, delta)
+        keys = [(scan, azimuth, each) for each in range(4)]
+        words = []
+        for key in keys:
+            if key not in self.words:
+                break
+            words.append(self.words[key][0])
+        if len(words) <= which:
+            return
+        try:
+            read_block(self, self.words[keys[0]][1], scan, azimuth, Numbers(words, 33, 4))
+        except Missing:
+            return
+        except Malformed:
+            pass
+        for key in keys:
+            self.words.pop(key, None)
+
 
 class Sensor:
     """What is known of a sensor: rules 1 to 5."""
 
     def __init__(self):
         self.session = None             # its epoch
+        self.levels = None
         self.came = {}                  # epoch: when its last frame came to rule 1 c
         self.left = {}                  # epoch: when rule 1 c ended a session of it
         self.left_last = (None, None)   # epoch, smallest lag of its measure then
@@ -446,14 +551,15 @@ class Sensor:
         self.misfit = None              # noted time, rule 3 a
         self.groups = [None] * 7
         self.header = None
+        self.levels = None              # group 7; b"" once it was contradicted
+        self.planes = [Plane() for _ in range(PLANES)]
         self.has_clock = self.has_measure = False
         self.last_in_time = t
         self.empty_maps()
 
     def empty_maps(self):
-        self.rays = [None] * 128        # of each azimuth: scan, ray
-        self.refreshes = [None] * 128
-        self.words = {}                 # (scan, first azimuth, which): (word, delta); in the order they came in
+        for plane in self.planes:
+            plane.empty()
         self.looked_after = None        # scan of the frame with which rule 4 e was seen to
 
     # Rule 1
@@ -519,7 +625,7 @@ class Sensor:
         if len(own) < 6:
             return
         if long and len(own) >= 36:
-            coming = {group: own[1 + 5 * group:6 + 5 * group] for group in range(7)}
+            coming = {group: own[1 + 5 * group:6 + 5 * group] for group in range(8 if len(own) >= 41 else 7)}
             try:
                 Header(own[6:36])
             except ValueError:
@@ -527,7 +633,7 @@ class Sensor:
         else:
             coming = {own[0] >> 4 & 7: own[1:6]}
         clock = coming.pop(0, None)
-        coming.pop(7, None)
+        levels = coming.pop(7, None)
         for group, content in coming.items():
             if self.groups[group] not in (None, content):
                 self.conflict = t
@@ -539,6 +645,8 @@ class Sensor:
                 self.header = Header(b"".join(self.groups[1:]))
             except ValueError:
                 self.groups = [None] * 7
+        if levels and levels[2] > 0 and levels[0] <= levels[1] <= levels[2]:
+            self.levels = levels if self.levels in (None, levels) else b""
         if clock:
             self.group_0(t, int.from_bytes(clock, "big") * 1000)
 
@@ -628,107 +736,28 @@ class Sensor:
 
     def map_message(self, t, number, own, long):
         self.drop_old(t, own[0])
-        plane, kind = divmod(number - 6, 6)
-        if self.header is None or plane != PLANE:
+        place, kind = divmod(number - 6, 6)
+        if self.header is None or place >= PLANES:
             return
+        plane = self.planes[place]
+        plane.header = self.header
         scan = own[0]
         if long:
             if own[1] >= self.header.azimuths:
                 return
             if kind in (0, 1):
-                self.long_block(scan, own[1], kind, own[2:])
+                plane.long_block(scan, own[1], kind, own[2:])
             elif kind == 5:
-                self.long_cells(scan, own[1], own[2:])
+                plane.long_cells(scan, own[1], own[2:])
         else:
             big = int.from_bytes(own, "big")
             azimuth = big >> 33 & 127
             if azimuth >= self.header.azimuths:
                 return
             if kind == 5:
-                self.classic_cells(scan, azimuth, big >> 29 & 15, big & (1 << 29) - 1)
+                plane.classic_cells(scan, azimuth, big >> 29 & 15, big & (1 << 29) - 1)
             else:
-                self.word(scan, azimuth, max(kind - 1, 0), big & (1 << 33) - 1, kind == 1)
-
-    def ray_of_block(self, azimuth, scan, ray, delta):                                                   # a
-        held = self.rays[azimuth]
-        if held is None or scan == held[0] or newer(scan, held[0]):
-            if held is not None and held[1][:2] != ray[:2]:
-                self.refreshes[azimuth] = None
-            held = self.rays[azimuth] = (scan, ray)
-        refresh = self.refreshes[azimuth]
-        if not delta and held[1][:2] == ray[:2] and (refresh is None or not newer(refresh[0], scan)):
-            self.refreshes[azimuth] = (scan, ray)
-
-    def ray_of_cells(self, azimuth, scan):
-        """Rule 4 b up to the first and last known cell: the held ray the cells go to, or None."""
-        held = self.rays[azimuth]
-        if held is None or newer(scan, held[0]):
-            held = self.rays[azimuth] = (scan, NO_CELLS)
-            self.refreshes[azimuth] = None
-        return held[1] if held[0] == scan else None
-
-    def put_cells(self, azimuth, scan, ray, near, end, bits):
-        if ray[:2] != (near, end):
-            self.refreshes[azimuth] = None
-        self.rays[azimuth] = (scan, (near, end, bits & cells_between(near, end)))
-
-    def known_cells(self, first, last):
-        """near and end, or None if malformed."""
-        if (first, last) == (1, 0):
-            return 1, 0
-        return (first, last + 1) if first <= last < self.header.ranges else None
-
-    def classic_cells(self, scan, azimuth, segment, content):                                            # b
-        if segment == 15:
-            known = self.known_cells(content >> 21, content >> 13 & 255)
-            ray = known and self.ray_of_cells(azimuth, scan)
-            if ray:
-                self.put_cells(azimuth, scan, ray, *known, ray[2])
-        elif segment <= 8:
-            ray = self.ray_of_cells(azimuth, scan)
-            if ray:
-                cells = int(format(content, "029b")[::-1], 2) << 29 * segment
-                self.put_cells(azimuth, scan, ray, ray[0], ray[1], ray[2] | cells)
-
-    def long_cells(self, scan, azimuth, content):                                                        # b
-        known = self.known_cells(*content[:2]) if len(content) >= 2 else None
-        if known and len(content) - 2 >= (known[1] + 7) // 8:
-            ray = self.ray_of_cells(azimuth, scan)
-            if ray:
-                cells = "".join(format(byte, "08b") for byte in content[2:])
-                self.put_cells(azimuth, scan, ray, *known, int("0" + cells[::-1], 2))
-
-    def long_block(self, scan, azimuth, delta, content):                                                 # c
-        words = [int.from_bytes(content[at:at + 4], "big") for at in range(0, min(len(content) // 4, 14) * 4, 4)]
-        if words:
-            try:
-                read_block(self, delta, scan, azimuth, Numbers(words, 32, 14))
-            except (Missing, Malformed):
-                pass
-
-    def word(self, scan, azimuth, which, word, delta):                                                   # d
-        if self.words.pop((scan, azimuth, which), None):
-            self.words[scan, azimuth, which] = (word, delta)
-            return
-        if len(self.words) == ROOM_OF_WORDS:
-            del self.words[next(iter(self.words))]
-        self.words[scan, azimuth, which] = (word, delta)
-        keys = [(scan, azimuth, each) for each in range(4)]
-        words = []
-        for key in keys:
-            if key not in self.words:
-                break
-            words.append(self.words[key][0])
-        if len(words) <= which:
-            return
-        try:
-            read_block(self, self.words[keys[0]][1], scan, azimuth, Numbers(words, 33, 4))
-        except Missing:
-            return
-        except Malformed:
-            pass
-        for key in keys:
-            self.words.pop(key, None)
+                plane.word(scan, azimuth, max(kind - 1, 0), big & (1 << 33) - 1, kind == 1)
 
     def drop_old(self, t, scan):                                                                         # e
         if scan == self.looked_after:
@@ -736,13 +765,13 @@ class Sensor:
         self.looked_after = scan
         smallest = self.smallest_lag(t)
         old = {each for each in range(256) if (lag(t, each) - smallest) % P > 1_000_000}
-        self.rays = [None if held and held[0] in old else held for held in self.rays]
-        self.refreshes = [None if held and held[0] in old else held for held in self.refreshes]
-        self.words = {key: word for key, word in self.words.items() if key[0] not in old}
+        for plane in self.planes:
+            plane.drop(old)
 
     # Rule 5
 
-    def look(self, t):
+    def shown(self, t):
+        """Of both planes the rays that are shown; None if nothing is."""
         if self.session is None or self.header is None or not self.has_measure or not self.has_clock:
             return None
         smallest = self.smallest_lag(t)
@@ -752,9 +781,25 @@ class Sensor:
                 or not self.fits(t)
                 or self.signed(self.conflict, t) or self.signed(self.other_version, t)):
             return None
-        rays = [held[1] if held and (lag(t, held[0]) - smallest) % P + 25_000 <= A else NO_CELLS
-                for held in self.rays[:self.header.azimuths]]
-        return [states_of(ray, self.header.ranges) for ray in rays]
+        return [[held[1] if held and (lag(t, held[0]) - smallest) % P + 25_000 <= A else NO_CELLS
+                 for held in plane.rays[:self.header.azimuths]] for plane in self.planes]
+
+    def look(self, t):
+        planes = self.shown(t)
+        return planes and [states_of(ray, self.header.ranges) for ray in planes[0]]
+
+    def probabilities(self, t):
+        """How many cells have one, and the least of every cell, azimuth by azimuth; 0 for none."""
+        planes = self.shown(t) if self.levels else None
+        known, all_cells = 0, bytearray()
+        for (near, end, visible), (n, e, clear) in zip(*planes) if planes else ():
+            clear &= visible & cells_between(n, e)
+            cells = bytearray(self.header.ranges)
+            for cell in range(near, end):
+                known += 1
+                cells[cell] = self.levels[(visible >> cell & 1) + (clear >> cell & 1)]
+            all_cells += cells
+        return known, bytes(all_cells)
 
 
 def lag(t, scan):
@@ -784,6 +829,10 @@ def answer_cells(time, rows):
     return " ".join([time] + [row[2].translate(bytes.maketrans(b"\0\1\2", b"?#.")).decode() for row in rows])
 
 
+def answer_probability(time, known, cells):
+    return "%s p %d %d %08x" % (time, known, sum(cells), zlib.crc32(cells) if known else 0)
+
+
 def data_of(field):
     return b"" if field == "-" else bytes.fromhex(field)
 
@@ -802,6 +851,8 @@ def main():
             print(answer(fields[0], receiver.look(int(fields[0]))))
         elif what == "cells":
             print(answer_cells(fields[0], receiver.look(int(fields[0]))))
+        elif what == "probability":
+            print(answer_probability(fields[0], *receiver.probabilities(int(fields[0]))))
 
 
 if __name__ == "__main__":

@@ -2,13 +2,13 @@
  *
  *     cc -O2 -o receiver receiver.c && ./receiver LOG [KEY]
  *
- * Reads a log of `candump -L` (classic CAN and CAN FD, sensors 0 to 7 from 0x400 on, the visibility plane), or of a serial line, chunk by
+ * Reads a log of `candump -L` (classic CAN and CAN FD, sensors 0 to 7 from 0x400 on, the planes of visibility and probability), or of a serial line, chunk by
  * chunk: `(seconds) device bytes`. With a key, 32 hexadecimal digits, it takes authenticated messages and no others. Prints, whenever 100 ms of the log are over, for every sensor whose map is shown:
  *
  *     microseconds sensor visible invisible hash
  *
  * with the number of visible and of invisible cells and a hash (FNV-1a) of all cells: 0 unknown, 1 not visible, 2 visible,
- * azimuth by azimuth, near to far. `receiver --cmac KEY [MESSAGE]` prints a message's authentication code. Rules by their numbers are those of "What a receiver does".
+ * azimuth by azimuth, near to far; of a sender with a table of probabilities also their sum in 1/255. `receiver --cmac KEY [MESSAGE]` prints a message's authentication code. Rules by their numbers are those of "What a receiver does".
  */
 #include <inttypes.h>
 #include <stdbool.h>
@@ -23,6 +23,7 @@
 #define SENSORS 8
 #define AZIMUTHS 128
 #define CELLS 256
+#define PLANES 2       /* visibility and, of senders with a table of probabilities, that of probability */
 #define WAITING 36     /* words that wait for others of their blocks */
 #define PERIOD 5120000 /* us, of the scan numbers */
 #define CLOCK (UINT64_C(1099511627776) * 1000) /* us, of the header's clock */
@@ -48,6 +49,14 @@ static void trim(ray_t *r) {
 
 typedef struct { int scan, start, index, delta; uint64_t word; } waiting_t;
 
+/* A plane of a sensor's maps. */
+typedef struct {
+    bool there[AZIMUTHS], refreshed[AZIMUTHS];
+    int now_scan[AZIMUTHS], was_scan[AZIMUTHS];
+    ray_t now[AZIMUTHS], was[AZIMUTHS];
+    waiting_t waiting[WAITING]; int words;
+} plane_t;
+
 typedef struct {
     /* session */
     int epoch; /* -1: none */
@@ -60,11 +69,8 @@ typedef struct {
     /* header */
     uint8_t group[7][5]; int groups; bool complete;
     int azimuths, ranges, usual_near, usual_end;
-    /* maps */
-    bool there[AZIMUTHS], refreshed[AZIMUTHS];
-    int now_scan[AZIMUTHS], was_scan[AZIMUTHS];
-    ray_t now[AZIMUTHS], was[AZIMUTHS];
-    waiting_t waiting[WAITING]; int words;
+    enum { UNSAID, SAID, CONTRADICTED } levels_are; uint8_t levels[5];
+    plane_t plane[PLANES];
     /* authentication */
     bool fresh; uint64_t freshness;
 } sensor_t;
@@ -228,24 +234,24 @@ static bool newer(int scan, int other) {
 }
 
 /* Rule 4. */
-static void take(sensor_t *s, int azimuth, int scan, const ray_t *ray, bool refresh) {
-    if (!s->there[azimuth] || newer(scan, s->now_scan[azimuth]) || scan == s->now_scan[azimuth]) {
-        if (s->there[azimuth] && (s->now[azimuth].near != ray->near || s->now[azimuth].end != ray->end))
-            s->refreshed[azimuth] = false;
-        s->now[azimuth] = *ray;
-        s->now_scan[azimuth] = scan;
-        s->there[azimuth] = true;
+static void take(plane_t *p, int azimuth, int scan, const ray_t *ray, bool refresh) {
+    if (!p->there[azimuth] || newer(scan, p->now_scan[azimuth]) || scan == p->now_scan[azimuth]) {
+        if (p->there[azimuth] && (p->now[azimuth].near != ray->near || p->now[azimuth].end != ray->end))
+            p->refreshed[azimuth] = false;
+        p->now[azimuth] = *ray;
+        p->now_scan[azimuth] = scan;
+        p->there[azimuth] = true;
     }
-    bool cells = s->now[azimuth].near == ray->near && s->now[azimuth].end == ray->end;
-    if (refresh && cells && (!s->refreshed[azimuth] || !newer(s->was_scan[azimuth], scan))) {
-        s->was[azimuth] = *ray;
-        s->was_scan[azimuth] = scan;
-        s->refreshed[azimuth] = true;
+    bool cells = p->now[azimuth].near == ray->near && p->now[azimuth].end == ray->end;
+    if (refresh && cells && (!p->refreshed[azimuth] || !newer(p->was_scan[azimuth], scan))) {
+        p->was[azimuth] = *ray;
+        p->was_scan[azimuth] = scan;
+        p->refreshed[azimuth] = true;
     }
 }
 
 /* Reads what is there of a block; whether nothing can follow: it is complete, or malformed. */
-static bool block(sensor_t *s, int delta, int scan, int start, const uint64_t *word, int words, int bits, int most) {
+static bool block(const sensor_t *s, plane_t *p, int delta, int scan, int start, const uint64_t *word, int words, int bits, int most) {
     static const int classes[7] = {8, 12, 16, 20, 26, 34, 48};
     number_t n = {word, words, bits, most, 1, word[0], UINT64_C(1) << bits, false};
     int base = 0;
@@ -266,8 +272,8 @@ static bool block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
         }
         const ray_t *was = &NOTHING;
         if (delta) {
-            if (!s->refreshed[a] || s->was_scan[a] != base) return false;
-            was = &s->was[a];
+            if (!p->refreshed[a] || p->was_scan[a] != base) return false;
+            was = &p->was[a];
             expected = *was;
             if (!first) {
                 for (int c = 0; c < CELLS; c++)
@@ -306,7 +312,7 @@ static bool block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
         before_was = *was;
         first = false;
         /* `was` may point into what is replaced here, so it is not used any more */
-        take(s, a, scan, &ray, !delta);
+        take(p, a, scan, &ray, !delta);
     }
     return true;
 }
@@ -314,9 +320,11 @@ static bool block(sensor_t *s, int delta, int scan, int start, const uint64_t *w
 /* ---- session: rules 1 to 5 ---- */
 
 static void forget_maps(sensor_t *s) {
-    memset(s->there, 0, sizeof s->there);
-    memset(s->refreshed, 0, sizeof s->refreshed);
-    s->words = 0;
+    for (plane_t *p = s->plane; p < s->plane + PLANES; p++) {
+        memset(p->there, 0, sizeof p->there);
+        memset(p->refreshed, 0, sizeof p->refreshed);
+        p->words = 0;
+    }
 }
 
 static void begin(sensor_t *s, uint64_t now, int epoch);
@@ -384,6 +392,7 @@ static void begin(sensor_t *s, uint64_t now, int epoch) {
     s->heard = s->map_heard = now;
     s->conflict = s->other_version = s->misfit_since = NEVER;
     s->clock.there = s->measure.there = s->doubt = s->complete = false;
+    s->levels_are = UNSAID;
     s->groups = 0;
     forget_maps(s);
 }
@@ -484,15 +493,21 @@ static bool hear(sensor_t *s, uint64_t now, int scan) {
 }
 
 /* Rule 4, the dropping. */
+static bool too_old(const sensor_t *s, uint64_t now, int scan) {
+    return behind(lag_of(now, scan), least(s, now)) > 1000000;
+}
+
 static void purge(sensor_t *s, uint64_t now) {
-    for (int a = 0; a < AZIMUTHS; a++) {
-        if (s->there[a] && behind(lag_of(now, s->now_scan[a]), least(s, now)) > 1000000) s->there[a] = s->refreshed[a] = false;
-        if (s->refreshed[a] && behind(lag_of(now, s->was_scan[a]), least(s, now)) > 1000000) s->refreshed[a] = false;
+    for (plane_t *p = s->plane; p < s->plane + PLANES; p++) {
+        for (int a = 0; a < AZIMUTHS; a++) {
+            if (p->there[a] && too_old(s, now, p->now_scan[a])) p->there[a] = p->refreshed[a] = false;
+            if (p->refreshed[a] && too_old(s, now, p->was_scan[a])) p->refreshed[a] = false;
+        }
+        int kept = 0;
+        for (int i = 0; i < p->words; i++)
+            if (!too_old(s, now, p->waiting[i].scan)) p->waiting[kept++] = p->waiting[i];
+        p->words = kept;
     }
-    int kept = 0;
-    for (int i = 0; i < s->words; i++)
-        if (behind(lag_of(now, s->waiting[i].scan), least(s, now)) <= 1000000) s->waiting[kept++] = s->waiting[i];
-    s->words = kept;
 }
 
 /* Rule 5. */
@@ -502,8 +517,16 @@ static bool trusted(const sensor_t *s, uint64_t now) {
            !lasts(s->conflict, now) && !lasts(s->other_version, now);
 }
 
-static bool shown(const sensor_t *s, uint64_t now, int a) {
-    return s->there[a] && behind(lag_of(now, s->now_scan[a]), least(s, now)) + MARGIN_US <= A_US;
+static bool shown(const sensor_t *s, const plane_t *p, uint64_t now, int a) {
+    return p->there[a] && behind(lag_of(now, p->now_scan[a]), least(s, now)) + MARGIN_US <= A_US;
+}
+
+/* The probability of a cell that is shown, 1/255; -1 for none. */
+static int probability(const sensor_t *s, uint64_t now, int a, int c) {
+    const ray_t *ray = &s->plane[0].now[a], *other = &s->plane[1].now[a];
+    if (s->levels_are != SAID || !shown(s, &s->plane[0], now, a) || c < ray->near || c >= ray->end) return -1;
+    bool bit = shown(s, &s->plane[1], now, a) && c >= other->near && c < other->end && other->bit[c];
+    return s->levels[!ray->bit[c] ? 0 : bit ? 2 : 1];
 }
 
 /* Nothing heard. */
@@ -534,6 +557,14 @@ static bool header_holds(uint8_t group[7][5]) {
            (group[5][0] || group[5][1]);
 }
 
+/* Group 7; it changes nothing of what is visible. */
+static void levels(sensor_t *s, const uint8_t group[5]) {
+    if (group[2] == 0 || group[0] > group[1] || group[1] > group[2]) return;
+    bool other = s->levels_are != UNSAID && memcmp(s->levels, group, 5);
+    if (s->levels_are == UNSAID || other) s->levels_are = other ? CONTRADICTED : SAID;
+    if (!other) memcpy(s->levels, group, 5);
+}
+
 static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
     if (n > 0 && (own[0] & 15) != 1) s->other_version = now;
     if (n < 6 || (own[0] & 15) != 1) return;
@@ -546,6 +577,7 @@ static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
             if (s->groups >> g & 1 && memcmp(s->group[g], all[g], 5)) { s->conflict = now; return; }
         memcpy(s->group, all, 35);
         s->groups = 0x7E;
+        if (n >= 41) levels(s, own + 36);
         hear_clock(s, now, all[0]);
     } else if (first == 0) {
         hear_clock(s, now, own + 1);
@@ -554,6 +586,8 @@ static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
         if (s->groups >> first & 1 && memcmp(s->group[first], own + 1, 5)) { s->conflict = now; return; }
         memcpy(s->group[first], own + 1, 5);
         s->groups |= 1 << first;
+    } else {
+        levels(s, own + 1);
     }
     if (s->groups != 0x7E || s->complete) return;
     if (!header_holds(s->group)) { s->groups = 0; return; }
@@ -565,7 +599,7 @@ static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
     s->complete = true;
 }
 
-static void plain_cells(sensor_t *s, int scan, int a, const uint8_t *own, int n, uint64_t word, bool is_long) {
+static void plain_cells(const sensor_t *s, plane_t *p, int scan, int a, const uint8_t *own, int n, uint64_t word, bool is_long) {
     ray_t new = NOTHING;
     int segment = is_long ? 15 : (int)(word >> 29);
     int near = is_long ? own[2] : (int)(word >> 21 & 255), last = is_long ? own[3] : (int)(word >> 13 & 255);
@@ -573,15 +607,15 @@ static void plain_cells(sensor_t *s, int scan, int a, const uint8_t *own, int n,
     if (segment == 15 && !known(s, &new, near, near == 1 && last == 0 ? 0 : last + 1)) return;
     if (segment > 8 && segment < 15) return;
     if (is_long && new.end > 8 * (n - 4)) return;
-    if (!s->there[a] || newer(scan, s->now_scan[a])) {
-        s->now[a] = NOTHING;
-        s->now_scan[a] = scan;
-        s->there[a] = true;
-        s->refreshed[a] = false;
+    if (!p->there[a] || newer(scan, p->now_scan[a])) {
+        p->now[a] = NOTHING;
+        p->now_scan[a] = scan;
+        p->there[a] = true;
+        p->refreshed[a] = false;
     }
-    if (s->now_scan[a] != scan) return;
-    ray_t *r = &s->now[a];
-    if (segment == 15 && (r->near != new.near || r->end != new.end)) s->refreshed[a] = false;
+    if (p->now_scan[a] != scan) return;
+    ray_t *r = &p->now[a];
+    if (segment == 15 && (r->near != new.near || r->end != new.end)) p->refreshed[a] = false;
     if (is_long) {
         for (int c = 0; c < new.end; c++) new.bit[c] = own[4 + c / 8] >> (7 - c % 8) & 1;
         *r = new;
@@ -596,34 +630,34 @@ static void plain_cells(sensor_t *s, int scan, int a, const uint8_t *own, int n,
 }
 
 /* A word of a block: it waits, and if it joins those that are there from the first on, they are read. */
-static void classic_word(sensor_t *s, int scan, int start, int index, int delta, uint64_t word) {
+static void classic_word(const sensor_t *s, plane_t *p, int scan, int start, int index, int delta, uint64_t word) {
     bool again = false;
     int kept = 0;
-    for (int i = 0; i < s->words; i++) {
-        const waiting_t *w = &s->waiting[i];
+    for (int i = 0; i < p->words; i++) {
+        const waiting_t *w = &p->waiting[i];
         bool same_word = w->scan == scan && w->start == start && w->index == index;
         again |= same_word;
-        if (!same_word) s->waiting[kept++] = *w;
+        if (!same_word) p->waiting[kept++] = *w;
     }
-    s->words = kept;
-    if (s->words == WAITING) memmove(s->waiting, s->waiting + 1, sizeof *s->waiting * (size_t)--s->words);
-    s->waiting[s->words++] = (waiting_t){scan, start, index, delta, word};
+    p->words = kept;
+    if (p->words == WAITING) memmove(p->waiting, p->waiting + 1, sizeof *p->waiting * (size_t)--p->words);
+    p->waiting[p->words++] = (waiting_t){scan, start, index, delta, word};
     if (again) return;
     uint64_t words[4] = {0};
     int have = 0, count = 0;
-    for (int i = 0; i < s->words; i++) {
-        const waiting_t *w = &s->waiting[i];
+    for (int i = 0; i < p->words; i++) {
+        const waiting_t *w = &p->waiting[i];
         if (w->scan != scan || w->start != start) continue;
         words[w->index] = w->word;
         have |= 1 << w->index;
         if (w->index == 0) delta = w->delta;
     }
     while (have >> count & 1) count++;
-    if (count <= index || !block(s, delta, scan, start, words, count, 33, 4)) return;
+    if (count <= index || !block(s, p, delta, scan, start, words, count, 33, 4)) return;
     kept = 0;
-    for (int i = 0; i < s->words; i++)
-        if (s->waiting[i].scan != scan || s->waiting[i].start != start) s->waiting[kept++] = s->waiting[i];
-    s->words = kept;
+    for (int i = 0; i < p->words; i++)
+        if (p->waiting[i].scan != scan || p->waiting[i].start != start) p->waiting[kept++] = p->waiting[i];
+    p->words = kept;
 }
 
 static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint8_t *own, int n, bool is_long, int most) {
@@ -634,8 +668,9 @@ static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint
     if (number == 1) header(s, now, own, n);
     if (!dated || !whole || !hear(s, now, own[0])) return;
     purge(s, now);
-    int scan = own[0], start = is_long ? own[1] : own[1] >> 1, part = number - 6;
-    if (number < 6 || number >= 12 || !s->complete || start >= s->azimuths) return;
+    int scan = own[0], start = is_long ? own[1] : own[1] >> 1, part = (number - 6) % 6;
+    if (number < 6 || number >= 6 + 6 * PLANES || !s->complete || start >= s->azimuths) return;
+    plane_t *p = &s->plane[(number - 6) / 6];
     uint64_t word[14] = {0};
     int words = 1;
     if (is_long) {
@@ -646,9 +681,9 @@ static void message(sensor_t *s, uint64_t now, int number, int epoch, const uint
         word[0] = own[1] & 1;
         for (int k = 2; k < 6; k++) word[0] = word[0] << 8 | own[k];
     }
-    if (part == 5) plain_cells(s, scan, start, own, n, word[0], is_long);
-    else if (is_long) { if (part < 2 && words > 0) block(s, part, scan, start, word, words, 32, most); }
-    else classic_word(s, scan, start, part < 2 ? 0 : part - 1, part == 1, word[0]);
+    if (part == 5) plain_cells(s, p, scan, start, own, n, word[0], is_long);
+    else if (is_long) { if (part < 2 && words > 0) block(s, p, part, scan, start, word, words, 32, most); }
+    else classic_word(s, p, scan, start, part < 2 ? 0 : part - 1, part == 1, word[0]);
 }
 
 /* Whether the last 8 bytes of a message are its sender's, and it is new. */
@@ -750,16 +785,22 @@ static void print_maps(uint64_t now) {
         const sensor_t *s = &sensors[i];
         if (!trusted(s, now)) continue;
         int visible = 0, invisible = 0;
+        long probable = 0;
         uint64_t hash = UINT64_C(14695981039346656037);
         for (int a = 0; a < s->azimuths; a++)
             for (int c = 0; c < s->ranges; c++) {
-                bool is_known = shown(s, now, a) && c >= s->now[a].near && c < s->now[a].end;
-                int state = is_known ? 1 + s->now[a].bit[c] : 0;
+                const ray_t *ray = &s->plane[0].now[a];
+                bool is_known = shown(s, &s->plane[0], now, a) && c >= ray->near && c < ray->end;
+                int state = is_known ? 1 + ray->bit[c] : 0;
                 visible += state == 2;
                 invisible += state == 1;
+                int p = probability(s, now, a, c);
+                probable += p > 0 ? p : 0;
                 hash = (hash ^ (uint64_t)state) * UINT64_C(1099511628211);
             }
-        printf("%" PRIu64 " %d %d %d %016" PRIx64 "\n", now, i, visible, invisible, hash);
+        printf("%" PRIu64 " %d %d %d %016" PRIx64, now, i, visible, invisible, hash);
+        if (s->levels_are == SAID) printf(" %ld", probable);
+        putchar('\n');
     }
 }
 

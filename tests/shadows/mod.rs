@@ -60,6 +60,7 @@ pub fn header(fingerprint: u32) -> Header {
         usual: USUAL,
         planes: 0,
         fingerprint,
+        probability: None,
     }
 }
 

@@ -10,6 +10,7 @@ use crate::shadows::{A, Map, Shadows, USUAL, W, header};
 use can_dbc::Dbc;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
+use viewshed::probability::Levels;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::can_service::{ANSWER, CanService, CanServiceConfig, REQUEST, Tool};
 use viewshed::unit::profile::small;
@@ -47,6 +48,7 @@ fn sent_header() -> Header {
             pitch: Angle::from_raw(728),
             roll: Angle::from_raw(-3),
         },
+        probability: Levels::from_bytes([51, 178, 242, 0xAB, 0xCD]),
         ..header(0xDEAD_BEEF)
     }
 }
@@ -148,6 +150,10 @@ fn header_and_status(medium: Medium) {
         ("Usual_First", USUAL.near() as f64),
         ("Usual_Last", (USUAL.end() - 1) as f64),
         ("Fingerprint", f64::from(0xDEAD_BEEF_u32)),
+        ("Probability_Known", 51.0 / 255.0),
+        ("Probability_Visible", 178.0 / 255.0),
+        ("Probability_Clear", 242.0 / 255.0),
+        ("Table_Check_Sum", f64::from(0xABCD_u16)),
     ];
     for (name, value) in expected {
         assert!((got[name] - value).abs() < 1e-9, "{name}: {} instead of {value}", got[name]);

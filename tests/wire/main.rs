@@ -15,6 +15,7 @@ mod configuration_block;
 mod e2e;
 mod fail_safe;
 mod maps;
+mod probability;
 #[cfg(feature = "secoc")]
 mod secured;
 mod specification;

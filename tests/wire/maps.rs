@@ -309,10 +309,11 @@ fn a_header_whose_check_fails_changes_nothing() {
         line.pass(ms(now));
     }
     let clock = viewshed::wire::header::Clock { time_ms: 9_000_000, synchronised: false };
-    let mut own = header(7).emit(&clock);
+    let (mut own, length) = header(7).emit(&clock);
     own[10] ^= 1;
-    let packet = viewshed::wire::message::Packet::new(Packing::Long, SENSOR, Message::Header, Epoch::new(3), &own)
-        .protect(0, None);
+    let packet =
+        viewshed::wire::message::Packet::new(Packing::Long, SENSOR, Message::Header, Epoch::new(3), &own[..length])
+            .protect(0, None);
     let outcome = line.receiver.message(ms(2000), packet.bytes());
     assert_eq!(outcome, Err(Refused::NotAHeader(viewshed::wire::header::NotAHeader::Check)));
     assert_eq!(line.received(Plane::Visibility, ms(2000)), map.0, "neither a conflict nor a clock");

@@ -5,6 +5,7 @@ use viewshed::fixed::angle::Angle;
 use viewshed::fixed::bits::Bits;
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
+use viewshed::probability::Levels;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::model::{MODEL, STOP_CLASSES};
@@ -37,6 +38,7 @@ pub fn header() -> Header {
         usual: Known::new(2, RANGES),
         planes: 1,
         fingerprint: 0xDEAD_BEEF,
+        probability: None,
     }
 }
 
@@ -118,6 +120,50 @@ fn the_example_is_what_is_sent() {
     long.push(format!("{:?}", packet.protect(0, filled).frame(&Addresses::STANDARD).unwrap()));
     same("long", long);
     assert!(wrong.is_empty(), "what is sent is, instead of the page's\n{}", wrong.join("\n"));
+}
+
+/// Visible as in one picture, probable as in another.
+struct Probable(Picture, Picture);
+
+impl Planes<1> for Probable {
+    fn ray(&self, plane: Plane, azimuth: usize) -> Ray<1> {
+        let picture = if plane == Plane::Visibility { &self.0 } else { &self.1 };
+        picture.0.get(azimuth).copied().unwrap_or(Ray::UNKNOWN)
+    }
+}
+
+#[test]
+fn probabilities_are_a_group_of_the_header_and_a_second_plane() {
+    let levels = Levels::from_bytes([51, 178, 242, 0xAB, 0xCD]).unwrap();
+    let header = Header { probability: Some(levels), ..header() };
+    let (medium, start) = (Medium::Can(Addresses::STANDARD), Time::from_micros(measured(0x21).micros() - 1_200_000));
+    let mut sender = Broadcaster::<AZIMUTHS, 1, 2>::new(BroadcastConfig::new(0, medium), header, EPOCH, start).unwrap();
+    let limits = ReceiverLimits::DEFAULT;
+    let mut receiver = Receiver::<1, AZIMUTHS, 1, 2>::new([0], Addresses::STANDARD, limits);
+    let (mut group, mut plane) = (None, Vec::new());
+    let probable = Probable(picture(0x21), picture(0x24));
+    let end = measured(0x21).micros() + 40_000;
+    for us in (start.micros()..end).step_by(1000) {
+        let now = Time::from_micros(us);
+        // every third is a refresh, and every second has probabilities of azimuths 0 and 1
+        if us >= end - 40_000 - 720_000 && (end - 40_000 - us).is_multiple_of(60_000) {
+            let _ = sender.scan(now, &probable);
+        }
+        let Some(packet) = sender.next_packet(now) else { continue };
+        let frame = packet.frame(&Addresses::STANDARD).unwrap();
+        let _ = receiver.frame(now, &frame);
+        let counted = |counter| format!("{:?}", packet.protect(counter, None).frame(&Addresses::STANDARD).unwrap());
+        match packet.message {
+            Message::Header if frame.data()[2] >> 4 & 7 == 7 => group = Some(counted(7)),
+            Message::Map(Plane::Grade, _) if us >= end - 40_000 => plane.push(counted(plane.len() as u8)),
+            _ => {}
+        }
+    }
+    let expected = [vec![group.unwrap()], plane].concat();
+    assert_eq!(page_frames("probability"), expected, "what is sent is, instead of the page's\n{}", expected.join("\n"));
+    let map = receiver.map(0, Time::from_micros(end));
+    let p = |cell| map.probability(1, cell).map(|p| p.raw());
+    assert_eq!([1, 2, 11, 12, 17, 18].map(p), [None, Some(242), Some(178), Some(51), Some(51), Some(242)]);
 }
 
 #[test]

@@ -13,6 +13,7 @@ use viewshed::{
 
 use crate::locate;
 use crate::one_file::is_one_file;
+use crate::probability::{Given, Table};
 use crate::state;
 
 /// Size of the grid.
@@ -73,6 +74,8 @@ pub struct Config {
     /// What stands in the view tells whether the radar is in order.
     #[serde(default, deserialize_with = "kept")]
     pub fixtures: Option<&'static FixturesConfig>,
+    /// How probable it is that vehicles are detected.
+    pub probability: Option<Given>,
     /// Which way traffic goes.
     #[serde(default, deserialize_with = "lanes")]
     pub lanes: &'static [&'static [[f32; 2]]],
@@ -246,6 +249,7 @@ impl Config {
         let log = self.output.candump.as_ref()?;
         let kept = self.state_dir.iter().flat_map(|folder| state::FILES.map(|name| ("state_dir", folder.join(name))));
         let read = self.input.candump.iter().map(|path| ("input.candump", path.clone()));
+        let read = read.chain(self.probability.iter().map(|given| ("probability.file", given.file.clone())));
         let mut files = read.chain(kept).chain([("the configuration", own.to_owned())]);
         let (what, path) = files.find(|(_, path)| is_one_file(path, log))?;
         Some(format!("{} would destroy {} ({what}); name another file", log.display(), path.display()))
@@ -332,6 +336,9 @@ impl Config {
         if self.addresses().is_none() {
             add("output.base_id", "not a multiple of 32 within 11 bits, or 29 if above 0x7FF");
         }
+        if let Some((key, what)) = self.probability.as_ref().and_then(Given::problem) {
+            add(&format!("probability.{key}"), what);
+        }
         // whatever the settings come from, maps are to be sent like this
         let refused = self.medium().and_then(|medium| self.broadcast(medium).check().err());
         problems.extend(refused.map(|e| of_library(&e)));
@@ -364,6 +371,11 @@ impl Config {
     pub fn of_place(&self, settings: Settings) -> Settings {
         let Self { lanes, obstacles, evidence, fixtures, .. } = *self;
         Settings { lanes, obstacles, evidence, fixtures, ..settings }
+    }
+
+    /// The table of probabilities for the file's own settings, if both are given.
+    pub fn table(&self) -> Option<anyhow::Result<Table>> {
+        self.probability.as_ref().zip(self.settings()).map(|(given, settings)| given.read(self.grid, &settings))
     }
 
     /// Which program the service says this is; its chip is the machine.
@@ -413,6 +425,7 @@ impl Config {
             )),
             _ => lines.push("mount: from a configuration block; the safe state until there is one".to_owned()),
         }
+        lines.extend(self.table().and_then(Result::ok).map(|table| format!("p:     {}", table.said())));
         lines.extend(self.absent().iter().map(|device| format!("not there now, would be waited for: {device}")));
         lines.join("\n")
     }

@@ -8,6 +8,7 @@ mod locate;
 #[path = "../../../tests/harness/src/results/files/one_file.rs"]
 mod one_file;
 mod output;
+mod probability;
 mod reference;
 mod serial;
 #[allow(clippy::duplicate_mod)] // the two grids' loops are the same two files
@@ -69,7 +70,10 @@ fn main() -> ExitCode {
         }
     };
     if args.check {
-        let missing = config.missing_files();
+        let mut missing = config.missing_files();
+        missing.extend(
+            config.table().and_then(Result::err).map(|e| format!("{e:#}; a daemon that runs goes on with grades")),
+        );
         missing.iter().for_each(|problem| error!("{}: {problem}", args.config.display()));
         println!("{}", config.summary(&args.config, missing.is_empty()));
         return if missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(2) };

@@ -10,10 +10,11 @@ use viewshed::board::{BlockError, Flow, StoredSettings};
 use viewshed::{PolarMap, Reason, Time, UnitState};
 
 use super::input::{self, Input, Step, Work};
-use super::size::State as Radar3d;
-use super::size::supervised::{CHECK, Map, Parameters, Sender, State};
+use super::size::supervised::{CHECK, Map, Parameters, State};
+use super::size::{QuantisedSender as Sender, State as Radar3d};
 use crate::config::{ClockSource, Config};
 use crate::output::{Output, version};
+use crate::probability::say_refused;
 use crate::state::{FileSlots, next_epoch};
 use crate::systemd::Systemd;
 
@@ -62,13 +63,26 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         if let Some(reason) = &refused {
             warn!("{reason}: safe state until a block is written");
         }
-        let (mut parameters, mut sender) = (None::<Parameters>, None);
+        let (mut parameters, mut sender, mut no_table) = (None::<Parameters>, None, None);
         if let Some(settings) = &settings {
             let medium = config.medium().context("output.base_id is no identifier")?;
             // what does not build was refused above
             let header = settings.build::<State>(&mut parameters).map_err(|e| anyhow!("{e}"))?;
             let now = input.now(clock.now());
-            let new = Sender::new(config.broadcast(medium), header, epoch, now).map_err(|e| anyhow!("{e}"))?;
+            let given = config.probability.as_ref().map(|given| given.read(config.grid, settings));
+            let quantiser = match given.transpose() {
+                Ok(table) => table.zip(parameters.as_ref()).map(|(table, (p, _))| {
+                    info!("{}", table.said());
+                    table.quantiser(p.visible_from())
+                }),
+                Err(e) => {
+                    warn!("{e:#}: maps are by grades");
+                    no_table = Some(format!("{e:#}"));
+                    None
+                }
+            };
+            let new =
+                Sender::new(config.broadcast(medium), header, quantiser, epoch, now).map_err(|e| anyhow!("{e}"))?;
             sender = Some(Box::new(new));
         }
         let mut unit =
@@ -79,7 +93,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         output.start(config, epoch, input.now(clock.now()), stored);
         info!("started, epoch {}", epoch.number());
         systemd.ready();
-        let mut watch = Watch { refused, ..Watch::default() };
+        let mut watch = Watch { refused, no_table, ..Watch::default() };
         let last = loop {
             if stop.load(Ordering::Relaxed) {
                 info!("stopping");
@@ -96,6 +110,9 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             if let Some(unit) = &mut unit {
                 if unit.offered() != offered && config.input.clock == ClockSource::System {
                     unit.took(now, began.elapsed().as_micros() as u64);
+                }
+                if watch.no_table.is_some() {
+                    say_refused(unit.broadcast().status_mut());
                 }
                 output.send(now, unit, input.line());
             }
@@ -188,6 +205,8 @@ struct Watch {
     found: Option<Reason>,
     /// Why there is no unit.
     refused: Option<BlockError>,
+    /// Why the table of probabilities that is given is not used.
+    no_table: Option<String>,
 }
 
 impl Watch {
@@ -225,6 +244,7 @@ impl Watch {
             (Some(reason), _) => format!("safe state: {reason}"),
             (None, shown) => format!("radar {:?}", shown.map_or(UnitState::Starting, |(state, _)| state)),
         };
-        format!("{state}; {} maps, {} messages sent, {} refused", self.maps, output.sent, output.refused)
+        let table = self.no_table.as_ref().map_or(String::new(), |why| format!("; maps are by grades: {why}"));
+        format!("{state}; {} maps, {} messages sent, {} refused{table}", self.maps, output.sent, output.refused)
     }
 }

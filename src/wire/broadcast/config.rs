@@ -49,6 +49,8 @@ pub struct BroadcastConfig {
     /// Whether messages carry an authenticator; they are then taken by `Broadcaster::next_sealed`. Not on
     /// classic CAN, whose frames have no room for it.
     pub secured: bool,
+    /// How many of the sender's planes are sent, 1 to 3.
+    pub planes: u8,
     /// Time in which the visible range of all azimuths is sent once, milliseconds; `None` for never.
     pub visible_range_ms: Option<u16>,
 }
@@ -66,6 +68,7 @@ impl BroadcastConfig {
             status_ms: 250,
             header_ms: 490,
             secured: false,
+            planes: 3,
             visible_range_ms: None,
         }
     }
@@ -89,6 +92,7 @@ impl BroadcastConfig {
         within("broadcast.max_delay_ms", u32::from(self.max_delay_ms), 10, 500)?;
         within("broadcast.status_ms", u32::from(self.status_ms), 10, 500)?;
         within("broadcast.header_ms", u32::from(self.header_ms), 10, 500)?;
+        within("broadcast.planes", u32::from(self.planes), 1, 3)?;
         within("broadcast.visible_range_ms", u32::from(self.visible_range_ms.unwrap_or(100)), 10, 60_000)
     }
 }

@@ -4,7 +4,7 @@ use super::outgoing_plane::{Encoding, Next};
 use super::{Broadcaster, Running};
 use crate::fixed::time::Time;
 use crate::wire::code::block::Kind;
-use crate::wire::header::{Clock, GROUPS};
+use crate::wire::header::Clock;
 use crate::wire::map_message::{self, LIMITS, SEGMENTS};
 use crate::wire::message::{Message, Packet, Part, Plane, WIRE_VERSION, Word};
 use crate::wire::scan_number::ScanNumber;
@@ -39,10 +39,11 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         }
         let clock = Clock { time_ms: now.micros() / 1000, synchronised: self.synchronised };
         if !self.packing().is_classic() {
-            return Some(self.packet(Message::Header, &self.header.emit(&clock)));
+            let (own, length) = self.header.emit(&clock);
+            return Some(self.packet(Message::Header, own.get(..length)?));
         }
         let own = self.header.emit_group(&clock, self.group);
-        self.group = (self.group + 1) % GROUPS;
+        self.group = (self.group + 1) % self.header.count();
         Some(self.packet(Message::Header, &own))
     }
 

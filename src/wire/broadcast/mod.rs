@@ -11,6 +11,9 @@
 //! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
 //! round all the time, so who joins late has everything within a second.
 //!
+//! *Probability.* With levels in the header the second plane is that of probability. It goes out by halves, right and left in
+//! turn, each with a scan that is 60 ms younger than the last one that brought a half.
+//!
 //! *What is dropped.* A new map ends the one before: what of that was not handed out is dropped, and
 //! the new one begins at the azimuth where the old one broke off, so that on a bus too narrow every
 //! azimuth has its turn. What of a map is not handed out within [`BroadcastConfig::stale_ms`] of its
@@ -35,7 +38,7 @@ use self::config::within;
 use self::outgoing_plane::{Next, OutgoingPlane};
 use self::pace::Every;
 use super::frame::{CanFrame, fd_length};
-use super::header::{GROUPS, Header};
+use super::header::Header;
 use super::message::{Epoch, Message, Packet, Packing, Plane};
 use super::planes::Planes;
 use super::scan_number::ScanNumber;
@@ -48,6 +51,10 @@ use crate::sensor::config::ConfigError;
 
 /// Age of the last whole refresh at which the next is due, ticks of 20 ms.
 const REFRESH_TICKS: u8 = 9;
+
+/// Age of the last half of the plane of probability at which the other is due: it costs more than visibility, and a
+/// receiver holds it for the greatest age, so that one of the same half may be lost.
+const PROBABILITY_US: u64 = 60_000;
 
 /// Why a map is not sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,6 +101,8 @@ pub struct Broadcaster<const A: usize, const W: usize, const P: usize = 1> {
     last: Option<Time>,
     /// The last scan that began to refresh everything.
     refreshed: Option<Time>,
+    /// The last scan with half of the plane of probability, and whether it was the left one.
+    probable: Option<(Time, bool)>,
     /// Where the next map begins.
     from: usize,
     started: Time,
@@ -130,6 +139,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             scan: None,
             last: None,
             refreshed: None,
+            probable: None,
             from: 0,
             started: now,
             quiet_until: now,
@@ -169,7 +179,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
         Self::fits(&header)?;
-        self.header = Header { planes: planes(P), ..header };
+        self.header = Header { planes: planes(P.min(usize::from(self.config.planes))), ..header };
         self.status.fingerprint = header.fingerprint;
         self.header_due = Every::new(now, u64::from(self.config.header_ms) * 1000 / u64::from(self.header_messages()));
         self.quiet(now);
@@ -181,7 +191,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     /// Messages that the whole header takes.
     fn header_messages(&self) -> u8 {
-        if self.packing().is_classic() { GROUPS } else { 1 }
+        if self.packing().is_classic() { self.header.count() } else { 1 }
     }
 
     fn quiet_us(&self) -> u64 {
@@ -196,7 +206,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.drop_scan();
         self.overloaded = overloaded;
         self.planes.iter_mut().for_each(OutgoingPlane::forget);
-        (self.last, self.refreshed, self.from) = (None, None, 0);
+        (self.last, self.refreshed, self.probable, self.from) = (None, None, None, 0);
         self.quiet_until = Time::from_micros(now.micros() + self.quiet_us());
     }
 
@@ -272,8 +282,17 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             self.refreshed = None;
         }
         let azimuths = usize::from(self.header.azimuths);
-        for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL) {
-            outgoing.offer(number, azimuths, |azimuth| map.ray(plane, azimuth));
+        for (outgoing, plane) in self.planes.iter_mut().zip(Plane::ALL).take(usize::from(self.config.planes)) {
+            let mut part = 0..azimuths;
+            if plane == Plane::Grade && self.header.probability.is_some() {
+                let (last, left) = self.probable.map_or((None, true), |(last, left)| (Some(last), left));
+                if last.and_then(|last| measured.since(last)).is_some_and(|us| us < PROBABILITY_US) {
+                    continue;
+                }
+                self.probable = Some((measured, !left));
+                part = if left { 0..azimuths / 2 } else { azimuths / 2..azimuths };
+            }
+            outgoing.offer(number, part, |azimuth| map.ray(plane, azimuth));
         }
         let refreshed = self.refreshed.map(ScanNumber::at);
         let all = refreshed.is_none_or(|refreshed| number.ticks_after(refreshed) >= REFRESH_TICKS);

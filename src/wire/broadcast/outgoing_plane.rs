@@ -5,6 +5,8 @@
 //! are as they were, is encoded against that refresh; any other is refreshed. An azimuth that no block
 //! can hold goes out in plain bits. Only what was handed out whole is built upon.
 
+use core::ops::Range;
+
 use crate::wire::code::block::{Block, Context, Kind, Rays};
 use crate::wire::code::ray::Ray;
 use crate::wire::message::Azimuths;
@@ -76,11 +78,11 @@ impl<const A: usize, const W: usize> OutgoingPlane<A, W> {
         }
     }
 
-    /// Takes a scan; what was still to be encoded of the one before is not encoded any more.
-    pub fn offer(&mut self, scan: ScanNumber, azimuths: usize, ray: impl Fn(usize) -> Ray<W>) {
-        self.pending = Azimuths::span(0, azimuths.min(A));
+    /// Takes some azimuths of a scan; what was still to be encoded of the one before is not encoded any more.
+    pub fn offer(&mut self, scan: ScanNumber, part: Range<usize>, ray: impl Fn(usize) -> Ray<W>) {
+        self.pending = Azimuths::span(part.start, part.end.min(A));
         let was = self.was.iter().zip(&self.was_scan);
-        let azimuths = self.now.iter_mut().zip(&mut self.ticks).zip(was).enumerate().take(azimuths);
+        let azimuths = self.now.iter_mut().zip(&mut self.ticks).zip(was).enumerate().take(part.end).skip(part.start);
         for (azimuth, ((now, ticks), (was, was_scan))) in azimuths {
             *now = ray(azimuth);
             *ticks = scan.ticks_after(*was_scan);

@@ -4,7 +4,9 @@ use super::measure::ReceiverLimits;
 use super::sensor::SensorReceiver;
 use crate::fixed::time::Time;
 use crate::map::polar::PolarGeometry;
+use crate::map::query::Footprint;
 use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::probability::{self, Probability};
 use crate::sensor::road::RoadPoint;
 use crate::wire::code::ray::Ray;
 use crate::wire::header::Header;
@@ -13,7 +15,7 @@ use crate::wire::scan_number::ScanNumber;
 
 /// The map of one sensor at a moment. Everything is unknown that is not known to be current.
 ///
-/// Grades come in four steps where the grade plane is sent, else they are 0 and 255. Occupancy needs
+/// Grades come in four steps where the grade plane is sent and no probabilities go with it, else they are 0 and 255. Occupancy needs
 /// its plane; without it nothing is said to be free.
 #[derive(Debug, Clone, Copy)]
 pub struct ReceivedMap<'a, const A: usize, const W: usize, const P: usize> {
@@ -50,6 +52,42 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
         sensor.current(Plane::Visibility, azimuth, self.now, &self.limits).map(|(_, scan)| scan)
     }
 
+    /// The probability that the sensor would detect a vehicle in a cell, rounded down to what the cell's bits say: never
+    /// above what the sender's table said of its map, measured at most `A + D` ago, and no frame of a newer scan that was
+    /// accepted says otherwise. `None` where the cell is unknown, and where the sender says nothing of probabilities.
+    pub fn probability(&self, azimuth: usize, range: usize) -> Option<Probability> {
+        let levels = self.header()?.probability?;
+        let visibility = self.ray(Plane::Visibility, azimuth);
+        if !visibility.known.contains(range) {
+            return None;
+        }
+        // bits outside the known cells are not set
+        Some(levels.of(visibility.get(range), self.ray(Plane::Grade, azimuth).get(range)))
+    }
+
+    /// The same of a point of the road.
+    pub fn probability_at(&self, point: RoadPoint) -> Option<Probability> {
+        let (azimuth, range) = self.locate(point)?;
+        self.probability(azimuth, range)
+    }
+
+    /// Of vehicles that are somewhere in an area, the share that is expected to be missed: mean(1 - p) over its cells,
+    /// rounded up. Unknown cells count as missed, and so does everything where the sender says nothing of
+    /// probabilities. `None` for an area larger than queries look at.
+    ///
+    /// It is an upper bound of what the sender's table says, because p comes rounded down. It is not the FVR: it is of
+    /// all vehicles, the FVR of those that were missed.
+    pub fn expected_missed(&self, area: &Footprint) -> Option<Probability> {
+        probability::expected_missed(area, |point| self.probability_at(point))
+    }
+
+    /// The cell a point lies in, azimuth and range.
+    fn locate(&self, point: RoadPoint) -> Option<(usize, usize)> {
+        let (_, header, geometry) = self.shown.as_ref()?;
+        let (x, y) = geometry.levelling.place(point);
+        geometry.locate(x, y, usize::from(header.ranges), usize::from(header.azimuths))
+    }
+
     /// Whether a plane is sent.
     pub fn has(&self, plane: Plane) -> bool {
         plane.index() < P && self.header().is_some_and(|header| header.planes >> plane.index() & 1 == 1)
@@ -66,7 +104,8 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
             let ray = Some(self.ray(plane, azimuth)).filter(|_| self.has(plane));
             ray.filter(|ray| ray.known.contains(range)).map(|ray| ray.get(range))
         };
-        let grade = match (visible, bit(Plane::Grade)) {
+        let graded = self.header().is_some_and(|header| header.probability.is_none());
+        let grade = match (visible, bit(Plane::Grade).filter(|_| graded)) {
             (true, None | Some(true)) => u8::MAX,
             (true, Some(false)) => 170,
             (false, Some(true)) => 85,
@@ -84,10 +123,7 @@ impl<'a, const A: usize, const W: usize, const P: usize> ReceivedMap<'a, A, W, P
 
 impl<const A: usize, const W: usize, const P: usize> VisibilityMap for ReceivedMap<'_, A, W, P> {
     fn at(&self, point: RoadPoint) -> CellState {
-        let Some((_, header, geometry)) = &self.shown else { return CellState::UNKNOWN };
-        let (x, y) = geometry.levelling.place(point);
-        let cell = geometry.locate(x, y, usize::from(header.ranges), usize::from(header.azimuths));
-        cell.map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))
+        self.locate(point).map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))
     }
 }
 

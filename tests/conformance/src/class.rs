@@ -52,16 +52,18 @@ pub enum Class {
     HeaderFaults,
     /// Made-up maps: noise, limits that change, azimuths without known cells.
     MadeUpMaps,
+    /// A sender with a table of probabilities; 5 % of its frames are lost.
+    Probabilities,
 }
 
 use Class::{
     ClockJumps, Cuts, DelayPasses, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, HeaderFaults, Jitter, Late1,
-    LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, Others, ReceiverRestarts,
-    Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
+    LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, Others, Probabilities,
+    ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
 };
 
 impl Class {
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 27] = [
         Lossless,
         Loss1,
         Loss5,
@@ -88,6 +90,7 @@ impl Class {
         Others,
         HeaderFaults,
         MadeUpMaps,
+        Probabilities,
     ];
 
     pub fn name(self) -> &'static str {
@@ -118,6 +121,7 @@ impl Class {
             Others => "others",
             HeaderFaults => "header-faults",
             MadeUpMaps => "made-up-maps",
+            Probabilities => "probabilities",
         }
     }
 
@@ -127,7 +131,7 @@ impl Class {
         let [can, canfd, serial] = match self {
             Lossless | Others | Repeated20 | Strays | Mailboxes | Echo => [97.5; 3],
             Loss1 | Late1 => [97.5, 98.0, 98.0],
-            Loss5 => [94.0, 97.5, 97.5],
+            Loss5 | Probabilities => [94.0, 97.5, 97.5],
             Loss20 => [66.0, 91.5, 91.5],
             Reordered => [60.0, 96.0, 95.3],
             Jitter | Flips => [96.7, 97.7, 97.7],

@@ -43,6 +43,7 @@ pub enum Input {
     Bytes { time: u64, data: Vec<u8> },
     Look { time: u64 },
     Cells { time: u64 },
+    Probability { time: u64 },
 }
 
 impl Input {
@@ -50,9 +51,11 @@ impl Input {
     pub fn time(&self) -> Option<u64> {
         match self {
             Self::Start { .. } => None,
-            Self::Frame { time, .. } | Self::Bytes { time, .. } | Self::Look { time } | Self::Cells { time } => {
-                Some(*time)
-            }
+            Self::Frame { time, .. }
+            | Self::Bytes { time, .. }
+            | Self::Look { time }
+            | Self::Cells { time }
+            | Self::Probability { time } => Some(*time),
         }
     }
 
@@ -86,6 +89,7 @@ impl fmt::Display for Input {
             Self::Bytes { time, data } => write!(f, "bytes {time} {}", Hex(data)),
             Self::Look { time } => write!(f, "look {time}"),
             Self::Cells { time } => write!(f, "cells {time}"),
+            Self::Probability { time } => write!(f, "probability {time}"),
         }
     }
 }
@@ -119,6 +123,7 @@ impl FromStr for Input {
             ["bytes", at, data] => time(at).zip(bytes(data)).map(|(time, data)| Self::Bytes { time, data }),
             ["look", at] => time(at).map(|time| Self::Look { time }),
             ["cells", at] => time(at).map(|time| Self::Cells { time }),
+            ["probability", at] => time(at).map(|time| Self::Probability { time }),
             _ => None,
         };
         input.ok_or_else(|| format!("`{line}` is no line of tests/conformance/README.md"))
@@ -131,9 +136,15 @@ mod tests {
 
     #[test]
     fn lines_are_read_as_they_are_written() {
-        for line in
-            ["start canfd 7", "frame 123 40A 00FF", "frame 1 400 -", "bytes 9 0102", "look 5", "cells 9007199254740991"]
-        {
+        for line in [
+            "start canfd 7",
+            "frame 123 40A 00FF",
+            "frame 1 400 -",
+            "bytes 9 0102",
+            "look 5",
+            "cells 9007199254740991",
+            "probability 6",
+        ] {
             assert_eq!(line.parse::<Input>().unwrap().to_string(), line);
         }
         for line in

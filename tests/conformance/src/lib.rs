@@ -25,7 +25,7 @@ use viewshed_harness::{estimators, recording};
 pub fn maps() -> Result<Maps> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
     let recording = recording::read(&path, &recording::ReadOptions::default())?;
-    let mut maps = Maps::new(&recording, &estimators::Options::default(), &|| ())?;
+    let mut maps = Maps::new(&recording, &estimators::Options::default(), None, &|| ())?;
     maps.scans.drain(..15);
     Ok(maps)
 }

@@ -22,7 +22,7 @@ pub type Visible = Vec<[u32; W]>;
 pub struct Library {
     bus: Bus,
     sensor: u8,
-    receiver: Box<Receiver<1, A, W>>,
+    receiver: Box<Receiver<1, A, W, 2>>,
     line: Unstuffer,
 }
 
@@ -51,6 +51,7 @@ impl Library {
             Input::Bytes { time, data } => self.bytes(Time::from_micros(*time), data),
             Input::Look { time } => return Some(self.look(*time)),
             Input::Cells { time } => return Some(self.cells(*time)),
+            Input::Probability { time } => return Some(self.probability(*time)),
         }
         None
     }
@@ -98,6 +99,21 @@ impl Library {
         }
         let hash = if visible + invisible == 0 { 0 } else { crc.sum() };
         format!("{time} {visible} {invisible} {hash:08x}")
+    }
+
+    fn probability(&self, time: u64) -> String {
+        let map = self.receiver.map(self.sensor, Time::from_micros(time));
+        let (ranges, azimuths) = map.header().map_or((0, 0), |h| (usize::from(h.ranges), usize::from(h.azimuths)));
+        let (mut crc, mut cells, mut sum) = (Crc::new(), 0, 0);
+        for azimuth in 0..azimuths {
+            let row: Vec<_> = (0..ranges).map(|range| map.probability(azimuth, range)).collect();
+            cells += row.iter().flatten().count();
+            let row: Vec<u8> = row.iter().map(|p| p.map_or(0, |p| p.raw())).collect();
+            sum += row.iter().map(|p| u64::from(*p)).sum::<u64>();
+            crc.update(&row);
+        }
+        let hash = if cells == 0 { 0 } else { crc.sum() };
+        format!("{time} p {cells} {sum} {hash:08x}")
     }
 
     fn cells(&self, time: u64) -> String {

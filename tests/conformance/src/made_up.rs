@@ -2,6 +2,7 @@
 
 use viewshed::fixed::bits::Bits;
 use viewshed::fixed::time::Time;
+use viewshed::probability::Levels;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Clock, Header};
 use viewshed::wire::message::{Epoch, Message, Packet};
@@ -84,7 +85,10 @@ impl Maker {
         let group = 1 + random.below(6) as u8;
         let mut own = match self.bus {
             Bus::Can => header.emit_group(&clock, group).to_vec(),
-            Bus::CanFd | Bus::Serial => header.emit(&clock).to_vec(),
+            Bus::CanFd | Bus::Serial => {
+                let (own, length) = header.emit(&clock);
+                own[..length].to_vec()
+            }
         };
         match random.below(6) {
             // another wire version, seldom, as it blanks
@@ -125,9 +129,20 @@ pub fn maps(like: &Maps, random: &mut Random) -> Maps {
             let wide = ray(&rays[from], ranges, random);
             rays[from..(from + 20).min(azimuths)].fill(wide);
         }
-        scans.push(Scan { measured: scan.measured, rays: rays.clone() });
+        scans.push(Scan { measured: scan.measured, rays: rays.clone(), probable: Vec::new() });
     }
     Maps { header: like.header, scans, holes: 0 }
+}
+
+/// The same maps with a plane of probability, whose bits are those of a map some scans later.
+pub fn with_probabilities(like: &Maps) -> Maps {
+    let later = like.scans.iter().cycle().skip(5);
+    let scan = |(scan, later): (&Scan, &Scan)| {
+        let probable = scan.rays.iter().zip(&later.rays).map(|(ray, later)| Ray::new(ray.known, *later.bits()));
+        Scan { probable: probable.collect(), ..scan.clone() }
+    };
+    let header = Header { probability: Levels::from_bytes([61, 178, 242, 0xAB, 0xCD]), ..like.header };
+    Maps { header, scans: like.scans.iter().zip(later).map(scan).collect(), holes: 0 }
 }
 
 fn ray(before: &Ray<W>, ranges: usize, random: &mut Random) -> Ray<W> {

@@ -74,7 +74,7 @@ struct Waiting {
 struct Sender<'a> {
     bus: Bus,
     plan: &'a Plan,
-    broadcaster: Broadcaster<A, W>,
+    broadcaster: Broadcaster<A, W, 2>,
     slots: Vec<Option<Waiting>>,
     /// The bus is busy up to here.
     free: u64,
@@ -90,6 +90,7 @@ pub fn send(maps: &Maps, bus: Bus, plan: &Plan) -> Result<(Vec<Sent>, Life)> {
     if plan.mailboxes.is_some() {
         config.gap_us = 0;
     }
+    config.planes = if maps.header.probability.is_some() { 2 } else { 1 };
     config.visible_range_ms = plan.visible_range.then_some(500);
     let begin = Time::from_micros(plan.from + plan.ahead);
     let mut broadcaster =

@@ -86,7 +86,11 @@ impl World {
         let end = START + length_us;
         let (mut sent, mut lives) = (Vec::new(), Vec::new());
         let plans = plans(class, &mut random, end);
-        let made_up = (class == Class::MadeUpMaps).then(|| made_up::maps(maps, &mut random));
+        let made_up = match class {
+            Class::MadeUpMaps => Some(made_up::maps(maps, &mut random)),
+            Class::Probabilities => Some(made_up::with_probabilities(maps)),
+            _ => None,
+        };
         let maps = made_up.as_ref().unwrap_or(maps);
         for plan in &plans {
             let (more, life) = send(maps, bus, plan)?;
@@ -119,6 +123,9 @@ impl World {
         let mut at = START;
         while at < end {
             inputs.push((at, 2, Input::Look { time: clock.read(at) }));
+            if class == Class::Probabilities {
+                inputs.push((at, 2, Input::Probability { time: clock.read(at) }));
+            }
             at += if looks == Looks::Log { 100 * MS } else { random.between(20 * MS, 50 * MS) };
         }
         inputs.sort_by_key(|(at, order, _)| (*at, *order));
@@ -224,7 +231,7 @@ impl Faults {
             | Class::MailboxesFull
             | Class::MadeUpMaps => sent,
             Class::Loss1 => self.lose(sent, 10),
-            Class::Loss5 => self.lose(sent, 50),
+            Class::Loss5 | Class::Probabilities => self.lose(sent, 50),
             Class::Loss20 => self.lose(sent, 200),
             Class::Reordered => self.delay(sent, 1000, 100 * MS),
             Class::Jitter => self.delay(sent, 1000, 50 * MS),

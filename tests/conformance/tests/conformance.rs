@@ -200,7 +200,7 @@ fn runs(
         }
         for other in others.iter().filter(|other| seed <= other.runs) {
             let text = world.text(other.length_us);
-            let asked = text.lines().filter(|line| line.starts_with("look")).count();
+            let asked = text.lines().filter(|line| ["look", "prob"].iter().any(|q| line.starts_with(q))).count();
             let theirs = other.program.answers(text).expect("a receiver that runs");
             let ours = ours[..asked].join("\n");
             wrong.extend(logs::difference(&format!("{name}, {}", other.language), &ours, &theirs));

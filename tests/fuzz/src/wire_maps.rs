@@ -47,6 +47,7 @@ pub fn run(bytes: &[u8]) {
         usual: Known::new(3, 64),
         planes: 1,
         fingerprint: 0,
+        probability: None,
     };
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     let mut sender = Broadcaster::<A, W>::new(config, header, Epoch::new(1), Time::from_micros(0)).unwrap();

@@ -52,6 +52,12 @@ pub fn run(bytes: &[u8]) {
             for azimuth in 0..32 {
                 let ray = map.ray(Plane::Visibility, azimuth);
                 assert!(ray.known.end() <= 128 && ray.bits().iter().all(|cell| ray.known.contains(cell)));
+                // only where something is known, and never more than the greatest level
+                let most = header.probability.map(|levels| levels.of(true, true));
+                for range in [ray.known.near(), ray.known.end().saturating_sub(1), 127] {
+                    let p = map.probability(azimuth, range);
+                    assert!(p.is_none() || ray.known.contains(range) && p <= most);
+                }
             }
         }
         let _ = receiver.together(now).at(RoadPoint::new(1000, 100));

@@ -42,6 +42,7 @@ fn sent() -> &'static [(Vec<u8>, u64)] {
             usual: Known::new(2, 30),
             planes: 1,
             fingerprint: 0,
+            probability: None,
         };
         let config = BroadcastConfig { secured: true, ..BroadcastConfig::new(SENSOR, Medium::Serial) };
         let mut sender = Broadcaster::<8, 1>::new(config, header, Epoch::new(1), Time::from_micros(0)).unwrap();

@@ -41,6 +41,10 @@ pub struct Moment {
     pub visible: usize,
     pub invisible: usize,
     pub unknown: usize,
+    /// Of the cells that are known, the mean of the least probability that a vehicle there is detected; of a sender
+    /// with a table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability: Option<f64>,
 }
 
 /// What one sensor said.
@@ -70,6 +74,18 @@ pub struct Mounted {
     pub ranges: u16,
     pub cell_m: f64,
     pub fingerprint: u32,
+    /// Of a sender with a table of probabilities.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probability: Option<LevelsSeen>,
+}
+
+/// What a cell's bits say of its probability at least.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LevelsSeen {
+    /// Known; visible; visible with the bit of the plane of probability.
+    pub least: [f64; 3],
+    /// Lowest 16 bits of the table's check sum.
+    pub table: u16,
 }
 
 /// The status.
@@ -187,14 +203,19 @@ impl Listening {
     pub fn moment(&self, sensor: u8) -> Option<Moment> {
         let map = self.map(sensor);
         let header = map.header()?;
-        let mut moment = Moment { time_s: self.time_s(), visible: 0, invisible: 0, unknown: 0 };
+        let mut moment = Moment { time_s: self.time_s(), visible: 0, invisible: 0, unknown: 0, probability: None };
+        let (mut cells, mut sum) = (0_u32, 0.0);
         for azimuth in 0..usize::from(header.azimuths) {
             let ray = map.ray(Plane::Visibility, azimuth);
             let (known, visible) = (ray.known.end().saturating_sub(ray.known.near()), ray.bits().count() as usize);
             moment.visible += visible;
             moment.invisible += known - visible;
             moment.unknown += usize::from(header.ranges) - known;
+            for p in (0..usize::from(header.ranges)).filter_map(|range| map.probability(azimuth, range)) {
+                (cells, sum) = (cells + 1, sum + f64::from(p.raw()) / 255.0);
+            }
         }
+        moment.probability = (cells > 0).then(|| sum / f64::from(cells));
         Some(moment)
     }
 
@@ -216,6 +237,11 @@ impl Listening {
                 ranges: h.ranges,
                 cell_m: f64::from(h.cell_cm) / 100.0,
                 fingerprint: h.fingerprint,
+                probability: h.probability.map(|levels| {
+                    let bits = [(false, false), (true, false), (true, true)];
+                    let least = bits.map(|(visible, clear)| levels.of(visible, clear));
+                    LevelsSeen { least: least.map(|p| f64::from(p.raw()) / 255.0), table: levels.table() }
+                }),
             }
         });
         let status = sensor.status().map(|s| StatusSeen {

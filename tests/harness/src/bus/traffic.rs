@@ -3,12 +3,13 @@
 use anyhow::{Result, anyhow};
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
+use viewshed::probability::Quantiser;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, fingerprint};
 use viewshed::wire::message::{Addresses, Epoch, Plane};
-use viewshed::wire::planes::Planes;
+use viewshed::wire::planes::{Planes, Quantised};
 use viewshed::wire::secoc::Sealer;
 use viewshed::wire::serial::{self, MOST_STUFFED};
 
@@ -47,6 +48,8 @@ pub const AUTHENTICATED: [Bus; 2] =
 pub struct Scan {
     pub measured: Time,
     pub rays: Vec<Ray<W>>,
+    /// Those of the plane of probability, where it is sent.
+    pub probable: Vec<Ray<W>>,
 }
 
 /// The maps of a recording, and what they are of.
@@ -58,15 +61,30 @@ pub struct Maps {
 }
 
 impl Maps {
-    /// Radar-3d's maps.
-    pub fn new(recording: &Recording, options: &estimators::Options, step: &dyn Fn()) -> Result<Self> {
+    /// Radar-3d's maps, with a table of probabilities as a unit that has it sends them.
+    pub fn new(
+        recording: &Recording,
+        options: &estimators::Options,
+        quantiser: Option<&Quantiser>,
+        step: &dyn Fn(),
+    ) -> Result<Self> {
         let sensor = estimators::sensor(recording, &options.noise);
         let (mut scans, mut geometry, mut holes) = (Vec::new(), None, 0);
         radar_3d::maps(&recording.frames, &sensor, &options.radar_3d, |measured, map| {
             geometry = Some(*map.geometry());
-            let rays: Vec<Ray<W>> = (0..A).map(|azimuth| map.ray(Plane::Visibility, azimuth)).collect();
+            let plane = |plane| -> Vec<Ray<W>> {
+                let ray = |azimuth| {
+                    quantiser.map_or_else(
+                        || map.ray(plane, azimuth),
+                        |quantiser| Quantised { map, quantiser }.ray(plane, azimuth),
+                    )
+                };
+                (0..A).map(ray).collect()
+            };
+            let rays = plane(Plane::Visibility);
             holes += holes_of(map, &rays);
-            scans.push(Scan { measured, rays });
+            let probable = if quantiser.is_some() { plane(Plane::Grade) } else { Vec::new() };
+            scans.push(Scan { measured, rays, probable });
             step();
         })?;
         let geometry = geometry.ok_or_else(|| anyhow!("{} has no radar frames", recording.name))?;
@@ -80,6 +98,7 @@ impl Maps {
             fingerprint(configuration.as_bytes()),
         )
         .map_err(|error| anyhow!("the maps of {} cannot be sent: {error:?}", recording.name))?;
+        let header = Header { probability: quantiser.map(Quantiser::levels), ..header };
         Ok(Self { header, scans, holes })
     }
 }
@@ -121,8 +140,12 @@ pub struct Traffic {
 
 impl Planes<W> for Scan {
     fn ray(&self, plane: Plane, azimuth: usize) -> Ray<W> {
-        let ray = self.rays.get(azimuth).filter(|_| plane == Plane::Visibility);
-        ray.copied().unwrap_or(Ray::UNKNOWN)
+        let rays = match plane {
+            Plane::Visibility => &self.rays,
+            Plane::Grade => &self.probable,
+            Plane::Occupancy => return Ray::UNKNOWN,
+        };
+        rays.get(azimuth).copied().unwrap_or(Ray::UNKNOWN)
     }
 }
 
@@ -137,8 +160,9 @@ impl Traffic {
     pub fn new(maps: &Maps, bus: Bus, visible_range_ms: Option<u16>, sensor: u8, key: Option<&Key>) -> Result<Self> {
         let begin = maps.scans.first().map_or(Time::from_micros(0), |scan| scan.measured);
         let secured = key.is_some();
-        let config = BroadcastConfig { visible_range_ms, secured, ..BroadcastConfig::new(sensor, bus.medium) };
-        let mut sender = Broadcaster::<A, W>::new(config, maps.header, Epoch::new(1), begin)
+        let planes = if maps.header.probability.is_some() { 2 } else { 1 };
+        let config = BroadcastConfig { visible_range_ms, secured, planes, ..BroadcastConfig::new(sensor, bus.medium) };
+        let mut sender = Broadcaster::<A, W, 2>::new(config, maps.header, Epoch::new(1), begin)
             .map_err(|error| anyhow!("{}: {error}", bus.name))?;
         sender.status_mut().state = viewshed::wire::status::UnitState::Ok;
         // a clock in microseconds runs ahead of any number of messages
@@ -164,7 +188,7 @@ impl Traffic {
 
 impl Sent {
     fn next(
-        sender: &mut Broadcaster<A, W>,
+        sender: &mut Broadcaster<A, W, 2>,
         sealer: Option<&mut Sealer<Key>>,
         bus: &Bus,
         at: Time,

@@ -13,6 +13,7 @@ use viewshed::wire::code::interval::Form;
 use super::key::KeyArgs;
 use super::print;
 use super::progress::bar;
+use super::replay::risk::{quantiser, share};
 use super::replay::shipped;
 use crate::bus::ears::Key;
 use crate::bus::entropy::Entropy;
@@ -22,6 +23,7 @@ use crate::bus::report::Report;
 use crate::bus::symbols::{self, Symbols};
 use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
 use crate::command::options::SettingsArgs;
+use crate::evaluation::probability::file::Fitted;
 use crate::recording;
 use crate::recording::can_log::{Content, Line};
 use crate::recording::serial_log::Chunk;
@@ -57,6 +59,12 @@ pub struct Args {
     /// Send the guaranteed visible range of every azimuth once in this time, too
     #[arg(long, value_name = "MS", help_heading = "Sender")]
     visible_range: Option<u16>,
+    /// Send probabilities by this unit's table, NAME.probability.toml of `viewshed experiment --calibration --tables`
+    #[arg(long, value_name = "FILE", help_heading = "Sender")]
+    probability: Option<PathBuf>,
+    /// Send as visible what keeps this risk, the share of vehicles in it that are missed, above 0 to below 1
+    #[arg(long, value_name = "SHARE", requires = "probability", value_parser = share, help_heading = "Sender")]
+    risk: Option<f64>,
     /// Number of the sensor, which decides the identifiers
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..8), help_heading = "Sender")]
     sensor: u8,
@@ -82,7 +90,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("--log writes one recording and {} are to be sent; name one", paths.len());
     }
     let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
-    outputs.reads(args.settings.files().chain(args.key.file()));
+    outputs.reads(args.settings.files().chain(args.key.file()).chain(args.probability.clone()));
     let json = outputs.file("--json", args.json.as_deref())?;
     let log = outputs.file("--log", args.log.as_deref())?;
     let key = args.key.key()?;
@@ -94,7 +102,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     for path in &paths {
         let recording = recording::read(path, &settings.reading)?;
         let progress = bar(&format!("replaying {}", recording.name), recording.frames.len() as u64);
-        let maps = Maps::new(&recording, &settings.estimators, &|| progress.step())?;
+        let fitted = args.probability.as_ref().map(|path| Fitted::read(path)).transpose()?;
+        let of_unit = fitted.map(|fitted| quantiser(fitted, args.risk, &recording, &settings)).transpose()?;
+        let table = of_unit.as_ref().map(|(quantiser, _)| quantiser);
+        let maps = Maps::new(&recording, &settings.estimators, table, &|| progress.step())?;
         drop(progress);
         if args.count_symbols {
             count(&mut symbols, &maps);

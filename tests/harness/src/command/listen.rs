@@ -210,7 +210,8 @@ fn shares(m: &Moment) -> String {
     let all = (m.visible + m.invisible + m.unknown).max(1) as f64;
     let share = |n: usize| 100.0 * n as f64 / all;
     let (visible, invisible, unknown) = (share(m.visible), share(m.invisible), share(m.unknown));
-    format!("{visible:.1} % of the cells visible, {invisible:.1} % not, {unknown:.1} % unknown")
+    let p = m.probability.map_or(String::new(), |p| format!("; a known cell has p >= {p:.2} in the mean"));
+    format!("{visible:.1} % of the cells visible, {invisible:.1} % not, {unknown:.1} % unknown{p}")
 }
 
 /// Counts, and draws, every sensor's map as it is now.
@@ -287,6 +288,14 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
                 h.cell_m,
                 h.fingerprint
             );
+            if let Some(p) = &h.probability {
+                let [known, visible, clear] = p.least;
+                let _ = writeln!(
+                    text,
+                    "  probabilities by a table whose check sum ends in {:04x}: known {known:.2}, visible {visible:.2} or {clear:.2}",
+                    p.table
+                );
+            }
         }
         if let Some(s) = &heard.status {
             let _ = writeln!(

@@ -1,40 +1,34 @@
 //! `radar-3d-risk`: the map of `radar-3d` with bits that keep a risk, by a unit's table of probabilities.
 
-use viewshed::map::{CellState, Visibility, VisibilityMap};
-use viewshed::probability::ProbabilityTable;
-use viewshed::sensor::mount::Levelling;
+use viewshed::map::polar::PolarGeometry;
+use viewshed::map::{CellState, VisibilityMap};
+use viewshed::probability::Quantiser;
 use viewshed::sensor::road::RoadPoint;
 
 use super::Estimator;
+use super::radar_3d::{AZIMUTHS, RANGES};
 use crate::geometry::solid::Solid;
 use crate::recording::Frame;
 
 /// What it is called in tables.
 pub const NAME: &str = "radar-3d-risk";
 
-/// Another estimator's map, a cell of which is visible where its probability is high enough.
+/// The map of `radar-3d`, a cell of which is visible where its probability is high enough: the bits a unit sends.
 pub struct AtRisk {
     inner: Box<dyn Estimator>,
-    table: ProbabilityTable,
-    levelling: Levelling,
-    /// Least probability of what is visible, 1/255; without, nothing is.
-    least: Option<u8>,
+    quantiser: Quantiser,
+    grid: PolarGeometry,
 }
 
 impl AtRisk {
-    pub fn new(inner: Box<dyn Estimator>, table: ProbabilityTable, levelling: Levelling, least: Option<u8>) -> Self {
-        Self { inner, table, levelling, least }
+    pub fn new(inner: Box<dyn Estimator>, quantiser: Quantiser, grid: PolarGeometry) -> Self {
+        Self { inner, quantiser, grid }
     }
 }
 
 impl VisibilityMap for AtRisk {
     fn at(&self, point: RoadPoint) -> CellState {
-        let mut state = self.inner.map().at(point);
-        if let Some(p) = self.table.of_cell(&self.levelling, state, point) {
-            let visible = self.least.is_some_and(|least| p.raw() >= least);
-            state.visibility = if visible { Visibility::Visible } else { Visibility::Invisible };
-        }
-        state
+        self.quantiser.of_point(&self.grid, [RANGES, AZIMUTHS], self.inner.map().at(point), point).0
     }
 }
 
@@ -66,7 +60,9 @@ impl Estimator for AtRisk {
 
 #[cfg(test)]
 mod tests {
-    use viewshed::probability::{Edges, Probability};
+    use viewshed::Angle;
+    use viewshed::map::Visibility;
+    use viewshed::probability::{Edges, Probability, ProbabilityTable, Threshold};
     use viewshed::sensor::mount::Mount;
 
     use super::*;
@@ -112,16 +108,23 @@ mod tests {
         }); 8];
         let table = ProbabilityTable::new(edges, values, 0).unwrap();
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
-        let at = |x_m: f32, least: Option<u8>| {
-            let map = AtRisk::new(Box::new(Fixed), table.clone(), mount.levelling().unwrap(), least);
+        let grid = PolarGeometry {
+            levelling: mount.levelling().unwrap(),
+            cell_cm: 100,
+            azimuth_origin: Angle::from_degrees(-60.0),
+            azimuth_span: 21_845,
+        };
+        let at = |x_m: f32, threshold: Threshold| {
+            let quantiser = Quantiser::new(table.clone(), Some(threshold), 0);
+            let map = AtRisk::new(Box::new(Fixed), quantiser, grid);
             map.at(RoadPoint::from_metres(x_m, 0.0).unwrap()).visibility
         };
         use Visibility::{Invisible, Unknown, Visible};
-        assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Some(200))), [Visible, Invisible, Invisible]);
-        assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Some(160))), [Visible, Visible, Invisible]);
-        assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Some(0))), [Visible; 3]);
-        assert_eq!([10.0, 60.0].map(|x| at(x, None)), [Invisible; 2]);
-        assert_eq!(at(-5.0, Some(0)), Unknown);
+        assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Threshold::From(200))), [Visible, Invisible, Invisible]);
+        assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Threshold::From(160))), [Visible, Visible, Invisible]);
+        assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Threshold::Everything)), [Visible; 3]);
+        assert_eq!([10.0, 60.0].map(|x| at(x, Threshold::Nothing)), [Invisible; 2]);
+        assert_eq!(at(-5.0, Threshold::Everything), Unknown);
         assert_eq!(table.look_up(200, 100, viewshed::Angle::ZERO), Some(Probability::from_raw(240)));
     }
 }

@@ -14,7 +14,7 @@ use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement, NotADetection};
 use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
-use viewshed::map::polar::PolarMap;
+use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::obstacles::lanes;
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
@@ -178,6 +178,15 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
     let mut radar_3d = options.radar_3d;
     radar_3d.gate.max_detections = max_detections;
     radar_3d::on(options.grid, &sensor, &radar_3d)
+}
+
+/// The grid of the map of [`own`], of a radar, and its least visible grade.
+///
+/// # Errors
+/// As for [`own`].
+pub fn own_grid(recording: &Recording, options: &Options) -> Result<(PolarGeometry, u8)> {
+    let (sensor, _) = radar(recording, options)?;
+    radar_3d::grid(&sensor, &options.radar_3d)
 }
 
 /// A recording's radar, and how many detections of a frame are used.

@@ -4,7 +4,7 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use viewshed::fixed::time::Time;
 use viewshed::map::VisibilityMap;
-use viewshed::map::polar::PolarMap;
+use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::mount::Mount;
@@ -92,6 +92,15 @@ pub fn on(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn
             Ok(Box::new(OfSmall { name, ..OfSmall::new(sensor, &config)? }))
         }
     }
+}
+
+/// Where the cells of its map lie, and from which grade on they are visible.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn grid(sensor: &Sensor, config: &Radar3dConfig) -> Result<(PolarGeometry, u8)> {
+    let parameters = Radar3dParameters::<RANGES, AZIMUTHS, ELEVATIONS>::new(sensor, config)?;
+    Ok((parameters.axes().polar(parameters.levelling()), parameters.visible_from()))
 }
 
 /// Runs the estimator over frames and shows its map after each, with the frame's time.

@@ -98,7 +98,7 @@ fn a_log_that_is_cut_in_the_middle_ends_there_and_what_is_cut_is_counted() {
 fn written(folder: &Path, sensors: &[u8], change: impl Fn(Message, &mut Vec<u8>)) -> PathBuf {
     let reading = ReadOptions { to_s: Some(4.0), ..ReadOptions::default() };
     let recording = read(Path::new(SHIPPED), &reading).unwrap();
-    let maps = Maps::new(&recording, &Default::default(), &|| ()).unwrap();
+    let maps = Maps::new(&recording, &Default::default(), None, &|| ()).unwrap();
     let medium = Medium::CanFd(Addresses::STANDARD);
     let begin = maps.scans[0].measured;
     let start = |sensor: &u8| {

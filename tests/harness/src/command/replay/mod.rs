@@ -5,7 +5,7 @@ mod fused;
 mod out;
 mod pictures;
 mod report;
-mod risk;
+pub mod risk;
 pub mod shipped;
 
 use std::path::{Path, PathBuf};

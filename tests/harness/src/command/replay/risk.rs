@@ -3,17 +3,36 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
+use viewshed::map::polar::PolarGeometry;
+use viewshed::probability::Quantiser;
 
 use crate::estimators::at_risk::{AtRisk, NAME};
 use crate::estimators::{self, Estimator};
 use crate::evaluation::Settings;
 use crate::evaluation::counts::rate;
 use crate::evaluation::probability::file::Fitted;
-use crate::evaluation::probability::risk::Threshold;
+use crate::evaluation::probability::risk::keeping;
 use crate::evaluation::probability::samples::fingerprint;
 use crate::evaluation::replay::Replay;
 use crate::recording::Recording;
 use crate::results::report::percent;
+
+/// What a unit of a recording makes of a table, and where the cells of its maps lie.
+///
+/// # Errors
+/// A table of another mount or configuration.
+pub fn quantiser(
+    fitted: Fitted,
+    risk: Option<f64>,
+    recording: &Recording,
+    settings: &Settings,
+) -> Result<(Quantiser, PolarGeometry)> {
+    let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
+    let table = table.with_context(|| format!("--probability: {}", recording.name))?;
+    let (grid, visible_from) = estimators::own_grid(recording, &settings.estimators)?;
+    let threshold = risk.map(|risk| keeping(risk, &fitted.counted));
+    Ok((Quantiser::new(table, threshold, visible_from), grid))
+}
 
 /// A risk and the table it is judged by.
 #[derive(Debug, Clone, clap::Args)]
@@ -32,7 +51,7 @@ pub struct RiskArgs {
     risk: Option<f64>,
 }
 
-fn share(text: &str) -> Result<f64, String> {
+pub fn share(text: &str) -> Result<f64, String> {
     let value = super::finite(text)?;
     if value > 0.0 && value < 1.0 { Ok(value) } else { Err(format!("{value} is not between 0 and 1: 0.1 is 10 %")) }
 }
@@ -55,17 +74,10 @@ impl RiskArgs {
     pub fn add(&self, running: &mut Vec<Box<dyn Estimator>>, recording: &Recording, settings: &Settings) -> Result<()> {
         let Some((risk, fitted)) = self.asked()? else { return Ok(()) };
         ensure!(recording.of_camera().is_none(), "--risk: {} is of a camera; tables are of radars", recording.name);
-        let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
-        let table = table.with_context(|| format!("--probability: {}", recording.name))?;
-        let least = match Threshold::keeping(risk, &fitted.counted) {
-            Threshold::Everything => Some(0),
-            Threshold::From(p) => Some(p),
-            Threshold::Nothing => None,
-        };
-        let levelling = estimators::mount(&recording.pose).levelling()?;
+        let (quantiser, grid) = quantiser(fitted, Some(risk), recording, settings)?;
         let inner = estimators::own(recording, &settings.estimators)?;
         let place = running.iter().position(|e| e.name() == inner.name()).map_or(running.len(), |k| k + 1);
-        running.insert(place, Box::new(AtRisk::new(inner, table, levelling, least)));
+        running.insert(place, Box::new(AtRisk::new(inner, quantiser, grid)));
         Ok(())
     }
 
@@ -75,7 +87,7 @@ impl RiskArgs {
     /// Those of reading the table.
     pub fn told(&self, replay: &Replay) -> Result<String> {
         let Some((risk, fitted)) = self.asked()? else { return Ok(String::new()) };
-        let threshold = Threshold::keeping(risk, &fitted.counted).said();
+        let threshold = keeping(risk, &fitted.counted);
         let counts = replay.summary.row(NAME).map(|row| row.counts).unwrap_or_default();
         let found = rate(counts.fv, counts.tv + counts.fv);
         let share = rate(counts.tv + counts.fv, counts.total());

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
-use serde::{Deserialize, Serialize};
-use viewshed::probability::{AZIMUTHS, Edges, GRADES, ProbabilityTable, RANGES};
-use viewshed::wire::header::fingerprint;
+use anyhow::{Context, Result};
+use viewshed::probability::{Edges, ProbabilityTable};
 
+use super::table_file::{self, Content, sum};
 use crate::evaluation::curve::{GRADE_SLOTS, Grades};
 
 /// A table and the samples it was fitted on, by what tables fitted without them say of them.
@@ -14,25 +13,6 @@ use crate::evaluation::curve::{GRADE_SLOTS, Grades};
 pub struct Fitted {
     pub table: ProbabilityTable,
     pub counted: Grades,
-}
-
-/// The file's keys.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Content {
-    /// CRC-32 of the table's bytes as a unit stores them, hexadecimal.
-    check_sum: String,
-    /// Configuration it was fitted with, hexadecimal.
-    fingerprint: String,
-    /// Least grade of each step but the first.
-    grades: [u8; GRADES - 1],
-    ranges_cm: [u16; RANGES - 1],
-    /// 2^-16 turn from the boresight, + left.
-    azimuths: [i16; AZIMUTHS - 1],
-    /// In 1/255: azimuths from right to left, ranges from near to far, steps of the grade.
-    values: [[[u8; GRADES]; RANGES]; AZIMUTHS],
-    /// Of the samples of fitting, by tables fitted without them: p in 1/255, detected, missed.
-    counted: Vec<[u64; 3]>,
 }
 
 const HEAD: &str = "# Probability that a vehicle is detected, by grade, range and azimuth, of one unit.\n\
@@ -59,23 +39,10 @@ impl Fitted {
     /// The key, with its line, of what cannot be read or is cut off; a check sum that does not hold; a table that the
     /// library refuses, with its reason.
     pub fn parse(text: &str) -> Result<Self> {
-        let content: Content = toml::from_str(text)?;
-        let unit = u32::from_str_radix(&content.fingerprint, 16)
-            .with_context(|| format!("`fingerprint` is `{}`, not 8 hexadecimal digits", content.fingerprint))?;
-        let edges = Edges { grades: content.grades, ranges_cm: content.ranges_cm, azimuths: content.azimuths };
-        let table = ProbabilityTable::new(edges, content.values, unit)?;
-        let found = sum(&table);
-        ensure!(
-            found == content.check_sum,
-            "`check_sum` is {}, the table's is {found}: it was changed after it was fitted; fit it again",
-            content.check_sum
-        );
+        let (table, by_probability) = table_file::parse(text)?;
         let mut counted = Grades::default();
-        for [p, detected, missed] in content.counted {
-            let slot = usize::try_from(p).ok().filter(|slot| *slot < GRADE_SLOTS - 1);
-            let slot = slot.with_context(|| format!("`counted` has p = {p}, which is above 255"))?;
-            counted.positive[slot] += detected;
-            counted.negative[slot] += missed;
+        for (p, [detected, missed]) in by_probability.iter().enumerate() {
+            (counted.positive[p], counted.negative[p]) = (*detected, *missed);
         }
         Ok(Self { table, counted })
     }
@@ -86,12 +53,6 @@ impl Fitted {
         let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
         Self::parse(&text).with_context(|| format!("probability table {}", path.display()))
     }
-}
-
-fn sum(table: &ProbabilityTable) -> String {
-    // without the block's own sum: a CRC over it is the same for every block
-    let block = table.to_block();
-    format!("{:08x}", fingerprint(&block[..block.len() - 4]))
 }
 
 #[cfg(test)]

@@ -7,5 +7,6 @@ pub mod file;
 pub mod fit;
 pub mod risk;
 pub mod samples;
+pub mod table_file;
 
-pub use viewshed::probability::{Probability, ProbabilityTable, TableError};
+pub use viewshed::probability::{Probability, ProbabilityTable, TableError, Threshold};

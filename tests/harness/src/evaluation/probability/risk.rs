@@ -1,61 +1,18 @@
-//! From an accepted risk to a threshold on the probability.
-//!
-//! # Model
-//! Risk = P(not detected | called visible): of the vehicles that stand where the map says visible, the share that is
-//! missed. Called visible is what has p >= threshold. The threshold for a risk is the least whose risk was not above it
-//! among the samples of fitting, each judged by a table that was fitted without it. It is not the FVR, which is of those that were missed.
+//! What the library's threshold for an accepted risk comes to on samples.
 
 use serde::Serialize;
+use viewshed::probability::{Counted, Probability, Threshold};
 
 use crate::evaluation::counts::rate;
 use crate::evaluation::curve::{GRADE_SLOTS, Grades};
 
-/// What to call visible so that a risk is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Threshold {
-    /// Everything known: even so the risk is kept.
-    Everything,
-    /// What has at least this probability, in 1/255.
-    From(u8),
-    /// Nothing: no threshold keeps the risk.
-    Nothing,
-}
-
-impl Threshold {
-    /// The least that keeps the risk among these samples.
-    pub fn keeping(risk: f64, fitted: &Grades) -> Self {
-        let (mut visible, mut missed) = (0, 0);
-        let mut found = Self::Nothing;
-        let lowest = (0..GRADE_SLOTS - 1).find(|&p| fitted.positive[p] + fitted.negative[p] > 0);
-        for p in (0..GRADE_SLOTS - 1).rev() {
-            let samples = fitted.positive[p] + fitted.negative[p];
-            visible += samples;
-            missed += fitted.negative[p];
-            if samples > 0 && missed as f64 <= risk * visible as f64 {
-                found = if Some(p) == lowest { Self::Everything } else { Self::From(p as u8) };
-            }
-        }
-        found
+/// The library's threshold for a risk, of samples that were counted here.
+pub fn keeping(risk: f64, fitted: &Grades) -> Threshold {
+    let mut counted: Counted = [[0; 2]; 256];
+    for (p, both) in counted.iter_mut().enumerate() {
+        *both = [fitted.positive[p], fitted.negative[p]];
     }
-
-    /// Whether a probability is called visible; unknown never is.
-    pub fn visible(self, p: Option<u8>) -> bool {
-        match self {
-            Self::Everything => p.is_some(),
-            Self::From(least) => p.is_some_and(|p| p >= least),
-            Self::Nothing => false,
-        }
-    }
-
-    /// In words, after "visible is".
-    pub fn said(self) -> String {
-        match self {
-            Self::Everything => "everything known: it keeps the risk as it is".into(),
-            Self::From(p) => format!("what has p >= {:.3}", f64::from(p) / 255.0),
-            Self::Nothing => "nothing: no threshold keeps the risk".into(),
-        }
-    }
+    Threshold::keeping(risk, &counted)
 }
 
 /// What a threshold gives.
@@ -72,7 +29,7 @@ pub struct Kept {
 impl Kept {
     pub fn of(threshold: Threshold, grades: &Grades) -> Self {
         let sum = |slots: &[u64; GRADE_SLOTS]| -> (u64, u64) {
-            let visible = |slot: usize| threshold.visible(u8::try_from(slot).ok());
+            let visible = |slot: usize| threshold.visible(u8::try_from(slot).ok().map(Probability::from_raw));
             let seen = slots.iter().enumerate().filter(|(slot, _)| visible(*slot)).map(|(_, n)| n).sum();
             (seen, slots.iter().sum())
         };
@@ -99,13 +56,9 @@ mod tests {
     }
 
     #[test]
-    fn the_threshold_is_the_least_that_keeps_the_risk() {
-        // 1/20, 3/30, 8/40 from the top down
-        let of = |risk| Threshold::keeping(risk, &counted());
-        assert_eq!((of(0.04), of(0.05), of(0.099)), (Threshold::Nothing, Threshold::From(250), Threshold::From(250)));
-        assert_eq!((of(0.1), of(0.199)), (Threshold::From(150), Threshold::From(150)));
-        assert_eq!(of(0.2), Threshold::Everything);
-        assert_eq!(Threshold::keeping(0.5, &Grades::default()), Threshold::Nothing);
+    fn the_threshold_is_that_of_the_samples() {
+        assert_eq!(keeping(0.099, &counted()), Threshold::From(250));
+        assert_eq!(keeping(0.2, &counted()), Threshold::Everything, "what is unknown does not count");
     }
 
     #[test]

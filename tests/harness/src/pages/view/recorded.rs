@@ -170,7 +170,7 @@ fn receiver(recording: &Recording, settings: &Settings) -> Result<Option<Receive
     if recording.sensor.frames_independent || recording.frames.is_empty() {
         return Ok(None);
     }
-    let maps = Maps::new(recording, &settings.estimators, &|| ())?;
+    let maps = Maps::new(recording, &settings.estimators, None, &|| ())?;
     let traffic = Traffic::new(&maps, BUS, None, SENSOR, None)?;
     let line = |sent: &crate::bus::traffic::Sent| {
         let time_ns =

@@ -7,7 +7,7 @@ use super::json::Options;
 use super::table::{Extent, tables};
 use super::{ORIGIN, percent};
 use crate::evaluation::bootstrap::Interval;
-use crate::evaluation::probability::risk::Threshold;
+use crate::evaluation::probability::Threshold;
 use crate::studies::experiment::calibration::{Figure, Judged, Predictor, Risk};
 
 /// Bars that a table has to reach.

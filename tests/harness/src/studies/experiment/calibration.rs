@@ -15,9 +15,10 @@ use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::bootstrap::{Draws, Interval};
 use crate::evaluation::calibration::{Bin, ByTrack, Metrics, diagram};
+use crate::evaluation::probability::Threshold;
 use crate::evaluation::probability::file::Fitted;
 use crate::evaluation::probability::fit;
-use crate::evaluation::probability::risk::{Kept, Threshold};
+use crate::evaluation::probability::risk::{self, Kept};
 use crate::evaluation::probability::samples::{Places, fingerprint};
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::{Score, score};
@@ -282,7 +283,7 @@ fn judge(
         interval: said.interval_with(said_by, &draws, value),
     };
     let risk = |asked: f64| {
-        let threshold = Threshold::keeping(asked, &counted);
+        let threshold = risk::keeping(asked, &counted);
         let drawn = draws.iter().map(|times| Kept::of(threshold, &said.drawn(times)).risk);
         Risk { asked, threshold, kept: Kept::of(threshold, &said.total()), interval: Interval::of(drawn) }
     };

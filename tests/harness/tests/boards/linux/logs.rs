@@ -7,9 +7,10 @@ use viewshed::fixed::time::Time;
 use viewshed::fusion::FixturesConfig;
 use viewshed::inputs::ars408::Ars408Config;
 use viewshed::map::polar::PolarMap;
+use viewshed::probability::Quantiser;
 use viewshed::unit::Unit;
-use viewshed::unit::profile::reference::State as Radar3d;
-use viewshed::unit::profile::reference::supervised::{Parameters, Radar, Sender, State};
+use viewshed::unit::profile::reference::supervised::{Parameters, Radar, State};
+use viewshed::unit::profile::reference::{QuantisedSender, State as Radar3d};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::frame::CanFrame;
@@ -27,10 +28,16 @@ use crate::shipped;
 const EPOCH: Epoch = Epoch::new(5);
 
 /// Everything that is sent, and when.
-type Sent = Vec<(u64, CanFrame)>;
+pub type Sent = Vec<(u64, CanFrame)>;
 
 /// What a unit sends that hears a log, looks once a millisecond, and is stopped a second after the log's end.
-fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium) -> Sent {
+pub fn twin(
+    settings: &Settings,
+    quantiser: Option<Quantiser>,
+    log: &[(u64, CanFrame)],
+    radar: u8,
+    medium: Medium,
+) -> Sent {
     let mut parameters: Option<Parameters> = None;
     let header = settings.build::<State>(&mut parameters).unwrap();
     let parameters = parameters.unwrap();
@@ -39,12 +46,12 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     let (first, last) = (log.first().unwrap().0, log.last().unwrap().0);
     let at = Time::from_micros;
     let config = BroadcastConfig::new(0, medium);
-    let mut sender = Box::new(Sender::new(config, header, EPOCH, at(first)).unwrap());
+    let mut sender = Box::new(QuantisedSender::new(config, header, quantiser, EPOCH, at(first)).unwrap());
     let mut unit = Unit::new(&parameters, &mut *state, &mut *map, &mut *sender);
     unit.broadcast().status_mut().firmware = [0, 1, 0];
     let mut decoder = Radar::new(Ars408Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
-    let flush = |unit: &mut Unit<'_, State, Sender>, now: u64, sent: &mut Sent| {
+    let flush = |unit: &mut Unit<'_, State, QuantisedSender>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
     };
     loop {
@@ -70,13 +77,13 @@ fn twin(settings: &Settings, log: &[(u64, CanFrame)], radar: u8, medium: Medium)
     sent
 }
 
-fn read(path: &Path) -> Sent {
+pub fn read(path: &Path) -> Sent {
     let text = std::fs::read_to_string(path).unwrap();
     let lines = text.lines().map(|line| candump::line(line).unwrap());
     lines.map(|line| (line.time_ns as u64 / 1000, *line.frame().unwrap())).collect()
 }
 
-fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> String {
+pub fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> String {
     format!(
         "state_dir = \"FOLDER\"\n[input]\nradar = \"ars408\"\ncandump = \"{}\"\nclock = \"input\"\nsensor_id = {radar}\n\
          [output]\nmedium = \"{medium}\"\ncandump = \"FOLDER/maps.log\"\n{}",
@@ -88,7 +95,7 @@ fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> String {
 }
 
 /// The scans as the log of an ARS408.
-fn log_of(scans: &[Scan]) -> String {
+pub fn log_of(scans: &[Scan]) -> String {
     let mut text = String::new();
     for scan in clusters(scans, scans.len(), 240) {
         // as they come on a bus of 500 kbit/s, four in a millisecond
@@ -108,7 +115,7 @@ fn same(settings: &Settings, log: &Path, radar: u8, name: &str, medium: Medium) 
     let mut daemon = Daemon::start_in(folder, &config(settings, log, radar, name), &[]);
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
     let sent = read(&daemon.folder.0.join("maps.log"));
-    let expected = twin(settings, &read(log), radar, medium);
+    let expected = twin(settings, None, &read(log), radar, medium);
     println!("{}, sensor {radar}, {name}: {} frames", log.file_name().unwrap().display(), sent.len());
     let first = sent.iter().zip(&expected).position(|(a, b)| a != b);
     assert_eq!((first, sent.len()), (None, expected.len()), "first frame that differs, and how many came");

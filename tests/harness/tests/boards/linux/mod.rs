@@ -3,6 +3,7 @@
 mod daemon;
 mod lines;
 mod logs;
+mod probability;
 mod service;
 mod terminal;
 #[allow(dead_code)] // of every kind of frame, few are sent here
