@@ -29,6 +29,7 @@ use crate::obstacles::tracking::Tracking;
 use crate::obstacles::{Claimed, Obstacles};
 use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, within};
+use crate::sensor::ground::Ground;
 use crate::sensor::mount::Levelling;
 use crate::sensor::noise::Noise;
 
@@ -51,6 +52,10 @@ pub struct Radar3dConfig {
     /// traffic, metres in road coordinates, x along the road and y to the left. No part of a file's table.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub lanes: &'static [Lane],
+    /// Where the road is not flat, its height over its length: x along the road and height, metres, in road coordinates,
+    /// linear in between and level beyond. Only differences count. No part of a file's table.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub ground: &'static [[f32; 2]],
 }
 
 /// How the result is read off the grid.
@@ -99,7 +104,8 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         let levelling = sensor.mount.levelling()?;
         let view = sensor.field_of_view.limits()?;
         let noise = sensor.noise.noise()?;
-        let axes = Axes::new(&levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
+        let ground = Ground::new(&levelling, config.ground)?;
+        let axes = Axes::on(ground, &levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
         let limit_cm = view.range_cm[1] + BEYOND_CM;
         let mut tracking = config.obstacles.tracking(noise, levelling.road_axis(), limit_cm)?;
         tracking.lanes = Lanes::new(&levelling, config.lanes)?;
@@ -270,7 +276,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         ended: &mut impl FnMut(),
     ) -> FrameReport {
         let FrameStatus { fault, refused } = status.into();
-        let place = |d: &Detection| p.noise.place(d, &p.levelling);
+        let place = |d: &Detection| p.noise.place_on(d, &p.levelling, p.axes.ground());
         let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
         let points = self.scan.within_reach(points, |r| p.reaches(r));
         let continuity = self.health.frame(now, &points, fault, &p.health);

@@ -8,6 +8,7 @@ use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig::{self, Direction, ONE};
 use crate::frame::detection::Detection;
+use crate::sensor::ground::Ground;
 use crate::sensor::mount::Levelling;
 use crate::sensor::noise::Noise;
 
@@ -34,24 +35,38 @@ pub struct Reflection {
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
 impl Noise {
-    /// Places a detection on the ground, with its height where its elevation was measured.
+    /// Places a detection on flat ground, with its height where its elevation was measured.
     pub fn place(&self, d: &Detection, levelling: &Levelling) -> Reflection {
+        self.place_on(d, levelling, &Ground::LEVEL)
+    }
+
+    /// Places a detection on the ground, with its height where its elevation was measured.
+    pub fn place_on(&self, d: &Detection, levelling: &Levelling, ground: &Ground) -> Reflection {
         let azimuth = trig::direction(d.azimuth);
-        let height_cm = d.elevation.map(|elevation| self.height(d, azimuth, elevation, levelling));
-        Reflection { height_cm, ..self.place_along(d, azimuth, levelling) }
+        let mut placed = self.place_along(d, azimuth, levelling, 0);
+        let mut foot_cm = 0;
+        if !ground.is_level() {
+            // what lies higher is a little farther along the ground, where the road is not much higher again
+            foot_cm = ground.height_cm(placed.x_cm, placed.y_cm);
+            placed = self.place_along(d, azimuth, levelling, foot_cm);
+            foot_cm = ground.height_cm(placed.x_cm, placed.y_cm);
+        }
+        let height_cm = d.elevation.map(|elevation| self.height(d, azimuth, elevation, levelling, foot_cm));
+        Reflection { height_cm, ..placed }
     }
 
-    /// Places a detection on the ground, its height left open.
+    /// Places a detection on flat ground, its height left open.
     pub fn place_flat(&self, d: &Detection, levelling: &Levelling) -> Reflection {
-        self.place_along(d, trig::direction(d.azimuth), levelling)
+        self.place_along(d, trig::direction(d.azimuth), levelling, 0)
     }
 
-    fn place_along(&self, d: &Detection, azimuth: Direction, levelling: &Levelling) -> Reflection {
+    /// At the height of usual reflectors above ground of the height `foot_cm`.
+    fn place_along(&self, d: &Detection, azimuth: Direction, levelling: &Levelling, foot_cm: i32) -> Reflection {
         let range = i32::from(d.range_cm);
         // the half-plane of this azimuth, levelled: ahead (elevation 0) and up
         let ahead = levelling.level([i32::from(azimuth.x), i32::from(azimuth.y), 0]);
         let up = levelling.up();
-        let fall = ((self.reflector_height_cm - levelling.height_cm) << 14) / range.max(1);
+        let fall = ((self.reflector_height_cm + foot_cm - levelling.height_cm) << 14) / range.max(1);
         let (cosine, sine) = meet_height(fall, ahead[2], up[2]);
         let (x, y) = ((ahead[0] * cosine + up[0] * sine) >> 14, (ahead[1] * cosine + up[1] * sine) >> 14);
         let (x_cm, y_cm) = ((x * range) >> 14, (y * range) >> 14);
@@ -68,12 +83,19 @@ impl Noise {
     }
 
     /// Height above the road and its standard deviation, centimetres.
-    fn height(&self, d: &Detection, azimuth: Direction, elevation: Angle, levelling: &Levelling) -> (i16, u16) {
+    fn height(
+        &self,
+        d: &Detection,
+        azimuth: Direction,
+        elevation: Angle,
+        levelling: &Levelling,
+        foot_cm: i32,
+    ) -> (i16, u16) {
         let range = i32::from(d.range_cm);
         let up = trig::direction(elevation);
         let level = |part: i16| (i32::from(part) * i32::from(up.x)) >> 14;
         let rise = levelling.rise([level(azimuth.x), level(azimuth.y), i32::from(up.y)]);
-        let height = levelling.height_cm + ((rise * range) >> 14);
+        let height = levelling.height_cm - foot_cm + ((rise * range) >> 14);
         let sigma = math::mul_shift(range, self.elevation, 16);
         (height.clamp(-30_000, 30_000) as i16, sigma.clamp(1, 65_535) as u16)
     }

@@ -7,6 +7,10 @@
 //! slopes under which the plane at slice height is seen at ground distances
 //! `(sqrt(near) + k (sqrt(far) - sqrt(near)) / E)^2`. Uniform rows would spend most of their number
 //! on sky: from 6 m, one of 2 degrees covers the road from 71 to 143 m.
+//!
+//! Over a road that is not flat the slice is no plane, and farther is no longer higher: rows are laid where slopes to
+//! the slice gather, and a cell's place between them is found when it is asked for, one division each. A table of them
+//! would take 48 kB.
 
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
@@ -14,10 +18,8 @@ use crate::fixed::trig::Direction;
 use crate::map::polar::{self, PolarGeometry};
 use crate::sensor::config::{ConfigError, Problem, within};
 use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::ground::{Ground, SLOPE_BITS};
 use crate::sensor::mount::Levelling;
-
-/// Fraction bits of a slope.
-const SLOPE_BITS: u32 = 18;
 
 /// Height above or below the sensor up to which slopes fit, centimetres.
 const FARTHEST_RISE_CM: i32 = 4000;
@@ -33,6 +35,9 @@ const NOTHING: (u8, u8) = (1, 0);
 
 /// A sensor closer to the slice plane than this has no slopes to measure distances by, centimetres.
 const LEAST_DROP_CM: i32 = 10;
+
+/// Least height of a row over ground that is not level, a slope: 5 cm at 200 m.
+const LEAST_ROW: i32 = 64;
 
 /// Geometry of a grid of `R` range cells, `A` azimuth columns and `E` elevation rows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,6 +62,8 @@ pub struct Axes<const R: usize, const A: usize, const E: usize> {
     slice_rows: [SliceRow; E],
     /// For every column: the first and the last range cell in view on the slice plane.
     view: [(u8, u8); A],
+    /// Heights of the road; where it is flat, `slice_share` and `slice_rows` hold.
+    ground: Ground,
 }
 
 /// A stretch of range cells on which the slice plane runs between the same two rows' centres.
@@ -75,6 +82,19 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// # Errors
     /// A field of view that the slice plane never enters.
     pub fn new(levelling: &Levelling, view: &FieldOfView, slice_height_m: f32) -> Result<Self, ConfigError> {
+        Self::on(Ground::LEVEL, levelling, view, slice_height_m)
+    }
+
+    /// Lays the axes over a road that need not be flat.
+    ///
+    /// # Errors
+    /// A field of view that the slice never enters.
+    pub fn on(
+        ground: Ground,
+        levelling: &Levelling,
+        view: &FieldOfView,
+        slice_height_m: f32,
+    ) -> Result<Self, ConfigError> {
         const { assert!(R <= crate::fixed::bits::RangeBits::CAPACITY && R >= 2 && A >= 2 && E >= 2 && A <= 512 && E <= 64) }
         let limits = view.limits()?;
         within("visibility.slice_height_m", slice_height_m, 0.0, 10.0)?;
@@ -93,6 +113,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             slice_share: [0; R],
             slice_rows: [SliceRow { lower: 0, end: 0 }; E],
             view: [NOTHING; A],
+            ground,
         };
         // a limit itself is in view, whatever a float makes of it
         let wide = FieldOfView {
@@ -102,9 +123,11 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             elevation_max_deg: view.elevation_max_deg + ON_THE_LIMIT_DEG,
             ..*view
         };
+        let ground = axes.ground.clone();
         let in_view = |bearing: f32, ground_cm: f32| {
             let (x, y) = (math::cos(bearing) * ground_cm, math::sin(bearing) * ground_cm);
-            wide.contains(levelling.unlevel_exact([x, y, -drop as f32]).map(|v| v / 100.0))
+            let foot_cm = ground.height_cm(math::round_i32(x), math::round_i32(y));
+            wide.contains(levelling.unlevel_exact([x, y, (foot_cm - drop) as f32]).map(|v| v / 100.0))
         };
         axes.lay_columns(&in_view).ok_or(ConfigError {
             parameter: "field_of_view.elevation_min_deg",
@@ -112,7 +135,11 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             problem: Problem::NothingInView,
         })?;
         axes.find_view(&in_view);
-        axes.lay_rows(drop);
+        if axes.ground.is_level() {
+            axes.lay_rows(drop);
+        } else {
+            axes.lay_rows_over_ground();
+        }
         Ok(axes)
     }
 
@@ -184,6 +211,80 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
                 *s = SliceRow { lower: lower as u8, end: r as u16 + 1 };
             }
         }
+    }
+
+    /// Rows for a slice that follows the ground: edges are quantiles of the slopes under which it is seen at distances
+    /// that are dense near the sensor, along the road and along both edges of the view.
+    fn lay_rows_over_ground(&mut self) {
+        let near_cell = self.view.iter().filter(|v| **v != NOTHING).map(|v| v.0).min().unwrap_or(0);
+        let near = math::sqrt((f32::from(near_cell) + 0.5) * self.cell_cm as f32);
+        let far = math::sqrt((self.cell_cm * R as i32) as f32);
+        let seen = |a: &usize| !self.view(*a).is_empty();
+        let (right, left) = ((0..A).find(seen).unwrap_or(0), (0..A).rev().find(seen).unwrap_or(0));
+        let on_road = |a: &usize| self.ground.along_road(self.column_direction(*a)).abs();
+        let road = (right..=left).max_by_key(on_road).unwrap_or(right);
+        let mut slopes = [[0; 4]; E];
+        for (k, part) in slopes.iter_mut().enumerate() {
+            for (quarter, (slope, column)) in part.iter_mut().zip([road, right, road, left]).enumerate() {
+                let root = near + (far - near) * (k as f32 + quarter as f32 / 4.0) / E as f32;
+                *slope = self.slice_slope(column, math::round_i32(root * root));
+            }
+        }
+        let slopes = slopes.as_flattened_mut();
+        slopes.sort_unstable();
+        let mut lowest = i32::MIN;
+        for (edge, slope) in self.row_edges.iter_mut().zip(slopes.iter().step_by(4)) {
+            *edge = (*slope).clamp(-STEEPEST, STEEPEST).max(lowest);
+            lowest = *edge + LEAST_ROW;
+        }
+        self.row_top = slopes.last().copied().unwrap_or(0).clamp(lowest, STEEPEST.max(lowest));
+    }
+
+    /// Slope under which the slice is seen in a column, at a distance along the ground.
+    fn slice_slope(&self, column: usize, ground_cm: i32) -> i32 {
+        let towards = self.column_direction(column);
+        let along = |part: i16| (i32::from(part) * ground_cm) >> 14;
+        self.slope(self.ground.height_cm(along(towards.x), along(towards.y)) + self.slice_cm, ground_cm)
+    }
+
+    /// The lower of the two rows between whose centres the slice lies in a cell, over ground that is not level, and its
+    /// share of the upper.
+    pub fn slice_place(&self, column: usize, cell: usize) -> (usize, u8) {
+        let place = self.row_place(self.slice_slope(column, cell as i32 * self.cell_cm + self.cell_cm / 2)) - 128;
+        let place = place.clamp(0, (E as i32 - 1) * 256);
+        let lower = (place >> 8).min(E as i32 - 2);
+        (lower as usize, (place - lower * 256).min(255) as u8)
+    }
+
+    /// Heights of the road.
+    pub fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
+    /// Where the road itself hides the slice above it in a column, centimetres: behind a crest.
+    pub fn hidden_by_ground(&self, column: usize) -> impl Iterator<Item = (i32, i32)> {
+        let mut horizon = None;
+        self.ground.stretches(self.column_direction(column)).filter_map(move |stretch| {
+            let hidden = horizon.and_then(|slope| stretch.below(slope, self.height_cm, self.slice_cm));
+            let end = stretch.end_slope(self.height_cm);
+            horizon = Some(horizon.map_or(end, |slope: i32| slope.max(end)));
+            hidden
+        })
+    }
+
+    /// Where a box hides the slice over ground that is not level, centimetres, if its top lies this high above the
+    /// ground below the sensor and rays enter and leave it at these distances.
+    pub fn hidden_over_ground(
+        &self,
+        column: usize,
+        top_cm: i32,
+        enter_cm: i32,
+        leave_cm: i32,
+    ) -> impl Iterator<Item = (i32, i32)> {
+        let slope = self.slope(top_cm, enter_cm).max(self.slope(top_cm, leave_cm));
+        let behind = self.ground.stretches(self.column_direction(column));
+        let below = behind.filter_map(move |stretch| stretch.below(slope, self.height_cm, self.slice_cm));
+        below.filter_map(move |(from, to)| (to > leave_cm).then_some((from.max(leave_cm), to)))
     }
 
     /// The geometry of the maps cast on these axes.

@@ -273,6 +273,7 @@ impl InverseSensor {
         column.change_before(end, |stack| {
             let row = *row.get_or_insert_with(|| {
                 let (height, _) = self.height(r, Around::Nothing);
+                let height = height + axes.ground().height_cm(r.x_cm, r.y_cm);
                 ((axes.row_place(axes.slope(height, i32::from(r.ground_cm))) + 255) >> 8) as usize
             });
             for v in stack.iter_mut().skip(row) {
@@ -293,9 +294,10 @@ impl InverseSensor {
         let ground_cm = i32::from(r.ground_cm);
         let (height, sigma) = self.height(r, around);
         let proven = Self::proven_cm(r, around);
+        let foot_cm = axes.ground().height_cm(r.x_cm, r.y_cm);
         let mut profile = [0_u8; E];
         for (row, p) in profile.iter_mut().enumerate() {
-            let level = axes.height_at(axes.row_centre(row), ground_cm);
+            let level = axes.height_at(axes.row_centre(row), ground_cm) - foot_cm;
             *p = if level <= proven { 255 } else { self.bell((level - height).max(0), sigma) as u8 };
         }
         let place = axes.column_place(r.bearing());

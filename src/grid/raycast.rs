@@ -8,8 +8,11 @@
 //!
 //! An object never hides itself: the cells of an occupied run count as blocking only once the ray
 //! has left the run. What stands on the far side of the run is hidden.
+//!
+//! A road that is not flat hides what lies behind a crest of it; its shadows have exact ends, as those of boxes do.
 
 use crate::grid::axes::{Axes, SliceRow};
+use crate::grid::shadow::shade;
 use crate::grid::spherical::{Column, SphericalGrid};
 use crate::grid::stack;
 use crate::map::polar::PolarMap;
@@ -35,7 +38,14 @@ pub fn cast<const R: usize, const A: usize, const E: usize, const W: usize>(
     for (a, column) in grid.columns().enumerate() {
         let Some((grades, occupancy)) = map.rows_mut(a) else { return };
         *occupancy = [0; R];
-        cast_column(column, axes, grades, occupancy);
+        if axes.ground().is_level() {
+            cast_column(column, &mut Plane { axes, rows: axes.slice_rows() }, grades, occupancy);
+        } else {
+            cast_column(column, &mut OverGround { axes, column: a }, grades, occupancy);
+            for hidden in axes.hidden_by_ground(a) {
+                shade(grades, 0, hidden, axes.cell_cm, CLEAR);
+            }
+        }
         let view = axes.view(a);
         if let Some(near) = grades.get_mut(..view.start) {
             near.fill(0);
@@ -46,22 +56,82 @@ pub fn cast<const R: usize, const A: usize, const E: usize, const W: usize>(
     }
 }
 
-fn cast_column<const R: usize, const A: usize, const E: usize, const W: usize>(
+/// Where the slice runs through the rows of a column.
+trait Slice<const R: usize, const E: usize> {
+    /// The lower of the two rows it runs between at a range cell, and its share of the upper; cells come in their order.
+    fn place(&mut self, r: usize) -> (usize, u8);
+
+    /// Grades of cells that hold nothing, behind what blocks so much of each row.
+    fn shade(&mut self, blocked: &[u8; E], grades: &mut [u8; R], from: usize, to: usize);
+}
+
+/// A plane, of which all is known from the start.
+struct Plane<'a, const R: usize, const A: usize, const E: usize> {
+    axes: &'a Axes<R, A, E>,
+    rows: &'a [SliceRow],
+}
+
+/// Above ground that is not level.
+struct OverGround<'a, const R: usize, const A: usize, const E: usize> {
+    axes: &'a Axes<R, A, E>,
+    column: usize,
+}
+
+impl<const R: usize, const A: usize, const E: usize> Slice<R, E> for Plane<'_, R, A, E> {
+    #[inline]
+    fn place(&mut self, r: usize) -> (usize, u8) {
+        (rows_at(&mut self.rows, r), self.axes.slice_share().get(r).copied().unwrap_or(0))
+    }
+
+    fn shade(&mut self, blocked: &[u8; E], grades: &mut [u8; R], from: usize, to: usize) {
+        let mut start = from;
+        while start < to {
+            let lower = rows_at(&mut self.rows, start);
+            let end = self.rows.first().map_or(to, |s| usize::from(s.end)).clamp(start + 1, to);
+            let pair = pair(blocked, lower);
+            let (Some(cells), Some(shares)) = (grades.get_mut(start..end), self.axes.slice_share().get(start..end))
+            else {
+                return;
+            };
+            if pair.low == pair.high {
+                cells.fill((CLEAR - pair.low).max(BLOCKED));
+            } else {
+                for (g, &share) in cells.iter_mut().zip(shares) {
+                    *g = (CLEAR - pair.at(share)).max(BLOCKED);
+                }
+            }
+            start = end;
+        }
+    }
+}
+
+impl<const R: usize, const A: usize, const E: usize> Slice<R, E> for OverGround<'_, R, A, E> {
+    fn place(&mut self, r: usize) -> (usize, u8) {
+        self.axes.slice_place(self.column, r)
+    }
+
+    fn shade(&mut self, blocked: &[u8; E], grades: &mut [u8; R], from: usize, to: usize) {
+        for (r, g) in grades.iter_mut().enumerate().take(to).skip(from) {
+            let (lower, share) = self.place(r);
+            *g = (CLEAR - pair(blocked, lower).at(share)).max(BLOCKED);
+        }
+    }
+}
+
+fn cast_column<const R: usize, const E: usize, const W: usize>(
     column: &Column<R, E, W>,
-    axes: &Axes<R, A, E>,
+    slice: &mut impl Slice<R, E>,
     grades: &mut [u8; R],
     occupancy: &mut [u8; R],
 ) {
     let mut shadow = Shadow { blocked: [0; E], run: [0; E], in_run: false };
-    let mut rows = axes.slice_rows().as_slice();
     let mut next = 0;
     for (r, stack) in column.stacks() {
         if next < r {
             shadow.leave_run();
-            shadow.shade(axes, &mut rows, grades, next, r);
+            shadow.shade(slice, grades, next, r);
         }
-        let row = rows_at(&mut rows, r);
-        let share = axes.slice_share().get(r).copied().unwrap_or(0);
+        let (row, share) = slice.place(r);
         let here = pair(stack, row).at(share);
         if here < OCCUPIED {
             shadow.leave_run();
@@ -74,7 +144,7 @@ fn cast_column<const R: usize, const A: usize, const E: usize, const W: usize>(
         next = r + 1;
     }
     shadow.leave_run();
-    shadow.shade(axes, &mut rows, grades, next, R);
+    shadow.shade(slice, grades, next, R);
 }
 
 /// The lower of the two rows the slice plane runs between at a range cell; drops the stretches
@@ -113,37 +183,14 @@ impl<const E: usize> Shadow<E> {
     }
 
     /// Grades of empty cells.
-    fn shade<const R: usize, const A: usize>(
-        &self,
-        axes: &Axes<R, A, E>,
-        rows: &mut &[SliceRow],
-        grades: &mut [u8; R],
-        from: usize,
-        to: usize,
-    ) {
+    fn shade<const R: usize>(&self, slice: &mut impl Slice<R, E>, grades: &mut [u8; R], from: usize, to: usize) {
         if stack::is_empty(&self.blocked) {
             if let Some(clear) = grades.get_mut(from..to) {
                 clear.fill(CLEAR);
             }
             return;
         }
-        let mut start = from;
-        while start < to {
-            let lower = rows_at(rows, start);
-            let end = rows.first().map_or(to, |s| usize::from(s.end)).clamp(start + 1, to);
-            let pair = pair(&self.blocked, lower);
-            let (Some(cells), Some(shares)) = (grades.get_mut(start..end), axes.slice_share().get(start..end)) else {
-                return;
-            };
-            if pair.low == pair.high {
-                cells.fill((CLEAR - pair.low).max(BLOCKED));
-            } else {
-                for (g, &share) in cells.iter_mut().zip(shares) {
-                    *g = (CLEAR - pair.at(share)).max(BLOCKED);
-                }
-            }
-            start = end;
-        }
+        slice.shade(&self.blocked, grades, from, to);
     }
 }
 

@@ -9,6 +9,10 @@
 //! end. Through the rows of the grid such an end is right to a tenth of a row, which is a metre 60 m
 //! away.
 //!
+//! Over a road that is not flat the same holds piece by piece: between two points of its profile the ground is straight,
+//! and the slice is hidden where it is seen under a lower slope than the box's top. A box stands upright, on the height
+//! of the road at its middle. It may hide what lies beyond, the road being seen again in between.
+//!
 //! A box never hides the place it fills itself. Evidence in a box's place leaves the grid: the place was
 //! swept. A vehicle that is detected in another's shadow stays in it: showing its place would be right of
 //! every detected object by construction, and say nothing of the lines of sight there.
@@ -47,17 +51,22 @@ pub fn cast<const R: usize, const A: usize, const E: usize, const W: usize>(
     map: &mut PolarMap<R, A>,
 ) {
     for covered in columns(solid, axes) {
-        let Covered { column, share, enter_cm, leave_cm, cells } = covered;
-        if let Some(column) = grid.column_mut(column) {
+        let Covered { column: number, share, enter_cm, leave_cm, cells } = covered;
+        if let Some(column) = grid.column_mut(number) {
             column.empty(cells.clone());
         }
-        let Some((grades, occupancy)) = map.rows_mut(column) else { continue };
+        let Some((grades, occupancy)) = map.rows_mut(number) else { continue };
         if solid.height_cm > axes.slice_cm() {
             for o in occupancy.get_mut(cells.clone()).unwrap_or(&mut []) {
                 *o = (*o).max(share);
             }
         }
-        if let Some(hidden) = axes.hidden_behind(solid.height_cm, enter_cm, leave_cm) {
+        if !axes.ground().is_level() {
+            let top_cm = axes.ground().height_cm(solid.x_cm, solid.y_cm) + solid.height_cm;
+            for hidden in axes.hidden_over_ground(number, top_cm, enter_cm, leave_cm) {
+                shade(grades, cells.end, hidden, axes.cell_cm, share);
+            }
+        } else if let Some(hidden) = axes.hidden_behind(solid.height_cm, enter_cm, leave_cm) {
             shade(grades, cells.end, hidden, axes.cell_cm, share);
         }
     }
@@ -94,7 +103,13 @@ fn columns<const R: usize, const A: usize, const E: usize>(
 /// Lowers the grades of cells between two distances, from cell `first` on, by the part of them that is hidden.
 /// What is unknown stays unknown.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // range indices and bytes
-fn shade<const R: usize>(grades: &mut [u8; R], first: usize, (from, to): (i32, i32), cell_cm: i32, share: u8) {
+pub(super) fn shade<const R: usize>(
+    grades: &mut [u8; R],
+    first: usize,
+    (from, to): (i32, i32),
+    cell_cm: i32,
+    share: u8,
+) {
     let cell_cm = cell_cm.max(1);
     let to = to.min(R as i32 * cell_cm);
     let (first, last) = (first.max((from / cell_cm) as usize), (to / cell_cm) as usize);

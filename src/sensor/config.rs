@@ -56,6 +56,10 @@ pub enum Problem {
     TooFar,
     /// A lane that crosses itself.
     CrossesItself,
+    /// More heights of the road than there is room for.
+    TooManyHeights,
+    /// Two heights of the road with more than 12 % between them, or less than a metre of road.
+    TooSteep,
     /// A bit rate that no divider of a controller's clock meets.
     NoDivider {
         /// The clock.
@@ -80,6 +84,8 @@ impl core::fmt::Display for ConfigError {
             Problem::PointTwice => write!(f, "{parameter}: lane {value} has two points within half a metre"),
             Problem::TooFar => write!(f, "{parameter}: lane {value} reaches farther than 400 m from the sensor"),
             Problem::CrossesItself => write!(f, "{parameter}: lane {value} crosses itself"),
+            Problem::TooManyHeights => write!(f, "{parameter}: point {value} is one more than there is room for"),
+            Problem::TooSteep => write!(f, "{parameter}: before point {value} the road is steeper than 12 %"),
             Problem::NoDivider { clock_hz } => {
                 write!(f, "{parameter} is {value}, which no divider of {clock_hz} Hz meets")
             }

@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod field_of_view;
+pub mod ground;
 pub mod mount;
 pub mod noise;
 pub mod road;

@@ -79,10 +79,17 @@ pub struct Config {
     /// Which way traffic goes.
     #[serde(default, deserialize_with = "lanes")]
     pub lanes: &'static [&'static [[f32; 2]]],
+    /// Height of the road over its length.
+    #[serde(default, deserialize_with = "points")]
+    pub ground: &'static [[f32; 2]],
 }
 
 fn kept<'de, T: Deserialize<'de>, D: serde::Deserializer<'de>>(table: D) -> Result<Option<&'static T>, D::Error> {
     Ok(Some(Box::leak(Box::new(T::deserialize(table)?))))
+}
+
+fn points<'de, D: serde::Deserializer<'de>>(list: D) -> Result<&'static [[f32; 2]], D::Error> {
+    Ok(Vec::deserialize(list)?.leak())
 }
 
 fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [&'static [[f32; 2]]], D::Error> {
@@ -369,8 +376,8 @@ impl Config {
 
     /// Settings with what the file says of the place and no configuration block does.
     pub fn of_place(&self, settings: Settings) -> Settings {
-        let Self { lanes, obstacles, evidence, fixtures, .. } = *self;
-        Settings { lanes, obstacles, evidence, fixtures, ..settings }
+        let Self { lanes, ground, obstacles, evidence, fixtures, .. } = *self;
+        Settings { lanes, ground, obstacles, evidence, fixtures, ..settings }
     }
 
     /// The table of probabilities for the file's own settings, if both are given.

@@ -13,6 +13,7 @@ use crate::radar_3d::VisibilityConfig;
 use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, Problem};
 use crate::sensor::field_of_view::FieldOfView;
+use crate::sensor::ground::MOST_HEIGHTS;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
 use crate::unit::can_bus::BusConfig;
@@ -48,7 +49,7 @@ impl Settings {
     /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
     /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each
     /// tuned number with its place, from 2^16 on for obstacles, from 2^17 on for evidence and from 2^18 on
-    /// for fixtures.
+    /// for fixtures; and where the road is not flat the number 2^19 and each point of its profile.
     #[inline(never)] // once a start
     pub fn fingerprint(&self) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];
@@ -79,6 +80,10 @@ impl Settings {
         {
             let fixtures = self.fixtures().into_iter().flat_map(|fixtures| fixtures.numbers());
             (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
+        }
+        if MOST_HEIGHTS > 0 && !self.ground.is_empty() {
+            take([1 << 19, 0]);
+            self.ground.iter().for_each(|point| take(point.map(f32::to_bits)));
         }
         sum
     }
@@ -337,6 +342,7 @@ pub(super) mod tests {
         assert_ne!(a.fingerprint(), b.fingerprint());
         // of lanes each point, each end and the order
         let of = |lanes| Settings { lanes, ..a }.fingerprint();
+        let over = |ground| Settings { ground, ..a }.fingerprint();
         let all = [
             a.fingerprint(),
             of(&[&[[0.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]]]),
@@ -344,6 +350,9 @@ pub(super) mod tests {
             of(&[&[[4.0, 5.0], [6.0, 7.0]], &[[0.0, 1.0], [2.0, 3.0]]]),
             of(&[&[[1.0, 0.0], [2.0, 3.0]], &[[4.0, 5.0], [6.0, 7.0]]]),
             of(&[&[[0.0, 1.0], [2.0, 3.0]]]),
+            over(&[[0.0, 1.0], [2.0, 3.0]]),
+            over(&[[0.0, 1.0], [2.0, 3.5]]),
+            over(&[[0.0, 1.0]]),
         ];
         assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:x?}");
     }

@@ -78,6 +78,9 @@ pub struct Settings {
     /// Which way traffic goes, where that is given; no block has it.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub lanes: &'static [Lane],
+    /// Height of the road over its length, where it is not flat; no block has it.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub ground: &'static [[f32; 2]],
     /// How obstacles are tracked, where that was tuned for the place; no block has it.
     #[cfg(feature = "tuned")]
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -150,6 +153,7 @@ impl Settings {
             broadcast_bus: BusConfig::default(),
             unit: UnitConfig::default(),
             lanes: &[],
+            ground: &[],
             #[cfg(feature = "tuned")]
             obstacles: None,
             #[cfg(feature = "tuned")]
@@ -175,8 +179,8 @@ impl Settings {
 
     /// The estimator's configuration; what an integrator does not set is the library's.
     pub fn radar_3d(&self) -> Radar3dConfig {
-        let Self { gate, visibility, health, lanes, .. } = *self;
-        let config = Radar3dConfig { gate, visibility, health, lanes, ..Radar3dConfig::default() };
+        let Self { gate, visibility, health, lanes, ground, .. } = *self;
+        let config = Radar3dConfig { gate, visibility, health, lanes, ground, ..Radar3dConfig::default() };
         #[cfg(feature = "tuned")]
         let config = Radar3dConfig {
             obstacles: self.obstacles.copied().unwrap_or_default(),
