@@ -172,6 +172,31 @@ mod tests {
         assert!((pitched - (600 - 523)).abs() <= 3, "nose down lowers the axis: {pitched}");
     }
 
+    #[cfg(feature = "ground")]
+    #[test]
+    fn heights_are_above_a_road_that_climbs_or_falls() {
+        for (yaw_deg, grade) in [(0.0, 0.04), (0.0, -0.04), (180.0, 0.04)] {
+            let mount = Mount { x_m: 30.0, y_m: 0.0, height_m: 6.0, yaw_deg, pitch_deg: 2.0, roll_deg: 0.0 };
+            let levelling = mount.levelling().unwrap();
+            let ground = Ground::new(&levelling, &[[-200.0, -200.0 * grade], [200.0, 200.0 * grade]]).unwrap();
+            // a plate 0.8 m above the road 100 m ahead
+            let climb = f64::from(grade) * if yaw_deg == 0.0 { 100.0 } else { -100.0 };
+            let rise = climb + 0.8 - 6.0;
+            let d = Detection {
+                range_cm: (100.0_f64.hypot(rise) * 100.0).round() as u16,
+                azimuth: Angle::ZERO,
+                elevation: Some(Angle::from_degrees((rise.atan2(100.0).to_degrees() + 2.0) as f32)),
+                radial_velocity_cm_s: 100,
+                rcs_half_dbsm: None,
+                snr_half_db: Some(30),
+            };
+            let r = NoiseConfig::default().noise().unwrap().place_on(&d, &levelling, &ground);
+            assert!((i32::from(r.ground_cm) - 10_000).abs() <= 3, "{grade}: {r:?}");
+            let (height, _) = r.height_cm.unwrap();
+            assert!((height - 80).abs() <= 4, "{yaw_deg} {grade}: {height} cm");
+        }
+    }
+
     #[test]
     fn a_range_shorter_than_the_mast_lies_below_the_sensor() {
         let r = place(4.0, 20.0, None, 0.0);

@@ -146,6 +146,7 @@ mod tests {
     use crate::fixed::trig::Direction;
     use crate::map::Visibility;
     use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::ground::Ground;
     use crate::sensor::mount::Mount;
     use std::vec::Vec;
 
@@ -153,7 +154,12 @@ mod tests {
 
     /// 60 m in cells of 1 m, four columns from 30 degrees to the right to 30 to the left, and a map that is clear.
     fn world(sensor_m: f32) -> World {
-        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: sensor_m, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+        over(sensor_m, 0.0, &[])
+    }
+
+    /// The same over a road that is not flat.
+    fn over(sensor_m: f32, yaw_deg: f32, points: &[[f32; 2]]) -> World {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: sensor_m, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
         let view = FieldOfView {
             azimuth_min_deg: -30.0,
             azimuth_max_deg: 30.0,
@@ -163,7 +169,8 @@ mod tests {
             range_max_m: 60.0,
         };
         let levelling = mount.levelling().unwrap();
-        let axes = Axes::new(&levelling, &view, 1.0).unwrap();
+        let ground = Ground::new(&levelling, points).unwrap();
+        let axes = Axes::on(ground, &levelling, &view, 1.0).unwrap();
         let (grid, mut map) = (SphericalGrid::new(), PolarMap::unknown(axes.polar(&levelling), 128, 128));
         crate::grid::raycast::cast(&grid, &axes, &mut map);
         (axes, grid, map)
@@ -177,7 +184,10 @@ mod tests {
 
     /// Invisible cells of the second column behind a box.
     fn hidden(sensor_m: f32, solid: Solid) -> Vec<usize> {
-        let (axes, mut grid, mut map) = world(sensor_m);
+        hidden_in(world(sensor_m), solid)
+    }
+
+    fn hidden_in((axes, mut grid, mut map): World, solid: Solid) -> Vec<usize> {
         cast(&solid, &axes, &mut grid, &mut map);
         (0..60).filter(|r| map.cell(1, *r).visibility == Visibility::Invisible).collect()
     }
@@ -193,6 +203,51 @@ mod tests {
         }
         assert_eq!(hidden(6.0, wall(2500, 3000, 600)), (30..60).collect::<Vec<_>>(), "as high as the sensor");
         assert_eq!(hidden(6.0, wall(2500, 3000, 100)), [0_usize; 0], "no higher than the slice plane");
+    }
+
+    #[cfg(feature = "ground")]
+    #[test]
+    fn on_a_road_that_climbs_a_shadow_is_shorter_and_on_one_that_falls_it_does_not_end() {
+        let ends = |yaw_deg: f32, grade: f32| {
+            let cells = hidden_in(over(6.0, yaw_deg, &[[-90.0, -90.0 * grade], [90.0, 90.0 * grade]]), wall(2500, 3000, 300));
+            assert!(grade == 0.0 || cells.is_empty() || cells.contains(&31), "{cells:?}");
+            cells.last().map_or(0, |last| last + 1)
+        };
+        // along the ray, 7.5 degrees aside, the top lies 30.3 m away at 3 m and 27.5 m times the grade; the slice 1 m
+        // above a road that climbs as much as the ray ahead: 5 / (3 / 30.3 ...), as in double precision
+        let exact = |grade: f64| {
+            let (along, leave) = (7.5_f64.to_radians().cos(), 30.0 / 7.5_f64.to_radians().cos());
+            let top = (27.5 * grade + 3.0 - 6.0) / leave;
+            5.0 / (grade * along - top)
+        };
+        for grade in [0.0, 0.04, 0.1] {
+            let got = ends(0.0, grade as f32) as f64;
+            assert!((got - exact(grade)).abs() <= 1.0, "{grade}: {got} m, {} m", exact(grade));
+        }
+        assert!(exact(0.04) < 40.0 && exact(-0.04) > 60.0, "{} {}", exact(0.04), exact(-0.04));
+        assert_eq!(ends(0.0, -0.04), 60);
+        // who looks back sees the same road fall, and across it neither
+        assert_eq!(ends(180.0, 0.04), 60);
+        assert_eq!(ends(180.0, -0.04), ends(0.0, 0.04));
+        assert!(ends(90.0, 0.04).abs_diff(ends(0.0, 0.0)) <= 1);
+    }
+
+    #[cfg(feature = "ground")]
+    #[test]
+    fn behind_a_crest_the_road_hides_itself_and_comes_into_sight_again_where_it_climbs() {
+        // from 3 m: the crest 1.2 m high at 20 m, 10 % down to 40 m, and up again
+        let (_, _, map) = over(3.0, 0.0, &[[0.0, 0.0], [20.0, 1.2], [40.0, -0.8], [60.0, 1.2]]);
+        let cells: Vec<usize> = (0..60).filter(|r| map.cell(1, *r).visibility == Visibility::Invisible).collect();
+        // the line over the crest falls 0.09 m a metre: 1.2 - 0.09 s against 1.2 - 0.1 s + 1, never below; from 2 m it is
+        assert_eq!(cells, [0_usize; 0]);
+        let (_, _, map) = over(2.0, 0.0, &[[0.0, 0.0], [20.0, 1.2], [40.0, -0.8], [60.0, 1.2]]);
+        let cells: Vec<usize> = (0..60).filter(|r| map.cell(1, *r).visibility == Visibility::Invisible).collect();
+        // 1.2 - 0.04 s against 2.2 - 0.1 s: hidden from 16.7 m behind the crest, seen where 0.2 + 0.1 t is above 0.4 - 0.04 t
+        let along = 7.5_f64.to_radians().cos();
+        let (from, to) = ((20.0 + 1.0 / 0.06) / along, (40.0 + 0.2 / 0.14) / along);
+        assert!((cells[0] as f64 + 0.5 - from).abs() <= 1.0, "{cells:?} from {from}");
+        assert!((*cells.last().unwrap() as f64 + 0.5 - to).abs() <= 1.0, "{cells:?} to {to}");
+        assert!(cells.windows(2).all(|w| w[1] == w[0] + 1));
     }
 
     #[test]

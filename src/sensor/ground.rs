@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn the_part_below_a_slope_is_that_of_double_precision() {
-        for (foot_cm, rise) in [(0, 0), (0, 0.04), (0, -0.04), (-320, 0.08), (640, -0.04), (900, 0.02)] {
+        for (foot_cm, rise) in [(0, 0.0), (0, 0.04), (0, -0.04), (-320, 0.08), (640, -0.04), (900, 0.02)] {
             let rise = (rise * f64::from(1 << SLOPE_BITS)) as i32;
             let s = Stretch { from_cm: 3000, to_cm: 20_000, foot_cm, rise };
             for slope_permille in [-100, -40, -20, -5, 0, 10, 30, 60] {

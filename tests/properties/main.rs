@@ -16,6 +16,7 @@ mod configuration;
 mod detections;
 mod fixtures;
 mod fusion;
+mod ground;
 mod maps;
 mod monitor;
 mod radar_2d;

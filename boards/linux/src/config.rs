@@ -80,7 +80,7 @@ pub struct Config {
     #[serde(default, deserialize_with = "lanes")]
     pub lanes: &'static [&'static [[f32; 2]]],
     /// Height of the road over its length.
-    #[serde(default, deserialize_with = "points")]
+    #[serde(default, deserialize_with = "ground")]
     pub ground: &'static [[f32; 2]],
 }
 
@@ -88,16 +88,18 @@ fn kept<'de, T: Deserialize<'de>, D: serde::Deserializer<'de>>(table: D) -> Resu
     Ok(Some(Box::leak(Box::new(T::deserialize(table)?))))
 }
 
-fn points<'de, D: serde::Deserializer<'de>>(list: D) -> Result<&'static [[f32; 2]], D::Error> {
-    Ok(Vec::deserialize(list)?.leak())
+/// A lane, or the road's profile.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    points: Vec<[f32; 2]>,
+}
+
+fn ground<'de, D: serde::Deserializer<'de>>(table: D) -> Result<&'static [[f32; 2]], D::Error> {
+    Ok(Table::deserialize(table)?.points.leak())
 }
 
 fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [&'static [[f32; 2]]], D::Error> {
-    #[derive(Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct Table {
-        points: Vec<[f32; 2]>,
-    }
     let tables = Vec::<Table>::deserialize(tables)?;
     Ok(tables.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak())
 }
@@ -570,6 +572,17 @@ mod tests {
         assert!(check("[[-50.0, 2.0], [50.0, 2.0]]").is_ok());
         let refused = check("[[-50.0, 2.0]]").unwrap_err().to_string();
         assert_eq!(refused, "lanes: lane 0 has fewer than two points");
+    }
+
+    #[test]
+    fn the_roads_heights_are_a_part_of_the_settings_and_of_the_fingerprint_and_a_steep_one_is_named() {
+        let config = |points: &str| with(&format!("[ground]\npoints = {points}\n")).unwrap().settings().unwrap();
+        let (plain, climbing) = (with("").unwrap().settings().unwrap(), config("[[0.0, 0.0], [100.0, 4.0]]"));
+        assert_eq!(climbing.radar_3d().ground, [[0.0, 0.0], [100.0, 4.0]]);
+        assert_ne!(plain.fingerprint(), climbing.fingerprint());
+        assert!(Grid::Small.check().settings(&climbing).is_ok());
+        let refused = Grid::Reference.check().settings(&config("[[0.0, 0.0], [10.0, 4.0]]")).unwrap_err().to_string();
+        assert_eq!(refused, "ground: before point 1 the road is steeper than 12 %");
     }
 
     #[test]

@@ -38,6 +38,8 @@ enum World {
     Crossing,
     /// Motorways with lanes that creep or stop and go beside lanes that flow, four scenes
     Queue,
+    /// Motorways on a grade of 4 %, a crest, a dip and a ramp, five scenes
+    Grade,
     /// A camera on the motorway's gantry, with detectors from ideal to poor, in dense and in light traffic
     GantryCamera,
     /// Two radars at opposite corners of a crossing, each alone and fused, four sites
@@ -52,6 +54,7 @@ impl World {
             Self::Motorway => "motorway",
             Self::Crossing => "crossing",
             Self::Queue => "queue",
+            Self::Grade => "grade",
             Self::GantryCamera => "gantry-camera",
             Self::TwoRadars => "two-radars",
             Self::RadarCamera => "radar-camera",
@@ -63,6 +66,7 @@ impl World {
             Self::Motorway => "experiment.toml",
             Self::Crossing => "crossing/scenes.toml",
             Self::Queue => "queue/scenes.toml",
+            Self::Grade => "grade/scenes.toml",
             Self::GantryCamera => "gantry-camera.toml",
             Self::TwoRadars => "two-radars.toml",
             Self::RadarCamera => "radar-camera.toml",
@@ -141,7 +145,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     match args.scene {
         _ if args.calibration => calibration(args, &path, &settings, &mut outputs)?,
         World::Motorway => motorway(args, &path, &settings, &mut outputs)?,
-        World::Crossing | World::Queue => several_scenes(args, &path, &settings, &mut outputs)?,
+        World::Crossing | World::Queue | World::Grade => several_scenes(args, &path, &settings, &mut outputs)?,
         World::GantryCamera => gantry_camera(args, &path, &settings, &mut outputs)?,
         World::TwoRadars | World::RadarCamera => several_sensors(args, &path, &settings, &mut outputs)?,
     }
@@ -180,9 +184,10 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
+    let on_grades = all.iter().all(|scene| !scene.ground.is_empty());
     let running = bar(
         "simulating and replaying",
-        scenes::total_steps(&all, extent, ESTIMATORS + u64::from(scenes::with_lanes(&all))),
+        scenes::total_steps(&all, extent, ESTIMATORS + u64::from(scenes::with_lanes(&all)) + u64::from(on_grades)),
     );
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
     let results = scenes::run(&all, settings, extent, &keep, &|| running.step())?;

@@ -53,6 +53,8 @@ struct Tables {
     evidence: Option<toml::Value>,
     #[serde(default, skip_serializing)]
     fixtures: Option<toml::Value>,
+    #[serde(default, skip_serializing)]
+    ground: Option<toml::Value>,
 }
 
 /// What a file says.
@@ -91,6 +93,7 @@ fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
         ("[obstacles]", tables.obstacles.is_some()),
         ("[evidence]", tables.evidence.is_some()),
         ("[fixtures]", tables.fixtures.is_some()),
+        ("[ground]", tables.ground.is_some()),
     ];
     let left_out = keys.into_iter().filter(|(_, is_there)| *is_there).map(|(key, _)| key).collect();
     let settings = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
@@ -136,13 +139,14 @@ fn tables(settings: &Settings) -> Tables {
         broadcast_bus,
         unit,
         lanes: _,
+        ground: _,
         obstacles: _,
         evidence: _,
         fixtures: _,
     } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
     let (state_dir, grid, input, output) = (None, None, None, None);
-    let (lanes, obstacles, evidence, fixtures) = (None, None, None, None);
+    let (lanes, ground, obstacles, evidence, fixtures) = (None, None, None, None, None);
     Tables {
         unit,
         mount,
@@ -161,6 +165,7 @@ fn tables(settings: &Settings) -> Tables {
         obstacles,
         evidence,
         fixtures,
+        ground,
     }
 }
 

@@ -24,6 +24,7 @@ use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::{Frame, RadarDetection, Recording};
@@ -88,6 +89,24 @@ pub struct Options {
     /// Which way traffic goes; where there are any, `radar-3d-lanes` runs beside `radar-3d`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lanes: Vec<Lane>,
+    /// Height of the road over its length, metres; where it is given, or a recording says it, `radar-3d-ground` runs beside
+    /// `radar-3d`, and `reference` with it.
+    #[serde(skip_serializing_if = "Profile::is_empty")]
+    pub ground: Profile,
+}
+
+/// Heights of a road that is not flat.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Place along the road and height, metres in road coordinates.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl Profile {
+    fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
 }
 
 /// A lane: a polyline in the direction of its traffic.
@@ -114,6 +133,7 @@ impl Default for Options {
             radar_3d: Radar3dConfig::default(),
             camera_3d: Camera3dConfig::default(),
             lanes: Vec::new(),
+            ground: Profile::default(),
         }
     }
 }
@@ -155,14 +175,24 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     if !options.grid.is_reference() {
         estimators.push(radar_3d::on(options.grid, &sensor, &radar_3d)?);
     }
+    let ground = ground(recording, options)?;
+    if !ground.is_level() {
+        estimators.push(radar_3d::new(&sensor, &Radar3dConfig { ground: ground.kept(), ..radar_3d })?);
+    }
     if !options.lanes.is_empty() {
         radar_3d.lanes = kept(&options.lanes);
         estimators.push(radar_3d::new(&sensor, &radar_3d)?);
     }
     if let Some(truth) = &recording.truth {
-        estimators.push(reference::new(recording, truth, &sensor, options)?);
+        estimators.push(reference::new(recording, truth, &sensor, &ground, options)?);
     }
     Ok(estimators)
+}
+
+/// The road's heights as estimators are given them: those of the options, or else the recording's own.
+fn ground(recording: &Recording, options: &Options) -> Result<Ground> {
+    let recorded = recording.truth.as_ref().map(|truth| truth.ground.clone()).unwrap_or_default();
+    if options.ground.is_empty() { Ok(recorded) } else { Ground::new(options.ground.points.clone()) }
 }
 
 /// The estimator whose map a sensor sends: `radar-3d`, or `camera-3d` of a camera's own recording.
@@ -177,6 +207,7 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
     let (sensor, max_detections) = radar(recording, options)?;
     let mut radar_3d = options.radar_3d;
     radar_3d.gate.max_detections = max_detections;
+    radar_3d.ground = ground(recording, options)?.kept();
     radar_3d::on(options.grid, &sensor, &radar_3d)
 }
 
@@ -186,7 +217,8 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
 /// As for [`own`].
 pub fn own_grid(recording: &Recording, options: &Options) -> Result<(PolarGeometry, u8)> {
     let (sensor, _) = radar(recording, options)?;
-    radar_3d::grid(&sensor, &options.radar_3d)
+    let radar_3d = Radar3dConfig { ground: ground(recording, options)?.kept(), ..options.radar_3d };
+    radar_3d::grid(&sensor, &radar_3d)
 }
 
 /// A recording's radar, and how many detections of a frame are used.
@@ -216,8 +248,11 @@ fn radar(recording: &Recording, options: &Options) -> Result<(Sensor, u16)> {
 pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
     let view = recording.sensor.field_of_view;
     let degrees = |v: f64| v.to_degrees() as f32;
+    let mut mount = mount(&recording.pose);
+    // above the road below it
+    mount.height_m -= recording.truth.as_ref().map_or(0.0, |t| t.ground.height(recording.pose.position[0])) as f32;
     Sensor {
-        mount: mount(&recording.pose),
+        mount,
         field_of_view: FieldOfView {
             azimuth_min_deg: degrees(view.azimuth_rad[0]),
             azimuth_max_deg: degrees(view.azimuth_rad[1]),

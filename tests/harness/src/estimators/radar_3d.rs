@@ -128,7 +128,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
         let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
-        let name = if config.lanes.is_empty() { "radar-3d" } else { "radar-3d-lanes" };
+        let name = match (config.lanes, config.ground) {
+            ([], []) => "radar-3d",
+            ([], _) => "radar-3d-ground",
+            _ => "radar-3d-lanes",
+        };
         Ok(Self { name, parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
     }
 }

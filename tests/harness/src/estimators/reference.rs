@@ -9,12 +9,13 @@ use viewshed::grid::raycast;
 use viewshed::grid::spherical::SphericalGrid;
 use viewshed::map::VisibilityMap;
 use viewshed::map::polar::PolarMap;
-use viewshed::radar_3d::Radar3dParameters;
+use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 
 use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
 use super::{Estimator, PolarCells};
 use super::{Options, polar_cells};
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::{Solid, clipped};
 use crate::recording::truth::Truth;
@@ -37,13 +38,20 @@ struct Reference {
     scale: f64,
 }
 
-pub fn new(recording: &Recording, truth: &Truth, sensor: &Sensor, options: &Options) -> Result<Box<dyn Estimator>> {
+pub fn new(
+    recording: &Recording,
+    truth: &Truth,
+    sensor: &Sensor,
+    ground: &Ground,
+    options: &Options,
+) -> Result<Box<dyn Estimator>> {
     anyhow::ensure!(
         options.reference_share > 0.0 && options.reference_share <= 1.0,
         "--reference-share {} is outside 0 to 1",
         options.reference_share
     );
-    let parameters = Box::new(Radar3dParameters::new(sensor, &options.radar_3d)?);
+    let config = Radar3dConfig { ground: ground.kept(), ..options.radar_3d };
+    let parameters = Box::new(Radar3dParameters::new(sensor, &config)?);
     let map = Box::new(parameters.map());
     Ok(Box::new(Reference {
         truth: truth.clone(),
@@ -66,7 +74,7 @@ impl Estimator for Reference {
         self.grid.clear();
         let axes = self.parameters.axes();
         for object in self.truth.at(frame.time_ns) {
-            fill(&object.solid, &self.pose, axes, self.scale, &mut self.grid);
+            fill(&object.solid, (&self.pose, self.truth.ground.height(self.pose.position[0])), axes, self.scale, &mut self.grid);
         }
         raycast::cast(&self.grid, axes, &mut self.map);
     }
@@ -83,7 +91,7 @@ impl Estimator for Reference {
 /// Adds the share of every cell that a box fills.
 fn fill(
     solid: &Solid,
-    pose: &SensorPose,
+    (pose, foot_m): (&SensorPose, f64),
     axes: &Axes<RANGES, AZIMUTHS, ELEVATIONS>,
     scale: f64,
     grid: &mut SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>,
@@ -91,7 +99,8 @@ fn fill(
     let (sensor, yaw) = (pose.position, pose.yaw_rad());
     let cell_m = f64::from(axes.cell_cm) / 100.0;
     // slopes a point at this ground distance is seen under, from the box's bottom to its top
-    let slope = |z: f64, ground: f64| (z - f64::from(axes.sensor_height_cm()) / 100.0) / ground;
+    // below the sensor the road may lie at any height
+    let slope = |z: f64, ground: f64| (z - foot_m - f64::from(axes.sensor_height_cm()) / 100.0) / ground;
     let span = f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU;
     let towards = |place: f64| yaw + f64::from(axes.azimuth_origin.radians()) + span * place / AZIMUTHS as f64;
     for a in 0..AZIMUTHS {

@@ -115,7 +115,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
         sensor: first.recording.sensor.clone(),
         pose: first.recording.pose,
         frames,
-        truth: Some(Truth { tracks, beside: None }),
+        truth: Some(Truth { tracks, ..Truth::default() }),
         occlusion: Default::default(),
         camera: None,
         problems: Problems::default(),

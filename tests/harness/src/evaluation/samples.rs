@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::Options;
+use crate::geometry::ground::Ground;
 use crate::geometry::polygon::{Bounds, Convex};
 use crate::geometry::pose::{SensorPose, direction};
 use crate::geometry::sight::{box_in_sight, column_in_sight, footprint_in_sight, shadow};
@@ -134,22 +135,37 @@ fn frame_samples(
     let pose = &recording.pose;
     let sensor = pose.position;
     let height = options.slice_height_m;
-    let shadows: Vec<Option<Convex>> = objects.iter().map(|o| shadow(sensor, &o.solid, height)).collect();
+    let ground = ground(recording);
+    let shadows: Vec<Option<Convex>> = match ground {
+        Some(_) => vec![None; objects.len()],
+        None => objects.iter().map(|o| shadow(sensor, &o.solid, height)).collect(),
+    };
     let mut samples = Vec::new();
     for (k, object) in objects.iter().enumerate() {
         let [x, y, _] = object.solid.center;
         let slow = object.speed().is_some_and(|v| v < options.min_speed_mps);
-        if slow || !recording.sensor.field_of_view.contains(pose.to_spherical([x, y, height])) {
+        if slow || !recording.sensor.field_of_view.contains(pose.to_spherical(above(ground, [x, y], height))) {
             continue;
         }
         let others = || (0..objects.len()).filter(|&i| i != k);
+        let (slice_in_sight, box_in_sight) = match ground {
+            Some(ground) => {
+                let others: Vec<Solid> = others().map(|i| objects[i].solid).collect();
+                let slice = ground.footprint_in_sight(sensor, &object.solid, height, &others);
+                (slice, ground.box_in_sight(sensor, &object.solid, &others))
+            }
+            None => (
+                footprint_in_sight(&object.solid, others().filter_map(|i| shadows[i].as_ref())),
+                box_in_sight(sensor, &object.solid, others().map(|i| &objects[i].solid)),
+            ),
+        };
         samples.push(Sample {
             track: object.track,
             distance_m: (x - sensor[0]).hypot(y - sensor[1]),
             detections: associated[k],
             detected: associated[k] >= options.min_detections,
-            slice_in_sight: footprint_in_sight(&object.solid, others().filter_map(|i| shadows[i].as_ref())),
-            box_in_sight: box_in_sight(sensor, &object.solid, others().map(|i| &objects[i].solid)),
+            slice_in_sight,
+            box_in_sight,
             cells: object.solid.cells().collect(),
             solid: object.solid,
         });
@@ -161,11 +177,14 @@ fn frame_samples(
         .filter(|c| !taken.contains(c))
         .map(|&(i, j)| {
             let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5];
-            let in_sight = match column {
-                Some((height_m, share)) => {
+            let in_sight = match (column, ground) {
+                (Some((height_m, share)), _) => {
                     column_in_sight(sensor, centre, height_m, objects.iter().map(|o| &o.solid)) >= share
                 }
-                None => !bounded.iter().any(|(b, s)| b.contains(centre) && s.contains(centre)),
+                (None, Some(ground)) => {
+                    ground.in_sight(sensor, ground.above(centre, height), objects.iter().map(|o| &o.solid))
+                }
+                (None, None) => !bounded.iter().any(|(b, s)| b.contains(centre) && s.contains(centre)),
             };
             ((i, j), in_sight)
         })
@@ -194,8 +213,18 @@ fn road_cells(recording: &Recording, options: &Options) -> Vec<Cell> {
 
 /// Whether a cell's own centre, at slice height, lies in the static field of view.
 pub fn cell_in_view(recording: &Recording, (i, j): Cell, height_m: f64) -> bool {
-    let centre = [f64::from(i) + 0.5, f64::from(j) + 0.5, height_m];
+    let centre = above(ground(recording), [f64::from(i) + 0.5, f64::from(j) + 0.5], height_m);
     recording.sensor.field_of_view.contains(recording.pose.to_spherical(centre))
+}
+
+/// The road's heights, where it is known not to be flat.
+fn ground(recording: &Recording) -> Option<&Ground> {
+    recording.truth.as_ref().map(|truth| &truth.ground).filter(|ground| !ground.is_level())
+}
+
+/// A place so high above the road.
+fn above(ground: Option<&Ground>, [x, y]: [f64; 2], height_m: f64) -> [f64; 3] {
+    [x, y, ground.map_or(0.0, |g| g.height(x)) + height_m]
 }
 
 /// How many detections belong to each object. A detection belongs to at most one.
@@ -226,7 +255,10 @@ pub fn owner(
     options: &Options,
 ) -> Option<usize> {
     let pose = &recording.pose;
-    let p = detection.road_position(pose, options.slice_height_m);
+    let mut p = detection.road_position(pose, options.slice_height_m);
+    if let Some(ground) = ground(recording).filter(|_| detection.elevation_rad.is_none()) {
+        p = detection.road_position(pose, ground.height(p[0]) + options.slice_height_m);
+    }
     let grown = !recording.sensor.frames_independent;
     let judge_doppler = grown && !recording.sensor.platform_moving;
     let line = line_of_sight(pose, p);

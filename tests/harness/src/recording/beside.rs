@@ -28,7 +28,8 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
         labels::check_places(&labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
         let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let beside = Some(LabelsBeside { file, sized_by_class });
-        recording.truth = Some(Truth { beside, ..Truth::new(labels) });
+        let ground = recording.truth.take().map(|truth| truth.ground).unwrap_or_default();
+        recording.truth = Some(Truth { beside, ground, ..Truth::new(labels) });
     }
     if occlusion_csv.exists() {
         recording.occlusion = labels::read_occlusion(&occlusion_csv)?;

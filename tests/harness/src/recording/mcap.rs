@@ -12,6 +12,7 @@ use super::problems::Problems;
 use super::ros::{self, CameraInfo, Detection2DArray, Detection3DArray, PointCloud2, RadarScan, TfMessage};
 use super::transforms::Transforms;
 use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::truth::{Label, Truth};
@@ -20,6 +21,8 @@ pub const POINTS_TOPIC: &str = "/radar/points";
 pub const TRUTH_TOPIC: &str = "/ground_truth/objects";
 pub const ROAD_FRAME: &str = "road";
 pub const SENSOR_METADATA: &str = "viewshed.sensor";
+/// Its `points_m` is a list of [x, height] in the road frame, metres: the road where it is not flat.
+pub const GROUND_METADATA: &str = "viewshed.ground";
 
 /// Topic of one of several radars, by its name.
 pub fn points_topic(name: &str) -> String {
@@ -71,6 +74,8 @@ struct Reader {
     channels: BTreeMap<u16, Topic>,
     /// Records of [`SENSOR_METADATA`].
     metadata: Vec<BTreeMap<String, String>>,
+    /// What [`GROUND_METADATA`] says.
+    ground: Option<String>,
     transforms: Transforms,
     radar_frame: Option<String>,
     topics_of_frames: BTreeSet<String>,
@@ -179,6 +184,7 @@ impl Reader {
                     });
                 }
                 Record::Message { header, data } => self.message(&header, &data),
+                Record::Metadata(m) if m.name == GROUND_METADATA => self.ground = m.metadata.get("points_m").cloned(),
                 Record::Metadata(m) => self.metadata.extend(of_sensor(m)),
                 Record::DataEnd(_) => {
                     ended = true;
@@ -358,7 +364,14 @@ impl Reader {
             );
         }
         let sensor = self.sensor(&name, options)?;
-        let truth = self.labelled.then(|| Truth::new(self.labels));
+        let ground = match &self.ground {
+            Some(text) => serde_json::from_str(text)
+                .map_err(anyhow::Error::from)
+                .and_then(Ground::new)
+                .with_context(|| format!("{name}: metadata `{GROUND_METADATA}`: `points_m` is `{text}`"))?,
+            None => Ground::default(),
+        };
+        let truth = self.labelled.then(|| Truth { ground, ..Truth::new(self.labels) });
         let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);
         Ok(Recording {
             name,

@@ -9,12 +9,13 @@ use mcap::{Compression, WriteOptions, Writer};
 use serde::Serialize;
 
 use super::camera::{self, CAMERA_FRAME, CameraFrame, INFO_TOPIC, Intrinsics, OBJECTS_TOPIC, OPTICAL_FRAME};
-use super::mcap::{POINTS_TOPIC, ROAD_FRAME, SENSOR_METADATA, TRUTH_TOPIC, in_topics, points_topic};
+use super::mcap::{GROUND_METADATA, POINTS_TOPIC, ROAD_FRAME, SENSOR_METADATA, TRUTH_TOPIC, in_topics, points_topic};
 use super::ros::{
     Detection3D, Detection3DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose, PointCloud2, PointField, Pose,
     Quaternion, Stamp, TfMessage, Transform, TransformStamped, Vector3, encode,
 };
 use super::{Frame, RadarDetection, Sensor};
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::{SensorPose, direction};
 use crate::recording::truth::Label;
 
@@ -104,6 +105,13 @@ impl<W: Write + Seek> RecordingWriter<W> {
         let mut recording = Self { writer, radars: topics, channels: BTreeMap::new(), sequence: 0 };
         recording.message(TF_TOPIC, TF, start_ns, &mounts)?;
         Ok(recording)
+    }
+
+    /// Says that the road is not flat.
+    pub fn ground(&mut self, ground: &Ground) -> Result<()> {
+        let points = serde_json::to_string(ground.points())?;
+        let metadata = BTreeMap::from([("points_m".to_owned(), points)]);
+        Ok(self.writer.write_metadata(&Metadata { name: GROUND_METADATA.into(), metadata })?)
     }
 
     /// A frame of the first radar.

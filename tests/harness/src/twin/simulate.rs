@@ -14,11 +14,12 @@ use super::radar::Radar;
 use super::radar::disturbance::{Outage, noise_db, outage};
 use super::random::{Dice, Use, name};
 use super::scatter::{Scatterer, scatterers};
-use super::scene::structure::Piece;
+use super::scene::structure::{PIECE_M, PIECE_ON_GRADE_M, Piece};
 use super::scene::{Look, RadarSection, Scene};
 use super::traffic::types::Class;
 use super::traffic::{self, Region, Traffic};
 use super::world::{Body, Sides, World};
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::camera::{CameraFrame, RecordedCamera};
@@ -45,6 +46,7 @@ pub struct Simulation {
     pub further_radars: Vec<Radar>,
     vehicles: Vec<Prepared>,
     structures: Vec<Piece>,
+    ground: Ground,
 }
 
 /// What never changes of a vehicle.
@@ -131,9 +133,18 @@ impl Simulation {
                 }
             })
             .collect();
-        let structures = scene.structures.iter().flat_map(|s| s.pieces(scene.seed)).collect();
-        let further_radars = scene.radars().iter().skip(1).map(RadarSection::radar).collect();
-        Ok(Self { radar: scene.radar.radar(), further_radars, vehicles, structures, traffic, scene })
+        let ground = scene.ground()?;
+        let longest_m = if ground.is_level() { PIECE_M } else { PIECE_ON_GRADE_M };
+        let mut structures: Vec<Piece> =
+            scene.structures.iter().flat_map(|s| s.pieces(scene.seed, longest_m)).collect();
+        structures.iter_mut().for_each(|piece| lift(&ground, &mut piece.label.solid));
+        let radar = |section: &RadarSection| {
+            let mut radar = section.radar();
+            radar.pose.position[2] += ground.height(radar.pose.position[0]);
+            radar
+        };
+        let further_radars = scene.radars().iter().skip(1).map(radar).collect();
+        Ok(Self { radar: radar(&scene.radar), further_radars, vehicles, structures, ground, traffic, scene })
     }
 
     /// When the last vehicle leaves, seconds since the begin.
@@ -177,7 +188,7 @@ impl Simulation {
             None => {
                 let mut dice = Dice::new(self.scene.seed, Use::Interference, number);
                 let noise = noise_db(&section.interference, &section.model.interference, since_s, &mut dice);
-                let world = World::new(self.radar.pose.position, bodies);
+                let world = World::over(&self.ground, self.radar.pose.position, bodies);
                 Some(self.radar.scan(&world, &returns, self.scene.seed, number, noise))
             }
         };
@@ -236,7 +247,7 @@ impl Simulation {
     /// What a radar mounted anywhere measures at an instant; `number` makes the draws its own.
     pub fn scan(&self, radar: &Radar, since_s: f64, number: u64) -> Vec<RadarDetection> {
         let Instant { bodies, returns, .. } = self.instant(since_s, self.time_ns(since_s));
-        radar.scan(&World::new(radar.pose.position, bodies), &returns, self.scene.seed, number, 0.0)
+        radar.scan(&World::over(&self.ground, radar.pose.position, bodies), &returns, self.scene.seed, number, 0.0)
     }
 
     fn instant(&self, since_s: f64, time_ns: i64) -> Instant<'_> {
@@ -249,7 +260,8 @@ impl Simulation {
         }
         for (k, pose) in self.traffic.at(self.scene.from_s() + since_s) {
             let (vehicle, prepared) = (&self.traffic.vehicles[k], &self.vehicles[k]);
-            let solid = pose.solid;
+            let mut solid = pose.solid;
+            lift(&self.ground, &mut solid);
             instant.bodies.push(Body {
                 solid,
                 velocity: pose.velocity,
@@ -259,6 +271,7 @@ impl Simulation {
             instant.returns.push(&prepared.scatterers);
             let round = |v: f64| (v / LABEL_STEP_M).round() * LABEL_STEP_M;
             let [x, y, z] = solid.center;
+            let z = if self.ground.is_level() { z } else { round(z) };
             instant.labels.push(Label {
                 time_ns,
                 id: vehicle.id.clone(),
@@ -278,7 +291,7 @@ impl Simulation {
     /// Every vehicle passes below (or above) every sensor of the scene.
     fn passes_below(&self, labels: &[Label], since_s: f64) -> Result<()> {
         for (sensor, mount) in self.scene.mounts() {
-            if let Some(hit) = labels[self.structures.len()..].iter().find(|l| mount.is_inside(&l.solid)) {
+            if let Some(hit) = labels[self.structures.len()..].iter().find(|l| mount.is_inside(&self.on_flat(&l.solid))) {
                 bail!(
                     "{} `{}` drives through {sensor} at {since_s:.2} s: it is {} m high, the mount at ({}, {}) {} m",
                     hit.class,
@@ -291,6 +304,12 @@ impl Simulation {
             }
         }
         Ok(())
+    }
+
+    /// A box as it would stand on a flat road.
+    fn on_flat(&self, solid: &Solid) -> Solid {
+        let [x, y, z] = solid.center;
+        Solid { center: [x, y, z - self.ground.height(x)], ..*solid }
     }
 
     /// What the recording says of the first radar.
@@ -335,7 +354,7 @@ impl Simulation {
                 further.iter_mut().zip(step.further).for_each(|(all, one)| all.push(one));
             }
         }
-        let truth = Some(Truth::new(labels));
+        let truth = Some(Truth { ground: self.ground.clone(), ..Truth::new(labels) });
         let recording = |((sensor, pose), frames): ((Sensor, SensorPose), Vec<Frame>)| Recording {
             name: sensor.name.clone(),
             sensor,
@@ -365,6 +384,9 @@ impl Simulation {
         let camera = self.scene.camera.as_ref().map(|section| (section.camera(), section.rate_hz));
         let camera_pose = camera.as_ref().map(|(camera, _)| &camera.pose);
         let mut writer = RecordingWriter::of_several(sink, &self.radars(), camera_pose, start_ns)?;
+        if !self.ground.is_level() {
+            writer.ground(&self.ground)?;
+        }
         let frames = self.frames();
         let mut made = Made { vehicles: self.traffic.vehicles.len(), ..Made::default() };
         let mut camera_first = 0;
@@ -408,6 +430,11 @@ impl Simulation {
         let sink = writer.finish().context("cannot complete the recording")?;
         Ok((sink, made))
     }
+}
+
+/// Puts what would stand on a flat road upon the ground below its middle.
+fn lift(ground: &Ground, solid: &mut Solid) {
+    solid.center[2] += ground.height(solid.center[0]);
 }
 
 /// Computes numbered frames in parallel, in their order; the first error wins.

@@ -2,9 +2,11 @@
 //!
 //! A path is tried against the boxes of every body that could stand in it; by the road it is the straight
 //! line to the point's mirror image, past the boxes and past their mirror images. A box that is touched
-//! only at its surface does not block.
+//! only at its surface does not block. Where the road is not flat it hides, too, and mirrors about the height below each
+//! point: a wave leaves it near what it meets, which stands low.
 
 use super::body::{Block, FRAME_M};
+use crate::geometry::ground::Ground;
 use crate::geometry::solid::Solid;
 
 /// Shortening at both ends of a path, so that a point on a surface is not blocked by that surface.
@@ -83,6 +85,7 @@ pub struct World<'a> {
     /// Bodies that could stand between the sensor and each body, itself included.
     between: Vec<Vec<usize>>,
     eye: [f64; 3],
+    ground: Ground,
 }
 
 /// Directions a body covers, seen from above.
@@ -94,7 +97,13 @@ struct Extent {
 }
 
 impl<'a> World<'a> {
+    #[cfg(test)]
     pub fn new(eye: [f64; 3], bodies: Vec<Body<'a>>) -> Self {
+        Self::over(&Ground::default(), eye, bodies)
+    }
+
+    /// Bodies that stand on ground which hides, too.
+    pub fn over(ground: &Ground, eye: [f64; 3], bodies: Vec<Body<'a>>) -> Self {
         let extents: Vec<Extent> = bodies.iter().map(|b| extent(&b.solid, eye)).collect();
         let between = extents
             .iter()
@@ -108,7 +117,7 @@ impl<'a> World<'a> {
             })
             .collect();
         let eyes = bodies.iter().map(|b| in_axes(&b.solid, eye)).collect();
-        Self { bodies, eyes, between, eye }
+        Self { bodies, eyes, between, eye, ground: ground.clone() }
     }
 
     /// A point of a body's own axes, in the road frame.
@@ -121,14 +130,31 @@ impl<'a> World<'a> {
     /// Whether nothing stands between the sensor and a point of a body (road frame); the body itself
     /// blocks it too, but for a point `inside`.
     pub fn in_sight(&self, body: usize, point: [f64; 3], inside: bool) -> bool {
-        self.between(body, inside).all(|i| !self.hit(i, self.eyes[i], point, Fold::None))
+        !self.ground.hides(self.eye, point)
+            && self.between(body, inside).all(|i| !self.hit(i, self.eyes[i], point, Fold::None))
     }
 
     /// Whether the point is seen by way of the road: sensor, road, point.
     pub fn in_sight_by_road(&self, body: usize, point: [f64; 3], inside: bool) -> bool {
-        let image = [point[0], point[1], -point[2]];
-        self.between(body, inside)
-            .all(|i| !self.hit(i, self.eyes[i], image, Fold::None) && !self.hit(i, self.eyes[i], image, Fold::Down))
+        let image = self.mirrored(point);
+        self.fall_by_road(point) > 0.0
+            && !self.ground.hides(self.eye, point)
+            && self
+                .between(body, inside)
+                .all(|i| !self.hit(i, self.eyes[i], image, Fold::None) && !self.hit(i, self.eyes[i], image, Fold::Down))
+    }
+
+    /// Image of a point in the road.
+    pub fn mirrored(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        [x, y, 2.0 * self.ground.height(x) - z]
+    }
+
+    /// How far the way from the sensor by the road to a point falls and rises again, metres; none where the sensor lies
+    /// below the plane of the road at the point.
+    pub fn fall_by_road(&self, [x, _, z]: [f64; 3]) -> f64 {
+        let foot = self.ground.height(x);
+        let above = self.eye[2] - (foot + self.ground.grade(x) * (self.eye[0] - x));
+        if above > 0.0 { above + (z - foot) } else { 0.0 }
     }
 
     fn between(&self, body: usize, inside: bool) -> impl Iterator<Item = usize> {
@@ -139,7 +165,7 @@ impl<'a> World<'a> {
     pub fn clear(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy).max(1e-9);
-        (0..self.bodies.len()).all(|i| {
+        !self.ground.hides(from, to) && (0..self.bodies.len()).all(|i| {
             let solid = &self.bodies[i].solid;
             // the path passes the body at more than its half diagonal
             let (cx, cy) = (solid.center[0] - from[0], solid.center[1] - from[1]);
@@ -182,13 +208,13 @@ impl<'a> World<'a> {
     fn hit(&self, body: usize, from: [f64; 3], to: [f64; 3], fold: Fold) -> bool {
         let Body { solid, blocks, .. } = &self.bodies[body];
         let to = in_axes(solid, to);
-        let floor = solid.bottom();
+        let (floor, foot) = (solid.bottom(), self.ground.height(solid.center[0]));
         let outer = Block {
             ahead: [-solid.size[0] / 2.0, solid.size[0] / 2.0],
             left: [-solid.size[1] / 2.0, solid.size[1] / 2.0],
             up: [0.0, solid.size[2]],
         };
-        crosses(from, to, &outer, floor, fold) && blocks.iter().any(|b| crosses(from, to, b, floor, fold))
+        crosses(from, to, &outer, [floor, foot], fold) && blocks.iter().any(|b| crosses(from, to, b, [floor, foot], fold))
     }
 }
 
@@ -199,10 +225,11 @@ enum Fold {
     Down,
 }
 
-/// Whether a segment passes through the inside of a block (both in the body's axes, heights from the road).
-fn crosses(from: [f64; 3], to: [f64; 3], block: &Block, floor: f64, fold: Fold) -> bool {
+/// Whether a segment passes through the inside of a block (both in the body's axes, heights those of the road frame; the
+/// block's lowest, and the road's).
+fn crosses(from: [f64; 3], to: [f64; 3], block: &Block, [floor, foot]: [f64; 2], fold: Fold) -> bool {
     let up = [floor + block.up[0], floor + block.up[1]];
-    let up = if fold == Fold::Down { [-up[1], -up[0]] } else { up };
+    let up = if fold == Fold::Down { [2.0 * foot - up[1], 2.0 * foot - up[0]] } else { up };
     let (mut enter, mut leave) = (END, 1.0 - END);
     for (axis, [low, high]) in [block.ahead, block.left, up].into_iter().enumerate() {
         let step = to[axis] - from[axis];

@@ -15,6 +15,8 @@ use crate::twin::scene::Scene;
 
 /// The estimator that is developed here.
 const OURS: &str = "radar-3d";
+/// The same where it was given the road's heights.
+const WITH_GROUND: &str = "radar-3d-ground";
 
 /// What was run.
 pub struct Title<'a> {
@@ -140,22 +142,24 @@ fn by_scene(counted: &[Counted], extent: Extent) -> String {
     .map(str::to_owned);
     let more = beside.iter().map(|c| format!("cells\n{}", c.variant.name()));
     let heading: Vec<String> = fixed.into_iter().chain(more).collect();
-    let rows = main.scenes.iter().enumerate().map(|(k, scene)| {
+    let of = |(k, name): (usize, &str)| {
+        let scene = main.scenes.get(k)?;
         let summary = &scene.summary;
-        let ours = summary.row(OURS);
+        let ours = Some(summary.row(name)?);
         let fixed = [
-            scene.recording.name.clone(),
+            scene.recording.name.clone() + if name == OURS { "" } else { ", heights given" },
             summary.objects.to_string(),
             percent(summary.coverage_rate),
             objects(ours),
             from_slice(ours),
             cells(ours),
-            at_equal_fir(scene, "cells"),
+            if name == OURS { at_equal_fir(scene, "cells") } else { String::new() },
             cells(summary.row("reference")),
         ];
-        let more = beside.iter().map(|c| cells(c.scenes.get(k).and_then(|s| s.summary.row(OURS))));
-        fixed.into_iter().chain(more).collect()
-    });
+        let more = beside.iter().map(|c| cells(c.scenes.get(k).and_then(|s| s.summary.row(name))));
+        Some(fixed.into_iter().chain(more).collect::<Vec<String>>())
+    };
+    let rows = (0..main.scenes.len()).flat_map(|k| [(k, OURS), (k, WITH_GROUND)]).filter_map(of);
     let heading: Vec<&str> = heading.iter().map(String::as_str).collect();
     tables(&heading, &rows.collect::<Vec<_>>(), 1, extent)
 }

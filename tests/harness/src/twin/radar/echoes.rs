@@ -101,10 +101,10 @@ fn ways(
     phase: f64,
     echoes: &mut Vec<Echo>,
 ) {
-    let image = [seen.place[0], seen.place[1], -seen.place[2]];
+    let image = world.mirrored(seen.place);
     let below = radar.pose.to_spherical(image);
     let eye = world.eye();
-    let sine = (eye[2] - image[2]) / below.range_m;
+    let sine = world.fall_by_road(seen.place) / below.range_m;
     let road = radar.model.road.reflection(sine, radar.model.wavelength_m);
     let by_road = road != 0.0 && world.in_sight_by_road(body, seen.place, seen.inside);
     if !in_sight && !by_road {

@@ -5,6 +5,7 @@
 //! seed = 1                        # of everything that is drawn
 //! start_unix_s = 1777874400       # time of the first frame
 //! duration_s = 60.0
+//! ground = [[-50.0, -2.0], [250.0, 10.0]]   # height over x, metres: climbs by 4 %; left out, the road is flat
 //!
 //! [traffic]                       # paths from the scene file's folder
 //! fcd = "motorway/day-1.fcd.xml.gz"
@@ -57,6 +58,7 @@ use super::traffic::Source;
 use super::traffic::frame::RoadFrame;
 use super::traffic::net::{self, Reach};
 use crate::estimators::Lane;
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::{self, mcap::in_topics};
@@ -76,6 +78,9 @@ pub struct Scene {
     pub duration_s: f64,
     /// What the recording says of its licence.
     pub licence: Option<String>,
+    /// Where the road is not flat, its height over its length: x and height in the road frame, metres.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ground: Vec<[f64; 2]>,
     pub traffic: Option<TrafficFile>,
     pub radar: RadarSection,
     /// Radars beside the first.
@@ -347,6 +352,8 @@ impl Scene {
             self.duration_s
         );
         self.radar.check().with_context(|| format!("radar `{}`", self.radar.name))?;
+        let ground = self.ground()?;
+        ensure!(ground.is_level() || self.camera.is_none(), "ground: a camera sees flat roads only");
         for radar in &self.further_radars {
             radar.mount.check().with_context(|| format!("radar `{}`", radar.name))?;
         }
@@ -374,6 +381,14 @@ impl Scene {
             bail!("two elements of [[static]] have the id `{}`", twice[0]);
         }
         Ok(())
+    }
+
+    /// Heights of the road.
+    ///
+    /// # Errors
+    /// What is no road.
+    pub fn ground(&self) -> Result<Ground> {
+        Ground::new(self.ground.clone())
     }
 
     /// Every radar, the first first.

@@ -12,7 +12,9 @@ use crate::twin::traffic::types::{Class, Kind};
 use crate::twin::world::Sides;
 
 /// Longest piece a long structure is cut into, metres: labels and shadows stay near what they are of.
-const PIECE_M: f64 = 50.0;
+pub const PIECE_M: f64 = 50.0;
+/// The same where the road is not flat: pieces are level, one after another follows it.
+pub const PIECE_ON_GRADE_M: f64 = 8.0;
 /// Spread of RCS among posts, dB (standard deviation; assumption).
 const POST_SPREAD_DB: f64 = 4.0;
 
@@ -108,8 +110,8 @@ impl Structure {
         Ok(())
     }
 
-    /// The structure in pieces of at most 50 m. What differs from post to post is drawn from the seed.
-    pub fn pieces(&self, seed: u64) -> Vec<Piece> {
+    /// The structure in pieces of at most so many metres. What differs from post to post is drawn from the seed.
+    pub fn pieces(&self, seed: u64, longest_m: f64) -> Vec<Piece> {
         let Some(size) = self.size() else { return Vec::new() };
         let mut dice = Dice::new(seed, Use::Structure, name(&self.id));
         if let Some(class) = Class::named(&self.class) {
@@ -119,7 +121,7 @@ impl Structure {
             return vec![Piece { label, blocks: blocks(&kind), scatterers: scatterers(&kind, &mut dice), sides }];
         }
         let whole = self.solid(size);
-        let count = (size[0] / PIECE_M).ceil().max(1.0);
+        let count = (size[0] / longest_m).ceil().max(1.0);
         let length = size[0] / count;
         let sides = self.mirror_loss_db.map_or(Sides::Dull, |loss_db| Sides::Structure { loss_db });
         (0..count as u32)
@@ -185,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_long_barrier_comes_in_pieces_that_join() {
-        let pieces = barrier().pieces(1);
+        let pieces = barrier().pieces(1, PIECE_M);
         assert_eq!(pieces.len(), 5);
         let edges: Vec<[f64; 2]> = pieces
             .iter()
@@ -201,7 +203,7 @@ mod tests {
     fn a_parked_truck_is_a_truck() {
         let parked = Structure { class: "truck".into(), length_m: None, width_m: None, height_m: None, ..barrier() };
         parked.check().unwrap();
-        let pieces = parked.pieces(1);
+        let pieces = parked.pieces(1, PIECE_M);
         assert_eq!((pieces.len(), pieces[0].label.solid.size), (1, Class::Truck.size()));
         assert!(pieces[0].blocks.len() > 3 && pieces[0].sides == Sides::Vehicle);
         assert!(parked.holds([100.0, 1.0, 2.0]) && !parked.holds([100.0, 1.0, 6.0]));
