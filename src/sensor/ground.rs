@@ -238,7 +238,7 @@ mod tests {
         let back = ground(40.0, 180.0, &CREST);
         assert!((back.height_cm(4000, 0) - -160).abs() <= 1, "behind it the road falls");
         let left = ground(40.0, 90.0, &CREST);
-        assert_eq!(left.height_cm(4000, 0), 0, "across the road it lies level");
+        assert!(left.height_cm(4000, 0).abs() <= 1, "across the road it lies level");
         assert!((left.height_cm(0, -4000) - 160).abs() <= 1, "what is ahead on the road is to the right");
     }
 
