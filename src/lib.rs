@@ -78,6 +78,7 @@
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
 //! | `probability` | units with a table of probabilities, and receivers of theirs | module `probability`: the table, thresholds of an accepted risk, what goes on the wire; `QuantisedSender` of the two grids, for units that have one |
+//! | `ground` | units beside roads that are not flat, with 4 kB of flash to spare | room for heights of the road over its length; without it all roads are flat |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!
@@ -116,7 +117,7 @@
 //! | solid | the upright box that an obstacle becomes; it casts its shadow on the map |
 //! | evidence | occupancy of the grid's cells from reflections that no obstacle explains; fades by the second |
 //! | slope | height over ground range; a row of the grid is a range of slopes, so a line of sight is a row |
-//! | slice | the plane, 1 m above the road, on which visibility is judged |
+//! | slice | the surface, 1 m above the road, on which visibility is judged: a plane where the road is flat |
 //! | grade | how visible a cell is: 1 hidden to 255 clear; 0 is unknown |
 //! | scan | the detections of one radar frame, as an input gives them out |
 //! | refresh | a message that describes azimuths by itself; a *delta* describes them against a refresh |
@@ -141,6 +142,12 @@
 //!   come some way at the same distance. What turns (wheels) or lies inside an outline is no vehicle.
 //! - **Boxes are not drawn into cells.** Shadows of boxes end where similar triangles say, not at the edge
 //!   of a row of slopes: in queues that is every twentieth blocked cell.
+//! - **The road's height is a function of its length.** Crests, dips and ramps lie along the road, so a profile over its
+//!   x axis holds for any mount and any direction of sight; heights over range would bend the road with the sensor's
+//!   yaw, and say nothing of a road that climbs on one side and falls on the other. Straight pieces are what makes it
+//!   cheap: along a line of sight the ground is straight too, and a shadow's end on each piece is one division, exact as
+//!   on a plane. A crest's shadow is a box's of no height. Grids, slopes and rays stay as they are, since they are taken from
+//!   the sensor and not from the road.
 //! - **A thing never hides itself.** Along a row only cells behind the *end* of an occupied run are
 //!   hidden by it, and a box shades only what lies behind it.
 //! - **Elevation says how high, within what length allows.** A reflection well above a level proves it; many

@@ -161,7 +161,12 @@ impl Ground {
         let (from_cm, to_cm) = (distance(near), distance(far));
         let (at, grade) = begin.map_or((self.points.first()?, 0), |p| (p, p.grade));
         let foot_cm = at.height_cm - math::mul_shift(at.along_cm, grade, GRADE_BITS);
-        (from_cm < to_cm).then_some(Stretch { from_cm, to_cm, foot_cm, rise: (grade * cosine) >> (14 + GRADE_BITS - SLOPE_BITS) })
+        (from_cm < to_cm).then_some(Stretch {
+            from_cm,
+            to_cm,
+            foot_cm,
+            rise: (grade * cosine) >> (14 + GRADE_BITS - SLOPE_BITS),
+        })
     }
 }
 
@@ -204,7 +209,8 @@ impl Stretch {
     }
 }
 
-#[cfg(all(test, feature = "ground"))]
+#[cfg(test)]
+#[cfg(feature = "ground")]
 mod tests {
     use super::*;
     use crate::sensor::mount::Mount;
@@ -271,7 +277,8 @@ mod tests {
                 let slope = slope_permille * (1 << SLOPE_BITS) / 1000;
                 let got = s.below(slope, 600, 100);
                 for d in (3010..20_000).step_by(90) {
-                    let seen = f64::from(foot_cm + 100 - 600) / f64::from(d) + f64::from(rise) / f64::from(1 << SLOPE_BITS);
+                    let seen =
+                        f64::from(foot_cm + 100 - 600) / f64::from(d) + f64::from(rise) / f64::from(1 << SLOPE_BITS);
                     let off = seen - f64::from(slope) / f64::from(1 << SLOPE_BITS);
                     let inside = got.is_some_and(|(from, to)| (from..to).contains(&d));
                     assert!((off < 0.0) == inside || off.abs() < 1e-4, "{s:?} {slope_permille} {d}: {got:?}");
@@ -295,7 +302,8 @@ mod tests {
     }
 }
 
-#[cfg(all(test, not(feature = "ground")))]
+#[cfg(test)]
+#[cfg(not(feature = "ground"))]
 mod without_room {
     use super::*;
 

@@ -91,16 +91,16 @@ fn kept<'de, T: Deserialize<'de>, D: serde::Deserializer<'de>>(table: D) -> Resu
 /// A lane, or the road's profile.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+struct Points {
     points: Vec<[f32; 2]>,
 }
 
 fn ground<'de, D: serde::Deserializer<'de>>(table: D) -> Result<&'static [[f32; 2]], D::Error> {
-    Ok(Table::deserialize(table)?.points.leak())
+    Ok(Points::deserialize(table)?.points.leak())
 }
 
 fn lanes<'de, D: serde::Deserializer<'de>>(tables: D) -> Result<&'static [&'static [[f32; 2]]], D::Error> {
-    let tables = Vec::<Table>::deserialize(tables)?;
+    let tables = Vec::<Points>::deserialize(tables)?;
     Ok(tables.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak())
 }
 

@@ -74,7 +74,13 @@ impl Estimator for Reference {
         self.grid.clear();
         let axes = self.parameters.axes();
         for object in self.truth.at(frame.time_ns) {
-            fill(&object.solid, (&self.pose, self.truth.ground.height(self.pose.position[0])), axes, self.scale, &mut self.grid);
+            fill(
+                &object.solid,
+                (&self.pose, self.truth.ground.height(self.pose.position[0])),
+                axes,
+                self.scale,
+                &mut self.grid,
+            );
         }
         raycast::cast(&self.grid, axes, &mut self.map);
     }

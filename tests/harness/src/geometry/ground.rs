@@ -29,7 +29,11 @@ impl Ground {
             let [[x, low], [next, high]] = [pair[0], pair[1]];
             ensure!(next >= x + 1.0, "ground: point {} at {next} m does not lie 1 m or more behind {x} m", k + 1);
             let grade = (high - low) / (next - x);
-            ensure!(grade.abs() <= STEEPEST + 1e-9, "ground: before point {} the grade is {grade:.3}, above 0.12", k + 1);
+            ensure!(
+                grade.abs() <= STEEPEST + 1e-9,
+                "ground: before point {} the grade is {grade:.3}, above 0.12",
+                k + 1
+            );
         }
         Ok(Self { points })
     }

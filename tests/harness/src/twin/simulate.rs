@@ -291,7 +291,8 @@ impl Simulation {
     /// Every vehicle passes below (or above) every sensor of the scene.
     fn passes_below(&self, labels: &[Label], since_s: f64) -> Result<()> {
         for (sensor, mount) in self.scene.mounts() {
-            if let Some(hit) = labels[self.structures.len()..].iter().find(|l| mount.is_inside(&self.on_flat(&l.solid))) {
+            if let Some(hit) = labels[self.structures.len()..].iter().find(|l| mount.is_inside(&self.on_flat(&l.solid)))
+            {
                 bail!(
                     "{} `{}` drives through {sensor} at {since_s:.2} s: it is {} m high, the mount at ({}, {}) {} m",
                     hit.class,

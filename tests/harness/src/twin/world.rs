@@ -165,14 +165,15 @@ impl<'a> World<'a> {
     pub fn clear(&self, from: [f64; 3], to: [f64; 3]) -> bool {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy).max(1e-9);
-        !self.ground.hides(from, to) && (0..self.bodies.len()).all(|i| {
-            let solid = &self.bodies[i].solid;
-            // the path passes the body at more than its half diagonal
-            let (cx, cy) = (solid.center[0] - from[0], solid.center[1] - from[1]);
-            let aside = (dx * cy - dy * cx).abs() / length;
-            let reach = 0.5 * solid.size[0].hypot(solid.size[1]);
-            aside > reach || !self.hit(i, in_axes(solid, from), to, Fold::None)
-        })
+        !self.ground.hides(from, to)
+            && (0..self.bodies.len()).all(|i| {
+                let solid = &self.bodies[i].solid;
+                // the path passes the body at more than its half diagonal
+                let (cx, cy) = (solid.center[0] - from[0], solid.center[1] - from[1]);
+                let aside = (dx * cy - dy * cx).abs() / length;
+                let reach = 0.5 * solid.size[0].hypot(solid.size[1]);
+                aside > reach || !self.hit(i, in_axes(solid, from), to, Fold::None)
+            })
     }
 
     /// All faces that mirror; the walls of vehicles lose `vehicle_loss_db`.
@@ -214,7 +215,8 @@ impl<'a> World<'a> {
             left: [-solid.size[1] / 2.0, solid.size[1] / 2.0],
             up: [0.0, solid.size[2]],
         };
-        crosses(from, to, &outer, [floor, foot], fold) && blocks.iter().any(|b| crosses(from, to, b, [floor, foot], fold))
+        crosses(from, to, &outer, [floor, foot], fold)
+            && blocks.iter().any(|b| crosses(from, to, b, [floor, foot], fold))
     }
 }
 

@@ -282,7 +282,17 @@ mod tests {
             ("waves-1", 4103, 150.0, 8.0),
             ("waves-2", 4104, 150.0, 5.0),
         ];
+        let grades = [
+            ("train-1", 6101, 60.0, 6.0),
+            ("train-2", 6102, 60.0, 7.0),
+            ("up", 7101, 60.0, 6.0),
+            ("down", 7102, 60.0, 7.0),
+            ("crest", 7103, 60.0, 6.5),
+            ("dip", 7104, 60.0, 5.5),
+            ("ramp", 7105, 60.0, 6.0),
+        ];
         assert_eq!((fixed("crossing"), fixed("queue")), (of(&crossings), of(&queues)));
+        assert_eq!(fixed("grade"), of(&grades));
         for name in ["crossing", "queue"] {
             let plan = shipped(name);
             assert_eq!(plan.reporting.warm_up_s, 60.0);
@@ -341,6 +351,71 @@ mod tests {
                 assert!(standing * 5 > steps && driving * 5 > steps, "{id}: {standing} and {driving} of {steps}");
             }
         }
+    }
+
+    /// A scene of the grades, its road raised as a whole, for two seconds, and its recording.
+    fn on_grade(name: &str, raised_m: f64) -> (Simulation, Recording) {
+        let plan = shipped("grade");
+        let mut scene = Scene::read(&plan.folder.join(name).with_extension("toml")).unwrap();
+        scene.duration_s = 2.0;
+        scene.ground.iter_mut().for_each(|point| point[1] += raised_m);
+        let simulation = Simulation::new(scene, None).unwrap();
+        let (_, recording) = plan::recorded(&simulation, name, &Settings::default(), &|| ()).unwrap();
+        (simulation, recording)
+    }
+
+    #[test]
+    fn a_recording_on_a_grade_says_so_and_all_stands_on_it() {
+        for (name, raised_m) in [("up", 0.0), ("down", 0.0), ("crest", 300.0)] {
+            let (simulation, recording) = on_grade(name, raised_m);
+            let ground = recording.truth.as_ref().map(|truth| truth.ground.clone()).unwrap();
+            assert_eq!(ground.points(), simulation.scene.ground);
+            let truth = recording.truth.as_ref().unwrap();
+            for solid in truth.solids() {
+                let over = solid.bottom() - ground.height(solid.center[0]);
+                assert!(over.abs() < 0.01, "{name}: {solid:?} stands {over} m over the road");
+            }
+            // what is detected is vehicles' height above the road, near and far, and not above the road at the mast
+            let mut heights: Vec<[f64; 2]> = Vec::new();
+            for d in recording.frames.iter().flat_map(|frame| &frame.detections).filter(|d| d.range_m > 120.0) {
+                let [x, _, z] = d.road_position(&recording.pose, 1.0);
+                heights.push([z - ground.height(x), z - ground.height(0.0)]);
+            }
+            let median = |k: usize| {
+                let mut of: Vec<f64> = heights.iter().map(|h| h[k]).collect();
+                of.sort_by(f64::total_cmp);
+                of[of.len() / 2]
+            };
+            assert!(heights.len() > 30 && (-0.3..1.8).contains(&median(0)), "{name}: {}", median(0));
+            assert!(name == "crest" || (median(1) - median(0)).abs() > 4.0, "{name}: {}", median(1));
+            // and the mount is that of the scene, whatever the road's height
+            let sensor = estimators::sensor(&recording, &Default::default());
+            assert!((f64::from(sensor.mount.height_m) - simulation.scene.radar.mount.height_m).abs() < 1e-4);
+            let names = estimators::all(&recording, &Settings::default().estimators).unwrap();
+            assert!(names.iter().any(|e| e.name() == "radar-3d-ground"), "{name}");
+        }
+    }
+
+    #[test]
+    fn behind_a_crest_less_is_detected_than_on_a_level_road() {
+        let far = |recording: &Recording| {
+            recording.frames.iter().flat_map(|f| &f.detections).filter(|d| d.range_m > 170.0).count()
+        };
+        let (simulation, crest) = on_grade("crest", 0.0);
+        let mut scene = simulation.scene.clone();
+        // lower by half the mast, so that the crest hides what is far
+        scene.radar.mount.height_m = 2.5;
+        let low = Simulation::new(scene.clone(), None).unwrap();
+        scene.ground.clear();
+        let level = Simulation::new(scene, None).unwrap();
+        let [low, level] = [low, level].map(|s| plan::recorded(&s, "s", &Settings::default(), &|| ()).unwrap().1);
+        assert!(
+            far(&low) * 3 < far(&level),
+            "{} and {} from 2.5 m, {} from 6.5 m",
+            far(&low),
+            far(&level),
+            far(&crest)
+        );
     }
 
     #[test]
