@@ -12,7 +12,6 @@
 //! A road that is not flat hides what lies behind a crest of it; its shadows have exact ends, as those of boxes do.
 
 use crate::grid::axes::{Axes, SliceRow};
-use crate::grid::shadow::shade;
 use crate::grid::spherical::{Column, SphericalGrid};
 use crate::grid::stack;
 use crate::map::polar::PolarMap;
@@ -214,6 +213,32 @@ impl Pair {
     fn at(self, share: u8) -> u8 {
         let (low, high) = (i32::from(self.low), i32::from(self.high));
         ((low * 256 + (high - low) * i32::from(share)) >> 8) as u8
+    }
+}
+
+/// Lowers the grades of cells between two distances, from cell `first` on, by the part of them that is hidden.
+/// What is unknown stays unknown.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // range indices and bytes
+pub(super) fn shade<const R: usize>(
+    grades: &mut [u8; R],
+    first: usize,
+    (from, to): (i32, i32),
+    cell_cm: i32,
+    share: u8,
+) {
+    let cell_cm = cell_cm.max(1);
+    let to = to.min(R as i32 * cell_cm);
+    let (first, last) = (first.max((from / cell_cm) as usize), (to / cell_cm) as usize);
+    let lower = |g: &mut u8, by: u8| {
+        if *g > BLOCKED {
+            *g = (*g).min((CLEAR - by).max(BLOCKED));
+        }
+    };
+    for g in grades.get_mut(first..last).unwrap_or(&mut []) {
+        lower(g, share);
+    }
+    if let Some(g) = grades.get_mut(last).filter(|_| last >= first) {
+        lower(g, (i32::from(share) * (to - last as i32 * cell_cm) / cell_cm) as u8);
     }
 }
 

@@ -21,7 +21,7 @@ use core::ops::Range;
 
 use crate::fixed::trig;
 use crate::grid::axes::Axes;
-use crate::grid::raycast::{BLOCKED, CLEAR};
+use crate::grid::raycast::shade;
 use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
 use crate::obstacles::solid::Solid;
@@ -98,32 +98,6 @@ fn columns<const R: usize, const A: usize, const E: usize>(
         let share = ((to - from) * 255 / (2 * WINDOW)) as u8;
         Some(Covered { column: a as usize, share, enter_cm, leave_cm, cells: nearest..end })
     })
-}
-
-/// Lowers the grades of cells between two distances, from cell `first` on, by the part of them that is hidden.
-/// What is unknown stays unknown.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // range indices and bytes
-pub(super) fn shade<const R: usize>(
-    grades: &mut [u8; R],
-    first: usize,
-    (from, to): (i32, i32),
-    cell_cm: i32,
-    share: u8,
-) {
-    let cell_cm = cell_cm.max(1);
-    let to = to.min(R as i32 * cell_cm);
-    let (first, last) = (first.max((from / cell_cm) as usize), (to / cell_cm) as usize);
-    let lower = |g: &mut u8, by: u8| {
-        if *g > BLOCKED {
-            *g = (*g).min((CLEAR - by).max(BLOCKED));
-        }
-    };
-    for g in grades.get_mut(first..last).unwrap_or(&mut []) {
-        lower(g, share);
-    }
-    if let Some(g) = grades.get_mut(last).filter(|_| last >= first) {
-        lower(g, (i32::from(share) * (to - last as i32 * cell_cm) / cell_cm) as u8);
-    }
 }
 
 /// Right and left edge of a box on the column axis, 2^-8 columns.
