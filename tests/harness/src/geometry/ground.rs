@@ -173,10 +173,10 @@ mod tests {
             let truck = [truck(&g, 55.0)];
             (61..400).map(f64::from).find(|x| g.in_sight(EYE, g.above([*x, 0.0], 1.0), &truck))
         };
-        // level: 150 m; climbing by 4 % the line over its far edge (60 m, 6.2 m high) rises
+        // level: 150 m; climbing by 4 % its top is 6.2 m high, and the line over its near edge, 50 m away, rises
         assert_eq!(end(0.0), Some(150.0));
-        // 6 + (4 + 2.2 - 6) / 60 d = 0.04 d + 1
-        assert_eq!(end(0.04), Some((5.0_f64 / (0.04 - 0.2 / 60.0)).ceil()));
+        // 6 + (4 + 2.2 - 6) / 50 d = 0.04 d + 1
+        assert_eq!(end(0.04), Some((5.0_f64 / (0.04 - 0.2 / 50.0)).ceil()));
         // 6 - (6 - 1.8) / 60 d = 1 - 0.04 d
         assert_eq!(end(-0.04), Some((5.0_f64 / (4.2 / 60.0 - 0.04)).ceil()));
     }
