@@ -78,7 +78,7 @@
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
 //! | `probability` | units with a table of probabilities, and receivers of theirs | module `probability`: the table, thresholds of an accepted risk, what goes on the wire; `QuantisedSender` of the two grids, for units that have one |
-//! | `ground` | units beside roads that are not flat, with 4 kB of flash to spare | room for heights of the road over its length; without it all roads are flat |
+//! | `ground` | units beside roads that are not flat, with 5 kB of flash to spare | room for heights of the road over its length; without it all roads are flat |
 //! | `secoc` | broadcasts that are authenticated | `SecuredReceiver`, `Sealer`, `Key` |
 //! | `bench` | benches, tests and those who work on the library, not products | every room, the flat baseline `radar_2d`, and the loops that compare boards with a PC |
 //!

@@ -231,7 +231,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             }
         }
         let slopes = slopes.as_flattened_mut();
-        slopes.sort_unstable();
+        sort(slopes);
         let mut lowest = i32::MIN;
         for (edge, slope) in self.row_edges.iter_mut().zip(slopes.iter().step_by(4)) {
             *edge = (*slope).clamp(-STEEPEST, STEEPEST).max(lowest);
@@ -399,6 +399,19 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         match self.view.get(column) {
             Some(&(first, last)) if first <= last => usize::from(first)..usize::from(last) + 1,
             _ => 0..0,
+        }
+    }
+}
+
+/// Sorts few numbers; `sort_unstable` has a path that panics.
+fn sort(numbers: &mut [i32]) {
+    for _ in 0..numbers.len() {
+        let mut before: Option<&mut i32> = None;
+        for number in numbers.iter_mut() {
+            if let Some(before) = before.filter(|before| **before > *number) {
+                core::mem::swap(before, number);
+            }
+            before = Some(number);
         }
     }
 }
