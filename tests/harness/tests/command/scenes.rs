@@ -138,7 +138,7 @@ fn a_plan_of_scenes_that_cannot_be_run_says_why() {
         ("gone.toml --scene crossing", "gone-2.toml"),
         ("typing.toml --scene crossing", "unknown field `scnes`"),
         ("--train", "go with --scene crossing or --scene queue"),
-        ("--scene roundabout", "possible values: motorway, crossing, queue, gantry-camera"),
+        ("--scene roundabout", "possible values: motorway, crossing, queue, grade, gantry-camera"),
         ("plan.toml --scene crossing --every 0", "0 is not in 1..=1000"),
     ] {
         let output = experiment(&folder, arguments);

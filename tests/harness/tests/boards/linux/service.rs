@@ -273,7 +273,20 @@ fn linux_bytes_that_are_no_scans_are_told_from_silence() {
 
 /// The sample with every key on that can be on together.
 fn all_keys(sample: &str) -> String {
-    let not = ["port", "baud", "candump", "header_bytes", "has_elevation", "doppler_step_mps", "angles", "[input.ti]"];
+    let not = [
+        "port",
+        "baud",
+        "candump",
+        "header_bytes",
+        "has_elevation",
+        "doppler_step_mps",
+        "angles",
+        "[input.ti]",
+        // a file that would have to be there
+        "[probability]",
+        "file",
+        "risk",
+    ];
     let is_key = |line: &str| line.contains(" = ") || line.starts_with('[');
     let on = |line: &str| match line.strip_prefix('#') {
         Some(key) if !key.starts_with(' ') && is_key(key) && !not.iter().any(|n| key.starts_with(n)) => key.to_owned(),

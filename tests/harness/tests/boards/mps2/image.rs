@@ -5,8 +5,9 @@ use viewshed_harness::boards::{Board, Profile, Run, firmware};
 
 use crate::shipped;
 
-/// Bytes a controller of each size has for everything: variables and stack, image. Flash comes in powers of two.
-const LIMITS: [(Profile, u64, u64); 2] = [(Profile::Reference, 512_000, 65_536), (Profile::Small, 98_000, 72_000)];
+/// Bytes for everything, of each size: variables and stack, which a controller has; image, of which controllers with as
+/// much memory have several times that, so that growth is seen.
+const LIMITS: [(Profile, u64, u64); 2] = [(Profile::Reference, 512_000, 72_000), (Profile::Small, 98_000, 76_000)];
 
 fn image(profile: Profile) -> Image {
     Image::read(&firmware::build(Board::Mps2An386, profile, "batch").unwrap()).unwrap()
