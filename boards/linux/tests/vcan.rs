@@ -189,11 +189,11 @@ impl Bench {
         self.state().is_some_and(|(state, _)| state == UnitState::Ok) && self.visible() > 5000
     }
 
-    /// Listens until something is so; `false` if it is not within ten seconds.
+    /// Listens until something is so; `false` if it is not within a minute: a loaded machine that emulates another is slow.
     fn until(&mut self, so: impl Fn(&Self) -> bool) -> bool {
         let started = Instant::now();
         while !so(self) {
-            if started.elapsed() > Duration::from_secs(10) {
+            if started.elapsed() > Duration::from_secs(60) {
                 return false;
             }
             self.listen(Duration::from_millis(10));
