@@ -177,6 +177,10 @@ struct Sector {
     expects: bool,
 }
 
+impl Sector {
+    const NEW: Self = Self { missed: 0, others: 0, blind: false, expects: false };
+}
+
 /// A mean difference, and whether it is believed in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Level {
@@ -278,7 +282,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         window: Window::of_ms(0),
         windows: 0,
         fixtures: heapless::Vec::new(),
-        sectors: [Sector { missed: 0, others: 0, blind: false, expects: false }; K],
+        sectors: [Sector::NEW; K],
         levels: [Level::new(0); 3],
         missing: Level::new(0),
     };
@@ -300,7 +304,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         self.window = Window::of_ms(limits.window_ms);
         self.windows = 0;
         self.fixtures.clear();
-        self.sectors = [Sector { missed: 0, others: 0, blind: false, expects: false }; K];
+        self.sectors = [Sector::NEW; K];
         self.levels = limits.levels.map(|limit| Level::new(i32::from(limit)));
         self.missing = Level::new(i32::from(limits.fewer));
     }
@@ -426,6 +430,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     /// Whether nothing of what stands in a sector is seen; not of one that does not exist.
     pub fn is_blind(&self, sector: usize) -> bool {
         self.sectors.get(sector).is_some_and(|sector| sector.blind)
+    }
+
+    /// Whether any sector is.
+    pub fn any_blind(&self) -> bool {
+        self.sectors.iter().any(|sector| sector.blind)
     }
 
     /// Whether the sector of a bearing from the sensor's heading is, or outside of the view the one at that edge.

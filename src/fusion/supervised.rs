@@ -60,7 +60,7 @@ impl<E> Supervised<E> {
     /// What is to be said of a radar that is healthy otherwise.
     fn condition(&self, own: Condition) -> Condition {
         let Some(standing) = self.standing().filter(|_| own == Condition::Healthy) else { return own };
-        if (0..SECTORS).any(|sector| standing.is_blind(sector)) {
+        if standing.any_blind() {
             Condition::SectorBlind
         } else if standing.turned().is_some() || standing.tilted().is_some() {
             Condition::Misaligned
@@ -116,7 +116,9 @@ where
             if progress.condition == Condition::Healthy {
                 standing.advance(measured, |at| map.at(at).visible());
             }
-            for azimuth in 0..A {
+            // nearly never
+            let azimuths = if standing.any_blind() { A } else { 0 };
+            for azimuth in 0..azimuths {
                 if standing.is_blind_at(map.geometry().middle_of(azimuth, A)) {
                     map.forget_azimuth(azimuth);
                 }

@@ -24,6 +24,9 @@ use clap::ValueEnum;
 use viewshed::camera::boxes::ImageBox;
 use viewshed::unit::settings::Settings;
 
+/// Which firmware, by its grid.
+pub use crate::estimators::Grid as Profile;
+
 use check::Checked;
 use scans::Scan;
 
@@ -53,34 +56,6 @@ impl Board {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => "mps2-an386",
             Self::Zcu102R5 => "zcu102-r5",
-        }
-    }
-}
-
-/// Size of the grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Profile {
-    /// 200 x 120 x 16 cells
-    Reference,
-    /// 100 x 64 x 8 cells
-    Small,
-}
-
-impl Profile {
-    pub const ALL: [Self; 2] = [Self::Reference, Self::Small];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Reference => "reference",
-            Self::Small => "small",
-        }
-    }
-
-    /// Ranges and azimuths.
-    pub const fn grid(self) -> [u8; 2] {
-        match self {
-            Self::Reference => [200, 120],
-            Self::Small => [100, 64],
         }
     }
 }

@@ -211,7 +211,8 @@ impl Listening {
             moment.visible += visible;
             moment.invisible += known - visible;
             moment.unknown += usize::from(header.ranges) - known;
-            for p in (0..usize::from(header.ranges)).filter_map(|range| map.probability(azimuth, range)) {
+            let ranges = header.probability.map_or(0, |_| usize::from(header.ranges));
+            for p in (0..ranges).filter_map(|range| map.probability(azimuth, range)) {
                 (cells, sum) = (cells + 1, sum + f64::from(p.raw()) / 255.0);
             }
         }

@@ -7,7 +7,7 @@ mod radar_2d;
 pub mod radar_3d;
 mod reference;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use viewshed::camera::Camera3dConfig;
 use viewshed::fixed::time::Time;
@@ -139,6 +139,18 @@ impl Default for Options {
 }
 
 impl Options {
+    /// Whether there can be tables of probabilities for its maps.
+    ///
+    /// # Errors
+    /// Another grid than theirs.
+    pub fn has_tables(&self) -> Result<()> {
+        ensure!(
+            self.grid.is_reference(),
+            "tables of probabilities are of the reference grid, not of --grid-size small"
+        );
+        Ok(())
+    }
+
     /// Takes the height at which truth is judged over to every estimator.
     pub fn judge_at(&mut self, slice_height_m: f64) {
         self.radar_2d.slice_height_m = slice_height_m as f32;
@@ -216,6 +228,7 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
 /// # Errors
 /// As for [`own`].
 pub fn own_grid(recording: &Recording, options: &Options) -> Result<(PolarGeometry, u8)> {
+    options.has_tables()?;
     let (sensor, _) = radar(recording, options)?;
     let radar_3d = Radar3dConfig { ground: ground(recording, options)?.kept(), ..options.radar_3d };
     radar_3d::grid(&sensor, &radar_3d)

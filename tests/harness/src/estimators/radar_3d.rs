@@ -40,7 +40,17 @@ impl Grid {
         *self == Self::Reference
     }
 
-    /// As files have it.
+    pub const ALL: [Self; 2] = [Self::Reference, Self::Small];
+
+    /// Ranges and azimuths.
+    pub const fn grid(self) -> [u8; 2] {
+        match self {
+            Self::Reference => [200, 120],
+            Self::Small => [100, 64],
+        }
+    }
+
+    /// As on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reference => "reference",

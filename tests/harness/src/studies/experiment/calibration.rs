@@ -234,6 +234,7 @@ fn scored(
 ) -> Result<(Vec<FrameSamples>, Score)> {
     let samples = samples::collect(recording, &settings.evaluation, progress);
     ensure!(recording.of_camera().is_none(), "{} is of a camera; probabilities are of radars", recording.name);
+    settings.estimators.has_tables()?;
     let mut estimator = estimators::own(recording, &settings.estimators)?;
     let score = score(estimator.as_mut(), recording, &samples, settings.evaluation.grid, &|| progress());
     Ok((samples, score))

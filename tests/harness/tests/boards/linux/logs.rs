@@ -1,6 +1,6 @@
 //! A log of a bus in, the log of the broadcast out: frame by frame what the library's session gives.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use viewshed::fixed::time::Time;
@@ -94,8 +94,10 @@ pub fn config(settings: &Settings, log: &Path, radar: u8, medium: &str) -> Strin
         .map_or_else(String::new, |f| format!("[fixtures]\nlearned_windows = {}\n", f.learned_windows))
 }
 
-/// The scans as the log of an ARS408.
-pub fn log_of(scans: &[Scan]) -> String {
+/// The scans as the log of an ARS408, in a folder of its own.
+pub fn logged(scans: &[Scan]) -> (Folder, PathBuf) {
+    let folder = Folder::new().unwrap();
+    let log = folder.0.join("radar.log");
     let mut text = String::new();
     for scan in clusters(scans, scans.len(), 240) {
         // as they come on a bus of 500 kbit/s, four in a millisecond
@@ -105,7 +107,8 @@ pub fn log_of(scans: &[Scan]) -> String {
             text += &format!("{line}\n");
         }
     }
-    text
+    std::fs::write(&log, text).unwrap();
+    (folder, log)
 }
 
 /// Runs the daemon over a log and compares every frame and its time.
@@ -122,7 +125,7 @@ fn same(settings: &Settings, log: &Path, radar: u8, name: &str, medium: Medium) 
     (daemon, sent)
 }
 
-fn made_up() -> std::path::PathBuf {
+fn made_up() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/ars408-made-up.log")
 }
 
@@ -144,9 +147,7 @@ fn linux_every_frame_of_the_shipped_log_is_the_same() {
 #[ignore = "needs the daemon"]
 fn linux_every_frame_of_the_motorway_is_the_same_and_listen_decodes_all() {
     let (settings, scans) = shipped(20.0);
-    let folder = Folder::new().unwrap();
-    let log = folder.0.join("motorway.log");
-    std::fs::write(&log, log_of(&scans)).unwrap();
+    let (_folder, log) = logged(&scans);
     let (daemon, sent) = same(&settings, &log, 0, "can", Medium::Can(Addresses::STANDARD));
     assert!(sent.len() > 15 * scans.len(), "{} frames of {} scans", sent.len(), scans.len());
 
@@ -186,9 +187,7 @@ fn linux_a_sector_that_goes_dark_is_unknown_to_receivers_and_its_status_says_so(
         // the left third
         scan.detections.retain(|d| d.azimuth.radians().to_degrees() < 20.0);
     }
-    let folder = Folder::new().unwrap();
-    let log = folder.0.join("dark.log");
-    std::fs::write(&log, log_of(&scans)).unwrap();
+    let (_folder, log) = logged(&scans);
     let (daemon, sent) = same(&settings, &log, 0, "can", Medium::Can(Addresses::STANDARD));
     assert!(daemon.log().contains("radar Degraded: SectorBlind"), "{}", daemon.log());
 

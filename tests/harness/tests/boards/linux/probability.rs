@@ -15,7 +15,7 @@ use viewshed_harness::evaluation::curve::Grades;
 use viewshed_harness::evaluation::probability::file::Fitted;
 
 use super::daemon::Daemon;
-use super::logs::{Sent, config, log_of, read, twin};
+use super::logs::{Sent, config, logged, read, twin};
 use crate::shipped;
 
 const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
@@ -53,9 +53,7 @@ fn sent(settings: &Settings, log: &std::path::Path, table: &str, risk: &str) -> 
 #[ignore = "needs the daemon"]
 fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
     let (settings, scans) = shipped(4.0);
-    let folder = Folder::new().unwrap();
-    let log = folder.0.join("motorway.log");
-    std::fs::write(&log, log_of(&scans)).unwrap();
+    let (_folder, log) = logged(&scans);
     let fitted = fitted(settings.fingerprint());
     let quantiser = |threshold| Quantiser::new(fitted.table.clone(), threshold, 128);
     for (risk, threshold) in [("risk = 0.05", Some(Threshold::From(230))), ("", None)] {
@@ -93,9 +91,7 @@ fn is_map(frame: &CanFrame) -> bool {
 #[ignore = "needs the daemon"]
 fn linux_a_table_that_cannot_be_used_is_refused_by_its_reason_and_maps_are_by_grades() {
     let (settings, scans) = shipped(3.0);
-    let folder = Folder::new().unwrap();
-    let log = folder.0.join("motorway.log");
-    std::fs::write(&log, log_of(&scans)).unwrap();
+    let (_folder, log) = logged(&scans);
     let good = fitted(settings.fingerprint()).text().unwrap();
     let expected = twin(&settings, None, &read(&log), 0, MEDIUM);
     let maps = |sent: &Sent| -> Vec<CanFrame> { sent.iter().map(|(_, frame)| *frame).filter(is_map).collect() };

@@ -6,10 +6,10 @@ use viewshed::fusion::{Alignment, Fixtures, FixturesConfig, Monitor, MonitorConf
 use viewshed::map::{CellState, Visibility, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 
-use super::turned::{PLACES, Pieces, alignment, observe};
+use super::turned::{PLACES, Pieces, alignment, at, observe};
 use super::{Follows, Judge, Sight};
 use crate::estimators::{self, camera_3d::time};
-use crate::evaluation::sensor_set::newest;
+use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
 
 pub const SECTORS: usize = 6;
@@ -38,7 +38,7 @@ pub struct Said {
 /// All judges of one sensor.
 pub struct Judges<'a> {
     all: &'a [Recording],
-    follows: Vec<&'a Follows>,
+    follows: &'a [Follows],
     watched: usize,
     /// One for each other sensor: an obstacle that two of them follow would be two.
     others: Vec<(usize, [Monitor<SECTORS>; 2])>,
@@ -50,13 +50,13 @@ pub struct Judges<'a> {
 }
 
 impl<'a> Judges<'a> {
-    /// Of one of all sensors; `follows` is what each of them follows.
+    /// Of one of all sensors; `follows` is what each of them follows in order.
     ///
     /// # Errors
     /// Parameters that cannot be.
     pub fn new(
         all: &'a [Recording],
-        follows: Vec<&'a Follows>,
+        follows: &'a [Follows],
         watched: usize,
         lanes: &'a Pieces,
         slice_m: f64,
@@ -87,17 +87,27 @@ impl<'a> Judges<'a> {
         })
     }
 
-    /// Takes a frame of the sensor with its own map and the places where it detects something. In which sectors it
-    /// misses what others follow and both have seen before.
+    /// Takes a frame of the sensor with its own map, the places where it detects something and what it follows. In
+    /// which sectors it misses what others follow and both have seen before.
     ///
     /// # Errors
     /// Places that are none.
-    pub fn step(&mut self, frame: &Frame, map: &dyn VisibilityMap, seen: &[[f64; 2]]) -> Result<[bool; SECTORS]> {
+    pub fn step(
+        &mut self,
+        frame: &Frame,
+        map: &dyn VisibilityMap,
+        seen: &[[f64; 2]],
+        follows: &[Solid],
+    ) -> Result<[bool; SECTORS]> {
         let (own, now) = (&self.all[self.watched], time(frame.time_ns));
+        let of = |k: usize| {
+            if k == self.watched { Some(follows) } else { at(&self.all[k], &self.follows[k], frame.time_ns) }
+        };
+        let followed: Vec<_> = (0..self.all.len()).map(of).collect();
         let mut missed = [false; SECTORS];
         for (other, monitors) in &mut self.others {
-            let Some(theirs) = newest(&self.all[*other], frame.time_ns) else { continue };
-            for solid in self.follows[*other].get(theirs).into_iter().flatten() {
+            let Some(theirs) = followed[*other] else { continue };
+            for solid in theirs {
                 let [x, y, _] = solid.center;
                 let place = own.pose.to_spherical([x, y, self.slice_m]);
                 if !own.sensor.field_of_view.contains(place) {
@@ -114,14 +124,15 @@ impl<'a> Judges<'a> {
             monitors.iter_mut().for_each(|monitor| monitor.advance(now));
         }
         if let Some(standing) = &mut self.standing {
+            let detections = frame.detections.iter().map(estimators::measurement);
+            let detections: Vec<Detection> = detections.filter_map(|m| Detection::new(&m).ok()).collect();
             for (fixtures, sight) in standing.iter_mut().zip(Sight::ALL) {
-                let detections = frame.detections.iter().map(estimators::measurement);
-                detections.filter_map(|m| Detection::new(&m).ok()).for_each(|d| fixtures.observe(&d));
+                detections.iter().for_each(|d| fixtures.observe(d));
                 fixtures.advance(now, |at| sight == Sight::Without || map.at(at).visible());
             }
         }
         if frame.time_ns >= self.aligned_from_ns {
-            observe(&mut self.alignment, self.all, &self.follows, self.lanes, frame.time_ns)?;
+            observe(&mut self.alignment, &followed, self.lanes, frame.time_ns)?;
         }
         Ok(missed)
     }

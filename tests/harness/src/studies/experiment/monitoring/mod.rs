@@ -19,7 +19,8 @@ use self::turned::Pieces;
 use crate::estimators::{self, camera_3d::lifted};
 use crate::evaluation::Settings;
 use crate::geometry::solid::Solid;
-use crate::recording::Recording;
+use crate::recording::camera::RecordedCamera;
+use crate::recording::{Frame, Recording};
 
 /// After the warm-up a sensor is in order for so long at least, seconds.
 const IN_ORDER_S: f64 = 20.0;
@@ -229,25 +230,21 @@ impl Site<'_> {
         let from_ns = after(warm_s.max(settings.evaluation.warm_up_s + IN_ORDER_S));
         let broken = (fault != Fault::None).then(|| fault.of(own, from_ns));
         let recording = broken.as_ref().unwrap_or(own);
-        let mut followed = match broken {
-            Some(_) => follow(recording, settings)?,
-            None => Vec::new(),
-        };
-        // a camera's recording is with the fault from its beginning
-        let whole = own.frames.iter().position(|f| f.time_ns >= from_ns).unwrap_or(0);
-        if !followed.is_empty() && !is_radar {
-            followed.iter_mut().zip(&self.follows[k]).take(whole).for_each(|(to, own)| to.clone_from(own));
-        }
-        let follows = (0..all.len()).map(|s| if s == k && broken.is_some() { &followed } else { &self.follows[s] });
         let aligned_from = after(settings.evaluation.warm_up_s);
         let slice_m = settings.evaluation.slice_height_m;
-        let mut judges = Judges::new(all, follows.collect(), k, self.lanes, slice_m, aligned_from)?;
+        let mut judges = Judges::new(all, self.follows, k, self.lanes, slice_m, aligned_from)?;
         let mut running = estimators::own(recording, &settings.estimators)?;
         let mut watched = [Watched::default(); 2];
         let (mut missed, mut expected) = ([false; SECTORS], [false; SECTORS]);
         for (n, frame) in recording.frames.iter().enumerate() {
             running.step(frame);
-            let misses = judges.step(frame, running.map(), &places(recording, n, settings)?)?;
+            let lifts = recording.of_camera().map(|camera| lifts(camera, n, settings)).transpose()?;
+            let seen = lifts.as_ref().map_or_else(|| places(recording, frame, settings), |lifts| middles(lifts));
+            // a camera's recording is with the fault from its beginning
+            let in_order = broken.is_none() || (!is_radar && frame.time_ns < from_ns);
+            let with_fault = if in_order { Vec::new() } else { lifts.unwrap_or_else(|| running.obstacles()) };
+            let follows = if in_order { self.follows[k].get(n) } else { Some(&with_fault) };
+            let misses = judges.step(frame, running.map(), &seen, follows.map_or(&[], Vec::as_slice))?;
             let since = (frame.time_ns - from_ns) as f64 * 1e-9;
             for (watched, sight) in watched.iter_mut().zip(Sight::ALL) {
                 if frame.time_ns < after(warm_s) {
@@ -329,16 +326,21 @@ fn in_third(sector: usize, third: usize) -> bool {
     sector * THIRDS / SECTORS == third
 }
 
-/// Where a sensor detects something on the road.
-fn places(recording: &Recording, frame: usize, settings: &Settings) -> Result<Vec<[f64; 2]>> {
-    if let Some(camera) = recording.of_camera() {
-        let Some(boxes) = camera.frames.get(frame) else { return Ok(Vec::new()) };
-        let solids = lifted(camera, boxes, &settings.estimators.camera_3d)?;
-        return Ok(solids.iter().map(|s| [s.center[0], s.center[1]]).collect());
-    }
+/// A camera's vehicles in one of its pictures.
+fn lifts(camera: &RecordedCamera, frame: usize, settings: &Settings) -> Result<Vec<Solid>> {
+    let Some(boxes) = camera.frames.get(frame) else { return Ok(Vec::new()) };
+    lifted(camera, boxes, &settings.estimators.camera_3d)
+}
+
+fn middles(solids: &[Solid]) -> Vec<[f64; 2]> {
+    solids.iter().map(|s| [s.center[0], s.center[1]]).collect()
+}
+
+/// Where a radar detects something on the road.
+fn places(recording: &Recording, frame: &Frame, settings: &Settings) -> Vec<[f64; 2]> {
     let height = settings.evaluation.slice_height_m;
-    let all = recording.frames.get(frame).map_or(&[][..], |f| &f.detections);
-    Ok(all.iter().map(|d| d.road_position(&recording.pose, height)).map(|[x, y, _]| [x, y]).collect())
+    let all = frame.detections.iter().map(|d| d.road_position(&recording.pose, height));
+    all.map(|[x, y, _]| [x, y]).collect()
 }
 
 #[cfg(test)]

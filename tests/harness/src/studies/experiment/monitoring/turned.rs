@@ -112,29 +112,29 @@ pub(super) fn alignment(poses: &[SensorPose]) -> Result<Alignment<PLACES>> {
     Ok(Alignment::new(&mounts, &AlignmentConfig::default())?)
 }
 
+/// What a sensor follows at a time; none without a frame that is new enough.
+pub(super) fn at<'f>(recording: &Recording, follows: &'f Follows, time_ns: i64) -> Option<&'f [Solid]> {
+    newest(recording, time_ns).map(|k| follows.get(k).map_or(&[][..], Vec::as_slice))
+}
+
 /// Compares what all sensors follow at a time, with each other and with the lanes.
 ///
 /// # Errors
 /// Places that are none.
 pub(super) fn observe(
     alignment: &mut Alignment<PLACES>,
-    all: &[Recording],
-    follows: &[&Follows],
+    now: &[Option<&[Solid]>],
     lanes: &Pieces,
     time_ns: i64,
 ) -> Result<()> {
-    let sensors = all.len().min(ROAD);
-    let now = |(r, follows): (&Recording, &&Follows)| -> Vec<Solid> {
-        newest(r, time_ns).and_then(|k| follows.get(k)).cloned().unwrap_or_default()
-    };
-    let now: Vec<Vec<Solid>> = all.iter().zip(follows).map(now).collect();
-    for a in 0..sensors {
-        for b in a + 1..sensors {
-            for (own, theirs) in the_same(&now[a], &now[b]) {
+    let now: Vec<&[Solid]> = now.iter().take(ROAD).map(|solids| solids.unwrap_or_default()).collect();
+    for a in 0..now.len() {
+        for b in a + 1..now.len() {
+            for (own, theirs) in the_same(now[a], now[b]) {
                 alignment.observe(a, point(own)?, b, point(theirs)?);
             }
         }
-        for solid in &now[a] {
+        for solid in now[a] {
             if let Some(at) = on_lane(solid, lanes) {
                 alignment.observe(a, point([solid.center[0], solid.center[1]])?, ROAD, point(at)?);
             }
@@ -165,7 +165,8 @@ fn one(
         if since < 0.0 {
             continue;
         }
-        observe(&mut alignment, all, follows, lanes, frame.time_ns)?;
+        let now: Vec<_> = all.iter().zip(follows).map(|(r, follows)| at(r, follows, frame.time_ns)).collect();
+        observe(&mut alignment, &now, lanes, frame.time_ns)?;
         for a in 0..sensors {
             for (b, disagreed) in disagreed[a].iter_mut().enumerate().take(sensors).skip(a + 1) {
                 let is_one = turned.is_none_or(|(k, _)| k == a || k == b);
