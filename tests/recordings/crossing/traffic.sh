@@ -45,3 +45,9 @@ traffic tee-2 tee tee 2006 90 1.2 150
 for day in $(seq 1 14); do
     traffic "wide-day-$day" wide crossing $((5000 + day)) 80 1.0 90
 done
+
+# days of the other layouts, for tuning.toml
+for day in $(seq 1 6); do
+    traffic "skewed-day-$day" skewed crossing $((6000 + day)) 90 0.9 90
+    traffic "tee-day-$day" tee tee $((6100 + day)) 90 1.1 90
+done

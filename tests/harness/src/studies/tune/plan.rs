@@ -42,6 +42,8 @@ pub struct Run {
     pub scene: PathBuf,
     pub fcd: Option<PathBuf>,
     pub seed: Option<u64>,
+    /// At most what the traffic lasts.
+    pub duration_s: Option<f64>,
     /// Of the radar.
     pub mount: Option<Mount>,
 }
@@ -94,6 +96,7 @@ impl Plan {
     fn scene(&self, run: &Run) -> Result<Scene> {
         let mut scene = Scene::read(&self.folder.join(&run.scene))?;
         scene.seed = run.seed.unwrap_or(scene.seed);
+        scene.duration_s = run.duration_s.unwrap_or(scene.duration_s);
         scene.radar.mount = run.mount.unwrap_or(scene.radar.mount);
         // what does not change what the radar sees
         scene.camera = None;
