@@ -185,8 +185,8 @@ mod tests {
         };
         assert!(refused(&|p| p.unit[0].report[0].seed = Some(9003)).contains("has the seed 9003 of another recording"));
         assert!(refused(&|p| p.unit[1].report.clear()).contains("`crossing` has nothing to train on"));
-        assert!(refused(&|p| p.unit[2].warm_up_s = 90.0).contains("leaves nothing of queue/train-1.toml"));
-        assert!(refused(&|p| p.unit[2].name = "motorway".into()).contains("two units are called `motorway`"));
+        assert!(refused(&|p| p.unit[3].warm_up_s = 90.0).contains("leaves nothing of queue/train-1.toml"));
+        assert!(refused(&|p| p.unit[3].name = "motorway".into()).contains("two units are called `motorway`"));
         assert!(refused(&|p| p.unit[0].train[2].mount.as_mut().unwrap().height_m = -1.0).contains("height_m"));
     }
 }
