@@ -6,9 +6,14 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use viewshed::fixed::time::Time;
+use viewshed::probability::{Edges, ProbabilityTable};
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::message::{Addresses, Epoch, Message, Packet};
 use viewshed_harness::bus::traffic::{A, Maps, W};
+use viewshed_harness::estimators::Options;
+use viewshed_harness::evaluation::curve::Grades;
+use viewshed_harness::evaluation::probability::file::Fitted;
+use viewshed_harness::evaluation::probability::samples::fingerprint;
 use viewshed_harness::recording::can_log::{Content, Line};
 use viewshed_harness::recording::{ReadOptions, read};
 
@@ -21,6 +26,28 @@ fn log(folder: &Path) -> PathBuf {
     let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
     command.args(["bus", SHIPPED, "--to", "5", "--bus", "fd-500k-2M", "--log"]).arg(&path);
     let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    path
+}
+
+/// The same with a made-up table of probabilities, which rises with the grade.
+fn log_with_probabilities(folder: &Path) -> PathBuf {
+    let edges = Edges {
+        grades: [2, 26, 51, 76, 102, 128, 153, 179, 204, 230, 255],
+        ranges_cm: [2000, 4000, 6000, 8000, 10_000, 13_000, 16_000],
+        azimuths: [-6000, -3000, -1500, 0, 1500, 3000, 6000],
+    };
+    let values = [[std::array::from_fn(|step| 51 + 17 * step as u8); 8]; 8];
+    let recording = read(SHIPPED.as_ref(), &ReadOptions::default()).unwrap();
+    let table = ProbabilityTable::new(edges, values, fingerprint(&recording, &Options::default())).unwrap();
+    let mut counted = Grades::default();
+    (51..=255).for_each(|p| counted.add(true, Some(p)));
+    let file = folder.join("t.probability.toml");
+    std::fs::write(&file, Fitted { table, counted }.text().unwrap()).unwrap();
+    let path = folder.join("bus.log");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+    command.args(["bus", SHIPPED, "--to", "5", "--bus", "fd-500k-2M", "--probability"]).arg(&file);
+    let output = command.arg("--log").arg(&path).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     path
 }
@@ -70,6 +97,44 @@ fn a_log_is_played_and_its_sender_described() {
     page.key("Enter");
     page.until("viewshed.told !== null");
     page.picture(&folder.join("log.png"));
+    assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
+fn a_cell_says_how_often_a_vehicle_there_is_detected() {
+    let folder = folder("probability");
+    let server = Server::run([Path::new("view"), &log_with_probabilities(&folder)]);
+    let last = overview(&server)["count"].as_u64().unwrap() - 1;
+    // by state: unknown, invisible, visible
+    let mut said: [Vec<Option<f64>>; 3] = Default::default();
+    for (azimuth, range) in (0..120).step_by(12).flat_map(|a| (0..200).step_by(8).map(move |r| (a, r))) {
+        let (_, answer) = server.own("GET", &format!("cell/{last}/0/{azimuth}/{range}"), &[], "");
+        let cell: Value = serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap_or_default()).unwrap();
+        said[cell["state"].as_u64().unwrap() as usize & 3].push(cell["probability"].as_f64());
+    }
+    let [unknown, invisible, visible] = said;
+    assert!(!unknown.is_empty() && unknown.iter().all(Option::is_none), "nothing is said of what is unknown");
+    let known =
+        |all: &[Option<f64>]| all.iter().map(|p| p.expect("what is known has a probability")).collect::<Vec<_>>();
+    let (invisible, visible) = (known(&invisible), known(&visible));
+    assert!(invisible.iter().all(|p| (p - 0.2).abs() < 1e-9), "the table's least: {invisible:?}");
+    let least = 0.2 + 6.0 * 17.0 / 255.0; // grade 128, from which the map is visible, has the seventh step
+    assert!(visible.iter().all(|p| *p >= least - 1e-9), "{visible:?}");
+    assert!(visible.iter().any(|p| *p > least + 1e-9), "the plane of probability says more of some: {visible:?}");
+
+    let Some(browser) = Browser::start("probability") else { return };
+    let page = browser.open(&server.url);
+    page.until("viewshed.source.done && viewshed.drawn.number >= 0");
+    page.key("End");
+    page.until("viewshed.number === viewshed.source.count - 1");
+    page.focus("plan");
+    page.key("Enter");
+    page.until("viewshed.told !== null && viewshed.told.probability !== undefined");
+    let told = page.ask("[viewshed.told.probability, document.getElementById('cell').textContent]");
+    let (p, text) = (told[0].as_f64(), told[1].as_str().unwrap());
+    let expected = p.map(|p| format!("at least {} %", (100.0 * p).floor()));
+    assert!(expected.is_none_or(|expected| text.contains(&expected)), "{told}");
+    page.picture(&folder.join("probability.png"));
     assert_eq!(page.console(), Vec::<String>::new());
 }
 

@@ -80,6 +80,10 @@ impl Receiving {
         renew(news, &map, cells.azimuths, now_s);
         let ages = news.iter().map(|news| news.map(|(_, at)| ((now_s - at).max(0.0) * 1000.0) as u32)).collect();
         let (shown, sample) = Shown::new(name, cells, |azimuth, range| shown(&map, azimuth, range));
+        let shown = match header.probability {
+            Some(_) => shown.with_probabilities(|azimuth, range| map.probability(azimuth, range)),
+            None => shown,
+        };
         self.cells.insert(sensor, cells);
         Some((Shown { ages_ms: Some(ages), ..shown }, sample))
     }

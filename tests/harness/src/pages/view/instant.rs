@@ -8,6 +8,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde::{Deserialize, Serialize};
 use viewshed::map::{CellState, Visibility};
+use viewshed::probability::Probability;
 
 use crate::bus::listening::Heard;
 use crate::geometry::pose::SensorPose;
@@ -27,6 +28,10 @@ pub struct Shown {
     /// Of a received map: milliseconds since each azimuth's last news; `None` where it is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ages_ms: Option<Vec<Option<u32>>>,
+    /// Of a sender with a table of probabilities: base64 of a byte a cell, the least probability that a vehicle there is
+    /// detected, 1/255; 0 where nothing is said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probabilities: Option<String>,
 }
 
 /// Where the cells of a map lie.
@@ -144,13 +149,31 @@ impl Shown {
             *share += one;
             bytes.extend([cell.grade, code + if cell.occupied && code > 0 { OCCUPIED } else { 0 }]);
         }
-        (Self { name: name.to_owned(), cells, bytes: Some(BASE64.encode(bytes)), ages_ms: None }, sample)
+        let bytes = Some(BASE64.encode(bytes));
+        (Self { name: name.to_owned(), cells, bytes, ages_ms: None, probabilities: None }, sample)
     }
 
     /// Of a sensor that never said where its cells lie.
     pub fn nothing(name: &str, mount: [f64; 4]) -> Self {
         let cells = Cells { azimuths: 0, ranges: 0, azimuth_rad: [0.0; 2], cell_m: 1.0, mount };
-        Self { name: name.to_owned(), cells, bytes: None, ages_ms: None }
+        Self { name: name.to_owned(), cells, bytes: None, ages_ms: None, probabilities: None }
+    }
+
+    /// With the least probabilities that vehicles are detected.
+    pub fn with_probabilities(self, of: impl Fn(usize, usize) -> Option<Probability>) -> Self {
+        let places = (0..self.cells.azimuths).flat_map(|a| (0..self.cells.ranges).map(move |r| (a, r)));
+        let bytes: Vec<u8> = places.map(|(azimuth, range)| of(azimuth, range).map_or(0, Probability::raw)).collect();
+        Self { probabilities: Some(BASE64.encode(bytes)), ..self }
+    }
+
+    /// The least probability that a vehicle in a cell is detected, where it is said.
+    pub fn probability(&self, azimuth: usize, range: usize) -> Option<f64> {
+        if azimuth >= self.cells.azimuths || range >= self.cells.ranges {
+            return None;
+        }
+        let bytes = BASE64.decode(self.probabilities.as_ref()?).ok()?;
+        let raw = bytes.get(azimuth * self.cells.ranges + range).filter(|raw| **raw > 0)?;
+        Some(f64::from(*raw) / 255.0)
     }
 
     /// A cell's grade and state; `None` outside, and where nothing is known of the map.

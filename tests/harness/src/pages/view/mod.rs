@@ -235,6 +235,7 @@ fn told(this: &Viewing, (number, map, azimuth, range): (usize, usize, usize, usi
         "azimuth_deg": ((place[1] - y).atan2(place[0] - x) - shown.cells.mount[3]).to_degrees(),
         "grade": grade,
         "state": state,
+        "probability": shown.probability(azimuth, range),
         "since_s": since_s,
         "since_begin": since_begin,
         "or_longer": is_longer && !since_begin,

@@ -38,6 +38,7 @@ export function showCell(told, instant, name) {
     ['map', name],
     ['state', `${state}${told.state & 4 ? ', occupied' : ''}`],
     ['grade', `${told.grade} of 255`],
+    ['p of detection', told.probability === null ? '' : `at least ${Math.floor(100 * told.probability)} %`],
     ['since', since],
     ['place', `${told.x_m.toFixed(1)}, ${told.y_m.toFixed(1)} m; ${told.range_m.toFixed(0)} m away, ${told.azimuth_deg.toFixed(1)}°`],
     ['sector’s age', told.age_ms === null ? '' : `${told.age_ms} ms`],
