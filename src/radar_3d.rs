@@ -24,7 +24,7 @@ use crate::grid::shadow;
 use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
 use crate::obstacles::config::ObstacleConfig;
-use crate::obstacles::lanes::{Lane, Lanes};
+use crate::obstacles::lanes::Lane;
 use crate::obstacles::tracking::Tracking;
 use crate::obstacles::{Claimed, Obstacles};
 use crate::sensor::Sensor;
@@ -32,6 +32,7 @@ use crate::sensor::config::{ConfigError, within};
 use crate::sensor::ground::Ground;
 use crate::sensor::mount::Levelling;
 use crate::sensor::noise::Noise;
+use crate::sensor::place::{LaneList, Place, Points};
 
 /// Everything that can be set, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -58,6 +59,13 @@ pub struct Radar3dConfig {
     pub ground: &'static [[f32; 2]],
 }
 
+impl Radar3dConfig {
+    /// What it says of the place.
+    pub fn place(&self) -> Place<'static> {
+        Place { lanes: LaneList::Metres(self.lanes), heights: Points::Metres(self.ground) }
+    }
+}
+
 /// How the result is read off the grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -75,6 +83,16 @@ pub struct VisibilityConfig {
 impl Default for VisibilityConfig {
     fn default() -> Self {
         Self { slice_height_m: 1.0, visible_from: 0.5, occupied_from: 0.5 }
+    }
+}
+
+impl VisibilityConfig {
+    /// Least grade that counts as visible.
+    ///
+    /// # Errors
+    /// A share that is none.
+    pub fn least_grade(&self) -> Result<u8, ConfigError> {
+        threshold("visibility.visible_from", self.visible_from)
     }
 }
 
@@ -101,14 +119,22 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
     /// # Errors
     /// Names the first parameter that cannot be worked with.
     pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self, ConfigError> {
+        Self::at(sensor, config, &config.place())
+    }
+
+    /// The same at another place than the configuration's own.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn at(sensor: &Sensor, config: &Radar3dConfig, place: &Place<'_>) -> Result<Self, ConfigError> {
         let levelling = sensor.mount.levelling()?;
         let view = sensor.field_of_view.limits()?;
         let noise = sensor.noise.noise()?;
-        let ground = Ground::new(&levelling, config.ground)?;
+        let ground = Ground::new(&levelling, place.heights)?;
         let axes = Axes::on(ground, &levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
         let limit_cm = view.range_cm[1] + BEYOND_CM;
         let mut tracking = config.obstacles.tracking(noise, levelling.road_axis(), limit_cm)?;
-        tracking.lanes = Lanes::new(&levelling, config.lanes)?;
+        tracking.lanes.set(&levelling, place.lanes)?;
         Ok(Self {
             levelling,
             gate: config.gate.gate(&view)?,
@@ -116,7 +142,7 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
             tracking,
             inverse_sensor: config.evidence.inverse_sensor(&sensor.noise, &axes)?,
             health: config.health.limits()?,
-            visible_from: threshold("visibility.visible_from", config.visibility.visible_from)?,
+            visible_from: config.visibility.least_grade()?,
             occupied_from: threshold("visibility.occupied_from", config.visibility.occupied_from)?,
             axes,
         })

@@ -7,7 +7,7 @@ use core::ffi::CStr;
 use super::Bench;
 use super::flash::{FLASH_LEN, Flash};
 use super::record::Record;
-use crate::unit::settings::{BLOCK_LEN, SettingsSlots};
+use crate::unit::settings::SettingsSlots;
 use crate::wire::message::Epoch;
 
 const JOB: &CStr = c"job.bin";
@@ -133,7 +133,7 @@ impl<F: HostFile> SettingsSlots for FlashFile<F> {
         self.flash.slot(slot)
     }
 
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+    fn write(&mut self, slot: usize, block: &[u8]) {
         self.flash.write(slot, block);
         self.keep();
     }

@@ -1,12 +1,12 @@
 //! What a unit keeps over a loss of power, for boards and hosts of a test bench that have no flash.
 
-use crate::unit::settings::{BLOCK_LEN, SettingsSlots};
+use crate::unit::settings::{ALL_SLOTS_LEN, Kind, SettingsSlots};
 use crate::wire::message::Epoch;
 
-/// Bytes of it: two slots, starts.
-pub const FLASH_LEN: usize = 2 * BLOCK_LEN + 1;
+/// Bytes of it: all slots, starts.
+pub const FLASH_LEN: usize = ALL_SLOTS_LEN + 1;
 
-/// Both slots of the configuration block, and how often the unit started.
+/// The slots of all kinds of blocks, and how often the unit started.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Flash {
     bytes: [u8; FLASH_LEN],
@@ -28,7 +28,7 @@ impl Flash {
 
     /// The bytes of a slot, to damage them.
     pub fn slot_mut(&mut self, slot: usize) -> &mut [u8] {
-        self.bytes.get_mut(slot * BLOCK_LEN..(slot + 1) * BLOCK_LEN).unwrap_or_default()
+        self.bytes.get_mut(range(slot)).unwrap_or_default()
     }
 
     /// Counts a start; its epoch is not that of the 15 before.
@@ -45,29 +45,37 @@ impl Flash {
 
 impl SettingsSlots for Flash {
     fn slot(&self, slot: usize) -> &[u8] {
-        self.bytes.get(slot * BLOCK_LEN..(slot + 1) * BLOCK_LEN).unwrap_or(&[])
+        self.bytes.get(range(slot)).unwrap_or(&[])
     }
 
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
-        if let Some(place) = self.slot_mut(slot).first_chunk_mut() {
-            *place = *block;
-        }
+    fn write(&mut self, slot: usize, block: &[u8]) {
+        self.slot_mut(slot).iter_mut().zip(block).for_each(|(to, from)| *to = *from);
     }
+}
+
+/// Where a slot lies.
+fn range(slot: usize) -> core::ops::Range<usize> {
+    let length = |slot| Kind::of_slot(slot).map_or(0, Kind::most_len);
+    let from = (0..slot).map(length).sum();
+    from..from + length(slot)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unit::settings::{BLOCK_LEN, SLOTS};
 
     #[test]
     fn slots_and_starts_are_kept_apart() {
         let mut flash = Flash::ERASED;
         assert_eq!(flash.start(), Epoch::new(0));
         flash.write(1, &[7; BLOCK_LEN]);
-        flash.write(2, &[8; BLOCK_LEN]);
+        flash.write(Kind::Lanes.slots()[1], &[8; BLOCK_LEN]);
+        flash.write(SLOTS, &[9; BLOCK_LEN]);
         let mut kept = Flash::new(*flash.bytes());
         assert_eq!((kept.slot(0), kept.slot(1)), (&[0xFF; BLOCK_LEN][..], &[7; BLOCK_LEN][..]));
         assert_eq!(kept.start(), Epoch::new(1));
-        assert!(kept.slot(2).is_empty());
+        assert_eq!(kept.slot(5)[..BLOCK_LEN], [8; BLOCK_LEN]);
+        assert!(kept.slot(SLOTS).is_empty());
     }
 }

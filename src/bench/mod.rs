@@ -20,4 +20,4 @@ pub mod stage;
 mod start;
 
 pub use run::{Bench, run};
-pub use start::start;
+pub use start::{start, start_stored};

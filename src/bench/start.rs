@@ -1,11 +1,12 @@
 //! A unit in a test bench: its sender sends every message at the moment it is due.
 
 use crate::fixed::time::Time;
-use crate::unit::settings::Settings;
-use crate::unit::{InUnit, MapSender};
+use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
+use crate::unit::{InUnit, MapSender, sender};
 use crate::wire::broadcast::{BroadcastConfig, Medium};
 use crate::wire::header::Header;
 use crate::wire::message::Epoch;
+use crate::wire::status::Reason;
 
 /// Puts parameters and sender where they stay. `None` without settings, and without ones that can be worked with.
 /// Apart, so that what this takes of the stack is free again before the first scan.
@@ -24,6 +25,24 @@ pub fn start<E: InUnit, S: MapSender<E::Map>>(
     start_sender(sender, header, (settings.unit.sensor, medium), epoch, now);
 }
 
+/// The same with what is kept beside the settings: lanes, heights, a table of probabilities. What the unit lacks, where a
+/// table is kept that is not its own.
+#[inline(never)]
+pub fn start_stored<E: InUnit, S: MapSender<E::Map>>(
+    parameters: &mut Option<E::Parameters>,
+    sender: &mut Option<S>,
+    stored: (&StoredSettings, &impl SettingsSlots),
+    medium: Medium,
+    epoch: Epoch,
+    now: Time,
+) -> Option<Reason> {
+    (*parameters, *sender) = (None, None);
+    let (settings, slots) = (stored.0.settings()?, stored.1);
+    let header = settings.build_at::<E>(&StoredSettings::place_of(slots).ok()?, parameters).ok()?;
+    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(settings.unit.sensor, medium) };
+    sender::start_stored(sender, (config, header), settings, slots, epoch, now)
+}
+
 #[inline(never)]
 fn start_sender<M, S: MapSender<M>>(
     sender: &mut Option<S>,
@@ -33,5 +52,5 @@ fn start_sender<M, S: MapSender<M>>(
     now: Time,
 ) {
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(number, medium) };
-    *sender = S::start(config, header, epoch, now).ok();
+    let _ = S::start(sender, config, header, epoch, now);
 }

@@ -29,6 +29,12 @@ impl Reader<'_> {
         self.take().map(i16::from_le_bytes)
     }
 
+    /// Three bytes, signed.
+    pub fn i24(&mut self) -> Option<i32> {
+        // the sign is that of the highest byte
+        self.take().map(|[a, b, c]| i32::from_le_bytes([0, a, b, c]) >> 8)
+    }
+
     pub fn u32(&mut self) -> Option<u32> {
         self.take().map(u32::from_le_bytes)
     }

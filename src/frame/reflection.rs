@@ -127,6 +127,8 @@ mod tests {
     use super::*;
     use crate::sensor::mount::Mount;
     use crate::sensor::noise::NoiseConfig;
+    #[cfg(feature = "ground")]
+    use crate::sensor::place::Points;
 
     fn place(range_m: f32, azimuth_deg: f32, elevation_deg: Option<f32>, pitch_deg: f32) -> Reflection {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
@@ -178,7 +180,8 @@ mod tests {
         for (yaw_deg, grade) in [(0.0, 0.04), (0.0, -0.04), (180.0, 0.04)] {
             let mount = Mount { x_m: 30.0, y_m: 0.0, height_m: 6.0, yaw_deg, pitch_deg: 2.0, roll_deg: 0.0 };
             let levelling = mount.levelling().unwrap();
-            let ground = Ground::new(&levelling, &[[-200.0, -200.0 * grade], [200.0, 200.0 * grade]]).unwrap();
+            let ground =
+                Ground::new(&levelling, Points::Metres(&[[-200.0, -200.0 * grade], [200.0, 200.0 * grade]])).unwrap();
             // a plate 0.8 m above the road 100 m ahead
             let climb = f64::from(grade) * if yaw_deg == 0.0 { 100.0 } else { -100.0 };
             let rise = climb + 0.8 - 6.0;

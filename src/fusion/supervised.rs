@@ -57,6 +57,15 @@ impl<E> Supervised<E> {
         self.is_watched.then_some(&self.standing)
     }
 
+    /// What the radar is watched by, checked.
+    ///
+    /// # Errors
+    /// Names the parameter that cannot be worked with.
+    pub fn limits(supervision: Option<&Supervision>) -> Result<Option<FixturesLimits>, ConfigError> {
+        let fixtures = |(mount, azimuth_deg, config): &Supervision| FixturesLimits::new(mount, *azimuth_deg, config);
+        supervision.map(fixtures).transpose()
+    }
+
     /// What is to be said of a radar that is healthy otherwise.
     fn condition(&self, own: Condition) -> Condition {
         let Some(standing) = self.standing().filter(|_| own == Condition::Healthy) else { return own };
@@ -82,8 +91,7 @@ where
     type Map = PolarMap<R, A>;
 
     fn parameters((config, supervision): &Self::Config) -> Result<Self::Parameters, ConfigError> {
-        let fixtures = |(mount, azimuth_deg, config): &Supervision| FixturesLimits::new(mount, *azimuth_deg, config);
-        Ok((E::parameters(config)?, supervision.as_ref().map(fixtures).transpose()?))
+        Ok((E::parameters(config)?, Self::limits(supervision.as_ref())?))
     }
 
     fn prepare((parameters, _): &Self::Parameters, map: &mut Self::Map) {

@@ -122,6 +122,7 @@ mod tests {
     use crate::sensor::field_of_view::FieldOfView;
     use crate::sensor::ground::Ground;
     use crate::sensor::mount::Mount;
+    use crate::sensor::place::Points;
     use std::vec::Vec;
 
     type World = (Axes<60, 4, 16>, SphericalGrid<60, 4, 16>, PolarMap<60, 4>);
@@ -143,7 +144,7 @@ mod tests {
             range_max_m: 60.0,
         };
         let levelling = mount.levelling().unwrap();
-        let ground = Ground::new(&levelling, points).unwrap();
+        let ground = Ground::new(&levelling, Points::Metres(points)).unwrap();
         let axes = Axes::on(ground, &levelling, &view, 1.0).unwrap();
         let (grid, mut map) = (SphericalGrid::new(), PolarMap::unknown(axes.polar(&levelling), 128, 128));
         crate::grid::raycast::cast(&grid, &axes, &mut map);

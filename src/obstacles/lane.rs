@@ -136,13 +136,14 @@ mod tests {
     use crate::frame::by_range::ByRange;
     use crate::frame::reflection::Reflection;
     use crate::sensor::mount::Levelling;
+    use crate::sensor::place::LaneList;
     use crate::sensor::road::RoadPoint;
     use std::vec::Vec;
 
     /// The default rules with lanes; the sensor stands at the origin and looks along x.
     fn with_lanes(lanes: &[Lane]) -> Tracking {
         let level = Levelling::on_road(RoadPoint::new(0, 0), 600, Angle::ZERO);
-        Tracking { lanes: Lanes::new(&level, lanes).unwrap(), ..rules() }
+        Tracking { lanes: Lanes::new(&level, LaneList::Metres(lanes)).unwrap(), ..rules() }
     }
 
     fn frame(list: &mut Obstacles<16>, seen: &[Reflection], t: &Tracking) {

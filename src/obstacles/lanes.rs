@@ -18,6 +18,7 @@ use crate::fixed::math::{length, mul_shift};
 use crate::fixed::trig::{self, Direction};
 use crate::sensor::config::{ConfigError, Problem, within};
 use crate::sensor::mount::Levelling;
+use crate::sensor::place::{LaneList, Points};
 use crate::sensor::road::RoadPoint;
 
 /// A lane: a polyline in the direction of its traffic, metres in road coordinates, x along the road and y to the left.
@@ -106,18 +107,29 @@ impl Lanes {
     /// # Errors
     /// Too many lanes or segments; a lane of one point, with a point that is repeated or too far from the sensor, or
     /// that crosses itself: by the number of the lane, from 0.
-    pub fn new(levelling: &Levelling, lanes: &[Lane]) -> Result<Self, ConfigError> {
+    pub fn new(levelling: &Levelling, lanes: LaneList<'_>) -> Result<Self, ConfigError> {
         let mut all = Self::default();
+        all.set(levelling, lanes).map(|()| all)
+    }
+
+    /// The same where they stay.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); which lanes are there then is not said.
+    #[inline(never)] // once a start
+    pub fn set(&mut self, levelling: &Levelling, mut lanes: LaneList<'_>) -> Result<(), ConfigError> {
+        self.segments.clear();
+        self.lanes = 0;
         if !ROOM {
-            if lanes.is_empty() {
-                return Ok(all);
+            if lanes.next().is_none() {
+                return Ok(());
             }
             return Err(ConfigError { parameter: "lanes", value: 0.0, problem: Problem::TooManyLanes });
         }
-        for points in lanes.iter().take(MOST_LANES + 1) {
-            all.add(levelling, points)?;
+        for points in lanes.take(MOST_LANES + 1) {
+            self.add(levelling, points)?;
         }
-        Ok(all)
+        Ok(())
     }
 
     /// Whether there are none.
@@ -127,18 +139,18 @@ impl Lanes {
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss)] // limits are checked
-    fn add(&mut self, levelling: &Levelling, points: &[[f32; 2]]) -> Result<(), ConfigError> {
+    fn add(&mut self, levelling: &Levelling, points: Points<'_>) -> Result<(), ConfigError> {
         let lane = self.lanes;
         let refuse = |problem| Err(ConfigError { parameter: "lanes", value: f32::from(lane), problem });
         if MOST_LANES.checked_sub(usize::from(lane) + 1).is_none() {
             return refuse(Problem::TooManyLanes);
         }
-        if points.len() < 2 {
+        if points.take(2).count() < 2 {
             return refuse(Problem::OnePoint);
         }
         let first = self.segments.len();
         let mut last = None;
-        for &[x, y] in points {
+        for [x, y] in points {
             let place = levelling.place(RoadPoint::from_metres(
                 within("lanes.points", x, -10_000.0, 10_000.0)?,
                 within("lanes.points", y, -10_000.0, 10_000.0)?,
@@ -281,7 +293,7 @@ mod tests {
     }
 
     fn lanes(all: &[Lane]) -> Lanes {
-        Lanes::new(&level(), all).unwrap()
+        Lanes::new(&level(), LaneList::Metres(all)).unwrap()
     }
 
     /// A motion that is seen for the first time, with a radial speed.
@@ -300,7 +312,7 @@ mod tests {
     #[test]
     fn a_lane_that_cannot_be_is_refused_by_its_number() {
         let good: Lane = &[[0.0, 0.0], [50.0, 0.0]];
-        let refused = |lane: Lane| Lanes::new(&level(), &[good, lane]).unwrap_err();
+        let refused = |lane: Lane| Lanes::new(&level(), LaneList::Metres(&[good, lane])).unwrap_err();
         for (lane, problem) in [
             (&[][..], Problem::OnePoint),
             (&[[1.0, 2.0]], Problem::OnePoint),
@@ -320,12 +332,15 @@ mod tests {
     #[test]
     fn more_than_there_is_room_for_is_refused() {
         let lane: Lane = &[[0.0, 0.0], [50.0, 0.0]];
-        assert!(Lanes::new(&level(), &vec![lane; MOST_LANES]).is_ok());
-        assert_eq!(Lanes::new(&level(), &vec![lane; MOST_LANES + 1]).unwrap_err().problem, Problem::TooManyLanes);
+        assert!(Lanes::new(&level(), LaneList::Metres(&vec![lane; MOST_LANES])).is_ok());
+        assert_eq!(
+            Lanes::new(&level(), LaneList::Metres(&vec![lane; MOST_LANES + 1])).unwrap_err().problem,
+            Problem::TooManyLanes
+        );
         let long: Vec<[f32; 2]> = (0..MOST_SEGMENTS + 2).map(|k| [k as f32 * 2.0, 0.0]).collect();
         let long: &'static [[f32; 2]] = long.leak();
-        assert!(Lanes::new(&level(), &[&long[1..]]).is_ok());
-        assert_eq!(Lanes::new(&level(), &[long]).unwrap_err().problem, Problem::TooManyPoints);
+        assert!(Lanes::new(&level(), LaneList::Metres(&[&long[1..]])).is_ok());
+        assert_eq!(Lanes::new(&level(), LaneList::Metres(&[long])).unwrap_err().problem, Problem::TooManyPoints);
     }
 
     #[test]

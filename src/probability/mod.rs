@@ -95,6 +95,7 @@ impl Probability {
 
 /// Why a table is not used. The unit goes on with grades.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum TableError {
     /// No table was ever written here, or something else.
     Empty,

@@ -19,6 +19,7 @@ use crate::fixed::math;
 use crate::fixed::trig::Direction;
 use crate::sensor::config::{ConfigError, Problem, above, within};
 use crate::sensor::mount::Levelling;
+use crate::sensor::place::Points;
 
 /// Whether there is room for any.
 const ROOM: bool = cfg!(feature = "ground");
@@ -81,12 +82,12 @@ impl Ground {
     /// # Errors
     /// More points than there is room for, one too near to the one before it or behind it, too far from the sensor, or
     /// after a grade that is too steep.
-    pub fn new(levelling: &Levelling, points: &[[f32; 2]]) -> Result<Self, ConfigError> {
+    pub fn new(levelling: &Levelling, points: Points<'_>) -> Result<Self, ConfigError> {
         let mut ground = Self { axis: levelling.road_axis(), ..Self::LEVEL };
         let sensor_m = levelling.origin().x_cm as f32 / 100.0;
         let below_m = height_m(points, sensor_m);
         let mut last: Option<[f32; 2]> = None;
-        for (number, &[x, height]) in points.iter().enumerate() {
+        for (number, [x, height]) in points.enumerate() {
             let refuse = |problem| ConfigError { parameter: "ground", value: number as f32, problem };
             within("ground.x_m", x, sensor_m - FARTHEST_M, sensor_m + FARTHEST_M)?;
             within("ground.height_m", height, -10_000.0, 10_000.0)?;
@@ -171,8 +172,8 @@ impl Ground {
 }
 
 /// Height of a profile somewhere along the road, metres; for start-up.
-fn height_m(points: &[[f32; 2]], x_m: f32) -> f32 {
-    let mut last: Option<&[f32; 2]> = None;
+fn height_m(points: Points<'_>, x_m: f32) -> f32 {
+    let mut last: Option<[f32; 2]> = None;
     for point in points {
         if x_m < point[0] {
             return last.map_or(point[1], |from| {
@@ -223,7 +224,7 @@ mod tests {
     }
 
     fn ground(x_m: f32, yaw_deg: f32, points: &[[f32; 2]]) -> Ground {
-        Ground::new(&levelling(x_m, yaw_deg), points).unwrap()
+        Ground::new(&levelling(x_m, yaw_deg), Points::Metres(points)).unwrap()
     }
 
     const CREST: [[f32; 2]; 4] = [[-100.0, 498.0], [0.0, 500.0], [80.0, 503.2], [200.0, 498.4]];
@@ -289,7 +290,8 @@ mod tests {
 
     #[test]
     fn what_is_no_road_is_refused_by_name() {
-        let refused = |points: &[[f32; 2]]| Ground::new(&levelling(0.0, 0.0), points).unwrap_err().to_string();
+        let refused =
+            |points: &[[f32; 2]]| Ground::new(&levelling(0.0, 0.0), Points::Metres(points)).unwrap_err().to_string();
         assert_eq!(refused(&[[0.0, 0.0], [10.0, 1.3]]), "ground: before point 1 the road is steeper than 12 %");
         assert_eq!(refused(&[[0.0, 0.0], [10.0, -1.3]]), "ground: before point 1 the road is steeper than 12 %");
         assert_eq!(refused(&[[10.0, 0.0], [0.0, 0.0]]), "ground.x_m is 0, not above 10");
@@ -297,8 +299,8 @@ mod tests {
         assert_eq!(refused(&[[0.0, f32::NAN]]), "ground.height_m is NaN, not a finite number");
         let many: Vec<[f32; 2]> = (0..17).map(|k| [10.0 * k as f32, 0.0]).collect();
         assert_eq!(refused(&many), "ground: point 16 is one more than there is room for");
-        assert!(Ground::new(&levelling(0.0, 0.0), &many[..16]).is_ok());
-        assert!(Ground::new(&levelling(0.0, 0.0), &[[0.0, 0.0], [100.0, 12.0]]).is_ok());
+        assert!(Ground::new(&levelling(0.0, 0.0), Points::Metres(&many[..16])).is_ok());
+        assert!(Ground::new(&levelling(0.0, 0.0), Points::Metres(&[[0.0, 0.0], [100.0, 12.0]])).is_ok());
     }
 }
 
@@ -309,7 +311,7 @@ mod without_room {
 
     #[test]
     fn a_profile_without_room_for_one_is_refused() {
-        let refused = Ground::new(&Levelling::NOWHERE, &[[0.0, 0.0], [100.0, 4.0]]).unwrap_err();
+        let refused = Ground::new(&Levelling::NOWHERE, Points::Metres(&[[0.0, 0.0], [100.0, 4.0]])).unwrap_err();
         assert_eq!((refused.parameter, refused.problem), ("ground", Problem::TooManyHeights));
     }
 }

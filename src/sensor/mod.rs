@@ -5,6 +5,7 @@ pub mod field_of_view;
 pub mod ground;
 pub mod mount;
 pub mod noise;
+pub mod place;
 pub mod road;
 
 use crate::sensor::field_of_view::FieldOfView;

@@ -9,8 +9,9 @@ use crate::frame::detection::Detection;
 #[cfg(feature = "monitoring")]
 use crate::fusion::Supervised;
 use crate::map::polar::{PolarGeometry, PolarMap};
-use crate::radar_3d::Radar3d;
+use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::sensor::config::{ConfigError, Problem};
+use crate::sensor::place::Place;
 use crate::unit::sender::MapSender;
 use crate::unit::settings::{Settings, SettingsCheck};
 use crate::wire::code::ray::Known;
@@ -20,6 +21,22 @@ use crate::wire::header::{Header, MOST_AZIMUTHS};
 pub trait InUnit: Estimator {
     /// Its configuration by the settings; what an integrator does not set is the library's.
     fn config(settings: &Settings) -> Self::Config;
+
+    /// Its parameters by the settings, at the place a unit keeps, which may be another than the settings' own.
+    ///
+    /// # Errors
+    /// Names the first parameter that cannot be worked with; lanes and heights that it has no use for.
+    fn parameters_at(settings: &Settings, place: &Place<'_>) -> Result<Self::Parameters, ConfigError> {
+        let Place { mut lanes, mut heights } = *place;
+        let without_use = |parameter, problem| Err(ConfigError { parameter, value: 0.0, problem });
+        if lanes.next().is_some() {
+            return without_use("lanes", Problem::TooManyLanes);
+        }
+        if heights.next().is_some() {
+            return without_use("ground", Problem::TooManyHeights);
+        }
+        Self::parameters(&Self::config(settings))
+    }
 
     /// Whether the configuration can be made, by the names the settings have.
     ///
@@ -42,16 +59,28 @@ impl Settings {
     ///
     /// # Errors
     /// Names the first parameter that cannot be worked with; there are no parameters then.
-    #[inline(never)] // what it takes of the stack is free again afterwards
     pub fn build<E: InUnit>(&self, parameters: &mut Option<E::Parameters>) -> Result<Header, ConfigError> {
+        self.build_at::<E>(&self.place(), parameters)
+    }
+
+    /// The same at another place than the settings' own.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    #[inline(never)] // what it takes of the stack is free again afterwards
+    pub fn build_at<E: InUnit>(
+        &self,
+        place: &Place<'_>,
+        parameters: &mut Option<E::Parameters>,
+    ) -> Result<Header, ConfigError> {
         *parameters = None;
         self.radar_bus.check("radar_bus")?;
         self.broadcast_bus.check("broadcast_bus")?;
         self.unit.check()?;
         E::check(self)?;
         // large: moved once
-        let made = parameters.insert(E::parameters(&E::config(self))?);
-        let header = E::header(self, made);
+        let made = parameters.insert(E::parameters_at(self, place)?);
+        let header = E::header(self, made).map(|header| Header { fingerprint: self.fingerprint_at(place), ..header });
         if header.is_err() {
             *parameters = None;
         }
@@ -61,14 +90,14 @@ impl Settings {
 
 /// Whether a unit with this sender can be made by these settings.
 #[inline(never)] // as above
-fn check<E: InUnit, S: MapSender<E::Map>>(settings: &Settings) -> Result<(), ConfigError> {
-    settings.build::<E>(&mut None).and_then(|header| S::fits(&header))
+fn check<E: InUnit, S: MapSender<E::Map>>(settings: &Settings, place: &Place<'_>) -> Result<Header, ConfigError> {
+    settings.build_at::<E>(place, &mut None).and_then(|header| S::fits(&header).map(|()| header))
 }
 
 impl SettingsCheck {
     /// For a unit of this estimator and sender.
     pub const fn of<E: InUnit, S: MapSender<E::Map>>() -> Self {
-        Self::by(check::<E, S>)
+        Self::by(check::<E, S>, S::TAKES_TABLES)
     }
 }
 
@@ -77,6 +106,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
 {
     fn config(settings: &Settings) -> Self::Config {
         (settings.sensor, settings.radar_3d())
+    }
+
+    fn parameters_at(settings: &Settings, place: &Place<'_>) -> Result<Self::Parameters, ConfigError> {
+        let (sensor, config) = Self::config(settings);
+        Radar3dParameters::at(&sensor, &config, place)
     }
 
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
@@ -97,6 +131,11 @@ where
         let view = &settings.sensor.field_of_view;
         let azimuth_deg = [view.azimuth_min_deg, view.azimuth_max_deg];
         (E::config(settings), settings.fixtures().map(|fixtures| (settings.sensor.mount, azimuth_deg, fixtures)))
+    }
+
+    fn parameters_at(settings: &Settings, place: &Place<'_>) -> Result<Self::Parameters, ConfigError> {
+        let (_, supervision) = Self::config(settings);
+        Ok((E::parameters_at(settings, place)?, Self::limits(supervision.as_ref())?))
     }
 
     fn check(settings: &Settings) -> Result<(), ConfigError> {

@@ -88,6 +88,8 @@ pub struct Unit<'a, E: Estimator, S> {
     frames: u32,
     /// Whether the sensor says that it has a fault.
     fault: bool,
+    /// Maps go on all the time, without something that was asked for.
+    lacking: Option<Reason>,
     /// What went wrong last, and when.
     trouble: Option<(Time, Reason)>,
 }
@@ -107,6 +109,7 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             period_us: None,
             frames: 0,
             fault: false,
+            lacking: None,
             trouble: None,
         }
     }
@@ -191,6 +194,11 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         }
     }
 
+    /// Maps go on without something that was asked for: in the status whenever nothing else is wrong.
+    pub fn lacks(&mut self, reason: Reason) {
+        self.lacking = Some(reason);
+    }
+
     /// A frame took so long to be worked up, microseconds, by the clock of `now`: reported if it is longer than the
     /// time from frame to frame.
     pub fn took(&mut self, now: Time, took_us: u64) {
@@ -216,7 +224,9 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             (Condition::Misaligned, _) => (UnitState::Degraded, Reason::Misaligned),
             (Condition::Weaker, None) => (UnitState::Degraded, Reason::Weaker),
             (Condition::Healthy | Condition::Weaker, Some(reason)) => (UnitState::Degraded, reason),
-            (Condition::Healthy, None) => (UnitState::Ok, Reason::None),
+            (Condition::Healthy, None) => {
+                self.lacking.map_or((UnitState::Ok, Reason::None), |reason| (UnitState::Degraded, reason))
+            }
         };
     }
 
@@ -342,8 +352,15 @@ mod tests {
         fn fits(_: &Header) -> Result<(), ConfigError> {
             Ok(())
         }
-        fn start(_: BroadcastConfig, _: Header, _: Epoch, _: Time) -> Result<Self, ConfigError> {
-            Ok(Self::default())
+        fn start(
+            place: &mut Option<Self>,
+            _: BroadcastConfig,
+            _: Header,
+            _: Epoch,
+            _: Time,
+        ) -> Result<(), ConfigError> {
+            *place = Some(Self::default());
+            Ok(())
         }
         fn offer(&mut self, _: Time, map: &Squares) {
             self.0.push(*map);

@@ -32,9 +32,14 @@ impl<const A: usize, const W: usize> QuantisedSender<A, W> {
         epoch: Epoch,
         now: Time,
     ) -> Result<Self, ConfigError> {
-        let planes = if quantiser.is_some() { 2 } else { 1 };
         let header = Header { probability: quantiser.as_ref().map(Quantiser::levels), ..header };
-        Ok(Self { broadcast: Broadcaster::new(BroadcastConfig { planes, ..config }, header, epoch, now)?, quantiser })
+        let config = Self::config(config, quantiser.is_some());
+        Ok(Self { broadcast: Broadcaster::new(config, header, epoch, now)?, quantiser })
+    }
+
+    /// With as many planes as there are.
+    fn config(config: BroadcastConfig, has_table: bool) -> BroadcastConfig {
+        BroadcastConfig { planes: if has_table { 2 } else { 1 }, ..config }
     }
 
     /// What is said of the sender.
@@ -49,12 +54,29 @@ impl<const A: usize, const W: usize> QuantisedSender<A, W> {
 }
 
 impl<const R: usize, const A: usize, const W: usize> MapSender<PolarMap<R, A>> for QuantisedSender<A, W> {
+    const TAKES_TABLES: bool = true;
+
     fn fits(header: &Header) -> Result<(), ConfigError> {
         Broadcaster::<A, W, 2>::fits(header)
     }
 
-    fn start(config: BroadcastConfig, header: Header, epoch: Epoch, now: Time) -> Result<Self, ConfigError> {
-        Self::new(config, header, None, epoch, now)
+    fn start(
+        place: &mut Option<Self>,
+        config: BroadcastConfig,
+        header: Header,
+        epoch: Epoch,
+        now: Time,
+    ) -> Result<(), ConfigError> {
+        *place = None;
+        config.check()?;
+        Broadcaster::<A, W, 2>::fits(&header)?;
+        let config = Self::config(config, header.probability.is_some());
+        let broadcast = Broadcaster::blank(config, header, epoch, now);
+        place.insert(Self { broadcast, quantiser: None }).broadcast.begin(header, now)
+    }
+
+    fn set_quantiser(&mut self, quantiser: Quantiser) {
+        self.quantiser = Some(quantiser);
     }
 
     fn offer(&mut self, measured: Time, map: &PolarMap<R, A>) {

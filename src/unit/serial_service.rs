@@ -3,8 +3,9 @@
 use crate::fixed::time::Time;
 use crate::unit::identity::{Identity, VERSION};
 use crate::unit::safe_state::SafeState;
-use crate::unit::service::{Reply, Request};
-use crate::unit::settings::{SettingsSlots, StoredSettings};
+use crate::unit::said::Piece;
+use crate::unit::service::{PART_LEN, Reply, Request, Which};
+use crate::unit::settings::{BlockError, Kind, SettingsSlots, StoredError, StoredSettings};
 use crate::unit::timing::Took;
 use crate::wire::broadcast::Medium;
 use crate::wire::message::{Epoch, Packing};
@@ -38,6 +39,9 @@ pub(crate) struct SerialService {
     stored: StoredSettings,
     safe: SafeState,
     counter: u8,
+    /// A block that comes in parts, and its sequence once it was written.
+    incoming: Piece,
+    written: Option<u32>,
     /// Messages the line did not take.
     refused: u16,
 }
@@ -52,7 +56,8 @@ impl SerialService {
         line: &mut impl SerialLine,
     ) -> Self {
         let safe = SafeState::new(sensor, Medium::Serial, epoch, now);
-        let mut service = Self { sensor, identity, stored, safe, counter: 0, refused: 0 };
+        let mut service =
+            Self { sensor, identity, stored, safe, counter: 0, incoming: Piece::EMPTY, written: None, refused: 0 };
         let place = stored.place();
         service.reply(&Reply::Started(place.ok()), line);
         if let Err(reason) = &place {
@@ -76,30 +81,76 @@ impl SerialService {
         match Request::read(message, self.sensor)? {
             Request::Restart => return Some(Asked::Restart),
             Request::Time(time) => return Some(Asked::Time(time)),
-            Request::Write(block) => match self.stored.write(block, slots) {
-                Ok(sequence) => self.reply(&Reply::Written(sequence), line),
-                Err(reason) => self.reply(&Reply::Refused(&reason), line),
-            },
-            Request::Read => {
-                let stored = self.stored;
-                self.reply(&Reply::Block(stored.block(slots)), line);
+            Request::Write(block) => {
+                self.write(block, slots, line);
             }
-            Request::ReadNewest => {
-                let slot = self.stored.newest_slot(slots);
-                let block = slot.map_or(&[][..], |slot| StoredSettings::in_slot(slots, slot));
+            Request::Part(place, bytes) => self.part(usize::from(place), bytes, slots, line),
+            Request::Read(which) => {
+                let block = self.block(which, slots);
                 self.reply(&Reply::Block(block), line);
             }
+            Request::ReadPart(which, place) => match self.block(which, slots) {
+                [] => {
+                    let absent = self.stored.absence_of(which.kind, slots);
+                    self.reply(&Reply::Refused(&absent), line);
+                }
+                block => {
+                    let rest = block.get(usize::from(place)..).unwrap_or(&[]);
+                    let part = rest.get(..PART_LEN).unwrap_or(rest);
+                    self.reply(&Reply::Part(which, place, part), line);
+                }
+            },
             Request::Identify => {
                 let identity = self.identity;
                 self.reply(&Reply::Identified(&identity, VERSION), line);
             }
             Request::Timing => return Some(Asked::Timing),
-            Request::Clear => {
-                StoredSettings::clear(slots);
+            Request::Clear(kind) => {
+                StoredSettings::clear(kind, slots);
                 self.reply(&Reply::Cleared, line);
             }
         }
         Some(Asked::Nothing)
+    }
+
+    /// A stored block; empty where there is none.
+    fn block<'s>(&self, which: Which, slots: &'s impl SettingsSlots) -> &'s [u8] {
+        let slot = self.stored.slot_of(which.kind, which.newest, slots);
+        slot.map_or(&[][..], |slot| StoredSettings::in_slot(slots, slot))
+    }
+
+    fn write(&mut self, block: &[u8], slots: &mut impl SettingsSlots, line: &mut impl SerialLine) -> Option<u32> {
+        let written = self.stored.write(block, slots);
+        match &written {
+            Ok(sequence) => self.reply(&Reply::Written(*sequence), line),
+            Err(reason) => self.reply(&Reply::Refused(reason), line),
+        }
+        written.ok()
+    }
+
+    /// Takes a part of a block, which is written once it is as long as it says itself.
+    fn part(&mut self, place: usize, bytes: &[u8], slots: &mut impl SettingsSlots, line: &mut impl SerialLine) {
+        if place == 0 {
+            (self.incoming, self.written) = (Piece::EMPTY, None);
+        }
+        if let Some(sequence) = self.written {
+            // the answer may have been lost
+            return self.reply(&Reply::Written(sequence), line);
+        }
+        let came = self.incoming.bytes().len();
+        if place == came && !self.incoming.put(place, bytes) {
+            let head = if place == 0 { bytes } else { self.incoming.bytes() };
+            let kind = Kind::of_block(head).unwrap_or(Kind::Settings);
+            return self.reply(&Reply::Refused(&StoredError { kind, error: BlockError::NoRoom }), line);
+        }
+        let incoming = self.incoming;
+        let length = block_length(incoming.bytes());
+        if length.is_some_and(|length| incoming.bytes().len() >= length) {
+            self.written = self.write(incoming.bytes(), slots, line);
+            return;
+        }
+        #[allow(clippy::cast_possible_truncation)] // a block has a kilobyte at most
+        self.reply(&Reply::Came(incoming.bytes().len() as u16), line);
     }
 
     /// Answers how long frames take.
@@ -132,4 +183,10 @@ impl SerialService {
             self.refused = self.refused.saturating_add(1);
         }
     }
+}
+
+/// Bytes of a block of any kind, as its head says; none before that came.
+fn block_length(head: &[u8]) -> Option<usize> {
+    let [.., low, high] = *head.first_chunk::<8>()?;
+    Some(usize::from(u16::from_le_bytes([low, high])))
 }

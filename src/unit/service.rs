@@ -14,30 +14,33 @@
 //!
 //! | kind | towards the unit | body |
 //! |---|---|---|
-//! | 1 | write a configuration block into the slot not in use | block ([`settings`](crate::unit::settings)) |
-//! | 2 | read a block | none: the one in use; 1: the one that counts from the next restart on |
+//! | 1 | write a block into the slot of its kind that is not in use | block ([`settings`](crate::unit::settings)) |
+//! | 2 | read a block | which one: 2 x its kind, and 1 more for the one that counts from the next restart on instead of the one in use; none: 0; for a part, as it is asked for of all kinds but settings, its place in the block, 2 bytes |
 //! | 3 | restart with the newest block | |
 //! | 4 | the time, where the unit has no clock of its own | microseconds, 8 bytes |
 //! | 5 | say which unit you are | |
-//! | 6 | empty both slots; it counts from the next restart on | `VSCF` |
+//! | 6 | empty both slots of a kind; it counts from the next restart on | `VSCF` settings, `VSHF` heights, `VSLF` lanes, `VSPF` probabilities |
 //! | 7 | say how long frames take | |
+//! | 8 | a part of a block that is longer than a message; with the last one it is written as by kind 1 | its place in the block, 2 bytes; up to 200 bytes |
 //!
 //! | kind | from the unit | body |
 //! |---|---|---|
 //! | 129 | a block was written; it counts from the next restart on | sequence, 4 bytes |
 //! | 130 | the block that was asked for | block |
 //! | 131 | the unit starts | slot, 1 byte; 255 without a block; the block's sequence, 4 bytes |
-//! | 132 | a block was refused, the unit stays in its safe state if it has no other | reason, 1 byte; of a parameter: its value as `f32`, 4 bytes, and its name |
+//! | 132 | a block was refused, the unit stays in its safe state if it has no other | reason and 16 x its kind, 1 byte; of a parameter: its value as `f32`, 4 bytes, and its name; of other reasons what goes with them ([`can_service`](crate::unit::can_service)), 4 bytes |
 //! | 133 | which unit it is, by [`EVERY_SENSOR`] | sensor; 1 for a test bench, which takes scans on this line, else 0; ranges and azimuths of its grid; major, minor and patch number; the chip's number, 4 bytes; the board's name |
 //! | 134 | both slots are empty | |
+//! | 136 | the part that was asked for | which block and the part's place in it, as asked for; up to 200 bytes, none behind its end |
+//! | 137 | a part came | the place in the block from which on parts are missing, 2 bytes |
 //! | 135 | how long frames take, where the unit counts it | counts in a second, frames since the start; of a whole frame and of 8 stages: the last count and the greatest; 4 bytes each |
 
 use crate::fixed::bytes::Reader;
 use crate::fixed::time::Time;
 use crate::sensor::config::ConfigError;
 use crate::unit::identity::{Identified, Identity};
-use crate::unit::said::{Refusal, Said};
-use crate::unit::settings::{BLOCK_LEN, BlockError};
+use crate::unit::said::{Piece, Refusal, Said};
+use crate::unit::settings::{BlockError, Kind, StoredError};
 use crate::unit::timing::{Count, Took};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
@@ -47,28 +50,61 @@ const HEADER: usize = 4;
 /// In place of a sensor's number: the unit at the other end, whichever it is.
 pub const EVERY_SENSOR: u8 = u8::MAX;
 
-/// Marks the emptying of the slots: not every message that passes its check sum by chance does it.
-const CLEAR: [u8; 4] = *b"VSCF";
+/// Bytes of a part.
+pub const PART_LEN: usize = 200;
 
 /// What the integrator asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Request<'a> {
     /// Write this block.
     Write(&'a [u8]),
-    /// Send the block in use.
-    Read,
-    /// Send the block that counts from the next restart on.
-    ReadNewest,
+    /// A part of a block to be written, and its place in it.
+    Part(u16, &'a [u8]),
+    /// Send a block whole.
+    Read(Which),
+    /// Send the part of a block that begins at this place in it.
+    ReadPart(Which, u16),
     /// Start over.
     Restart,
     /// It is this time.
     Time(Time),
     /// Say which unit you are.
     Identify,
-    /// Empty both slots.
-    Clear,
+    /// Empty both slots of a kind.
+    Clear(Kind),
     /// Say how long frames take.
     Timing,
+}
+
+/// Which block is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Which {
+    /// What it is of.
+    pub kind: Kind,
+    /// The one that counts from the next restart on, instead of the one in use.
+    pub newest: bool,
+}
+
+impl Which {
+    /// The one in use.
+    pub const fn in_use(kind: Kind) -> Self {
+        Self { kind, newest: false }
+    }
+
+    /// The one that counts from the next restart on.
+    pub const fn newest(kind: Kind) -> Self {
+        Self { kind, newest: true }
+    }
+
+    /// On the wire.
+    pub const fn number(self) -> u8 {
+        2 * self.kind.number() + self.newest as u8
+    }
+
+    /// Of a number on the wire.
+    pub fn from_number(number: u8) -> Option<Self> {
+        Kind::from_number(number / 2).map(|kind| Self { kind, newest: number % 2 != 0 })
+    }
 }
 
 /// What the unit answers.
@@ -78,10 +114,14 @@ pub enum Reply<'a> {
     Written(u32),
     /// The block that was asked for.
     Block(&'a [u8]),
+    /// The part of a block that was asked for, and its place.
+    Part(Which, u16, &'a [u8]),
+    /// A part came; from this place on they are missing.
+    Came(u16),
     /// The unit starts with the block of a slot and its sequence.
     Started(Option<(u8, u32)>),
     /// A block was refused.
-    Refused(&'a BlockError),
+    Refused(&'a StoredError),
     /// Which unit it is, and the version of its firmware.
     Identified(&'a Identity, [u8; 3]),
     /// Both slots are empty.
@@ -140,10 +180,21 @@ impl<'a> Request<'a> {
                 message.put(block);
                 message
             }
-            Self::Read => ServiceMessage::new(2),
-            Self::ReadNewest => {
+            Self::Part(place, bytes) => {
+                let mut message = ServiceMessage::new(8);
+                message.put(&place.to_le_bytes());
+                message.put(bytes);
+                message
+            }
+            Self::Read(which) => {
                 let mut message = ServiceMessage::new(2);
-                message.put(&[1]);
+                message.put(&[which.number()]);
+                message
+            }
+            Self::ReadPart(which, place) => {
+                let mut message = ServiceMessage::new(2);
+                message.put(&[which.number()]);
+                message.put(&place.to_le_bytes());
                 message
             }
             Self::Restart => ServiceMessage::new(3),
@@ -153,9 +204,9 @@ impl<'a> Request<'a> {
                 message
             }
             Self::Identify => return ServiceMessage::new(5).protect(EVERY_SENSOR, counter),
-            Self::Clear => {
+            Self::Clear(kind) => {
                 let mut message = ServiceMessage::new(6);
-                message.put(&CLEAR);
+                message.put(&kind.clear_mark());
                 message
             }
             Self::Timing => ServiceMessage::new(7),
@@ -170,12 +221,20 @@ impl<'a> Request<'a> {
         Profile::P05.check(message, data_id(asked)).ok()?;
         match kind {
             1 => Some(Self::Write(body)),
-            2 => Some(if body.first().is_some_and(|which| *which != 0) { Self::ReadNewest } else { Self::Read }),
+            2 => {
+                let (number, rest) = body.split_first().unwrap_or((&0, &[]));
+                let which = Which::from_number(*number)?;
+                Some(match rest.first_chunk() {
+                    None => Self::Read(which),
+                    Some(place) => Self::ReadPart(which, u16::from_le_bytes(*place)),
+                })
+            }
             3 => Some(Self::Restart),
             4 => Reader(body).u64().map(|t| Self::Time(Time::from_micros(t))),
             5 => Some(Self::Identify),
-            6 => (body == CLEAR).then_some(Self::Clear),
+            6 => Kind::of_clear_mark(body).map(Self::Clear),
             7 => Some(Self::Timing),
+            8 => body.split_first_chunk().map(|(place, bytes)| Self::Part(u16::from_le_bytes(*place), bytes)),
             _ => None,
         }
     }
@@ -192,7 +251,19 @@ impl Reply<'_> {
             }
             Self::Block(block) => {
                 let mut message = ServiceMessage::new(130);
-                message.put(block.get(..BLOCK_LEN).unwrap_or(block));
+                message.put(block);
+                message
+            }
+            Self::Part(which, place, bytes) => {
+                let mut message = ServiceMessage::new(136);
+                message.put(&[which.number()]);
+                message.put(&place.to_le_bytes());
+                message.put(bytes);
+                message
+            }
+            Self::Came(place) => {
+                let mut message = ServiceMessage::new(137);
+                message.put(&place.to_le_bytes());
                 message
             }
             Self::Started(place) => {
@@ -205,9 +276,11 @@ impl Reply<'_> {
             Self::Refused(reason) => {
                 let mut message = ServiceMessage::new(132);
                 message.put(&[reason.code()]);
-                if let BlockError::Parameter(ConfigError { parameter, value, .. }) = reason {
+                if let BlockError::Parameter(ConfigError { parameter, value, .. }) = &reason.error {
                     message.put(&value.to_le_bytes());
                     message.put(parameter.as_bytes());
+                } else {
+                    message.put(&reason.detail());
                 }
                 message
             }
@@ -242,11 +315,7 @@ impl Said {
         let mut r = Reader(body);
         match kind {
             129 => r.u32().map(Self::Written),
-            130 => {
-                let mut block = [0xFF; BLOCK_LEN];
-                block.iter_mut().zip(body).for_each(|(to, from)| *to = *from);
-                Some(Self::Block(block))
-            }
+            130 => Some(Self::Block(Piece::new(body))),
             131 => {
                 let [slot] = r.take()?;
                 let sequence = r.u32()?;
@@ -254,15 +323,22 @@ impl Said {
             }
             132 => {
                 let [reason] = r.take()?;
-                let value = r.f32().filter(|_| reason == Refusal::PARAMETER);
-                let mut refusal = Refusal::new(reason, value.map_or([0; 4], f32::to_be_bytes));
-                if value.is_some() {
+                // a number of a parameter is little-endian as all of this line's
+                let [a, b, c, d] = r.take().unwrap_or_default();
+                let is_of_parameter = reason & 0xF == Refusal::PARAMETER;
+                let mut refusal = Refusal::new(reason, if is_of_parameter { [d, c, b, a] } else { [a, b, c, d] });
+                if is_of_parameter {
                     refusal.name.iter_mut().zip(r.0).for_each(|(to, from)| *to = *from);
                 }
                 Some(Self::Refused(refusal))
             }
             133 => Identified::read(body).map(Self::Identified),
             134 => Some(Self::Cleared),
+            136 => {
+                let ([number], place) = (r.take()?, r.u16()?);
+                Some(Self::Part(Which::from_number(number)?, place, Piece::new(r.0)))
+            }
+            137 => r.u16().map(Self::Came),
             135 => {
                 let count = |r: &mut Reader<'_>| Some(Count { last: r.u32()?, worst: r.u32()? });
                 let mut took = Took { hz: r.u32()?, frames: r.u32()?, frame: count(&mut r)?, ..Took::default() };
@@ -285,11 +361,15 @@ mod tests {
     fn requests_read_back_and_belong_to_one_sensor() {
         for request in [
             Request::Write(&[1, 2, 3]),
-            Request::Read,
+            Request::Read(Which::in_use(Kind::Settings)),
+            Request::Read(Which::newest(Kind::Settings)),
+            Request::ReadPart(Which::in_use(Kind::Lanes), 200),
+            Request::ReadPart(Which::newest(Kind::Probabilities), 0),
+            Request::Part(600, &[4; PART_LEN]),
             Request::Restart,
             Request::Time(Time::from_micros(0x0102_0304_0506_0708)),
-            Request::ReadNewest,
-            Request::Clear,
+            Request::Clear(Kind::Settings),
+            Request::Clear(Kind::Heights),
             Request::Timing,
             Request::Identify,
         ] {
@@ -312,26 +392,51 @@ mod tests {
             value: 50.0,
             problem: Problem::OutOfLimits { min: 0.1, max: 20.0 },
         });
-        let message = Reply::Refused(&reason).message(0, 0);
+        let message = Reply::Refused(&StoredError::of_settings(reason)).message(0, 0);
         assert_eq!(message.bytes()[3..5], [132, 5]);
         assert_eq!(message.bytes()[5..9], 50.0_f32.to_le_bytes());
         assert_eq!(&message.bytes()[9..], b"mount.height_m");
         let Some(Said::Refused(refusal)) = Said::read(message.bytes(), 0) else { panic!() };
         assert_eq!((refusal.reason, refusal.value(), refusal.parameter()), (5, 50.0, "mount.height_m"));
-        let empty = Reply::Refused(&BlockError::Empty).message(0, 0);
+        let empty = Reply::Refused(&StoredError::of_settings(BlockError::Empty)).message(0, 0);
         assert_eq!(Said::read(empty.bytes(), 0), Some(Said::Refused(Refusal::new(1, [0; 4]))));
+    }
+
+    #[test]
+    fn a_refusal_says_what_the_block_is_of_and_what_goes_with_its_reason() {
+        let refused = |kind, error| {
+            let message = Reply::Refused(&StoredError { kind, error }).message(0, 0);
+            let Some(Said::Refused(refusal)) = Said::read(message.bytes(), 0) else { panic!() };
+            (message.bytes()[4], refusal.of_kind(), refusal.detail)
+        };
+        assert_eq!(refused(Kind::Settings, BlockError::Layout(0x0102)), (3, (Some(Kind::Settings), 3), [1, 2, 0, 0]));
+        assert_eq!(refused(Kind::Lanes, BlockError::CheckSum), (0x24, (Some(Kind::Lanes), 4), [0; 4]));
+        #[cfg(feature = "probability")]
+        {
+            use crate::probability::TableError;
+            let of_table = |error| refused(Kind::Probabilities, error);
+            let falls = TableError::NotMonotone { azimuth: 3, range: 5 };
+            assert_eq!(of_table(BlockError::Table(falls)), (0x39, (Some(Kind::Probabilities), 9), [3, 5, 0, 0]));
+            let other = TableError::Configuration { table: 1, unit: 0x0102_0304 };
+            assert_eq!(of_table(BlockError::Table(other)).2, [1, 2, 3, 4]);
+            assert_eq!(of_table(BlockError::Grid([200, 120])).2, [200, 120, 0, 0]);
+        }
     }
 
     #[test]
     fn replies_read_back_and_belong_to_one_sensor() {
         let identity = Identity { board: "a-board", chip: 7, is_bench: true, grid: [100, 64] };
-        let mut block = [0xFF; BLOCK_LEN];
-        block[..3].copy_from_slice(&[1, 2, 3]);
+        let part = Piece::new(&[7; PART_LEN]);
         let stages = core::array::from_fn(|k| Count { last: k as u32, worst: 70_000 + k as u32 });
         let took = Took { hz: 480_000_000, frames: 9, frame: Count { last: 1, worst: 2 }, stages };
         for (reply, said) in [
             (Reply::Written(70_000), Said::Written(70_000)),
-            (Reply::Block(&[1, 2, 3]), Said::Block(block)),
+            (Reply::Block(&[1, 2, 3]), Said::Block(Piece::new(&[1, 2, 3]))),
+            (
+                Reply::Part(Which::newest(Kind::Lanes), 400, &[7; PART_LEN]),
+                Said::Part(Which::newest(Kind::Lanes), 400, part),
+            ),
+            (Reply::Came(400), Said::Came(400)),
             (Reply::Started(Some((1, 9))), Said::Started(Some((1, 9)))),
             (Reply::Started(None), Said::Started(None)),
             (Reply::Cleared, Said::Cleared),

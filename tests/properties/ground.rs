@@ -13,6 +13,7 @@ use viewshed::obstacles::solid::Solid;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::sensor::ground::Ground;
 use viewshed::sensor::mount::Mount;
+use viewshed::sensor::place::Points;
 
 use crate::cases;
 use crate::setup::{Setup, setups};
@@ -64,7 +65,7 @@ proptest! {
         setup.sensor.field_of_view.elevation_min_deg = -40.0;
         setup.sensor.field_of_view.elevation_max_deg = 20.0;
         let levelling = mount.levelling().unwrap();
-        let ground = Ground::new(&levelling, &points).unwrap();
+        let ground = Ground::new(&levelling, Points::Metres(&points)).unwrap();
         let Ok(axes) = Axes::<R, A, E>::on(ground, &levelling, &setup.sensor.field_of_view, 1.0) else { return Ok(()) };
         let mut grid = SphericalGrid::<R, A, E, 3>::new();
         let mut map = PolarMap::unknown(axes.polar(&levelling), 128, 128);

@@ -9,7 +9,7 @@ impl SettingsSlots for Block {
         if slot == 0 { &self.0 } else { &[] }
     }
 
-    fn write(&mut self, _: usize, block: &[u8; BLOCK_LEN]) {
-        self.0 = *block;
+    fn write(&mut self, _: usize, block: &[u8]) {
+        self.0[..block.len()].copy_from_slice(block);
     }
 }

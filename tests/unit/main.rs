@@ -14,6 +14,7 @@ mod common;
 mod block;
 mod camera;
 mod can_service;
+mod kept;
 mod pil;
 mod roadside;
 mod session;

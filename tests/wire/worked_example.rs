@@ -146,7 +146,7 @@ fn probabilities_are_a_group_of_the_header_and_a_second_plane() {
     for us in (start.micros()..end).step_by(1000) {
         let now = Time::from_micros(us);
         // every third is a refresh, and every second has probabilities of azimuths 0 and 1
-        if us >= end - 40_000 - 720_000 && (end - 40_000 - us).is_multiple_of(60_000) {
+        if (end - 40_000 - 720_000..=end - 40_000).contains(&us) && (end - 40_000 - us).is_multiple_of(60_000) {
             let _ = sender.scan(now, &probable);
         }
         let Some(packet) = sender.next_packet(now) else { continue };

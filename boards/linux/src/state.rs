@@ -96,9 +96,10 @@ impl SettingsSlots for FileSlots {
         self.slots.get(slot).map_or(&[], |block| block)
     }
 
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+    fn write(&mut self, slot: usize, block: &[u8]) {
         let Some(place) = self.slots.get_mut(slot) else { return };
-        let before = std::mem::replace(place, *block);
+        let before = *place;
+        place.iter_mut().zip(block).for_each(|(to, from)| *to = *from);
         if let Err(e) = self.keep(slot) {
             error!("{}: {e}: a configuration block is lost", self.path.as_deref().unwrap_or(Path::new("")).display());
             // reading it back is to show that it was not written

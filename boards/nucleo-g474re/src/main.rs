@@ -20,6 +20,7 @@
 #![no_std]
 #![no_main]
 
+use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -33,7 +34,6 @@ use stm32::can::open;
 use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
 use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
-use cortex_m::peripheral::DWT;
 use viewshed::small::supervised::{CHECK, Radar};
 use viewshed::{Ars408Config, Epoch};
 
@@ -41,11 +41,11 @@ const CAN_CLOCK_HZ: u32 = 24_000_000;
 /// Frames of the radar between interrupt and loop: 30 ms of a full bus.
 const FRAMES: usize = 128;
 /// The slots of the settings, from the beginning of the flash.
-const SETTINGS: [u32; 2] = [0x7_F000, 0x7_F800];
+const SLOTS: [u32; 4] = [0x7_F000, 0x7_F800, 0x7_E000, 0x7_E800];
 /// Several frames.
 const WATCHDOG_US: u32 = 1_000_000;
 
-stm32::memory!(small, FRAMES);
+stm32::memory!(small, Sender, FRAMES);
 
 bind_interrupts!(struct Irqs {
     FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
@@ -104,7 +104,7 @@ async fn main(_spawner: Spawner) {
     let flags = reset_flags(last.crashed);
     defmt::info!("reset: {}", flags);
 
-    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS, |slot| last.readable(slot));
+    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SLOTS, |slot| last.readable(slot));
     crash::read_done();
     let stored = StoredSettings::read(&slots, CHECK.on_can(CAN_CLOCK_HZ));
     let [radar_timing, broadcast_timing] = stored.buses().map(|bus| bus.timing(CAN_CLOCK_HZ));

@@ -10,7 +10,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::peripheral::{CPUID, MPU, SCB};
 
-use crate::{FLASH_BASE, SETTINGS, SETTINGS_BYTES};
+use crate::{FLASH_BASE, SLOTS_BYTES, SLOTS_FROM};
 
 /// Not executed, read and written, normal memory that is not cached.
 const NOT_CACHED: u32 = 1 << 28 | 0b011 << 24 | 0b001 << 19;
@@ -26,7 +26,7 @@ unsafe extern "C" {
 /// Before the first DMA transfer.
 pub fn enable(mpu: &mut MPU, scb: &mut SCB, cpuid: &mut CPUID) {
     let dma = ((&raw const _dma_start).addr(), (&raw const _dma_bytes).addr());
-    let settings = ((FLASH_BASE + SETTINGS[0]) as usize, SETTINGS_BYTES as usize);
+    let settings = ((FLASH_BASE + SLOTS_FROM) as usize, SLOTS_BYTES as usize);
     for (number, (start, bytes)) in (0..).zip([dma, settings]) {
         // a power of two, at a multiple of itself
         let size = bytes.trailing_zeros() - 1;

@@ -11,7 +11,7 @@
 //! | serial line | USART3, transmit PD8, receive PD9, 115 200 baud | `nucleo_h743zi.dts`, `usart3` |
 //! | status output | LD1, PB0, high is on | the same, `green_led` |
 //! | watchdog | IWDG1 | the same, `iwdg1` |
-//! | settings | last two sectors, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
+//! | settings, heights, lanes, table of probabilities | the eight sectors of bank 2, 128 kB each, written by 32 bytes | Zephyr, `dts/arm/st/h7/stm32h743.dtsi`, `flash0` |
 //!
 //! Zephyr as of commit 0225b4db0265, `hal_stm32` as of 257c26c17af3. Not verified against ST's manuals of the
 //! board (UM1974 for MB1137, UM2407 for MB1364): solder bridges, and whether D1 and D11 are free of other uses
@@ -22,6 +22,7 @@
 mod caches;
 mod tightly_coupled;
 
+use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use embassy_executor::Spawner;
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -36,23 +37,25 @@ use embassy_stm32::{bind_interrupts, can, dma, flash, pac, rng};
 use stm32::can::open;
 use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
-use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
-use cortex_m::peripheral::DWT;
-use viewshed::reference::supervised::{CHECK, Radar};
+use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, SettingsCheck, StoredSettings, UnitConfig};
+use viewshed::reference::QuantisedSender;
+use viewshed::reference::supervised::{Radar, State};
 use viewshed::{Ars408Config, Epoch};
 
 const CAN_CLOCK_HZ: u32 = 80_000_000;
 /// Frames of the radar between interrupt and loop: 60 ms of a full bus.
 const FRAMES: usize = 256;
 const FLASH_BASE: u32 = 0x0800_0000;
-/// The slots of the settings, from the beginning of the flash.
-const SETTINGS: [u32; 2] = [0x1C_0000, 0x1E_0000];
-const SETTINGS_BYTES: u32 = 0x4_0000;
-/// More than a sector takes to be erased, in which the loop stands still: taken as 4 s at worst, which is not
+/// The slots of settings, heights, lanes and tables, from the beginning of the flash.
+const SLOTS: [u32; 8] = [0x1C_0000, 0x1E_0000, 0x10_0000, 0x12_0000, 0x14_0000, 0x16_0000, 0x18_0000, 0x1A_0000];
+/// All of them, from there.
+const SLOTS_FROM: u32 = 0x10_0000;
+const SLOTS_BYTES: u32 = 0x10_0000;
+/// More than two sectors take to be erased, in which the loop stands still: taken as 4 s each at worst, which is not
 /// verified against the data sheet.
-const WATCHDOG_US: u32 = 5_000_000;
+const WATCHDOG_US: u32 = 10_000_000;
 
-stm32::memory!(reference, FRAMES);
+stm32::memory!(reference, QuantisedSender, FRAMES);
 
 bind_interrupts!(struct Irqs {
     FDCAN1_IT0 => can::IT0InterruptHandler<FDCAN1>;
@@ -117,9 +120,9 @@ async fn main(_spawner: Spawner) {
     let flags = reset_flags(last.crashed);
     defmt::info!("reset: {}", flags);
 
-    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SETTINGS, |slot| last.readable(slot));
+    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SLOTS, |slot| last.readable(slot));
     crash::read_done();
-    let stored = StoredSettings::read(&slots, CHECK.on_can(CAN_CLOCK_HZ));
+    let stored = StoredSettings::read(&slots, SettingsCheck::of::<State, QuantisedSender>().on_can(CAN_CLOCK_HZ));
     let [radar_timing, broadcast_timing] = stored.buses().map(|bus| bus.timing(CAN_CLOCK_HZ));
     let can = can::CanConfigurator::new(p.FDCAN1, p.PD0, p.PD1, Irqs);
     let (radar_receiver, radar) = open(can, pac::FDCAN1, radar_timing, &RADAR_QUEUE);

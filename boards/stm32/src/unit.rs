@@ -63,7 +63,7 @@ pub struct Wiring<P, O, W: Instance + 'static, const N: usize> {
 /// statics nor tasks can be generic.
 #[macro_export]
 macro_rules! memory {
-    ($size:ident, $frames:expr) => {
+    ($size:ident, $sender:ident, $frames:expr) => {
         static RADAR_QUEUE: $crate::can::Queue<{ $frames }> = $crate::can::queue();
 
         #[embassy_executor::task]
@@ -74,10 +74,11 @@ macro_rules! memory {
         fn memory() -> viewshed::board::RoadsideMemory<
             'static,
             viewshed::$size::supervised::State,
-            viewshed::$size::supervised::Sender,
+            viewshed::$size::$sender,
         > {
             use static_cell::{ConstStaticCell, StaticCell};
-            use viewshed::$size::supervised::{Map, Parameters, Sender, State};
+            use viewshed::$size::$sender as Sender;
+            use viewshed::$size::supervised::{Map, Parameters, State};
             static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new(viewshed::$size::State::new()));
             static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
             static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(None);

@@ -1,19 +1,19 @@
-//! The integrator's messages on CAN: a configuration block in parts, read back, and a restart.
+//! The integrator's messages on CAN: blocks in parts, read back, and a restart.
 //!
 //! # Model
 //! Two messages of a sensor, packed and protected as all of its messages are
 //! ([`message`](crate::wire::message)): [`REQUEST`] towards the unit, [`ANSWER`] from it. Both have six own
-//! bytes, on classic CAN and on CAN FD: a kind, a number, and four more. The block is the one of
-//! [`settings`](crate::unit::settings); it travels in parts of four bytes.
+//! bytes, on classic CAN and on CAN FD: a kind, a number, and four more. Blocks are those of
+//! [`settings`](crate::unit::settings); they travel in parts of four bytes.
 //!
 //! | kind | towards the unit | number | four bytes |
 //! |---|---|---|---|
 //! | 1 | a block begins | 0 | its length (2, big-endian), 0, 0 |
 //! | 2 | a part of it | n | its bytes 4 n to 4 n + 3 |
-//! | 3 | it is complete: check it, write it into the slot not in use | 0 | its last four bytes |
-//! | 4 | read a block | 0: the one in use; 1: the one that counts from the next restart on | 0 |
+//! | 3 | it is complete: check it, write it into the slot of its kind that is not in use | 0 | its last four bytes |
+//! | 4 | read a block | 2 x its kind: the one in use; 1 more: the one that counts from the next restart on | 0 |
 //! | 5 | restart with the newest block | 0 | `VSCB` |
-//! | 6 | empty both slots; it counts from the next restart on | 0 | `VSCF` |
+//! | 6 | empty both slots of a kind; it counts from the next restart on | 0 | `VSCF` settings, `VSHF` heights, `VSLF` lanes, `VSPF` probabilities |
 //! | 7 | say which unit you are | 0 | 0 |
 //! | 8 | from now on this chip's unit alone takes requests; 0: every unit | 0 | the chip's number, big-endian |
 //!
@@ -22,13 +22,15 @@
 //! | 129 | a block was written; it counts from the next restart on | 0 | its sequence, big-endian |
 //! | 130 | a part of the block that was asked for | n | its bytes 4 n to 4 n + 3 |
 //! | 131 | the unit starts | slot; 255 without a block | the block's sequence, big-endian |
-//! | 132 | a block was refused | reason | see below |
+//! | 132 | a block was refused | reason + 16 x its kind | see below |
 //! | 133 | letters of the refused parameter's name | n | letters 4 n to 4 n + 3; zeros after the last |
 //! | 134 | which unit it is; after 7, and after 8 by the chip that was named | 1 for a test bench, else 0 | the chip's number, big-endian |
 //! | 135 | both slots are empty | 0 | 0 |
 //!
-//! Reasons are those of [`BlockError::code`](crate::unit::settings::BlockError::code), with the layout that was
-//! found (2 bytes, big-endian) or the parameter's value (`f32`, big-endian), and
+//! Kinds are 0 settings, 1 heights, 2 lanes, 3 probabilities. Reasons are those of
+//! [`BlockError::code`](crate::unit::settings::BlockError::code), with the layout that was
+//! found (2 bytes, big-endian), the parameter's value (`f32`, big-endian), a table's bin of azimuth and of range or its
+//! grid of ranges and azimuths (1 byte each) or the unit's fingerprint (4 bytes, big-endian), and
 //! [`INCOMPLETE`], with the first missing part in the first byte.
 //!
 //! *Why no damaged block is taken.* Every message is protected, parts are placed by their number, whatever
@@ -50,7 +52,9 @@ mod unit;
 pub use tool::{Answers, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
-use crate::unit::settings::BLOCK_LEN;
+use crate::fixed::bits::Bits;
+use crate::unit::service::Which;
+use crate::unit::settings::{Kind, MOST_BLOCK_LEN};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet, Received};
@@ -65,16 +69,16 @@ pub const ANSWER: Message = Message::Other(25);
 pub const INCOMPLETE: u8 = 6;
 
 /// Parts of the longest block.
-pub const PARTS: usize = BLOCK_LEN / 4;
+const PARTS: usize = MOST_BLOCK_LEN / 4;
 
 /// Marks a restart: not every message that passes its check sum by chance begins one.
 const RESTART: [u8; 4] = *b"VSCB";
 
-/// Marks the emptying of the slots, likewise.
-const CLEAR: [u8; 4] = *b"VSCF";
+/// Parts have numbers of a byte, and what is longer is cut to whole parts.
+const _: () = assert!(MOST_BLOCK_LEN.is_multiple_of(4) && PARTS < 256);
 
-/// What arrived is a bit each.
-const _: () = assert!(BLOCK_LEN.is_multiple_of(4) && PARTS <= 64);
+/// Which parts came, a bit each.
+type Came = Bits<{ PARTS.div_ceil(32) }>;
 
 /// Own bytes of both messages.
 type Own = [u8; 6];
@@ -84,9 +88,9 @@ enum BlockRequest {
     Begin { length: u16 },
     Part { number: u8, bytes: [u8; 4] },
     Complete { last: [u8; 4] },
-    Read { newest: bool },
+    Read(Which),
     Restart,
-    Clear,
+    Clear(Kind),
     Identify,
     Address { chip: u32 },
 }
@@ -100,9 +104,9 @@ impl BlockRequest {
             }
             Self::Part { number, bytes } => own(2, number, bytes),
             Self::Complete { last } => own(3, 0, last),
-            Self::Read { newest } => own(4, u8::from(newest), [0; 4]),
+            Self::Read(which) => own(4, which.number(), [0; 4]),
             Self::Restart => own(5, 0, RESTART),
-            Self::Clear => own(6, 0, CLEAR),
+            Self::Clear(kind) => own(6, 0, kind.clear_mark()),
             Self::Identify => own(7, 0, [0; 4]),
             Self::Address { chip } => own(8, 0, chip.to_be_bytes()),
         }
@@ -116,9 +120,9 @@ impl BlockRequest {
             1 => Some(Self::Begin { length: u16::from_be_bytes([a, b]) }),
             2 => Some(Self::Part { number, bytes }),
             3 => Some(Self::Complete { last: bytes }),
-            4 => Some(Self::Read { newest: number != 0 }),
+            4 => Which::from_number(number).map(Self::Read),
             5 => (bytes == RESTART).then_some(Self::Restart),
-            6 => (bytes == CLEAR).then_some(Self::Clear),
+            6 => Kind::of_clear_mark(&bytes).map(Self::Clear),
             7 => Some(Self::Identify),
             8 => Some(Self::Address { chip: u32::from_be_bytes(bytes) }),
             _ => None,
@@ -198,10 +202,12 @@ mod tests {
             BlockRequest::Begin { length: 0x0102 },
             BlockRequest::Part { number: 36, bytes: [1, 2, 3, 4] },
             BlockRequest::Complete { last: [5, 6, 7, 8] },
-            BlockRequest::Read { newest: false },
-            BlockRequest::Read { newest: true },
+            BlockRequest::Read(Which::in_use(Kind::Settings)),
+            BlockRequest::Read(Which::newest(Kind::Settings)),
+            BlockRequest::Read(Which::newest(Kind::Probabilities)),
             BlockRequest::Restart,
-            BlockRequest::Clear,
+            BlockRequest::Clear(Kind::Settings),
+            BlockRequest::Clear(Kind::Lanes),
             BlockRequest::Identify,
             BlockRequest::Address { chip: 0x0102_0304 },
         ] {
@@ -220,6 +226,7 @@ mod tests {
         }
         assert_eq!(BlockRequest::read(&own(5, 0, *b"VSCA")), None, "a restart by chance");
         assert_eq!(BlockRequest::read(&own(6, 0, *b"VSCB")), None, "emptied by chance");
+        assert_eq!(BlockRequest::read(&own(4, 8, [0; 4])), None, "no such kind");
         assert_eq!(BlockRequest::read(&own(9, 0, [0; 4])), None);
         assert_eq!(BlockRequest::read(&[1, 0, 0, 148, 0]), None);
     }

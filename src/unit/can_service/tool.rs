@@ -1,9 +1,10 @@
 //! The integrator's end: what to send, and what the answers say.
 
-use super::{ANSWER, BlockAnswer, BlockRequest, REQUEST, frame, received};
+use super::{ANSWER, BlockAnswer, BlockRequest, Came, REQUEST, frame, received};
 use crate::unit::identity::Identified;
-use crate::unit::said::{Refusal, Said};
-use crate::unit::settings::BLOCK_LEN;
+use crate::unit::said::{Piece, Refusal, Said};
+use crate::unit::service::Which;
+use crate::unit::settings::Kind;
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -22,7 +23,7 @@ impl Tool {
         Self { sensor, medium, counter: 0 }
     }
 
-    /// A whole block, to be written into the slot not in use. Of one that is not of this library's layout
+    /// A whole block, to be written into the slot of its kind that is not in use. Of one that is not of this library's layout
     /// the first 1020 bytes at most.
     pub fn write(&mut self, block: &[u8]) -> impl Iterator<Item = CanFrame> {
         let length = u16::try_from(block.len()).unwrap_or(u16::MAX);
@@ -45,14 +46,9 @@ impl Tool {
         again.into_iter().chain([BlockRequest::Complete { last }]).filter_map(|request| self.frame(request))
     }
 
-    /// Asks for the block in use.
-    pub fn read(&mut self) -> Option<CanFrame> {
-        self.frame(BlockRequest::Read { newest: false })
-    }
-
-    /// Asks for the block that counts from the next restart on.
-    pub fn read_newest(&mut self) -> Option<CanFrame> {
-        self.frame(BlockRequest::Read { newest: true })
+    /// Asks for a block.
+    pub fn read(&mut self, which: Which) -> Option<CanFrame> {
+        self.frame(BlockRequest::Read(which))
     }
 
     /// Asks for a restart with the newest block.
@@ -60,9 +56,9 @@ impl Tool {
         self.frame(BlockRequest::Restart)
     }
 
-    /// Asks for both slots to be emptied.
-    pub fn clear(&mut self) -> Option<CanFrame> {
-        self.frame(BlockRequest::Clear)
+    /// Asks for both slots of a kind to be emptied.
+    pub fn clear(&mut self, kind: Kind) -> Option<CanFrame> {
+        self.frame(BlockRequest::Clear(kind))
     }
 
     /// Asks every unit of the sensor's number which one it is; all have answered 0.3 s later.
@@ -86,16 +82,16 @@ impl Tool {
 pub struct Answers {
     sensor: u8,
     medium: Medium,
-    block: [u8; BLOCK_LEN],
-    /// A bit a part.
-    came: u64,
+    block: Piece,
+    /// Parts that came.
+    came: Came,
     refusal: Option<Refusal>,
 }
 
 impl Answers {
     /// Of the unit of a sensor.
     pub const fn new(sensor: u8, medium: Medium) -> Self {
-        Self { sensor, medium, block: [0; BLOCK_LEN], came: 0, refusal: None }
+        Self { sensor, medium, block: Piece::EMPTY, came: Came::NONE, refusal: None }
     }
 
     /// Takes a frame; what the unit said, once it is complete.
@@ -104,7 +100,7 @@ impl Answers {
         match BlockAnswer::read(own)? {
             BlockAnswer::Written { sequence } => Some(Said::Written(sequence)),
             BlockAnswer::Started { slot, sequence } => {
-                self.came = 0;
+                self.came = Came::NONE;
                 Some(Said::Started((slot != u8::MAX).then_some((slot, sequence))))
             }
             BlockAnswer::Identified { is_bench, chip } => {
@@ -113,7 +109,7 @@ impl Answers {
             BlockAnswer::Cleared => Some(Said::Cleared),
             BlockAnswer::Refused { reason, detail } => {
                 let refusal = Refusal::new(reason, detail);
-                self.refusal = (reason == Refusal::PARAMETER).then_some(refusal);
+                self.refusal = (reason & 0xF == Refusal::PARAMETER).then_some(refusal);
                 self.refusal.is_none().then_some(Said::Refused(refusal))
             }
             BlockAnswer::Name { number, letters } => {
@@ -129,19 +125,20 @@ impl Answers {
     }
 
     fn part(&mut self, number: u8, bytes: [u8; 4]) -> Option<Said> {
-        let at = 4 * usize::from(number);
         if number == 0 {
             // a block is read from its beginning on
-            (self.came, self.block) = (0, [0xFF; BLOCK_LEN]);
+            (self.came, self.block) = (Came::NONE, Piece::EMPTY);
         }
-        self.block.get_mut(at..at + 4)?.copy_from_slice(&bytes);
-        self.came |= 1 << number;
+        if !self.block.put(4 * usize::from(number), &bytes) {
+            return None;
+        }
+        self.came.set(usize::from(number));
         // the second part says how long the block is
-        let [.., low, high] = *self.block.first_chunk::<8>()?;
+        let [.., low, high] = *self.block.bytes().first_chunk::<8>()?;
         let parts = usize::from(u16::from_le_bytes([low, high])).div_ceil(4);
-        let has_length = self.came & 0b10 != 0;
-        if has_length && self.came.count_ones() as usize == parts {
-            self.came = 0;
+        let has_length = self.came.get(1);
+        if has_length && (0..parts).all(|part| self.came.get(part)) {
+            self.came = Came::NONE;
             return Some(Said::Block(self.block));
         }
         None

@@ -1,11 +1,12 @@
 //! The unit's end: takes a block, keeps it, answers what it runs with, and what it sends without one.
 
-use super::{ANSWER, BlockAnswer, BlockRequest, INCOMPLETE, REQUEST, frame, received};
+use super::{ANSWER, BlockAnswer, BlockRequest, Came, INCOMPLETE, REQUEST, frame, received};
 use crate::fixed::time::Time;
 use crate::unit::Flow;
 use crate::unit::identity::Identity;
 use crate::unit::safe_state::SafeState;
-use crate::unit::settings::{BLOCK_LEN, BlockError, Settings, SettingsSlots, StoredSettings};
+use crate::unit::said::Piece;
+use crate::unit::settings::{BlockError, Kind, MOST_BLOCK_LEN, Settings, SettingsSlots, StoredError, StoredSettings};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -48,8 +49,8 @@ impl CanServiceConfig {
 /// # use viewshed::{Addresses, Epoch, FieldOfView, Medium, Mount, NoiseConfig, Sensor, Settings, Time, small};
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);
 /// # impl SettingsSlots for InRam {
-/// #     fn slot(&self, slot: usize) -> &[u8] { &self.0[slot] }
-/// #     fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) { self.0[slot] = *block }
+/// #     fn slot(&self, slot: usize) -> &[u8] { self.0.get(slot).map_or(&[], |slot| slot) }
+/// #     fn write(&mut self, slot: usize, block: &[u8]) { self.0[slot][..block.len()].copy_from_slice(block) }
 /// # }
 /// # let settings = Settings::of(Sensor {
 /// #     mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 },
@@ -129,7 +130,7 @@ impl CanService {
     }
 
     /// Why there is no block to work with.
-    pub fn refusal(&self) -> Option<BlockError> {
+    pub fn refusal(&self) -> Option<StoredError> {
         self.stored.place().err()
     }
 
@@ -160,19 +161,18 @@ impl CanService {
                 Ok(sequence) => self.outgoing.written = Some(sequence),
                 Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
             },
-            BlockRequest::Read { newest } => {
-                let in_use = || self.stored.place().ok().map(|(slot, _)| usize::from(slot));
-                let slot = if newest { self.stored.newest_slot(slots) } else { in_use() };
+            BlockRequest::Read(which) => {
+                let slot = self.stored.slot_of(which.kind, which.newest, slots);
                 match slot.filter(|slot| !StoredSettings::in_slot(slots, *slot).is_empty()) {
                     Some(slot) => self.outgoing.part = Some((slot, 0)),
                     None => {
-                        let error = self.stored.place().err().unwrap_or(BlockError::Empty);
-                        self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 });
+                        let what = What::Block(self.stored.absence_of(which.kind, slots));
+                        self.outgoing.refused = Some(Refused { what, next: 0 });
                     }
                 }
             }
-            BlockRequest::Clear => {
-                StoredSettings::clear(slots);
+            BlockRequest::Clear(kind) => {
+                StoredSettings::clear(kind, slots);
                 // a completion that is repeated is of no block any more
                 self.incoming = Incoming::NONE;
                 self.outgoing.cleared = true;
@@ -228,9 +228,9 @@ impl CanService {
 /// A block on its way here.
 #[derive(Debug, Clone, Copy)]
 struct Incoming {
-    bytes: [u8; BLOCK_LEN],
-    /// A bit a part.
-    came: u64,
+    block: Piece,
+    /// Parts that came.
+    came: Came,
     /// Of the block that began and is not yet complete.
     length: Option<usize>,
     /// Last bytes and sequence of the block that was written last.
@@ -238,18 +238,16 @@ struct Incoming {
 }
 
 impl Incoming {
-    const NONE: Self = Self { bytes: [0; BLOCK_LEN], came: 0, length: None, written: None };
+    const NONE: Self = Self { block: Piece::EMPTY, came: Came::NONE, length: None, written: None };
 
     fn begin(&mut self, length: u16) {
         // what is longer is of another layout, as its first bytes say
-        (self.came, self.length) = (0, Some(usize::from(length).min(BLOCK_LEN)));
+        (self.came, self.length) = (Came::NONE, Some(usize::from(length).min(MOST_BLOCK_LEN)));
     }
 
     fn part(&mut self, number: u8, bytes: [u8; 4]) {
-        let at = 4 * usize::from(number);
-        if let (Some(_), Some(place)) = (self.length, self.bytes.get_mut(at..at + 4)) {
-            place.copy_from_slice(&bytes);
-            self.came |= 1 << number;
+        if self.length.is_some() && self.block.put(4 * usize::from(number), &bytes) {
+            self.came.set(usize::from(number));
         }
     }
 
@@ -265,14 +263,15 @@ impl Incoming {
             let again = self.written.filter(|(sum, _)| *sum == last);
             return again.map(|(_, sequence)| sequence).ok_or(What::Missing(0));
         };
-        #[allow(clippy::cast_possible_truncation)] // at most 37
-        if let Some(missing) = (0..length.div_ceil(4)).find(|part| self.came >> part & 1 == 0) {
+        #[allow(clippy::cast_possible_truncation)] // at most 255
+        if let Some(missing) = (0..length.div_ceil(4)).find(|part| !self.came.get(*part)) {
             return Err(What::Missing(missing as u8));
         }
         self.length = None;
-        let block = self.bytes.get(..length).unwrap_or(&[]);
+        let block = self.block.bytes().get(..length).unwrap_or(&[]);
         if block.last_chunk::<4>().is_some_and(|end| *end != last) {
-            return Err(What::Block(BlockError::CheckSum));
+            let kind = Kind::of_block(block).unwrap_or(Kind::Settings);
+            return Err(What::Block(StoredError { kind, error: BlockError::CheckSum }));
         }
         let sequence = stored.write(block, slots).map_err(What::Block)?;
         self.written = Some((last, sequence));
@@ -283,7 +282,7 @@ impl Incoming {
 /// What was refused.
 #[derive(Debug, Clone, Copy)]
 enum What {
-    Block(BlockError),
+    Block(StoredError),
     /// The first part that did not come.
     Missing(u8),
 }
@@ -344,7 +343,7 @@ impl Outgoing {
 impl Refused {
     fn name(&self) -> &'static [u8] {
         match &self.what {
-            What::Block(BlockError::Parameter(error)) => error.parameter.as_bytes(),
+            What::Block(StoredError { error: BlockError::Parameter(error), .. }) => error.parameter.as_bytes(),
             _ => &[],
         }
     }
@@ -358,17 +357,7 @@ impl Refused {
         }
         match &self.what {
             What::Missing(part) => BlockAnswer::Refused { reason: INCOMPLETE, detail: [*part, 0, 0, 0] },
-            What::Block(error) => {
-                let detail = match error {
-                    BlockError::Parameter(error) => error.value.to_be_bytes(),
-                    BlockError::Layout(layout) => {
-                        let [high, low] = layout.to_be_bytes();
-                        [high, low, 0, 0]
-                    }
-                    _ => [0; 4],
-                };
-                BlockAnswer::Refused { reason: error.code(), detail }
-            }
+            What::Block(error) => BlockAnswer::Refused { reason: error.code(), detail: error.detail() },
         }
     }
 

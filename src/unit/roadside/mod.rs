@@ -38,6 +38,7 @@ use crate::inputs::ars408::upkeep::Ars408Upkeep;
 use crate::unit::can_bus::{BusKeeper, BusState, CanPort};
 use crate::unit::can_service::{CanService, CanServiceConfig};
 use crate::unit::identity::{Identity, VERSION};
+use crate::unit::sender::start_stored;
 use crate::unit::serial_service::{Asked, SerialLine, SerialService};
 use crate::unit::settings::{Settings, SettingsSlots, StoredSettings, UnitConfig};
 use crate::unit::timing::{CycleCounter, Timing};
@@ -77,7 +78,7 @@ pub struct RoadsidePorts<R, B, L, S> {
     pub broadcast: B,
     /// The integrator's line, on which maps go out as well.
     pub serial: L,
-    /// Where configuration blocks are kept.
+    /// Where blocks are kept.
     pub slots: S,
 }
 
@@ -171,7 +172,8 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         let asked = CanServiceConfig { identity, ..CanServiceConfig::new(config.sensor, medium) };
         let can_service = CanService::start(asked, start.epoch, now, start.stored);
         let [radar_bus, broadcast_bus] = start.stored.buses();
-        let maps = start.stored.settings().and_then(|settings| maps(&start, settings, memory, now));
+        let settings = start.stored.settings();
+        let maps = settings.and_then(|settings| maps(&start, settings, &ports.slots, memory, now));
         Self {
             reset_cause: start.reset_cause,
             unstuffer: Unstuffer::new(),
@@ -377,20 +379,24 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
 fn maps<'u, E: InUnit, S: MapSender<E::Map>>(
     start: &RoadsideStart,
     settings: &Settings,
+    slots: &impl SettingsSlots,
     memory: RoadsideMemory<'u, E, S>,
     now: Time,
 ) -> Option<Maps<'u, E, S>> {
-    let header = settings.build::<E>(memory.parameters).ok()?;
+    let header = settings.build_at::<E>(&StoredSettings::place_of(slots).ok()?, memory.parameters).ok()?;
     let parameters = memory.parameters.as_ref()?;
-    let sender = |medium| {
+    let start_one = |medium, sender: &mut Option<S>| {
         let (stale_ms, max_delay_ms) = (settings.unit.stale_ms(), settings.unit.max_delay_ms);
         let usual = BroadcastConfig::new(settings.unit.sensor, medium);
         let config = BroadcastConfig { stale_ms, max_delay_ms, ..usual };
-        S::start(config, header, start.epoch, now).ok()
+        start_stored(sender, (config, header), settings, slots, start.epoch, now)
     };
-    *memory.broadcast = sender(Medium::Can(Addresses::STANDARD));
-    *memory.serial = sender(Medium::Serial);
-    let unit = Unit::new(parameters, memory.state, memory.map, memory.broadcast.as_mut()?);
+    let lacking = start_one(Medium::Can(Addresses::STANDARD), memory.broadcast);
+    start_one(Medium::Serial, memory.serial);
+    let mut unit = Unit::new(parameters, memory.state, memory.map, memory.broadcast.as_mut()?);
+    if let Some(reason) = lacking {
+        unit.lacks(reason);
+    }
     Some(Maps { unit, serial: memory.serial.as_mut()? })
 }
 

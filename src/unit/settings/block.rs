@@ -16,6 +16,7 @@ use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::ground::MOST_HEIGHTS;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
+use crate::sensor::place::Place;
 use crate::unit::can_bus::BusConfig;
 use crate::wire::header::fingerprint;
 
@@ -50,8 +51,13 @@ impl Settings {
     /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each
     /// tuned number with its place, from 2^16 on for obstacles, from 2^17 on for evidence and from 2^18 on
     /// for fixtures; and where the road is not flat the number 2^19 and each point of its profile.
-    #[inline(never)] // once a start
     pub fn fingerprint(&self) -> u32 {
+        self.fingerprint_at(&self.place())
+    }
+
+    /// The same at another place than the settings' own.
+    #[inline(never)] // once a start
+    pub fn fingerprint_at(&self, place: &Place<'_>) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];
         self.write(1, 0, &mut block);
         // not of the check sum as well: a CRC over its own is the same for every block
@@ -64,10 +70,10 @@ impl Settings {
             sum = fingerprint(&with);
         };
         // where there is no room for lanes, nothing runs with them
-        let lanes = if MOST_LANES == 0 { &[] } else { self.lanes };
-        for (number, lane) in (1..).zip(lanes) {
+        let Place { lanes, mut heights } = *place;
+        for (number, lane) in (1..).zip(lanes).take(MOST_LANES) {
             take([number, 0]);
-            lane.iter().for_each(|point| take(point.map(f32::to_bits)));
+            lane.for_each(|point| take(point.map(f32::to_bits)));
         }
         #[cfg(feature = "tuned")]
         {
@@ -81,9 +87,9 @@ impl Settings {
             let fixtures = self.fixtures().into_iter().flat_map(|fixtures| fixtures.numbers());
             (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
         }
-        if MOST_HEIGHTS > 0 && !self.ground.is_empty() {
+        if let Some(first) = heights.next().filter(|_| MOST_HEIGHTS > 0) {
             take([1 << 19, 0]);
-            self.ground.iter().for_each(|point| take(point.map(f32::to_bits)));
+            core::iter::once(first).chain(heights).for_each(|point| take(point.map(f32::to_bits)));
         }
         sum
     }

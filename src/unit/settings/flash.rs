@@ -1,7 +1,7 @@
-//! The two slots of the configuration block in a flash memory.
+//! The slots of stored blocks in a flash memory.
 //!
-//! Both are read at the start; what the rest of the library sees is that copy. A write erases the slot
-//! it goes to and no other, so that a loss of power leaves the other one.
+//! All are read at the start; what the rest of the library sees is that copy. A write erases the slot
+//! it goes to and no other, so that a loss of power leaves the other one of its kind.
 //!
 //! # Limits
 //! A slot begins where a page begins and takes as many pages as a block needs, which is one on every
@@ -10,71 +10,75 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::{BLOCK_LEN, SettingsSlots};
+use super::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SettingsSlots};
 
-/// A block up to the next whole word of any flash memory, which has at most 32 bytes.
-const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(32);
+/// The longest block up to the next whole word of any flash memory, which has at most 32 bytes.
+const MOST_STORED_LEN: usize = MOST_BLOCK_LEN.next_multiple_of(WORD);
 
-/// Erased memory.
-const EMPTY: [u8; BLOCK_LEN] = [0xFF; BLOCK_LEN];
+/// Bytes of the longest word of any flash memory.
+const WORD: usize = 32;
 
-/// Slots at two places of a memory.
+/// Slots at so many places of a memory, two for each kind of block, settings first.
 #[derive(Debug)]
-pub struct FlashSlots<F> {
+pub struct FlashSlots<F, const N: usize> {
     flash: F,
-    places: [u32; 2],
-    copies: [[u8; BLOCK_LEN]; 2],
+    places: [u32; N],
+    copies: [u8; ALL_SLOTS_LEN],
 }
 
-impl<F: NorFlash> FlashSlots<F> {
-    /// Reads both slots, if the board lets it read them; one that cannot be read is empty.
-    pub fn new(mut flash: F, places: [u32; 2], mut readable: impl FnMut(usize) -> bool) -> Self {
-        let mut copies = [EMPTY; 2];
-        for (slot, (copy, place)) in copies.iter_mut().zip(places).enumerate() {
+impl<F: NorFlash, const N: usize> FlashSlots<F, N> {
+    /// Reads all slots, if the board lets it read them; one that cannot be read holds nothing.
+    pub fn new(flash: F, places: [u32; N], mut readable: impl FnMut(usize) -> bool) -> Self {
+        let mut slots = Self { flash, places, copies: [0; ALL_SLOTS_LEN] };
+        for slot in 0..N {
             if readable(slot) {
-                *copy = read(&mut flash, place);
+                slots.read(slot);
             }
         }
-        Self { flash, places, copies }
+        slots
     }
 
     /// Gives the memory back.
     pub fn free(self) -> F {
         self.flash
     }
-}
 
-fn read<F: NorFlash>(flash: &mut F, place: u32) -> [u8; BLOCK_LEN] {
-    let mut stored = [0xFF; STORED_LEN];
-    let mut copy = EMPTY;
-    if flash.read(place, &mut stored).is_ok() {
-        copy.iter_mut().zip(stored).for_each(|(to, from)| *to = from);
+    fn read(&mut self, slot: usize) {
+        let Some((place, copy)) = self.places.get(slot).zip(self.copies.get_mut(range(slot))) else { return };
+        if self.flash.read(*place, copy).is_err() {
+            copy.fill(0);
+        }
     }
-    copy
 }
 
-impl<F: NorFlash> SettingsSlots for FlashSlots<F> {
+/// Where the copy of a slot lies.
+fn range(slot: usize) -> core::ops::Range<usize> {
+    let length = |slot| Kind::of_slot(slot).map_or(0, |kind| kind.most_len().next_multiple_of(WORD));
+    let from = (0..slot).map(length).sum();
+    from..from + length(slot)
+}
+
+impl<F: NorFlash, const N: usize> SettingsSlots for FlashSlots<F, N> {
     fn slot(&self, slot: usize) -> &[u8] {
-        self.copies.get(slot).map_or(&[], |copy| copy)
+        let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
+        let copy = self.copies.get(range(slot)).filter(|_| slot < N);
+        copy.and_then(|copy| copy.get(..length)).unwrap_or(&[])
     }
 
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
+    fn write(&mut self, slot: usize, block: &[u8]) {
         let Some(place) = self.places.get(slot).copied() else { return };
-        let mut stored = [0xFF; STORED_LEN];
+        let mut stored = [0xFF; MOST_STORED_LEN];
         stored.iter_mut().zip(block).for_each(|(to, from)| *to = *from);
         let page = u32::try_from(F::ERASE_SIZE).unwrap_or(u32::MAX);
-        let needed = u32::try_from(STORED_LEN).unwrap_or(u32::MAX).next_multiple_of(page.max(1));
-        let words = BLOCK_LEN.next_multiple_of(F::WRITE_SIZE.max(1));
+        let needed = u32::try_from(range(slot).len()).unwrap_or(u32::MAX).next_multiple_of(page.max(1));
+        let words = block.len().next_multiple_of(F::WRITE_SIZE.max(1));
         // what failed shows when the slot is read back
         if flash_erase(&mut self.flash, place, needed)
             && let Some(words) = stored.get(..words)
         {
             let _ = self.flash.write(place, words);
         }
-        let copy = read(&mut self.flash, place);
-        if let Some(old) = self.copies.get_mut(slot) {
-            *old = copy;
-        }
+        self.read(slot);
     }
 }
 
@@ -85,7 +89,7 @@ fn flash_erase<F: NorFlash>(flash: &mut F, place: u32, length: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::unit::settings::Settings;
+    use crate::unit::settings::{BLOCK_LEN, Settings};
     use embedded_storage::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
     use std::vec;
     use std::vec::Vec;
@@ -176,6 +180,8 @@ mod tests {
         Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).ok().map(|n| n.settings.gate.max_detections)
     }
 
+    const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(WORD);
+
     fn works_on<const WORD: usize, const PAGE: usize>() {
         let length = STORED_LEN.next_multiple_of(PAGE);
         let memory = Memory::<WORD, PAGE> { bytes: vec![0xFF; 4 * length], words_left: usize::MAX };
@@ -218,9 +224,9 @@ mod tests {
     }
 
     #[test]
-    fn a_slot_outside_the_memory_is_empty() {
+    fn a_slot_outside_the_memory_holds_nothing() {
         let memory = Memory::<8, 2048> { bytes: vec![0xFF; 2048], words_left: usize::MAX };
         let slots = FlashSlots::new(memory, [0, 4096], |_| true);
-        assert_eq!((slots.slot(1), slots.slot(2)), (&[0xFF; BLOCK_LEN][..], &[][..]));
+        assert_eq!((slots.slot(1), slots.slot(2)), (&[0; BLOCK_LEN][..], &[][..]));
     }
 }

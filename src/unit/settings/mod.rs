@@ -18,18 +18,24 @@
 //! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), whether it is supervised by what stands in its view (1 byte: 0 or 1), 0 (2 bytes) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
-//! Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
+//! Blocks of what is known of a place, in slots of their own: `kept`. Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
 //! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes,
 //! of tuned parameters, of what is said of fixtures and of the road's heights.
 
 mod block;
 mod flash;
+mod kept;
+mod kind;
 mod stored;
 mod unit_config;
 
 pub use block::BLOCK_LEN;
 pub use flash::FlashSlots;
-pub use stored::{SettingsCheck, SettingsSlots, StoredSettings};
+#[cfg(feature = "probability")]
+pub use kept::table_block;
+pub use kept::{heights_block, kept_points, lanes_block};
+pub use kind::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SLOTS};
+pub use stored::{SettingsCheck, SettingsSlots, StoredError, StoredSettings};
 pub use unit_config::{ConfigureRadar, UnitConfig};
 
 use crate::camera::Camera3dConfig;
@@ -42,12 +48,15 @@ use crate::grid::evidence::EvidenceConfig;
 #[cfg(feature = "tuned")]
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::Lane;
+#[cfg(feature = "probability")]
+use crate::probability::TableError;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
 use crate::sensor::Sensor;
 use crate::sensor::config::ConfigError;
 use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
+use crate::sensor::place::{LaneList, Place, Points};
 use crate::unit::can_bus::BusConfig;
 
 /// Everything an integrator sets for one installation.
@@ -75,10 +84,10 @@ pub struct Settings {
     /// Numbers and rates of the unit itself.
     #[cfg_attr(feature = "serde", serde(default))]
     pub unit: UnitConfig,
-    /// Which way traffic goes, where that is given; no block has it.
+    /// Which way traffic goes, where that is given; a controller has it in a block of its own.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub lanes: &'static [Lane],
-    /// Height of the road over its length, where it is not flat; no block has it.
+    /// Height of the road over its length, where it is not flat; likewise.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub ground: &'static [[f32; 2]],
     /// How obstacles are tracked, where that was tuned for the place; no block has it.
@@ -110,6 +119,14 @@ pub enum BlockError {
     CheckSum,
     /// A parameter that cannot be worked with.
     Parameter(ConfigError),
+    /// This firmware, or its memory, has no room for blocks of this kind.
+    NoRoom,
+    /// A table of probabilities that is not this unit's, or none.
+    #[cfg(feature = "probability")]
+    Table(TableError),
+    /// A table of probabilities of another grid: its ranges and azimuths.
+    #[cfg(feature = "probability")]
+    Grid([u8; 2]),
 }
 
 impl BlockError {
@@ -121,6 +138,17 @@ impl BlockError {
             Self::Layout(_) => 3,
             Self::CheckSum => 4,
             Self::Parameter(_) => 5,
+            Self::NoRoom => 7,
+            #[cfg(feature = "probability")]
+            Self::Table(TableError::Edges(_)) => 8,
+            #[cfg(feature = "probability")]
+            Self::Table(TableError::NotMonotone { .. }) => 9,
+            #[cfg(feature = "probability")]
+            Self::Table(TableError::Configuration { .. }) => 10,
+            #[cfg(feature = "probability")]
+            Self::Table(TableError::Empty | TableError::Short | TableError::Layout | TableError::CheckSum) => 11,
+            #[cfg(feature = "probability")]
+            Self::Grid(_) => 12,
         }
     }
 }
@@ -135,6 +163,13 @@ impl core::fmt::Display for BlockError {
             }
             Self::CheckSum => write!(f, "the configuration block's check sum does not hold"),
             Self::Parameter(e) => write!(f, "configuration block: {e}"),
+            Self::NoRoom => write!(f, "this firmware has no room for such a block"),
+            #[cfg(feature = "probability")]
+            Self::Table(e) => write!(f, "{e}"),
+            #[cfg(feature = "probability")]
+            Self::Grid([ranges, azimuths]) => {
+                write!(f, "the probability table was fitted on a grid of {ranges} x {azimuths}")
+            }
         }
     }
 }
@@ -171,10 +206,27 @@ impl Settings {
         Self { visibility, ..Self::of(Sensor { mount, field_of_view, noise: NoiseConfig::default() }) }
     }
 
+    /// The same without what watches the radar, which changes no grade: tables of probabilities are of these.
+    #[cfg(feature = "probability")]
+    pub(crate) fn of_grades(&self) -> Self {
+        let unit = UnitConfig { supervise: false, ..self.unit };
+        Self {
+            unit,
+            #[cfg(feature = "monitoring")]
+            fixtures: None,
+            ..*self
+        }
+    }
+
     /// What is asked of what stands in the view, if the radar is supervised.
     #[cfg(feature = "monitoring")]
     pub fn fixtures(&self) -> Option<FixturesConfig> {
         self.fixtures.copied().or_else(|| self.unit.supervise.then(FixturesConfig::default))
+    }
+
+    /// What they say of the place.
+    pub fn place(&self) -> Place<'static> {
+        Place { lanes: LaneList::Metres(self.lanes), heights: Points::Metres(self.ground) }
     }
 
     /// The estimator's configuration; what an integrator does not set is the library's.
@@ -209,15 +261,20 @@ impl Settings {
             next_slot: 1 - slot,
             next_sequence: sequence.wrapping_add(1),
         };
-        match slots.map(read) {
-            [Err(first), Err(second)] => Err([first, second]),
-            [Ok(first), Err(_)] => Ok(found(0, first)),
-            [Err(_), Ok(second)] => Ok(found(1, second)),
-            // half the range ahead is newer
-            [Ok(first), Ok(second)] => {
-                let second_is_newer = second.0.wrapping_sub(first.0) < 1 << 31 && second.0 != first.0;
-                Ok(if second_is_newer { found(1, second) } else { found(0, first) })
-            }
+        newer(slots.map(read)).map(|(slot, what)| found(slot, what))
+    }
+}
+
+/// The newer of two slots that hold: its number, its sequence and what it has.
+fn newer<T, E>(slots: [Result<(u32, T), E>; 2]) -> Result<(usize, (u32, T)), [E; 2]> {
+    match slots {
+        [Err(first), Err(second)] => Err([first, second]),
+        [Ok(first), Err(_)] => Ok((0, first)),
+        [Err(_), Ok(second)] => Ok((1, second)),
+        // half the range ahead is newer
+        [Ok(first), Ok(second)] => {
+            let second_is_newer = second.0.wrapping_sub(first.0) < 1 << 31 && second.0 != first.0;
+            Ok(if second_is_newer { (1, second) } else { (0, first) })
         }
     }
 }

@@ -128,7 +128,32 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     /// Names the parameter that cannot be worked with.
     pub fn new(config: BroadcastConfig, header: Header, epoch: Epoch, now: Time) -> Result<Self, ConfigError> {
         config.check()?;
-        let mut new = Self {
+        let mut new = Self::blank(config, header, epoch, now);
+        new.begin(header, now)?;
+        Ok(new)
+    }
+
+    /// The same where the sender stays: controllers have no stack for a second.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); there is no sender then.
+    pub fn start(
+        place: &mut Option<Self>,
+        config: BroadcastConfig,
+        header: Header,
+        epoch: Epoch,
+        now: Time,
+    ) -> Result<(), ConfigError> {
+        *place = None;
+        config.check()?;
+        Self::fits(&header)?;
+        place.insert(Self::blank(config, header, epoch, now)).begin(header, now)
+    }
+
+    /// Before its first epoch.
+    #[inline(always)] // made where it stays
+    pub(crate) fn blank(config: BroadcastConfig, header: Header, epoch: Epoch, now: Time) -> Self {
+        Self {
             config,
             header,
             epoch,
@@ -153,9 +178,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             groups_first: 0,
             range_from: 0,
             counters: [0; 32],
-        };
-        new.begin(header, now)?;
-        Ok(new)
+        }
     }
 
     /// Begins a new epoch: the mount, the geometry or the configuration changed.
@@ -177,7 +200,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         within("header.ranges", u32::from(header.ranges), 1, most((32 * W).min(256)))
     }
 
-    fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
+    pub(crate) fn begin(&mut self, header: Header, now: Time) -> Result<(), ConfigError> {
         Self::fits(&header)?;
         self.header = Header { planes: planes(P.min(usize::from(self.config.planes))), ..header };
         self.status.fingerprint = header.fingerprint;

@@ -9,10 +9,10 @@ struct InRam([[u8; BLOCK_LEN]; 2]);
 
 impl SettingsSlots for InRam {
     fn slot(&self, slot: usize) -> &[u8] {
-        &self.0[slot]
+        self.0.get(slot).map_or(&[], |slot| slot)
     }
-    fn write(&mut self, slot: usize, block: &[u8; BLOCK_LEN]) {
-        self.0[slot] = *block;
+    fn write(&mut self, slot: usize, block: &[u8]) {
+        self.0[slot][..block.len()].copy_from_slice(block);
     }
 }
 

@@ -24,8 +24,8 @@ pub fn run(bytes: &[u8]) {
             let _ = answers.take(&frame);
         }
         // an answer has an end
-        let said = std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &flash)).take(200).count();
-        assert!(said < 200);
+        let said = std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &flash)).take(300).count();
+        assert!(said < 300);
         for slot in 0..2 {
             let read = Settings::from_block(flash.slot(slot));
             assert!(read.is_ok() || read == Err(BlockError::Empty));

@@ -8,7 +8,7 @@ use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::profile::small;
 use viewshed::unit::service::{Reply, Request, data_id};
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
+use viewshed::unit::settings::{BLOCK_LEN, Settings, StoredError};
 use viewshed::wire::e2e::Profile;
 
 fn crc32(bytes: &[u8]) -> u32 {
@@ -57,7 +57,7 @@ pub fn run(bytes: &[u8]) {
         }
         Err(reason) => {
             assert!((1..=5).contains(&reason.code()));
-            let reply = Reply::Refused(&reason).message(4, 9);
+            let reply = Reply::Refused(&StoredError::of_settings(reason)).message(4, 9);
             assert!(Profile::P05.check(reply.bytes(), data_id(4)).is_ok());
         }
     }
@@ -65,7 +65,7 @@ pub fn run(bytes: &[u8]) {
     let mut message = bytes.get(..200).unwrap_or(bytes).to_vec();
     assert!(Request::read(&message, 4).is_none_or(|_| message.len() >= 4));
     if message.len() >= 4 {
-        message[3] %= 6;
+        message[3] %= 9;
         Profile::P05.protect(&mut message, data_id(4), 1);
         assert_eq!(Request::read(&message, 5), None, "another sensor's");
         if let Some(request) = Request::read(&message, 4) {

@@ -3,9 +3,9 @@
 use crc::Crc;
 use proptest::prelude::*;
 use viewshed::unit::can_service::Tool;
-use viewshed::unit::said::{Refusal, Said};
-use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, SettingsSlots};
+use viewshed::unit::said::{Piece, Refusal, Said};
+use viewshed::unit::service::{Request, Which};
+use viewshed::unit::settings::{BLOCK_LEN, Kind, SettingsSlots};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::status::{Reason, UnitState};
 
@@ -124,8 +124,8 @@ impl World {
         let started =
             self.said.iter().find_map(|said| if let Said::Started(place) = said { Some(*place) } else { None });
         let started = started.expect("says on the bus that it starts");
-        self.ports.broadcast.incoming.extend(tool().read());
-        self.ask(Request::Read);
+        self.ports.broadcast.incoming.extend(tool().read(Which::in_use(Kind::Settings)));
+        self.ask(Request::Read(Which::in_use(Kind::Settings)));
         let before = self.replies.len();
         self.run(200);
         let read: Vec<u8> =
@@ -136,7 +136,7 @@ impl World {
             Some((slot, sequence)) => {
                 let stored = self.ports.slots.slot(slot.into()).to_vec();
                 assert_eq!(read, stored);
-                assert!(self.said.contains(&Said::Block(stored.try_into().unwrap())), "{:?}", self.said);
+                assert!(self.said.contains(&Said::Block(Piece::new(&stored))), "{:?}", self.said);
                 assert!(
                     state != UnitState::Fault && status.iter().all(|s| s.reason != Reason::Configuration),
                     "{status:?}"

@@ -8,7 +8,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 use viewshed::bench::can::CanBench;
 use viewshed::bench::files::{FlashFile, answer};
 use viewshed::bench::record::{Closing, Record};
-use viewshed::bench::start;
+use viewshed::bench::start_stored;
 use viewshed::inputs::ars408::Ars408Config;
 use viewshed::unit::can_bus::BusKeeper;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
@@ -62,7 +62,7 @@ extern "C" fn main() -> ! {
         let config = CanServiceConfig { gap_us: 0, identity, ..CanServiceConfig::new(sensor, MEDIUM) };
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start::<State, _>(&mut parameters, sender, stored.settings(), MEDIUM, epoch, session.now());
+        let _ = start_stored::<State, _>(&mut parameters, sender, (&stored, &flash), MEDIUM, epoch, session.now());
         let mut unit = parameters.as_ref().zip(sender.as_mut()).map(|(p, sender)| Unit::new(p, state, map, sender));
 
         while session.turn((&mut keeper, &mut can), &mut service, &mut unit, &mut flash) == Flow::Continue {}

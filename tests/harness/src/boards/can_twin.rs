@@ -5,7 +5,7 @@ use std::mem;
 
 use viewshed::bench::can::{CanBench, TIME_ID};
 use viewshed::bench::flash::Flash;
-use viewshed::bench::start;
+use viewshed::bench::start_stored;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::Ars408Config;
@@ -115,7 +115,8 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
         let config = CanServiceConfig { gap_us: 0, identity, ..CanServiceConfig::new(stored.unit().sensor, MEDIUM) };
         let mut service = CanService::start(config, epoch, session.now(), stored);
         let mut parameters: Option<Parameters> = None;
-        start::<State, _>(&mut parameters, &mut sender, stored.settings(), MEDIUM, epoch, session.now());
+        let _ =
+            start_stored::<State, _>(&mut parameters, &mut sender, (&stored, &*flash), MEDIUM, epoch, session.now());
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut *state, &mut *map, sender));
         let mut last = None;
@@ -133,7 +134,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
                 let deadline = unit.broadcast().deadline();
                 if deadline != last {
                     last = deadline;
-                    now.maps.extend(Map::offered(unit));
+                    now.maps.extend(Map::offered(unit, epoch));
                 }
             }
         }

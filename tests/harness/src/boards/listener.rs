@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
-use viewshed::unit::Unit;
 use viewshed::unit::profile::reference::State;
-use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::unit::{MapSender, Unit};
+use viewshed::wire::broadcast::Medium;
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Epoch, Plane};
@@ -36,15 +36,13 @@ pub struct Map {
 }
 
 impl Map {
-    /// The map that a unit offered to its sender last; `None` if it offered none.
-    pub fn offered<E, const R: usize, const A: usize, const W: usize>(
-        unit: &mut Unit<'_, E, Broadcaster<A, W>>,
-    ) -> Option<Self>
+    /// The map that a unit offered to its sender last in this epoch; `None` if it offered none.
+    pub fn offered<E, S, const R: usize, const A: usize>(unit: &mut Unit<'_, E, S>, epoch: Epoch) -> Option<Self>
     where
         E: Estimator<Map = PolarMap<R, A>>,
+        S: MapSender<PolarMap<R, A>>,
     {
-        let sender = unit.broadcast();
-        let (deadline, epoch) = (sender.deadline()?, sender.epoch());
+        let deadline = unit.broadcast().deadline()?;
         let measured = Time::from_micros(deadline.micros().checked_sub(STALE_US)?);
         let rays = (0..A).map(|a| unit.map().ray(Plane::Visibility, a)).collect();
         Some(Self { measured, epoch, rays })

@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::{iter, mem};
 
 use viewshed::bench::flash::Flash;
-use viewshed::bench::start;
+use viewshed::bench::start_stored;
 use viewshed::estimator::Estimator;
 use viewshed::fixed::time::Time;
 use viewshed::fusion::Supervised;
@@ -14,12 +14,13 @@ use viewshed::map::polar::PolarMap;
 use viewshed::radar_3d::Radar3d;
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::{reference, small};
+use viewshed::unit::quantised::QuantisedSender;
 use viewshed::unit::serial_service::SerialLine;
-use viewshed::unit::service::Request;
+use viewshed::unit::service::{PART_LEN, Request};
 use viewshed::unit::session::SerialSession;
 use viewshed::unit::settings::{Settings, SettingsCheck, StoredSettings};
-use viewshed::unit::{Flow, Unit};
-use viewshed::wire::broadcast::{Broadcaster, Medium};
+use viewshed::unit::{Flow, MapSender, Unit};
+use viewshed::wire::broadcast::Medium;
 use viewshed::wire::serial::{MOST_STUFFED, stuff};
 
 use super::Profile;
@@ -108,26 +109,37 @@ fn work<const R: usize, const A: usize, const E: usize, const W: usize, const N:
     let mut flash = Flash::ERASED;
     let mut line = Answer(send);
     let mut map = Box::new(PolarMap::<R, A>::NOWHERE);
-    let mut sender: Box<Option<Broadcaster<A, W>>> = Box::new(None);
+    let mut sender: Box<Option<QuantisedSender<A, W>>> = Box::new(None);
     'start: loop {
         let epoch = flash.start();
-        let stored = StoredSettings::read(&flash, SettingsCheck::of::<Watched<R, A, E, W, N, D>, Broadcaster<A, W>>());
+        let stored =
+            StoredSettings::read(&flash, SettingsCheck::of::<Watched<R, A, E, W, N, D>, QuantisedSender<A, W>>());
         // of this computer: a real board names itself
         #[allow(clippy::cast_possible_truncation)] // at most 200
         let identity = Identity { board: "this-computer", chip: 0, is_bench, grid: [R as u8, A as u8] };
         let mut session = SerialSession::<D>::start(stored.unit().sensor, identity, epoch, stored, &mut line);
         let mut parameters: Option<<Watched<R, A, E, W, N, D> as Estimator>::Parameters> = None;
-        let (settings, now) = (session.settings(), session.now());
-        start::<Watched<R, A, E, W, N, D>, _>(&mut parameters, &mut sender, settings, Medium::Serial, epoch, now);
+        let now = session.now();
+        let lacking = start_stored::<Watched<R, A, E, W, N, D>, _>(
+            &mut parameters,
+            &mut sender,
+            (&stored, &flash),
+            Medium::Serial,
+            epoch,
+            now,
+        );
         let sender = (*sender).as_mut();
         let mut unit = parameters.as_ref().zip(sender).map(|(p, sender)| Unit::new(p, &mut *state, &mut *map, sender));
+        if let Some((unit, reason)) = unit.as_mut().zip(lacking) {
+            unit.lacks(reason);
+        }
         let mut last = None;
         for byte in &mut *bytes {
             let flow = session.take(&[byte], &mut unit, &mut flash, &mut line, &mut |_, _| {});
             let offered = unit.as_mut().and_then(|unit| {
-                let deadline = unit.broadcast().deadline();
+                let deadline = MapSender::<PolarMap<R, A>>::deadline(unit.broadcast());
                 let new = deadline != mem::replace(&mut last, deadline);
-                new.then(|| Map::offered(unit)).flatten()
+                new.then(|| Map::offered(unit, epoch)).flatten()
             });
             after(session.now(), offered);
             if flow == Flow::Restart {
@@ -167,6 +179,17 @@ impl Script {
     pub fn configure(&mut self, settings: &Settings) {
         self.request(&Request::Write(&settings.to_block(1)));
         self.request(&Request::Restart);
+    }
+
+    /// A block, in parts where it is longer than a message.
+    #[allow(clippy::cast_possible_truncation)] // a kilobyte
+    pub fn write(&mut self, block: &[u8]) {
+        if block.len() <= PART_LEN {
+            return self.request(&Request::Write(block));
+        }
+        for (k, part) in block.chunks(PART_LEN).enumerate() {
+            self.request(&Request::Part((k * PART_LEN) as u16, part));
+        }
     }
 
     pub fn request(&mut self, request: &Request<'_>) {

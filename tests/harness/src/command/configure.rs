@@ -7,13 +7,15 @@ use std::time::Duration;
 use anyhow::{Result, bail, ensure};
 use viewshed::bench::stage::Stage;
 use viewshed::unit::profile::{reference, small};
-use viewshed::unit::settings::{BlockError, Settings};
+use viewshed::unit::service::Which;
+use viewshed::unit::settings::{BlockError, Kind, Settings};
 use viewshed::unit::timing::Count;
 
 use serde_json::{Map, Value, json};
 
 use super::print;
 use crate::configure::file::{self, EXAMPLE, UnitFile};
+use crate::configure::kept::{self, Blocks, KINDS, Kept};
 use crate::configure::link::Link;
 use crate::configure::{Found, Stored, Wanted, find, name};
 use crate::results::files::OutputArgs;
@@ -21,7 +23,8 @@ use crate::results::files::OutputArgs;
 /// Write the configuration of a unit on a controller, over its serial port or its CAN bus
 ///
 /// A flashed unit sends nothing but its status until it has a configuration: where it stands, what its radar could see, its
-/// buses. This writes one, reads it back, and says what the unit refuses and why. The unit keeps its old configuration until
+/// buses. This writes one, reads it back, and says what the unit refuses and why. Lanes, heights of the road and a table of
+/// probabilities are part of it, as in a daemon's file, where the unit's firmware has room for them. The unit keeps its old configuration until
 /// its next start, and for good if anything goes wrong on the way.
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = EXAMPLES)]
@@ -141,21 +144,24 @@ fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
         return timing(&mut unit, told);
     }
     if args.factory {
-        unit.clear()?;
+        for kind in KINDS {
+            if unit.kept(Which::newest(kind))? != Kept::NoRoom {
+                unit.clear(kind)?;
+            }
+        }
+        unit.clear(Kind::Settings)?;
         unit.restart()?;
         told.insert("emptied".into(), true.into());
         print("emptied and restarted: it sends its status only, until it is configured\n")?;
         return Ok(ExitCode::SUCCESS);
     }
     if let (Some(file), true) = (&file, args.check) {
-        return compare(&mut unit, &file.settings, told);
+        return compare(&mut unit, file, told);
     }
     let mut written = None;
-    if let Some(UnitFile { settings, .. }) = &file {
+    if let Some(UnitFile { settings, blocks, .. }) = &file {
         unit.check(settings)?;
-        written = Some(unit.write(settings)?);
-        told.insert("written".into(), written.into());
-        print(&format!("written as block {}, and read back the same\n", written.unwrap_or(0)))?;
+        written = Some(write(&mut unit, settings, blocks, told)?);
     }
     if !args.restart {
         print(
@@ -175,6 +181,32 @@ fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
         (None, Some(wanted)) => bail!("it runs without a configuration: block {wanted} is gone; write it again"),
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes what a file says; the sequence of the settings.
+fn write(unit: &mut Found<'_>, settings: &Settings, blocks: &Blocks, told: &mut Told) -> Result<u32> {
+    let plan = unit.plan(blocks)?;
+    for (kind, _) in plan.iter().filter(|(_, has_old)| *has_old) {
+        unit.clear(*kind)?;
+    }
+    let written = unit.write(settings)?;
+    told.insert("written".into(), written.into());
+    print(&format!("written as block {written}, and read back the same\n"))?;
+    let mut others = Map::new();
+    for (kind, block) in KINDS.into_iter().zip(blocks) {
+        let Some((_, has_old)) = plan.iter().find(|(planned, _)| *planned == kind) else { continue };
+        let key = kept::key(kind);
+        if let Some(block) = block {
+            let sequence = unit.write_kept(kind, block)?;
+            others.insert(key.into(), sequence.into());
+            print(&format!("{key} written as block {sequence}, {} bytes, and read back the same\n", block.len()))?;
+        } else if *has_old {
+            others.insert(key.into(), Value::Null);
+            print(&format!("{key} taken from the unit: the file has none\n"))?;
+        }
+    }
+    told.insert("written_beside".into(), others.into());
+    Ok(written)
 }
 
 fn open(args: &Args) -> Result<Box<dyn Link>> {
@@ -219,6 +251,16 @@ fn on_grids(settings: &Settings, told: &mut Told) -> Result<ExitCode> {
 fn read(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
     let (in_use, newest) = (unit.in_use()?, unit.newest()?);
     let place = unit.place().to_owned();
+    let mut beside = Vec::new();
+    for kind in KINDS {
+        // what counts from the next start on, if there is nothing in use
+        let which = if in_use.is_ok() { Which::in_use(kind) } else { Which::newest(kind) };
+        match unit.kept(which)? {
+            Kept::Block(Some(block)) => beside.push(kept::text(kind, &block)?),
+            Kept::Damaged => beside.push(format!("\n# {}: what is stored does not hold any more\n", kept::key(kind))),
+            Kept::Block(None) | Kept::NoRoom => {}
+        }
+    }
     let head = |Stored { sequence, .. }: &Stored| format!("# {place}: {}, block {sequence}\n", name(&unit.unit));
     match (&in_use, &newest) {
         (Err(BlockError::Empty), Err(BlockError::Empty)) => {
@@ -228,7 +270,10 @@ fn read(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
         }
         (Err(error), Err(_)) => bail!("{place}: {error}"),
         (Ok(stored), _) | (Err(_), Ok(stored)) => {
-            let text = file::text(&stored.settings)?;
+            let mut text = file::text(&stored.settings)?;
+            for block in &beside {
+                text += block;
+            }
             told.insert("block".into(), stored.sequence.into());
             told.insert("configuration".into(), toml::from_str(&text)?);
             print(&(head(stored) + &text))?;
@@ -276,13 +321,22 @@ fn timing(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn compare(unit: &mut Found<'_>, settings: &Settings, told: &mut Told) -> Result<ExitCode> {
+fn compare(unit: &mut Found<'_>, file: &UnitFile, told: &mut Told) -> Result<ExitCode> {
+    let UnitFile { settings, blocks, .. } = file;
     unit.check(settings)?;
     let Ok(stored) = unit.newest()? else {
         print("the unit has no configuration; the file can be used\n")?;
         return Ok(ExitCode::FAILURE);
     };
-    let found = file::differences(&stored.settings, settings)?;
+    let mut found = file::differences(&stored.settings, settings)?;
+    for (kind, has_old) in unit.plan(blocks)? {
+        let is_in_file = KINDS.into_iter().zip(blocks).any(|(k, block)| k == kind && block.is_some());
+        let said = |is_there| if is_there { "is there" } else { "is not there" }.to_owned();
+        found.push(match (has_old, is_in_file) {
+            (true, true) => (kept::key(kind).into(), "another".into(), "one".into()),
+            (has, wanted) => (kept::key(kind).into(), said(has), said(wanted)),
+        });
+    }
     told.insert("block".into(), stored.sequence.into());
     let each = found.iter().map(|(key, has, wanted)| json!({"key": key, "unit": has, "file": wanted}));
     told.insert("differences".into(), each.collect());

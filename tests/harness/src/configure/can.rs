@@ -74,14 +74,13 @@ impl<B: CanBus> Link for CanLink<B> {
             let frames: Vec<CanFrame> = match what {
                 Ask::Identify => tool.identify().into_iter().collect(),
                 Ask::Address(chip) => tool.address(chip).into_iter().collect(),
-                Ask::Read => tool.read().into_iter().collect(),
-                Ask::ReadNewest => tool.read_newest().into_iter().collect(),
+                Ask::Read(which) | Ask::ReadPart(which, _) => tool.read(which).into_iter().collect(),
                 Ask::Write(block) => tool.write(block).collect(),
                 Ask::Again(block, part) => tool.again(block, part).collect(),
                 Ask::Restart => tool.restart().into_iter().collect(),
-                Ask::Clear => tool.clear().into_iter().collect(),
+                Ask::Clear(kind) => tool.clear(kind).into_iter().collect(),
                 // on the serial line only
-                Ask::Timing => Vec::new(),
+                Ask::Part(..) | Ask::Timing => Vec::new(),
             };
             for frame in &frames {
                 self.bus.send(frame)?;

@@ -1,18 +1,23 @@
 //! Settings of a unit as a TOML file: the tables of the daemon's file, and those only a controller has.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, ensure};
 use serde::{Deserialize, Serialize};
 use viewshed::frame::gate::GateConfig;
 use viewshed::frame::health::HealthConfig;
+use viewshed::probability::Threshold;
 use viewshed::radar_3d::VisibilityConfig;
 use viewshed::sensor::Sensor;
 use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 use viewshed::unit::can_bus::BusConfig;
-use viewshed::unit::settings::{Settings, UnitConfig};
+use viewshed::unit::profile::reference;
+use viewshed::unit::settings::{Settings, UnitConfig, table_block};
+
+use super::kept::{self, Blocks};
+use crate::evaluation::probability::table_file;
 
 /// A file that explains every key, with their defaults.
 pub const EXAMPLE: &str = include_str!("../../../../boards/unit.toml");
@@ -46,7 +51,7 @@ struct Tables {
     #[serde(default, skip_serializing)]
     output: Option<toml::Value>,
     #[serde(default, skip_serializing)]
-    lanes: Option<toml::Value>,
+    lanes: Vec<PointList>,
     #[serde(default, skip_serializing)]
     obstacles: Option<toml::Value>,
     #[serde(default, skip_serializing)]
@@ -54,13 +59,33 @@ struct Tables {
     #[serde(default, skip_serializing)]
     fixtures: Option<toml::Value>,
     #[serde(default, skip_serializing)]
-    ground: Option<toml::Value>,
+    ground: Option<PointList>,
+    #[serde(default, skip_serializing)]
+    probability: Option<Given>,
+}
+
+/// A lane, or the road's profile.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PointList {
+    points: Vec<[f32; 2]>,
+}
+
+/// Which table, and what of it is called visible.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Given {
+    file: PathBuf,
+    risk: Option<f64>,
 }
 
 /// What a file says.
 #[derive(Debug)]
 pub struct UnitFile {
+    /// With lanes and heights.
     pub settings: Settings,
+    /// What a unit keeps beside them.
+    pub blocks: Blocks,
     /// Keys of the daemon's that no block has.
     pub left_out: Vec<&'static str>,
 }
@@ -73,11 +98,31 @@ pub fn read(path: &Path) -> Result<UnitFile> {
     let text = std::fs::read_to_string(path).with_context(|| {
         format!("cannot read {}; `viewshed configure --example > unit.toml` writes one to begin with", path.display())
     })?;
-    parse(&text).map_err(|(line, what)| anyhow!("{}:{line}: {what}", path.display()))
+    let (mut file, given) = parse(&text).map_err(|(line, what)| anyhow!("{}:{line}: {what}", path.display()))?;
+    let in_file = || path.display().to_string();
+    let Settings { ground, lanes, .. } = file.settings;
+    let heights = (!ground.is_empty()).then(|| kept::of_heights(ground)).transpose().with_context(in_file)?;
+    let lanes = (!lanes.is_empty()).then(|| kept::of_lanes(lanes)).transpose().with_context(in_file)?;
+    file.blocks = [heights, lanes, given.map(|given| table(&given)).transpose().with_context(in_file)?];
+    Ok(file)
+}
+
+/// The table as a block. Tables are fitted on the reference grid.
+#[allow(clippy::cast_possible_truncation)] // 200, 120
+fn table(given: &Given) -> Result<Vec<u8>> {
+    let share = given.risk.is_none_or(|risk| risk > 0.0 && risk < 1.0);
+    ensure!(share, "probability.risk is not between 0 and 1: 0.1 is 10 %");
+    let read = || -> Result<Vec<u8>> {
+        let (table, counted) = table_file::parse(&std::fs::read_to_string(&given.file)?)?;
+        let threshold = given.risk.map(|risk| Threshold::keeping(risk, &counted));
+        let grid = [reference::State::RANGES as u8, reference::State::AZIMUTHS as u8];
+        Ok(table_block(grid, &table, threshold).to_vec())
+    };
+    read().with_context(|| format!("probability.file: {}", given.file.display()))
 }
 
 /// Reads a text; the line and what is wrong there.
-fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
+fn parse(text: &str) -> Result<(UnitFile, Option<Given>), (usize, String)> {
     let tables: Tables = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start.min(text.len()));
         (1 + text[..at].matches('\n').count(), error.message().to_owned())
@@ -89,15 +134,17 @@ fn parse(text: &str) -> Result<UnitFile, (usize, String)> {
         ("grid", tables.grid.is_some()),
         ("[input]", tables.input.is_some()),
         ("[output]", tables.output.is_some()),
-        ("[[lanes]]", tables.lanes.is_some()),
         ("[obstacles]", tables.obstacles.is_some()),
         ("[evidence]", tables.evidence.is_some()),
         ("[fixtures]", tables.fixtures.is_some()),
-        ("[ground]", tables.ground.is_some()),
     ];
     let left_out = keys.into_iter().filter(|(_, is_there)| *is_there).map(|(key, _)| key).collect();
-    let settings = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
-    Ok(UnitFile { settings, left_out })
+    // once a run
+    let lanes = tables.lanes.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak();
+    let ground = tables.ground.map_or(&[][..], |ground| ground.points.leak());
+    let own = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
+    let file = UnitFile { settings: Settings { lanes, ground, ..own }, blocks: [None, None, None], left_out };
+    Ok((file, tables.probability))
 }
 
 /// Settings as a file.
@@ -146,7 +193,7 @@ fn tables(settings: &Settings) -> Tables {
     } = *settings;
     let Sensor { mount, field_of_view, noise } = sensor;
     let (state_dir, grid, input, output) = (None, None, None, None);
-    let (lanes, ground, obstacles, evidence, fixtures) = (None, None, None, None, None);
+    let (lanes, ground, obstacles, evidence, fixtures, probability) = (Vec::new(), None, None, None, None, None);
     Tables {
         unit,
         mount,
@@ -166,6 +213,7 @@ fn tables(settings: &Settings) -> Tables {
         evidence,
         fixtures,
         ground,
+        probability,
     }
 }
 
@@ -175,7 +223,7 @@ mod tests {
 
     #[test]
     fn the_example_explains_every_key_with_its_default() {
-        let example = parse(EXAMPLE).unwrap().settings;
+        let example = parse(EXAMPLE).unwrap().0.settings;
         assert_eq!(example, Settings { sensor: example.sensor, ..Settings::of(example.sensor) });
         // what is commented out is what counts without it
         let all: String = EXAMPLE
@@ -183,7 +231,7 @@ mod tests {
             .map(|line| line.strip_prefix('#').filter(|rest| !rest.starts_with(' ')).unwrap_or(line))
             .map(|line| format!("{line}\n"))
             .collect();
-        assert_eq!(parse(&all).unwrap().settings, example);
+        assert_eq!(parse(&all).unwrap().0.settings, example);
         for line in text(&example).unwrap().lines().filter(|line| !line.is_empty()) {
             let key = line.split(" = ").next().unwrap();
             assert!(all.lines().any(|l| l.starts_with(key)), "{key} is not explained");
@@ -192,17 +240,17 @@ mod tests {
 
     #[test]
     fn settings_come_back_from_their_own_text() {
-        let mut settings = parse(EXAMPLE).unwrap().settings;
+        let mut settings = parse(EXAMPLE).unwrap().0.settings;
         settings.sensor.noise.range_m = 0.1;
         settings.unit.serial_baud = 921_600;
         let text = text(&settings).unwrap();
         assert!(text.contains("range_m = 0.1\n"), "{text}");
-        assert_eq!(parse(&text).unwrap().settings, settings);
+        assert_eq!(parse(&text).unwrap().0.settings, settings);
     }
 
     #[test]
     fn the_daemons_file_is_taken_and_what_is_not_in_a_block_is_told() {
-        let file = parse(include_str!("../../../../boards/linux/viewshed.toml")).unwrap();
+        let (file, _) = parse(include_str!("../../../../boards/linux/viewshed.toml")).unwrap();
         assert_eq!(file.left_out, ["[input]", "[output]"]);
         assert_eq!(file.settings.sensor.mount.height_m, 6.0);
     }
@@ -225,7 +273,7 @@ mod tests {
 
     #[test]
     fn differences_have_names_and_both_values() {
-        let a = parse(EXAMPLE).unwrap().settings;
+        let a = parse(EXAMPLE).unwrap().0.settings;
         let mut b = a;
         b.sensor.mount.height_m = 5.5;
         b.broadcast_bus.bit_rate = 250_000;

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 use viewshed::unit::said::Said;
-use viewshed::unit::settings::BLOCK_LEN;
+use viewshed::unit::service::Which;
+use viewshed::unit::settings::Kind;
 
 /// What a unit is asked.
 #[derive(Debug, Clone, Copy)]
@@ -13,18 +14,20 @@ pub enum Ask<'a> {
     Identify,
     /// Of the units of one number this chip's alone takes what follows; 0: all of them.
     Address(u32),
-    /// The block in use.
-    Read,
-    /// The block that counts from the next start on.
-    ReadNewest,
-    /// Write this block.
-    Write(&'a [u8; BLOCK_LEN]),
-    /// A part of it again, where it travels in parts.
-    Again(&'a [u8; BLOCK_LEN], u8),
+    /// A block, whole.
+    Read(Which),
+    /// A block from this place on: whole on a bus, a part of it on a serial line.
+    ReadPart(Which, u16),
+    /// Write this block: whole on a bus and where it fits a message, else its first part.
+    Write(&'a [u8]),
+    /// What follows the part before, on a serial line.
+    Part(&'a [u8], u16),
+    /// A part of it again, on a bus.
+    Again(&'a [u8], u8),
     /// Start over.
     Restart,
-    /// Empty both slots.
-    Clear,
+    /// Empty both slots of a kind.
+    Clear(Kind),
     /// Say how long frames take.
     Timing,
 }

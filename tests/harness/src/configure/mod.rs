@@ -1,15 +1,17 @@
 //! A unit's configuration from here: found, checked, written, read back, restarted.
 //!
 //! ```text
-//! unit.toml ──> settings ──> block ──┐
+//! unit.toml ──> file ──> blocks ─────┐
 //!                                    ├──> link: serial port, CAN bus ──> unit
 //! what a unit says <── steps <───────┘
 //! ```
-//! Nothing is written before a unit said which one it is. A unit keeps its old block whatever happens on the way: it takes a
+//! A file is the whole truth of a unit: lanes, heights and a table of probabilities that it does not have are taken from the
+//! unit. Nothing is written before a unit said which one it is. A unit keeps its old block whatever happens on the way: it takes a
 //! new one whole, into the slot that is not in use, and from its next start on.
 
 pub mod can;
 pub mod file;
+pub mod kept;
 pub mod link;
 pub mod serial;
 #[cfg(target_os = "linux")]
@@ -18,11 +20,12 @@ pub mod socketcan;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use viewshed::unit::can_service::{INCOMPLETE, PARTS};
+use viewshed::unit::can_service::INCOMPLETE;
 use viewshed::unit::identity::Identified;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::said::{Refusal, Said};
-use viewshed::unit::settings::{BlockError, Settings, SettingsCheck};
+use viewshed::unit::service::{PART_LEN, Which};
+use viewshed::unit::settings::{BlockError, Kind, Settings, SettingsCheck};
 use viewshed::unit::timing::Took;
 
 use link::{Ask, Link};
@@ -36,9 +39,8 @@ const ANSWER: Duration = Duration::from_secs(2);
 const ALL: Duration = Duration::from_millis(400);
 /// Time a unit may take to erase and write a slot: parts with large sectors take seconds.
 const WRITING: Duration = Duration::from_secs(10);
-/// The last part of a block.
-#[allow(clippy::cast_possible_truncation)] // at most 63
-const LAST_PART: u8 = PARTS as u8 - 1;
+/// What counts whatever goes wrong while a block is sent.
+const OLD: &str = "its old block is in force";
 /// Parts that are sent again at most.
 const MOST_LOST: usize = 64;
 
@@ -201,7 +203,7 @@ impl Found<'_> {
     fn read_block(&mut self, what: Ask<'_>) -> Result<Result<Stored, BlockError>> {
         let heard = self.ask(what, 4 * ANSWER, |said| match said {
             Said::Block(block) => {
-                Some(Settings::from_block(&block).map(|(sequence, settings)| Stored { sequence, settings }))
+                Some(Settings::from_block(block.bytes()).map(|(sequence, settings)| Stored { sequence, settings }))
             }
             // there is none
             Said::Refused(_) => Some(Err(BlockError::Empty)),
@@ -218,7 +220,7 @@ impl Found<'_> {
     /// # Errors
     /// It does not answer.
     pub fn in_use(&mut self) -> Result<Result<Stored, BlockError>> {
-        self.read_block(Ask::Read)
+        self.read_block(Ask::Read(Which::in_use(Kind::Settings)))
     }
 
     /// The block it will run with from its next start on.
@@ -226,7 +228,7 @@ impl Found<'_> {
     /// # Errors
     /// It does not answer.
     pub fn newest(&mut self) -> Result<Result<Stored, BlockError>> {
-        self.read_block(Ask::ReadNewest)
+        self.read_block(Ask::Read(Which::newest(Kind::Settings)))
     }
 
     /// Writes settings and reads them back; the block's sequence.
@@ -234,10 +236,22 @@ impl Found<'_> {
     /// # Errors
     /// It refuses them, by the parameter's name; it falls silent; it says other ones afterwards.
     pub fn write(&mut self, settings: &Settings) -> Result<u32> {
-        let block = settings.to_block(0);
-        let place = self.place().to_owned();
-        let old = "its old block is in force";
-        self.link.ask(Ask::Write(&block))?;
+        let sequence = self.send(&settings.to_block(0))?;
+        let (place, stored) = (self.place().to_owned(), self.newest()?);
+        // a unit keeps lanes and heights in blocks of their own
+        let alone = Settings { lanes: &[], ground: &[], ..*settings };
+        let same = stored.as_ref().is_ok_and(|stored| *stored == Stored { sequence, settings: alone });
+        ensure!(same, "{place}: what reads back is not what was written: {stored:?}; {OLD}");
+        Ok(sequence)
+    }
+
+    /// Sends a block until the unit says that it is written; its sequence.
+    fn send(&mut self, block: &[u8]) -> Result<u32> {
+        let (place, old) = (self.place().to_owned(), OLD);
+        // the last part on a bus, the one that is missing on a serial line
+        let last_part = u8::try_from(block.len() / 4 - 1).unwrap_or(u8::MAX);
+        let mut missing = None;
+        self.link.ask(Ask::Write(block))?;
         let (begun, mut lost) = (Instant::now(), 0);
         let sequence = loop {
             let until = (begun + WRITING).min(Instant::now() + 4 * AGAIN);
@@ -247,23 +261,28 @@ impl Found<'_> {
                     lost += 1;
                     // without its first part the beginning may be lost as well
                     let part = refusal.detail[0];
-                    self.link.ask(if part == 0 { Ask::Write(&block) } else { Ask::Again(&block, part) })?;
+                    self.link.ask(if part == 0 { Ask::Write(block) } else { Ask::Again(block, part) })?;
                 }
                 Some(Said::Refused(refusal)) => bail!("{place}: the unit refuses the block: {}; {old}", why(&refusal)),
+                Some(Said::Came(next)) => {
+                    missing = Some(next);
+                    self.link.ask(Ask::Part(block, next))?;
+                }
                 Some(Said::Started(_)) => {
                     bail!("{place}: the unit started anew while it was written: its power? {old}; try again")
                 }
                 Some(_) => {}
                 // its end may be lost, or the answer; a unit that is writing answers nothing
-                None if begun.elapsed() < WRITING => self.link.ask(Ask::Again(&block, LAST_PART))?,
+                None if begun.elapsed() < WRITING => self.link.ask(match missing {
+                    None if !self.link.is_bus() && block.len() > PART_LEN => Ask::Write(block),
+                    None => Ask::Again(block, last_part),
+                    Some(next) => Ask::Part(block, next),
+                })?,
                 None => bail!(
                     "{place}: the unit does not answer since the block was sent; {old} or the new one, whole: --read tells"
                 ),
             }
         };
-        let stored = self.newest()?;
-        let same = stored.as_ref().is_ok_and(|stored| *stored == Stored { sequence, settings: *settings });
-        ensure!(same, "{place}: what reads back is not what was written: {stored:?}; {old}");
         Ok(sequence)
     }
 
@@ -296,12 +315,12 @@ impl Found<'_> {
         bail!("{}: the unit does not say that it started; is it powered?", self.place())
     }
 
-    /// Empties both slots.
+    /// Empties both slots of a kind.
     ///
     /// # Errors
     /// It does not answer.
-    pub fn clear(&mut self) -> Result<()> {
-        let cleared = self.ask(Ask::Clear, WRITING, |said| (said == Said::Cleared).then_some(()))?;
+    pub fn clear(&mut self, kind: Kind) -> Result<()> {
+        let cleared = self.ask(Ask::Clear(kind), WRITING, |said| (said == Said::Cleared).then_some(()))?;
         ensure!(cleared.is_some(), "{}: the unit does not say that its slots are empty; --read tells", self.place());
         Ok(())
     }
@@ -346,14 +365,15 @@ fn check_of(grid: [u8; 2]) -> Option<SettingsCheck> {
 
 /// A refusal in words.
 fn why(refusal: &Refusal) -> String {
-    match refusal.reason {
+    let (_, reason) = refusal.of_kind();
+    let [a, b, ..] = refusal.detail;
+    match reason {
         1 => "nothing of a block arrived".into(),
         2 => "it is cut off".into(),
         3 => {
-            let [high, low, ..] = refusal.detail;
             format!(
                 "its layout {} is none this firmware reads; use the viewshed that is as old as the firmware",
-                u16::from_be_bytes([high, low])
+                u16::from_be_bytes([a, b])
             )
         }
         4 => "its check sum does not hold".into(),
@@ -361,6 +381,14 @@ fn why(refusal: &Refusal) -> String {
         INCOMPLETE => {
             format!("part {} never arrived, {MOST_LOST} times: too much is lost on this line", refusal.detail[0])
         }
+        7 => "its firmware, or its memory, has no room for such blocks".into(),
+        8 => "edges of the table do not rise".into(),
+        9 => format!("the table falls with the grade, in azimuth {a}, range {b}"),
+        10 => format!(
+            "the table was fitted with another configuration; with these settings, lanes and heights it is {:08x}",
+            u32::from_be_bytes(refusal.detail)
+        ),
+        12 => format!("the table was fitted on a grid of {a} x {b}"),
         other => format!("reason {other}"),
     }
 }

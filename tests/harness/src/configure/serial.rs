@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use viewshed::unit::said::Said;
-use viewshed::unit::service::{EVERY_SENSOR, Request};
+use viewshed::unit::service::{EVERY_SENSOR, PART_LEN, Request};
 use viewshed::unit::settings::UnitConfig;
 use viewshed::wire::message::Received;
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
@@ -98,11 +98,13 @@ impl<P: Read + Write + Baud> Link for SerialLink<P> {
             Ask::Identify => Request::Identify,
             // there is one at the other end
             Ask::Address(_) | Ask::Again(..) => return Ok(()),
-            Ask::Read => Request::Read,
-            Ask::ReadNewest => Request::ReadNewest,
-            Ask::Write(block) => Request::Write(block),
+            Ask::Read(which) => Request::Read(which),
+            Ask::ReadPart(which, place) => Request::ReadPart(which, place),
+            Ask::Write(block) if block.len() <= PART_LEN => Request::Write(block),
+            Ask::Write(block) => part(block, 0),
+            Ask::Part(block, place) => part(block, place),
             Ask::Restart => Request::Restart,
-            Ask::Clear => Request::Clear,
+            Ask::Clear(kind) => Request::Clear(kind),
             Ask::Timing => Request::Timing,
         };
         let message = request.message(self.sensor, self.counter);
@@ -169,6 +171,12 @@ impl<P: Read + Write + Baud> Link for SerialLink<P> {
             None => Ok(false),
         }
     }
+}
+
+/// The part of a block that begins at this place.
+fn part(block: &[u8], place: u16) -> Request<'_> {
+    let rest = block.get(usize::from(place)..).unwrap_or(&[]);
+    Request::Part(place, rest.get(..PART_LEN).unwrap_or(rest))
 }
 
 fn is_wait(kind: ErrorKind) -> bool {

@@ -7,9 +7,12 @@ use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::map::Visibility;
-use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, Settings};
-use viewshed::wire::message::{Addresses, Received};
+use viewshed::unit::profile::reference::Map;
+use viewshed::unit::said::Said;
+use viewshed::unit::service::{Request, Which};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, Kind, Settings};
+use viewshed::wire::message::{Addresses, Plane, Received};
+use viewshed::wire::planes::{Planes, Quantised};
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
 use viewshed::wire::status::{Reason, UnitState};
@@ -19,8 +22,9 @@ use viewshed_harness::boards::machine::{Emulator, Folder, Lines};
 use viewshed_harness::boards::scans::Scan;
 use viewshed_harness::boards::serial::{Far, LINES, SerialBoard, Waiting};
 use viewshed_harness::boards::{Board, Profile, firmware};
+use viewshed_harness::configure;
 
-use crate::shipped;
+use crate::{kept, shipped};
 
 /// A board that runs the live program; the emulator ends with it.
 struct Running {
@@ -253,9 +257,9 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     let mut other = settings;
     other.visibility.visible_from = 0.8;
     script.request(&Request::Write(&other.to_block(0)));
-    script.request(&Request::Read);
+    script.request(&Request::Read(Which::in_use(Kind::Settings)));
     script.request(&Request::Restart);
-    script.request(&Request::Read);
+    script.request(&Request::Read(Which::in_use(Kind::Settings)));
     scans.iter().for_each(|s| script.scan(s, scans[0].time));
     script.request(&Request::Restart);
     let board = same(Profile::Small, &script);
@@ -269,6 +273,65 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     assert_eq!(blocks.len(), 2);
     assert_eq!((blocks[0].1, blocks[1].1), (settings, other));
     assert_eq!((blocks[0].0, blocks[1].0), (1, 2), "sequences");
+}
+
+#[test]
+#[ignore = "needs QEMU"]
+fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_maps_of_a_pc() {
+    let (settings, scans) = shipped(2.0);
+    let first = scans[0].time;
+    let mut script = Script::default();
+    script.configure(&settings);
+    kept::blocks(&settings).iter().for_each(|block| script.write(block));
+    // not before the restart
+    script.request(&Request::ReadPart(Which::in_use(Kind::Lanes), 0));
+    script.request(&Request::ReadPart(Which::newest(Kind::Lanes), 0));
+    script.request(&Request::Restart);
+    script.request(&Request::ReadPart(Which::in_use(Kind::Lanes), 0));
+    scans.iter().for_each(|s| script.scan(s, first));
+    let board = same(Profile::Reference, &script);
+    let all = messages(&board.line.answer);
+    let said: Vec<Said> = all.iter().filter_map(|m| Said::read(m, SENSOR)).collect();
+    let written = said.iter().filter(|said| **said == Said::Written(1)).count();
+    assert_eq!(written, 4, "settings, heights, lanes, table");
+    let [_, lanes, _] = kept::blocks(&settings);
+    let of_lanes = |said: &&Said| match said {
+        Said::Part(which, ..) => which.kind == Kind::Lanes,
+        Said::Refused(refusal) => refusal.of_kind().0 == Some(Kind::Lanes),
+        _ => false,
+    };
+    let parts: Vec<_> = said.iter().filter(of_lanes).collect();
+    let [Said::Refused(none), Said::Part(_, 0, newest), Said::Part(_, 0, in_use)] = parts[..] else {
+        panic!("{parts:?}")
+    };
+    assert_eq!((none.of_kind(), newest), ((Some(Kind::Lanes), BlockError::Empty.code()), in_use));
+    assert!(configure::kept::same(newest.bytes(), &lanes));
+
+    let (header, map, quantiser) = kept::on_a_pc(&kept::with_place(&settings), &scans);
+    let mut far = Receiver::<1, 120, 7, 2>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+    let expected = board.expected.as_ref().unwrap();
+    let mut from = 0;
+    for (to, now) in &expected.times {
+        for message in messages(&expected.bytes[from..*to]).iter().filter(|m| Received::from_bytes(m).is_ok()) {
+            let _ = far.message(*now, message);
+        }
+        from = *to;
+    }
+    let now = on_the_line(scans.last().unwrap().time, first);
+    let received = far.map(SENSOR, now);
+    let told = received.header().unwrap();
+    assert_eq!((told.fingerprint, told.probability), (header.fingerprint, Some(quantiser.levels())));
+    let cells = |map: &Map| -> usize {
+        let quantised = Quantised { map, quantiser: &quantiser };
+        let of_ray = |a| {
+            let ray = Planes::<7>::ray(&quantised, Plane::Visibility, a);
+            (0..200).filter(|r| ray.bits().get(*r) == (received.cell(a, *r).visibility == Visibility::Visible)).count()
+        };
+        (0..120).map(of_ray).sum()
+    };
+    let (_, flat, _) = kept::on_a_pc(&settings, &scans);
+    let (equal, of_flat) = (cells(&map), cells(&flat));
+    assert!(equal == 24_000 && of_flat < 23_500, "{equal} of 24000 cells are the PC's, {of_flat} those of a flat road");
 }
 
 #[test]

@@ -7,7 +7,8 @@ use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{Answers, Tool};
 use viewshed::unit::said::Said;
-use viewshed::unit::settings::Settings;
+use viewshed::unit::service::Which;
+use viewshed::unit::settings::{Kind, Settings};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::can::CanBoard;
@@ -111,7 +112,7 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
         steps.push(Step { time: at(1000 + 100 * k as u64), frames: tool.write(block).collect() });
     }
     steps.push(Step { time: at(1300), frames: tool.restart().into_iter().collect() });
-    steps.push(Step { time: at(1320), frames: tool.read().into_iter().collect() });
+    steps.push(Step { time: at(1320), frames: tool.read(Which::in_use(Kind::Settings)).into_iter().collect() });
     let mut traffic = clusters(&scans, 20, 40);
     traffic.iter_mut().for_each(|step| step.time = Time::from_micros(step.time.micros() + 1_400_000));
     steps.extend(traffic.clone());
@@ -131,7 +132,7 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
     assert_eq!(refused, [(1, String::new()), (4, String::new()), (5, "mount.height_m".to_owned())]);
     assert!(all.contains(&Said::Written(1)) && all.contains(&Said::Started(Some((0, 1)))), "{all:?}");
     let read = all.iter().find_map(|told| if let Said::Block(block) = told { Some(block) } else { None });
-    assert_eq!(Settings::from_block(read.unwrap()), Ok((1, settings)));
+    assert_eq!(Settings::from_block(read.unwrap().bytes()), Ok((1, settings)));
     let (listener, told) = heard(&sent[..20]);
     let status = listener.receiver().sensor(SENSOR).and_then(|s| s.status().copied()).unwrap();
     assert_eq!((status.state, status.reason), (UnitState::Fault, Reason::Configuration));
