@@ -25,7 +25,7 @@ use crate::sensor::road::RoadPoint;
 pub type Lane = &'static [[f32; 2]];
 
 /// Whether there is room for any.
-const ROOM: bool = cfg!(feature = "lanes");
+pub const ROOM: bool = cfg!(feature = "lanes");
 /// Most lanes.
 pub const MOST_LANES: usize = if ROOM { 64 } else { 0 };
 /// Most segments of all lanes together.

@@ -22,7 +22,7 @@ use crate::sensor::mount::Levelling;
 use crate::sensor::place::Points;
 
 /// Whether there is room for any.
-const ROOM: bool = cfg!(feature = "ground");
+pub const ROOM: bool = cfg!(feature = "ground");
 /// Most points of a profile.
 pub const MOST_HEIGHTS: usize = if ROOM { 16 } else { 0 };
 

@@ -82,7 +82,7 @@ impl<'a> Iterator for LaneList<'a> {
                 Some(Points::Metres(first))
             }
             Self::Bytes(bytes) => {
-                let mut head = Reader(*bytes);
+                let mut head = Reader(bytes);
                 let [count] = head.take()?;
                 let further = usize::from(count).checked_sub(1)?;
                 let first = [head.i24()?, head.i24()?];
@@ -105,14 +105,14 @@ impl Iterator for Points<'_> {
                 Some(*first)
             }
             Self::Heights(bytes) => {
-                let mut r = Reader(*bytes);
+                let mut r = Reader(bytes);
                 let point = [r.f32()?, r.f32()?];
                 *bytes = r.0;
                 Some(point)
             }
             Self::Lane(next, bytes) => {
                 let point = (*next)?;
-                let mut r = Reader(*bytes);
+                let mut r = Reader(bytes);
                 let further = |r: &mut Reader<'_>| Some([i32::from(r.i16()?), i32::from(r.i16()?)]);
                 *next = further(&mut r).map(|[dx, dy]| [point[0].saturating_add(dx), point[1].saturating_add(dy)]);
                 *bytes = r.0;

@@ -1,8 +1,7 @@
 //! What a unit says to its integrator, whatever line it came over.
 
 use super::identity::Identified;
-use super::service::Which;
-use super::settings::{Kind, MOST_BLOCK_LEN};
+use super::settings::{Kind, MOST_BLOCK_LEN, Which};
 use super::timing::Took;
 
 /// Why a unit refused a block.

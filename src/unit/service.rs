@@ -40,7 +40,7 @@ use crate::fixed::time::Time;
 use crate::sensor::config::ConfigError;
 use crate::unit::identity::{Identified, Identity};
 use crate::unit::said::{Piece, Refusal, Said};
-use crate::unit::settings::{BlockError, Kind, StoredError};
+use crate::unit::settings::{BlockError, Kind, StoredError, Which};
 use crate::unit::timing::{Count, Took};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
@@ -74,37 +74,6 @@ pub enum Request<'a> {
     Clear(Kind),
     /// Say how long frames take.
     Timing,
-}
-
-/// Which block is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Which {
-    /// What it is of.
-    pub kind: Kind,
-    /// The one that counts from the next restart on, instead of the one in use.
-    pub newest: bool,
-}
-
-impl Which {
-    /// The one in use.
-    pub const fn in_use(kind: Kind) -> Self {
-        Self { kind, newest: false }
-    }
-
-    /// The one that counts from the next restart on.
-    pub const fn newest(kind: Kind) -> Self {
-        Self { kind, newest: true }
-    }
-
-    /// On the wire.
-    pub const fn number(self) -> u8 {
-        2 * self.kind.number() + self.newest as u8
-    }
-
-    /// Of a number on the wire.
-    pub fn from_number(number: u8) -> Option<Self> {
-        Kind::from_number(number / 2).map(|kind| Self { kind, newest: number % 2 != 0 })
-    }
 }
 
 /// What the unit answers.

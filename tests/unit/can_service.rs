@@ -7,8 +7,9 @@ use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig,
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::small;
 use viewshed::unit::said::{Piece, Said};
-use viewshed::unit::service::Which;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Kind, Settings, SettingsSlots, StoredError, StoredSettings};
+use viewshed::unit::settings::{
+    BLOCK_LEN, BlockError, Kind, Settings, SettingsSlots, StoredError, StoredSettings, Which,
+};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::message::{Addresses, Epoch, Packet, Packing};

@@ -11,11 +11,11 @@ use viewshed::unit::identity::Identity;
 use viewshed::unit::quantised::QuantisedSender;
 use viewshed::unit::said::Said;
 use viewshed::unit::serial_service::SerialLine;
-use viewshed::unit::service::{PART_LEN, Request, Which};
+use viewshed::unit::service::{PART_LEN, Request};
 use viewshed::unit::session::SerialSession;
 use viewshed::unit::settings::{
     BLOCK_LEN, BlockError, Kind, MOST_BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredError, StoredSettings,
-    heights_block, lanes_block, table_block,
+    Which, heights_block, lanes_block, table_block,
 };
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::header::Header;

@@ -8,7 +8,8 @@ use viewshed::sensor::config::{ConfigError, Problem};
 use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Settings};
+use viewshed::sensor::place::{LaneList, Points};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, MOST_BLOCK_LEN, Settings, heights_block, lanes_block};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
@@ -117,4 +118,40 @@ fn the_rest_of_the_block_is_as_on_the_page() {
         (refused.parameter, refused.problem),
         ("field_of_view.azimuth_max_deg", Problem::NotAscending { lower: 60.0 })
     );
+}
+
+/// Blocks of a place as on the page: heights and a lane that bends, and the fingerprint with both.
+#[test]
+fn blocks_of_a_place_are_these_bytes_and_the_fingerprint_goes_on_with_them() {
+    const HEIGHTS: [[f32; 2]; 3] = [[-200.0, 100.0], [0.0, 103.5], [150.0, 101.25]];
+    const LANE: &[[f32; 2]] = &[[-50.0, -1.75], [20.05, -1.75], [30.0, 8.2]];
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02X}")).collect::<String>();
+    let mut here = String::new();
+    let mut block = [0; MOST_BLOCK_LEN];
+    let length = heights_block(Points::Metres(&HEIGHTS), &mut block).unwrap();
+    here += &(hex(&block[..length]) + "\n");
+    // from the page: 12 + 2 + 2 + 3 x 8 + 4 bytes
+    assert_eq!((length, &block[6..8], &block[12..20]), (44, &[44, 0][..], &[3, 0, 0, 0, 0, 0, 0x48, 0xC3][..]));
+    assert_eq!(block[40..44], CRC.checksum(&block[..40]).to_le_bytes());
+    let length = lanes_block(LaneList::Metres(&[LANE]), &mut block).unwrap();
+    here += &(hex(&block[..length]) + "\n");
+    // 12 + 2 + 2 + 1 + 6 + 2 x 4, filled up to 32, + 4 bytes
+    assert_eq!((length, &block[12..17], &block[31..32]), (36, &[1, 0, 15, 0, 3][..], &[0][..]));
+    assert_eq!(
+        block[17..27],
+        [0x78, 0xEC, 0xFF, 0x51, 0xFF, 0xFF, 0x5D, 0x1B, 0, 0],
+        "-5000, -175; 7005 on, 0 to the left"
+    );
+
+    let settings = Settings { lanes: &[LANE], ground: &HEIGHTS, ..settings() };
+    let goes_on =
+        |sum: u32, a: u32, b: u32| CRC.checksum(&[sum.to_le_bytes(), a.to_le_bytes(), b.to_le_bytes()].concat());
+    let points =
+        |sum, points: &[[f32; 2]]| points.iter().fold(sum, |sum, [x, y]| goes_on(sum, x.to_bits(), y.to_bits()));
+    let plain = Settings { lanes: &[], ground: &[], ..settings }.fingerprint();
+    let with_lane = points(goes_on(plain, 1, 0), LANE);
+    let expected = points(goes_on(with_lane, 1 << 19, 0), &HEIGHTS);
+    assert_eq!(settings.fingerprint(), expected);
+    here += &format!("{plain:08X} {expected:08X}\n");
+    assert_eq!(fenced("place"), here.lines().collect::<Vec<_>>(), "the page's example is now:\n{here}");
 }

@@ -53,8 +53,7 @@ pub use tool::{Answers, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
 use crate::fixed::bits::Bits;
-use crate::unit::service::Which;
-use crate::unit::settings::{Kind, MOST_BLOCK_LEN};
+use crate::unit::settings::{Kind, MOST_BLOCK_LEN, Which};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet, Received};

@@ -3,8 +3,7 @@
 use super::{ANSWER, BlockAnswer, BlockRequest, Came, REQUEST, frame, received};
 use crate::unit::identity::Identified;
 use crate::unit::said::{Piece, Refusal, Said};
-use crate::unit::service::Which;
-use crate::unit::settings::Kind;
+use crate::unit::settings::{Kind, Which};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;

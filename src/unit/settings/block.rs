@@ -13,7 +13,7 @@ use crate::radar_3d::VisibilityConfig;
 use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, Problem};
 use crate::sensor::field_of_view::FieldOfView;
-use crate::sensor::ground::MOST_HEIGHTS;
+use crate::sensor::ground;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
 use crate::sensor::place::Place;
@@ -87,7 +87,7 @@ impl Settings {
             let fixtures = self.fixtures().into_iter().flat_map(|fixtures| fixtures.numbers());
             (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
         }
-        if let Some(first) = heights.next().filter(|_| MOST_HEIGHTS > 0) {
+        if let Some(first) = heights.next().filter(|_| ground::ROOM) {
             take([1 << 19, 0]);
             core::iter::once(first).chain(heights).for_each(|point| take(point.map(f32::to_bits)));
         }

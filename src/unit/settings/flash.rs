@@ -10,13 +10,11 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
+use super::kind::word;
 use super::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SettingsSlots};
 
-/// The longest block up to the next whole word of any flash memory, which has at most 32 bytes.
-const MOST_STORED_LEN: usize = MOST_BLOCK_LEN.next_multiple_of(WORD);
-
-/// Bytes of the longest word of any flash memory.
-const WORD: usize = 32;
+/// The longest block up to the next whole word.
+const MOST_STORED_LEN: usize = word(MOST_BLOCK_LEN);
 
 /// Slots at so many places of a memory, two for each kind of block, settings first.
 #[derive(Debug)]
@@ -53,7 +51,7 @@ impl<F: NorFlash, const N: usize> FlashSlots<F, N> {
 
 /// Where the copy of a slot lies.
 fn range(slot: usize) -> core::ops::Range<usize> {
-    let length = |slot| Kind::of_slot(slot).map_or(0, |kind| kind.most_len().next_multiple_of(WORD));
+    let length = |slot| Kind::of_slot(slot).map_or(0, |kind| word(kind.most_len()));
     let from = (0..slot).map(length).sum();
     from..from + length(slot)
 }
@@ -180,7 +178,7 @@ mod tests {
         Settings::newest([slots.slot(0), slots.slot(1)], |_| Ok(())).ok().map(|n| n.settings.gate.max_detections)
     }
 
-    const STORED_LEN: usize = BLOCK_LEN.next_multiple_of(WORD);
+    const STORED_LEN: usize = word(BLOCK_LEN);
 
     fn works_on<const WORD: usize, const PAGE: usize>() {
         let length = STORED_LEN.next_multiple_of(PAGE);

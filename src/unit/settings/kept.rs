@@ -20,25 +20,13 @@
 //! | probabilities | ranges and azimuths of the grid it was fitted on (1 byte each); what is visible: 0 what has the map's least grade, 1 what has at least the next byte's probability, 2 nothing (1 byte); that probability in 1/255 (1 byte); the table as [`probability`](crate::probability) has it |
 
 use super::BlockError;
-use super::kind::Kind;
+#[cfg(feature = "probability")]
+use super::kind::TABLE_LEN;
+use super::kind::{COUNT_LEN, HEADER_LEN, Kind, SUM_LEN};
 use crate::fixed::bytes::{Reader, Writer, fingerprint};
 #[cfg(feature = "probability")]
 use crate::probability::{self, ProbabilityTable, Threshold};
 use crate::sensor::place::{HEIGHT_LEN, LaneList, PackError, Points};
-
-/// Bytes of magic, layout, length and sequence.
-const HEADER_LEN: usize = 12;
-/// Bytes of the check sum.
-const SUM_LEN: usize = 4;
-/// Bytes of the two numbers before points.
-const COUNT_LEN: usize = 4;
-/// Bytes of a block of points that are none.
-pub(super) const BYTES_AROUND: usize = HEADER_LEN + COUNT_LEN + SUM_LEN;
-/// Bytes of a block with a table; 0 where there is no room for one.
-#[cfg(feature = "probability")]
-pub(super) const TABLE_LEN: usize = (BYTES_AROUND + probability::BLOCK_LEN).next_multiple_of(4);
-#[cfg(not(feature = "probability"))]
-pub(super) const TABLE_LEN: usize = 0;
 
 const LAYOUT: u16 = 1;
 

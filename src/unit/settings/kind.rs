@@ -1,9 +1,8 @@
 //! The kinds of blocks a unit keeps.
 
 use super::BLOCK_LEN;
-use super::kept::{BYTES_AROUND, TABLE_LEN};
-use crate::obstacles::lanes::{MOST_LANES, MOST_SEGMENTS};
-use crate::sensor::ground::MOST_HEIGHTS;
+use crate::obstacles::lanes::{self, MOST_LANES, MOST_SEGMENTS};
+use crate::sensor::ground::{self, MOST_HEIGHTS};
 use crate::sensor::place::{HEIGHT_LEN, LANE_HEAD_LEN, LANE_POINT_LEN};
 
 /// What a block is of.
@@ -21,36 +20,45 @@ pub enum Kind {
     Probabilities,
 }
 
+/// Bytes of magic, layout, length and sequence.
+pub(super) const HEADER_LEN: usize = 12;
+/// Bytes of the check sum.
+pub(super) const SUM_LEN: usize = 4;
+/// Bytes of the two numbers before points, or a table.
+pub(super) const COUNT_LEN: usize = 4;
+/// Bytes of a block that are neither points nor a table.
+const BYTES_AROUND: usize = HEADER_LEN + COUNT_LEN + SUM_LEN;
+/// Bytes of a block with a table; 0 where there is no room for one.
+#[cfg(feature = "probability")]
+pub(super) const TABLE_LEN: usize = (BYTES_AROUND + crate::probability::BLOCK_LEN).next_multiple_of(4);
+#[cfg(not(feature = "probability"))]
+const TABLE_LEN: usize = 0;
+
+/// Bytes of the longest block of heights, and of lanes; 0 without room for any.
+const HEIGHTS_LEN: usize = if ground::ROOM { BYTES_AROUND + HEIGHT_LEN * MOST_HEIGHTS } else { 0 };
+const LANES_LEN: usize =
+    if lanes::ROOM { BYTES_AROUND + LANE_HEAD_LEN * MOST_LANES + LANE_POINT_LEN * MOST_SEGMENTS } else { 0 };
+
 /// Bytes of the longest block there is room for.
-pub const MOST_BLOCK_LEN: usize = {
-    let (mut most, mut k) = (0, 0);
-    while k < Kind::ALL.len() {
-        let here = LENGTHS[k];
-        most = if here > most { here } else { most };
-        k += 1;
-    }
-    most
-};
+pub const MOST_BLOCK_LEN: usize = max(max(BLOCK_LEN, HEIGHTS_LEN), max(LANES_LEN, TABLE_LEN));
 
 /// Bytes of all slots together, each up to a whole word of any flash memory.
-pub const ALL_SLOTS_LEN: usize = {
-    let (mut all, mut k) = (0, 0);
-    while k < Kind::ALL.len() {
-        all += 2 * LENGTHS[k].next_multiple_of(32);
-        k += 1;
-    }
-    all
-};
+pub const ALL_SLOTS_LEN: usize = 2 * (word(BLOCK_LEN) + word(HEIGHTS_LEN) + word(LANES_LEN) + word(TABLE_LEN));
 
 /// Slots of all kinds.
 pub const SLOTS: usize = 2 * Kind::ALL.len();
 
-const LENGTHS: [usize; 4] = [
-    BLOCK_LEN,
-    if MOST_HEIGHTS > 0 { BYTES_AROUND + HEIGHT_LEN * MOST_HEIGHTS } else { 0 },
-    if MOST_LANES > 0 { BYTES_AROUND + LANE_HEAD_LEN * MOST_LANES + LANE_POINT_LEN * MOST_SEGMENTS } else { 0 },
-    TABLE_LEN,
-];
+// parts of four bytes have numbers of one byte
+const _: () = assert!(MOST_BLOCK_LEN <= 4 * 255);
+
+const fn max(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
+}
+
+/// Up to a whole word of any flash memory, which has at most 32 bytes.
+pub(super) const fn word(length: usize) -> usize {
+    length.next_multiple_of(32)
+}
 
 impl Kind {
     /// All of them, in the order of their numbers.
@@ -69,10 +77,10 @@ impl Kind {
     /// Bytes of the longest block of it; 0 where this firmware has no room for it.
     pub const fn most_len(self) -> usize {
         match self {
-            Self::Settings => LENGTHS[0],
-            Self::Heights => LENGTHS[1],
-            Self::Lanes => LENGTHS[2],
-            Self::Probabilities => LENGTHS[3],
+            Self::Settings => BLOCK_LEN,
+            Self::Heights => HEIGHTS_LEN,
+            Self::Lanes => LANES_LEN,
+            Self::Probabilities => TABLE_LEN,
         }
     }
 
@@ -116,6 +124,37 @@ impl Kind {
     }
 }
 
+/// Which block is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Which {
+    /// What it is of.
+    pub kind: Kind,
+    /// The one that counts from the next restart on, instead of the one in use.
+    pub newest: bool,
+}
+
+impl Which {
+    /// The one in use.
+    pub const fn in_use(kind: Kind) -> Self {
+        Self { kind, newest: false }
+    }
+
+    /// The one that counts from the next restart on.
+    pub const fn newest(kind: Kind) -> Self {
+        Self { kind, newest: true }
+    }
+
+    /// On the wire.
+    pub const fn number(self) -> u8 {
+        2 * self.kind.number() + self.newest as u8
+    }
+
+    /// Of a number on the wire.
+    pub fn from_number(number: u8) -> Option<Self> {
+        Kind::from_number(number / 2).map(|kind| Self { kind, newest: number & 1 == 1 })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,8 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn no_block_is_longer_than_a_kilobyte_and_than_parts_of_four_bytes_have_numbers() {
-        assert!(MOST_BLOCK_LEN <= 4 * 255, "{MOST_BLOCK_LEN}");
+    fn blocks_are_whole_parts_of_four_bytes() {
         assert!(Kind::ALL.iter().all(|kind| kind.most_len().is_multiple_of(4)));
     }
 }

@@ -4,8 +4,8 @@ use crc::Crc;
 use proptest::prelude::*;
 use viewshed::unit::can_service::Tool;
 use viewshed::unit::said::{Piece, Refusal, Said};
-use viewshed::unit::service::{Request, Which};
-use viewshed::unit::settings::{BLOCK_LEN, Kind, SettingsSlots};
+use viewshed::unit::service::Request;
+use viewshed::unit::settings::{BLOCK_LEN, Kind, SettingsSlots, Which};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::status::{Reason, UnitState};
 

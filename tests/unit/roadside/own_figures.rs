@@ -1,7 +1,7 @@
 //! What a block says of the unit itself: its number, the bit rate of its line, how old its maps may get.
 
-use viewshed::unit::service::{Request, Which};
-use viewshed::unit::settings::{BLOCK_LEN, ConfigureRadar, Kind, Settings, UnitConfig};
+use viewshed::unit::service::Request;
+use viewshed::unit::settings::{BLOCK_LEN, ConfigureRadar, Kind, Settings, UnitConfig, Which};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::{VERSION, World, settings};

@@ -7,8 +7,7 @@ use std::time::Duration;
 use anyhow::{Result, bail, ensure};
 use viewshed::bench::stage::Stage;
 use viewshed::unit::profile::{reference, small};
-use viewshed::unit::service::Which;
-use viewshed::unit::settings::{BlockError, Kind, Settings};
+use viewshed::unit::settings::{BlockError, Kind, Settings, Which};
 use viewshed::unit::timing::Count;
 
 use serde_json::{Map, Value, json};

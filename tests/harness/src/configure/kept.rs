@@ -3,8 +3,7 @@
 use anyhow::{Result, bail, ensure};
 use viewshed::sensor::place::{LaneList, PackError, Points};
 use viewshed::unit::said::Said;
-use viewshed::unit::service::Which;
-use viewshed::unit::settings::{BlockError, Kind, MOST_BLOCK_LEN, heights_block, kept_points, lanes_block};
+use viewshed::unit::settings::{BlockError, Kind, MOST_BLOCK_LEN, Which, heights_block, kept_points, lanes_block};
 
 use super::link::Ask;
 use super::{ANSWER, Found};

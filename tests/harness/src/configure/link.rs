@@ -4,8 +4,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use viewshed::unit::said::Said;
-use viewshed::unit::service::Which;
-use viewshed::unit::settings::Kind;
+use viewshed::unit::settings::{Kind, Which};
 
 /// What a unit is asked.
 #[derive(Debug, Clone, Copy)]

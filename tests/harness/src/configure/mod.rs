@@ -24,8 +24,8 @@ use viewshed::unit::can_service::INCOMPLETE;
 use viewshed::unit::identity::Identified;
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::said::{Refusal, Said};
-use viewshed::unit::service::{PART_LEN, Which};
-use viewshed::unit::settings::{BlockError, Kind, Settings, SettingsCheck};
+use viewshed::unit::service::PART_LEN;
+use viewshed::unit::settings::{BlockError, Kind, Settings, SettingsCheck, Which};
 use viewshed::unit::timing::Took;
 
 use link::{Ask, Link};
@@ -202,6 +202,7 @@ impl Found<'_> {
 
     fn read_block(&mut self, what: Ask<'_>) -> Result<Result<Stored, BlockError>> {
         let heard = self.ask(what, 4 * ANSWER, |said| match said {
+            Said::Block(block) if block.bytes().is_empty() => Some(Err(BlockError::Empty)),
             Said::Block(block) => {
                 Some(Settings::from_block(block.bytes()).map(|(sequence, settings)| Stored { sequence, settings }))
             }

@@ -28,10 +28,12 @@ use viewshed_harness::boards::machine::{Emulator, Folder, Lines};
 use viewshed_harness::boards::serial::{Far, LINES, Waiting};
 use viewshed_harness::boards::{Board, Profile, firmware};
 use viewshed_harness::configure::can::{CanBus, CanLink};
-use viewshed_harness::configure::{Stored, Wanted, find};
+use viewshed_harness::configure::{self, Stored, Wanted, find};
+use viewshed_harness::evaluation::curve::Grades;
+use viewshed_harness::evaluation::probability::file::Fitted;
 
 use crate::live::device;
-use crate::shipped;
+use crate::{kept, shipped};
 
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("configure-{name}"));
@@ -40,13 +42,13 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-fn configure(folder: &Path, arguments: &[&str]) -> Output {
+fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(folder).arg("configure").args(arguments).output().unwrap()
 }
 
 /// Exit code, what was printed, and what was complained about.
 fn said(folder: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = configure(folder, arguments);
+    let output = run(folder, arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
 }
@@ -113,6 +115,92 @@ fn a_unit_is_configured_compared_read_and_emptied() {
     let (code, text, _) = ask(&["--factory"]);
     assert!(code == 0 && text.contains("emptied and restarted"), "{text}");
     assert!(ask(&["--read"]).2.contains("no configuration"));
+}
+
+/// Lanes and heights for the end of a file.
+const PLACE: &str = "\n[[lanes]]\npoints = [[0.0, -1.75], [60.55, -1.75], [150.0, -2.0]]\n\n[[lanes]]\npoints = [[150.0, 9.25], [0.0, 9.25]]\n\n[ground]\npoints = [[0.0, 101.2], [150.0, 105.7]]\n";
+
+#[test]
+fn lanes_heights_and_a_table_are_written_compared_read_and_taken_away_with_the_file() {
+    let folder = folder("place");
+    let port = device(Profile::Reference, true, Some);
+    let ask = |arguments: &[&str]| said(&folder, &[arguments, &["--port", &port]].concat());
+    file(&folder, "flat.toml", &[]);
+    let flat = std::fs::read_to_string(folder.join("flat.toml")).unwrap();
+    std::fs::write(folder.join("unit.toml"), flat.clone() + PLACE).unwrap();
+    let settings = configure::file::read(&folder.join("unit.toml")).unwrap().settings;
+    let table = Fitted { table: kept::table(settings.fingerprint()), counted: Grades::default() };
+    std::fs::write(folder.join("t.toml"), table.text().unwrap()).unwrap();
+    let whole = flat.clone() + PLACE + "\n[probability]\nfile = \"t.toml\"\n";
+    std::fs::write(folder.join("unit.toml"), whole).unwrap();
+
+    let (code, text, error) = ask(&["unit.toml", "--restart"]);
+    assert_eq!(code, 0, "{text}{error}");
+    for said in
+        ["[ground] written as block 1, 36 bytes", "[[lanes]] written as block 1", "[probability] written as block 1"]
+    {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let (code, text, _) = ask(&["unit.toml", "--check"]);
+    assert_eq!((code, text.lines().nth(1)), (0, Some("block 1 is what the file says")), "{text}");
+    // what is read is a file that says the same, but for the table, of which it names the check sum
+    let (_, text, _) = ask(&["--read"]);
+    assert!(text.contains("# a table of probabilities, in a block of check sum"), "{text}");
+    std::fs::write(folder.join("read.toml"), &text).unwrap();
+    let read = configure::file::read(&folder.join("read.toml")).unwrap().settings;
+    assert_eq!((read.fingerprint(), read.lanes.len(), read.ground.len()), (settings.fingerprint(), 2, 2));
+    let (code, text, _) = ask(&["read.toml", "--check"]);
+    assert_eq!((code, text.lines().nth(1)), (1, Some("[probability]: is there in the unit, is not there in the file")));
+    // nothing is written twice
+    let (_, text, _) = ask(&["unit.toml"]);
+    assert!(text.contains("written as block 2") && !text.contains("[[lanes]]"), "{text}");
+
+    // another profile of the road: the table is not of that one, and the unit says so
+    let steeper = std::fs::read_to_string(folder.join("unit.toml")).unwrap().replace("105.7", "107.7");
+    std::fs::write(folder.join("steeper.toml"), steeper).unwrap();
+    let (code, text, _) = ask(&["steeper.toml", "--check"]);
+    assert_eq!((code, text.lines().nth(1)), (1, Some("[ground]: another in the unit, one in the file")), "{text}");
+    // a file is the whole truth
+    let (code, text, error) = ask(&["flat.toml", "--restart"]);
+    assert_eq!(code, 0, "{text}{error}");
+    for key in ["[ground]", "[[lanes]]", "[probability]"] {
+        assert!(text.contains(&format!("{key} taken from the unit: the file has none")), "{text}");
+    }
+    let (_, text, _) = ask(&["--read"]);
+    assert!(!text.contains("points") && !text.contains("table of probabilities"), "{text}");
+}
+
+#[test]
+fn what_a_unit_cannot_keep_is_said_before_anything_is_written() {
+    let folder = folder("refused");
+    let port = own_unit(Some);
+    let (_, example, _) = said(&folder, &["--example"]);
+    let refused = |place: &str| {
+        std::fs::write(folder.join("unit.toml"), example.clone() + place).unwrap();
+        let (code, _, error) = said(&folder, &["unit.toml", "--port", &port]);
+        assert_eq!(code, 2, "{place}: {error}");
+        assert!(said(&folder, &["--port", &port, "--read"]).2.contains("no configuration"), "{place}");
+        error
+    };
+    for (place, why) in [
+        ("[[lanes]]\npoints = [[0.0, 0.0], [60.555, 0.0]]", "lane 0 has a point that is not of whole centimetres"),
+        ("[[lanes]]\npoints = [[0.0, 0.0], [340.0, 0.0]]", "lane 0 has two points more than 327 m apart"),
+        ("[[lanes]]\npoints = [[0.0, 0.0]]", "lanes: lane 0 has fewer than two points"),
+        ("[ground]\npoints = [[0.0, 0.0], [10.0, 2.0]]", "before point 1 the road is steeper than 12 %"),
+        ("[probability]\nfile = \"none.toml\"", "probability.file: none.toml"),
+        ("[probability]\nfile = \"none.toml\"\nrisk = 10.0", "probability.risk is not between 0 and 1"),
+    ] {
+        let error = refused(place);
+        assert!(error.contains(why), "{place}: {error}");
+    }
+    // tables are fitted on the reference grid, and this unit has the small one
+    std::fs::write(folder.join("plain.toml"), &example).unwrap();
+    let settings = configure::file::read(&folder.join("plain.toml")).unwrap().settings;
+    let table = Fitted { table: kept::table(settings.fingerprint()), counted: Grades::default() };
+    std::fs::write(folder.join("t.toml"), table.text().unwrap()).unwrap();
+    std::fs::write(folder.join("unit.toml"), example.clone() + "[probability]\nfile = \"t.toml\"\n").unwrap();
+    let (code, _, error) = said(&folder, &["unit.toml", "--port", &port]);
+    assert!(code == 2 && error.contains("the table was fitted on a grid of 200 x 120"), "{error}");
 }
 
 #[test]
