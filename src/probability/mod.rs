@@ -219,6 +219,17 @@ impl ProbabilityTable {
     ) -> Option<Probability> {
         let (x, y) = geometry.levelling.place(point);
         let (azimuth, range) = geometry.locate(x, y, ranges, azimuths)?;
+        self.in_cell(geometry, azimuths, grade, [azimuth, range])
+    }
+
+    /// The same of a cell by its numbers, of a map of so many azimuths.
+    pub fn in_cell(
+        &self,
+        geometry: &PolarGeometry,
+        azimuths: usize,
+        grade: u8,
+        [azimuth, range]: [usize; 2],
+    ) -> Option<Probability> {
         let middle_cm = i32::try_from(range).ok()? * geometry.cell_cm + geometry.cell_cm / 2;
         self.look_up(grade, middle_cm, geometry.middle_of(azimuth, azimuths))
     }

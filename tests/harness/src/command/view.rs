@@ -15,10 +15,12 @@ use super::key::KeyArgs;
 use super::label::open;
 use super::options::SettingsArgs;
 use super::print;
+use super::replay::risk::{quantiser, share};
 use crate::bus::ears::Key;
 use crate::bus::listening::Listening;
 use crate::bus::logged::{self, Logged};
 use crate::evaluation::Settings;
+use crate::evaluation::probability::file::Fitted;
 use crate::pages::server::{LOOPBACK, Server};
 use crate::pages::view::broadcast::Receiving;
 use crate::pages::view::{About, Viewing, recorded};
@@ -76,6 +78,14 @@ pub struct Args {
     bind: IpAddr,
     #[command(flatten)]
     key: KeyArgs,
+    /// Table of this recording's unit, NAME.probability.toml of `viewshed experiment --calibration --tables`
+    ///
+    /// A click on a cell then says how often a vehicle there is detected, and what a receiver knows of that.
+    #[arg(long, value_name = "FILE", requires = "file", help_heading = "Probability")]
+    probability: Option<PathBuf>,
+    /// What is sent is visible where at most this share of vehicles is missed, above 0 to below 1
+    #[arg(long, value_name = "SHARE", requires = "probability", value_parser = share, help_heading = "Probability")]
+    risk: Option<f64>,
     #[command(flatten)]
     settings: SettingsArgs,
 }
@@ -89,7 +99,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let key = args.key.key()?;
     let settings = args.settings.settings()?;
     let (viewing, says) = match (&args.file, &args.port, &args.can) {
-        (Some(path), ..) => from_file(path, addresses, key.as_ref(), args.every, settings)?,
+        (Some(path), ..) => from_file(path, args, addresses, key.as_ref(), settings)?,
         (_, Some(port), _) => from_port(port, args.baud, addresses, key.as_ref())?,
         (_, _, Some(interface)) => from_can(interface, addresses, key.as_ref())?,
         _ => bail!("neither a file nor a port nor an interface"),
@@ -107,16 +117,22 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 /// A log of a broadcast if it holds one, else a recording.
 fn from_file(
     path: &Path,
+    args: &Args,
     addresses: Addresses,
     key: Option<&Key>,
-    every_s: f64,
     settings: Settings,
 ) -> Result<(Arc<Viewing>, String)> {
+    let fitted = args.probability.as_ref().map(|path| Fitted::read(path)).transpose()?;
     if let Ok((lines, unread)) = logged::read(path, None) {
         let mut trial = Listening::new(addresses, key);
         lines.iter().for_each(|line| trial.take_logged(line));
         if !trial.sensors().is_empty() {
-            return Ok(from_log(path, lines, unread, Listening::new(addresses, key), every_s));
+            ensure!(
+                fitted.is_none(),
+                "--probability: {} is the log of a broadcast, which says itself what its sender's table is",
+                file::shown(path)
+            );
+            return Ok(from_log(path, lines, unread, Listening::new(addresses, key), args.every));
         }
         ensure!(
             trial.not_authentic() == 0,
@@ -132,12 +148,13 @@ fn from_file(
         "{}: a camera without a radar; `viewshed replay --report` shows what became of its boxes",
         recording.name
     );
+    let table = fitted.map(|fitted| quantiser(fitted, args.risk, recording, &settings)).transpose()?;
     let viewing = Viewing::recording(&radars, path, settings.evaluation.slice_height_m);
     let frames: Vec<String> = radars.iter().map(|radar| radar.frames.len().to_string()).collect();
     let says = format!("{}: {} radar frames", file::stem(path), frames.join(" and "));
     let filling = viewing.clone();
     std::thread::spawn(move || {
-        if let Err(error) = recorded::fill(&filling.instants, &radars, &settings) {
+        if let Err(error) = recorded::fill(&filling.instants, &radars, &settings, table.as_ref()) {
             eprintln!("error: {error:#}");
             filling.instants.end(format!("failed: {error:#}"));
         }

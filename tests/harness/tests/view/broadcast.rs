@@ -30,8 +30,8 @@ fn log(folder: &Path) -> PathBuf {
     path
 }
 
-/// The same with a made-up table of probabilities, which rises with the grade.
-fn log_with_probabilities(folder: &Path) -> PathBuf {
+/// A file with a made-up table of probabilities of the shipped recording's unit, which rises with the grade.
+pub fn table(folder: &Path) -> PathBuf {
     let edges = Edges {
         grades: [2, 26, 51, 76, 102, 128, 153, 179, 204, 230, 255],
         ranges_cm: [2000, 4000, 6000, 8000, 10_000, 13_000, 16_000],
@@ -44,7 +44,12 @@ fn log_with_probabilities(folder: &Path) -> PathBuf {
     (51..=255).for_each(|p| counted.add(true, Some(p)));
     let file = folder.join("t.probability.toml");
     std::fs::write(&file, Fitted { table, counted }.text().unwrap()).unwrap();
-    let path = folder.join("bus.log");
+    file
+}
+
+/// The same log with that table.
+fn log_with_probabilities(folder: &Path) -> PathBuf {
+    let (file, path) = (table(folder), folder.join("bus.log"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
     command.args(["bus", SHIPPED, "--to", "5", "--bus", "fd-500k-2M", "--probability"]).arg(&file);
     let output = command.arg("--log").arg(&path).output().unwrap();

@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::net::TcpStream;
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use viewshed_harness::recording::write::RecordingWriter;
@@ -222,6 +223,57 @@ fn several_radars_of_a_recording_are_shown_each_and_together_and_a_silent_one_is
     page.until("viewshed.number === viewshed.source.count - 1");
     assert!(visible("left") > 1000.0 && visible("right") == 0.0, "{}", visible("right"));
     assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
+fn with_a_table_a_cell_says_how_often_a_vehicle_there_is_detected_and_what_a_receiver_knows_of_it() {
+    let folder = folder("recorded-probability");
+    let table = crate::broadcast::table(&folder);
+    let server = Server::run([
+        Path::new("view"),
+        Path::new(SHIPPED),
+        Path::new("--to"),
+        Path::new("4"),
+        Path::new("--probability"),
+        &table,
+    ]);
+    let last = filled(&server)["count"].as_u64().unwrap() - 1;
+    let cell = |map: usize, azimuth: usize, range: usize| -> serde_json::Value {
+        let (_, answer) = server.own("GET", &format!("cell/{last}/{map}/{azimuth}/{range}"), &[], "");
+        serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap_or_default()).unwrap()
+    };
+    let edges = [2, 26, 51, 76, 102, 128, 153, 179, 204, 230, 255];
+    let (mut known, mut lower, mut both) = (0, 0, 0);
+    for (azimuth, range) in (0..120).step_by(7).flat_map(|a| (0..200).step_by(9).map(move |r| (a, r))) {
+        let (own, received) = (cell(0, azimuth, range), cell(1, azimuth, range));
+        let grade = own["grade"].as_u64().unwrap();
+        let step = edges.iter().filter(|edge| grade >= **edge).count();
+        let of = |cell: &serde_json::Value| cell["probability"].as_f64().map(|p| (255.0 * p).round() as usize);
+        let expected = (grade > 0).then_some(51 + 17 * step);
+        assert_eq!(of(&own), expected, "grade {grade}");
+        known += usize::from(expected.is_some());
+        // a receiver's are rounded down, and of the scan that came last
+        if let (Some(of_table), Some(at_least)) = (expected, of(&received)) {
+            both += 1;
+            lower += usize::from(at_least <= of_table);
+        }
+    }
+    assert!(known > 200 && both > 200 && 50 * (both - lower) < both, "{known} known, {lower} of {both} not above");
+
+    let view = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+        command.current_dir(&folder).args(["view", SHIPPED, "--to", "1", "--no-open", "--probability"]);
+        let output = command.args(arguments).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for (arguments, why) in [
+        (&["t.probability.toml", "--noise", "0.25,0.3,1,0.15"][..], "was fitted with configuration"),
+        (&["none.toml"], "none.toml"),
+        (&["t.probability.toml", "--risk", "2"], "2 is not between 0 and 1"),
+    ] {
+        let (code, error) = view(arguments);
+        assert!(code == Some(2) && error.contains(why), "{arguments:?}: {error}");
+    }
 }
 
 #[test]

@@ -2,6 +2,8 @@
 //! say of both.
 
 use anyhow::Result;
+use viewshed::map::polar::PolarGeometry;
+use viewshed::probability::Quantiser;
 use viewshed::wire::message::Addresses;
 
 use super::broadcast::Receiving;
@@ -25,11 +27,17 @@ const BUS: Bus = BUSES[2];
 const SENSOR: u8 = 1;
 const ESTIMATOR: &str = "radar-3d";
 
-/// Finds every instant of a recording, at the frames of its first radar; labels are compared with that one's map.
+/// Finds every instant of a recording, at the frames of its first radar; labels are compared with that one's map. With a
+/// table its cells have their probabilities, and the receiver's the levels that are sent of them.
 ///
 /// # Errors
 /// A parameter the library refuses, by name.
-pub fn fill(instants: &Instants, radars: &[Recording], settings: &Settings) -> Result<()> {
+pub fn fill(
+    instants: &Instants,
+    radars: &[Recording],
+    settings: &Settings,
+    table: Option<&(Quantiser, PolarGeometry)>,
+) -> Result<()> {
     let Some((recording, others)) = radars.split_first() else { return Ok(()) };
     let mut others = others.iter().map(|other| Beside::new(other, settings)).collect::<Result<Vec<_>>>()?;
     let name = if others.is_empty() { ESTIMATOR.to_owned() } else { recording.sensor.name.clone() };
@@ -41,7 +49,7 @@ pub fn fill(instants: &Instants, radars: &[Recording], settings: &Settings) -> R
     let evaluation = crate::evaluation::Options { bootstrap: 0, ..settings.evaluation.clone() };
     let replay = Replay::new(recording.clone(), &mut running, &evaluation, &|| ());
     instants.say("sending the maps over a bus");
-    let mut received = receiver(recording, settings)?;
+    let mut received = receiver(recording, settings, table.map(|(quantiser, _)| quantiser))?;
     instants.say(format!("{frames} frames"));
     let mut estimator = radar_3d::new(&sensor, &settings.estimators.radar_3d)?;
     let all: Vec<usize> = (0..frames).collect();
@@ -50,6 +58,13 @@ pub fn fill(instants: &Instants, radars: &[Recording], settings: &Settings) -> R
     visit(recording, estimator.as_mut(), &all, |k, estimator| {
         let (Some(frame), Some(polar)) = (recording.frames.get(k), estimator.polar()) else { return };
         let (own, shares) = shown(&name, recording, &polar);
+        let own = match table {
+            Some((quantiser, grid)) => own.with_probabilities(|azimuth, range| {
+                let cell = (polar.cell)(azimuth, range);
+                quantiser.table().in_cell(grid, polar.azimuths, cell.grade, [azimuth, range])
+            }),
+            None => own,
+        };
         let mut counts = Counts::default();
         let objects = recording.truth.as_ref().map(|truth| truth.at(frame.time_ns)).unwrap_or_default();
         let mut boxes = Vec::new();
@@ -166,11 +181,11 @@ struct Received {
 }
 
 /// `None` where frames are single: what is sent of one does not fit to the next.
-fn receiver(recording: &Recording, settings: &Settings) -> Result<Option<Received>> {
+fn receiver(recording: &Recording, settings: &Settings, table: Option<&Quantiser>) -> Result<Option<Received>> {
     if recording.sensor.frames_independent || recording.frames.is_empty() {
         return Ok(None);
     }
-    let maps = Maps::new(recording, &settings.estimators, None, &|| ())?;
+    let maps = Maps::new(recording, &settings.estimators, table, &|| ())?;
     let traffic = Traffic::new(&maps, BUS, None, SENSOR, None)?;
     let line = |sent: &crate::bus::traffic::Sent| {
         let time_ns =
