@@ -1,6 +1,6 @@
 //! What a unit keeps over a loss of power, for boards and hosts of a test bench that have no flash.
 
-use crate::unit::settings::{ALL_SLOTS_LEN, Kind, SettingsSlots};
+use crate::unit::settings::{ALL_SLOTS_LEN, Kind, SettingsSlots, in_copy};
 use crate::wire::message::Epoch;
 
 /// Bytes of it: all slots, starts.
@@ -28,7 +28,8 @@ impl Flash {
 
     /// The bytes of a slot, to damage them.
     pub fn slot_mut(&mut self, slot: usize) -> &mut [u8] {
-        self.bytes.get_mut(range(slot)).unwrap_or_default()
+        let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
+        self.bytes.get_mut(in_copy(slot)).and_then(|slot| slot.get_mut(..length)).unwrap_or_default()
     }
 
     /// Counts a start; its epoch is not that of the 15 before.
@@ -45,19 +46,13 @@ impl Flash {
 
 impl SettingsSlots for Flash {
     fn slot(&self, slot: usize) -> &[u8] {
-        self.bytes.get(range(slot)).unwrap_or(&[])
+        let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
+        self.bytes.get(in_copy(slot)).and_then(|slot| slot.get(..length)).unwrap_or(&[])
     }
 
     fn write(&mut self, slot: usize, block: &[u8]) {
         self.slot_mut(slot).iter_mut().zip(block).for_each(|(to, from)| *to = *from);
     }
-}
-
-/// Where a slot lies.
-fn range(slot: usize) -> core::ops::Range<usize> {
-    let length = |slot| Kind::of_slot(slot).map_or(0, Kind::most_len);
-    let from = (0..slot).map(length).sum();
-    from..from + length(slot)
 }
 
 #[cfg(test)]

@@ -130,6 +130,8 @@ fn slots_take_turns_and_a_damaged_one_leaves_the_one_before() {
     flash.slot_mut(Kind::Lanes.slots()[0])[20] ^= 1;
     assert_eq!(fingerprint(&flash), None);
     assert_eq!(stored(&flash).place(), Err(refused(Kind::Lanes, BlockError::CheckSum)));
+    let slot = stored(&flash).slot_of(Kind::Settings, true, &flash);
+    assert_eq!(slot, Some(0), "the settings themselves are still read");
     let settings_again = stored(&flash).write(&settings().to_block(0), &mut flash);
     assert_eq!(settings_again, Err(refused(Kind::Lanes, BlockError::CheckSum)), "it could not start with them either");
     // a write, and emptying, get out of it
@@ -138,6 +140,18 @@ fn slots_take_turns_and_a_damaged_one_leaves_the_one_before() {
     assert_eq!(fingerprint(&written), Some(of(&LANES)));
     StoredSettings::clear(Kind::Lanes, &mut flash);
     assert_eq!(fingerprint(&flash), Some(settings().fingerprint()));
+}
+
+#[test]
+fn a_unit_that_is_safe_for_its_lanes_keeps_its_number_and_its_bit_rates() {
+    let mut numbered = settings();
+    numbered.unit.sensor = 5;
+    numbered.broadcast_bus.bit_rate = 250_000;
+    let mut flash = flash(&[&numbered.to_block(0), &lanes(&LANES)]);
+    flash.slot_mut(Kind::Lanes.slots()[0])[20] ^= 1;
+    let stored = stored(&flash);
+    assert!(stored.settings().is_none());
+    assert_eq!((stored.unit().sensor, stored.buses()[1].bit_rate), (5, 250_000), "not another unit's identifiers");
 }
 
 #[test]

@@ -11,7 +11,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::kind::word;
-use super::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SettingsSlots};
+use super::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SettingsSlots, in_copy};
 
 /// The longest block up to the next whole word.
 const MOST_STORED_LEN: usize = word(MOST_BLOCK_LEN);
@@ -42,24 +42,17 @@ impl<F: NorFlash, const N: usize> FlashSlots<F, N> {
     }
 
     fn read(&mut self, slot: usize) {
-        let Some((place, copy)) = self.places.get(slot).zip(self.copies.get_mut(range(slot))) else { return };
+        let Some((place, copy)) = self.places.get(slot).zip(self.copies.get_mut(in_copy(slot))) else { return };
         if self.flash.read(*place, copy).is_err() {
             copy.fill(0);
         }
     }
 }
 
-/// Where the copy of a slot lies.
-fn range(slot: usize) -> core::ops::Range<usize> {
-    let length = |slot| Kind::of_slot(slot).map_or(0, |kind| word(kind.most_len()));
-    let from = (0..slot).map(length).sum();
-    from..from + length(slot)
-}
-
 impl<F: NorFlash, const N: usize> SettingsSlots for FlashSlots<F, N> {
     fn slot(&self, slot: usize) -> &[u8] {
         let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
-        let copy = self.copies.get(range(slot)).filter(|_| slot < N);
+        let copy = self.copies.get(in_copy(slot)).filter(|_| slot < N);
         copy.and_then(|copy| copy.get(..length)).unwrap_or(&[])
     }
 
@@ -68,7 +61,7 @@ impl<F: NorFlash, const N: usize> SettingsSlots for FlashSlots<F, N> {
         let mut stored = [0xFF; MOST_STORED_LEN];
         stored.iter_mut().zip(block).for_each(|(to, from)| *to = *from);
         let page = u32::try_from(F::ERASE_SIZE).unwrap_or(u32::MAX);
-        let needed = u32::try_from(range(slot).len()).unwrap_or(u32::MAX).next_multiple_of(page.max(1));
+        let needed = u32::try_from(in_copy(slot).len()).unwrap_or(u32::MAX).next_multiple_of(page.max(1));
         let words = block.len().next_multiple_of(F::WRITE_SIZE.max(1));
         // what failed shows when the slot is read back
         if flash_erase(&mut self.flash, place, needed)

@@ -1,5 +1,7 @@
 //! The kinds of blocks a unit keeps.
 
+use core::ops::Range;
+
 use super::BLOCK_LEN;
 use crate::obstacles::lanes::{self, MOST_LANES, MOST_SEGMENTS};
 use crate::sensor::ground::{self, MOST_HEIGHTS};
@@ -44,6 +46,13 @@ pub const MOST_BLOCK_LEN: usize = max(max(BLOCK_LEN, HEIGHTS_LEN), max(LANES_LEN
 
 /// Bytes of all slots together, each up to a whole word of any flash memory.
 pub const ALL_SLOTS_LEN: usize = 2 * (word(BLOCK_LEN) + word(HEIGHTS_LEN) + word(LANES_LEN) + word(TABLE_LEN));
+
+/// Where a slot lies in a copy of all of them.
+pub fn in_copy(slot: usize) -> Range<usize> {
+    let length = |slot| Kind::of_slot(slot).map_or(0, |kind| word(kind.most_len()));
+    let from = (0..slot).map(length).sum();
+    from..from + length(slot)
+}
 
 /// Slots of all kinds.
 pub const SLOTS: usize = 2 * Kind::ALL.len();

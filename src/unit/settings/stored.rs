@@ -133,7 +133,11 @@ impl core::error::Error for StoredError {}
 #[derive(Debug, Clone, Copy)]
 pub struct StoredSettings {
     found: Result<Newest, StoredError>,
-    /// Slots of the blocks in use that are no settings, by kind.
+    /// What the settings say of the unit and its buses; also where lanes or heights stand against them, so that it is found
+    /// where it was.
+    unit: UnitConfig,
+    buses: [BusConfig; 2],
+    /// Slots of the blocks in use, by kind.
     in_use: [Option<usize>; Kind::ALL.len()],
     check: SettingsCheck,
 }
@@ -146,7 +150,11 @@ impl StoredSettings {
             Kind::Settings => found.as_ref().ok().map(|newest| newest.slot),
             _ => stored(kind, slots).ok().flatten().map(|(slot, _)| slot),
         });
-        Self { found, in_use, check }
+        let alone = || newest(slots, check, &Place::NOTHING);
+        let of_unit = found.or_else(|_| alone()).ok().map(|newest| newest.settings);
+        let buses = of_unit.map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus]);
+        let unit = of_unit.map_or_else(UnitConfig::default, |s| s.unit);
+        Self { found, unit, buses, in_use, check }
     }
 
     /// What to work with; none in the safe state. Lanes and heights are not among them: [`place`](Self::place_of).
@@ -176,9 +184,7 @@ impl StoredSettings {
     pub fn slot_of(&self, kind: Kind, newest: bool, slots: &impl SettingsSlots) -> Option<usize> {
         match (newest, kind) {
             (false, _) => self.in_use.get(usize::from(kind.number())).copied().flatten(),
-            (true, Kind::Settings) => {
-                place(slots).and_then(|place| self::newest(slots, self.check, &place)).ok().map(|newest| newest.slot)
-            }
+            (true, Kind::Settings) => self.newest(slots).ok().map(|newest| newest.slot),
             (true, _) => stored(kind, slots).ok().flatten().map(|(slot, _)| slot),
         }
     }
@@ -204,14 +210,20 @@ impl StoredSettings {
         StoredError { kind, error: error.unwrap_or(empty) }
     }
 
-    /// Both buses as the settings in use describe them: the radar's, the broadcast's. By default without any.
+    /// Both buses as the settings describe them: the radar's, the broadcast's. By default without any.
     pub fn buses(self) -> [BusConfig; 2] {
-        self.settings().map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus])
+        self.buses
     }
 
-    /// The unit's own numbers and rates by the settings in use; by default without any.
+    /// The unit's own numbers and rates by the settings; by default without any.
     pub fn unit(&self) -> UnitConfig {
-        self.settings().map_or_else(UnitConfig::default, |settings| settings.unit)
+        self.unit
+    }
+
+    /// The newest settings that the unit could run with, at the place that is stored where that holds.
+    fn newest(&self, slots: &impl SettingsSlots) -> Result<Newest, StoredError> {
+        let place = place(slots).unwrap_or(Place::NOTHING);
+        newest(slots, self.check, &place).or_else(|_| newest(slots, self.check, &Place::NOTHING))
     }
 
     /// Checks a block that came and writes it into the slot of its kind that is not in use; its sequence. It counts
@@ -268,8 +280,7 @@ impl StoredSettings {
         let stored = |other: Kind| stored(other, slots).ok().flatten().map(|(_, (_, body))| body);
         let of = |other: Kind| if other == kind { Some(body) } else { stored(other) };
         let place = place_from(of(Kind::Heights), of(Kind::Lanes));
-        let stored = Kind::Settings.slots().map(|slot| Settings::from_block(slots.slot(slot)));
-        let Ok((_, (_, settings))) = newer(stored) else { return Ok(()) };
+        let Ok(Newest { settings, .. }) = self.newest(slots) else { return Ok(()) };
         #[cfg(feature = "probability")]
         if kind == Kind::Probabilities {
             let header = self.check.at(&settings.of_grades(), &place).map_err(BlockError::Parameter)?;

@@ -11,7 +11,7 @@ use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
-use crate::estimators::{self, MOST_RANGE_M};
+use crate::estimators::{self, GroundError, MOST_RANGE_M};
 use crate::evaluation::{self, Grid, Settings};
 use crate::recording::{FieldOfView, ReadOptions};
 
@@ -190,6 +190,13 @@ struct EstimatorArgs {
     /// for one of half a degree costs points of every rate.
     #[arg(long, value_name = "M,DEG,DEG,M/S", value_parser = noise)]
     noise: Option<NoiseConfig>,
+    /// Heights of the road that estimators are given wrongly: so many times as high, and so far ahead of where they are, to see
+    /// what that costs [default: 1,0]
+    ///
+    /// Of a road that is not flat. `reference` and all that is judged keep the true ones. A survey that takes a grade of 4 %
+    /// for 3 %: --ground-error 0.75,0; a crest 15 m too far away: --ground-error 1,15
+    #[arg(long, value_name = "TIMES,M", value_parser = ground_error, allow_hyphen_values = true)]
+    ground_error: Option<GroundError>,
 }
 
 impl SettingsArgs {
@@ -283,6 +290,7 @@ impl EstimatorArgs {
         set(self.max_detections, &mut options.max_detections);
         set(self.reference_share, &mut options.reference_share);
         set(self.grid_size, &mut options.grid);
+        set(self.ground_error, &mut options.ground_error);
         if let Some(noise) = self.noise {
             // which is no accuracy, and in no data sheet
             let reflector_height_m = options.noise.reflector_height_m;
@@ -350,6 +358,15 @@ fn noise(text: &str) -> Result<NoiseConfig, String> {
     let [range_m, azimuth_deg, elevation_deg, radial_velocity_mps] = numbers(text)?.map(|v| v as f32);
     let config = NoiseConfig { range_m, azimuth_deg, elevation_deg, radial_velocity_mps, ..NoiseConfig::default() };
     config.noise().map(|_| config).map_err(|e| e.to_string())
+}
+
+fn ground_error(text: &str) -> Result<GroundError, String> {
+    let [times, ahead_m] = numbers(text)?;
+    if (0.0..=3.0).contains(&times) && (-200.0..=200.0).contains(&ahead_m) {
+        Ok(GroundError { times, ahead_m })
+    } else {
+        Err(format!("{times} times is not within 0 to 3, or {ahead_m} m not within -200 to 200"))
+    }
 }
 
 fn mount(text: &str) -> Result<[f64; 6], String> {
@@ -422,6 +439,7 @@ mod tests {
         assert!(error(&["--fov", "nan,60,-16,16,3,200"]).contains("not finite"));
         assert!(error(&["--min-detections", "0"]).contains("`min_detections` is 0"));
         assert!(error(&["--noise", "0.2,0.1"]).contains("2 values, 4 are needed"));
+        assert!(error(&["--ground-error", "4,0"]).contains("4 times is not within 0 to 3"));
         assert!(error(&["--noise", "0.2,100,1,0.1"]).contains("noise.azimuth_deg"));
     }
 

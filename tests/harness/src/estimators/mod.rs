@@ -93,6 +93,31 @@ pub struct Options {
     /// `radar-3d`, and `reference` with it.
     #[serde(skip_serializing_if = "Profile::is_empty")]
     pub ground: Profile,
+    /// What is wrong with the heights that estimators are given.
+    #[serde(skip_serializing_if = "GroundError::is_none")]
+    pub ground_error: GroundError,
+}
+
+/// What a survey of the road has wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroundError {
+    /// So many times as high.
+    pub times: f64,
+    /// So far ahead along the road, metres.
+    pub ahead_m: f64,
+}
+
+impl Default for GroundError {
+    fn default() -> Self {
+        Self { times: 1.0, ahead_m: 0.0 }
+    }
+}
+
+impl GroundError {
+    fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Heights of a road that is not flat.
@@ -134,6 +159,7 @@ impl Default for Options {
             camera_3d: Camera3dConfig::default(),
             lanes: Vec::new(),
             ground: Profile::default(),
+            ground_error: GroundError::default(),
         }
     }
 }
@@ -189,7 +215,8 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     }
     let ground = ground(recording, options)?;
     if !ground.is_level() {
-        estimators.push(radar_3d::new(&sensor, &Radar3dConfig { ground: ground.kept(), ..radar_3d })?);
+        let given = given(&ground, options.ground_error)?;
+        estimators.push(radar_3d::new(&sensor, &Radar3dConfig { ground: given.kept(), ..radar_3d })?);
     }
     if !options.lanes.is_empty() {
         radar_3d.lanes = kept(&options.lanes);
@@ -201,7 +228,13 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     Ok(estimators)
 }
 
-/// The road's heights as estimators are given them: those of the options, or else the recording's own.
+/// The heights that estimators are given for these.
+fn given(ground: &Ground, error: GroundError) -> Result<Ground> {
+    let wrong = |[x, height]: &[f64; 2]| [x + error.ahead_m, height * error.times];
+    Ground::new(ground.points().iter().map(wrong).collect())
+}
+
+/// The road's heights: those of the options, or else the recording's own.
 fn ground(recording: &Recording, options: &Options) -> Result<Ground> {
     let recorded = recording.truth.as_ref().map(|truth| truth.ground.clone()).unwrap_or_default();
     if options.ground.is_empty() { Ok(recorded) } else { Ground::new(options.ground.points.clone()) }
@@ -219,7 +252,7 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
     let (sensor, max_detections) = radar(recording, options)?;
     let mut radar_3d = options.radar_3d;
     radar_3d.gate.max_detections = max_detections;
-    radar_3d.ground = ground(recording, options)?.kept();
+    radar_3d.ground = given(&ground(recording, options)?, options.ground_error)?.kept();
     radar_3d::on(options.grid, &sensor, &radar_3d)
 }
 
@@ -230,7 +263,8 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
 pub fn own_grid(recording: &Recording, options: &Options) -> Result<(PolarGeometry, u8)> {
     options.has_tables()?;
     let (sensor, _) = radar(recording, options)?;
-    let radar_3d = Radar3dConfig { ground: ground(recording, options)?.kept(), ..options.radar_3d };
+    let given = given(&ground(recording, options)?, options.ground_error)?;
+    let radar_3d = Radar3dConfig { ground: given.kept(), ..options.radar_3d };
     radar_3d::grid(&sensor, &radar_3d)
 }
 
@@ -363,5 +397,20 @@ impl Intake {
         let absurd = (ABSURD, self.absurd);
         let intake = [(DROPPED, self.dropped), (NOT_FINITE, self.not_finite), (NO_RANGE, self.range), absurd];
         gate.chain(intake).filter(|(_, n)| *n > 0).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn heights_are_given_as_wrong_as_they_are_asked_for() {
+        let ground = Ground::new(vec![[0.0, 1.0], [50.0, 3.0], [100.0, 0.0]]).unwrap();
+        let points = |times, ahead_m| given(&ground, GroundError { times, ahead_m }).unwrap().points().to_vec();
+        assert_eq!(points(1.0, 0.0), ground.points());
+        assert_eq!(points(0.5, 15.0), [[15.0, 0.5], [65.0, 1.5], [115.0, 0.0]]);
+        let error = given(&ground, GroundError { times: 3.0, ahead_m: 0.0 }).unwrap_err().to_string();
+        assert!(error.contains("the grade is -0.180, above 0.12"), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 //! goes on with grades and says so.
 
 use viewshed::fixed::time::Time;
-use viewshed::probability::{Edges, ProbabilityTable, Quantiser, Threshold};
+use viewshed::probability::{Quantiser, Threshold};
 use viewshed::unit::profile::reference::State;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
@@ -16,25 +16,18 @@ use viewshed_harness::evaluation::probability::file::Fitted;
 
 use super::daemon::Daemon;
 use super::logs::{Sent, config, logged, read, twin};
-use crate::shipped;
+use crate::{kept, shipped};
 
 const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
 
 /// A made-up table that rises with the grade and falls with range; of the samples with p = 230 and more 4 % are missed,
 /// of all others half.
 fn fitted(fingerprint: u32) -> Fitted {
-    let edges = Edges {
-        grades: [2, 26, 51, 76, 102, 128, 153, 179, 204, 230, 255],
-        ranges_cm: [2000, 4000, 6000, 8000, 10_000, 13_000, 16_000],
-        azimuths: [-6000, -3000, -1500, 0, 1500, 3000, 6000],
-    };
-    let values =
-        std::array::from_fn(|a| std::array::from_fn(|r| std::array::from_fn(|g| (100 + 14 * g - 3 * r - a) as u8)));
     let mut counted = Grades::default();
     for p in 50..=255_u8 {
         (0..100).for_each(|k| counted.add(k >= if p >= 230 { 4 } else { 50 }, Some(p)));
     }
-    Fitted { table: ProbabilityTable::new(edges, values, fingerprint).unwrap(), counted }
+    Fitted { table: kept::table(fingerprint), counted }
 }
 
 /// What a daemon sends whose configuration has these lines, with a table's file of this text.
