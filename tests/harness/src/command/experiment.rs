@@ -185,10 +185,9 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
     let on_grades = all.iter().all(|scene| !scene.ground.is_empty());
-    let running = bar(
-        "simulating and replaying",
-        scenes::total_steps(&all, extent, ESTIMATORS + u64::from(scenes::with_lanes(&all)) + u64::from(on_grades)),
-    );
+    let more = [scenes::with_lanes(&all), on_grades, settings.estimators.fine_azimuths];
+    let estimators = ESTIMATORS + more.map(u64::from).iter().sum::<u64>();
+    let running = bar("simulating and replaying", scenes::total_steps(&all, extent, estimators));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
     let results = scenes::run(&all, settings, extent, &keep, &|| running.step())?;
     drop(running);

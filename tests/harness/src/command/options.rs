@@ -183,6 +183,12 @@ struct EstimatorArgs {
     /// fused [default: reference]
     #[arg(long, value_name = "SIZE")]
     grid_size: Option<estimators::Grid>,
+    /// A row radar-3d-fine beside radar-3d: twice the azimuths, columns of half a degree
+    ///
+    /// With 0.8 MB of state, which no controller here has, and more azimuths than a broadcast carries: to see what the width of
+    /// a column costs.
+    #[arg(long)]
+    fine_azimuths: bool,
     /// How well the radar measures, from its data sheet: standard deviations of range, azimuth, elevation and radial
     /// velocity [default: 0.25,0.5,1,0.15]
     ///
@@ -291,6 +297,7 @@ impl EstimatorArgs {
         set(self.reference_share, &mut options.reference_share);
         set(self.grid_size, &mut options.grid);
         set(self.ground_error, &mut options.ground_error);
+        options.fine_azimuths |= self.fine_azimuths;
         if let Some(noise) = self.noise {
             // which is no accuracy, and in no data sheet
             let reflector_height_m = options.noise.reflector_height_m;

@@ -81,6 +81,9 @@ pub struct Options {
     /// The grid of the estimator that is tuned, watched or drawn; on the small one, it runs beside `radar-3d` in tables.
     #[serde(skip_serializing_if = "Grid::is_reference")]
     pub grid: Grid,
+    /// Whether an estimator with twice the azimuths of the reference grid runs beside `radar-3d` in tables.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub fine_azimuths: bool,
     /// How well the sensor measures.
     pub noise: NoiseConfig,
     pub radar_2d: Radar2dConfig,
@@ -153,6 +156,7 @@ impl Default for Options {
             max_detections: 256,
             reference_share: 0.5,
             grid: Grid::Reference,
+            fine_azimuths: false,
             noise: NoiseConfig::default(),
             radar_2d: Radar2dConfig::default(),
             radar_3d: Radar3dConfig::default(),
@@ -212,6 +216,11 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     ];
     if !options.grid.is_reference() {
         estimators.push(radar_3d::on(options.grid, &sensor, &radar_3d)?);
+    }
+    if options.fine_azimuths {
+        let mut radar_3d = radar_3d;
+        radar_3d.gate.max_detections = max_detections.min(256);
+        estimators.push(radar_3d::fine(&sensor, &radar_3d)?);
     }
     let ground = ground(recording, options)?;
     if !ground.is_level() {

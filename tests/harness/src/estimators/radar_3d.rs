@@ -70,6 +70,8 @@ struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, co
 }
 
 type OfReference<const D: usize> = Driver<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>;
+/// Twice the azimuths, and twice the memory.
+type OfFine = Driver<RANGES, { 2 * AZIMUTHS }, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, 256>;
 type OfSmall = Driver<
     { small::State::RANGES },
     { small::State::AZIMUTHS },
@@ -102,6 +104,15 @@ pub fn on(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn
             Ok(Box::new(OfSmall { name, ..OfSmall::new(sensor, &config)? }))
         }
     }
+}
+
+/// The estimator with twice the azimuths, 0.8 MB of state: for machines of another kind than controllers, and to see what
+/// the width of a column costs. No broadcast carries as many azimuths.
+///
+/// # Errors
+/// A parameter the library refuses, by name.
+pub fn fine(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
+    Ok(Box::new(OfFine { name: "radar-3d-fine", ..OfFine::new(sensor, config)? }))
 }
 
 /// Where the cells of its map lie, and from which grade on they are visible.
@@ -214,6 +225,17 @@ mod tests {
         range_min_m: 3.0,
         range_max_m: 200.0,
     };
+
+    #[test]
+    fn the_fine_one_has_twice_the_columns_of_the_same_view() {
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 };
+        let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
+        let config = Radar3dConfig::default();
+        let (usual, fine) = (new(&sensor, &config).unwrap(), super::fine(&sensor, &config).unwrap());
+        let (a, b) = (usual.polar().unwrap(), fine.polar().unwrap());
+        assert_eq!((fine.name(), b.azimuths, b.ranges), ("radar-3d-fine", 2 * a.azimuths, a.ranges));
+        assert_eq!((a.azimuth_rad, a.cell_m), (b.azimuth_rad, b.cell_m));
+    }
 
     /// So many vehicles that come nearer, 6 m and 12 degrees apart.
     fn frame(k: i64, vehicles: usize) -> Frame {
