@@ -38,7 +38,7 @@ pub fn start_stored<E: InUnit, S: MapSender<E::Map>>(
 ) -> Option<Reason> {
     (*parameters, *sender) = (None, None);
     let (settings, slots) = (stored.0.settings()?, stored.1);
-    let header = settings.build_at::<E>(&StoredSettings::place_of(slots).ok()?, parameters).ok()?;
+    let header = settings.build_at::<E>(&StoredSettings::place(slots).ok()?, parameters).ok()?;
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(settings.unit.sensor, medium) };
     sender::start_stored(sender, (config, header), settings, slots, epoch, now)
 }

@@ -58,9 +58,9 @@ impl SerialService {
         let safe = SafeState::new(sensor, Medium::Serial, epoch, now);
         let mut service =
             Self { sensor, identity, stored, safe, counter: 0, incoming: Piece::EMPTY, written: None, refused: 0 };
-        let place = stored.place();
-        service.reply(&Reply::Started(place.ok()), line);
-        if let Err(reason) = &place {
+        let position = stored.position();
+        service.reply(&Reply::Started(position.ok()), line);
+        if let Err(reason) = &position {
             service.reply(&Reply::Refused(reason), line);
         }
         service

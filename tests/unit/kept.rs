@@ -90,7 +90,7 @@ fn starts(flash: &Flash) -> Option<(Header, Option<Reason>)> {
         Epoch::new(1),
         now,
     );
-    let header = StoredSettings::place_of(flash).ok().and_then(|place| {
+    let header = StoredSettings::place(flash).ok().and_then(|place| {
         let header = stored.settings()?.build_at::<SmallState>(&place, &mut None).ok()?;
         let quantiser = StoredSettings::quantiser(stored.settings()?, &header, flash).ok().flatten();
         Some(Header { probability: quantiser.map(|q| q.levels()), ..header })
@@ -106,7 +106,7 @@ fn refused(kind: Kind, error: BlockError) -> StoredError {
 #[test]
 fn what_is_kept_is_what_a_pc_has_with_the_same_file() {
     let flash = flash(&[&settings().to_block(0), &heights(&HEIGHTS), &lanes(&LANES)]);
-    let place = StoredSettings::place_of(&flash).unwrap();
+    let place = StoredSettings::place(&flash).unwrap();
     let parameters = |settings: &Settings, place: &Place<'_>| {
         let mut made = None;
         let header = settings.build_at::<SmallState>(place, &mut made).unwrap();
@@ -129,7 +129,7 @@ fn slots_take_turns_and_a_damaged_one_leaves_the_one_before() {
     // both: not without lanes that were given
     flash.slot_mut(Kind::Lanes.slots()[0])[20] ^= 1;
     assert_eq!(fingerprint(&flash), None);
-    assert_eq!(stored(&flash).place(), Err(refused(Kind::Lanes, BlockError::CheckSum)));
+    assert_eq!(stored(&flash).position(), Err(refused(Kind::Lanes, BlockError::CheckSum)));
     let slot = stored(&flash).slot_of(Kind::Settings, true, &flash);
     assert_eq!(slot, Some(0), "the settings themselves are still read");
     let settings_again = stored(&flash).write(&settings().to_block(0), &mut flash);

@@ -59,7 +59,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         input.start(epoch, stored, &mut output);
         // where blocks are taken the newest that can run, else what the file says
         let settings = if config.has_service() { of_line(&stored) } else { config.settings() };
-        let refused = stored.place().err().map(|refused| refused.error).filter(|_| settings.is_none());
+        let refused = stored.position().err().map(|refused| refused.error).filter(|_| settings.is_none());
         if let Some(reason) = &refused {
             warn!("{reason}: safe state until a block is written");
         }

@@ -141,7 +141,7 @@ mod tests {
 
     fn height(slots: &FileSlots) -> Result<f32, BlockError> {
         let stored = StoredSettings::read(slots, CHECK);
-        stored.place().map_err(|refused| refused.error).map(|_| stored.settings().unwrap().sensor.mount.height_m)
+        stored.position().map_err(|refused| refused.error).map(|_| stored.settings().unwrap().sensor.mount.height_m)
     }
 
     #[test]

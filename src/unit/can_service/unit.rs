@@ -109,7 +109,7 @@ enum Presence {
 impl CanService {
     /// Starts with a block, or without.
     pub fn start(config: CanServiceConfig, epoch: Epoch, now: Time, stored: StoredSettings) -> Self {
-        let refused = stored.place().err().map(|error| Refused { what: What::Block(error), next: 0 });
+        let refused = stored.position().err().map(|error| Refused { what: What::Block(error), next: 0 });
         Self {
             config,
             epoch,
@@ -131,7 +131,7 @@ impl CanService {
 
     /// Why there is no block to work with.
     pub fn refusal(&self) -> Option<StoredError> {
-        self.stored.place().err()
+        self.stored.position().err()
     }
 
     /// Takes a frame of the bus; `None` if it is none of the integrator's.
@@ -314,7 +314,7 @@ impl Outgoing {
         identity: &Identity,
     ) -> Option<BlockAnswer> {
         if core::mem::take(&mut self.started) {
-            let (slot, sequence) = stored.place().unwrap_or((u8::MAX, 0));
+            let (slot, sequence) = stored.position().unwrap_or((u8::MAX, 0));
             return Some(BlockAnswer::Started { slot, sequence });
         }
         if let Some(sequence) = self.written.take() {

@@ -383,7 +383,7 @@ fn maps<'u, E: InUnit, S: MapSender<E::Map>>(
     memory: RoadsideMemory<'u, E, S>,
     now: Time,
 ) -> Option<Maps<'u, E, S>> {
-    let header = settings.build_at::<E>(&StoredSettings::place_of(slots).ok()?, memory.parameters).ok()?;
+    let header = settings.build_at::<E>(&StoredSettings::place(slots).ok()?, memory.parameters).ok()?;
     let parameters = memory.parameters.as_ref()?;
     let start_one = |medium, sender: &mut Option<S>| {
         let (stale_ms, max_delay_ms) = (settings.unit.stale_ms(), settings.unit.max_delay_ms);

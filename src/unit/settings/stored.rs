@@ -157,7 +157,7 @@ impl StoredSettings {
         Self { found, unit, buses, in_use, check }
     }
 
-    /// What to work with; none in the safe state. Lanes and heights are not among them: [`place`](Self::place_of).
+    /// What to work with; none in the safe state. Lanes and heights are not among them: [`place`](Self::place).
     pub fn settings(&self) -> Option<&Settings> {
         self.found.as_ref().ok().map(|newest| &newest.settings)
     }
@@ -166,7 +166,7 @@ impl StoredSettings {
     ///
     /// # Errors
     /// A block that does not hold.
-    pub fn place_of(slots: &impl SettingsSlots) -> Result<Place<'_>, StoredError> {
+    pub fn place(slots: &impl SettingsSlots) -> Result<Place<'_>, StoredError> {
         place(slots)
     }
 
@@ -175,7 +175,7 @@ impl StoredSettings {
     /// # Errors
     /// Why there are none.
     #[allow(clippy::cast_possible_truncation)] // 0 or 1
-    pub fn place(&self) -> Result<(u8, u32), StoredError> {
+    pub fn position(&self) -> Result<(u8, u32), StoredError> {
         self.found.map(|newest| (newest.slot as u8, newest.next_sequence.wrapping_sub(1)))
     }
 
