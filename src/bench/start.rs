@@ -4,7 +4,6 @@ use crate::fixed::time::Time;
 use crate::unit::settings::{Settings, SettingsSlots, StoredSettings};
 use crate::unit::{InUnit, MapSender, sender};
 use crate::wire::broadcast::{BroadcastConfig, Medium};
-use crate::wire::header::Header;
 use crate::wire::message::Epoch;
 use crate::wire::status::Reason;
 
@@ -22,7 +21,7 @@ pub fn start<E: InUnit, S: MapSender<E::Map>>(
     (*parameters, *sender) = (None, None);
     let Some(settings) = settings else { return };
     let Ok(header) = settings.build::<E>(parameters) else { return };
-    start_sender(sender, header, (settings.unit.sensor, medium), epoch, now);
+    let _ = S::start(sender, at_once(settings.unit.sensor, medium), header, epoch, now);
 }
 
 /// The same with what is kept beside the settings: lanes, heights, a table of probabilities. What the unit lacks, where a
@@ -39,18 +38,10 @@ pub fn start_stored<E: InUnit, S: MapSender<E::Map>>(
     (*parameters, *sender) = (None, None);
     let (settings, slots) = (stored.0.settings()?, stored.1);
     let header = settings.build_at::<E>(&StoredSettings::place(slots).ok()?, parameters).ok()?;
-    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(settings.unit.sensor, medium) };
-    sender::start_stored(sender, (config, header), settings, slots, epoch, now)
+    sender::start_stored(sender, (at_once(settings.unit.sensor, medium), header), settings, slots, epoch, now)
 }
 
-#[inline(never)]
-fn start_sender<M, S: MapSender<M>>(
-    sender: &mut Option<S>,
-    header: Header,
-    (number, medium): (u8, Medium),
-    epoch: Epoch,
-    now: Time,
-) {
-    let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(number, medium) };
-    let _ = S::start(sender, config, header, epoch, now);
+/// A sender whose messages are due at once.
+fn at_once(sensor: u8, medium: Medium) -> BroadcastConfig {
+    BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(sensor, medium) }
 }

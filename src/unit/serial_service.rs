@@ -5,7 +5,7 @@ use crate::unit::identity::{Identity, VERSION};
 use crate::unit::safe_state::SafeState;
 use crate::unit::said::Piece;
 use crate::unit::service::{PART_LEN, Reply, Request};
-use crate::unit::settings::{BlockError, Kind, SettingsSlots, StoredError, StoredSettings, Which};
+use crate::unit::settings::{BlockError, Kind, SettingsSlots, StoredError, StoredSettings, announced_length};
 use crate::unit::timing::Took;
 use crate::wire::broadcast::Medium;
 use crate::wire::message::{Epoch, Packing};
@@ -86,16 +86,14 @@ impl SerialService {
             }
             Request::Part(place, bytes) => self.part(usize::from(place), bytes, slots, line),
             Request::Read(which) => {
-                let block = self.block(which, slots);
+                let slot = self.stored.find(which, slots);
+                let block = slot.map_or(&[][..], |slot| StoredSettings::in_slot(slots, slot));
                 self.reply(&Reply::Block(block), line);
             }
-            Request::ReadPart(which, place) => match self.block(which, slots) {
-                [] => {
-                    let absent = self.stored.absence_of(which.kind, slots);
-                    self.reply(&Reply::Refused(&absent), line);
-                }
-                block => {
-                    let rest = block.get(usize::from(place)..).unwrap_or(&[]);
+            Request::ReadPart(which, place) => match self.stored.find(which, slots) {
+                Err(absent) => self.reply(&Reply::Refused(&absent), line),
+                Ok(slot) => {
+                    let rest = StoredSettings::in_slot(slots, slot).get(usize::from(place)..).unwrap_or(&[]);
                     let part = rest.get(..PART_LEN).unwrap_or(rest);
                     self.reply(&Reply::Part(which, place, part), line);
                 }
@@ -111,12 +109,6 @@ impl SerialService {
             }
         }
         Some(Asked::Nothing)
-    }
-
-    /// A stored block; empty where there is none.
-    fn block<'s>(&self, which: Which, slots: &'s impl SettingsSlots) -> &'s [u8] {
-        let slot = self.stored.slot_of(which.kind, which.newest, slots);
-        slot.map_or(&[][..], |slot| StoredSettings::in_slot(slots, slot))
     }
 
     fn write(&mut self, block: &[u8], slots: &mut impl SettingsSlots, line: &mut impl SerialLine) -> Option<u32> {
@@ -144,7 +136,7 @@ impl SerialService {
             return self.reply(&Reply::Refused(&StoredError { kind, error: BlockError::NoRoom }), line);
         }
         let incoming = self.incoming;
-        let length = block_length(incoming.bytes());
+        let length = announced_length(incoming.bytes());
         if length.is_some_and(|length| incoming.bytes().len() >= length) {
             self.written = self.write(incoming.bytes(), slots, line);
             return;
@@ -183,10 +175,4 @@ impl SerialService {
             self.refused = self.refused.saturating_add(1);
         }
     }
-}
-
-/// Bytes of a block of any kind, as its head says; none before that came.
-fn block_length(head: &[u8]) -> Option<usize> {
-    let [.., low, high] = *head.first_chunk::<8>()?;
-    Some(usize::from(u16::from_le_bytes([low, high])))
 }

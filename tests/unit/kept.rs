@@ -130,8 +130,8 @@ fn slots_take_turns_and_a_damaged_one_leaves_the_one_before() {
     flash.slot_mut(Kind::Lanes.slots()[0])[20] ^= 1;
     assert_eq!(fingerprint(&flash), None);
     assert_eq!(stored(&flash).position(), Err(refused(Kind::Lanes, BlockError::CheckSum)));
-    let slot = stored(&flash).slot_of(Kind::Settings, true, &flash);
-    assert_eq!(slot, Some(0), "the settings themselves are still read");
+    let slot = stored(&flash).find(Which::newest(Kind::Settings), &flash);
+    assert_eq!(slot, Ok(0), "the settings themselves are still read");
     let settings_again = stored(&flash).write(&settings().to_block(0), &mut flash);
     assert_eq!(settings_again, Err(refused(Kind::Lanes, BlockError::CheckSum)), "it could not start with them either");
     // a write, and emptying, get out of it
@@ -243,7 +243,7 @@ fn kinds_there_is_no_room_for_are_refused_and_the_rest_works() {
     let stored = StoredSettings::read(&slots, CHECK);
     for (kind, block) in [(Kind::Heights, heights(&HEIGHTS)), (Kind::Lanes, lanes(&LANES))] {
         assert_eq!(stored.write(&block, &mut slots), Err(refused(kind, BlockError::NoRoom)));
-        assert_eq!(stored.absence_of(kind, &slots), refused(kind, BlockError::NoRoom));
+        assert_eq!(stored.find(Which::newest(kind), &slots), Err(refused(kind, BlockError::NoRoom)));
     }
     assert_eq!(stored.settings(), Some(&settings()));
     // a sender without a use for tables

@@ -11,7 +11,7 @@
 //! | serial line | LPUART1, transmit PA2, receive PA3, 115 200 baud | `nucleo_g474re.dts`, `lpuart1` |
 //! | status output | LD2, PA5, high is on | the same, `green_led` |
 //! | watchdog | IWDG | the same, `iwdg` |
-//! | settings | last two pages of 2 kB, in Zephyr's `storage_partition` | the same, `flash0`; page and word: `stm32-metapac` |
+//! | settings, heights | last four pages of 2 kB, in Zephyr's `storage_partition` | the same, `flash0`; page and word: `stm32-metapac` |
 //!
 //! Zephyr as of commit 19a6a69e3473, `hal_stm32` as of 161c4b2a1b86. Not verified against ST's manual of the
 //! board (UM2505): solder bridges. Both buses need a transceiver. PB5 and PB6, the other pins of
@@ -40,7 +40,7 @@ use viewshed::{Ars408Config, Epoch};
 const CAN_CLOCK_HZ: u32 = 24_000_000;
 /// Frames of the radar between interrupt and loop: 30 ms of a full bus.
 const FRAMES: usize = 128;
-/// The slots of the settings, from the beginning of the flash.
+/// The slots of settings and heights, from the beginning of the flash.
 const SLOTS: [u32; 4] = [0x7_F000, 0x7_F800, 0x7_E000, 0x7_E800];
 /// Several frames.
 const WATCHDOG_US: u32 = 1_000_000;

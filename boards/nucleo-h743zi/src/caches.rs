@@ -1,7 +1,7 @@
 //! Caches on, but not for what others than the core read and write.
 //!
 //! Without them the core waits for AXI SRAM and flash at each access. DMA controllers do not see the data
-//! cache, so their region is not cached; neither are the settings, which are erased without its knowledge.
+//! cache, so their region is not cached; neither are the slots of stored blocks, which are erased without its knowledge.
 //!
 //! # References
 //! Arm, "ARMv7-M Architecture Reference Manual" (DDI 0403), B3.5: MPU_RBAR, MPU_RASR, MPU_CTRL.
@@ -26,8 +26,8 @@ unsafe extern "C" {
 /// Before the first DMA transfer.
 pub fn enable(mpu: &mut MPU, scb: &mut SCB, cpuid: &mut CPUID) {
     let dma = ((&raw const _dma_start).addr(), (&raw const _dma_bytes).addr());
-    let settings = ((FLASH_BASE + SLOTS_FROM) as usize, SLOTS_BYTES as usize);
-    for (number, (start, bytes)) in (0..).zip([dma, settings]) {
+    let slots = ((FLASH_BASE + SLOTS_FROM) as usize, SLOTS_BYTES as usize);
+    for (number, (start, bytes)) in (0..).zip([dma, slots]) {
         // a power of two, at a multiple of itself
         let size = bytes.trailing_zeros() - 1;
         // SAFETY: the regions hold data only, and nothing of them is cached yet

@@ -3,7 +3,7 @@
 use super::{ANSWER, BlockAnswer, BlockRequest, Came, REQUEST, frame, received};
 use crate::unit::identity::Identified;
 use crate::unit::said::{Piece, Refusal, Said};
-use crate::unit::settings::{Kind, Which};
+use crate::unit::settings::{Kind, Which, announced_length};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -133,8 +133,7 @@ impl Answers {
         }
         self.came.set(usize::from(number));
         // the second part says how long the block is
-        let [.., low, high] = *self.block.bytes().first_chunk::<8>()?;
-        let parts = usize::from(u16::from_le_bytes([low, high])).div_ceil(4);
+        let parts = announced_length(self.block.bytes())?.div_ceil(4);
         let has_length = self.came.get(1);
         if has_length && (0..parts).all(|part| self.came.get(part)) {
             self.came = Came::NONE;

@@ -161,16 +161,10 @@ impl CanService {
                 Ok(sequence) => self.outgoing.written = Some(sequence),
                 Err(what) => self.outgoing.refused = Some(Refused { what, next: 0 }),
             },
-            BlockRequest::Read(which) => {
-                let slot = self.stored.slot_of(which.kind, which.newest, slots);
-                match slot.filter(|slot| !StoredSettings::in_slot(slots, *slot).is_empty()) {
-                    Some(slot) => self.outgoing.part = Some((slot, 0)),
-                    None => {
-                        let what = What::Block(self.stored.absence_of(which.kind, slots));
-                        self.outgoing.refused = Some(Refused { what, next: 0 });
-                    }
-                }
-            }
+            BlockRequest::Read(which) => match self.stored.find(which, slots) {
+                Ok(slot) => self.outgoing.part = Some((slot, 0)),
+                Err(error) => self.outgoing.refused = Some(Refused { what: What::Block(error), next: 0 }),
+            },
             BlockRequest::Clear(kind) => {
                 StoredSettings::clear(kind, slots);
                 // a completion that is repeated is of no block any more

@@ -47,6 +47,12 @@ pub const MOST_BLOCK_LEN: usize = max(max(BLOCK_LEN, HEIGHTS_LEN), max(LANES_LEN
 /// Bytes of all slots together, each up to a whole word of any flash memory.
 pub const ALL_SLOTS_LEN: usize = 2 * (word(BLOCK_LEN) + word(HEIGHTS_LEN) + word(LANES_LEN) + word(TABLE_LEN));
 
+/// Bytes of a block of any kind, as its head says; none before that came.
+pub fn announced_length(head: &[u8]) -> Option<usize> {
+    let [.., low, high] = *head.first_chunk::<8>()?;
+    Some(usize::from(u16::from_le_bytes([low, high])))
+}
+
 /// Where a slot lies in a copy of all of them.
 pub fn in_copy(slot: usize) -> Range<usize> {
     let length = |slot| Kind::of_slot(slot).map_or(0, |kind| word(kind.most_len()));

@@ -34,7 +34,7 @@ pub use flash::FlashSlots;
 #[cfg(feature = "probability")]
 pub use kept::table_block;
 pub use kept::{heights_block, kept_points, lanes_block};
-pub use kind::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SLOTS, Which, in_copy};
+pub use kind::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SLOTS, Which, announced_length, in_copy};
 pub use stored::{SettingsCheck, SettingsSlots, StoredError, StoredSettings};
 pub use unit_config::{ConfigureRadar, UnitConfig};
 

@@ -13,7 +13,7 @@
 //! grades and says so.
 
 use super::block::{is_layout_1, length};
-use super::kind::Kind;
+use super::kind::{Kind, Which};
 use super::{BlockError, MOST_BLOCK_LEN, Newest, Settings, UnitConfig, kept, newer};
 #[cfg(feature = "probability")]
 use crate::probability::{ProbabilityTable, Quantiser, TableError, Threshold};
@@ -179,14 +179,20 @@ impl StoredSettings {
         self.found.map(|newest| (newest.slot as u8, newest.next_sequence.wrapping_sub(1)))
     }
 
-    /// The slot of the block of this kind that is in use, or of the one that counts from the next start on, which is
-    /// another one after a write; none where none is stored. The latter takes as long as two starts.
-    pub fn slot_of(&self, kind: Kind, newest: bool, slots: &impl SettingsSlots) -> Option<usize> {
-        match (newest, kind) {
+    /// The slot of a block. The one that counts from the next start on is another one after a write; to find it takes as
+    /// long as two starts.
+    ///
+    /// # Errors
+    /// Why there is nothing to read.
+    pub fn find(&self, Which { kind, newest }: Which, slots: &impl SettingsSlots) -> Result<usize, StoredError> {
+        let slot = match (newest, kind) {
             (false, _) => self.in_use.get(usize::from(kind.number())).copied().flatten(),
             (true, Kind::Settings) => self.newest(slots).ok().map(|newest| newest.slot),
             (true, _) => stored(kind, slots).ok().flatten().map(|(slot, _)| slot),
-        }
+        };
+        // emptied since the start it holds none
+        let slot = slot.filter(|slot| !Self::in_slot(slots, *slot).is_empty());
+        slot.ok_or_else(|| self.absence_of(kind, slots))
     }
 
     /// The block in a slot, as long as it says itself; empty without one.
@@ -201,7 +207,7 @@ impl StoredSettings {
     }
 
     /// Why there is nothing to read of a kind: what was refused at the start, or that nothing is stored or could be.
-    pub fn absence_of(&self, kind: Kind, slots: &impl SettingsSlots) -> StoredError {
+    fn absence_of(&self, kind: Kind, slots: &impl SettingsSlots) -> StoredError {
         let empty = if has_room(kind, slots, self.check) { BlockError::Empty } else { BlockError::NoRoom };
         let error = match kind {
             Kind::Settings => self.found.err().filter(|refused| refused.kind == kind).map(|refused| refused.error),

@@ -3,7 +3,9 @@
 use anyhow::{Result, bail, ensure};
 use viewshed::sensor::place::{LaneList, PackError, Points};
 use viewshed::unit::said::Said;
-use viewshed::unit::settings::{BlockError, Kind, MOST_BLOCK_LEN, Which, heights_block, kept_points, lanes_block};
+use viewshed::unit::settings::{
+    BlockError, Kind, MOST_BLOCK_LEN, Which, announced_length, heights_block, kept_points, lanes_block,
+};
 
 use super::link::Ask;
 use super::{ANSWER, Found};
@@ -129,8 +131,7 @@ impl Found<'_> {
                 }
                 _ => bail!("{}: the unit does not answer any more; nothing was changed", self.place()),
             }
-            let length = bytes.get(6..8).map_or(usize::MAX, |two| usize::from(two[0]) | usize::from(two[1]) << 8);
-            if bytes.len() >= length {
+            if announced_length(&bytes).is_some_and(|length| bytes.len() >= length) {
                 return Ok(Kept::Block(Some(bytes)));
             }
             ensure!(bytes.len() > usize::from(at), "{}: the unit's block ends before it is whole", self.place());

@@ -5,10 +5,10 @@
 mod camera;
 #[cfg(unix)]
 mod configure;
-#[cfg(unix)]
 mod kept;
 #[cfg(target_os = "linux")]
 mod linux;
+#[cfg(unix)]
 mod live;
 mod mps2;
 mod nucleo;

@@ -70,7 +70,12 @@ type Hearing = Receiver<1, 120, 7>;
 
 /// A receiver that heard everything when it was sent.
 fn listen(answered: &Answered) -> Hearing {
-    let mut receiver = Hearing::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+    listen_to(answered)
+}
+
+/// The same with so many planes.
+fn listen_to<const P: usize>(answered: &Answered) -> Receiver<1, 120, 7, P> {
+    let mut receiver = Receiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let mut from = 0;
     for (to, now) in &answered.times {
         for message in messages(&answered.bytes[from..*to]) {
@@ -308,15 +313,7 @@ fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_map
     assert!(configure::kept::same(newest.bytes(), &lanes));
 
     let (header, map, quantiser) = kept::on_a_pc(&kept::with_place(&settings), &scans);
-    let mut far = Receiver::<1, 120, 7, 2>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
-    let expected = board.expected.as_ref().unwrap();
-    let mut from = 0;
-    for (to, now) in &expected.times {
-        for message in messages(&expected.bytes[from..*to]).iter().filter(|m| Received::from_bytes(m).is_ok()) {
-            let _ = far.message(*now, message);
-        }
-        from = *to;
-    }
+    let far = listen_to::<2>(board.expected.as_ref().unwrap());
     let now = on_the_line(scans.last().unwrap().time, first);
     let received = far.map(SENSOR, now);
     let told = received.header().unwrap();
