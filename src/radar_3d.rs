@@ -78,11 +78,14 @@ pub struct VisibilityConfig {
     pub visible_from: f32,
     /// Least occupancy that counts as occupied.
     pub occupied_from: f32,
+    /// Where the far road lies, whole degrees from the boresight's heading, + left: azimuths within ten degrees of it are
+    /// four times narrower than the others. Without it all are alike. Of radar-3d only.
+    pub far_road_deg: Option<i8>,
 }
 
 impl Default for VisibilityConfig {
     fn default() -> Self {
-        Self { slice_height_m: 1.0, visible_from: 0.5, occupied_from: 0.5 }
+        Self { slice_height_m: 1.0, visible_from: 0.5, occupied_from: 0.5, far_road_deg: None }
     }
 }
 
@@ -131,7 +134,8 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         let view = sensor.field_of_view.limits()?;
         let noise = sensor.noise.noise()?;
         let ground = Ground::new(&levelling, place.heights)?;
-        let axes = Axes::on(ground, &levelling, &sensor.field_of_view, config.visibility.slice_height_m)?;
+        let VisibilityConfig { slice_height_m, far_road_deg, .. } = config.visibility;
+        let axes = Axes::on(ground, &levelling, &sensor.field_of_view, slice_height_m, far_road_deg)?;
         let limit_cm = view.range_cm[1] + BEYOND_CM;
         let mut tracking = config.obstacles.tracking(noise, levelling.road_axis(), limit_cm)?;
         tracking.lanes.set(&levelling, place.lanes)?;

@@ -3,6 +3,7 @@
 use crate::camera::voxels::{CELL_CM, middle_of};
 use crate::fixed::angle::Angle;
 use crate::fixed::trig;
+use crate::map::azimuths::Narrow;
 use crate::map::polar::PolarGeometry;
 use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
@@ -99,8 +100,7 @@ impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
             Layer::Occupancy => &self.occupancy,
         };
         let geometry = self.geometry();
-        let middle = (u32::from(geometry.azimuth_span) * (2 * azimuth as u32 + 1)) / (2 * AZIMUTHS as u32);
-        let ray = trig::direction(geometry.azimuth_origin + Angle::from_raw(middle as i16));
+        let ray = trig::direction(geometry.middle_of(azimuth, AZIMUTHS));
         // cells, 2^-15: half a cell and then whole ones along the ray; what lies to the right of the cells wraps to
         // beyond them, and beyond them there are no more along the ray
         let (dx, dy) = (i32::from(ray.x), i32::from(ray.y));
@@ -128,6 +128,7 @@ pub(crate) fn geometry(levelling: &Levelling, [right, left]: [Angle; 2]) -> Pola
         cell_cm: CELL_CM,
         azimuth_origin: right,
         azimuth_span: (left - right).raw().max(0) as u16,
+        narrow: Narrow::NONE,
     }
 }
 

@@ -30,7 +30,7 @@ use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
 use crate::frame::detection::Detection;
-use crate::map::polar::{column, nearest_column};
+use crate::map::azimuths::Columns;
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::mount::{Levelling, Mount};
 use crate::sensor::road::RoadPoint;
@@ -419,7 +419,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
     }
 
     fn sector_of(&self, azimuth: Angle) -> Option<usize> {
-        column(azimuth - self.limits.right, self.limits.span, K)
+        Columns::even(self.limits.span, K).column(azimuth - self.limits.right)
     }
 
     /// Fixtures that were learned; none while they are.
@@ -439,7 +439,7 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
 
     /// Whether the sector of a bearing from the sensor's heading is, or outside of the view the one at that edge.
     pub fn is_blind_at(&self, bearing: Angle) -> bool {
-        self.is_blind(nearest_column(bearing - self.limits.right, self.limits.span, K))
+        self.is_blind(Columns::even(self.limits.span, K).nearest(bearing - self.limits.right))
     }
 
     /// Whether a sector has enough that stands and is not in a shadow for it to be judged.

@@ -32,7 +32,7 @@ use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
-use crate::map::polar::{column, nearest_column};
+use crate::map::azimuths::Columns;
 use crate::map::{CellState, VisibilityMap};
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::mount::{Levelling, Mount};
@@ -157,7 +157,7 @@ impl<const K: usize> Monitor<K> {
     /// The sector of a place; none outside of the view.
     pub fn sector(&self, at: RoadPoint) -> Option<usize> {
         let (x, y) = self.levelling.place(at);
-        column(trig::bearing(x, y) - self.right, self.span, K)
+        Columns::even(self.span, K).column(trig::bearing(x, y) - self.right)
     }
 
     /// Another sensor follows an obstacle whose middle is here. `own` is what the watched sensor's map says of the
@@ -229,7 +229,7 @@ pub struct Watched<'m, M: ?Sized, const K: usize> {
 impl<M: VisibilityMap + ?Sized, const K: usize> VisibilityMap for Watched<'_, M, K> {
     fn at(&self, point: RoadPoint) -> CellState {
         let (x, y) = self.monitor.levelling.place(point);
-        let sector = nearest_column(trig::bearing(x, y) - self.monitor.right, self.monitor.span, K);
+        let sector = Columns::even(self.monitor.span, K).nearest(trig::bearing(x, y) - self.monitor.right);
         if self.monitor.is_blind(sector) { CellState::UNKNOWN } else { self.map.at(point) }
     }
 }

@@ -3,6 +3,7 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig;
+use crate::map::azimuths::Narrow;
 use crate::map::polar::{PolarGeometry, PolarMap};
 use crate::map::{CellState, Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
@@ -33,6 +34,7 @@ pub fn polar<const R: usize, const A: usize>(
         cell_cm: math::round_i32(cell * 100.0),
         azimuth_origin,
         azimuth_span,
+        narrow: Narrow::NONE,
     };
     Ok(PolarMap::unknown(geometry, THRESHOLD, THRESHOLD))
 }
@@ -55,18 +57,20 @@ pub(super) fn edges([right, left]: [f32; 2]) -> Result<(Angle, u16), ConfigError
 pub fn fill<const R: usize, const A: usize>(map: &mut PolarMap<R, A>, with: &(impl VisibilityMap + ?Sized)) {
     let geometry = *map.geometry();
     let along = (geometry.cell_cm / 100).clamp(1, MOST_PLACES);
+    let (narrow, span) = (geometry.narrow, i64::from(geometry.azimuth_span));
+    let units = i64::from(narrow.units(A).max(1)) << 8;
     for azimuth in 0..A {
+        let [right, left] = [azimuth, azimuth + 1].map(|edge| i64::from(narrow.unit((edge as i32) << 8)));
         let Some((grades, occupancy)) = map.rows_mut(azimuth) else { continue };
         for (range, (grade, occupied)) in (0_i32..).zip(grades.iter_mut().zip(occupancy)) {
             let far = geometry.cell_cm * (range + 1);
             // the arc of a cell at its far end, metres: a turn is 65 536 steps, and 6.28 times the distance
-            let arc = i64::from(far) * i64::from(geometry.azimuth_span) / (10_430 * 100 * A.max(1) as i64);
+            let arc = i64::from(far) * span * (left - right) / (10_430 * 100 * units);
             let across = i32::try_from(arc + 1).unwrap_or(MOST_PLACES).clamp(1, MOST_PLACES);
             let (mut worst, mut any) = (None::<CellState>, false);
             for k in 0..across {
-                let steps =
-                    i64::from(geometry.azimuth_span) * (i64::from(2 * across) * azimuth as i64 + i64::from(2 * k + 1));
-                let turn = steps / (i64::from(2 * across) * A.max(1) as i64);
+                let steps = span * (i64::from(2 * across) * right + i64::from(2 * k + 1) * (left - right));
+                let turn = steps / (i64::from(2 * across) * units);
                 let direction = trig::direction(geometry.azimuth_origin + Angle::from_raw(turn as i16));
                 for l in 0..along {
                     let distance = geometry.cell_cm * range + geometry.cell_cm * (2 * l + 1) / (2 * along);

@@ -15,7 +15,8 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig::Direction;
-use crate::map::polar::{self, PolarGeometry};
+use crate::map::azimuths::{Columns, Narrow};
+use crate::map::polar::PolarGeometry;
 use crate::sensor::config::{ConfigError, Problem, within};
 use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::ground::{Ground, SLOPE_BITS};
@@ -48,6 +49,8 @@ pub struct Axes<const R: usize, const A: usize, const E: usize> {
     pub azimuth_origin: Angle,
     /// Width of all columns together, 2^-16 turn.
     pub azimuth_span: u16,
+    /// Columns that are narrower than the others.
+    pub narrow: Narrow,
     /// Height of the sensor, centimetres.
     height_cm: i32,
     /// Height of the slice plane, centimetres.
@@ -82,20 +85,22 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// # Errors
     /// A field of view that the slice plane never enters.
     pub fn new(levelling: &Levelling, view: &FieldOfView, slice_height_m: f32) -> Result<Self, ConfigError> {
-        Self::on(Ground::LEVEL, levelling, view, slice_height_m)
+        Self::on(Ground::LEVEL, levelling, view, slice_height_m, None)
     }
 
-    /// Lays the axes over a road that need not be flat.
+    /// Lays the axes over a road that need not be flat, columns narrower around where the far road lies, if that is
+    /// said in degrees from the boresight's heading.
     ///
     /// # Errors
-    /// A field of view that the slice never enters.
+    /// A field of view that the slice never enters; a far road outside of it.
     pub fn on(
         ground: Ground,
         levelling: &Levelling,
         view: &FieldOfView,
         slice_height_m: f32,
+        far_road_deg: Option<i8>,
     ) -> Result<Self, ConfigError> {
-        const { assert!(R <= crate::fixed::bits::RangeBits::CAPACITY && R >= 2 && A >= 2 && E >= 2 && A <= 512 && E <= 64) }
+        const { assert!(R <= crate::fixed::bits::RangeBits::CAPACITY && R >= 2 && A >= 2 && E >= 2 && A <= 255 && E <= 64) }
         let limits = view.limits()?;
         within("visibility.slice_height_m", slice_height_m, 0.0, 10.0)?;
         let cell_cm = (limits.range_cm[1] + R as i32 - 1) / R as i32;
@@ -106,6 +111,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             cell_cm,
             azimuth_origin: Angle::ZERO,
             azimuth_span: 0,
+            narrow: Narrow::NONE,
             height_cm: slice_cm + drop,
             slice_cm,
             row_edges: [0; E],
@@ -134,6 +140,11 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             value: view.elevation_min_deg,
             problem: Problem::NothingInView,
         })?;
+        if let Some(far_road) = far_road_deg {
+            let (least, most) = (view.azimuth_min_deg, view.azimuth_max_deg);
+            let far_road = Angle::from_degrees(within("visibility.far_road_deg", f32::from(far_road), least, most)?);
+            axes.narrow = Narrow::towards(far_road - axes.azimuth_origin, axes.azimuth_span, A);
+        }
         axes.find_view(&in_view);
         if axes.ground.is_level() {
             axes.lay_rows(drop);
@@ -294,6 +305,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             cell_cm: self.cell_cm,
             azimuth_origin: self.azimuth_origin,
             azimuth_span: self.azimuth_span,
+            narrow: self.narrow,
         }
     }
 
@@ -371,17 +383,26 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// Place of a bearing on the column axis, 2^-8 columns from the first one's right edge; negative
     /// or beyond `A` columns outside.
     pub fn column_place(&self, bearing: Angle) -> i32 {
-        polar::column_place(bearing - self.azimuth_origin, self.azimuth_span, A as i32)
+        self.columns().place(bearing - self.azimuth_origin)
+    }
+
+    /// The same in 2^-8 units of [`Narrow`], in which angles keep their proportions.
+    pub fn column_unit(&self, bearing: Angle) -> i32 {
+        self.columns().unit(bearing - self.azimuth_origin)
     }
 
     /// Column of a bearing.
     pub fn column(&self, bearing: Angle) -> Option<usize> {
-        usize::try_from(self.column_place(bearing) >> 8).ok().filter(|a| *a < A)
+        self.columns().column(bearing - self.azimuth_origin)
     }
 
     /// Bearing of a place on the column axis.
     pub fn azimuth_of(&self, place: i32) -> Angle {
-        self.azimuth_origin + Angle::from_raw((place * (i32::from(self.azimuth_span) / 4) / (A as i32 * 64)) as i16)
+        self.azimuth_origin + self.columns().bearing(place)
+    }
+
+    fn columns(&self) -> Columns {
+        Columns { span: self.azimuth_span, number: A, narrow: self.narrow }
     }
 
     /// Direction of a column's centre.

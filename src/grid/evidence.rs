@@ -131,7 +131,7 @@ pub struct InverseSensor {
     visible_memory: i32,
     height_prior_cm: i32,
     height_prior_variance: i32,
-    /// Standard deviation of azimuth, 2^-8 columns.
+    /// Standard deviation of azimuth, 2^-8 units of the columns.
     azimuth_sigma: i32,
     /// Standard deviation of range, half a cell's spread included, centimetres.
     range_sigma: i32,
@@ -171,7 +171,10 @@ impl EvidenceConfig {
             visible_memory: seconds("evidence.visible_memory_s", self.visible_memory_s)?,
             height_prior_cm: math::round_i32(prior * 100.0),
             height_prior_variance: math::round_i32(sigma * sigma * 10_000.0),
-            azimuth_sigma: math::round_i32(azimuth_turns * (A as f32 * 256.0) / f32::from(axes.azimuth_span)).max(1),
+            azimuth_sigma: math::round_i32(
+                azimuth_turns * (axes.narrow.units(A) as f32 * 256.0) / f32::from(axes.azimuth_span),
+            )
+            .max(1),
             range_sigma,
             // cells of which the centre can lie within two standard deviations
             range_reach: ((2 * range_sigma + axes.cell_cm / 2) / axes.cell_cm.max(1)).clamp(1, MOST_REACH),
@@ -300,13 +303,14 @@ impl InverseSensor {
             let level = axes.height_at(axes.row_centre(row), ground_cm) - foot_cm;
             *p = if level <= proven { 255 } else { self.bell((level - height).max(0), sigma) as u8 };
         }
-        let place = axes.column_place(r.bearing());
+        let place = axes.column_unit(r.bearing());
         let reach = 2 * self.azimuth_sigma;
-        let (first, last) = (((place - reach) >> 8).max(0), ((place + reach) >> 8).min(A as i32 - 1));
+        let column = |unit| axes.narrow.place(unit) >> 8;
+        let (first, last) = (column(place - reach).max(0), column(place + reach).min(A as i32 - 1));
         let middle = ground_cm / axes.cell_cm.max(1);
         for a in first..=last {
             let Some(column) = grid.column_mut(a as usize) else { continue };
-            let by_azimuth = self.bell(a * 256 + 128 - place, self.azimuth_sigma);
+            let by_azimuth = self.bell(axes.narrow.unit(a * 256 + 128) - place, self.azimuth_sigma);
             for cell in (middle - self.range_reach).max(0)..=(middle + self.range_reach).min(R as i32 - 1) {
                 let offset = cell * axes.cell_cm + axes.cell_cm / 2 - ground_cm;
                 let weight = (gain * by_azimuth * self.bell(offset, self.range_sigma)) >> 16;

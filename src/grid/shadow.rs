@@ -101,7 +101,7 @@ fn columns<const R: usize, const A: usize, const E: usize>(
 }
 
 /// Right and left edge of a box on the column axis, 2^-8 columns.
-#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 512 columns
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most 255 columns
 fn outline<const R: usize, const A: usize, const E: usize>(solid: &Solid, axes: &Axes<R, A, E>) -> (i32, i32) {
     let corners = solid.corners();
     if corners.iter().any(|c| c.0 <= 0) {
@@ -145,7 +145,7 @@ mod tests {
         };
         let levelling = mount.levelling().unwrap();
         let ground = Ground::new(&levelling, Points::Metres(points)).unwrap();
-        let axes = Axes::on(ground, &levelling, &view, 1.0).unwrap();
+        let axes = Axes::on(ground, &levelling, &view, 1.0, None).unwrap();
         let (grid, mut map) = (SphericalGrid::new(), PolarMap::unknown(axes.polar(&levelling), 128, 128));
         crate::grid::raycast::cast(&grid, &axes, &mut map);
         (axes, grid, map)

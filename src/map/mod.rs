@@ -5,6 +5,7 @@
 
 use crate::sensor::road::RoadPoint;
 
+pub mod azimuths;
 pub mod bitmap;
 pub mod polar;
 pub mod query;

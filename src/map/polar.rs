@@ -3,6 +3,7 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig;
+use crate::map::azimuths::{Columns, Narrow};
 use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
@@ -18,40 +19,25 @@ pub struct PolarGeometry {
     pub azimuth_origin: Angle,
     /// Width of all azimuths together, 2^-16 turn.
     pub azimuth_span: u16,
-}
-
-/// Place of a bearing among so many columns of a span, 2^-8 columns from the first one's right edge; negative or
-/// beyond the last one's left edge outside. Grid and map round alike.
-pub(crate) fn column_place(from_origin: Angle, span: u16, columns: i32) -> i32 {
-    i32::from(from_origin.raw()) * (columns * 64) / (i32::from(span) / 4).max(1)
-}
-
-/// The column of a bearing among so many, from right to left; none outside.
-#[inline]
-pub(crate) fn column(from_origin: Angle, span: u16, columns: usize) -> Option<usize> {
-    let place = column_place(from_origin, span, i32::try_from(columns).ok()?);
-    usize::try_from(place >> 8).ok().filter(|column| *column < columns)
-}
-
-/// The column of a bearing, that of the nearer edge outside: a map of a pitched sensor reaches beyond its view's edges.
-pub(crate) fn nearest_column(from_origin: Angle, span: u16, columns: usize) -> usize {
-    let last = columns.saturating_sub(1);
-    column(from_origin, span, columns).unwrap_or(if from_origin.raw() < 0 { 0 } else { last })
+    /// Azimuths that are narrower than the others.
+    pub narrow: Narrow,
 }
 
 impl PolarGeometry {
     /// Bearing of the middle of one of so many azimuths, from the boresight's heading.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // at most a turn; angles wrap
     pub(crate) fn middle_of(&self, azimuth: usize, azimuths: usize) -> Angle {
-        let doubled = (2 * azimuth as u64 + 1) * u64::from(self.azimuth_span);
-        let from_origin = doubled.checked_div(2 * azimuths as u64).unwrap_or(0);
-        self.azimuth_origin + Angle::from_raw(from_origin as u16 as i16)
+        self.azimuth_origin + self.columns(azimuths).middle(azimuth)
+    }
+
+    /// Its azimuths, so many.
+    pub(crate) fn columns(&self, number: usize) -> Columns {
+        Columns { span: self.azimuth_span, number, narrow: self.narrow }
     }
 
     /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size.
     pub fn locate(&self, x_cm: i32, y_cm: i32, ranges: usize, azimuths: usize) -> Option<(usize, usize)> {
         let from_origin = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
-        let azimuth = column(from_origin, self.azimuth_span, azimuths)?;
+        let azimuth = self.columns(azimuths).column(from_origin)?;
         let range = usize::try_from(math::length(x_cm, y_cm) / self.cell_cm.max(1)).ok()?;
         (range < ranges).then_some((azimuth, range))
     }
@@ -82,7 +68,13 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
 
     /// A map of no sensor, to be placed in static memory; everything is unknown.
     pub const NOWHERE: Self = Self::unknown(
-        PolarGeometry { levelling: Levelling::NOWHERE, cell_cm: 0, azimuth_origin: Angle::ZERO, azimuth_span: 0 },
+        PolarGeometry {
+            levelling: Levelling::NOWHERE,
+            cell_cm: 0,
+            azimuth_origin: Angle::ZERO,
+            azimuth_span: 0,
+            narrow: Narrow::NONE,
+        },
         0,
         0,
     );
@@ -183,6 +175,7 @@ mod tests {
             cell_cm: 200,
             azimuth_origin: Angle::from_degrees(-45.0),
             azimuth_span: Angle::QUARTER.raw().unsigned_abs(),
+            narrow: Narrow::NONE,
         };
         PolarMap::unknown(geometry, 100, 50)
     }

@@ -292,6 +292,7 @@ mod tests {
             cell_cm: 400,
             azimuth_origin: Angle::from_degrees(-45.0),
             azimuth_span: Angle::QUARTER.raw().unsigned_abs(),
+            narrow: crate::map::azimuths::Narrow::NONE,
         };
         let mut map = PolarMap::unknown(geometry, 128, 128);
         for a in 0..10 {

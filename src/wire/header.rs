@@ -1,9 +1,10 @@
 //! What a sender's maps are of: mount, geometry, configuration; and its clock.
 //!
 //! # Model
-//! Seven groups of five bytes, and an eighth of senders that have a table of probabilities. Group 0 is the sender's
-//! clock; the others stay the same for a whole epoch. A long message carries them one after another, a classic one
-//! carries one of them, so a receiver collects six and keeps them. All numbers are big-endian.
+//! Seven groups of five bytes, and more with the number 7 of senders that have a table of probabilities, or azimuths of
+//! which some are narrow. Group 0 is the sender's clock; the others stay the same for a whole epoch. A long message
+//! carries them one after another, a classic one carries one of them, so a receiver collects six and keeps them. All
+//! numbers are big-endian.
 //!
 //! | group | bytes |
 //! |---|---|
@@ -11,10 +12,14 @@
 //! | 1 | x, cm, 3 bytes signed; height, cm |
 //! | 2 | y, cm, 3 bytes signed; yaw, 2^-16 turn |
 //! | 3 | pitch, roll, 2^-16 turn; planes, a bit each |
-//! | 4 | right edge of the first azimuth from the boresight's heading, 2^-16 turn; width of all azimuths together, 2^-16 turn; azimuths less one |
+//! | 4 | right edge of the first azimuth from the boresight's heading, 2^-16 turn; width of all azimuths together, 2^-16 turn; azimuths less one, and 128 more if some are narrow |
 //! | 5 | length of a range cell, cm; range cells less one; first and last cell usually known (1 and 0: none) |
-//! | 6 | fingerprint of the configuration, 4 bytes; CRC-8 of profile 11 over the 29 bytes before it |
+//! | 6 | fingerprint of the configuration, 4 bytes; CRC-8 of profile 11 over the 29 bytes before it and, if some azimuths are narrow, the five of that group |
 //! | 7 | least probabilities by a cell's bits, 3 bytes; lowest 16 bits of the table's check sum |
+//! | 7 | first narrow azimuth; first behind them; 0; how many times narrower; 0 |
+//!
+//! A receiver that knows nothing of narrow azimuths finds more than 128 of them and no header, so it shows nothing; and
+//! a third byte of 0 is of no probabilities.
 //!
 //! # Limits
 //! 128 azimuths (their start takes seven bits of a classic frame), 256 range cells, positions within
@@ -28,6 +33,7 @@ use super::code::ray::Known;
 use super::message::{CLASSIC_BYTES, WIRE_VERSION};
 use crate::fixed::angle::Angle;
 pub use crate::fixed::bytes::fingerprint;
+use crate::map::azimuths::Narrow;
 use crate::map::polar::PolarGeometry;
 use crate::probability::Levels;
 use crate::sensor::mount::{Levelling, Mount};
@@ -36,14 +42,17 @@ use crate::sensor::road::RoadPoint;
 /// Groups every header has.
 pub const GROUPS: u8 = 7;
 
-/// The group after them, which says what a cell's bits say of its probability.
-const LEVELS: u8 = 7;
+/// The number of groups after them, which say what a cell's bits say of its probability and which azimuths are narrow.
+const MORE: u8 = 7;
+
+/// Added to the number of azimuths if some are narrow.
+const SOME_NARROW: u8 = 0x80;
 
 /// Bytes of a group.
 const GROUP: usize = 5;
 
 /// Most own bytes of a long header: flags, then the groups.
-pub const LONG: usize = 1 + (GROUPS as usize + 1) * GROUP;
+pub const LONG: usize = 1 + (GROUPS as usize + 2) * GROUP;
 
 /// Most azimuths of a map on the wire.
 pub const MOST_AZIMUTHS: usize = 128;
@@ -88,6 +97,8 @@ pub struct Header {
     pub azimuth_span: u16,
     /// Number of azimuths, 1 to 128.
     pub azimuths: u8,
+    /// Which of them are narrower than the others.
+    pub narrow: Narrow,
     /// Length of a range cell along the ground, centimetres.
     pub cell_cm: u16,
     /// Number of range cells, 1 to 256.
@@ -150,6 +161,7 @@ impl Header {
             azimuth_origin: geometry.azimuth_origin,
             azimuth_span: geometry.azimuth_span,
             azimuths: u8::try_from(A).map_err(|_| unsendable)?,
+            narrow: geometry.narrow,
             cell_cm: u16::try_from(geometry.cell_cm).map_err(|_| unsendable)?,
             ranges: u16::try_from(R).map_err(|_| unsendable)?,
             usual,
@@ -161,7 +173,18 @@ impl Header {
 
     /// Groups it has.
     pub fn count(&self) -> u8 {
-        GROUPS + u8::from(self.probability.is_some())
+        GROUPS + u8::from(self.probability.is_some()) + u8::from(self.some_narrow())
+    }
+
+    fn some_narrow(&self) -> bool {
+        self.narrow != Narrow::NONE
+    }
+
+    /// The groups with the number 7.
+    fn more(&self) -> impl Iterator<Item = [u8; GROUP]> {
+        let [first, end, times] = self.narrow.to_bytes();
+        let narrow = self.some_narrow().then_some([first, end, 0, times, 0]);
+        self.probability.map(|levels| levels.to_bytes()).into_iter().chain(narrow)
     }
 
     /// Where the cells lie on the road, for queries.
@@ -171,6 +194,7 @@ impl Header {
             cell_cm: i32::from(self.cell_cm),
             azimuth_origin: self.azimuth_origin,
             azimuth_span: self.azimuth_span,
+            narrow: self.narrow,
         }
     }
 
@@ -180,7 +204,7 @@ impl Header {
     }
 
     /// Groups 1 to 6.
-    fn groups(&self) -> [[u8; GROUP]; GROUPS as usize - 1] {
+    fn groups(&self) -> Groups {
         let [_, x1, x2, x3] = self.mount.origin.x_cm.to_be_bytes();
         let [_, y1, y2, y3] = self.mount.origin.y_cm.to_be_bytes();
         let [h1, h2] = self.mount.height_cm.to_be_bytes();
@@ -193,22 +217,24 @@ impl Header {
         let [f1, f2, f3, f4] = self.fingerprint.to_be_bytes();
         let [_, ranges] = self.ranges.saturating_sub(1).to_be_bytes();
         let [near, last] = self.usual.limits();
+        let azimuths = self.azimuths.saturating_sub(1) | if self.some_narrow() { SOME_NARROW } else { 0 };
         let mut groups = [
             [x1, x2, x3, h1, h2],
             [y1, y2, y3, yaw1, yaw2],
             [pitch1, pitch2, roll1, roll2, self.planes],
-            [origin1, origin2, span1, span2, self.azimuths.saturating_sub(1)],
+            [origin1, origin2, span1, span2, azimuths],
             [cell1, cell2, ranges, near, last],
             [f1, f2, f3, f4, 0],
         ];
-        let sum = check(&groups);
+        let sum = check(&groups, self.more().last());
         if let Some(byte) = groups.last_mut().and_then(|group| group.last_mut()) {
             *byte = sum;
         }
         groups
     }
 
-    fn parse(groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> Result<Self, NotAHeader> {
+    /// From groups 1 to 6 and the one of narrow azimuths, if that came.
+    fn parse(groups: &Groups, narrow: Option<[u8; GROUP]>) -> Result<Self, NotAHeader> {
         let [
             [x1, x2, x3, h1, h2],
             [y1, y2, y3, yaw1, yaw2],
@@ -217,13 +243,15 @@ impl Header {
             [cell1, cell2, ranges, near, last],
             [f1, f2, f3, f4, sum],
         ] = *groups;
-        if sum != check(groups) {
+        if sum != check(groups, narrow) {
             return Err(NotAHeader::Check);
         }
         let coordinate = |a, b, c| i32::from_be_bytes([a, b, c, 0]) >> 8;
         let angle = |a, b| Angle::from_raw(i16::from_be_bytes([a, b]));
         let ranges = u16::from(ranges) + 1;
         let usual = Known::from_limits([near, last]).ok_or(NotAHeader::Range)?;
+        let number = (azimuths & !SOME_NARROW) + 1;
+        let some = narrow.and_then(|[first, end, _, times, _]| Narrow::from_bytes([first, end, times], number));
         let header = Self {
             mount: WireMount {
                 origin: RoadPoint::new(coordinate(x1, x2, x3), coordinate(y1, y2, y3)),
@@ -234,7 +262,8 @@ impl Header {
             },
             azimuth_origin: angle(origin1, origin2),
             azimuth_span: u16::from_be_bytes([span1, span2]),
-            azimuths: azimuths.checked_add(1).filter(|n| usize::from(*n) <= MOST_AZIMUTHS).ok_or(NotAHeader::Range)?,
+            azimuths: number,
+            narrow: if azimuths == number - 1 { Narrow::NONE } else { some.ok_or(NotAHeader::Range)? },
             cell_cm: u16::from_be_bytes([cell1, cell2]),
             ranges,
             usual,
@@ -249,20 +278,18 @@ impl Header {
     /// Own bytes of a long message, and how many they are.
     pub fn emit(&self, clock: &Clock) -> ([u8; LONG], usize) {
         let mut bytes = [0; LONG];
-        let levels = self.probability.map(|levels| levels.to_bytes());
-        let groups = [clock.group()].into_iter().chain(self.groups()).chain(levels);
+        let groups = [clock.group()].into_iter().chain(self.groups()).chain(self.more());
         let all = [flags(clock, 0)].into_iter().chain(groups.flatten());
         bytes.iter_mut().zip(all).for_each(|(to, from)| *to = from);
         (bytes, 1 + usize::from(self.count()) * GROUP)
     }
 
-    /// Own bytes of the classic message that carries a group, 0 to 7.
+    /// Own bytes of the classic message that carries a group, by its place among all of them.
     pub fn emit_group(&self, clock: &Clock, group: u8) -> [u8; CLASSIC_BYTES] {
-        let groups = self.groups();
-        let place = usize::from(group).checked_sub(1).and_then(|place| groups.get(place).copied());
-        let levels = self.probability.filter(|_| group == LEVELS).map(|levels| levels.to_bytes());
-        let [a, b, c, d, e] = place.or(levels).unwrap_or_else(|| clock.group());
-        [flags(clock, group), a, b, c, d, e]
+        let mut others = self.groups().into_iter().chain(self.more());
+        let place = usize::from(group).checked_sub(1).and_then(|place| others.nth(place));
+        let [a, b, c, d, e] = place.unwrap_or_else(|| clock.group());
+        [flags(clock, if place.is_some() { group.min(MORE) } else { 0 }), a, b, c, d, e]
     }
 }
 
@@ -277,15 +304,33 @@ impl Clock {
     }
 }
 
+/// Whether a group 7 is of narrow azimuths. Probabilities with a third byte of 0 do not hold.
+fn is_narrow([_, _, third, times, _]: &[u8; GROUP]) -> bool {
+    *third == 0 && *times > 1
+}
+
 /// First own byte: clock set, group, wire version.
 fn flags(clock: &Clock, group: u8) -> u8 {
     u8::from(clock.synchronised) << 7 | group << 4 | WIRE_VERSION
 }
 
-/// The check over groups 1 to 6, the last byte left out.
-fn check(groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> u8 {
-    let bytes = groups.as_flattened();
-    CRC_8.checksum(bytes.split_last().map_or(bytes, |(_, rest)| rest))
+/// Groups 1 to 6.
+type Groups = [[u8; GROUP]; GROUPS as usize - 1];
+
+/// The check over groups 1 to 6, the last byte left out, and the one of narrow azimuths where they say that there are any.
+fn check(groups: &Groups, narrow: Option<[u8; GROUP]>) -> u8 {
+    let mut digest = CRC_8.digest();
+    digest.update(groups.as_flattened().split_last().map_or(&[], |(_, rest)| rest));
+    if let Some(narrow) = narrow.filter(|_| some_narrow(groups)) {
+        digest.update(&narrow);
+    }
+    digest.finalize()
+}
+
+/// Whether groups 1 to 6 say that some azimuths are narrow.
+fn some_narrow(groups: &Groups) -> bool {
+    let [.., [.., azimuths], _, _] = *groups;
+    azimuths & SOME_NARROW != 0
 }
 
 /// What a header message brought.
@@ -305,9 +350,11 @@ pub enum Brought {
 /// Collects an epoch's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Collector {
-    groups: [[u8; GROUP]; GROUPS as usize - 1],
+    groups: Groups,
     /// Which of them are there, a bit each.
     there: u8,
+    /// The group of narrow azimuths.
+    narrow: Option<[u8; GROUP]>,
     header: Option<Header>,
     levels: Said,
 }
@@ -331,7 +378,7 @@ impl Default for Collector {
 impl Collector {
     /// Nothing yet.
     pub const NEW: Self =
-        Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, header: None, levels: Said::Nothing };
+        Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, narrow: None, header: None, levels: Said::Nothing };
 
     /// The header, once complete.
     pub fn header(&self) -> Option<&Header> {
@@ -353,7 +400,8 @@ impl Collector {
         if bytes.len() < usize::from(GROUPS) * GROUP {
             return match flags >> 4 & 7 {
                 0 => Ok(Brought::Clock(Clock::parse(synchronised, first))),
-                LEVELS.. => {
+                MORE.. if is_narrow(&first) => self.take_narrow(first),
+                MORE.. => {
                     self.take_levels(first);
                     Ok(Brought::Group)
                 }
@@ -363,24 +411,25 @@ impl Collector {
         let mut groups = [[0; GROUP]; GROUPS as usize - 1];
         let rest = bytes.get(GROUP..).unwrap_or(&[]);
         groups.as_flattened_mut().iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
-        let header = Header::parse(&groups)?;
-        if self.there != 0 && self.contradicts(&groups) {
+        let more = rest.get(groups.as_flattened().len()..).unwrap_or(&[]).as_chunks::<GROUP>().0;
+        let narrow = more.iter().copied().find(is_narrow);
+        let header = Header::parse(&groups, narrow)?;
+        if self.contradicts(&groups) || self.narrow.is_some_and(|held| narrow.is_some_and(|new| new != held)) {
             return Ok(Brought::Contradiction);
         }
         (self.groups, self.there, self.header) = (groups, 0x3F, Some(header));
-        if let Some(levels) = rest.get(groups.as_flattened().len()..).and_then(<[u8]>::first_chunk) {
-            self.take_levels(*levels);
-        }
+        self.narrow = narrow.or(self.narrow);
+        more.iter().filter(|group| !is_narrow(group)).for_each(|levels| self.take_levels(*levels));
         self.with_levels();
         Ok(Brought::Clock(Clock::parse(synchronised, first)))
     }
 
-    fn contradicts(&self, groups: &[[u8; GROUP]; GROUPS as usize - 1]) -> bool {
+    fn contradicts(&self, groups: &Groups) -> bool {
         let mut both = self.groups.iter().zip(groups).enumerate();
         both.any(|(i, (old, new))| self.there >> i & 1 == 1 && old != new)
     }
 
-    /// Takes group 7; one that does not hold says nothing.
+    /// Takes group 7 of probabilities; one that does not hold says nothing.
     fn take_levels(&mut self, group: [u8; GROUP]) {
         let Some(new) = Levels::from_bytes(group) else { return };
         self.levels = match self.levels {
@@ -408,10 +457,28 @@ impl Collector {
         }
         *slot = group;
         self.there |= 1 << place;
-        if known || self.there != 0x3F {
+        if known { Ok(Brought::Group) } else { self.complete() }
+    }
+
+    /// Takes group 7 of narrow azimuths.
+    fn take_narrow(&mut self, group: [u8; GROUP]) -> Result<Brought, NotAHeader> {
+        match self.narrow {
+            Some(held) if held == group => Ok(Brought::Group),
+            Some(_) => Ok(Brought::Contradiction),
+            None => {
+                self.narrow = Some(group);
+                self.complete()
+            }
+        }
+    }
+
+    /// Makes the header, once all of it is there.
+    fn complete(&mut self) -> Result<Brought, NotAHeader> {
+        let missing = self.there != 0x3F || self.narrow.is_none() && some_narrow(&self.groups);
+        if missing || self.header.is_some() {
             return Ok(Brought::Group);
         }
-        match Header::parse(&self.groups) {
+        match Header::parse(&self.groups, self.narrow) {
             Ok(header) => {
                 self.header = Some(header);
                 self.with_levels();
@@ -442,6 +509,7 @@ mod tests {
             azimuth_origin: Angle::from_raw(-10968),
             azimuth_span: 21936,
             azimuths: 120,
+            narrow: Narrow::NONE,
             cell_cm: 100,
             ranges: 200,
             usual: Known::new(15, 200),
@@ -545,6 +613,80 @@ mod tests {
         assert_eq!(c.header(), Some(&header()));
     }
 
+    fn with_narrow(bytes: [u8; 3]) -> Header {
+        Header { narrow: Narrow::from_bytes(bytes, 120).unwrap(), ..header() }
+    }
+
+    #[test]
+    fn narrow_azimuths_are_one_more_group_without_which_there_is_no_header() {
+        let levels = Levels::from_bytes(LEVELS_7);
+        for (sent, more) in
+            [(with_narrow([40, 88, 4]), 1), (Header { probability: levels, ..with_narrow([0, 120, 2]) }, 2)]
+        {
+            let bytes = emit(&sent);
+            assert_eq!((bytes.len(), usize::from(sent.count())), (36 + 5 * more, 7 + more));
+            let [first, end, times] = sent.narrow.to_bytes();
+            assert_eq!(bytes[bytes.len() - 5..], [first, end, 0, times, 0]);
+            assert_eq!(bytes[25], 128 + 119, "more azimuths than there may be");
+            let mut c = Collector::NEW;
+            c.take(&bytes).unwrap();
+            assert_eq!(c.header(), Some(&sent));
+            assert_eq!(c.header().unwrap().geometry().narrow, sent.narrow);
+            let count = sent.count();
+            for first in 0..count {
+                let mut c = Collector::NEW;
+                for k in 0..count {
+                    assert!(c.header().is_none() || c.narrow.is_some(), "from group {first} on");
+                    c.take(&sent.emit_group(&CLOCK, (first + k) % count)).unwrap();
+                }
+                assert_eq!(c.header(), Some(&sent), "from group {first} on");
+            }
+            // a long message without that group
+            assert_eq!(Collector::NEW.take(&bytes[..bytes.len() - 5]), Err(NotAHeader::Check));
+        }
+    }
+
+    #[test]
+    fn a_receiver_that_knows_nothing_of_narrow_azimuths_has_no_header_of_them() {
+        // it reads 248 azimuths, and of group 7 probabilities that do not hold
+        let sent = with_narrow([40, 88, 4]);
+        let group = sent.emit_group(&CLOCK, 7);
+        assert_eq!(
+            (group[0] >> 4 & 7, Levels::from_bytes([group[1], group[2], group[3], group[4], group[5]])),
+            (7, None)
+        );
+        let azimuths = sent.emit_group(&CLOCK, 4)[5];
+        assert!(usize::from(azimuths) >= MOST_AZIMUTHS);
+    }
+
+    #[test]
+    fn other_narrow_azimuths_contradict_and_damaged_ones_make_no_header() {
+        let (one, other) = (with_narrow([40, 88, 4]), with_narrow([40, 87, 4]));
+        let mut c = Collector::NEW;
+        c.take(&emit(&one)).unwrap();
+        assert_eq!(c.take(&other.emit_group(&CLOCK, 7)), Ok(Brought::Contradiction));
+        assert_eq!(c.take(&emit(&other)), Ok(Brought::Contradiction));
+        assert_eq!(c.header(), Some(&one));
+        // the check of group 6 is over these, too
+        let mut c = Collector::NEW;
+        (1..7).for_each(|group| _ = c.take(&one.emit_group(&CLOCK, group)).unwrap());
+        assert!(c.header().is_none());
+        assert_eq!(c.take(&other.emit_group(&CLOCK, 7)), Err(NotAHeader::Check));
+        assert_eq!(c, Collector::NEW);
+        // in range of a byte, not of the header
+        let groups = one.groups();
+        for bytes in [[40, 121, 0, 4, 0], [88, 40, 0, 4, 0], [40, 88, 0, 5, 0]] {
+            let mut groups = groups;
+            groups[5][4] = check(&groups, Some(bytes));
+            assert_eq!(Header::parse(&groups, Some(bytes)), Err(NotAHeader::Range), "{bytes:?}");
+        }
+        // of a header without any, such a group says nothing
+        let mut c = Collector::NEW;
+        c.take(&emit(&header())).unwrap();
+        assert_eq!(c.take(&one.emit_group(&CLOCK, 7)), Ok(Brought::Group));
+        assert_eq!(c.header(), Some(&header()));
+    }
+
     #[test]
     fn unknown_versions_and_impossible_sizes_are_refused() {
         let take = |bytes: &[u8]| Collector::default().take(bytes);
@@ -566,6 +708,7 @@ mod tests {
             cell_cm: 100,
             azimuth_origin: Angle::from_degrees(-60.25),
             azimuth_span: 21936,
+            narrow: Narrow::NONE,
         };
         let sent = Header::new::<200, 120>(&mount, &geometry, Known::new(15, 200), 1, 0).unwrap();
         let received = sent.geometry();

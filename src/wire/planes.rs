@@ -177,6 +177,7 @@ mod tests {
             cell_cm: 100,
             azimuth_origin: Angle::from_raw(-1000),
             azimuth_span: 2000,
+            narrow: crate::map::azimuths::Narrow::NONE,
         };
         let mut map = PolarMap::unknown(geometry, 128, 100);
         let (grades, occupancy) = map.rows_mut(1).unwrap();

@@ -30,6 +30,7 @@ fn blank(sensor: usize) -> Map {
         cell_cm: 100,
         azimuth_origin: Angle::from_degrees(-60.0),
         azimuth_span: Angle::from_degrees(120.0).raw().unsigned_abs(),
+        narrow: viewshed::map::azimuths::Narrow::NONE,
     };
     Map::unknown(geometry, VISIBLE_FROM, 128)
 }

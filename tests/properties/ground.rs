@@ -66,7 +66,7 @@ proptest! {
         setup.sensor.field_of_view.elevation_max_deg = 20.0;
         let levelling = mount.levelling().unwrap();
         let ground = Ground::new(&levelling, Points::Metres(&points)).unwrap();
-        let Ok(axes) = Axes::<R, A, E>::on(ground, &levelling, &setup.sensor.field_of_view, 1.0) else { return Ok(()) };
+        let Ok(axes) = Axes::<R, A, E>::on(ground, &levelling, &setup.sensor.field_of_view, 1.0, None) else { return Ok(()) };
         let mut grid = SphericalGrid::<R, A, E, 3>::new();
         let mut map = PolarMap::unknown(axes.polar(&levelling), 128, 128);
         cast(&grid, &axes, &mut map);

@@ -99,7 +99,7 @@ proptest! {
         thresholds in (2..=255_u8, 2..=255_u8),
     ) {
         let levelling = crate::setup::Setup::default().sensor.mount.levelling().unwrap();
-        let geometry = viewshed::map::polar::PolarGeometry { levelling, cell_cm: 100, azimuth_origin: Angle::from_degrees(-60.0), azimuth_span: 21_845 };
+        let geometry = viewshed::map::polar::PolarGeometry { levelling, cell_cm: 100, azimuth_origin: Angle::from_degrees(-60.0), azimuth_span: 21_845, narrow: viewshed::map::azimuths::Narrow::NONE };
         let mut map = PolarMap::<R, A>::unknown(geometry, thresholds.0, thresholds.1);
         for (a, row) in grades.chunks(R).enumerate() {
             let (grades, occupancy) = map.rows_mut(a).unwrap();

@@ -54,6 +54,7 @@ pub fn header(fingerprint: u32) -> Header {
         },
         azimuth_origin: Angle::from_raw(-10_000),
         azimuth_span: 20_000,
+        narrow: viewshed::map::azimuths::Narrow::NONE,
         azimuths: A as u8,
         cell_cm: 200,
         ranges: R as u16,

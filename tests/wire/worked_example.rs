@@ -32,6 +32,7 @@ pub fn header() -> Header {
         },
         azimuth_origin: Angle::from_degrees(-2.0),
         azimuth_span: 728,
+        narrow: viewshed::map::azimuths::Narrow::NONE,
         azimuths: AZIMUTHS as u8,
         cell_cm: 100,
         ranges: RANGES as u16,

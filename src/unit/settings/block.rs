@@ -50,7 +50,8 @@ impl Settings {
     /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
     /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each
     /// tuned number with its place, from 2^16 on for obstacles, from 2^17 on for evidence and from 2^18 on
-    /// for fixtures; and where the road is not flat the number 2^19 and each point of its profile.
+    /// for fixtures; the number 2^20 and where the far road lies, if that is
+    /// said; and where the road is not flat the number 2^19 and each point of its profile.
     pub fn fingerprint(&self) -> u32 {
         self.fingerprint_at(&self.place())
     }
@@ -87,6 +88,9 @@ impl Settings {
             let fixtures = self.fixtures().into_iter().flat_map(|fixtures| fixtures.numbers());
             (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
         }
+        if let Some(far_road) = self.visibility.far_road_deg {
+            take([1 << 20, i32::from(far_road).cast_unsigned()]);
+        }
         if let Some(first) = heights.next().filter(|_| ground::ROOM) {
             take([1 << 19, 0]);
             core::iter::once(first).chain(heights).for_each(|point| take(point.map(f32::to_bits)));
@@ -115,7 +119,9 @@ impl Settings {
             w.put([self.unit.sensor, self.unit.radar_id]);
             w.put(self.unit.max_delay_ms.to_le_bytes());
             w.put(self.unit.serial_baud.to_le_bytes());
-            w.put([self.unit.configure_radar as u8, u8::from(self.unit.supervise), 0, 0]);
+            let far_road = self.visibility.far_road_deg;
+            let [said, towards] = far_road.map_or([0, 0], |degrees| [1, degrees.cast_unsigned()]);
+            w.put([self.unit.configure_radar as u8, u8::from(self.unit.supervise), said, towards]);
         }
         if let Some((body, sum)) = block.split_last_chunk_mut::<SUM_LEN>() {
             *sum = fingerprint(body).to_le_bytes();
@@ -145,7 +151,8 @@ impl Settings {
         let sequence = header.u32().ok_or(BlockError::Short)?;
         let mut settings = Self::read(&mut header).ok_or(BlockError::Short)?;
         if layout > 1 {
-            settings.unit = unit(&mut header).ok_or(BlockError::Short)?.map_err(BlockError::Parameter)?;
+            let (unit, far_road_deg) = unit(&mut header).ok_or(BlockError::Short)?.map_err(BlockError::Parameter)?;
+            (settings.unit, settings.visibility.far_road_deg) = (unit, far_road_deg);
         }
         Ok((sequence, settings))
     }
@@ -219,7 +226,12 @@ impl Settings {
             elevation_margin_deg: r.f32()?,
             max_detections: r.f32()? as u16,
         };
-        let visibility = VisibilityConfig { slice_height_m: r.f32()?, visible_from: r.f32()?, occupied_from: r.f32()? };
+        let visibility = VisibilityConfig {
+            slice_height_m: r.f32()?,
+            visible_from: r.f32()?,
+            occupied_from: r.f32()?,
+            far_road_deg: None,
+        };
         let health = HealthConfig { hold_s: r.f32()?, blind_after_s: r.f32()?, reset_gap_s: r.f32()? };
         let bus = |r: &mut Reader| {
             Some(BusConfig { bit_rate: r.u32()?, sample_point_permille: r.u16()?, listen_first: r.u16()? != 0 })
@@ -254,10 +266,11 @@ fn layout(block: &[u8]) -> Option<u16> {
     r.take().filter(|magic| *magic == MAGIC).and_then(|_| r.u16())
 }
 
-fn unit(r: &mut Reader) -> Option<Result<UnitConfig, ConfigError>> {
+/// The unit's own figures, and where the far road lies.
+fn unit(r: &mut Reader) -> Option<Result<(UnitConfig, Option<i8>), ConfigError>> {
     let [sensor, radar_id] = r.take()?;
     let (max_delay_ms, serial_baud) = (r.u16()?, r.u32()?);
-    let [number, supervise, _, _] = r.take()?;
+    let [number, supervise, said, towards] = r.take()?;
     let refused = |parameter, number, max| {
         let problem = Problem::OutOfLimits { min: 0.0, max };
         Err(ConfigError { parameter, value: f32::from(number), problem })
@@ -268,8 +281,12 @@ fn unit(r: &mut Reader) -> Option<Result<UnitConfig, ConfigError>> {
     if supervise > 1 {
         return Some(refused("unit.supervise", supervise, 1.0));
     }
+    if said > 1 {
+        return Some(refused("visibility.far_road_deg", said, 1.0));
+    }
     let supervise = supervise == 1;
-    Some(Ok(UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar, supervise }))
+    let far_road_deg = (said == 1).then_some(towards.cast_signed());
+    Some(Ok((UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar, supervise }, far_road_deg)))
 }
 
 #[cfg(test)]
@@ -301,6 +318,7 @@ pub(super) mod tests {
         let configure_radar = ConfigureRadar::Objects;
         let unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600, ..s.unit };
         s.unit = UnitConfig { configure_radar, supervise: true, ..unit };
+        s.visibility.far_road_deg = Some(-3);
         s
     }
 
@@ -325,7 +343,8 @@ pub(super) mod tests {
     fn a_block_of_layout_1_is_read_and_says_nothing_of_the_unit() {
         let (old, unit) = (layout_1(&settings(), 7), UnitConfig::default());
         assert_eq!((old.len(), old[4], old[6]), (148, 1, 148));
-        assert_eq!(Settings::from_block(&old), Ok((7, Settings { unit, ..settings() })));
+        let visibility = VisibilityConfig { far_road_deg: None, ..settings().visibility };
+        assert_eq!(Settings::from_block(&old), Ok((7, Settings { unit, visibility, ..settings() })));
         let padded: [u8; BLOCK_LEN] = core::array::from_fn(|k| old.get(k).copied().unwrap_or(0xFF));
         assert_eq!(Settings::from_block(&padded), Settings::from_block(&old), "in a slot of today's length");
         // neither layout passes for the other
@@ -337,7 +356,8 @@ pub(super) mod tests {
     #[test]
     fn the_fingerprint_is_of_what_maps_depend_on() {
         let (a, mut b) = (settings(), settings());
-        let plain = Settings { unit: UnitConfig::default(), ..a };
+        let far_road = |far_road_deg| Settings { visibility: VisibilityConfig { far_road_deg, ..a.visibility }, ..a };
+        let plain = Settings { unit: UnitConfig::default(), ..far_road(None) };
         assert_eq!(plain.fingerprint(), fingerprint(&layout_1(&a, 0)[..LAYOUT_1_LEN - SUM_LEN]));
         b.unit = UnitConfig { supervise: true, ..UnitConfig::default() };
         assert_eq!(a.fingerprint(), b.fingerprint());
@@ -359,6 +379,9 @@ pub(super) mod tests {
             over(&[[0.0, 1.0], [2.0, 3.0]]),
             over(&[[0.0, 1.0], [2.0, 3.5]]),
             over(&[[0.0, 1.0]]),
+            far_road(None).fingerprint(),
+            far_road(Some(0)).fingerprint(),
+            far_road(Some(3)).fingerprint(),
         ];
         assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:x?}");
     }

@@ -15,12 +15,12 @@
 //! | 4 | sequence: the newer slot has the higher one, modulo 2^32 |
 //! | 4 x 29 | `f32`: mount, field of view, noise, gate, visibility, health, each in the order of its fields |
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
-//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), whether it is supervised by what stands in its view (1 byte: 0 or 1), 0 (2 bytes) |
+//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), whether it is supervised by what stands in its view (1 byte: 0 or 1), whether it is said where the far road lies (1 byte: 0 or 1) and where, whole degrees (1 byte, signed) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Blocks of what is known of a place, in slots of their own: `kept`. Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
 //! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes,
-//! of tuned parameters, of what is said of fixtures and of the road's heights.
+//! of tuned parameters, of what is said of fixtures, of where the far road lies and of the road's heights.
 
 mod block;
 mod flash;

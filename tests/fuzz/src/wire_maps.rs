@@ -41,6 +41,7 @@ pub fn run(bytes: &[u8]) {
         mount: WireMount { origin: RoadPoint::new(0, 0), height_cm: 500, yaw: angle, pitch: angle, roll: angle },
         azimuth_origin: angle,
         azimuth_span: 900,
+        narrow: viewshed::map::azimuths::Narrow::NONE,
         azimuths: A as u8,
         cell_cm: 100,
         ranges: 64,

@@ -36,6 +36,7 @@ fn sent() -> &'static [(Vec<u8>, u64)] {
             mount: WireMount { origin: RoadPoint::new(0, 0), height_cm: 500, yaw: angle, pitch: angle, roll: angle },
             azimuth_origin: angle,
             azimuth_span: 900,
+            narrow: viewshed::map::azimuths::Narrow::NONE,
             azimuths: 8,
             cell_cm: 100,
             ranges: 32,

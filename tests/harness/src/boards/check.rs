@@ -6,6 +6,7 @@ use viewshed::bench::stage::Stage;
 use viewshed::map::polar::PolarGeometry;
 
 use super::image::Image;
+use crate::geometry::azimuths;
 
 /// What came out of a run.
 #[derive(Debug, Clone)]
@@ -30,6 +31,8 @@ pub struct Difference {
     pub ranges: usize,
     /// Outer edges of the first and last azimuth, radians.
     pub azimuth_rad: [f64; 2],
+    /// The first azimuth that is narrower than the others, the first behind them, how many times.
+    pub narrow: [u8; 3],
     pub cell_m: f64,
     /// Grade and occupancy of every cell, here and there.
     pub host: Vec<[u8; 2]>,
@@ -136,10 +139,9 @@ pub fn difference(answer: &[u8], here: &[u8], frame: usize, geometry: &PolarGeom
 impl Difference {
     /// Of two maps of the same geometry.
     pub fn new(frame: usize, ranges: usize, geometry: &PolarGeometry, host: Vec<[u8; 2]>, board: Vec<[u8; 2]>) -> Self {
-        let right = f64::from(geometry.azimuth_origin.radians());
-        let span = f64::from(geometry.azimuth_span) / 65536.0 * std::f64::consts::TAU;
+        let azimuth_rad = azimuths::ends_rad(geometry.azimuth_origin, geometry.azimuth_span);
         let cell_m = f64::from(geometry.cell_cm) / 100.0;
-        Self { frame, ranges, azimuth_rad: [right, right + span], cell_m, host, board, visible_from: 128 }
+        Self { frame, ranges, azimuth_rad, narrow: geometry.narrow.to_bytes(), cell_m, host, board, visible_from: 128 }
     }
 }
 

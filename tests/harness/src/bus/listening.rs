@@ -11,6 +11,7 @@ use viewshed::wire::serial::Unstuffer;
 
 use super::ears::{Ears, Key};
 use super::logged::Logged;
+use crate::geometry::azimuths::EVEN;
 use crate::recording::can_log::Line;
 use crate::recording::serial_log::Chunk;
 
@@ -71,6 +72,9 @@ pub struct Mounted {
     pub azimuths: u8,
     /// Right edge of the first, left edge of the last.
     pub azimuth_deg: [f64; 2],
+    /// Where some are narrower than the others: the first of them, the first behind them, and how many times.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub narrow: Option<[u8; 3]>,
     pub ranges: u16,
     pub cell_m: f64,
     pub fingerprint: u32,
@@ -235,6 +239,7 @@ impl Listening {
                 roll_deg: degrees(h.mount.roll),
                 azimuths: h.azimuths,
                 azimuth_deg: [right, right + f64::from(h.azimuth_span) / 65536.0 * 360.0],
+                narrow: Some(h.narrow.to_bytes()).filter(|narrow| *narrow != EVEN),
                 ranges: h.ranges,
                 cell_m: f64::from(h.cell_cm) / 100.0,
                 fingerprint: h.fingerprint,

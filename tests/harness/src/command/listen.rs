@@ -16,6 +16,7 @@ use super::print;
 use crate::bus::listening::{Counted, Heard, Listening, Moment, SENSORS, shown};
 use crate::bus::logged::{self, Logged};
 #[cfg(target_os = "linux")]
+use crate::geometry::azimuths;
 use crate::recording::can_log;
 use crate::recording::file;
 #[cfg(target_os = "linux")]
@@ -230,12 +231,11 @@ fn look(listening: &Listening, maps: &mut [Vec<Moment>], out: Option<&Folder>) -
 fn draw(listening: &Listening, sensor: u8, time_s: f64, target: &Target) -> Result<()> {
     let map = listening.map(sensor);
     let Some(header) = map.header() else { return Ok(()) };
-    let right = f64::from(header.azimuth_origin.radians());
-    let span = f64::from(header.azimuth_span) / 65536.0 * std::f64::consts::TAU;
     let grid = PolarGrid {
         azimuths: usize::from(header.azimuths),
         ranges: usize::from(header.ranges),
-        azimuth_rad: [right, right + span],
+        azimuth_rad: azimuths::ends_rad(header.azimuth_origin, header.azimuth_span),
+        narrow: header.narrow.to_bytes(),
         range_m: [0.0, f64::from(header.ranges) * f64::from(header.cell_cm) / 100.0],
         state: &|azimuth, range| shown(&map, azimuth, range),
         title: format!("sensor {sensor} as received, {time_s:.3} s"),
@@ -288,6 +288,9 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
                 h.cell_m,
                 h.fingerprint
             );
+            if let Some([first, end, times]) = h.narrow {
+                let _ = writeln!(text, "  azimuths {first} to {} are {times} times narrower than the others", end - 1);
+            }
             if let Some(p) = &h.probability {
                 let [known, visible, clear] = p.least;
                 let _ = writeln!(

@@ -113,6 +113,7 @@ mod tests {
             cell_cm: 100,
             azimuth_origin: Angle::from_degrees(-60.0),
             azimuth_span: 21_845,
+            narrow: viewshed::map::azimuths::Narrow::NONE,
         };
         let at = |x_m: f32, threshold: Threshold| {
             let quantiser = Quantiser::new(table.clone(), Some(threshold), 0);

@@ -24,6 +24,7 @@ use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 
+use crate::geometry::azimuths;
 use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
@@ -64,6 +65,8 @@ pub struct PolarCells<'a> {
     pub ranges: usize,
     /// Outer edges, radians from the boresight's heading, + left.
     pub azimuth_rad: [f64; 2],
+    /// The first azimuth that is narrower than the others, the first behind them, how many times.
+    pub narrow: [u8; 3],
     /// Length of a cell along the ground, metres.
     pub cell_m: f64,
     /// State of (azimuth, range).
@@ -337,11 +340,11 @@ pub fn mount(pose: &SensorPose) -> Mount {
 /// A polar map's cells, for pictures and for judging on them.
 fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCells<'_> {
     let g = map.geometry();
-    let right = f64::from(g.azimuth_origin.radians());
     PolarCells {
         azimuths: A,
         ranges: R,
-        azimuth_rad: [right, right + f64::from(g.azimuth_span) / 65536.0 * std::f64::consts::TAU],
+        azimuth_rad: azimuths::ends_rad(g.azimuth_origin, g.azimuth_span),
+        narrow: g.narrow.to_bytes(),
         cell_m: f64::from(g.cell_cm) / 100.0,
         cell: Box::new(|a, r| map.cell(a, r)),
     }

@@ -15,6 +15,7 @@ use viewshed::sensor::Sensor;
 use super::radar_3d::{AZIMUTHS, ELEVATIONS, RANGES};
 use super::{Estimator, PolarCells};
 use super::{Options, polar_cells};
+use crate::geometry::azimuths;
 use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::{Solid, clipped};
@@ -107,10 +108,11 @@ fn fill(
     // slopes a point at this ground distance is seen under, from the box's bottom to its top
     // below the sensor the road may lie at any height
     let slope = |z: f64, ground: f64| (z - foot_m - f64::from(axes.sensor_height_cm()) / 100.0) / ground;
-    let span = f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU;
-    let towards = |place: f64| yaw + f64::from(axes.azimuth_origin.radians()) + span * place / AZIMUTHS as f64;
+    let ends = azimuths::ends_rad(axes.azimuth_origin, axes.azimuth_span);
+    let towards = |place: f64| yaw + azimuths::bearing_rad(ends, axes.narrow.to_bytes(), AZIMUTHS, place);
     for a in 0..AZIMUTHS {
-        if !near(solid, [sensor[0], sensor[1]], towards(a as f64 + 0.5), span / AZIMUTHS as f64) {
+        let width = towards(a as f64 + 1.0) - towards(a as f64);
+        if !near(solid, [sensor[0], sensor[1]], towards(a as f64 + 0.5), width) {
             continue;
         }
         let Some(column) = grid.column_mut(a) else { continue };

@@ -1,5 +1,6 @@
 //! Double-precision geometry of the evaluation: poses, boxes and exact lines of sight.
 
+pub mod azimuths;
 pub mod ground;
 pub mod polygon;
 pub mod pose;

@@ -12,6 +12,7 @@ macro_rules! files {
 static FILES: &[(&str, &[u8])] = &files![
     "index.html",
     "style.css",
+    "azimuths.js",
     "camera.js",
     "colours.js",
     "ground.js",

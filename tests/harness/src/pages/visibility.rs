@@ -21,6 +21,8 @@ pub struct Cells {
     ranges: usize,
     /// From right to left, radians from the sensor's heading.
     azimuth_rad: [f64; 2],
+    /// The first azimuth that is narrower than the others, the first behind them, how many times.
+    narrow: [u8; 3],
     cell_m: f64,
 }
 
@@ -45,6 +47,7 @@ impl Maps {
                 azimuths: polar.azimuths,
                 ranges: polar.ranges,
                 azimuth_rad: polar.azimuth_rad,
+                narrow: polar.narrow,
                 cell_m: polar.cell_m,
             };
             let state = |a, r| {

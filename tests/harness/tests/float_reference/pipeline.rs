@@ -6,7 +6,7 @@ use viewshed::frame::gate::Rejection;
 use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
 use viewshed::grid::evidence::Around;
 use viewshed::map::{CellState, VisibilityMap};
-use viewshed::radar_3d::Radar3dConfig;
+use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::road::RoadPoint;
 use viewshed_harness::estimators::{Estimator, PolarCells, measurement};
@@ -45,7 +45,9 @@ impl Pipeline {
     pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Self {
         let levelled = Levelled::new(&sensor.mount);
         let slice_height_m = f64::from(config.visibility.slice_height_m);
-        let axes = Axes::new([RANGES, AZIMUTHS, ELEVATIONS], &levelled, &sensor.field_of_view, slice_height_m);
+        let integer = Radar3dParameters::<RANGES, AZIMUTHS, ELEVATIONS>::new(sensor, config).expect("checked before");
+        let (shape, narrow) = ([RANGES, AZIMUTHS, ELEVATIONS], integer.axes().narrow);
+        let axes = Axes::new(shape, &levelled, &sensor.field_of_view, slice_height_m, narrow);
         let limit = f64::from(sensor.field_of_view.range_max_m) + BEYOND_M;
         Self {
             sensor: *sensor,
@@ -152,6 +154,7 @@ impl Estimator for Pipeline {
             azimuths: self.axes.azimuths,
             ranges: self.axes.ranges,
             azimuth_rad: [self.axes.right_rad, self.axes.right_rad + self.axes.span_rad],
+            narrow: self.axes.narrow.map(|v| v as u8),
             cell_m: self.axes.cell_m,
             cell: Box::new(|a, r| self.cell(a, r)),
         })

@@ -6,6 +6,7 @@ use viewshed::frame::detection::{Detection, Measurement};
 use viewshed::frame::reflection::Reflection;
 use viewshed::grid::spherical::SphericalGrid;
 use viewshed::sensor::field_of_view::FieldOfView;
+use viewshed::sensor::ground::Ground as Level;
 use viewshed::sensor::mount::{Levelling, Mount};
 use viewshed::sensor::noise::{Noise, NoiseConfig};
 
@@ -115,10 +116,13 @@ impl Random {
     }
 }
 
-/// The library's axes for a mount, and the same in real numbers.
+/// The library's axes for a mount, and the same in real numbers; of a mount that is turned, columns are narrower along
+/// the road.
 pub fn axes(mount: &Mount) -> (Box<IntegerAxes>, Axes) {
-    let integer = IntegerAxes::new(&mount.levelling().unwrap(), &VIEW, 1.0).unwrap();
-    (Box::new(integer), Axes::new([RANGES, AZIMUTHS, ELEVATIONS], &Levelled::new(mount), &VIEW, 1.0))
+    let far_road = (mount.yaw_deg != 0.0).then(|| (-mount.yaw_deg).clamp(-60.0, 60.0) as i8);
+    let integer = IntegerAxes::on(Level::LEVEL, &mount.levelling().unwrap(), &VIEW, 1.0, far_road).unwrap();
+    let exact = Axes::new([RANGES, AZIMUTHS, ELEVATIONS], &Levelled::new(mount), &VIEW, 1.0, integer.narrow);
+    (Box::new(integer), exact)
 }
 
 /// Differences of two grids in steps of 255 where either holds anything, each with its row.

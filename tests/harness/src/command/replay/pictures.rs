@@ -261,6 +261,7 @@ pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> O
         azimuths: cells.azimuths,
         ranges: cells.ranges,
         azimuth_rad: cells.azimuth_rad,
+        narrow: cells.narrow,
         range_m: [0.0, cells.cell_m * cells.ranges as f64],
         state: &*cells.cell,
         title: title(replay, estimator.name(), frame),

@@ -10,6 +10,7 @@ use super::instant::{Cells, Instant, Sample, Shown};
 use super::instants::{Event, Instants};
 use crate::bus::listening::{Heard, Listening, Map, SENSORS, shown};
 use crate::bus::logged::Logged;
+use crate::geometry::azimuths;
 
 /// An azimuth's newest scan, and when it came.
 type News = Option<(ScanNumber, f64)>;
@@ -63,11 +64,11 @@ impl Receiving {
             let (shown, sample) = Shown::new(name, cells, |_, _| CellState::UNKNOWN);
             return Some((Shown { ages_ms: Some(vec![None; cells.azimuths]), ..shown }, sample));
         };
-        let right = f64::from(header.azimuth_origin.radians());
         let cells = Cells {
             azimuths: usize::from(header.azimuths),
             ranges: usize::from(header.ranges),
-            azimuth_rad: [right, right + f64::from(header.azimuth_span) / 65536.0 * std::f64::consts::TAU],
+            azimuth_rad: azimuths::ends_rad(header.azimuth_origin, header.azimuth_span),
+            narrow: header.narrow.to_bytes(),
             cell_m: f64::from(header.cell_cm) / 100.0,
             mount: [
                 f64::from(header.mount.origin.x_cm) / 100.0,

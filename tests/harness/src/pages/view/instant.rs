@@ -11,6 +11,7 @@ use viewshed::map::{CellState, Visibility};
 use viewshed::probability::Probability;
 
 use crate::bus::listening::Heard;
+use crate::geometry::azimuths::{EVEN, bearing_rad};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 
@@ -41,6 +42,8 @@ pub struct Cells {
     pub ranges: usize,
     /// From right to left, radians from the sensor's heading.
     pub azimuth_rad: [f64; 2],
+    /// The first azimuth that is narrower than the others, the first behind them, how many times.
+    pub narrow: [u8; 3],
     pub cell_m: f64,
     /// Road frame: x, y, height in metres, heading in radians.
     pub mount: [f64; 4],
@@ -119,8 +122,7 @@ impl Box3 {
 impl Cells {
     /// Middle of a cell on the road.
     pub fn middle(&self, azimuth: usize, range: usize) -> [f64; 2] {
-        let [right, left] = self.azimuth_rad;
-        let angle = right + (left - right) * (azimuth as f64 + 0.5) / self.azimuths.max(1) as f64;
+        let angle = bearing_rad(self.azimuth_rad, self.narrow, self.azimuths.max(1), azimuth as f64 + 0.5);
         let distance = (range as f64 + 0.5) * self.cell_m;
         let [x, y, _, heading] = self.mount;
         [x + distance * (heading + angle).cos(), y + distance * (heading + angle).sin()]
@@ -155,7 +157,7 @@ impl Shown {
 
     /// Of a sensor that never said where its cells lie.
     pub fn nothing(name: &str, mount: [f64; 4]) -> Self {
-        let cells = Cells { azimuths: 0, ranges: 0, azimuth_rad: [0.0; 2], cell_m: 1.0, mount };
+        let cells = Cells { azimuths: 0, ranges: 0, azimuth_rad: [0.0; 2], narrow: EVEN, cell_m: 1.0, mount };
         Self { name: name.to_owned(), cells, bytes: None, ages_ms: None, probabilities: None }
     }
 
@@ -191,8 +193,14 @@ impl Shown {
 mod tests {
     use super::*;
 
-    const CELLS: Cells =
-        Cells { azimuths: 2, ranges: 3, azimuth_rad: [-0.2, 0.2], cell_m: 10.0, mount: [5.0, 0.0, 6.0, 0.0] };
+    const CELLS: Cells = Cells {
+        azimuths: 2,
+        ranges: 3,
+        azimuth_rad: [-0.2, 0.2],
+        narrow: EVEN,
+        cell_m: 10.0,
+        mount: [5.0, 0.0, 6.0, 0.0],
+    };
 
     #[test]
     fn a_cell_comes_back_as_it_was_and_shares_add_up() {

@@ -127,6 +127,7 @@ fn shown(name: &str, recording: &Recording, polar: &PolarCells<'_>) -> (Shown, S
         azimuths: polar.azimuths,
         ranges: polar.ranges,
         azimuth_rad: polar.azimuth_rad,
+        narrow: polar.narrow,
         cell_m: polar.cell_m,
         mount: mount(&recording.pose),
     };

@@ -1,5 +1,6 @@
 // What the estimator thought visible, as the ground of the plan.
 
+import { azimuthAt } from './azimuths.js';
 import { groundColours } from './colours.js';
 
 // Side of the blocks of pixels that share a cell.
@@ -73,7 +74,7 @@ export class Ground {
   places(view, width, height, columns, rows) {
     const key = [view.left, view.right, view.bottom, view.top, width, height].join();
     if (key === this.key) return this.kept;
-    const { azimuths, ranges, azimuth_rad: [right, left], cell_m: cell } = this.cells;
+    const { ranges, cell_m: cell } = this.cells;
     const [mx, my, , heading] = this.recording.mount;
     const [stepX, stepY] = [(BLOCK_PX * (view.right - view.left)) / width, (BLOCK_PX * (view.top - view.bottom)) / height];
     const [cos, sin] = [Math.cos(heading), Math.sin(heading)];
@@ -85,8 +86,8 @@ export class Ground {
         const range = Math.floor(Math.hypot(dx, dy) / cell);
         if (range >= ranges) continue;
         const angle = Math.atan2(cos * dy - sin * dx, cos * dx + sin * dy);
-        const azimuth = Math.floor(((angle - right) / (left - right)) * azimuths);
-        if (azimuth >= 0 && azimuth < azimuths) places[at] = azimuth * ranges + range;
+        const azimuth = azimuthAt(this.cells, angle);
+        if (azimuth >= 0) places[at] = azimuth * ranges + range;
       }
     }
     [this.key, this.kept] = [key, places];

@@ -1,5 +1,6 @@
 // Maps as grounds of the plan: a colour a cell by its state and grade, as in the project's pictures.
 
+import { azimuthAt, bearingOf } from './azimuths.js';
 import { isDark } from './colours.js';
 import { Ground } from './ground.js';
 
@@ -53,9 +54,8 @@ export class MapGround {
 
   set(maps) {
     this.grounds = maps.map((map, k) => {
-      const mount = map.cells.mount;
       let ground = this.grounds[k];
-      if (!ground || ground.recording.mount.join() !== mount.join()) ground = new Ground({ mount }, () => {});
+      if (!ground || JSON.stringify(ground.cells) !== JSON.stringify(map.cells)) ground = new Ground({ mount: map.cells.mount }, () => {});
       ground.set(map.cells, codes(map));
       ground.colours = packedColours;
       return ground;
@@ -83,18 +83,20 @@ export class MapGround {
 }
 
 // The cell of a map at a place of the road: azimuth, range; null outside.
-export function cellAt({ azimuths, ranges, azimuth_rad: [right, left], cell_m: size, mount: [mx, my, , heading] }, [x, y]) {
+export function cellAt(cells, [x, y]) {
+  const { ranges, azimuth_rad: [right, left], cell_m: size, mount: [mx, my, , heading] } = cells;
   const range = Math.floor(Math.hypot(x - mx, y - my) / size);
   let angle = Math.atan2(y - my, x - mx) - heading;
   angle -= 2 * Math.PI * Math.round((angle - (right + left) / 2) / (2 * Math.PI));
-  const azimuth = Math.floor(((angle - right) / (left - right)) * azimuths);
-  return azimuth >= 0 && azimuth < azimuths && range < ranges ? [azimuth, range] : null;
+  const azimuth = azimuthAt(cells, angle);
+  return azimuth >= 0 && range < ranges ? [azimuth, range] : null;
 }
 
 // Corners of a cell on the road.
-export function corners({ azimuths, azimuth_rad: [right, left], cell_m: size, mount: [mx, my, , heading] }, [azimuth, range]) {
+export function corners(cells, [azimuth, range]) {
+  const { cell_m: size, mount: [mx, my, , heading] } = cells;
   const at = (a, r) => {
-    const angle = heading + right + ((left - right) * a) / azimuths;
+    const angle = heading + bearingOf(cells, a);
     return [mx + r * size * Math.cos(angle), my + r * size * Math.sin(angle)];
   };
   return [at(azimuth, range), at(azimuth, range + 1), at(azimuth + 1, range + 1), at(azimuth + 1, range)];

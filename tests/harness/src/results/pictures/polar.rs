@@ -6,10 +6,11 @@ use super::axes::{BELOW_PX, LEFT_PX, Plot, RIGHT_PX};
 use super::canvas::{Area, Canvas, Colour};
 use super::cells;
 use super::legend::{Surround, WIDTH_PX};
+use crate::geometry::azimuths::bearing_rad;
 
 const HEIGHT_PX: i32 = 620;
 
-/// A polar grid of equal cells. The plot shows ground range to the right, azimuth (+ left) up.
+/// A polar grid. The plot shows ground range to the right, azimuth (+ left) up.
 pub struct PolarGrid<'a> {
     /// Rows, the first at `azimuth_rad[0]`.
     pub azimuths: usize,
@@ -17,6 +18,8 @@ pub struct PolarGrid<'a> {
     pub ranges: usize,
     /// Outer edges of the first and last row, radians, + left.
     pub azimuth_rad: [f64; 2],
+    /// The first row that is narrower than the others, the first behind them, how many times.
+    pub narrow: [u8; 3],
     /// Outer edges of the first and last column, metres over ground.
     pub range_m: [f64; 2],
     /// State of (row, column).
@@ -35,7 +38,7 @@ pub fn draw(grid: &PolarGrid) -> Canvas {
     surround.draw(&mut canvas, bottom);
     let edge = |[lo, hi]: [f64; 2], k: usize, of: usize| lo + (hi - lo) * k as f64 / of as f64;
     for row in 0..grid.azimuths {
-        let y = [row, row + 1].map(|k| edge(plot.y, k, grid.azimuths));
+        let y = [row, row + 1].map(|k| bearing_rad(plot.y, grid.narrow, grid.azimuths, k as f64));
         for column in 0..grid.ranges {
             let x = [column, column + 1].map(|k| edge(plot.x, k, grid.ranges));
             cells::fill(&mut canvas, &plot, x, y, &(grid.state)(row, column));
@@ -57,6 +60,7 @@ mod tests {
     use viewshed::map::Visibility;
 
     use super::*;
+    use crate::geometry::azimuths::EVEN;
     use crate::results::pictures::palette;
 
     #[test]
@@ -75,6 +79,7 @@ mod tests {
             azimuths: 4,
             ranges: 5,
             azimuth_rad: [-0.5, 0.5],
+            narrow: EVEN,
             range_m: [0.0, 100.0],
             state: &state,
             title: "title".into(),
