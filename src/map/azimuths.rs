@@ -53,7 +53,7 @@ impl Narrow {
     }
 
     /// That of three numbers as a header has them; none if no sender says these of so many columns.
-    pub(crate) fn from_bytes([first, end, times]: [u8; 3], columns: u8) -> Option<Self> {
+    pub fn from_bytes([first, end, times]: [u8; 3], columns: u8) -> Option<Self> {
         let holds = first < end && end <= columns && (2..=MOST_TIMES).contains(&times);
         holds.then_some(Self { first, end, times })
     }

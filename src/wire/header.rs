@@ -642,7 +642,7 @@ mod tests {
                 assert_eq!(c.header(), Some(&sent), "from group {first} on");
             }
             // a long message without that group
-            assert_eq!(Collector::NEW.take(&bytes[..bytes.len() - 5]), Err(NotAHeader::Check));
+            assert_eq!(Collector::default().take(&bytes[..bytes.len() - 5]), Err(NotAHeader::Check));
         }
     }
 

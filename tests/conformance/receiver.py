@@ -83,17 +83,33 @@ def cobs(stuffed):
 # ------------------------------------------------------------------------------------------------------ Own bytes of header
 
 
+def some_are_narrow(groups):
+    """Whether the 30 bytes of groups 1 to 6 say that some azimuths are narrow."""
+    return groups[19] > 127
+
+
+def is_of_narrow(group):
+    """Whether a group 7 is of narrow azimuths."""
+    return group[2] == 0 and group[3] > 1
+
+
 class Header:
     """What maps need of groups 1 to 6."""
 
-    def __init__(self, groups):
-        """`groups`: the 30 bytes of groups 1 to 6. ValueError if they are no header."""
+    def __init__(self, groups, narrow):
+        """`groups`: the 30 bytes of groups 1 to 6; `narrow`: group 7 of narrow azimuths, or None. ValueError if they are
+        no header."""
         width = int.from_bytes(groups[17:19], "big")
         cell = int.from_bytes(groups[20:22], "big")
         first, last = groups[23], groups[24]
-        self.azimuths = groups[19] + 1
+        self.azimuths = (groups[19] & 127) + 1
+        checked = groups[:29]
+        if some_are_narrow(groups):
+            if narrow is None or not narrow[0] < narrow[1] <= self.azimuths or narrow[3] > 4:
+                raise ValueError
+            checked += narrow
         self.ranges = groups[22] + 1
-        if groups[29] != crc8(groups[:29]) or self.azimuths > 128 or width == 0 or cell == 0:
+        if groups[29] != crc8(checked) or width == 0 or cell == 0:
             raise ValueError
         if last >= self.ranges or first > last and (first, last) != (1, 0):
             raise ValueError
@@ -549,7 +565,7 @@ class Sensor:
         self.conflict = self.other_version = None       # last sign of it
         self.in_doubt = False
         self.misfit = None              # noted time, rule 3 a
-        self.groups = [None] * 7
+        self.groups = [None] * 8        # in the last place group 7 of narrow azimuths
         self.header = None
         self.levels = None              # group 7; b"" once it was contradicted
         self.planes = [Plane() for _ in range(PLANES)]
@@ -625,28 +641,36 @@ class Sensor:
         if len(own) < 6:
             return
         if long and len(own) >= 36:
-            coming = {group: own[1 + 5 * group:6 + 5 * group] for group in range(8 if len(own) >= 41 else 7)}
-            try:
-                Header(own[6:36])
-            except ValueError:
-                return
+            coming = {group: own[1 + 5 * group:6 + 5 * group] for group in range(7)}
+            sevens = [own[at:at + 5] for at in range(36, len(own) - 4, 5)]
         else:
             coming = {own[0] >> 4 & 7: own[1:6]}
+            sevens = [coming.pop(7)] if 7 in coming else []
+        narrow = next((seven for seven in sevens if is_of_narrow(seven)), None)
+        if len(coming) == 7:
+            try:
+                Header(own[6:36], narrow)
+            except ValueError:
+                return
         clock = coming.pop(0, None)
-        levels = coming.pop(7, None)
+        if narrow is not None:
+            coming[7] = narrow
         for group, content in coming.items():
             if self.groups[group] not in (None, content):
                 self.conflict = t
                 return
         for group, content in coming.items():
             self.groups[group] = content
-        if self.header is None and None not in self.groups[1:]:
-            try:
-                self.header = Header(b"".join(self.groups[1:]))
-            except ValueError:
-                self.groups = [None] * 7
-        if levels and levels[2] > 0 and levels[0] <= levels[1] <= levels[2]:
-            self.levels = levels if self.levels in (None, levels) else b""
+        if self.header is None and None not in self.groups[1:7]:
+            groups = b"".join(self.groups[1:7])
+            if not some_are_narrow(groups) or self.groups[7] is not None:
+                try:
+                    self.header = Header(groups, self.groups[7])
+                except ValueError:
+                    self.groups = [None] * 8
+        for levels in sevens:
+            if levels[2] > 0 and levels[0] <= levels[1] <= levels[2]:
+                self.levels = levels if self.levels in (None, levels) else b""
         if clock:
             self.group_0(t, int.from_bytes(clock, "big") * 1000)
 

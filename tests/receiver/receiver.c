@@ -67,7 +67,7 @@ typedef struct {
     struct { enum { UNMARKED, HEARD, LEFT } mark; uint64_t ms; } epochs[16];
     int previous; uint32_t previous_least; /* -1: none */
     /* header */
-    uint8_t group[7][5]; int groups; bool complete;
+    uint8_t group[8][5]; int groups; bool complete; /* in the last place group 7 of narrow azimuths */
     int azimuths, ranges, usual_near, usual_end;
     enum { UNSAID, SAID, CONTRADICTED } levels_are; uint8_t levels[5];
     plane_t plane[PLANES];
@@ -550,14 +550,26 @@ static uint64_t watch(uint64_t now) {
 
 /* ---- messages ---- */
 
-static bool header_holds(uint8_t group[7][5]) {
-    int ranges = group[5][2] + 1, near = group[5][3], last = group[5][4];
+/* Whether a group 7 is of narrow azimuths. */
+static bool of_narrow(const uint8_t group[5]) { return group[2] == 0 && group[3] > 1; }
+
+/* Whether group 4 says that some azimuths are narrow. */
+static bool some_narrow(uint8_t group[8][5]) { return group[4][4] > 127; }
+
+static bool header_holds(uint8_t group[8][5]) {
+    int ranges = group[5][2] + 1, near = group[5][3], last = group[5][4], azimuths = (group[4][4] & 127) + 1;
+    const uint8_t *narrow = group[7];
     bool cells = near <= last ? last < ranges : near == 1 && last == 0;
-        return crc8(0, group[1], 29) == group[6][4] && group[4][4] < AZIMUTHS && cells && (group[4][2] || group[4][3]) &&
+    uint8_t sum = crc8(0, group[1], 29);
+    if (some_narrow(group)) {
+        sum = crc8(sum, narrow, 5);
+        if (!of_narrow(narrow) || narrow[0] >= narrow[1] || narrow[1] > azimuths || narrow[3] > 4) return false;
+    }
+    return sum == group[6][4] && azimuths <= AZIMUTHS && cells && (group[4][2] || group[4][3]) &&
            (group[5][0] || group[5][1]);
 }
 
-/* Group 7; it changes nothing of what is visible. */
+/* Group 7 of probabilities; it changes nothing of what is visible. */
 static void levels(sensor_t *s, const uint8_t group[5]) {
     if (group[2] == 0 || group[0] > group[1] || group[1] > group[2]) return;
     bool other = s->levels_are != UNSAID && memcmp(s->levels, group, 5);
@@ -569,30 +581,34 @@ static void header(sensor_t *s, uint64_t now, const uint8_t *own, int n) {
     if (n > 0 && (own[0] & 15) != 1) s->other_version = now;
     if (n < 6 || (own[0] & 15) != 1) return;
     int first = own[0] >> 4 & 7;
-    uint8_t all[7][5];
+    uint8_t all[8][5] = {0};
     if (n >= 36) {
+        int there = 0x7E;
         memcpy(all, own + 1, 35);
+        for (int at = 36; at + 5 <= n && there == 0x7E; at += 5)
+            if (of_narrow(own + at)) { memcpy(all[7], own + at, 5); there |= 1 << 7; }
         if (!header_holds(all)) return;
-        for (int g = 1; g < 7; g++)
-            if (s->groups >> g & 1 && memcmp(s->group[g], all[g], 5)) { s->conflict = now; return; }
-        memcpy(s->group, all, 35);
-        s->groups = 0x7E;
-        if (n >= 41) levels(s, own + 36);
+        for (int g = 1; g < 8; g++)
+            if (s->groups & there & 1 << g && memcmp(s->group[g], all[g], 5)) { s->conflict = now; return; }
+        for (int g = 1; g < 8; g++)
+            if (there >> g & 1) memcpy(s->group[g], all[g], 5);
+        s->groups |= there;
+        for (int at = 36; at + 5 <= n; at += 5) levels(s, own + at);
         hear_clock(s, now, all[0]);
     } else if (first == 0) {
         hear_clock(s, now, own + 1);
         return;
-    } else if (first < 7) {
+    } else if (first < 7 || of_narrow(own + 1)) {
         if (s->groups >> first & 1 && memcmp(s->group[first], own + 1, 5)) { s->conflict = now; return; }
         memcpy(s->group[first], own + 1, 5);
         s->groups |= 1 << first;
     } else {
         levels(s, own + 1);
     }
-    if (s->groups != 0x7E || s->complete) return;
+    if ((s->groups & 0x7E) != 0x7E || (some_narrow(s->group) && !(s->groups >> 7)) || s->complete) return;
     if (!header_holds(s->group)) { s->groups = 0; return; }
     const uint8_t *g4 = s->group[4], *g5 = s->group[5];
-    s->azimuths = g4[4] + 1;
+    s->azimuths = (g4[4] & 127) + 1;
     s->ranges = g5[2] + 1;
     s->usual_near = g5[3];
     s->usual_end = g5[3] == 1 && g5[4] == 0 ? 0 : g5[4] + 1;

@@ -54,16 +54,18 @@ pub enum Class {
     MadeUpMaps,
     /// A sender with a table of probabilities; 5 % of its frames are lost.
     Probabilities,
+    /// The same, and some of its azimuths are narrow.
+    NarrowAzimuths,
 }
 
 use Class::{
     ClockJumps, Cuts, DelayPasses, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, HeaderFaults, Jitter, Late1,
-    LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, Others, Probabilities,
-    ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
+    LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, NarrowAzimuths, Others,
+    Probabilities, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
 };
 
 impl Class {
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 28] = [
         Lossless,
         Loss1,
         Loss5,
@@ -91,6 +93,7 @@ impl Class {
         HeaderFaults,
         MadeUpMaps,
         Probabilities,
+        NarrowAzimuths,
     ];
 
     pub fn name(self) -> &'static str {
@@ -122,6 +125,7 @@ impl Class {
             HeaderFaults => "header-faults",
             MadeUpMaps => "made-up-maps",
             Probabilities => "probabilities",
+            NarrowAzimuths => "narrow-azimuths",
         }
     }
 
@@ -131,7 +135,7 @@ impl Class {
         let [can, canfd, serial] = match self {
             Lossless | Others | Repeated20 | Strays | Mailboxes | Echo => [97.5; 3],
             Loss1 | Late1 => [97.5, 98.0, 98.0],
-            Loss5 | Probabilities => [94.0, 97.5, 97.5],
+            Loss5 | Probabilities | NarrowAzimuths => [94.0, 97.5, 97.5],
             Loss20 => [66.0, 91.5, 91.5],
             Reordered => [60.0, 96.0, 95.3],
             Jitter | Flips => [96.7, 97.7, 97.7],

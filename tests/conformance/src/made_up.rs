@@ -2,6 +2,7 @@
 
 use viewshed::fixed::bits::Bits;
 use viewshed::fixed::time::Time;
+use viewshed::map::azimuths::Narrow;
 use viewshed::probability::Levels;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::{Clock, Header};
@@ -143,6 +144,13 @@ pub fn with_probabilities(like: &Maps) -> Maps {
     };
     let header = Header { probability: Levels::from_bytes([61, 178, 242, 0xAB, 0xCD]), ..like.header };
     Maps { header, scans: like.scans.iter().zip(later).map(scan).collect(), holes: 0 }
+}
+
+/// The same maps as of azimuths of which the middle third is narrow.
+pub fn with_narrow(like: Maps) -> Maps {
+    let azimuths = like.header.azimuths;
+    let narrow = Narrow::from_bytes([azimuths / 3, azimuths - azimuths / 3, 4], azimuths).unwrap_or(Narrow::NONE);
+    Maps { header: Header { narrow, ..like.header }, ..like }
 }
 
 fn ray(before: &Ray<W>, ranges: usize, random: &mut Random) -> Ray<W> {

@@ -89,6 +89,7 @@ impl World {
         let made_up = match class {
             Class::MadeUpMaps => Some(made_up::maps(maps, &mut random)),
             Class::Probabilities => Some(made_up::with_probabilities(maps)),
+            Class::NarrowAzimuths => Some(made_up::with_narrow(made_up::with_probabilities(maps))),
             _ => None,
         };
         let maps = made_up.as_ref().unwrap_or(maps);
@@ -123,7 +124,7 @@ impl World {
         let mut at = START;
         while at < end {
             inputs.push((at, 2, Input::Look { time: clock.read(at) }));
-            if class == Class::Probabilities {
+            if matches!(class, Class::Probabilities | Class::NarrowAzimuths) {
                 inputs.push((at, 2, Input::Probability { time: clock.read(at) }));
             }
             at += if looks == Looks::Log { 100 * MS } else { random.between(20 * MS, 50 * MS) };
@@ -231,7 +232,7 @@ impl Faults {
             | Class::MailboxesFull
             | Class::MadeUpMaps => sent,
             Class::Loss1 => self.lose(sent, 10),
-            Class::Loss5 | Class::Probabilities => self.lose(sent, 50),
+            Class::Loss5 | Class::Probabilities | Class::NarrowAzimuths => self.lose(sent, 50),
             Class::Loss20 => self.lose(sent, 200),
             Class::Reordered => self.delay(sent, 1000, 100 * MS),
             Class::Jitter => self.delay(sent, 1000, 50 * MS),

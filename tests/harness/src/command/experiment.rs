@@ -160,7 +160,10 @@ fn motorway(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let kept = kept(args, plan.days().map(Day::name), outputs)?;
-    let running = bar("simulating and replaying", total_steps(&plan, ESTIMATORS)?);
+    let running = bar(
+        "simulating and replaying",
+        total_steps(&plan, ESTIMATORS + u64::from(settings.estimators.far_road.is_some()))?,
+    );
     let keep = |day: &Day, bytes: &[u8]| kept.get(&day.name()).map_or(Ok(()), |file| file.write(bytes));
     let experiment = Experiment::run(&plan, settings, &keep, &|| running.step())?;
     drop(running);
@@ -185,7 +188,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
     let on_grades = all.iter().all(|scene| !scene.ground.is_empty());
-    let more = [scenes::with_lanes(&all), on_grades, settings.estimators.fine_azimuths];
+    let more = [scenes::with_lanes(&all), on_grades, settings.estimators.far_road.is_some()];
     let estimators = ESTIMATORS + more.map(u64::from).iter().sum::<u64>();
     let running = bar("simulating and replaying", scenes::total_steps(&all, extent, estimators));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));

@@ -11,7 +11,7 @@ use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
-use crate::estimators::{self, GroundError, MOST_RANGE_M};
+use crate::estimators::{self, FarRoad, GroundError, MOST_RANGE_M};
 use crate::evaluation::{self, Grid, Settings};
 use crate::recording::{FieldOfView, ReadOptions};
 
@@ -183,12 +183,13 @@ struct EstimatorArgs {
     /// fused [default: reference]
     #[arg(long, value_name = "SIZE")]
     grid_size: Option<estimators::Grid>,
-    /// A row radar-3d-fine beside radar-3d: twice the azimuths, columns of half a degree
+    /// A row radar-3d-narrow beside radar-3d, whose azimuths are four times narrower within ten degrees of where the far road
+    /// lies: degrees from the sensor's heading, + left [along the road's axis unless said]
     ///
-    /// With 0.8 MB of state, which no controller here has, and more azimuths than a broadcast carries: to see what the width of
-    /// a column costs.
-    #[arg(long)]
-    fine_azimuths: bool,
+    /// The same memory, and columns of 0.4 degrees ahead in place of one. In a file, `far_road_deg` of
+    /// `[estimators.radar_3d.visibility]` is for radar-3d itself; of a unit, that of `[visibility]`.
+    #[arg(long, value_name = "DEG", num_args = 0..=1, require_equals = true, default_missing_value = "along-road", value_parser = far_road)]
+    far_road: Option<FarRoad>,
     /// How well the radar measures, from its data sheet: standard deviations of range, azimuth, elevation and radial
     /// velocity [default: 0.25,0.5,1,0.15]
     ///
@@ -297,12 +298,19 @@ impl EstimatorArgs {
         set(self.reference_share, &mut options.reference_share);
         set(self.grid_size, &mut options.grid);
         set(self.ground_error, &mut options.ground_error);
-        options.fine_azimuths |= self.fine_azimuths;
+        options.far_road = self.far_road.or(options.far_road);
         if let Some(noise) = self.noise {
             // which is no accuracy, and in no data sheet
             let reflector_height_m = options.noise.reflector_height_m;
             options.noise = NoiseConfig { reflector_height_m, ..noise };
         }
+    }
+}
+
+fn far_road(text: &str) -> Result<FarRoad, String> {
+    match text {
+        "along-road" => Ok(FarRoad::AlongRoad),
+        _ => text.parse().map(FarRoad::Degrees).map_err(|_| format!("`{text}` is not a whole number of degrees")),
     }
 }
 

@@ -84,9 +84,9 @@ pub struct Options {
     /// The grid of the estimator that is tuned, watched or drawn; on the small one, it runs beside `radar-3d` in tables.
     #[serde(skip_serializing_if = "Grid::is_reference")]
     pub grid: Grid,
-    /// Whether an estimator with twice the azimuths of the reference grid runs beside `radar-3d` in tables.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub fine_azimuths: bool,
+    /// Where the far road lies: if that is said, `radar-3d-narrow` runs beside `radar-3d` in tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub far_road: Option<FarRoad>,
     /// How well the sensor measures.
     pub noise: NoiseConfig,
     pub radar_2d: Radar2dConfig,
@@ -102,6 +102,27 @@ pub struct Options {
     /// What is wrong with the heights that estimators are given.
     #[serde(skip_serializing_if = "GroundError::is_none")]
     pub ground_error: GroundError,
+}
+
+/// Where the far road lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FarRoad {
+    /// Along the road's axis, on the side the sensor looks to.
+    AlongRoad,
+    /// So many degrees from the sensor's heading, + left.
+    Degrees(i8),
+}
+
+impl FarRoad {
+    /// Degrees from a sensor's heading.
+    pub fn degrees(self, sensor: &Sensor) -> i8 {
+        match self {
+            // the axis has two ends, 180 degrees apart: the nearer one
+            Self::AlongRoad => (-sensor.mount.yaw_deg - 180.0 * (-sensor.mount.yaw_deg / 180.0).round()).round() as i8,
+            Self::Degrees(degrees) => degrees,
+        }
+    }
 }
 
 /// What a survey of the road has wrong.
@@ -159,7 +180,7 @@ impl Default for Options {
             max_detections: 256,
             reference_share: 0.5,
             grid: Grid::Reference,
-            fine_azimuths: false,
+            far_road: None,
             noise: NoiseConfig::default(),
             radar_2d: Radar2dConfig::default(),
             radar_3d: Radar3dConfig::default(),
@@ -220,10 +241,10 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     if !options.grid.is_reference() {
         estimators.push(radar_3d::on(options.grid, &sensor, &radar_3d)?);
     }
-    if options.fine_azimuths {
-        let mut radar_3d = radar_3d;
-        radar_3d.gate.max_detections = max_detections.min(256);
-        estimators.push(radar_3d::fine(&sensor, &radar_3d)?);
+    if let Some(far_road) = options.far_road {
+        let mut narrow = radar_3d;
+        narrow.visibility.far_road_deg = Some(far_road.degrees(&sensor));
+        estimators.push(radar_3d::narrow(options.grid, &sensor, &narrow)?);
     }
     let ground = ground(recording, options)?;
     if !ground.is_level() {

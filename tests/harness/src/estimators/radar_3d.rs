@@ -70,8 +70,6 @@ struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, co
 }
 
 type OfReference<const D: usize> = Driver<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>;
-/// Twice the azimuths, and twice the memory.
-type OfFine = Driver<RANGES, { 2 * AZIMUTHS }, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, 256>;
 type OfSmall = Driver<
     { small::State::RANGES },
     { small::State::AZIMUTHS },
@@ -97,22 +95,28 @@ pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>
 pub fn on(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
     match grid {
         Grid::Reference => new(sensor, config),
-        Grid::Small => {
-            let mut config = *config;
-            config.gate.max_detections = config.gate.max_detections.min(small::State::DETECTIONS as u16);
-            let name = "radar-3d-small";
-            Ok(Box::new(OfSmall { name, ..OfSmall::new(sensor, &config)? }))
-        }
+        Grid::Small => Ok(Box::new(small("radar-3d-small", sensor, config)?)),
     }
 }
 
-/// The estimator with twice the azimuths, 0.8 MB of state: for machines of another kind than controllers, and to see what
-/// the width of a column costs. No broadcast carries as many azimuths.
+/// The estimator as a row of its own beside the one without narrow azimuths.
 ///
 /// # Errors
 /// A parameter the library refuses, by name.
-pub fn fine(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
-    Ok(Box::new(OfFine { name: "radar-3d-fine", ..OfFine::new(sensor, config)? }))
+pub fn narrow(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
+    match grid {
+        Grid::Reference => {
+            let name = "radar-3d-narrow";
+            Ok(Box::new(OfReference::<MOST_DETECTIONS> { name, ..OfReference::new(sensor, config)? }))
+        }
+        Grid::Small => Ok(Box::new(small("radar-3d-small-narrow", sensor, config)?)),
+    }
+}
+
+fn small(name: &'static str, sensor: &Sensor, config: &Radar3dConfig) -> Result<OfSmall> {
+    let mut config = *config;
+    config.gate.max_detections = config.gate.max_detections.min(small::State::DETECTIONS as u16);
+    Ok(OfSmall { name, ..OfSmall::new(sensor, &config)? })
 }
 
 /// Where the cells of its map lie, and from which grade on they are visible.
@@ -215,6 +219,8 @@ mod tests {
     use viewshed::sensor::noise::NoiseConfig;
 
     use super::*;
+    use crate::estimators::FarRoad;
+    use crate::geometry::azimuths::{EVEN, bearing_rad};
     use crate::recording::RadarDetection;
 
     const VIEW: FieldOfView = FieldOfView {
@@ -227,14 +233,25 @@ mod tests {
     };
 
     #[test]
-    fn the_fine_one_has_twice_the_columns_of_the_same_view() {
-        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 };
-        let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
-        let config = Radar3dConfig::default();
-        let (usual, fine) = (new(&sensor, &config).unwrap(), super::fine(&sensor, &config).unwrap());
-        let (a, b) = (usual.polar().unwrap(), fine.polar().unwrap());
-        assert_eq!((fine.name(), b.azimuths, b.ranges), ("radar-3d-fine", 2 * a.azimuths, a.ranges));
-        assert_eq!((a.azimuth_rad, a.cell_m), (b.azimuth_rad, b.cell_m));
+    fn the_narrow_one_has_the_columns_of_the_same_view_denser_along_the_road() {
+        for (yaw_deg, far_road) in [(0.0, 0), (20.0, -20), (-170.0, -10), (180.0, 0), (200.0, -20), (-35.4, 35)] {
+            let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg, pitch_deg: 3.0, roll_deg: 0.0 };
+            let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
+            let mut config = Radar3dConfig::default();
+            let usual = new(&sensor, &config).unwrap();
+            assert_eq!(FarRoad::AlongRoad.degrees(&sensor), far_road, "{yaw_deg}");
+            config.visibility.far_road_deg = Some(far_road);
+            let narrow = super::narrow(Grid::Reference, &sensor, &config).unwrap();
+            let (a, b) = (usual.polar().unwrap(), narrow.polar().unwrap());
+            assert_eq!((narrow.name(), b.azimuths, b.ranges), ("radar-3d-narrow", a.azimuths, a.ranges));
+            assert_eq!((a.azimuth_rad, a.cell_m, a.narrow), (b.azimuth_rad, b.cell_m, EVEN));
+            let [first, end, times] = b.narrow;
+            let middle = bearing_rad(b.azimuth_rad, b.narrow, b.azimuths, f64::from(first + end) / 2.0).to_degrees();
+            assert!(
+                times == 4 && end - first > 40 && (middle - f64::from(far_road)).abs() < 1.0,
+                "{yaw_deg}: {middle}"
+            );
+        }
     }
 
     /// So many vehicles that come nearer, 6 m and 12 degrees apart.
