@@ -10,6 +10,7 @@ use crate::shadows::{A, Map, Shadows, USUAL, W, header};
 use can_dbc::Dbc;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
+use viewshed::map::azimuths::Narrow;
 use viewshed::probability::Levels;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::can_service::{ANSWER, CanService, CanServiceConfig, REQUEST, Tool};
@@ -57,9 +58,13 @@ const TIME_MS: u64 = 7_000_000_000;
 
 /// A few seconds of a sensor's traffic, all planes, with visible ranges; and the maps by their numbers.
 fn frames(medium: Medium) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
+    frames_of(medium, sent_header())
+}
+
+fn frames_of(medium: Medium, header: Header) -> (Vec<CanFrame>, Vec<(f64, Map)>) {
     let config = BroadcastConfig { visible_range_ms: Some(200), gap_us: 100, ..BroadcastConfig::new(0, medium) };
     let time = |us: u64| Time::from_micros(TIME_MS * 1000 + us);
-    let mut sender = Broadcaster::<A, W, 3>::new(config, sent_header(), Epoch::new(11), time(0)).unwrap();
+    let mut sender = Broadcaster::<A, W, 3>::new(config, header, Epoch::new(11), time(0)).unwrap();
     sender.set_synchronised(true);
     let status = sender.status_mut();
     (status.state, status.reason, status.reset_cause) =
@@ -144,6 +149,7 @@ fn header_and_status(medium: Medium) {
         ("Planes", 7.0),
         ("Azimuth_Origin", -10_000.0 * turn),
         ("Azimuth_Span", 20_000.0 * turn),
+        ("Some_Narrow", 0.0),
         ("Azimuths", A as f64),
         ("Range_Cell", 2.0),
         ("Ranges", 64.0),
@@ -159,6 +165,18 @@ fn header_and_status(medium: Medium) {
         assert!((got[name] - value).abs() < 1e-9, "{name}: {} instead of {value}", got[name]);
     }
     assert!((TIME_MS as f64..TIME_MS as f64 + 3000.0).contains(&got["Time"]) && (1.0..4.0).contains(&got["Uptime"]));
+}
+
+#[test]
+fn azimuths_of_a_header_in_which_some_are_narrow_read_as_they_were_sent() {
+    let narrow = Narrow::from_bytes([3, 9, 4], A as u8).unwrap();
+    for medium in [CLASSIC, FD] {
+        let (frames, _) = frames_of(medium, Header { narrow, probability: None, ..sent_header() });
+        let got = all_signals(&described(medium), &frames);
+        assert_eq!((got["Some_Narrow"], got["Azimuths"], got["Probability_Clear"]), (1.0, A as f64, 0.0));
+        // where probabilities would be, the first azimuth and the first behind them
+        assert_eq!([got["Probability_Known"], got["Probability_Visible"]].map(|v| (v * 255.0).round()), [3.0, 9.0]);
+    }
 }
 
 #[test]

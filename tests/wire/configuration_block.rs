@@ -65,7 +65,7 @@ fn bytes(row: &Row, value: f32) -> Vec<u8> {
         "bit_rate" => (value as u32).to_le_bytes().to_vec(),
         "serial_baud" => (value as u32).to_le_bytes().to_vec(),
         "sample_point_permille" | "listen_first" | "max_delay_ms" => (value as u16).to_le_bytes().to_vec(),
-        "sensor" | "radar_id" | "configure_radar" => vec![value as u8],
+        "sensor" | "radar_id" | "configure_radar" | "supervise" => vec![value as u8],
         _ => value.to_le_bytes().to_vec(),
     }
 }
@@ -94,7 +94,31 @@ fn every_parameter_lies_where_the_page_says_and_has_its_limits() {
         assert_eq!(refused.parameter, row.name);
         assert_eq!(refused.problem, Problem::OutOfLimits { min: row.least, max: row.most }, "{}", row.name);
     }
-    assert_eq!((next, rows.len(), BLOCK_LEN), (153, 29 + 6 + 5, 160));
+    assert_eq!((next, rows.len(), BLOCK_LEN), (154, 29 + 6 + 6, 160));
+}
+
+#[test]
+fn where_the_far_road_lies_is_in_two_bytes_and_has_the_limits_of_the_field_of_view() {
+    let read = |bytes: [u8; 2]| Settings::from_block(&changed(154, &bytes)).map(|(_, settings)| settings);
+    let far_road = |bytes| read(bytes).unwrap().visibility.far_road_deg;
+    assert_eq!((far_road([0, 0]), far_road([1, 0]), far_road([1, 0xF4])), (None, Some(0), Some(-12)));
+    assert_eq!(settings().to_block(7)[154..156], [0, 0]);
+    let mut said = settings();
+    said.visibility.far_road_deg = Some(-12);
+    assert_eq!(said.to_block(7)[154..156], [1, 0xF4]);
+    // the view reaches from -60 to 50 degrees
+    assert_eq!((check(&read([1, 196]).unwrap()), check(&read([1, 50]).unwrap())), (Ok(()), Ok(())));
+    let outside = check(&read([1, 51]).unwrap()).unwrap_err();
+    assert_eq!(outside.parameter, "visibility.far_road_deg");
+    assert_eq!(outside.problem, Problem::OutOfLimits { min: -60.0, max: 50.0 });
+    let Err(BlockError::Parameter(neither)) = read([2, 0]) else { panic!("neither said nor not") };
+    assert_eq!(neither.parameter, "visibility.far_road_deg");
+    // and the fingerprint goes on with it, as on the page
+    let mut with = [0; 12];
+    with[..4].copy_from_slice(&settings().fingerprint().to_le_bytes());
+    with[4..8].copy_from_slice(&(1_u32 << 20).to_le_bytes());
+    with[8..].copy_from_slice(&(-12_i32).to_le_bytes());
+    assert_eq!(said.fingerprint(), CRC.checksum(&with));
 }
 
 #[test]
