@@ -20,8 +20,8 @@ pub struct Narrow {
     first: u8,
     /// The first one behind them.
     end: u8,
-    /// How many of them are as wide as one of the others.
-    times: u8,
+    /// How many of them are as wide as one of the others, less one: a map of no sensor is zeros, which cost no flash.
+    beyond_one: u8,
 }
 
 /// How far to each side of where the far road lies columns are narrow: ten degrees, 2^-16 turn.
@@ -32,14 +32,14 @@ const MOST_TIMES: u8 = 4;
 
 impl Narrow {
     /// All are alike.
-    pub const NONE: Self = Self { first: 0, end: 0, times: 1 };
+    pub const NONE: Self = Self { first: 0, end: 0, beyond_one: 0 };
 
     /// Four times narrower within ten degrees of where the far road lies, from the first column's right edge.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // at most 255 columns
     pub(crate) fn towards(far_road: Angle, span: u16, columns: usize) -> Self {
         let (span, columns) = (i32::from(span).max(1), columns.min(255) as i32);
         let times = i32::from(MOST_TIMES);
-        let edge = |side: i32| (i32::from(far_road.raw()) + side * HALF_WIDTH).clamp(0, span);
+        let edge = |side: i32| (i32::from(far_road.raw()) + side * HALF_WIDTH).max(0).min(span);
         let (right, left) = (edge(-1), edge(1));
         // a stretch of w has n columns if w / n, times over, is what the others have of the rest
         let wide = left - right;
@@ -49,18 +49,18 @@ impl Narrow {
         if number == 0 || number >= columns {
             return Self::NONE;
         }
-        Self { first: first as u8, end: (first + number) as u8, times: MOST_TIMES }
+        Self { first: first as u8, end: (first + number) as u8, beyond_one: MOST_TIMES - 1 }
     }
 
     /// That of three numbers as a header has them; none if no sender says these of so many columns.
     pub fn from_bytes([first, end, times]: [u8; 3], columns: u8) -> Option<Self> {
         let holds = first < end && end <= columns && (2..=MOST_TIMES).contains(&times);
-        holds.then_some(Self { first, end, times })
+        holds.then(|| Self { first, end, beyond_one: times.saturating_sub(1) })
     }
 
     /// First column, first one behind, how many times narrower.
     pub fn to_bytes(self) -> [u8; 3] {
-        [self.first, self.end, self.times]
+        [self.first, self.end, self.beyond_one.saturating_add(1)]
     }
 
     /// Units of so many columns together.
@@ -71,16 +71,21 @@ impl Narrow {
     /// From 2^-8 columns to 2^-8 units.
     pub fn unit(self, place: i32) -> i32 {
         let [first, end] = self.limits();
-        let within = place.clamp(first, end) - first;
-        (place - within) * i32::from(self.times) + within
+        // `clamp` can panic
+        let within = place.max(first).min(end) - first;
+        (place - within) * self.times() + within
     }
 
     /// From 2^-8 units to 2^-8 columns, rounded down.
     pub fn place(self, unit: i32) -> i32 {
         let [first, end] = self.limits();
-        let times = i32::from(self.times.max(1));
-        let within = (unit - first * times).clamp(0, end - first);
+        let times = self.times();
+        let within = (unit - first * times).max(0).min(end - first);
         (unit - within).div_euclid(times) + within
+    }
+
+    fn times(self) -> i32 {
+        i32::from(self.beyond_one) + 1
     }
 
     fn limits(self) -> [i32; 2] {

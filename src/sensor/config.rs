@@ -37,6 +37,8 @@ pub enum Problem {
         /// Largest value allowed.
         max: f32,
     },
+    /// Of radars only, and this is a camera.
+    OfRadars,
     /// With this mount nothing at slice height is in view.
     NothingInView,
     /// Not above its lower neighbour.
@@ -73,6 +75,7 @@ impl core::fmt::Display for ConfigError {
         match problem {
             Problem::NotFinite => write!(f, "{parameter} is {value}, not a finite number"),
             Problem::OutOfLimits { min, max } => write!(f, "{parameter} is {value}, outside {min} to {max}"),
+            Problem::OfRadars => write!(f, "{parameter} is {value}, which a camera has no use for"),
             Problem::NothingInView => write!(
                 f,
                 "{parameter} is {value}: with this mount no point at slice height is in view, check height and pitch"

@@ -179,6 +179,10 @@ impl<const NX: usize, const NY: usize> InUnit for Camera3d<NX, NY> {
     }
 
     fn check(settings: &Settings) -> Result<(), ConfigError> {
+        if let Some(far_road) = settings.visibility.far_road_deg {
+            let (parameter, value) = ("visibility.far_road_deg", f32::from(far_road));
+            return Err(ConfigError { parameter, value, problem: Problem::OfRadars });
+        }
         settings.sensor.field_of_view.limits().map(|_| ())
     }
 

@@ -237,6 +237,7 @@ fn settings_no_camera_can_run_with_are_refused_by_name() {
     assert_eq!(refused(|s| s.sensor.field_of_view.range_max_m = 0.0), "field_of_view.range_max_m");
     assert_eq!(refused(|s| s.sensor.field_of_view.azimuth_min_deg = 40.0), "field_of_view.azimuth_max_deg");
     assert_eq!(refused(|s| s.sensor.field_of_view.elevation_max_deg = f32::NAN), "field_of_view.elevation_max_deg");
+    assert_eq!(refused(|s| s.visibility.far_road_deg = Some(0)), "visibility.far_road_deg", "of radars only");
 }
 
 #[test]
