@@ -1,12 +1,12 @@
 //! Instructions a frame, counted by callgrind: `cargo bench -p viewshed-harness`.
 //!
-//! Counts everything from the gate to the map, for the shipped recording and for three adversarial
-//! scans of 256 detections; and sending and receiving the maps, from map to packets and back. Names
+//! Counts everything from the gate to the map, for the shipped recording, for a crossing and a queue of the twin, and for
+//! three adversarial scans of 256 detections; and sending and receiving the maps, from map to packets and back. Names
 //! behind `--` measure only those, `--recording PATH` takes another recording. Counts repeat exactly and do not
 //! depend on the machine's speed.
 
 use std::hint::black_box;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use viewshed::camera::boxes::ImageBox;
@@ -31,13 +31,20 @@ use viewshed::wire::message::{Addresses, Epoch, Packet, Plane};
 use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed_harness::boards::stress;
-use viewshed_harness::estimators::{self, camera_3d};
+use viewshed_harness::estimators::{self, FarRoad, camera_3d};
 use viewshed_harness::recording::Recording;
 use viewshed_harness::recording::read;
+use viewshed_harness::studies::experiment::scenes;
+use viewshed_harness::twin::simulate::Simulation;
 
-/// `radar-3d-blurred` is radar-3d with the largest range noise that may be set: evidence spreads widest.
-const ESTIMATORS: [&str; 4] = ["radar-3d", "radar-3d-small", "radar-3d-blurred", "radar-2d"];
-const SCENES: [&str; 4] = ["recording", "one-ray", "all-rays", "everywhere"];
+/// `radar-3d-narrow` has azimuths that are narrower along the road; `radar-3d-blurred` has the largest range noise that may
+/// be set: evidence spreads widest.
+const ESTIMATORS: [&str; 5] = ["radar-3d", "radar-3d-narrow", "radar-3d-small", "radar-3d-blurred", "radar-2d"];
+const SCENES: [&str; 6] = ["recording", CROSSING, QUEUE, "one-ray", "all-rays", "everywhere"];
+
+/// Training scenes of the twin, the first of each plan.
+const CROSSING: &str = "crossing";
+const QUEUE: &str = "queue";
 
 /// The camera: the recording's boxes, and as many as a frame may have.
 const CAMERA: [(&str, &str); 2] = [("camera-3d", SCENES[0]), ("camera-3d", CROWDED)];
@@ -53,8 +60,17 @@ const FUSION_BUDGET: u64 = 300_000;
 /// together.
 const MONITOR: &str = "monitor";
 
-/// What is measured on the recording's maps only, or their sending and receiving.
-const WIRE: [&str; 6] = ["send-can", "receive-can", "send-fd", "receive-fd", "send-long", "receive-long"];
+/// What is measured on the recording's maps only, or their sending and receiving; `narrow` those of `radar-3d-narrow`.
+const WIRE: [&str; 8] = [
+    "send-can",
+    "receive-can",
+    "send-can-narrow",
+    "receive-can-narrow",
+    "send-fd",
+    "receive-fd",
+    "send-long",
+    "receive-long",
+];
 
 type Road = Fusion<2, 200, 32>;
 
@@ -68,8 +84,8 @@ fn measured(estimator: &str) -> &'static str {
         "camera-3d" => "instructions::measured_frame_camera",
         FUSION => "instructions::measured_fusion",
         MONITOR => "instructions::measured_monitor",
-        "send-can" | "send-fd" | "send-long" => "instructions::measured_send",
-        "receive-can" | "receive-fd" | "receive-long" => "instructions::measured_receive",
+        name if name.starts_with("send-") => "instructions::measured_send",
+        name if name.starts_with("receive-") => "instructions::measured_receive",
         _ => "instructions::measured_frame_3d",
     }
 }
@@ -93,12 +109,15 @@ fn main() -> ExitCode {
     println!("{:<16} {:<12} {:>9} {:>12} {:>12} {:>12}", "estimator", "scene", "frames", "mean", "median", "worst");
     let estimators = ESTIMATORS.iter().flat_map(|e| SCENES.map(|scene| (*e, scene)));
     let asked: Vec<&String> = args.iter().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let scenes = asked.is_empty() || asked.iter().any(|a| a.starts_with("radar"));
+    let simulated = if scenes { [CROSSING, QUEUE].map(|scene| (scene, simulated(scene))).to_vec() } else { vec![] };
     let several = [FUSION, MONITOR].into_iter().chain(WIRE).map(|estimator| (estimator, SCENES[0]));
     for (estimator, scene) in estimators.chain(CAMERA).chain(several) {
         if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
             continue;
         }
-        let counts = measure(estimator, scene, &recording);
+        let of_scene = simulated.iter().find(|(name, _)| *name == scene).map(|(_, file)| file.display().to_string());
+        let counts = measure(estimator, scene, of_scene.as_ref().unwrap_or(&recording));
         let Some(worst) = counts.last() else {
             eprintln!("callgrind counted nothing for {estimator} on {scene}");
             return ExitCode::FAILURE;
@@ -115,7 +134,19 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     }
+    simulated.iter().for_each(|(_, file)| _ = std::fs::remove_file(file));
     ExitCode::SUCCESS
+}
+
+/// The recording of a training scene, in a file of its own.
+fn simulated(name: &str) -> PathBuf {
+    let plan = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings")).join(name).join("scenes.toml");
+    let plan = scenes::Plan::read(&plan).expect("the plan");
+    let scene = plan.scenes(&plan.training).expect("its scenes").swap_remove(0);
+    let file = std::env::temp_dir().join(format!("viewshed-bench-{}-{name}.mcap", std::process::id()));
+    let sink = std::fs::File::create(&file).expect("a file for a recording");
+    Simulation::new(scene, None).and_then(|twin| twin.record(sink, &|| ())).expect("a simulation");
+    file
 }
 
 /// Instructions of every frame, ascending.
@@ -156,7 +187,7 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
         return run_camera(&recording, scene == CROWDED);
     }
     let sensor = estimators::sensor(&recording, &Default::default());
-    let frames: Vec<(Time, Vec<Detection>)> = if scene == "recording" {
+    let frames: Vec<(Time, Vec<Detection>)> = if [SCENES[0], CROSSING, QUEUE].contains(&scene) {
         let time = |ns: i64| Time::from_micros(u64::try_from(ns / 1000).unwrap_or(0));
         recording
             .frames
@@ -166,18 +197,24 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
     } else {
         stress::scans(scene).into_iter().map(|s| (s.time, s.detections)).collect()
     };
+    let (even, mut narrow) = (Radar3dConfig::default(), Radar3dConfig::default());
+    narrow.visibility.far_road_deg = Some(FarRoad::AlongRoad.degrees(&sensor));
     match estimator {
         "radar-3d-blurred" => {
             let noise = NoiseConfig { range_m: 5.0, ..sensor.noise };
-            run_3d::<200, 120, 16, 7, 96, 256>(&Sensor { noise, ..sensor }, &frames);
+            run_3d::<200, 120, 16, 7, 96, 256>(&Sensor { noise, ..sensor }, &even, &frames);
         }
-        "radar-3d" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &frames),
-        "send-can" | "receive-can" => run_wire(&sensor, &frames, Medium::Can(Addresses::STANDARD)),
-        "send-fd" | "receive-fd" => run_wire(&sensor, &frames, Medium::CanFd(Addresses::STANDARD)),
-        "send-long" | "receive-long" => run_wire(&sensor, &frames, Medium::Serial),
+        "radar-3d" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &even, &frames),
+        "radar-3d-narrow" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &narrow, &frames),
+        "send-can" | "receive-can" => run_wire(&sensor, &even, &frames, Medium::Can(Addresses::STANDARD)),
+        "send-can-narrow" | "receive-can-narrow" => {
+            run_wire(&sensor, &narrow, &frames, Medium::Can(Addresses::STANDARD));
+        }
+        "send-fd" | "receive-fd" => run_wire(&sensor, &even, &frames, Medium::CanFd(Addresses::STANDARD)),
+        "send-long" | "receive-long" => run_wire(&sensor, &even, &frames, Medium::Serial),
         FUSION => run_fusion(&sensor, &frames),
         MONITOR => run_monitor(&sensor, &frames),
-        "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &frames),
+        "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &even, &frames),
         _ => run_2d(&sensor, &frames),
     }
 }
@@ -188,9 +225,10 @@ fn detection(d: &viewshed_harness::recording::RadarDetection) -> Option<Detectio
 
 fn run_3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
     sensor: &Sensor,
+    config: &Radar3dConfig,
     frames: &[(Time, Vec<Detection>)],
 ) {
-    let parameters = Radar3dParameters::<R, A, E>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let parameters = Radar3dParameters::<R, A, E>::new(sensor, config).expect("defaults are valid");
     let mut state = Box::new(Radar3d::<R, A, E, W, N, D>::new());
     let mut map = Box::new(parameters.map());
     for (now, detections) in frames {
@@ -285,9 +323,8 @@ fn measured_monitor(
 }
 
 /// Radar-3d's maps from a sender to a receiver, a scan at a time.
-fn run_wire(sensor: &Sensor, frames: &[(Time, Vec<Detection>)], medium: Medium) {
-    let parameters =
-        Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+fn run_wire(sensor: &Sensor, config: &Radar3dConfig, frames: &[(Time, Vec<Detection>)], medium: Medium) {
+    let parameters = Radar3dParameters::<200, 120, 16>::new(sensor, config).expect("defaults are valid");
     let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
     let mut map = Box::new(parameters.map());
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };

@@ -334,6 +334,23 @@ fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_map
 
 #[test]
 #[ignore = "needs QEMU"]
+fn azimuths_narrower_along_the_road_are_those_of_a_pc_and_told_in_the_header() {
+    let (mut settings, scans) = shipped(1.0);
+    settings.visibility.far_road_deg = Some(0);
+    let board = same(Profile::Reference, &script(&settings, &scans));
+    let (header, map, _) = kept::on_a_pc(&settings, &scans);
+    let far = listen(board.expected.as_ref().unwrap());
+    let received = far.map(SENSOR, on_the_line(scans.last().unwrap().time, scans[0].time));
+    let told = received.header().unwrap();
+    let [first, end, times] = told.narrow.to_bytes();
+    assert!(end - first > 40 && times == 4 && told.narrow == header.narrow, "{first} {end} {times}");
+    let visible = |a, r| received.cell(a, r).visibility == Visibility::Visible;
+    let equal = (0..120 * 200).filter(|k| visible(k / 200, k % 200) == map.cell(k / 200, k % 200).visible()).count();
+    assert!(equal > 23_900, "{equal} of 24000 cells are the PC's");
+}
+
+#[test]
+#[ignore = "needs QEMU"]
 fn a_line_that_takes_nothing_costs_maps_that_are_counted_and_no_safety() {
     let (settings, scans) = shipped(6.0);
     let mut script = script(&settings, &scans);
