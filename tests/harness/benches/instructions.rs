@@ -76,6 +76,8 @@ type Road = Fusion<2, 200, 32>;
 
 /// Instructions a scan that sending and receiving may take, median, on every bus.
 const WIRE_BUDGET: u64 = 150_000;
+/// The same of azimuths of which some are narrow: of a road that is drawn finer there is more to say.
+const NARROW_WIRE_BUDGET: u64 = 180_000;
 
 /// The function whose instructions are counted, as callgrind names it.
 fn measured(estimator: &str) -> &'static str {
@@ -129,8 +131,9 @@ fn main() -> ExitCode {
             eprintln!("fusing two maps takes {median} instructions, more than {FUSION_BUDGET}");
             return ExitCode::FAILURE;
         }
-        if WIRE.contains(&estimator) && median > WIRE_BUDGET {
-            eprintln!("{estimator} takes {median} instructions a scan, more than {WIRE_BUDGET}");
+        let budget = if estimator.ends_with("narrow") { NARROW_WIRE_BUDGET } else { WIRE_BUDGET };
+        if WIRE.contains(&estimator) && median > budget {
+            eprintln!("{estimator} takes {median} instructions a scan, more than {budget}");
             return ExitCode::FAILURE;
         }
     }

@@ -116,6 +116,38 @@ fn a_cell_says_what_it_is_since_when_and_in_whose_shadow() {
 }
 
 #[test]
+fn narrow_azimuths_are_drawn_where_they_lie_on_the_senders_and_the_receivers_map() {
+    let Some(browser) = Browser::start("narrow") else { return };
+    let config = folder("narrow").join("far-road.toml");
+    std::fs::write(&config, "[estimators.radar_3d.visibility]\nfar_road_deg = 0\n").unwrap();
+    let config = config.to_str().unwrap();
+    let server = Server::run(["view", SHIPPED, "--to", "10", "--config", config]);
+    let page = ready(&browser, &server);
+    page.click_plot("time", 7.0, 40.0);
+    page.until("Math.abs(viewshed.instant.sample.time_s - 7) < 0.2");
+    for map in 0..2 {
+        let narrow = page.ask(&format!("viewshed.instant.maps[{map}].cells.narrow"));
+        let [first, end, times] = [0, 1, 2].map(|k| narrow[k].as_f64().unwrap());
+        assert!(times == 4.0 && end - first > 40.0, "{narrow}");
+        // along the road and far to the side, where the columns are four times as wide
+        for (x, y) in [(110.0_f64, 2.0_f64), (110.0, -14.0), (60.0, 5.0), (40.0, 30.0), (30.0, -35.0)] {
+            page.click_plot("plan", x, y);
+            page.until(&format!("viewshed.told && Math.hypot(viewshed.told.x_m - {x}, viewshed.told.y_m - {y}) < 4"));
+            let told = page.ask("viewshed.told");
+            let [at_x, at_y] = ["x_m", "y_m"].map(|key| told[key].as_f64().unwrap());
+            // half a column to each side of its middle, and what a pixel is wide
+            let wide = if (y.atan2(x)).to_degrees().abs() < 10.0 { 0.38_f64 } else { 1.53 };
+            let across = (at_y.atan2(at_x) - y.atan2(x)).abs() * x.hypot(y);
+            let most = x.hypot(y) * wide.to_radians() / 2.0 + 0.15;
+            assert!(across <= most, "map {map}, ({x}, {y}): {across} m beside {told}, {most}");
+        }
+        page.key("m");
+    }
+    page.picture(&folder("pictures-narrow").join("view.png"));
+    assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
 fn the_receivers_map_stands_beside_the_senders_and_the_page_is_readable() {
     let Some(browser) = Browser::start("appearance") else { return };
     let server = start();
