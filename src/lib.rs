@@ -142,6 +142,10 @@
 //!   come some way at the same distance. What turns (wheels) or lies inside an outline is no vehicle.
 //! - **Boxes are not drawn into cells.** Shadows of boxes end where similar triangles say, not at the edge
 //!   of a row of slopes: in queues that is every twentieth blocked cell.
+//! - **Columns are narrow where the far road lies.** At 150 m a degree is a lane wide, and of a view of 120 degrees nearly
+//!   all vehicles are within twenty. Where [`VisibilityConfig`] says where that is, columns there are four times
+//!   narrower than the others: twice as many of all alike give the same, for twice the memory. Angles are
+//!   counted in widths of a narrow column, so that one factor tells both; on the wire it is one more group of the header.
 //! - **The road's height is a function of its length.** Crests, dips and ramps lie along the road, so a profile over its
 //!   x axis holds for any mount and any direction of sight; heights over range would bend the road with the sensor's
 //!   yaw, and say nothing of a road that climbs on one side and falls on the other. Straight pieces are what makes it

@@ -5,6 +5,6 @@ set -eu
 here=$(CDPATH='' cd -- "$(dirname "$0")" && pwd)
 . "$here/tools.sh"
 need_compilers
-[ $# -gt 0 ] || set -- --out out
+[ $# -gt 0 ] || set -- --far-road --out out
 exec cargo run --release --locked --manifest-path "$here/../Cargo.toml" --package viewshed-harness \
     --no-default-features -- replay "$@"
