@@ -58,6 +58,7 @@ proptest! {
         sensor_m in 3.0..10.0_f32,
         (ahead, left, turned) in (15.0..150.0_f64, -30.0..30.0_f64, any::<i16>()),
         top_cm in 50..500_i32,
+        far_road in proptest::option::of(-30..30_i8),
     ) {
         let mount = Mount { x_m: 20.0, y_m: -4.0, height_m: sensor_m, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
         let mut setup = Setup::default();
@@ -66,7 +67,7 @@ proptest! {
         setup.sensor.field_of_view.elevation_max_deg = 20.0;
         let levelling = mount.levelling().unwrap();
         let ground = Ground::new(&levelling, Points::Metres(&points)).unwrap();
-        let Ok(axes) = Axes::<R, A, E>::on(ground, &levelling, &setup.sensor.field_of_view, 1.0, None) else { return Ok(()) };
+        let Ok(axes) = Axes::<R, A, E>::on(ground, &levelling, &setup.sensor.field_of_view, 1.0, far_road) else { return Ok(()) };
         let mut grid = SphericalGrid::<R, A, E, 3>::new();
         let mut map = PolarMap::unknown(axes.polar(&levelling), 128, 128);
         cast(&grid, &axes, &mut map);

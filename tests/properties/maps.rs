@@ -3,11 +3,13 @@
 use proptest::prelude::*;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::trig;
+use viewshed::grid::axes::Axes;
 use viewshed::map::bitmap::VisibilityBitmap;
 use viewshed::map::polar::PolarMap;
 use viewshed::map::query::{self, Answer, Footprint};
 use viewshed::map::resample::RoadGrid;
 use viewshed::map::{CellState, Visibility, VisibilityMap};
+use viewshed::sensor::ground::Ground;
 use viewshed::sensor::road::RoadPoint;
 
 use crate::cases;
@@ -134,14 +136,15 @@ proptest! {
     #[test]
     fn a_cell_of_a_polar_map_is_found_at_its_centre(setup in setups(), a in 0..A, r in 1..R) {
         let levelling = setup.sensor.mount.levelling().unwrap();
-        let axes = viewshed::grid::axes::Axes::<R, A, 4>::new(&levelling, &setup.sensor.field_of_view, 1.0);
+        let far_road = setup.radar_3d.visibility.far_road_deg;
+        let axes = Axes::<R, A, 4>::on(Ground::LEVEL, &levelling, &setup.sensor.field_of_view, 1.0, far_road);
         let Ok(axes) = axes else { return Ok(()) };
         let geometry = axes.polar(&levelling);
         let map = PolarMap::<R, A>::unknown(geometry, 128, 128);
         let bearing = f64::from(axes.azimuth_of(a as i32 * 256 + 128).radians());
         let ground = f64::from(axes.cell_cm) * (r as f64 + 0.5);
         // whole centimetres and 2^-16 turns must not leave the cell
-        prop_assume!(axes.cell_cm >= 8 && ground * f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU / A as f64 > 8.0);
+        prop_assume!(axes.cell_cm >= 8 && ground * f64::from(axes.azimuth_span) / 65536.0 * std::f64::consts::TAU / f64::from(axes.narrow.units(A)) > 8.0);
         let (x, y) = ((ground * bearing.cos()).round() as i32, (ground * bearing.sin()).round() as i32);
         prop_assert_eq!(map.locate(x, y), Some((a, r)), "{} {}", x, y);
         prop_assert_eq!(axes.column(trig::bearing(x, y)), Some(a));

@@ -165,42 +165,44 @@ pub fn setups() -> impl Strategy<Value = Setup> {
     let changed = prop_oneof![Just(0.03), Just(0.2), Just(1.0)];
     let parts = proptest::collection::vec((0.0..1.0, part()), all().count());
     let sizes = proptest::collection::vec((0.5..39.0_f32, 0.3..6.0_f32, 0.3..8.0_f32), 4);
-    (changed, parts, proptest::option::weighted(0.2, sizes), proptest::option::weighted(0.2, 1..=u16::MAX)).prop_map(
-        |(changed, parts, sizes, most)| {
-            let mut setup = Setup::default();
-            for (p, (roll, part)) in all().zip(parts) {
-                if roll < changed {
-                    (p.set)(
-                        &mut setup,
-                        (p.limits[0] + (p.limits[1] - p.limits[0]) * part).clamp(p.limits[0], p.limits[1]),
-                    );
-                }
+    let sizes = proptest::option::weighted(0.2, sizes);
+    let most = proptest::option::weighted(0.2, 1..=u16::MAX);
+    let far_road = proptest::option::weighted(0.3, 0.0..=1.0_f32);
+    (changed, parts, sizes, most, far_road).prop_map(|(changed, parts, sizes, most, far_road)| {
+        let mut setup = Setup::default();
+        for (p, (roll, part)) in all().zip(parts) {
+            if roll < changed {
+                (p.set)(&mut setup, (p.limits[0] + (p.limits[1] - p.limits[0]) * part).clamp(p.limits[0], p.limits[1]));
             }
-            let v = &mut setup.sensor.field_of_view;
-            in_order(&mut v.azimuth_min_deg, &mut v.azimuth_max_deg, 85.0);
-            in_order(&mut v.elevation_min_deg, &mut v.elevation_max_deg, 85.0);
-            in_order(&mut v.range_min_m, &mut v.range_max_m, 400.0);
-            if let Some(most) = most {
-                setup.radar_3d.gate.max_detections = most;
-                setup.radar_2d.gate.max_detections = most;
+        }
+        let v = &mut setup.sensor.field_of_view;
+        in_order(&mut v.azimuth_min_deg, &mut v.azimuth_max_deg, 85.0);
+        in_order(&mut v.elevation_min_deg, &mut v.elevation_max_deg, 85.0);
+        in_order(&mut v.range_min_m, &mut v.range_max_m, 400.0);
+        if let Some(most) = most {
+            setup.radar_3d.gate.max_detections = most;
+            setup.radar_2d.gate.max_detections = most;
+        }
+        if let Some(mut sizes) = sizes {
+            sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let points = &mut setup.radar_3d.obstacles.sizes.points;
+            for (i, (p, (length, width, height))) in points.iter_mut().zip(sizes).enumerate() {
+                (p.length_m, p.width_m, p.height_m) = (length + 0.25 * i as f32, width, height);
             }
-            if let Some(mut sizes) = sizes {
-                sizes.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let points = &mut setup.radar_3d.obstacles.sizes.points;
-                for (i, (p, (length, width, height))) in points.iter_mut().zip(sizes).enumerate() {
-                    (p.length_m, p.width_m, p.height_m) = (length + 0.25 * i as f32, width, height);
-                }
-            }
-            let (gate, obstacles) = (&mut setup.radar_3d.gate, &mut setup.radar_3d.obstacles);
-            gate.max_speed_mps = gate.max_speed_mps.max(gate.min_speed_mps + 1.0);
-            setup.radar_2d.gate.max_speed_mps = gate.max_speed_mps;
-            obstacles.max_evidence = obstacles.max_evidence.max(obstacles.confirm_hits);
-            if Radar3dParameters::<2, 2, 2>::new(&setup.sensor, &setup.radar_3d).is_err() {
-                setup.sensor.field_of_view = Setup::default().sensor.field_of_view;
-            }
-            setup
-        },
-    )
+        }
+        let (gate, obstacles) = (&mut setup.radar_3d.gate, &mut setup.radar_3d.obstacles);
+        gate.max_speed_mps = gate.max_speed_mps.max(gate.min_speed_mps + 1.0);
+        setup.radar_2d.gate.max_speed_mps = gate.max_speed_mps;
+        obstacles.max_evidence = obstacles.max_evidence.max(obstacles.confirm_hits);
+        if Radar3dParameters::<2, 2, 2>::new(&setup.sensor, &setup.radar_3d).is_err() {
+            setup.sensor.field_of_view = Setup::default().sensor.field_of_view;
+        }
+        let view = &setup.sensor.field_of_view;
+        let [right, left] = [view.azimuth_min_deg.ceil(), view.azimuth_max_deg.floor()];
+        let far_road = far_road.filter(|_| right <= left).map(|part| (right + part * (left - right)).round() as i8);
+        setup.radar_3d.visibility.far_road_deg = far_road;
+        setup
+    })
 }
 
 /// Puts limits in ascending order, a little apart.

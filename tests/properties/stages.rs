@@ -13,6 +13,7 @@ use viewshed::grid::spherical::SphericalGrid;
 use viewshed::map::Visibility;
 use viewshed::map::polar::PolarMap;
 use viewshed::obstacles::solid::Solid;
+use viewshed::sensor::ground::Ground;
 
 use crate::cases;
 use crate::setup::{Setup, setups};
@@ -27,7 +28,9 @@ type Map = PolarMap<R, A>;
 
 fn axes(setup: &Setup) -> Option<Axes<R, A, E>> {
     let levelling = setup.sensor.mount.levelling().unwrap();
-    Axes::new(&levelling, &setup.sensor.field_of_view, setup.radar_3d.visibility.slice_height_m).ok()
+    let visibility = setup.radar_3d.visibility;
+    Axes::on(Ground::LEVEL, &levelling, &setup.sensor.field_of_view, visibility.slice_height_m, visibility.far_road_deg)
+        .ok()
 }
 
 fn map(axes: &Axes<R, A, E>) -> Map {
@@ -182,9 +185,13 @@ proptest! {
                     // two standard deviations of range, at most 8 cells
                     let reach = (setup.sensor.noise.range_m * 200.0) as i32 + 2 * axes.cell_cm;
                     prop_assert!((centre - i32::from(r.ground_cm)).abs() <= reach.min(9 * axes.cell_cm));
-                    let columns = (axes.column_place(r.bearing()) - (a as i32 * 256 + 128)).abs();
-                    let sigma = setup.sensor.noise.azimuth_deg / 360.0 * 65536.0 / f32::from(axes.azimuth_span) * A as f32;
-                    prop_assert!(columns as f32 <= 256.0 * (2.0 * sigma + 0.6), "{} of 256", columns);
+                    let middle = axes.narrow.unit(a as i32 * 256 + 128);
+                    let units = (axes.column_unit(r.bearing()) - middle).abs();
+                    let unit = f32::from(axes.azimuth_span) / axes.narrow.units(A) as f32;
+                    let sigma = setup.sensor.noise.azimuth_deg / 360.0 * 65536.0 / unit;
+                    // to the middle of the column beside, which may be a wide one
+                    let half = (axes.narrow.unit((a as i32 + 1) * 256) - middle) as f32;
+                    prop_assert!(units as f32 <= 256.0 * (2.0 * sigma + 0.1) + half, "{} of 256", units);
                 }
             }
         }

@@ -310,7 +310,10 @@ impl EstimatorArgs {
 fn far_road(text: &str) -> Result<FarRoad, String> {
     match text {
         "along-road" => Ok(FarRoad::AlongRoad),
-        _ => text.parse().map(FarRoad::Degrees).map_err(|_| format!("`{text}` is not a whole number of degrees")),
+        _ => text
+            .parse()
+            .map(FarRoad::Degrees)
+            .map_err(|_| format!("`{text}` is not a whole number of degrees, -128 to 127")),
     }
 }
 
@@ -433,6 +436,18 @@ mod tests {
         let [x, .., pitch, _] = s.reading.mount.unwrap();
         assert_eq!((x, pitch), (-1.0, 4_f64.to_radians()));
         assert_eq!(s.reading.field_of_view.unwrap().azimuth_rad[0], -60_f64.to_radians());
+    }
+
+    #[test]
+    fn the_far_road_lies_along_the_road_or_where_it_is_said() {
+        let far_road = |line: &[&str]| parse(line).map(|settings| settings.estimators.far_road);
+        assert_eq!(far_road(&[]).unwrap(), None);
+        assert_eq!(far_road(&["--far-road"]).unwrap(), Some(FarRoad::AlongRoad));
+        assert_eq!(far_road(&["--far-road=-12"]).unwrap(), Some(FarRoad::Degrees(-12)));
+        for wrong in ["--far-road=1.5", "--far-road=north", "--far-road=200"] {
+            let error = far_road(&[wrong]).unwrap_err().to_string();
+            assert!(error.contains("is not a whole number of degrees, -128 to 127"), "{error}");
+        }
     }
 
     #[test]
