@@ -353,8 +353,8 @@ pub struct Collector {
     groups: Groups,
     /// Which of them are there, a bit each.
     there: u8,
-    /// The group of narrow azimuths.
-    narrow: Option<[u8; GROUP]>,
+    /// The group of narrow azimuths; zeros are none.
+    narrow: [u8; GROUP],
     header: Option<Header>,
     levels: Said,
 }
@@ -378,7 +378,7 @@ impl Default for Collector {
 impl Collector {
     /// Nothing yet.
     pub const NEW: Self =
-        Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, narrow: None, header: None, levels: Said::Nothing };
+        Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, narrow: [0; GROUP], header: None, levels: Said::Nothing };
 
     /// The header, once complete.
     pub fn header(&self) -> Option<&Header> {
@@ -414,11 +414,11 @@ impl Collector {
         let more = rest.get(groups.as_flattened().len()..).unwrap_or(&[]).as_chunks::<GROUP>().0;
         let narrow = more.iter().copied().find(is_narrow);
         let header = Header::parse(&groups, narrow)?;
-        if self.contradicts(&groups) || self.narrow.is_some_and(|held| narrow.is_some_and(|new| new != held)) {
+        if self.contradicts(&groups) || self.narrow().is_some_and(|held| narrow.is_some_and(|new| new != held)) {
             return Ok(Brought::Contradiction);
         }
         (self.groups, self.there, self.header) = (groups, 0x3F, Some(header));
-        self.narrow = narrow.or(self.narrow);
+        self.narrow = narrow.unwrap_or(self.narrow);
         more.iter().filter(|group| !is_narrow(group)).for_each(|levels| self.take_levels(*levels));
         self.with_levels();
         Ok(Brought::Clock(Clock::parse(synchronised, first)))
@@ -460,13 +460,18 @@ impl Collector {
         if known { Ok(Brought::Group) } else { self.complete() }
     }
 
+    /// The group of narrow azimuths, once it came.
+    fn narrow(&self) -> Option<[u8; GROUP]> {
+        Some(self.narrow).filter(is_narrow)
+    }
+
     /// Takes group 7 of narrow azimuths.
     fn take_narrow(&mut self, group: [u8; GROUP]) -> Result<Brought, NotAHeader> {
-        match self.narrow {
+        match self.narrow() {
             Some(held) if held == group => Ok(Brought::Group),
             Some(_) => Ok(Brought::Contradiction),
             None => {
-                self.narrow = Some(group);
+                self.narrow = group;
                 self.complete()
             }
         }
@@ -474,11 +479,11 @@ impl Collector {
 
     /// Makes the header, once all of it is there.
     fn complete(&mut self) -> Result<Brought, NotAHeader> {
-        let missing = self.there != 0x3F || self.narrow.is_none() && some_narrow(&self.groups);
+        let missing = self.there != 0x3F || self.narrow().is_none() && some_narrow(&self.groups);
         if missing || self.header.is_some() {
             return Ok(Brought::Group);
         }
-        match Header::parse(&self.groups, self.narrow) {
+        match Header::parse(&self.groups, self.narrow()) {
             Ok(header) => {
                 self.header = Some(header);
                 self.with_levels();
@@ -636,7 +641,7 @@ mod tests {
             for first in 0..count {
                 let mut c = Collector::NEW;
                 for k in 0..count {
-                    assert!(c.header().is_none() || c.narrow.is_some(), "from group {first} on");
+                    assert!(c.header().is_none() || c.narrow().is_some(), "from group {first} on");
                     c.take(&sent.emit_group(&CLOCK, (first + k) % count)).unwrap();
                 }
                 assert_eq!(c.header(), Some(&sent), "from group {first} on");
