@@ -23,9 +23,11 @@ mod lane;
 mod lanes;
 mod motion;
 mod path;
+mod queues;
 mod reflections;
 mod shape;
 mod standing;
+mod streaks;
 mod tracker;
 
 use std::sync::Arc;
@@ -66,13 +68,15 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     }
     let mut instants = reflections::instants(recording);
     // the first time what drives shows the lanes, the second time they tell what is side by side
-    let lanes = lanes::learn(&paths(&instants, &[], &|share| progress(0.3 * share)), &instants);
+    let lanes = lanes::learn(&paths(&instants, &[], &[], &|share| progress(0.3 * share)), &instants);
     reflections::free_lanes(&mut instants, &lanes);
-    let paths = paths(&instants, &lanes, &|share| progress(0.3 + 0.3 * share));
+    let shared: Vec<Arc<Lane>> = lanes.iter().cloned().map(Arc::new).collect();
+    let paths = paths(&instants, &lanes, &shared, &|share| progress(0.3 + 0.3 * share));
     progress(0.7);
     let paths = joining::abreast(paths, &instants);
     let paths = assembly::assembled(paths, &instants);
     let paths = assembly::assembled(paths, &instants);
+    let paths = queues::queued(paths, &shared, &mut instants);
     progress(0.8);
     let paths = joining::through_gaps(paths, &instants);
     let paths = exclusion::without_images(paths);
@@ -97,14 +101,18 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
 }
 
 /// What moves, followed in both directions of time.
-fn paths(instants: &[reflections::Instant], lanes: &[Lane], progress: &(dyn Fn(f64) + Sync)) -> Vec<Path> {
+fn paths(
+    instants: &[reflections::Instant],
+    lanes: &[Lane],
+    shared: &[Arc<Lane>],
+    progress: &(dyn Fn(f64) + Sync),
+) -> Vec<Path> {
     let (forward, backward) = rayon::join(
         || tracker::tracklets(instants, lanes, false, progress),
         || tracker::tracklets(instants, lanes, true, &|_| ()),
     );
-    let lanes: Vec<Arc<Lane>> = lanes.iter().cloned().map(Arc::new).collect();
     let tracklets = joining::both_ways(&forward, &backward);
-    let path = |t: tracker::Tracklet| Path::new(t.members, t.lane.and_then(|k| lanes.get(k).cloned()), instants);
+    let path = |t: tracker::Tracklet| Path::new(t.members, t.lane.and_then(|k| shared.get(k).cloned()), instants);
     tracklets.into_par_iter().filter_map(path).collect()
 }
 

@@ -101,8 +101,9 @@ impl Path {
             while self.members.get(next).is_some_and(|m| m.0 == frame) {
                 next += 1;
             }
-            let own: Vec<Reflection> =
-                self.members[begin..next].iter().filter_map(|m| instant.reflections.get(m.1)).copied().collect();
+            let heading = self.heading_at(frame).map(|h| [h.cos(), h.sin()]);
+            let own = self.members[begin..next].iter().filter_map(|m| instant.reflections.get(m.1));
+            let own: Vec<Reflection> = own.map(|r| r.of_middle(heading)).collect();
             let mut now = match (motion, filtered.last()) {
                 (Some(mut now), Some((before_s, _))) => {
                     now.predict(instant.time_s - before_s);
@@ -110,7 +111,7 @@ impl Path {
                 }
                 _ => beginning(&own)?,
             };
-            let heading = self.heading_at(frame).map(|h| [h.cos(), h.sin()]);
+            let length_m = if own.iter().all(|r| r.ahead_m.is_some()) { 0.0 } else { length_m };
             if !own.is_empty() {
                 measure(&mut now, &own, 1.0, heading, length_m);
             } else if self.stood(begin, instants) {

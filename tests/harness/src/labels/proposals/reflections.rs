@@ -28,6 +28,16 @@ pub struct Reflection {
     /// m/s, + receding.
     pub doppler_mps: f64,
     pub fixture: bool,
+    /// How far ahead of its vehicle's middle it lies, metres, where that is known.
+    pub ahead_m: Option<f64>,
+}
+
+impl Reflection {
+    /// It as if it lay in the middle of its vehicle, where that is known.
+    pub fn of_middle(&self, heading: Option<[f64; 2]>) -> Self {
+        let Some((ahead_m, [c, s])) = self.ahead_m.zip(heading) else { return *self };
+        Self { place: [self.place[0] - ahead_m * c, self.place[1] - ahead_m * s], ..*self }
+    }
 }
 
 /// One frame of them.
@@ -68,7 +78,7 @@ fn reflection(pose: &SensorPose, [x, y, z]: [f64; 3], doppler_mps: f64) -> Refle
     let s = pose.to_spherical([x, y, z]);
     let [ux, uy, _] = pose.rotate_to_road(direction(s.azimuth_rad, s.elevation_rad));
     let distance_m = (x - pose.position[0]).hypot(y - pose.position[1]);
-    Reflection { place: [x, y], height_m: z, sight: [ux, uy], distance_m, doppler_mps, fixture: false }
+    Reflection { place: [x, y], height_m: z, sight: [ux, uy], distance_m, doppler_mps, fixture: false, ahead_m: None }
 }
 
 /// Marks standing reflections in cells of 1 m by 1 degree that have some in many frames.

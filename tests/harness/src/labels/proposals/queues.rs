@@ -1,0 +1,292 @@
+//! Vehicles in queues: streaks of one lane whose distance stays the same while they move.
+//!
+//! # Model
+//! Vehicles pull away and brake one after the other, so that their distances change by metres; those of the ends and
+//! wheels of one vehicle do not. Pairs of streaks are put together, the steadiest first, as long as all distances are
+//! steady and the length is a vehicle's. What the tracker found of these vehicles before they came into the queue and
+//! after they left it is theirs; what it made of the reflections of several of them is dropped.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::lane::Lane;
+use super::path::Path;
+use super::reflections::Instant;
+use super::streaks::{STANDS_BELOW_MPS, Streak, streaks};
+
+/// Longest vehicle, metres, noise included; longest one of which only the ends reflect.
+const LONG_M: f64 = 19.0;
+const SHORT_M: f64 = 6.6;
+/// Longest part of a long vehicle that does not reflect, metres.
+const VOID_M: f64 = 4.5;
+/// How much the distance of two streaks of one vehicle changes while they move (root mean square), metres.
+const STEADY_M: f64 = 0.45;
+/// Farthest two streaks of one vehicle are apart on average when it is not sure that they move as one, metres.
+const INSIDE_M: f64 = 0.5;
+/// Fewest frames in which two streaks have to move together, and how far, metres.
+const FRAMES: usize = 8;
+const MOVED_M: f64 = 1.0;
+/// A streak that ended is gone on with: standing after so long, moving after so long, seconds, so far away, metres.
+const STANDS_S: f64 = 25.0;
+const MOVES_S: f64 = 2.0;
+const AWAY_M: f64 = 0.7;
+/// A vehicle of a queue: its way, metres, reflections, and how many frames it is slower than this, m/s.
+const WAY_M: f64 = 2.0;
+const FEWEST: usize = 20;
+const SLOW_MPS: f64 = 2.5;
+const SLOW_FRAMES: usize = 15;
+/// Share of its reflections that a vehicle of another lane has already from which on it is that one.
+const TAKEN: f64 = 0.4;
+/// How long before and after the queue the tracker has to agree, frames, and with how many reflections.
+const AGREES: usize = 30;
+const ALIKE: usize = 5;
+/// Share of a path's reflections that have to be left for it to stay.
+const LEFT: f64 = 0.5;
+
+/// A vehicle: its reflections, each with how far ahead of the middle it lies.
+struct Vehicle {
+    lane: usize,
+    members: Vec<((usize, usize), f64)>,
+    first: usize,
+    last: usize,
+}
+
+/// Paths with those of slow vehicles in lanes anew.
+pub fn queued(paths: Vec<Path>, lanes: &[Arc<Lane>], instants: &mut [Instant]) -> Vec<Path> {
+    let mut vehicles: Vec<Vehicle> = lanes
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(k, lane)| vehicles(k, joined(streaks(lane, instants), instants)))
+        .collect();
+    vehicles.sort_by_key(|v| std::cmp::Reverse(v.members.len()));
+    // lanes overlap at crossings: what has most is right
+    let mut owner: HashMap<(usize, usize), usize> = HashMap::new();
+    let mut kept: Vec<Vehicle> = Vec::new();
+    for mut v in vehicles {
+        let before = v.members.len();
+        v.members.retain(|(m, _)| !owner.contains_key(m));
+        if (v.members.len() as f64) < (1.0 - TAKEN) * before as f64 {
+            continue;
+        }
+        owner.extend(v.members.iter().map(|(m, _)| (*m, kept.len())));
+        kept.push(v);
+    }
+    for ((frame, i), ahead_m) in kept.iter().flat_map(|v| &v.members) {
+        instants[*frame].reflections[*i].ahead_m = Some(*ahead_m);
+    }
+    let mut all: Vec<Vec<(usize, usize)>> =
+        kept.iter().map(|v| v.members.iter().map(|(m, _)| *m).collect()).collect();
+    // what the tracker has before and after
+    let mut best: Vec<[Option<(usize, usize)>; 2]> = vec![[None; 2]; kept.len()];
+    for (p, path) in paths.iter().enumerate() {
+        let mut shared: HashMap<usize, [usize; 2]> = HashMap::new();
+        for m in &path.members {
+            let Some(k) = owner.get(m) else { continue };
+            let counts = shared.entry(*k).or_default();
+            counts[0] += usize::from(m.0 < kept[*k].first + AGREES);
+            counts[1] += usize::from(m.0 + AGREES > kept[*k].last);
+        }
+        for (k, counts) in shared {
+            for (end, n) in counts.into_iter().enumerate() {
+                if n >= ALIKE && best[k][end].is_none_or(|(most, _)| n > most) {
+                    best[k][end] = Some((n, p));
+                }
+            }
+        }
+    }
+    for (k, ends) in best.into_iter().enumerate() {
+        let (first, last) = (kept[k].first, kept[k].last);
+        for (end, p) in ends.into_iter().enumerate().filter_map(|(end, p)| Some((end, p?.1))) {
+            let beyond = paths[p].members.iter().filter(|m| if end == 0 { m.0 < first } else { m.0 > last });
+            for m in beyond {
+                if !owner.contains_key(m) {
+                    owner.insert(*m, k);
+                    all[k].push(*m);
+                }
+            }
+        }
+    }
+    let instants = &*instants;
+    let mut result: Vec<Path> = Vec::new();
+    for path in paths {
+        let left: Vec<(usize, usize)> = path.members.iter().copied().filter(|m| !owner.contains_key(m)).collect();
+        if left.len() == path.members.len() {
+            result.push(path);
+        } else if left.len() as f64 >= LEFT * path.members.len() as f64 {
+            result.extend(Path::new(left, path.lane.clone(), instants));
+        }
+    }
+    let made = all.into_par_iter().zip(&kept).filter_map(|(m, v)| Path::new(m, lanes.get(v.lane).cloned(), instants));
+    result.extend(made.collect::<Vec<Path>>());
+    result
+}
+
+/// Streaks with those that go on after a gap.
+fn joined(mut all: Vec<Streak>, instants: &[Instant]) -> Vec<Streak> {
+    let time = |frame: usize| instants.get(frame).map_or(0.0, |i| i.time_s);
+    loop {
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (a, before) in all.iter().enumerate() {
+            for (b, after) in all.iter().enumerate() {
+                if after.first <= before.last() {
+                    continue;
+                }
+                let gap_s = time(after.first) - time(before.last());
+                let (Some([x, u]), Some([y, v])) = (before.along.last(), after.along.first()) else { continue };
+                let stand = u.abs().max(v.abs()) < 1.5 * STANDS_BELOW_MPS;
+                let off = if stand { y - x } else { y - x - 0.5 * (u + v) * gap_s };
+                let within = if stand { AWAY_M } else { AWAY_M + 0.5 * gap_s };
+                let goes_on = if stand { gap_s < STANDS_S } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
+                if goes_on && off.abs() < within {
+                    pairs.push((off.abs() / within + gap_s / 10.0, a, b));
+                }
+            }
+        }
+        if pairs.is_empty() {
+            return all;
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut parts: Vec<Option<Streak>> = all.into_iter().map(Some).collect();
+        for (_, a, b) in pairs {
+            if parts[a].is_none() || parts[b].is_none() {
+                continue;
+            }
+            if let (Some(mut one), Some(other)) = (parts[a].take(), parts[b].take()) {
+                let (Some([x, _]), Some([y, _])) = (one.along.last().copied(), other.along.first()) else { continue };
+                let gap = other.first - one.last();
+                for k in 1..gap {
+                    let f = k as f64 / gap as f64;
+                    one.along.push([x + f * (y - x), 0.0]);
+                }
+                one.along.extend(&other.along);
+                one.members.extend(&other.members);
+                parts.push(Some(one));
+            }
+        }
+        all = parts.into_iter().flatten().collect();
+    }
+}
+
+/// How two streaks move together.
+#[derive(Clone, Copy)]
+struct Together {
+    /// How far the second is ahead of the first, metres.
+    ahead_m: f64,
+    /// How much that changes while they move, metres; `None` if they do not.
+    changes_m: Option<f64>,
+    moved_m: f64,
+}
+
+fn together(a: &Streak, b: &Streak) -> Option<Together> {
+    let (begin, end) = (a.first.max(b.first), a.last().min(b.last()));
+    if end < begin + FRAMES {
+        return None;
+    }
+    let common: Vec<([f64; 2], [f64; 2])> = (begin..=end).filter_map(|f| Some((a.at(f)?, b.at(f)?))).collect();
+    let ahead_m = common.iter().map(|(a, b)| b[0] - a[0]).sum::<f64>() / common.len() as f64;
+    if ahead_m.abs() > LONG_M {
+        return None;
+    }
+    let moving: Vec<f64> = common
+        .iter()
+        .filter(|(a, b)| a[1].abs().max(b[1].abs()) > STANDS_BELOW_MPS)
+        .map(|(a, b)| (b[0] - a[0] - ahead_m).powi(2))
+        .collect();
+    let moved_m = (common.last()?.0[0] - common.first()?.0[0]).abs();
+    let known = moving.len() >= FRAMES && moved_m >= MOVED_M;
+    let changes_m = known.then(|| (moving.iter().sum::<f64>() / moving.len() as f64).sqrt());
+    Some(Together { ahead_m, changes_m, moved_m })
+}
+
+/// Vehicles of a lane's streaks.
+fn vehicles(lane: usize, mut all: Vec<Streak>) -> Vec<Vehicle> {
+    all.sort_by_key(|s| s.first);
+    let n = all.len();
+    let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+    let mut known: HashMap<(usize, usize), Together> = HashMap::new();
+    for a in 0..n {
+        for b in a + 1..n {
+            let Some(t) = together(&all[a], &all[b]) else { continue };
+            known.insert((a, b), t);
+            if let Some(changes_m) = t.changes_m.filter(|c| *c < STEADY_M) {
+                pairs.push((changes_m + 0.3 / (1.0 + t.moved_m), a, b));
+            }
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // each streak's vehicle, and how far it is ahead of its first
+    let mut of: Vec<(usize, f64)> = (0..n).map(|k| (k, 0.0)).collect();
+    let mut groups: Vec<Vec<usize>> = (0..n).map(|k| vec![k]).collect();
+    for (_, a, b) in pairs {
+        let ((one, at_a), (other, at_b)) = (of[a], of[b]);
+        if one == other {
+            continue;
+        }
+        let shift = at_a + known[&(a, b)].ahead_m - at_b;
+        let fits = groups[one].iter().all(|i| {
+            groups[other].iter().all(|j| {
+                known.get(&(*i.min(j), *i.max(j))).is_none_or(|t| t.changes_m.is_none_or(|c| c < 1.5 * STEADY_M))
+            })
+        });
+        let mut places: Vec<f64> = groups[one].iter().map(|i| of[*i].1).collect();
+        places.extend(groups[other].iter().map(|j| of[*j].1 + shift));
+        if fits && possible(places) {
+            for j in std::mem::take(&mut groups[other]) {
+                of[j] = (one, of[j].1 + shift);
+                groups[one].push(j);
+            }
+        }
+    }
+    // what stands all the time is of the vehicle that stands there
+    for k in 0..n {
+        if groups[k].len() != 1 || all[k].along.iter().any(|[x, _]| (x - all[k].along[0][0]).abs() > MOVED_M) {
+            continue;
+        }
+        let holds = |g: &Vec<usize>| {
+            let places: Vec<f64> = g
+                .iter()
+                .filter_map(|i| {
+                    let t = known.get(&(*i.min(&k), *i.max(&k)))?;
+                    Some(if *i < k { -t.ahead_m } else { t.ahead_m })
+                })
+                .collect();
+            let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+            places.len() > 1 && low < INSIDE_M && high > -INSIDE_M
+        };
+        let Some(g) = (0..n).find(|g| groups[*g].len() > 1 && holds(&groups[*g])) else { continue };
+        let Some((i, t)) = groups[g].iter().find_map(|i| Some((*i, known.get(&(*i.min(&k), *i.max(&k)))?))) else {
+            continue;
+        };
+        of[k] = (g, of[i].1 + if i < k { t.ahead_m } else { -t.ahead_m });
+        groups[k].clear();
+        groups[g].push(k);
+    }
+    let groups = groups.into_iter().filter(|g| !g.is_empty());
+    groups.filter_map(|g| vehicle(lane, &g, &all, &of)).collect()
+}
+
+/// Whether a vehicle may reflect in these places along it.
+fn possible(mut places: Vec<f64>) -> bool {
+    places.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (places.first(), places.last()) else { return false };
+    let widest = places.windows(2).map(|p| p[1] - p[0]).fold(0.0, f64::max);
+    last - first <= SHORT_M || (last - first <= LONG_M && widest <= VOID_M)
+}
+
+fn vehicle(lane: usize, group: &[usize], all: &[Streak], of: &[(usize, f64)]) -> Option<Vehicle> {
+    let places = group.iter().map(|k| of[*k].1);
+    let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    let middle = 0.5 * (low + high);
+    let on = |k: &usize| of[*k].1 - middle;
+    let members: Vec<((usize, usize), f64)> =
+        group.iter().flat_map(|k| all[*k].members.iter().map(move |m| (*m, on(k)))).collect();
+    let along = || group.iter().flat_map(|k| all[*k].along.iter().map(move |[x, _]| x - on(k)));
+    let (from, to) = along().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+    let slow = group.iter().map(|k| all[*k].along.iter().filter(|[_, v]| v.abs() < SLOW_MPS).count()).max()?;
+    let first = members.iter().map(|(m, _)| m.0).min()?;
+    let last = members.iter().map(|(m, _)| m.0).max()?;
+    let enough = members.len() >= FEWEST && to - from >= WAY_M && slow >= SLOW_FRAMES;
+    enough.then_some(Vehicle { lane, members, first, last })
+}
