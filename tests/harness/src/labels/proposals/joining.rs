@@ -230,9 +230,12 @@ fn overlaps(before: &Path, after: &Path) -> Option<f64> {
     }
     let length_m = (before.reach[1] - before.reach[0]).max(after.reach[1] - after.reach[0]).clamp(0.0, LONGEST_M);
     let mut away_m = 0.0;
+    // changing lanes it moved to the side
+    let side = if differ(before, after) { LANE_M } else { 0.0 };
     for frame in frames {
-        let ([a, b], [c, d]) = (before.at(frame)?.place(), after.at(frame)?.place());
-        away_m += (a - c).hypot(b - d) / common as f64;
+        let ([a, b], [x, y], (s, c)) = (before.at(frame)?.place(), after.at(frame)?.place(), after.heading_at(frame)?.sin_cos());
+        let (along, left) = ((a - x) * c + (b - y) * s, (b - y) * c - (a - x) * s);
+        away_m += along.hypot((left.abs() - side).max(0.0)) / common as f64;
     }
     (away_m < OVER_M + 0.3 * length_m).then_some(away_m / (OVER_M + 0.3 * length_m))
 }

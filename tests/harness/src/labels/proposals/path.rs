@@ -111,7 +111,8 @@ impl Path {
                 }
                 _ => beginning(&own)?,
             };
-            let length_m = if own.iter().all(|r| r.ahead_m.is_some()) { 0.0 } else { length_m };
+            let known = heading.is_some() && own.iter().all(|r| r.ahead_m.is_some());
+            let length_m = (!known).then_some(length_m);
             if !own.is_empty() {
                 measure(&mut now, &own, 1.0, heading, length_m);
             } else if self.stood(begin, instants) {

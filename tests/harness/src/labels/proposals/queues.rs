@@ -39,9 +39,11 @@ const SLOW_MPS: f64 = 2.5;
 const SLOW_FRAMES: usize = 15;
 /// Share of its reflections that a vehicle of another lane has already from which on it is that one.
 const TAKEN: f64 = 0.4;
-/// How long before and after the queue the tracker has to agree, frames, and with how many reflections.
-const AGREES: usize = 30;
+/// How long after the beginning and before the end of the queue the tracker has to agree, frames, with how many
+/// reflections and which share of them; within as many frames it goes on.
+const AGREES: usize = 15;
 const ALIKE: usize = 5;
+const AGREE: f64 = 0.6;
 /// Share of a path's reflections that have to be left for it to stay.
 const LEFT: f64 = 0.5;
 
@@ -79,33 +81,13 @@ pub fn queued(paths: Vec<Path>, lanes: &[Arc<Lane>], instants: &mut [Instant]) -
     let mut all: Vec<Vec<(usize, usize)>> =
         kept.iter().map(|v| v.members.iter().map(|(m, _)| *m).collect()).collect();
     // what the tracker has before and after
-    let mut best: Vec<[Option<(usize, usize)>; 2]> = vec![[None; 2]; kept.len()];
-    for (p, path) in paths.iter().enumerate() {
-        let mut shared: HashMap<usize, [usize; 2]> = HashMap::new();
-        for m in &path.members {
-            let Some(k) = owner.get(m) else { continue };
-            let counts = shared.entry(*k).or_default();
-            counts[0] += usize::from(m.0 < kept[*k].first + AGREES);
-            counts[1] += usize::from(m.0 + AGREES > kept[*k].last);
-        }
-        for (k, counts) in shared {
-            for (end, n) in counts.into_iter().enumerate() {
-                if n >= ALIKE && best[k][end].is_none_or(|(most, _)| n > most) {
-                    best[k][end] = Some((n, p));
-                }
-            }
-        }
-    }
-    for (k, ends) in best.into_iter().enumerate() {
-        let (first, last) = (kept[k].first, kept[k].last);
-        for (end, p) in ends.into_iter().enumerate().filter_map(|(end, p)| Some((end, p?.1))) {
-            let beyond = paths[p].members.iter().filter(|m| if end == 0 { m.0 < first } else { m.0 > last });
-            for m in beyond {
-                if !owner.contains_key(m) {
-                    owner.insert(*m, k);
-                    all[k].push(*m);
-                }
-            }
+    for (k, v) in kept.iter().enumerate() {
+        for end in [End::First, End::Last] {
+            let best = paths.iter().filter_map(|p| Some((end.goes_on(p, v, k, &owner)?, p))).max_by_key(|(n, _)| *n);
+            let beyond = best.iter().flat_map(|(_, p)| end.beyond(p, v));
+            let beyond: Vec<(usize, usize)> = beyond.filter(|m| !owner.contains_key(m)).collect();
+            owner.extend(beyond.iter().map(|m| (*m, k)));
+            all[k].extend(beyond);
         }
     }
     let instants = &*instants;
@@ -121,6 +103,42 @@ pub fn queued(paths: Vec<Path>, lanes: &[Arc<Lane>], instants: &mut [Instant]) -
     let made = all.into_par_iter().zip(&kept).filter_map(|(m, v)| Path::new(m, lanes.get(v.lane).cloned(), instants));
     result.extend(made.collect::<Vec<Path>>());
     result
+}
+
+/// An end of a vehicle's time in the queue.
+#[derive(Clone, Copy)]
+enum End {
+    First,
+    Last,
+}
+
+impl End {
+    /// In how many reflections a path agrees with a vehicle at this end, if it does and goes on soon.
+    fn goes_on(self, path: &Path, v: &Vehicle, k: usize, owner: &HashMap<(usize, usize), usize>) -> Option<usize> {
+        if path.first > v.last || path.last() < v.first {
+            return None;
+        }
+        let inside = |m: &&(usize, usize)| match self {
+            Self::First => (v.first..=v.first + AGREES).contains(&m.0),
+            Self::Last => m.0 <= v.last && m.0 + AGREES >= v.last,
+        };
+        let (all, own) = path.members.iter().filter(inside).fold((0, 0), |(all, own), m| {
+            (all + 1, own + usize::from(owner.get(m) == Some(&k)))
+        });
+        let next = match self {
+            Self::First => self.beyond(path, v).map(|m| v.first - m.0).min()?,
+            Self::Last => self.beyond(path, v).map(|m| m.0 - v.last).min()?,
+        };
+        (own >= ALIKE && own as f64 >= AGREE * all as f64 && next <= AGREES).then_some(own)
+    }
+
+    /// A path's reflections before or after the queue.
+    fn beyond<'a>(self, path: &'a Path, v: &'a Vehicle) -> impl Iterator<Item = (usize, usize)> + 'a {
+        path.members.iter().copied().filter(move |m| match self {
+            Self::First => m.0 < v.first,
+            Self::Last => m.0 > v.last,
+        })
+    }
 }
 
 /// Streaks with those that go on after a gap.

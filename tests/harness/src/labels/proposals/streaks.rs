@@ -33,6 +33,9 @@ const WAITS_S: f64 = 12.0;
 const COASTS_S: f64 = 0.8;
 const YOUNG_S: f64 = 0.35;
 const YOUNG: usize = 6;
+/// Weight of a frame in how often it is seen lately; a streak with fewer frames than this is a part of another one.
+const LATELY: f64 = 0.04;
+const SAME: usize = 30;
 
 /// One of them: a place along the lane for every frame.
 #[derive(Debug, Clone)]
@@ -68,6 +71,8 @@ struct Running {
     first: usize,
     filtered: Vec<(f64, Motion)>,
     hits: usize,
+    /// Share of the frames in which it was seen lately.
+    seen: f64,
     last_s: f64,
     last_frame: usize,
 }
@@ -104,11 +109,10 @@ pub fn streaks(lane: &Lane, instants: &[Instant]) -> Vec<Streak> {
                 k += 1;
                 continue;
             }
-            // what waits there has left unseen; of two that are seen the one that was seen less belongs to the other
-            let stale = |r: &Running| instant.time_s - r.last_s > YOUNG_S;
-            let fewer = if stale(a) != stale(b) { stale(b) } else { b.hits < a.hits };
+            // what waits there has left unseen, or was seen less since it is of the other
+            let fewer = b.seen < a.seen;
             let mut out = running.remove(if fewer { k } else { k - 1 });
-            if stale(&out) {
+            if out.filtered.len() > SAME {
                 done.extend(out.streak());
             } else {
                 running[k - 1].members.append(&mut out.members);
@@ -168,6 +172,7 @@ impl Running {
     }
 
     fn take(&mut self, frame: usize, now_s: f64, own: &[usize], seen: &[Seen]) {
+        self.seen += LATELY * (f64::from(u8::from(!own.is_empty())) - self.seen);
         if own.is_empty() {
             if self.motion.state[2].abs() < STANDS_BELOW_MPS {
                 self.motion.update([0.0, 0.0, 1.0, 0.0], 0.0, 0.05);
@@ -220,6 +225,7 @@ fn births(frame: usize, now_s: f64, free: &[usize], seen: &[Seen]) -> Vec<Runnin
             first: frame,
             filtered: vec![(now_s, motion)],
             hits: 1,
+            seen: LATELY,
             last_s: now_s,
             last_frame: frame,
         });

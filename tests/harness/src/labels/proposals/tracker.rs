@@ -164,7 +164,7 @@ impl Running {
             return;
         }
         let all: Vec<Reflection> = own.iter().map(|i| reflections[*i]).collect();
-        measure(&mut self.motion, &all, sign, self.heading, self.reach[1] - self.reach[0]);
+        measure(&mut self.motion, &all, sign, self.heading, Some(self.reach[1] - self.reach[0]));
         let in_lane = self.lane.and_then(|k| lanes.get(k)?.beside(self.motion.place()));
         if let Some(b) = &in_lane {
             keep_to(&mut self.motion, b);
@@ -195,8 +195,14 @@ impl Running {
     }
 }
 
-/// Measures place and Doppler of one frame's reflections.
-pub fn measure(motion: &mut Motion, all: &[Reflection], sign: f64, heading: Option<[f64; 2]>, length_m: f64) {
+/// Measures place and Doppler of one frame's reflections, of a vehicle of this length or whose middle they tell.
+pub fn measure(
+    motion: &mut Motion,
+    all: &[Reflection],
+    sign: f64,
+    heading: Option<[f64; 2]>,
+    length_m: Option<f64>,
+) {
     let n = all.len().max(1) as f64;
     let mean = |f: &dyn Fn(&Reflection) -> f64| all.iter().map(f).sum::<f64>() / n;
     let [x, y] = [mean(&|r| r.place[0]), mean(&|r| r.place[1])];
@@ -205,7 +211,7 @@ pub fn measure(motion: &mut Motion, all: &[Reflection], sign: f64, heading: Opti
     let [c, s] = [ux / ground, uy / ground];
     let distance_m = mean(&|r| r.distance_m);
     // reflections come from anywhere on the vehicle
-    let anywhere = (length_m / 3.0).clamp(0.5, 4.0);
+    let anywhere = length_m.map_or(0.0, |m| (m / 3.0).clamp(0.5, 4.0));
     let aspect = heading.map_or([0.7, 0.7], |[a, b]| [(a * c + b * s).abs(), (b * c - a * s).abs()]);
     let radial = 0.5_f64.hypot(anywhere * aspect[0]);
     let across = across_m(distance_m).hypot(anywhere * aspect[1]);
