@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use super::Site;
-use super::near_face::{self, BoxStep, boxes, headings};
+use super::near_face::{self, BoxStep, HEADING_BASE_M, boxes, headings};
 use super::tracks::{LabelPoint, LabelTrack, check_all};
 use crate::recording::beside;
 use crate::recording::labels::{LabelRow, at_line, label, read_rows};
@@ -146,7 +146,7 @@ fn track(path: &Path, rows: &[&(u64, LabelRow)], site: &Site) -> Result<LabelTra
 /// Boxes of rows; a heading nobody gave is that of the path.
 fn steps(rows: &[&(u64, LabelRow)]) -> Vec<BoxStep> {
     let path: Vec<[f64; 2]> = rows.iter().map(|(_, row)| [row.x_m, row.y_m]).collect();
-    let all = rows.iter().zip(headings(&path));
+    let all = rows.iter().zip(headings(&path, HEADING_BASE_M));
     all.map(|((_, row), heading)| BoxStep {
         time_s: row.time_s,
         center: [row.x_m, row.y_m],

@@ -25,8 +25,10 @@ use super::tracks::{LabelPoint, LabelTrack};
 
 /// Time between two boxes of a track, seconds.
 pub const STEP_S: f64 = 0.1;
-/// The heading is taken between the places this far behind and ahead, metres.
-const HEADING_BASE_M: f64 = 4.0;
+/// The heading is taken between the places this far behind and ahead, metres, of a long vehicle this share of its length:
+/// its centre turns about the near face with its heading, and over a shorter way that would turn it more and more.
+pub const HEADING_BASE_M: f64 = 4.0;
+const HEADING_LENGTHS: f64 = 0.8;
 /// How often the near face is computed anew, and how often halved: to a tenth of a millimetre.
 const ROUNDS: usize = 40;
 const HALVINGS: usize = 20;
@@ -120,13 +122,14 @@ pub fn boxes(track: &LabelTrack, sensor: [f64; 2]) -> Vec<BoxStep> {
     let nears: Vec<[f64; 2]> = track.points.iter().map(|p| [p.x_m, p.y_m]).collect();
     let size = track.size();
     let mut centers = between(&nears, &times, &at);
-    let mut headings = headings(&centers);
+    let base_m = HEADING_BASE_M.max(HEADING_LENGTHS * size[0]);
+    let mut headings = headings(&centers, base_m);
     // the heading is that of the centres, which depend on it
     for _ in 0..4 {
         let own: Vec<[f64; 2]> =
             nears.iter().zip(&at).map(|(near, k)| center(*near, headings[*k], size, sensor)).collect();
         centers = between(&own, &times, &at);
-        headings = self::headings(&centers);
+        headings = self::headings(&centers, base_m);
     }
     let all = times.into_iter().zip(centers).zip(headings);
     all.map(|((time_s, center), heading_rad)| BoxStep { time_s, center, heading_rad }).collect()
@@ -187,7 +190,7 @@ fn times(points: &[LabelPoint]) -> (Vec<f64>, Vec<usize>) {
 
 /// Heading at each place of a path: from the place behind to the place ahead, each the nearest in time that is far
 /// enough away. So standing changes nothing.
-pub fn headings(path: &[[f64; 2]]) -> Vec<f64> {
+pub fn headings(path: &[[f64; 2]], base_m: f64) -> Vec<f64> {
     let distance = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]).hypot(b[1] - a[1]);
     let moves = path.first().is_some_and(|first| path.iter().any(|p| distance(*first, *p) >= STANDS_M));
     if !moves {
@@ -196,8 +199,8 @@ pub fn headings(path: &[[f64; 2]]) -> Vec<f64> {
     // both pointers only go forward; where nothing is far enough, the end of the path is taken
     let mut all = Vec::with_capacity(path.len());
     for (k, here) in path.iter().enumerate() {
-        let behind = path[..k].iter().rev().find(|p| distance(**p, *here) >= HEADING_BASE_M).or(path.first());
-        let ahead = path[k..].iter().find(|p| distance(**p, *here) >= HEADING_BASE_M).or(path.last());
+        let behind = path[..k].iter().rev().find(|p| distance(**p, *here) >= base_m).or(path.first());
+        let ahead = path[k..].iter().find(|p| distance(**p, *here) >= base_m).or(path.last());
         let (Some(a), Some(b)) = (behind, ahead) else { continue };
         let heading = (b[1] - a[1]).atan2(b[0] - a[0]);
         let clear = distance(*a, *b) >= STANDS_M;

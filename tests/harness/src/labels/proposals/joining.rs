@@ -121,7 +121,8 @@ fn joined(paths: Vec<Path>, mut pairs: Vec<(f64, usize, usize)>, instants: &[Ins
         if let (Some(first), Some(second)) = (all[a].take(), all[b].take()) {
             let lane = common(&first, &second);
             let members = [first.members, second.members].concat();
-            all.push(Path::new(members, lane, instants));
+            let queued = [first.queued, second.queued].concat();
+            all.push(Path::in_queues(members, lane, queued, instants));
         }
     }
     all.into_iter().flatten().collect()
@@ -263,7 +264,7 @@ mod tests {
         };
         let motions: Vec<(f64, Motion)> = (first..first + frames).map(motion).collect();
         let headings_rad = vec![0.0; frames];
-        Path { members: vec![(first, 0)], first, motions, headings_rad, reach: [-2.0, 2.0], top_m: 1.5, lane: None }
+        Path { members: vec![(first, 0)], first, motions, headings_rad, reach: [-2.0, 2.0], top_m: 1.5, lane: None, queued: Vec::new() }
     }
 
     #[test]

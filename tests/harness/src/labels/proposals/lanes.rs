@@ -325,7 +325,7 @@ mod tests {
             motions.push((time_s, Motion::new(place, [15.0, 0.0], 0.1, [1.0, 0.0], [0.1, 0.1])));
         }
         let headings_rad = vec![0.0; motions.len()];
-        Path { members, first: 0, motions, headings_rad, reach: [0.0; 2], top_m: 1.5, lane: None }
+        Path { members, first: 0, motions, headings_rad, reach: [0.0; 2], top_m: 1.5, lane: None, queued: Vec::new() }
     }
 
     #[test]

@@ -84,7 +84,7 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     progress(0.9);
     let mut scored: Vec<(f64, &Path)> = paths
         .iter()
-        .filter(|p| p.members.len() >= FEWEST && p.travel_m() >= if p.lane.is_some() { IN_LANE_M } else { TRAVEL_M })
+        .filter(|p| p.members.len() >= FEWEST && p.travel_m() >= if p.lane.is_some() || !p.queued.is_empty() { IN_LANE_M } else { TRAVEL_M })
         .map(|p| (score(p, &instants), p))
         .filter(|(score, _)| *score >= LEAST)
         .collect();
@@ -116,6 +116,16 @@ fn paths(
     tracklets.into_par_iter().filter_map(path).collect()
 }
 
+/// The way that makes a path worth a look.
+fn way_m(path: &Path) -> f64 {
+    match () {
+        // its reflections moved as one
+        () if !path.queued.is_empty() => 1.0,
+        () if path.lane.is_some() => 2.5,
+        () => 15.0,
+    }
+}
+
 /// Many reflections, a long way and a Doppler that fits speak for a path.
 fn score(path: &Path, instants: &[reflections::Instant]) -> f64 {
     let wrong: Vec<f64> = path
@@ -127,6 +137,6 @@ fn score(path: &Path, instants: &[reflections::Instant]) -> f64 {
         .collect();
     let wrong = wrong.iter().sum::<f64>() / wrong.len().max(1) as f64;
     let many = 1.0 - (-(path.members.len() as f64) / 40.0).exp();
-    let far = 1.0 - (-path.travel_m() / if path.lane.is_some() { 2.5 } else { 15.0 }).exp();
+    let far = 1.0 - (-path.travel_m() / way_m(path)).exp();
     many * far * (-(wrong / 0.8).powi(2)).exp()
 }

@@ -1,12 +1,13 @@
 //! The path of a road user through all its reflections, both directions of time used.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::lane::Lane;
 use super::motion::{Motion, smooth};
 use super::reflections::{Instant, Reflection};
 use super::tracker::{across_m, keep_to, measure};
-use crate::labels::near_face::headings;
+use crate::labels::near_face::{HEADING_BASE_M, headings};
 
 /// A gap in which it moved less than this although it lasted longer than that: it stood.
 const STOOD_M: f64 = 4.0;
@@ -34,16 +35,35 @@ pub struct Path {
     pub top_m: f64,
     /// The lane it keeps to.
     pub lane: Option<Arc<Lane>>,
+    /// Where it was in a queue: frames and lane.
+    pub queued: Vec<Queued>,
+}
+
+/// Frames in which a path is in a queue, and the lane of that.
+#[derive(Debug, Clone)]
+pub struct Queued {
+    pub frames: RangeInclusive<usize>,
+    pub lane: Arc<Lane>,
 }
 
 impl Path {
     /// `None` without members.
-    pub fn new(mut members: Vec<(usize, usize)>, lane: Option<Arc<Lane>>, instants: &[Instant]) -> Option<Self> {
+    pub fn new(members: Vec<(usize, usize)>, lane: Option<Arc<Lane>>, instants: &[Instant]) -> Option<Self> {
+        Self::in_queues(members, lane, Vec::new(), instants)
+    }
+
+    /// One that was in queues. `None` without members.
+    pub fn in_queues(
+        mut members: Vec<(usize, usize)>,
+        lane: Option<Arc<Lane>>,
+        queued: Vec<Queued>,
+        instants: &[Instant],
+    ) -> Option<Self> {
         members.sort_unstable();
         members.dedup();
         let (first, last) = (members.first()?.0, members.last()?.0);
-        let mut path =
-            Self { members, first, motions: Vec::new(), headings_rad: Vec::new(), reach: [0.0; 2], top_m: 0.0, lane };
+        let (motions, headings_rad) = (Vec::new(), Vec::new());
+        let mut path = Self { members, first, motions, headings_rad, reach: [0.0; 2], top_m: 0.0, lane, queued };
         // how long it is tells how much a place can be trusted, and the other way round
         for _ in 0..2 {
             path.motions = smooth(&path.filtered(last, instants)?);
@@ -64,6 +84,11 @@ impl Path {
 
     pub fn heading_at(&self, frame: usize) -> Option<f64> {
         self.headings_rad.get(frame.checked_sub(self.first)?).copied()
+    }
+
+    /// The lane it keeps to then.
+    fn lane_at(&self, frame: usize) -> Option<&Arc<Lane>> {
+        self.queued.iter().find(|q| q.frames.contains(&frame)).map(|q| &q.lane).or(self.lane.as_ref())
     }
 
     /// How far it gets from its start, metres.
@@ -119,7 +144,7 @@ impl Path {
                 now.update([0.0, 0.0, 1.0, 0.0], 0.0, 0.3);
                 now.update([0.0, 0.0, 0.0, 1.0], 0.0, 0.3);
             }
-            if let Some(b) = self.lane.as_ref().and_then(|lane| lane.beside(now.place())) {
+            if let Some(b) = self.lane_at(frame).and_then(|lane| lane.beside(now.place())) {
                 keep_to(&mut now, &b);
             }
             motion = Some(now);
@@ -140,9 +165,9 @@ impl Path {
 
     fn headings(&self) -> Vec<f64> {
         let places: Vec<[f64; 2]> = self.motions.iter().map(|(_, m)| m.place()).collect();
-        let by_place = headings(&places);
-        let all = self.motions.iter().zip(by_place).map(|((_, m), by_place)| {
-            if let Some(b) = self.lane.as_ref().and_then(|lane| lane.beside(m.place())) {
+        let by_place = headings(&places, HEADING_BASE_M);
+        let all = (self.first..).zip(self.motions.iter().zip(by_place)).map(|(frame, ((_, m), by_place))| {
+            if let Some(b) = self.lane_at(frame).and_then(|lane| lane.beside(m.place())) {
                 return b.heading[1].atan2(b.heading[0]);
             }
             let [vx, vy] = m.velocity();

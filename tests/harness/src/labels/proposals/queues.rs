@@ -12,7 +12,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::lane::Lane;
-use super::path::Path;
+use super::path::{Path, Queued};
 use super::reflections::Instant;
 use super::streaks::{STANDS_BELOW_MPS, Streak, streaks};
 
@@ -100,7 +100,11 @@ pub fn queued(paths: Vec<Path>, lanes: &[Arc<Lane>], instants: &mut [Instant]) -
             result.extend(Path::new(left, path.lane.clone(), instants));
         }
     }
-    let made = all.into_par_iter().zip(&kept).filter_map(|(m, v)| Path::new(m, lanes.get(v.lane).cloned(), instants));
+    let made = all.into_par_iter().zip(&kept).filter_map(|(members, v)| {
+        let lane = lanes.get(v.lane)?;
+        let queued = vec![Queued { frames: v.first..=v.last, lane: lane.clone() }];
+        Path::in_queues(members, Some(lane.clone()), queued, instants)
+    });
     result.extend(made.collect::<Vec<Path>>());
     result
 }
@@ -156,7 +160,9 @@ fn joined(mut all: Vec<Streak>, instants: &[Instant]) -> Vec<Streak> {
                 let stand = u.abs().max(v.abs()) < 1.5 * STANDS_BELOW_MPS;
                 let off = if stand { y - x } else { y - x - 0.5 * (u + v) * gap_s };
                 let within = if stand { AWAY_M } else { AWAY_M + 0.5 * gap_s };
-                let goes_on = if stand { gap_s < STANDS_S } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
+                // what is seen shortly is no beginning or end of a long stop
+                let lasts_s = (before.along.len().min(after.along.len())) as f64 * 0.067;
+                let goes_on = if stand { gap_s < STANDS_S.min(lasts_s) } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
                 if goes_on && off.abs() < within {
                     pairs.push((off.abs() / within + gap_s / 10.0, a, b));
                 }

@@ -52,7 +52,7 @@ pub fn stood(mut paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
         }
         taken.extend(&more);
         let members = [&path.members[..], &more[..]].concat();
-        Path::new(members, path.lane.clone(), instants).unwrap_or(path)
+        Path::in_queues(members, path.lane.clone(), path.queued.clone(), instants).unwrap_or(path)
     });
     longer.collect()
 }

@@ -29,7 +29,7 @@ const ALIKE_MPS: f64 = 1.5;
 /// Speed below which one stands, m/s.
 pub const STANDS_BELOW_MPS: f64 = 0.4;
 /// How long one is waited for: when it stands, when it moves, when it is young, seconds; and how long it is young, frames.
-const WAITS_S: f64 = 12.0;
+const WAITS_S: f64 = 2.0;
 const COASTS_S: f64 = 0.8;
 const YOUNG_S: f64 = 0.35;
 const YOUNG: usize = 6;
