@@ -18,6 +18,8 @@ const LANE_M: f64 = 4.2;
 /// Share of the shorter path's time in which both may be seen, and how far apart they are then, metres.
 const OVER_SHARE: f64 = 0.35;
 const OVER_M: f64 = 1.5;
+/// Frames of an overlap that is no more than a gap is.
+const SHORT: usize = 8;
 /// Longest gap in a turn, seconds, and speed at most, m/s.
 const TURN_GAP_S: f64 = 5.0;
 const TURN_MPS: f64 = 10.0;
@@ -176,7 +178,10 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
     }
     let fast = before.motions.last()?.1.speed().max(after.motions.first()?.1.speed()) > TURN_MPS;
     if after.first <= before.last() && !fast {
-        return overlaps(before, after);
+        let over = overlaps(before, after);
+        if over.is_some() || after.first + SHORT < before.last() {
+            return over;
+        }
     }
     let (from_s, from) = before.motions.last()?;
     let (to_s, to) = after.motions.first()?;
@@ -213,12 +218,12 @@ fn follows(before: &Path, after: &Path) -> Option<f64> {
 fn turns(way: [f64; 2], u: [f64; 2], v: [f64; 2], gap_s: f64) -> Option<f64> {
     let [before, after] = [u, v].map(|v| v[0].hypot(v[1]));
     let turned = u[0] * v[0] + u[1] * v[1] > -0.3 * before * after;
-    if !(0.0..=TURN_GAP_S).contains(&gap_s) || before.max(after) > TURN_MPS || !turned {
+    if !(-0.5..=TURN_GAP_S).contains(&gap_s) || before.max(after) > TURN_MPS || !turned {
         return None;
     }
     let rest = [0, 1].map(|k| way[k] - 0.5 * (u[k] + v[k]) * gap_s);
-    let wrong = rest[0].hypot(rest[1]) / (2.0 + 1.0 * gap_s);
-    (wrong < 1.0).then_some(1.0 + wrong + gap_s / 5.0)
+    let wrong = rest[0].hypot(rest[1]) / (2.0 + gap_s.abs());
+    (wrong < 1.0).then_some(1.0 + wrong + gap_s.abs() / 5.0)
 }
 
 /// How far two paths are apart while one goes over into the other; `None` where they are not one.

@@ -88,7 +88,9 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         .map(|p| (score(p, &instants), p))
         .filter(|(score, _)| *score >= LEAST)
         .collect();
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // of two in one place the one that stood in a queue has more to show for it
+    let queued = |p: &Path| if p.queued.is_empty() { 0 } else { p.members.len() };
+    scored.sort_by(|a, b| queued(b.1).cmp(&queued(a.1)).then(b.0.total_cmp(&a.0)));
     let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {
         track: shape::track(path, &instants, recording, format!("p{}", k + 1)),
         score,

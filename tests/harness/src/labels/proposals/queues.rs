@@ -22,7 +22,9 @@ const SHORT_M: f64 = 6.6;
 /// Longest part of a long vehicle that does not reflect, metres.
 const VOID_M: f64 = 4.5;
 /// How much the distance of two streaks of one vehicle changes while they move (root mean square), metres.
-const STEADY_M: f64 = 0.45;
+const STEADY_M: f64 = 0.4;
+/// How much the distance of two streaks of one vehicle seems to change, metres.
+const ALIKE_M: f64 = 0.2;
 /// Farthest two streaks of one vehicle are apart on average when it is not sure that they move as one, metres.
 const INSIDE_M: f64 = 0.5;
 /// Fewest frames in which two streaks have to move together, and how far, metres.
@@ -186,6 +188,7 @@ fn joined(mut all: Vec<Streak>, instants: &[Instant]) -> Vec<Streak> {
                 }
                 one.along.extend(&other.along);
                 one.members.extend(&other.members);
+                one.beside = [0, 1].map(|k| one.beside[k] + other.beside[k]);
                 parts.push(Some(one));
             }
         }
@@ -249,19 +252,47 @@ fn vehicles(lane: usize, mut all: Vec<Streak>) -> Vec<Vehicle> {
             continue;
         }
         let shift = at_a + known[&(a, b)].ahead_m - at_b;
-        let fits = groups[one].iter().all(|i| {
-            groups[other].iter().all(|j| {
-                known.get(&(*i.min(j), *i.max(j))).is_none_or(|t| t.changes_m.is_none_or(|c| c < 1.5 * STEADY_M))
-            })
-        });
-        let mut places: Vec<f64> = groups[one].iter().map(|i| of[*i].1).collect();
-        places.extend(groups[other].iter().map(|j| of[*j].1 + shift));
-        if fits && possible(places) {
+        let changes: Vec<f64> = groups[one]
+            .iter()
+            .flat_map(|i| groups[other].iter().map(move |j| (*i.min(j), *i.max(j))))
+            .filter_map(|pair| known.get(&pair)?.changes_m)
+            .collect();
+        let fits = changes.iter().sum::<f64>() < STEADY_M * changes.len() as f64;
+        if fits {
             for j in std::mem::take(&mut groups[other]) {
                 of[j] = (one, of[j].1 + shift);
                 groups[one].push(j);
             }
         }
+    }
+    // where traffic flows evenly all distances stay
+    let near: Vec<f64> = known.values().filter(|t| t.ahead_m.abs() < 12.0).filter_map(|t| t.changes_m).collect();
+    let uneven = (near.iter().filter(|c| **c > STEADY_M).count() as f64 / near.len().max(1) as f64 / 0.4).min(1.0);
+    // what moves as one may be several that creep alike
+    let mut single = Vec::new();
+    for g in groups.iter_mut().filter(|g| !g.is_empty()) {
+        g.sort_by(|i, j| of[*i].1.total_cmp(&of[*j].1));
+        let places: Vec<f64> = g.iter().map(|k| of[*k].1).collect();
+        let apart: Vec<f64> = (1..g.len())
+            .map(|k| {
+                let pairs = g[k.saturating_sub(3)..k].iter().flat_map(|i| g[k..(k + 3).min(g.len())].iter().map(move |j| (*i.min(j), *i.max(j))));
+                let (sum, weight) = pairs.filter_map(|p| { let t = known.get(&p)?; Some((t.changes_m?, t.moved_m)) }).fold((0.0, 0.0), |(s, w), (c, m)| (s + c * m, w + m));
+                let rigid = if weight > 0.0 {
+                    let c = sum / weight;
+                    if c > ALIKE_M { ((c - ALIKE_M) / 0.1).min(3.0) } else { (c - ALIKE_M) / 0.1 * 1.5 * uneven }
+                } else { 0.0 };
+                inwards(&all[g[k]]) - inwards(&all[g[k - 1]]) + rigid
+            })
+            .collect();
+        for (from, to) in cut(&places, &apart) {
+            single.push(g[from..to].to_vec());
+        }
+    }
+    let mut groups: Vec<Vec<usize>> = vec![Vec::new(); n];
+    for g in single {
+        let first = g[0];
+        g.iter().for_each(|k| of[*k].0 = first);
+        groups[first] = g;
     }
     // what stands all the time is of the vehicle that stands there
     for k in 0..n {
@@ -291,12 +322,59 @@ fn vehicles(lane: usize, mut all: Vec<Streak>) -> Vec<Vehicle> {
     groups.filter_map(|g| vehicle(lane, &g, &all, &of)).collect()
 }
 
-/// Whether a vehicle may reflect in these places along it.
-fn possible(mut places: Vec<f64>) -> bool {
-    places.sort_by(f64::total_cmp);
-    let (Some(first), Some(last)) = (places.first(), places.last()) else { return false };
-    let widest = places.windows(2).map(|p| p[1] - p[0]).fold(0.0, f64::max);
-    last - first <= SHORT_M || (last - first <= LONG_M && widest <= VOID_M)
+/// How much a streak looks like a rear, 1, or a front, -1: nothing reflects beyond the ends of a vehicle.
+fn inwards(streak: &Streak) -> f64 {
+    let [behind, ahead] = streak.beside.map(|n| n as f64);
+    (ahead - behind) / (ahead + behind + 5.0 + 0.05 * streak.along.len() as f64)
+}
+
+/// How unlikely it is that what reflects of a vehicle is so long, with such a void in it; infinite where it cannot be.
+fn unlikely(length_m: f64, void_m: f64) -> f64 {
+    match length_m {
+        m if m < 1.2 => 0.6,
+        m if m < 3.3 => 0.5,
+        m if m < 5.4 => 0.0,
+        m if m <= SHORT_M => 0.2,
+        m if m > LONG_M || void_m > VOID_M => f64::INFINITY,
+        m => f64::from(u8::from(m < 9.5)) * 0.7 + f64::from(u8::from(void_m > 3.8)) * 0.5,
+    }
+}
+
+/// Vehicles in a row of streaks that move as one, from where to where.
+fn cut(places: &[f64], apart: &[f64]) -> Vec<(usize, usize)> {
+    // best up to each streak: how good, and where its last vehicle begins
+    let mut best: Vec<(f64, usize)> = vec![(0.0, 0)];
+    for end in 0..places.len() {
+        let mut most = (f64::NEG_INFINITY, end);
+        let (mut inside, mut void_m) = (0.0, 0.0_f64);
+        for begin in (0..=end).rev() {
+            if begin < end {
+                inside -= apart[begin];
+                void_m = void_m.max(places[begin + 1] - places[begin]);
+            }
+            let length_m = places[end] - places[begin];
+            if length_m > LONG_M {
+                break;
+            }
+            let between = begin.checked_sub(1).map_or(0.0, |before| {
+                let near = if places[begin] - places[before] < 0.8 { 1.5 } else { 0.0 };
+                apart[before] - near
+            });
+            let good = best[begin].0 + inside + between - unlikely(length_m, void_m) - 0.2;
+            if good > most.0 {
+                most = (good, begin);
+            }
+        }
+        best.push(most);
+    }
+    let mut all = Vec::new();
+    let mut end = places.len();
+    while end > 0 {
+        let begin = best[end].1;
+        all.push((begin, end));
+        end = begin;
+    }
+    all
 }
 
 fn vehicle(lane: usize, group: &[usize], all: &[Streak], of: &[(usize, f64)]) -> Option<Vehicle> {

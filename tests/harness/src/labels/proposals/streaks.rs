@@ -26,6 +26,8 @@ const GATE_M: f64 = 1.0;
 /// Two streaks as close as this, metres, and as fast, m/s, are one.
 const ONE_M: f64 = 0.35;
 const ALIKE_MPS: f64 = 1.5;
+/// Reflections that far from one are beside it, metres.
+const BESIDE_M: std::ops::Range<f64> = 0.4..1.3;
 /// Speed below which one stands, m/s.
 pub const STANDS_BELOW_MPS: f64 = 0.4;
 /// How long one is waited for: when it stands, when it moves, when it is young, seconds; and how long it is young, frames.
@@ -44,6 +46,8 @@ pub struct Streak {
     pub first: usize,
     /// Place along the lane, metres, and speed, m/s.
     pub along: Vec<[f64; 2]>,
+    /// Reflections shortly behind and ahead of it.
+    pub beside: [usize; 2],
 }
 
 impl Streak {
@@ -75,6 +79,7 @@ struct Running {
     seen: f64,
     last_s: f64,
     last_frame: usize,
+    beside: [usize; 2],
 }
 
 /// The streaks of a lane.
@@ -187,6 +192,12 @@ impl Running {
             self.members.extend(own.iter().map(|i| (frame, seen[*i].index)));
             (self.hits, self.last_s, self.last_frame) = (self.hits + 1, now_s, frame);
         }
+        for s in seen {
+            let ahead_m = s.along_m - self.motion.state[0];
+            if BESIDE_M.contains(&ahead_m.abs()) {
+                self.beside[usize::from(ahead_m > 0.0)] += 1;
+            }
+        }
         self.filtered.push((now_s, self.motion));
     }
 
@@ -196,7 +207,8 @@ impl Running {
         }
         self.filtered.truncate(self.last_frame + 1 - self.first);
         let along = smooth(&self.filtered).into_iter().map(|(_, m)| [m.state[0], m.state[2]]).collect();
-        Some(Streak { members: std::mem::take(&mut self.members), first: self.first, along })
+        let members = std::mem::take(&mut self.members);
+        Some(Streak { members, first: self.first, along, beside: self.beside })
     }
 }
 
@@ -228,6 +240,7 @@ fn births(frame: usize, now_s: f64, free: &[usize], seen: &[Seen]) -> Vec<Runnin
             seen: LATELY,
             last_s: now_s,
             last_frame: frame,
+            beside: [0; 2],
         });
     }
     all
