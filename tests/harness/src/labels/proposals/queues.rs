@@ -331,8 +331,8 @@ fn inwards(streak: &Streak) -> f64 {
 /// How unlikely it is that what reflects of a vehicle is so long, with such a void in it; infinite where it cannot be.
 fn unlikely(length_m: f64, void_m: f64) -> f64 {
     match length_m {
-        m if m < 1.2 => 0.6,
-        m if m < 3.3 => 0.5,
+        m if m < 1.2 => 2.5,
+        m if m < 3.3 => 2.0,
         m if m < 5.4 => 0.0,
         m if m <= SHORT_M => 0.2,
         m if m > LONG_M || void_m > VOID_M => f64::INFINITY,
@@ -357,7 +357,7 @@ fn cut(places: &[f64], apart: &[f64]) -> Vec<(usize, usize)> {
                 break;
             }
             let between = begin.checked_sub(1).map_or(0.0, |before| {
-                let near = if places[begin] - places[before] < 0.8 { 1.5 } else { 0.0 };
+                let near = if places[begin] - places[before] < 1.5 { 3.0 } else { 0.0 };
                 apart[before] - near
             });
             let good = best[begin].0 + inside + between - unlikely(length_m, void_m) - 0.2;
