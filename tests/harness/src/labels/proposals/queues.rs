@@ -20,7 +20,7 @@ use super::streaks::{STANDS_BELOW_MPS, Streak, streaks};
 const LONG_M: f64 = 19.0;
 const SHORT_M: f64 = 6.6;
 /// Longest part of a long vehicle that does not reflect, metres.
-const VOID_M: f64 = 4.5;
+const VOID_M: f64 = 4.0;
 /// How much the distance of two streaks of one vehicle changes while they move (root mean square), metres.
 const STEADY_M: f64 = 0.4;
 /// How much the distance of two streaks of one vehicle seems to change, metres.
