@@ -25,10 +25,10 @@ use super::tracks::{LabelPoint, LabelTrack};
 
 /// Time between two boxes of a track, seconds.
 pub const STEP_S: f64 = 0.1;
-/// The heading is taken between the places this far behind and ahead, metres, of a long vehicle this share of its length:
+/// The heading is taken between the places this far behind and ahead, metres, of a long vehicle this share of its length, its ends:
 /// its centre turns about the near face with its heading, and over a shorter way that would turn it more and more.
 pub const HEADING_BASE_M: f64 = 4.0;
-const HEADING_LENGTHS: f64 = 0.8;
+const HEADING_LENGTHS: f64 = 0.5;
 /// How often the near face is computed anew, and how often halved: to a tenth of a millimetre.
 const ROUNDS: usize = 40;
 const HALVINGS: usize = 20;
