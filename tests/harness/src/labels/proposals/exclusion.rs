@@ -124,7 +124,16 @@ mod tests {
         let motion = |frame: usize| Motion::new([2.0 * frame as f64, left_m], [20.0, 0.0], 0.1, [1.0, 0.0], [0.1; 2]);
         let motions: Vec<(f64, Motion)> = (0..60).map(|k| (k as f64 * 0.1, motion(k))).collect();
         let members = (0..60 * reflections).map(|k| (k / reflections, k)).collect();
-        Path { members, first: 0, headings_rad: vec![0.0; 60], motions, reach: [0.0; 2], top_m: 1.5, lane, queued: Vec::new() }
+        Path {
+            members,
+            first: 0,
+            headings_rad: vec![0.0; 60],
+            motions,
+            reach: [0.0; 2],
+            top_m: 1.5,
+            lane,
+            queued: Vec::new(),
+        }
     }
 
     #[test]

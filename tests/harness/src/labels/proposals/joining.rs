@@ -239,7 +239,8 @@ fn overlaps(before: &Path, after: &Path) -> Option<f64> {
     // changing lanes it moved to the side
     let side = if differ(before, after) { LANE_M } else { 0.0 };
     for frame in frames {
-        let ([a, b], [x, y], (s, c)) = (before.at(frame)?.place(), after.at(frame)?.place(), after.heading_at(frame)?.sin_cos());
+        let ([a, b], [x, y], (s, c)) =
+            (before.at(frame)?.place(), after.at(frame)?.place(), after.heading_at(frame)?.sin_cos());
         let (along, left) = ((a - x) * c + (b - y) * s, (b - y) * c - (a - x) * s);
         away_m += along.hypot((left.abs() - side).max(0.0)) / common as f64;
     }
@@ -269,7 +270,16 @@ mod tests {
         };
         let motions: Vec<(f64, Motion)> = (first..first + frames).map(motion).collect();
         let headings_rad = vec![0.0; frames];
-        Path { members: vec![(first, 0)], first, motions, headings_rad, reach: [-2.0, 2.0], top_m: 1.5, lane: None, queued: Vec::new() }
+        Path {
+            members: vec![(first, 0)],
+            first,
+            motions,
+            headings_rad,
+            reach: [-2.0, 2.0],
+            top_m: 1.5,
+            lane: None,
+            queued: Vec::new(),
+        }
     }
 
     #[test]

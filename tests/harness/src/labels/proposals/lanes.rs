@@ -319,7 +319,15 @@ mod tests {
             }
             let distance_m = x.hypot(place[1]);
             let sight = [x / distance_m, place[1] / distance_m];
-            let r = Reflection { place, height_m: 1.0, sight, distance_m, doppler_mps: 15.0, fixture: false, ahead_m: None };
+            let r = Reflection {
+                place,
+                height_m: 1.0,
+                sight,
+                distance_m,
+                doppler_mps: 15.0,
+                fixture: false,
+                ahead_m: None,
+            };
             instants[frame].reflections.push(r);
             members.push((frame, instants[frame].reflections.len() - 1));
             motions.push((time_s, Motion::new(place, [15.0, 0.0], 0.1, [1.0, 0.0], [0.1, 0.1])));

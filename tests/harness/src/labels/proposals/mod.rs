@@ -84,7 +84,10 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     progress(0.9);
     let mut scored: Vec<(f64, &Path)> = paths
         .iter()
-        .filter(|p| p.members.len() >= FEWEST && p.travel_m() >= if p.lane.is_some() || !p.queued.is_empty() { IN_LANE_M } else { TRAVEL_M })
+        .filter(|p| {
+            p.members.len() >= FEWEST
+                && p.travel_m() >= if p.lane.is_some() || !p.queued.is_empty() { IN_LANE_M } else { TRAVEL_M }
+        })
         .map(|p| (score(p, &instants), p))
         .filter(|(score, _)| *score >= LEAST)
         .collect();

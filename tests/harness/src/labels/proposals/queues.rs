@@ -80,8 +80,7 @@ pub fn queued(paths: Vec<Path>, lanes: &[Arc<Lane>], instants: &mut [Instant]) -
     for ((frame, i), ahead_m) in kept.iter().flat_map(|v| &v.members) {
         instants[*frame].reflections[*i].ahead_m = Some(*ahead_m);
     }
-    let mut all: Vec<Vec<(usize, usize)>> =
-        kept.iter().map(|v| v.members.iter().map(|(m, _)| *m).collect()).collect();
+    let mut all: Vec<Vec<(usize, usize)>> = kept.iter().map(|v| v.members.iter().map(|(m, _)| *m).collect()).collect();
     // what the tracker has before and after
     for (k, v) in kept.iter().enumerate() {
         for end in [End::First, End::Last] {
@@ -128,9 +127,11 @@ impl End {
             Self::First => (v.first..=v.first + AGREES).contains(&m.0),
             Self::Last => m.0 <= v.last && m.0 + AGREES >= v.last,
         };
-        let (all, own) = path.members.iter().filter(inside).fold((0, 0), |(all, own), m| {
-            (all + 1, own + usize::from(owner.get(m) == Some(&k)))
-        });
+        let (all, own) = path
+            .members
+            .iter()
+            .filter(inside)
+            .fold((0, 0), |(all, own), m| (all + 1, own + usize::from(owner.get(m) == Some(&k))));
         let next = match self {
             Self::First => self.beyond(path, v).map(|m| v.first - m.0).min()?,
             Self::Last => self.beyond(path, v).map(|m| m.0 - v.last).min()?,
@@ -164,7 +165,8 @@ fn joined(mut all: Vec<Streak>, instants: &[Instant]) -> Vec<Streak> {
                 let within = if stand { AWAY_M } else { AWAY_M + 0.5 * gap_s };
                 // what is seen shortly is no beginning or end of a long stop
                 let lasts_s = (before.along.len().min(after.along.len())) as f64 * 0.067;
-                let goes_on = if stand { gap_s < STANDS_S.min(lasts_s) } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
+                let goes_on =
+                    if stand { gap_s < STANDS_S.min(lasts_s) } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
                 if goes_on && off.abs() < within {
                     pairs.push((off.abs() / within + gap_s / 10.0, a, b));
                 }
@@ -275,12 +277,21 @@ fn vehicles(lane: usize, mut all: Vec<Streak>) -> Vec<Vehicle> {
         let places: Vec<f64> = g.iter().map(|k| of[*k].1).collect();
         let apart: Vec<f64> = (1..g.len())
             .map(|k| {
-                let pairs = g[k.saturating_sub(3)..k].iter().flat_map(|i| g[k..(k + 3).min(g.len())].iter().map(move |j| (*i.min(j), *i.max(j))));
-                let (sum, weight) = pairs.filter_map(|p| { let t = known.get(&p)?; Some((t.changes_m?, t.moved_m)) }).fold((0.0, 0.0), |(s, w), (c, m)| (s + c * m, w + m));
+                let pairs = g[k.saturating_sub(3)..k]
+                    .iter()
+                    .flat_map(|i| g[k..(k + 3).min(g.len())].iter().map(move |j| (*i.min(j), *i.max(j))));
+                let (sum, weight) = pairs
+                    .filter_map(|p| {
+                        let t = known.get(&p)?;
+                        Some((t.changes_m?, t.moved_m))
+                    })
+                    .fold((0.0, 0.0), |(s, w), (c, m)| (s + c * m, w + m));
                 let rigid = if weight > 0.0 {
                     let c = sum / weight;
                     if c > ALIKE_M { ((c - ALIKE_M) / 0.1).min(3.0) } else { (c - ALIKE_M) / 0.1 * 1.5 * uneven }
-                } else { 0.0 };
+                } else {
+                    0.0
+                };
                 inwards(&all[g[k]]) - inwards(&all[g[k - 1]]) + rigid
             })
             .collect();
@@ -307,7 +318,8 @@ fn vehicles(lane: usize, mut all: Vec<Streak>) -> Vec<Vehicle> {
                     Some(if *i < k { -t.ahead_m } else { t.ahead_m })
                 })
                 .collect();
-            let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+            let (low, high) =
+                places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
             places.len() > 1 && low < INSIDE_M && high > -INSIDE_M
         };
         let Some(g) = (0..n).find(|g| groups[*g].len() > 1 && holds(&groups[*g])) else { continue };

@@ -169,7 +169,15 @@ mod tests {
     fn reflection(x: f64, speed: f64) -> Reflection {
         let distance_m = x.hypot(30.0);
         let sight = [x / distance_m, 30.0 / distance_m];
-        Reflection { place: [x, 30.0], height_m: 1.0, sight, distance_m, doppler_mps: speed * sight[0], fixture: false, ahead_m: None }
+        Reflection {
+            place: [x, 30.0],
+            height_m: 1.0,
+            sight,
+            distance_m,
+            doppler_mps: speed * sight[0],
+            fixture: false,
+            ahead_m: None,
+        }
     }
 
     /// A car at x = 40 m pulls away along x at 6 s, seen by a sensor beside it, and reflects from `seen_from_s` on.

@@ -196,13 +196,7 @@ impl Running {
 }
 
 /// Measures place and Doppler of one frame's reflections, of a vehicle of this length or whose middle they tell.
-pub fn measure(
-    motion: &mut Motion,
-    all: &[Reflection],
-    sign: f64,
-    heading: Option<[f64; 2]>,
-    length_m: Option<f64>,
-) {
+pub fn measure(motion: &mut Motion, all: &[Reflection], sign: f64, heading: Option<[f64; 2]>, length_m: Option<f64>) {
     let n = all.len().max(1) as f64;
     let mean = |f: &dyn Fn(&Reflection) -> f64| all.iter().map(f).sum::<f64>() / n;
     let [x, y] = [mean(&|r| r.place[0]), mean(&|r| r.place[1])];
