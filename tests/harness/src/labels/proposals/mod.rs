@@ -29,6 +29,7 @@ mod shape;
 mod standing;
 mod streaks;
 mod tracker;
+mod vehicles;
 
 use std::sync::Arc;
 

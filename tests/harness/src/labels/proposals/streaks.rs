@@ -38,6 +38,10 @@ const YOUNG: usize = 6;
 /// Weight of a frame in how often it is seen lately; a streak with fewer frames than this is a part of another one.
 const LATELY: f64 = 0.04;
 const SAME: usize = 30;
+/// A streak that ended is gone on with: standing after so long, moving after so long, seconds, so far away, metres.
+const STANDS_S: f64 = 25.0;
+const MOVES_S: f64 = 2.0;
+const AWAY_M: f64 = 0.7;
 
 /// One of them: a place along the lane for every frame.
 #[derive(Debug, Clone)]
@@ -138,7 +142,58 @@ pub fn streaks(lane: &Lane, instants: &[Instant]) -> Vec<Streak> {
         running.extend(births(frame, instant.time_s, &free, &seen));
     }
     done.extend(running.iter_mut().filter_map(Running::streak));
-    done
+    joined(done, instants)
+}
+
+/// Streaks with those that go on after a gap.
+fn joined(mut all: Vec<Streak>, instants: &[Instant]) -> Vec<Streak> {
+    let time = |frame: usize| instants.get(frame).map_or(0.0, |i| i.time_s);
+    loop {
+        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+        for (a, before) in all.iter().enumerate() {
+            for (b, after) in all.iter().enumerate() {
+                if after.first <= before.last() {
+                    continue;
+                }
+                let gap_s = time(after.first) - time(before.last());
+                let (Some([x, u]), Some([y, v])) = (before.along.last(), after.along.first()) else { continue };
+                let stand = u.abs().max(v.abs()) < 1.5 * STANDS_BELOW_MPS;
+                let off = if stand { y - x } else { y - x - 0.5 * (u + v) * gap_s };
+                let within = if stand { AWAY_M } else { AWAY_M + 0.5 * gap_s };
+                // what is seen shortly is no beginning or end of a long stop
+                let lasts_s =
+                    [before, after].map(|s| time(s.last()) - time(s.first)).into_iter().fold(f64::INFINITY, f64::min);
+                let goes_on =
+                    if stand { gap_s < STANDS_S.min(lasts_s) } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
+                if goes_on && off.abs() < within {
+                    pairs.push((off.abs() / within + gap_s / 10.0, a, b));
+                }
+            }
+        }
+        if pairs.is_empty() {
+            return all;
+        }
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut parts: Vec<Option<Streak>> = all.into_iter().map(Some).collect();
+        for (_, a, b) in pairs {
+            if parts[a].is_none() || parts[b].is_none() {
+                continue;
+            }
+            if let (Some(mut one), Some(other)) = (parts[a].take(), parts[b].take()) {
+                let (Some([x, _]), Some([y, _])) = (one.along.last().copied(), other.along.first()) else { continue };
+                let gap = other.first - one.last();
+                for k in 1..gap {
+                    let f = k as f64 / gap as f64;
+                    one.along.push([x + f * (y - x), 0.0]);
+                }
+                one.along.extend(&other.along);
+                one.members.extend(&other.members);
+                one.beside = [0, 1].map(|k| one.beside[k] + other.beside[k]);
+                parts.push(Some(one));
+            }
+        }
+        all = parts.into_iter().flatten().collect();
+    }
 }
 
 /// What lies in the lane and may be of a vehicle that keeps to it, along it.
@@ -244,4 +299,97 @@ fn births(frame: usize, now_s: f64, free: &[usize], seen: &[Seen]) -> Vec<Runnin
         });
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::reflections::Reflection;
+    use super::*;
+
+    const FRAMES: usize = 200;
+
+    fn lane() -> Lane {
+        Lane { points: vec![[0.0, 3.0], [150.0, 3.0]], straight: None }
+    }
+
+    /// A reflection at x metres along the lane of what drives that fast, seen from the lane's beginning.
+    fn reflection(x: f64, speed: f64) -> Reflection {
+        let distance_m = x.hypot(3.0);
+        let sight = [x / distance_m, 3.0 / distance_m];
+        Reflection {
+            place: [x, 3.0],
+            height_m: 1.0,
+            sight,
+            distance_m,
+            doppler_mps: speed * sight[0],
+            fixture: false,
+            ahead_m: None,
+        }
+    }
+
+    /// Frames 0.1 s apart with one at 60 m that stands, brakes before it or drives off at 10 s, as `moves` says by the
+    /// second: place, speed and whether it is seen.
+    fn seen(moves: impl Fn(f64) -> (f64, f64, bool)) -> Vec<Instant> {
+        let instant = |k: usize| {
+            let time_s = k as f64 * 0.1;
+            let (x, speed, there) = moves(time_s);
+            Instant { time_s, reflections: there.then(|| reflection(x, speed)).into_iter().collect() }
+        };
+        (0..FRAMES).map(instant).collect()
+    }
+
+    /// Stands at 60 m until 10 s, then gains 1 m/s every second.
+    fn drives_off(s: f64) -> (f64, f64) {
+        let since = (s - 10.0).max(0.0);
+        (60.0 + 0.5 * since * since, since)
+    }
+
+    #[test]
+    fn one_that_stands_and_then_drives_is_one_streak_from_the_beginning() {
+        let all = streaks(&lane(), &seen(|s| (drives_off(s).0, drives_off(s).1, true)));
+        let [one] = &all[..] else { panic!("{} streaks", all.len()) };
+        assert_eq!((one.first, one.members.len()), (0, one.along.len()));
+        for (k, [x, speed]) in one.along.iter().enumerate() {
+            let (at, fast) = drives_off(k as f64 * 0.1);
+            assert!(
+                (x - at).abs() < 0.4 && (speed - fast).abs() < 0.5,
+                "frame {k}: {x} m of {at}, {speed} m/s of {fast}"
+            );
+        }
+    }
+
+    #[test]
+    fn one_that_stands_is_waited_for_and_one_that_leaves_unseen_is_another() {
+        let hidden = |from: f64, to: f64| move |s: f64| (drives_off(s).0, drives_off(s).1, s < from || s > to);
+        let all = streaks(&lane(), &seen(hidden(4.0, 6.5)));
+        assert_eq!(all.len(), 1, "it stood behind what passed");
+        assert_eq!(all[0].along.len(), all[0].last() + 1, "a place for every frame of it");
+        // from 60 m to 68 m unseen
+        assert_eq!(streaks(&lane(), &seen(hidden(6.0, 14.0))).len(), 2);
+    }
+
+    #[test]
+    fn two_that_stand_two_metres_apart_are_two_and_know_who_is_beside_them() {
+        let mut instants = seen(|s| (drives_off(s).0, drives_off(s).1, true));
+        instants.iter_mut().for_each(|i| i.reflections.extend([reflection(62.0, 0.0), reflection(63.0, 0.0)]));
+        instants.truncate(90);
+        let mut all = streaks(&lane(), &instants);
+        all.sort_by(|a, b| a.along[0][0].total_cmp(&b.along[0][0]));
+        let places: Vec<f64> = all.iter().map(|s| s.along[0][0].round()).collect();
+        assert_eq!(places, [60.0, 62.0, 63.0]);
+        assert_eq!(all[0].beside, [0, 0]);
+        assert!(all[1].beside[0] == 0 && all[1].beside[1] > 60 && all[2].beside[0] > 60 && all[2].beside[1] == 0);
+    }
+
+    #[test]
+    fn what_lies_beside_the_lane_drives_against_it_or_is_fast_is_followed_elsewhere() {
+        let mut beside = seen(|_| (60.0, 0.0, true));
+        beside.iter_mut().for_each(|i| i.reflections[0].place[1] = 6.5);
+        assert!(streaks(&lane(), &beside).is_empty());
+        assert!(streaks(&lane(), &seen(|s| (100.0 - 3.0 * s, -3.0, true))).is_empty());
+        assert!(streaks(&lane(), &seen(|s| (10.0 + 20.0 * s, 20.0, s < 5.0))).is_empty());
+        let mut fixture = seen(|_| (60.0, 0.0, true));
+        fixture.iter_mut().for_each(|i| i.reflections[0].fixture = true);
+        assert!(streaks(&lane(), &fixture).is_empty());
+    }
 }
