@@ -377,8 +377,13 @@ impl Default for Collector {
 
 impl Collector {
     /// Nothing yet.
-    pub const NEW: Self =
-        Self { groups: [[0; GROUP]; GROUPS as usize - 1], there: 0, narrow: [0; GROUP], header: None, levels: Said::Nothing };
+    pub const NEW: Self = Self {
+        groups: [[0; GROUP]; GROUPS as usize - 1],
+        there: 0,
+        narrow: [0; GROUP],
+        header: None,
+        levels: Said::Nothing,
+    };
 
     /// The header, once complete.
     pub fn header(&self) -> Option<&Header> {
