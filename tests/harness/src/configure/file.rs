@@ -243,8 +243,9 @@ mod tests {
         let mut settings = parse(EXAMPLE).unwrap().0.settings;
         settings.sensor.noise.range_m = 0.1;
         settings.unit.serial_baud = 921_600;
+        settings.visibility.far_road_deg = Some(-12);
         let text = text(&settings).unwrap();
-        assert!(text.contains("range_m = 0.1\n"), "{text}");
+        assert!(text.contains("range_m = 0.1\n") && text.contains("far_road_deg = -12\n"), "{text}");
         assert_eq!(parse(&text).unwrap().0.settings, settings);
     }
 

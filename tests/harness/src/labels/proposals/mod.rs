@@ -5,7 +5,9 @@
 //! `reflections` puts detections on the road and tells fixtures, `tracker` follows what moves through the frames,
 //! forwards and backwards, `path` smooths (`motion`). What drives shows the `lanes`; known these, all is followed again,
 //! and nobody is mixed up with the vehicle beside. `joining` makes one path of the pieces of a vehicle, `assembly` tells
-//! one long vehicle from two that creep in one lane, `exclusion` drops mirror images, `standing` adds the time in which it
+//! one long vehicle from two that creep in one lane. What stands in lanes is followed there by place alone: `streaks` are
+//! what goes on in one place of a vehicle, `vehicles` puts together those whose distance stays while they move, `queues`
+//! makes paths of them in place of the tracker's. `exclusion` drops mirror images, `standing` adds the time in which it
 //! stood before and after, `shape` puts a box around it, and of proposals for one place `exclusion` keeps the best.
 //!
 //! # Limits
