@@ -54,6 +54,7 @@
 //! For 120 azimuths by 200 ranges 8.0 kB a sensor, ages included.
 
 mod assembly;
+mod collector;
 mod epochs;
 mod map;
 mod measure;
@@ -63,6 +64,7 @@ mod secured;
 mod sensor;
 mod session;
 
+pub use collector::{Brought, Collector};
 pub use map::{ReceivedMap, Together};
 pub use measure::{ENOUGH, ReceiverLimits};
 #[cfg(feature = "secoc")]

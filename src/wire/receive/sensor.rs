@@ -1,6 +1,7 @@
 //! Everything a receiver knows of one sensor.
 
 use super::assembly::{Assembly, Begun, BlockKey};
+use super::collector::{Brought, Collector};
 use super::measure::ReceiverLimits;
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Session};
@@ -9,7 +10,7 @@ use crate::wire::code::block::Kind;
 use crate::wire::code::ray::Ray;
 use crate::wire::code::reading::{self, Ending, Reader};
 use crate::wire::e2e::{Counter, Sequence};
-use crate::wire::header::{Brought, Clock, Collector, Header, NotAHeader};
+use crate::wire::header::{Clock, Header, NotAHeader};
 use crate::wire::map_message::{self, Plain};
 use crate::wire::message::{Epoch, Message, NotAMessage, NotAuthentic, Part, Plane, Received};
 use crate::wire::scan_number::ScanNumber;

@@ -1,8 +1,8 @@
 //! Any bytes as header, status, visible range, sealed message and serial line.
 
 use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::header::Collector;
 use viewshed::wire::message::{Addresses, Packing, Received, data_id};
+use viewshed::wire::receive::Collector;
 use viewshed::wire::secoc::Opener;
 use viewshed::wire::serial::{MOST_STUFFED, Unstuffer, stuff};
 use viewshed::wire::status::Status;

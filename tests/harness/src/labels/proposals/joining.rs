@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::lane::Lane;
+use super::pairs;
 use super::path::Path;
 use super::reflections::Instant;
 use super::tracker::{LONGEST_M, Tracklet};
@@ -77,57 +78,23 @@ pub fn both_ways(forward: &[Tracklet], backward: &[Tracklet]) -> Vec<Tracklet> {
 }
 
 /// Joins pieces of one vehicle that are seen at the same time and move as one.
-pub fn abreast(mut paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
-    loop {
-        let mut pairs = Vec::new();
-        for (a, first) in paths.iter().enumerate() {
-            for (b, second) in paths.iter().enumerate().skip(a + 1) {
-                if let Some(cost) = rigid(first, second) {
-                    pairs.push((cost, a, b));
-                }
-            }
-        }
-        if pairs.is_empty() {
-            return paths;
-        }
-        paths = joined(paths, pairs, instants);
-    }
+pub fn abreast(paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
+    let rigid = |(a, first): (usize, &Path), (b, second): (usize, &Path)| (a < b).then(|| rigid(first, second))?;
+    pairs::joined(paths, rigid, |first, second| one(first, second, instants))
 }
 
 /// Joins pieces before and after a gap.
-pub fn through_gaps(mut paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
-    loop {
-        let mut pairs = Vec::new();
-        for (a, before) in paths.iter().enumerate() {
-            for (b, after) in paths.iter().enumerate() {
-                if let Some(cost) = follows(before, after) {
-                    pairs.push((cost, a, b));
-                }
-            }
-        }
-        if pairs.is_empty() {
-            return paths;
-        }
-        paths = joined(paths, pairs, instants);
-    }
+pub fn through_gaps(paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
+    let follows = |(_, before): (usize, &Path), (_, after): (usize, &Path)| follows(before, after);
+    pairs::joined(paths, follows, |first, second| one(first, second, instants))
 }
 
-/// Joins the best pairs, each path once.
-fn joined(paths: Vec<Path>, mut pairs: Vec<(f64, usize, usize)>, instants: &[Instant]) -> Vec<Path> {
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut all: Vec<Option<Path>> = paths.into_iter().map(Some).collect();
-    for (_, a, b) in pairs {
-        if all[a].is_none() || all[b].is_none() {
-            continue;
-        }
-        if let (Some(first), Some(second)) = (all[a].take(), all[b].take()) {
-            let lane = common(&first, &second);
-            let members = [first.members, second.members].concat();
-            let queued = [first.queued, second.queued].concat();
-            all.push(Path::in_queues(members, lane, queued, instants));
-        }
-    }
-    all.into_iter().flatten().collect()
+/// The path of two pieces.
+fn one(first: Path, second: Path, instants: &[Instant]) -> Option<Path> {
+    let lane = common(&first, &second);
+    let members = [first.members, second.members].concat();
+    let queued = [first.queued, second.queued].concat();
+    Path::in_queues(members, lane, queued, instants)
 }
 
 /// How little two paths look like pieces of one vehicle; `None` where they are not.

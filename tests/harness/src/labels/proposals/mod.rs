@@ -24,6 +24,7 @@ mod joining;
 mod lane;
 mod lanes;
 mod motion;
+mod pairs;
 mod path;
 mod queues;
 mod reflections;

@@ -100,3 +100,16 @@ fn mark_fixtures(instants: &mut [Instant]) {
         r.fixture = stands(r) && frames.get(&cell(r)).is_some_and(|(count, _)| f64::from(*count) >= enough);
     }
 }
+
+#[cfg(test)]
+pub mod tests {
+    use super::Reflection;
+
+    /// Of what drives along x that fast, seen from the origin.
+    pub fn seen_from_origin([x, y]: [f64; 2], speed: f64) -> Reflection {
+        let distance_m = x.hypot(y);
+        let sight = [x / distance_m, y / distance_m];
+        let doppler_mps = speed * sight[0];
+        Reflection { place: [x, y], height_m: 1.0, sight, distance_m, doppler_mps, fixture: false, ahead_m: None }
+    }
+}

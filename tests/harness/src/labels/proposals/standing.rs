@@ -162,22 +162,13 @@ impl End {
 
 #[cfg(test)]
 mod tests {
+    use super::super::reflections::tests::seen_from_origin;
     use super::*;
 
     const STOPPED_X: f64 = 40.0;
 
     fn reflection(x: f64, speed: f64) -> Reflection {
-        let distance_m = x.hypot(30.0);
-        let sight = [x / distance_m, 30.0 / distance_m];
-        Reflection {
-            place: [x, 30.0],
-            height_m: 1.0,
-            sight,
-            distance_m,
-            doppler_mps: speed * sight[0],
-            fixture: false,
-            ahead_m: None,
-        }
+        seen_from_origin([x, 30.0], speed)
     }
 
     /// A car at x = 40 m pulls away along x at 6 s, seen by a sensor beside it, and reflects from `seen_from_s` on.

@@ -7,6 +7,7 @@
 
 use super::lane::Lane;
 use super::motion::{Motion, smooth};
+use super::pairs;
 use super::reflections::{Instant, STANDS_MPS};
 use super::tracker::across_m;
 
@@ -62,6 +63,37 @@ impl Streak {
     pub fn at(&self, frame: usize) -> Option<[f64; 2]> {
         self.along.get(frame.checked_sub(self.first)?).copied()
     }
+
+    /// How badly another one goes on with it after a gap, by the seconds of frames; `None` where it does not.
+    fn goes_on(&self, after: &Self, time: impl Fn(usize) -> f64) -> Option<f64> {
+        if after.first <= self.last() {
+            return None;
+        }
+        let gap_s = time(after.first) - time(self.last());
+        let ([x, u], [y, v]) = (self.along.last()?, after.along.first()?);
+        let stands = u.abs().max(v.abs()) < 1.5 * STANDS_BELOW_MPS;
+        let (off, within) =
+            if stands { (y - x, AWAY_M) } else { (y - x - 0.5 * (u + v) * gap_s, AWAY_M + 0.5 * gap_s) };
+        // what is seen shortly is no beginning or end of a long stop
+        let lasts_s = |s: &Self| time(s.last()) - time(s.first);
+        let in_time = if stands {
+            gap_s < STANDS_S.min(lasts_s(self)).min(lasts_s(after))
+        } else {
+            gap_s < MOVES_S && (u - v).abs() < 2.0
+        };
+        (in_time && off.abs() < within).then(|| off.abs() / within + gap_s / 10.0)
+    }
+
+    /// It and another one after it, with places between.
+    fn with(mut self, after: &Self) -> Option<Self> {
+        let ([x, _], [y, _]) = (*self.along.last()?, after.along.first()?);
+        let gap = after.first - self.last();
+        self.along.extend((1..gap).map(|k| [x + k as f64 / gap as f64 * (y - x), 0.0]));
+        self.along.extend(&after.along);
+        self.members.extend(&after.members);
+        self.beside = [0, 1].map(|k| self.beside[k] + after.beside[k]);
+        Some(self)
+    }
 }
 
 /// A reflection in the lane.
@@ -109,24 +141,7 @@ pub fn streaks(lane: &Lane, instants: &[Instant]) -> Vec<Streak> {
         for (r, own) in running.iter_mut().zip(&own) {
             r.take(frame, instant.time_s, own, &seen);
         }
-        running.sort_by(|a, b| a.motion.state[0].total_cmp(&b.motion.state[0]));
-        let mut k = 1;
-        while k < running.len() {
-            let [a, b] = [&running[k - 1], &running[k]];
-            let close = b.motion.state[0] - a.motion.state[0] < ONE_M;
-            if !close || (b.motion.state[2] - a.motion.state[2]).abs() > ALIKE_MPS {
-                k += 1;
-                continue;
-            }
-            // what waits there has left unseen, or was seen less since it is of the other
-            let fewer = b.seen < a.seen;
-            let mut out = running.remove(if fewer { k } else { k - 1 });
-            if out.filtered.len() > SAME {
-                done.extend(out.streak());
-            } else {
-                running[k - 1].members.append(&mut out.members);
-            }
-        }
+        done.extend(ended_in_another(&mut running));
         running.retain_mut(|r| {
             let waits_s = match () {
                 () if r.hits < YOUNG => YOUNG_S,
@@ -142,58 +157,32 @@ pub fn streaks(lane: &Lane, instants: &[Instant]) -> Vec<Streak> {
         running.extend(births(frame, instant.time_s, &free, &seen));
     }
     done.extend(running.iter_mut().filter_map(Running::streak));
-    joined(done, instants)
+    let time = |frame: usize| instants.get(frame).map_or(0.0, |i| i.time_s);
+    pairs::joined(done, |(_, before), (_, after)| before.goes_on(after, time), |first, second| first.with(&second))
 }
 
-/// Streaks with those that go on after a gap.
-fn joined(mut all: Vec<Streak>, instants: &[Instant]) -> Vec<Streak> {
-    let time = |frame: usize| instants.get(frame).map_or(0.0, |i| i.time_s);
-    loop {
-        let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
-        for (a, before) in all.iter().enumerate() {
-            for (b, after) in all.iter().enumerate() {
-                if after.first <= before.last() {
-                    continue;
-                }
-                let gap_s = time(after.first) - time(before.last());
-                let (Some([x, u]), Some([y, v])) = (before.along.last(), after.along.first()) else { continue };
-                let stand = u.abs().max(v.abs()) < 1.5 * STANDS_BELOW_MPS;
-                let off = if stand { y - x } else { y - x - 0.5 * (u + v) * gap_s };
-                let within = if stand { AWAY_M } else { AWAY_M + 0.5 * gap_s };
-                // what is seen shortly is no beginning or end of a long stop
-                let lasts_s =
-                    [before, after].map(|s| time(s.last()) - time(s.first)).into_iter().fold(f64::INFINITY, f64::min);
-                let goes_on =
-                    if stand { gap_s < STANDS_S.min(lasts_s) } else { gap_s < MOVES_S && (u - v).abs() < 2.0 };
-                if goes_on && off.abs() < within {
-                    pairs.push((off.abs() / within + gap_s / 10.0, a, b));
-                }
-            }
+/// Takes out those that have come to the place of another one, and gives the streaks they were.
+fn ended_in_another(running: &mut Vec<Running>) -> Vec<Streak> {
+    let mut ended = Vec::new();
+    running.sort_by(|a, b| a.motion.state[0].total_cmp(&b.motion.state[0]));
+    let mut k = 1;
+    while k < running.len() {
+        let [a, b] = [&running[k - 1], &running[k]];
+        let close = b.motion.state[0] - a.motion.state[0] < ONE_M;
+        if !close || (b.motion.state[2] - a.motion.state[2]).abs() > ALIKE_MPS {
+            k += 1;
+            continue;
         }
-        if pairs.is_empty() {
-            return all;
+        // what waits there has left unseen, or was seen less since it is of the other
+        let fewer = b.seen < a.seen;
+        let mut out = running.remove(if fewer { k } else { k - 1 });
+        if out.filtered.len() > SAME {
+            ended.extend(out.streak());
+        } else {
+            running[k - 1].members.append(&mut out.members);
         }
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut parts: Vec<Option<Streak>> = all.into_iter().map(Some).collect();
-        for (_, a, b) in pairs {
-            if parts[a].is_none() || parts[b].is_none() {
-                continue;
-            }
-            if let (Some(mut one), Some(other)) = (parts[a].take(), parts[b].take()) {
-                let (Some([x, _]), Some([y, _])) = (one.along.last().copied(), other.along.first()) else { continue };
-                let gap = other.first - one.last();
-                for k in 1..gap {
-                    let f = k as f64 / gap as f64;
-                    one.along.push([x + f * (y - x), 0.0]);
-                }
-                one.along.extend(&other.along);
-                one.members.extend(&other.members);
-                one.beside = [0, 1].map(|k| one.beside[k] + other.beside[k]);
-                parts.push(Some(one));
-            }
-        }
-        all = parts.into_iter().flatten().collect();
     }
+    ended
 }
 
 /// What lies in the lane and may be of a vehicle that keeps to it, along it.
@@ -304,6 +293,7 @@ fn births(frame: usize, now_s: f64, free: &[usize], seen: &[Seen]) -> Vec<Runnin
 #[cfg(test)]
 mod tests {
     use super::super::reflections::Reflection;
+    use super::super::reflections::tests::seen_from_origin;
     use super::*;
 
     const FRAMES: usize = 200;
@@ -312,19 +302,9 @@ mod tests {
         Lane { points: vec![[0.0, 3.0], [150.0, 3.0]], straight: None }
     }
 
-    /// A reflection at x metres along the lane of what drives that fast, seen from the lane's beginning.
+    /// A reflection at x metres along the lane of what drives that fast, seen from beside the lane's beginning.
     fn reflection(x: f64, speed: f64) -> Reflection {
-        let distance_m = x.hypot(3.0);
-        let sight = [x / distance_m, 3.0 / distance_m];
-        Reflection {
-            place: [x, 3.0],
-            height_m: 1.0,
-            sight,
-            distance_m,
-            doppler_mps: speed * sight[0],
-            fixture: false,
-            ahead_m: None,
-        }
+        seen_from_origin([x, 3.0], speed)
     }
 
     /// Frames 0.1 s apart with one at 60 m that stands, brakes before it or drives off at 10 s, as `moves` says by the
