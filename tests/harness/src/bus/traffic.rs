@@ -1,6 +1,6 @@
 //! Everything a sender puts on a bus while a recording runs.
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, ensure};
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
 use viewshed::probability::Quantiser;
@@ -61,16 +61,20 @@ pub struct Maps {
 }
 
 impl Maps {
-    /// Radar-3d's maps, with a table of probabilities as a unit that has it sends them.
+    /// The maps of the recording's [unit](estimators::unit), with a table of probabilities as a unit that has it sends them.
     pub fn new(
         recording: &Recording,
         options: &estimators::Options,
         quantiser: Option<&Quantiser>,
         step: &dyn Fn(),
     ) -> Result<Self> {
-        let sensor = estimators::sensor(recording, &options.noise);
+        ensure!(
+            options.grid.is_reference(),
+            "maps on a bus are of the reference grid here: leave out --grid-size; boards with the small grid send theirs"
+        );
+        let (sensor, config) = estimators::unit(recording, options)?;
         let (mut scans, mut geometry, mut holes) = (Vec::new(), None, 0);
-        radar_3d::maps(&recording.frames, &sensor, &options.radar_3d, |measured, map| {
+        radar_3d::maps(&recording.frames, &sensor, &config, |measured, map| {
             geometry = Some(*map.geometry());
             let plane = |plane| -> Vec<Ray<W>> {
                 let ray = |azimuth| {
@@ -89,7 +93,7 @@ impl Maps {
         })?;
         let geometry = geometry.ok_or_else(|| anyhow!("{} has no radar frames", recording.name))?;
         let usual = scans.iter().map(|scan| scan.rays[A / 2].known).find(|known| !known.is_empty());
-        let configuration = format!("{sensor:?} {:?}", options.radar_3d);
+        let configuration = format!("{sensor:?} {config:?}");
         let header = Header::new::<{ radar_3d::RANGES }, A>(
             &sensor.mount,
             &geometry,
@@ -209,5 +213,23 @@ impl Sent {
         let bits = bits::of(&frame);
         let duration_s = f64::from(bits.nominal) / bus.rates[0] + f64::from(bits.data) / bus.rates[1];
         Some(Self { at, duration_s, bytes: frame.data().to_vec(), frame: Some(frame), scans })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimators::{FarRoad, Grid, Options};
+    use crate::evaluation::samples::by_hand::recording;
+
+    #[test]
+    fn what_is_sent_is_the_map_of_a_unit_that_is_told_of_its_site() {
+        let of = |options: &Options| Maps::new(&recording(3, 1), options, None, &|| ()).map(|maps| maps.header);
+        let usual = of(&Options::default()).unwrap();
+        let told = of(&Options { far_road: Some(FarRoad::Degrees(-12)), ..Options::default() }).unwrap();
+        assert_ne!(usual.narrow, told.narrow);
+        assert_ne!(usual.fingerprint, told.fingerprint);
+        let error = of(&Options { grid: Grid::Small, ..Options::default() }).unwrap_err().to_string();
+        assert!(error.contains("leave out --grid-size"), "{error}");
     }
 }

@@ -189,7 +189,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
     let on_grades = all.iter().all(|scene| !scene.ground.is_empty());
     let more = [scenes::with_lanes(&all), on_grades, settings.estimators.far_road.is_some()];
-    let estimators = ESTIMATORS + more.map(u64::from).iter().sum::<u64>();
+    let estimators = ESTIMATORS + estimators::site_rows(more.map(u64::from).iter().sum());
     let running = bar("simulating and replaying", scenes::total_steps(&all, extent, estimators));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
     let results = scenes::run(&all, settings, extent, &keep, &|| running.step())?;

@@ -186,8 +186,8 @@ struct EstimatorArgs {
     /// A row radar-3d-narrow beside radar-3d, whose azimuths are four times narrower within ten degrees of where the far road
     /// lies: degrees from the sensor's heading, + left [along the road's axis unless said]
     ///
-    /// The same memory, and columns of 0.4 degrees ahead in place of one. In a file, `far_road_deg` of
-    /// `[estimators.radar_3d.visibility]` is for radar-3d itself; of a unit, that of `[visibility]`.
+    /// The same memory, and columns of 0.4 degrees ahead in place of one. `viewshed view`, `bus` and `label` show this map. In a
+    /// file, `far_road_deg` of `[estimators.radar_3d.visibility]` is for radar-3d itself; of a unit, that of `[visibility]`.
     #[arg(long, value_name = "DEG", num_args = 0..=1, require_equals = true, default_missing_value = "along-road", value_parser = far_road)]
     far_road: Option<FarRoad>,
     /// How well the radar measures, from its data sheet: standard deviations of range, azimuth, elevation and radial

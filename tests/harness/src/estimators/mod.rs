@@ -84,7 +84,8 @@ pub struct Options {
     /// The grid of the estimator that is tuned, watched or drawn; on the small one, it runs beside `radar-3d` in tables.
     #[serde(skip_serializing_if = "Grid::is_reference")]
     pub grid: Grid,
-    /// Where the far road lies: if that is said, `radar-3d-narrow` runs beside `radar-3d` in tables.
+    /// Where the far road lies. Each thing that is said of a site has a row of its own beside `radar-3d` in tables, this one
+    /// `radar-3d-narrow`; and `radar-3d-site` has all of them, as the unit there would.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub far_road: Option<FarRoad>,
     /// How well the sensor measures.
@@ -92,11 +93,11 @@ pub struct Options {
     pub radar_2d: Radar2dConfig,
     pub radar_3d: Radar3dConfig,
     pub camera_3d: Camera3dConfig,
-    /// Which way traffic goes; where there are any, `radar-3d-lanes` runs beside `radar-3d`.
+    /// Which way traffic goes: the row `radar-3d-lanes`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lanes: Vec<Lane>,
-    /// Height of the road over its length, metres; where it is given, or a recording says it, `radar-3d-ground` runs beside
-    /// `radar-3d`, and `reference` with it.
+    /// Height of the road over its length, metres, where it is not the recording's own: the row `radar-3d-ground`, and
+    /// `reference` with it.
     #[serde(skip_serializing_if = "Profile::is_empty")]
     pub ground: Profile,
     /// What is wrong with the heights that estimators are given.
@@ -228,37 +229,69 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     if let Some(camera) = recording.of_camera() {
         return camera_3d::all(camera, recording.truth.as_ref(), &options.camera_3d);
     }
-    let (sensor, max_detections) = radar(recording, options)?;
+    let (sensor, told) = unit(recording, options)?;
     let mut radar_2d = options.radar_2d;
-    radar_2d.gate.max_detections = max_detections;
-    let mut radar_3d = options.radar_3d;
-    radar_3d.gate.max_detections = max_detections;
+    radar_2d.gate.max_detections = told.gate.max_detections;
+    let radar_3d = Radar3dConfig { visibility: options.radar_3d.visibility, ground: &[], lanes: &[], ..told };
     let mut estimators = vec![
         radar_2d::new("radar-2d", Radar2dReading::Last, &sensor, &radar_2d)?,
         radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
-        radar_3d::new(&sensor, &radar_3d)?,
+        radar_3d::new(Grid::Reference, "radar-3d", &sensor, &radar_3d)?,
     ];
+    let name = own_name(options);
     if !options.grid.is_reference() {
-        estimators.push(radar_3d::on(options.grid, &sensor, &radar_3d)?);
+        estimators.push(radar_3d::new(options.grid, name, &sensor, &radar_3d)?);
     }
+    for (what, config) in site(&radar_3d, &told) {
+        estimators.push(radar_3d::new(options.grid, &format!("{name}-{what}"), &sensor, &config)?);
+    }
+    if let Some(truth) = &recording.truth {
+        estimators.push(reference::new(recording, truth, &sensor, &ground(recording, options)?, options)?);
+    }
+    Ok(estimators)
+}
+
+/// What is said of the site, each alone, and where there is more than one, all of it.
+fn site<'a>(usual: &Radar3dConfig, told: &Radar3dConfig) -> Vec<(&'a str, Radar3dConfig)> {
+    let each = [
+        ("narrow", Radar3dConfig { visibility: told.visibility, ..*usual }),
+        ("ground", Radar3dConfig { ground: told.ground, ..*usual }),
+        ("lanes", Radar3dConfig { lanes: told.lanes, ..*usual }),
+    ];
+    let mut said: Vec<_> = each.into_iter().filter(|(_, config)| config != usual).collect();
+    if said.len() > 1 {
+        said.push(("site", *told));
+    }
+    said
+}
+
+/// How many rows of tables [`site`] makes, of so many things that are said of a site.
+pub const fn site_rows(said: u64) -> u64 {
+    if said > 1 { said + 1 } else { said }
+}
+
+/// What a unit in a recording's place is given: its sensor, and all that is said of it and of the site.
+///
+/// # Errors
+/// A field of view that grids here do not cover; heights that are none.
+pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3dConfig)> {
+    let (sensor, max_detections) = radar(recording, options)?;
+    let mut config = options.radar_3d;
+    config.gate.max_detections = max_detections;
     if let Some(far_road) = options.far_road {
-        let mut narrow = radar_3d;
-        narrow.visibility.far_road_deg = Some(far_road.degrees(&sensor));
-        estimators.push(radar_3d::narrow(options.grid, &sensor, &narrow)?);
+        config.visibility.far_road_deg = Some(far_road.degrees(&sensor));
     }
     let ground = ground(recording, options)?;
     if !ground.is_level() {
-        let given = given(&ground, options.ground_error)?;
-        estimators.push(radar_3d::new(&sensor, &Radar3dConfig { ground: given.kept(), ..radar_3d })?);
+        config.ground = given(&ground, options.ground_error)?.kept();
     }
-    if !options.lanes.is_empty() {
-        radar_3d.lanes = kept(&options.lanes);
-        estimators.push(radar_3d::new(&sensor, &radar_3d)?);
-    }
-    if let Some(truth) = &recording.truth {
-        estimators.push(reference::new(recording, truth, &sensor, &ground, options)?);
-    }
-    Ok(estimators)
+    config.lanes = kept(&options.lanes);
+    Ok((sensor, config))
+}
+
+/// Name of the estimator of [`own`], of a radar.
+fn own_name(options: &Options) -> &'static str {
+    if options.grid.is_reference() { "radar-3d" } else { "radar-3d-small" }
 }
 
 /// The heights that estimators are given for these.
@@ -273,7 +306,8 @@ fn ground(recording: &Recording, options: &Options) -> Result<Ground> {
     if options.ground.is_empty() { Ok(recorded) } else { Ground::new(options.ground.points.clone()) }
 }
 
-/// The estimator whose map a sensor sends: `radar-3d`, or `camera-3d` of a camera's own recording.
+/// The estimator whose map a sensor sends: `radar-3d` with all that is said of the [site](unit), or `camera-3d` of a
+/// camera's own recording.
 ///
 /// # Errors
 /// Those of [`all`].
@@ -282,11 +316,8 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
         let all = camera_3d::all(camera, None, &options.camera_3d)?;
         return all.into_iter().find(|e| e.name() == "camera-3d").context("no estimator for the camera");
     }
-    let (sensor, max_detections) = radar(recording, options)?;
-    let mut radar_3d = options.radar_3d;
-    radar_3d.gate.max_detections = max_detections;
-    radar_3d.ground = given(&ground(recording, options)?, options.ground_error)?.kept();
-    radar_3d::on(options.grid, &sensor, &radar_3d)
+    let (sensor, config) = unit(recording, options)?;
+    radar_3d::new(options.grid, own_name(options), &sensor, &config)
 }
 
 /// The grid of the map of [`own`], of a radar, and its least visible grade.
@@ -295,10 +326,8 @@ pub fn own(recording: &Recording, options: &Options) -> Result<Box<dyn Estimator
 /// As for [`own`].
 pub fn own_grid(recording: &Recording, options: &Options) -> Result<(PolarGeometry, u8)> {
     options.has_tables()?;
-    let (sensor, _) = radar(recording, options)?;
-    let given = given(&ground(recording, options)?, options.ground_error)?;
-    let radar_3d = Radar3dConfig { ground: given.kept(), ..options.radar_3d };
-    radar_3d::grid(&sensor, &radar_3d)
+    let (sensor, config) = unit(recording, options)?;
+    radar_3d::grid(&sensor, &config)
 }
 
 /// A recording's radar, and how many detections of a frame are used.
@@ -436,6 +465,58 @@ impl Intake {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::samples::by_hand::recording;
+
+    /// Options of a site of which all is said.
+    fn all_said() -> Options {
+        Options {
+            far_road: Some(FarRoad::Degrees(7)),
+            lanes: vec![Lane { points: vec![[10.0, 2.0], [90.0, 2.0]] }],
+            ground: Profile { points: vec![[0.0, 0.0], [100.0, 3.0]] },
+            ..Options::default()
+        }
+    }
+
+    #[test]
+    fn what_is_said_of_a_site_has_a_row_each_and_one_with_all() {
+        let all_said = all_said();
+        let rows = |options: Options| {
+            let all = all(&recording(1, 1), &options).unwrap();
+            let site =
+                all.iter().map(|e| e.name().to_owned()).filter(|n| n.starts_with("radar-3d")).collect::<Vec<_>>();
+            site.join(" ")
+        };
+        assert_eq!(rows(Options::default()), "radar-3d");
+        let lanes = Options { lanes: all_said.lanes.clone(), ..Options::default() };
+        assert_eq!(rows(lanes.clone()), "radar-3d radar-3d-lanes");
+        assert_eq!(
+            rows(Options { far_road: Some(FarRoad::AlongRoad), ..lanes }),
+            "radar-3d radar-3d-narrow radar-3d-lanes radar-3d-site"
+        );
+        let every = "radar-3d radar-3d-narrow radar-3d-ground radar-3d-lanes radar-3d-site";
+        assert_eq!(rows(all_said.clone()), every);
+        let small = rows(Options { grid: Grid::Small, ..all_said });
+        assert_eq!(
+            small,
+            every.replace("radar-3d", "radar-3d-small").replacen("radar-3d-small", "radar-3d radar-3d-small", 1)
+        );
+        for said in 0..4 {
+            assert_eq!(site_rows(said), [0, 1, 3, 4][said as usize]);
+        }
+    }
+
+    #[test]
+    fn a_unit_is_given_all_that_is_said_of_its_site() {
+        let options = Options { max_detections: 300, ..all_said() };
+        let (_, config) = unit(&recording(1, 1), &options).unwrap();
+        assert_eq!((config.visibility.far_road_deg, config.gate.max_detections), (Some(7), 300));
+        assert_eq!((config.ground, config.lanes.len()), (&[[0.0, 0.0], [100.0, 3.0]][..], 1));
+        assert_eq!(config.lanes[0], &[[10.0, 2.0], [90.0, 2.0]][..]);
+        let own = own(&recording(1, 1), &options).unwrap();
+        assert_eq!((own.name(), own.polar().unwrap().narrow[2]), ("radar-3d", 4));
+        let (_, level) = unit(&recording(1, 1), &Options::default()).unwrap();
+        assert_eq!(level, Radar3dConfig::default(), "of a level road nothing is said");
+    }
 
     #[test]
     fn heights_are_given_as_wrong_as_they_are_asked_for() {

@@ -36,7 +36,7 @@ pub enum Grid {
 }
 
 impl Grid {
-    pub(super) fn is_reference(&self) -> bool {
+    pub fn is_reference(&self) -> bool {
         *self == Self::Reference
     }
 
@@ -60,7 +60,7 @@ impl Grid {
 }
 
 struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> {
-    name: &'static str,
+    name: String,
     parameters: Box<Radar3dParameters<R, A, E>>,
     state: Box<Radar3d<R, A, E, W, N, D>>,
     map: Box<PolarMap<R, A>>,
@@ -79,44 +79,23 @@ type OfSmall = Driver<
     { small::State::DETECTIONS },
 >;
 
-/// The estimator on the reference grid; storage for 256 detections unless more are asked for.
-pub fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
-    if config.gate.max_detections <= 256 {
-        Ok(Box::new(OfReference::<256>::new(sensor, config)?))
-    } else {
-        Ok(Box::new(OfReference::<MOST_DETECTIONS>::new(sensor, config)?))
-    }
-}
-
-/// The estimator on a grid of one's choice; the small one has room for so many detections of a frame.
+/// The estimator on a grid of one's choice, as a row of tables. The reference grid has storage for 256 detections unless
+/// more are asked for, the small one for its own number.
 ///
 /// # Errors
 /// A parameter the library refuses, by name.
-pub fn on(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
-    match grid {
-        Grid::Reference => new(sensor, config),
-        Grid::Small => Ok(Box::new(small("radar-3d-small", sensor, config)?)),
-    }
-}
-
-/// The estimator as a row of its own beside the one without narrow azimuths.
-///
-/// # Errors
-/// A parameter the library refuses, by name.
-pub fn narrow(grid: Grid, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
-    match grid {
-        Grid::Reference => {
-            let name = "radar-3d-narrow";
-            Ok(Box::new(OfReference::<MOST_DETECTIONS> { name, ..OfReference::new(sensor, config)? }))
+pub fn new(grid: Grid, name: &str, sensor: &Sensor, config: &Radar3dConfig) -> Result<Box<dyn Estimator>> {
+    Ok(match grid {
+        Grid::Reference if config.gate.max_detections <= 256 => {
+            Box::new(OfReference::<256>::new(name, sensor, config)?)
         }
-        Grid::Small => Ok(Box::new(small("radar-3d-small-narrow", sensor, config)?)),
-    }
-}
-
-fn small(name: &'static str, sensor: &Sensor, config: &Radar3dConfig) -> Result<OfSmall> {
-    let mut config = *config;
-    config.gate.max_detections = config.gate.max_detections.min(small::State::DETECTIONS as u16);
-    Ok(OfSmall { name, ..OfSmall::new(sensor, &config)? })
+        Grid::Reference => Box::new(OfReference::<MOST_DETECTIONS>::new(name, sensor, config)?),
+        Grid::Small => {
+            let mut config = *config;
+            config.gate.max_detections = config.gate.max_detections.min(small::State::DETECTIONS as u16);
+            Box::new(OfSmall::new(name, sensor, &config)?)
+        }
+    })
 }
 
 /// Where the cells of its map lie, and from which grade on they are visible.
@@ -136,9 +115,22 @@ pub fn maps(
     frames: &[Frame],
     sensor: &Sensor,
     config: &Radar3dConfig,
+    visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>),
+) -> Result<()> {
+    if config.gate.max_detections <= 256 {
+        maps_with::<256>(frames, sensor, config, visit)
+    } else {
+        maps_with::<MOST_DETECTIONS>(frames, sensor, config, visit)
+    }
+}
+
+fn maps_with<const D: usize>(
+    frames: &[Frame],
+    sensor: &Sensor,
+    config: &Radar3dConfig,
     mut visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>),
 ) -> Result<()> {
-    let mut driver = OfReference::<256>::new(sensor, config)?;
+    let mut driver = OfReference::<D>::new("radar-3d", sensor, config)?;
     for frame in frames {
         driver.step(frame);
         visit(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &driver.map);
@@ -149,16 +141,11 @@ pub fn maps(
 impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>
     Driver<R, A, E, W, N, D>
 {
-    fn new(sensor: &Sensor, config: &Radar3dConfig) -> Result<Self> {
+    fn new(name: &str, sensor: &Sensor, config: &Radar3dConfig) -> Result<Self> {
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
         let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
-        let name = match (config.lanes, config.ground) {
-            ([], []) => "radar-3d",
-            ([], _) => "radar-3d-ground",
-            _ => "radar-3d-lanes",
-        };
-        Ok(Self { name, parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
+        Ok(Self { name: name.to_owned(), parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
     }
 }
 
@@ -166,7 +153,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     for Driver<R, A, E, W, N, D>
 {
     fn name(&self) -> &str {
-        self.name
+        &self.name
     }
 
     fn reset(&mut self) {
@@ -238,12 +225,12 @@ mod tests {
             let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg, pitch_deg: 3.0, roll_deg: 0.0 };
             let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
             let mut config = Radar3dConfig::default();
-            let usual = new(&sensor, &config).unwrap();
+            let usual = reference(&sensor, &config);
             assert_eq!(FarRoad::AlongRoad.degrees(&sensor), far_road, "{yaw_deg}");
             config.visibility.far_road_deg = Some(far_road);
-            let narrow = super::narrow(Grid::Reference, &sensor, &config).unwrap();
+            let narrow = reference(&sensor, &config);
             let (a, b) = (usual.polar().unwrap(), narrow.polar().unwrap());
-            assert_eq!((narrow.name(), b.azimuths, b.ranges), ("radar-3d-narrow", a.azimuths, a.ranges));
+            assert_eq!((b.azimuths, b.ranges), (a.azimuths, a.ranges));
             assert_eq!((a.azimuth_rad, a.cell_m, a.narrow), (b.azimuth_rad, b.cell_m, EVEN));
             let [first, end, times] = b.narrow;
             let middle = bearing_rad(b.azimuth_rad, b.narrow, b.azimuths, f64::from(first + end) / 2.0).to_degrees();
@@ -252,6 +239,10 @@ mod tests {
                 "{yaw_deg}: {middle}"
             );
         }
+    }
+
+    fn reference(sensor: &Sensor, config: &Radar3dConfig) -> Box<dyn Estimator> {
+        new(Grid::Reference, "radar-3d", sensor, config).unwrap()
     }
 
     /// So many vehicles that come nearer, 6 m and 12 degrees apart.
@@ -276,7 +267,7 @@ mod tests {
         // looks back along the road, from (100, 20): what is to its left has the smaller y
         let mount = Mount { x_m: 100.0, y_m: 20.0, height_m: 6.0, yaw_deg: 180.0, pitch_deg: 0.0, roll_deg: 0.0 };
         let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
-        let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
+        let mut estimator = reference(&sensor, &Radar3dConfig::default());
         let mut one = frame(0, 1);
         one.detections[0].azimuth_rad = 0.1;
         for k in 0..20 {
@@ -296,7 +287,7 @@ mod tests {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 3.0, roll_deg: 0.0 };
         let sensor = Sensor { mount, field_of_view: VIEW, noise: NoiseConfig::default() };
         let no_room = |vehicles: usize| {
-            let mut estimator = new(&sensor, &Radar3dConfig::default()).unwrap();
+            let mut estimator = reference(&sensor, &Radar3dConfig::default());
             (0..40).for_each(|k| estimator.step(&frame(k, vehicles)));
             estimator.counters().into_iter().find(|(what, _)| what.contains("96 obstacles")).map_or(0, |(_, n)| n)
         };

@@ -1,4 +1,4 @@
-//! What `radar-3d` thought visible at each frame, found beside the page's work.
+//! What the recording's own unit thought visible at each frame, found beside the page's work.
 //!
 //! # Model
 //! A map is one byte a polar cell, azimuth by azimuth from right to left, near cells first: 0 unknown, 1 invisible,
@@ -11,7 +11,7 @@ use serde::Serialize;
 use viewshed::map::Visibility;
 
 use super::locked;
-use crate::estimators::{Options, radar_3d, sensor};
+use crate::estimators::{self, Options};
 use crate::recording::Recording;
 
 /// Where the cells of the maps lie.
@@ -36,7 +36,7 @@ impl Maps {
     /// # Errors
     /// A parameter the library refuses, by name.
     pub fn fill(&self, recording: &Recording, options: &Options) -> Result<()> {
-        let mut estimator = radar_3d::new(&sensor(recording, &options.noise), &options.radar_3d)?;
+        let mut estimator = estimators::own(recording, options)?;
         for frame in &recording.frames {
             if recording.sensor.frames_independent {
                 estimator.reset();

@@ -39,7 +39,7 @@ pub fn table(folder: &Path) -> PathBuf {
     };
     let values = [[std::array::from_fn(|step| 51 + 17 * step as u8); 8]; 8];
     let recording = read(SHIPPED.as_ref(), &ReadOptions::default()).unwrap();
-    let table = ProbabilityTable::new(edges, values, fingerprint(&recording, &Options::default())).unwrap();
+    let table = ProbabilityTable::new(edges, values, fingerprint(&recording, &Options::default()).unwrap()).unwrap();
     let mut counted = Grades::default();
     (51..=255).for_each(|p| counted.add(true, Some(p)));
     let file = folder.join("t.probability.toml");

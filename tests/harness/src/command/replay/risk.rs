@@ -27,7 +27,7 @@ pub fn quantiser(
     recording: &Recording,
     settings: &Settings,
 ) -> Result<(Quantiser, PolarGeometry)> {
-    let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators));
+    let table = fitted.table.of_unit(fingerprint(recording, &settings.estimators)?);
     let table = table.with_context(|| format!("--probability: {}", recording.name))?;
     let (grid, visible_from) = estimators::own_grid(recording, &settings.estimators)?;
     let threshold = risk.map(|risk| keeping(risk, &fitted.counted));

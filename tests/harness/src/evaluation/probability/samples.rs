@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use anyhow::Result;
 use viewshed::Settings;
 use viewshed::fixed::angle::Angle;
 
@@ -77,14 +78,19 @@ fn place(pose: &SensorPose, [x, y]: [f64; 2]) -> (i32, Angle) {
     ((dx.hypot(dy) * 100.0).round() as i32, Angle::from_degrees(((turns - turns.round()) * 360.0) as f32))
 }
 
-/// Fingerprint of what a table depends on, that of a unit with these settings. Parameters of obstacles and evidence are
+/// Fingerprint of what a table depends on, that of the recording's unit. Parameters of obstacles and evidence are
 /// among them where they are not the usual ones; they are kept for good then.
-pub fn fingerprint(recording: &Recording, options: &estimators::Options) -> u32 {
-    let mut settings = Settings::of(estimators::sensor(recording, &options.noise));
-    let config = options.radar_3d;
+///
+/// # Errors
+/// Those of [`estimators::unit`].
+pub fn fingerprint(recording: &Recording, options: &estimators::Options) -> Result<u32> {
+    let (sensor, config) = estimators::unit(recording, options)?;
+    let mut settings = Settings::of(sensor);
     settings.gate = config.gate;
     settings.visibility = config.visibility;
     settings.health = config.health;
+    settings.lanes = config.lanes;
+    settings.ground = config.ground;
     let usual = viewshed::Radar3dConfig::default();
     if config.obstacles != usual.obstacles {
         settings.obstacles = Some(Box::leak(Box::new(config.obstacles)));
@@ -92,12 +98,13 @@ pub fn fingerprint(recording: &Recording, options: &estimators::Options) -> u32 
     if config.evidence != usual.evidence {
         settings.evidence = Some(Box::leak(Box::new(config.evidence)));
     }
-    settings.fingerprint()
+    Ok(settings.fingerprint())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimators::{FarRoad, Lane, Profile};
     use crate::evaluation::samples::by_hand::{frames, recording, sample};
     use crate::evaluation::score::by_hand::score;
 
@@ -126,6 +133,8 @@ mod tests {
     #[test]
     fn another_mount_or_another_setting_is_another_configuration() {
         let (recording, options) = (recording(1, 1), estimators::Options::default());
+        let fingerprint =
+            |recording: &Recording, options: &estimators::Options| fingerprint(recording, options).unwrap();
         let usual = fingerprint(&recording, &options);
         let mut moved = recording.clone();
         moved.pose = SensorPose::new([0.0, 0.0, 6.5], 0.0, 0.0, 0.0);
@@ -133,9 +142,13 @@ mod tests {
         set.radar_3d.gate.min_snr_db += 1.0;
         let mut tuned = options.clone();
         tuned.radar_3d.evidence.visible_memory_s += 1.0;
-        let all =
-            [usual, fingerprint(&moved, &options), fingerprint(&recording, &set), fingerprint(&recording, &tuned)];
-        assert!((0..4).all(|i| (0..i).all(|k| all[i] != all[k])), "{all:x?}");
+        let (mut lanes, mut far_road, mut ground) = (options.clone(), options.clone(), options.clone());
+        lanes.lanes = vec![Lane { points: vec![[0.0, 2.0], [50.0, 2.0]] }];
+        far_road.far_road = Some(FarRoad::Degrees(5));
+        ground.ground = Profile { points: vec![[0.0, 0.0], [50.0, 1.0]] };
+        let told = [set, tuned, lanes, far_road, ground].map(|options| fingerprint(&recording, &options));
+        let all = [&[usual, fingerprint(&moved, &options)], &told[..]].concat();
+        assert!((0..all.len()).all(|i| (0..i).all(|k| all[i] != all[k])), "{all:x?}");
         assert_eq!(usual, fingerprint(&recording, &options.clone()));
     }
 }

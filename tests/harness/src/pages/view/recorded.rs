@@ -1,4 +1,4 @@
-//! Instants of a recording: what radar-3d says frame by frame, what a receiver on a bus has of it, and what the labels
+//! Instants of a recording: what its unit says frame by frame, what a receiver on a bus has of it, and what the labels
 //! say of both.
 
 use anyhow::Result;
@@ -12,7 +12,7 @@ use super::instants::Instants;
 use crate::bus::listening::Listening;
 use crate::bus::logged::Logged;
 use crate::bus::traffic::{BUSES, Bus, Maps, Traffic};
-use crate::estimators::{self, Estimator, PolarCells, radar_3d};
+use crate::estimators::{self, Estimator, PolarCells};
 use crate::evaluation::Settings;
 use crate::evaluation::counts::{Counts, Outcome};
 use crate::evaluation::replay::{Replay, visit};
@@ -41,8 +41,7 @@ pub fn fill(
     let Some((recording, others)) = radars.split_first() else { return Ok(()) };
     let mut others = others.iter().map(|other| Beside::new(other, settings)).collect::<Result<Vec<_>>>()?;
     let name = if others.is_empty() { ESTIMATOR.to_owned() } else { recording.sensor.name.clone() };
-    let sensor = estimators::sensor(recording, &settings.estimators.noise);
-    let mut running = vec![radar_3d::new(&sensor, &settings.estimators.radar_3d)?];
+    let mut running = vec![estimators::own(recording, &settings.estimators)?];
     let frames = recording.frames.len();
     instants.say(format!("comparing {frames} frames with the labels"));
     // the figures have no intervals here
@@ -51,7 +50,7 @@ pub fn fill(
     instants.say("sending the maps over a bus");
     let mut received = receiver(recording, settings, table.map(|(quantiser, _)| quantiser))?;
     instants.say(format!("{frames} frames"));
-    let mut estimator = radar_3d::new(&sensor, &settings.estimators.radar_3d)?;
+    let mut estimator = estimators::own(recording, &settings.estimators)?;
     let all: Vec<usize> = (0..frames).collect();
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let mut outcome = Ok(());
@@ -153,8 +152,7 @@ struct Beside<'r> {
 
 impl<'r> Beside<'r> {
     fn new(recording: &'r Recording, settings: &Settings) -> Result<Self> {
-        let sensor = estimators::sensor(recording, &settings.estimators.noise);
-        Ok(Self { recording, estimator: radar_3d::new(&sensor, &settings.estimators.radar_3d)?, taken: 0 })
+        Ok(Self { recording, estimator: estimators::own(recording, &settings.estimators)?, taken: 0 })
     }
 
     /// Its frame at a time; `None` where it is silent.

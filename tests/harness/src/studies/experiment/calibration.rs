@@ -198,7 +198,7 @@ pub fn run(plan: &Plan, settings: &Settings, progress: &(dyn Fn() + Sync)) -> Re
             let mut settings = settings.clone();
             settings.evaluation.warm_up_s = unit.warm_up_s;
             let (samples, score) = scored(&recording, &settings, progress)?;
-            Ok((Places::of(&recording, &samples, &score), fingerprint(&recording, &settings.estimators)))
+            Ok((Places::of(&recording, &samples, &score), fingerprint(&recording, &settings.estimators)?))
         };
         let days = |days: &[Day]| -> Result<Vec<(Places, u32)>> { days.par_iter().map(day).collect() };
         let (fit, report) = (days(&unit.fit)?, days(&unit.report)?);
@@ -224,7 +224,7 @@ pub fn run_halves(recording: &Recording, settings: &Settings, progress: &(dyn Fn
         score.verdicts.iter_mut().enumerate().filter(|(k, _)| !kept(*k)).for_each(|(_, v)| v.clear());
         (1, Places::of(recording, &part, &score))
     };
-    judge(name, of(&|k| k < half), of(&|k| k >= half), fingerprint(recording, &settings.estimators), settings)
+    judge(name, of(&|k| k < half), of(&|k| k >= half), fingerprint(recording, &settings.estimators)?, settings)
 }
 
 fn scored(
