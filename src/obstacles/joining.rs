@@ -1,11 +1,22 @@
 //! Parts of one vehicle that were taken for several.
 
+use core::ops::RangeInclusive;
+
 use super::body::LONGEST_LOW_CM;
 use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::BIN_CM;
 use super::tracking::{MERGE_PARALLEL, Tracking};
 use crate::fixed::math::hypot_gate;
+
+/// Least distance between the faces of two cars in a row: a short car's length and a gap, centimetres.
+const SPACING_CM: i32 = 480;
+/// Longest outline of one end of a car, and of a car that shows both its ends, with what noise adds, centimetres.
+const END_CM: i32 = 150;
+/// See [`END_CM`].
+const CAR_CM: RangeInclusive<i32> = 400..=520;
+/// Largest difference of speed of the ends of one car, 2^-8 cm/s: a metre a second.
+const ENDS_SPEED: i32 = 100 << FRACTION;
 
 impl Obstacle {
     /// Whether another obstacle is near enough to be a part of the same vehicle, or to lie within it.
@@ -44,7 +55,25 @@ impl Obstacle {
         // nothing low is as long as a lorry
         let low = self.tallness.is_low() && other.tallness.is_low();
         let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
-        gap <= widest && length <= longest
+        (gap <= widest && length <= longest) || self.has_other_end(other, along, length, t)
+    }
+
+    /// Whether another obstacle, in line and together so long with this one, the better seen, is the other end of the same
+    /// car: in a queue cars are no farther from each other than their own ends are. What begins less than a car's length and
+    /// a gap behind a face is no other car's face; and two ends as far apart as a car's are one car's, which then has both,
+    /// so that the next end is the next car's.
+    fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &Tracking) -> bool {
+        let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
+        if hypot_gate(dvx, dvy) > ENDS_SPEED {
+            return false;
+        }
+        let (x, y) = self.anchor();
+        let ahead = along > self.extent.middle_cm();
+        // the sensor lies behind what it is seen from behind
+        let behind_its_face = ahead == (self.heading.along(x, y) > 0);
+        let confirmed = self.existence.min(other.existence) >= t.confirmed;
+        let ends = self.extent.length_cm().max(other.extent.length_cm()) <= END_CM;
+        (behind_its_face && length < SPACING_CM) || (confirmed && ends && CAR_CM.contains(&length))
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
@@ -176,6 +205,52 @@ mod tests {
         let (mut a, mut b) = two(50, 0, 2000);
         (a.tallness, b.tallness) = (low(), low());
         assert!(a.is_one_with(&b, &t), "8.5 m");
+    }
+
+    /// Two ends of cars that creep at 2 m/s, as long as given and so far apart between their outer ends, the second
+    /// ahead of the first and both ahead of the sensor.
+    fn ends(lengths_cm: [i32; 2], over_all_cm: i32, x_cm: i32) -> [Obstacle; 2] {
+        let t = rules();
+        let of = |rear_cm: i32, length_cm: i32| {
+            let mut o = Obstacle::new(&seen_at(rear_cm + length_cm / 2, 0, 0), AHEAD, 200);
+            o.extent = Extent { rear_cm: -length_cm / 2, front_cm: length_cm / 2 };
+            (o.lateral_weight, o.existence) = (MOST_WEIGHT, t.existence_max);
+            o
+        };
+        [of(x_cm, lengths_cm[0]), of(x_cm + over_all_cm - lengths_cm[1], lengths_cm[1])]
+    }
+
+    #[test]
+    fn what_begins_behind_a_face_by_less_than_a_car_and_a_gap_is_that_cars_other_end() {
+        let t = rules();
+        // neither is short; ahead of the sensor the face is the rear, behind it the front
+        let [near, far] = ends([170, 40], 460, 3000);
+        assert!(near.is_one_with(&far, &t) && !far.is_one_with(&near, &t));
+        let [far, near] = ends([40, 170], 460, -3500);
+        assert!(near.is_one_with(&far, &t) && !far.is_one_with(&near, &t));
+        let [near, far] = ends([170, 40], 500, 3000);
+        assert!(!near.is_one_with(&far, &t), "the next car's face");
+        let [near, mut far] = ends([170, 40], 460, 3000);
+        far.velocity.0 += 130 << FRACTION;
+        assert!(!near.is_one_with(&far, &t), "it comes nearer");
+    }
+
+    #[test]
+    fn two_ends_as_far_apart_as_a_cars_are_one_car_and_the_next_is_the_next_cars() {
+        let t = rules();
+        let one = |lengths: [i32; 2], over_all: i32, x: i32| {
+            let [a, b] = ends(lengths, over_all, x);
+            (a.is_one_with(&b, &t), b.is_one_with(&a, &t))
+        };
+        assert_eq!(one([95, 95], 500, 3000), (true, true));
+        assert_eq!(one([95, 95], 500, -3500), (true, true));
+        assert_eq!(one([95, 95], 540, 3000), (false, false), "ends of two cars");
+        assert_eq!(one([40, 40], 390, -3500).0, false, "too short for a car; its face is the other one");
+        assert_eq!(one([490, 95], 900, 3000), (false, false), "one that has both its ends");
+        assert_eq!(one([160, 95], 500, 3000), (false, false), "more than an end");
+        let [mut a, b] = ends([95, 95], 500, 3000);
+        a.existence = t.confirmed - 1;
+        assert!(!a.is_one_with(&b, &t) && !b.is_one_with(&a, &t), "perhaps it is nothing");
     }
 
     #[test]

@@ -315,11 +315,18 @@ impl Obstacle {
         let widest = if coupled { self.distance_at(rules.coupled_headway, rules) } else { self.gap(rules) };
         let uncertain = rules.sigmas * (self.lateral_sigma() + other.lateral_sigma());
         let abreast = if gap <= 0.0 { rules.abreast } else { 0.0 };
+        let near =
+            gap <= widest && whole <= if self.is_low() && other.is_low() { LONGEST_LOW } else { rules.max_length };
+        // the ends of a car that is creeping
+        let behind_its_face = (ahead > self.extent.middle()) == (along(self.heading, self.anchor) > 0.0);
+        let confirmed = self.existence.min(other.existence) >= rules.confirm_hits;
+        let ends = self.extent.length().max(other.extent.length()) <= 1.5;
+        let other_end =
+            apart <= 1.0 && ((behind_its_face && whole < 4.8) || (confirmed && ends && (4.0..=5.2).contains(&whole)));
         apart <= rules.merge_speed
             && along(self.heading, other.heading) >= rules.merge_parallel
             && left.abs() <= abreast.max(rules.merge_lateral + uncertain)
-            && gap <= widest
-            && whole <= if self.is_low() && other.is_low() { LONGEST_LOW } else { rules.max_length }
+            && (near || other_end)
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be.
