@@ -58,10 +58,10 @@ impl Obstacle {
         (gap <= widest && length <= longest) || self.has_other_end(other, along, length, t)
     }
 
-    /// Whether another obstacle, in line and together so long with this one, the better seen, is the other end of the same
-    /// car: in a queue cars are no farther from each other than their own ends are. What begins less than a car's length and
-    /// a gap behind a face is no other car's face; and two ends as far apart as a car's are one car's, which then has both,
-    /// so that the next end is the next car's.
+    /// Whether another obstacle, in line and together so long with this one, which is seen better, is the other end of the
+    /// same car. Gaps do not tell: in a queue cars are as close to each other as their own ends are. But no face of another
+    /// car lies less than a car's length and a gap behind a face. And two ends as far apart as a car's are one car's; it
+    /// then has both, so the next end is the next car's.
     fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &Tracking) -> bool {
         let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
         if hypot_gate(dvx, dvy) > ENDS_SPEED {
@@ -69,7 +69,7 @@ impl Obstacle {
         }
         let (x, y) = self.anchor();
         let ahead = along > self.extent.middle_cm();
-        // the sensor lies behind what it is seen from behind
+        // what lies ahead of the sensor shows it the face that is nearer, and its other end is farther away
         let behind_its_face = ahead == (self.heading.along(x, y) > 0);
         let confirmed = self.existence.min(other.existence) >= t.confirmed;
         let ends = self.extent.length_cm().max(other.extent.length_cm()) <= END_CM;
