@@ -30,8 +30,8 @@ impl Obstacle {
     /// away than vehicles keep from each other at this speed.
     #[inline]
     pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
-        let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
-        if hypot_gate(dvx, dvy) > t.merge_speed {
+        let apart = hypot_gate(self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
+        if apart > t.merge_speed {
             return false;
         }
         if self.heading.cosine(other.heading) < MERGE_PARALLEL {
@@ -49,24 +49,20 @@ impl Obstacle {
         }
         let length = front.max(self.extent.front_cm) - rear.min(self.extent.rear_cm);
         let coupled = i32::from(self.travelled_cm.min(other.travelled_cm)) >= t.coupled_way_cm
-            && hypot_gate(dvx, dvy) <= t.coupled_speed
+            && apart <= t.coupled_speed
             && left.abs() <= t.merge_lateral_cm;
         let widest = if coupled { self.headway_cm(t.coupled_headway, t) } else { self.gap_cm(t) };
         // nothing low is as long as a lorry
         let low = self.tallness.is_low() && other.tallness.is_low();
         let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
-        (gap <= widest && length <= longest) || self.has_other_end(other, along, length, t)
+        (gap <= widest && length <= longest) || (apart <= ENDS_SPEED && self.has_other_end(other, along, length, t))
     }
 
-    /// Whether another obstacle, in line and together so long with this one, which is seen better, is the other end of the
+    /// Whether another obstacle, in line, as fast and together so long with this one, which is seen better, is the other end of the
     /// same car. Gaps do not tell: in a queue cars are as close to each other as their own ends are. But no face of another
     /// car lies less than a car's length and a gap behind a face. And two ends as far apart as a car's are one car's; it
     /// then has both, so the next end is the next car's.
     fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &Tracking) -> bool {
-        let (dvx, dvy) = (self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
-        if hypot_gate(dvx, dvy) > ENDS_SPEED {
-            return false;
-        }
         let (x, y) = self.anchor();
         let ahead = along > self.extent.middle_cm();
         // what lies ahead of the sensor shows it the face that is nearer, and its other end is farther away

@@ -25,7 +25,6 @@ use crate::recording::{Frame, RadarDetection, Recording};
 const BUS: Bus = BUSES[2];
 /// Its sender's number.
 const SENSOR: u8 = 1;
-const ESTIMATOR: &str = "radar-3d";
 
 /// Finds every instant of a recording, at the frames of its first radar; labels are compared with that one's map. With a
 /// table its cells have their probabilities, and the receiver's the levels that are sent of them.
@@ -40,7 +39,9 @@ pub fn fill(
 ) -> Result<()> {
     let Some((recording, others)) = radars.split_first() else { return Ok(()) };
     let mut others = others.iter().map(|other| Beside::new(other, settings)).collect::<Result<Vec<_>>>()?;
-    let name = if others.is_empty() { ESTIMATOR.to_owned() } else { recording.sensor.name.clone() };
+    let mut estimator = estimators::own(recording, &settings.estimators)?;
+    let own_name = estimator.name().to_owned();
+    let name = if others.is_empty() { own_name.clone() } else { recording.sensor.name.clone() };
     let mut running = vec![estimators::own(recording, &settings.estimators)?];
     let frames = recording.frames.len();
     instants.say(format!("comparing {frames} frames with the labels"));
@@ -50,7 +51,6 @@ pub fn fill(
     instants.say("sending the maps over a bus");
     let mut received = receiver(recording, settings, table.map(|(quantiser, _)| quantiser))?;
     instants.say(format!("{frames} frames"));
-    let mut estimator = estimators::own(recording, &settings.estimators)?;
     let all: Vec<usize> = (0..frames).collect();
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let mut outcome = Ok(());
@@ -69,7 +69,7 @@ pub fn fill(
         let mut boxes = Vec::new();
         for object in &objects {
             let track = recording.truth.as_ref().and_then(|truth| truth.tracks.get(object.track));
-            let judged = replay.judged(ESTIMATOR, k, object.track);
+            let judged = replay.judged(&own_name, k, object.track);
             if let Some((visible, detected)) = judged {
                 counts.add(visible, detected);
             }
