@@ -33,7 +33,7 @@ const HEADING_LENGTHS: f64 = 0.5;
 const ROUNDS: usize = 40;
 const HALVINGS: usize = 20;
 /// A track that nowhere gets this far from its start stands, metres.
-const STANDS_M: f64 = 0.5;
+pub const STANDS_M: f64 = 0.5;
 /// How far the drawn line may be from the near face between two points, metres.
 const LINE_M: f64 = 2.0;
 /// Cosine of the aspect from which on the near face is the rear or the front.

@@ -71,7 +71,7 @@ pub enum TrackError {
 }
 
 /// Farthest from the recording's start and from the road frame's origin a point may lie, seconds and metres.
-const FARTHEST: f64 = 1e6;
+pub const FARTHEST: f64 = 1e6;
 
 impl LabelTrack {
     /// Length, width, height in metres; of a class nobody knows, a car's.

@@ -9,6 +9,7 @@ use axum::extract::{DefaultBodyLimit, Path, State};
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use serde::Deserialize;
 
 use super::labels::{Labels, NotSaved};
 use super::points::{self, Description};
@@ -17,8 +18,9 @@ use super::visibility::Maps;
 use super::{as_json, assets, broken, camera, json};
 use crate::estimators::Options;
 use crate::labels::Site;
+use crate::labels::proposals::follow::Follower;
 use crate::labels::proposals::propose;
-use crate::labels::tracks::LabelTrack;
+use crate::labels::tracks::{LabelPoint, LabelTrack, TrackError};
 use crate::recording::Recording;
 use crate::results::files::Target;
 
@@ -37,6 +39,7 @@ pub struct Labelling {
     labels: Labels,
     maps: Maps,
     proposals: OnceLock<Vec<u8>>,
+    follower: OnceLock<Follower>,
     images: camera::Images,
 }
 
@@ -51,9 +54,11 @@ impl Labelling {
         let labels = Labels::new(file, labels, Site::of(&recording))?;
         labels.read()?;
         let images = camera::Images::of(file);
-        let this = Arc::new(Self { recording, labels, maps: Maps::default(), proposals: OnceLock::new(), images });
+        let (maps, proposals, follower) = (Maps::default(), OnceLock::new(), OnceLock::new());
+        let this = Arc::new(Self { recording, labels, maps, proposals, follower, images });
         let worker = this.clone();
         std::thread::spawn(move || {
+            worker.follower.get_or_init(|| Follower::new(&worker.recording));
             let found = serde_json::to_vec(&propose(&worker.recording, &|_| ()));
             let _ = worker.proposals.set(found.unwrap_or_else(|_| b"[]".to_vec()));
             if let Err(error) = worker.maps.fill(&worker.recording, &options) {
@@ -74,6 +79,7 @@ impl Labelling {
             .route(&path("/visibility/{frame}"), get(visibility))
             .route(&path("/camera/{frame}"), get(image))
             .route(&path("/proposals"), get(proposals))
+            .route(&path("/follow"), post(follow))
             .route(&path("/labels"), get(labels).put(save))
             .route(&path("/boxes"), get(boxes))
             .route(&path("/writer"), post(hold))
@@ -113,6 +119,42 @@ async fn proposals(State(this): Shared) -> Response {
     match this.proposals.get() {
         Some(found) => as_json(found.clone()),
         None => (StatusCode::ACCEPTED, "not found yet\n").into_response(),
+    }
+}
+
+/// A click on a vehicle: its track as it is, where the click was, and the tracks of others.
+#[derive(Deserialize)]
+struct Click {
+    track: LabelTrack,
+    click: LabelPoint,
+    others: Vec<LabelTrack>,
+}
+
+/// The track through a click; 204 where nothing is to follow, 202 while the reflections are not sorted yet.
+async fn follow(State(this): Shared, body: Bytes) -> Response {
+    let click: Click = match serde_json::from_slice(&body) {
+        Ok(click) => click,
+        Err(error) => {
+            return (StatusCode::UNPROCESSABLE_ENTITY, format!("this is no click: {error}\n")).into_response();
+        }
+    };
+    let checked = click.others.iter().try_for_each(LabelTrack::check);
+    let own = match click.track.check() {
+        // one that begins has no points
+        Err(TrackError::TooFewPoints { .. }) => Ok(()),
+        other => other,
+    };
+    if let Err(error) = checked.and(own) {
+        return (StatusCode::UNPROCESSABLE_ENTITY, format!("{error}\n")).into_response();
+    }
+    let found = tokio::task::spawn_blocking(move || {
+        let follower = this.follower.get().ok_or(StatusCode::ACCEPTED)?;
+        follower.through(&click.track, click.click, &click.others).ok_or(StatusCode::NO_CONTENT)
+    });
+    match found.await {
+        Ok(Ok(track)) => json(&track),
+        Ok(Err(status)) => status.into_response(),
+        Err(error) => broken(&error.into()),
     }
 }
 

@@ -20,6 +20,7 @@
 
 mod assembly;
 mod exclusion;
+pub mod follow;
 mod joining;
 mod lane;
 mod lanes;

@@ -114,6 +114,13 @@ class Page {
     this.release(this.active, cursor, false, taken);
   }
 
+  // From where the mouse is, or the cursor.
+  follow() {
+    const under = Object.values(this.plots).find((plot) => plot.element.matches(':hover'));
+    const plot = under ?? this.active;
+    this.session.follow(plot.name, plot.here());
+  }
+
   nudge(right, up) {
     const { session, active } = this;
     if (!session.track || session.point === null) return;

@@ -23,6 +23,9 @@ export class Session {
     this.point = null;
     this.drawing = null;
     this.joining = null;
+    // the class of new tracks, and whether an answer to a click is waited for
+    this.kind = 'car';
+    this.following = false;
     this.now = 0;
     this.window = 0.25;
     this.colouring = 'rcs';
@@ -144,16 +147,52 @@ export class Session {
 
   // A point at a place of a plot, which gives two of time, x and y.
   draw(plot, [a, b]) {
-    const old = tracks.find(this.tracks, this.drawing) ?? { id: this.drawing, class: 'car', points: [] };
+    const old = tracks.find(this.tracks, this.drawing) ?? { id: this.drawing, class: this.kind, points: [] };
     const time = plot === 'plan' ? this.now : a;
     if (time < 0 || time > this.duration) return this.say('The recording has no reflections at this time.');
     const missing = { along: 'y', across: 'x' }[plot];
-    const point = plot === 'plan' ? [time, a, b] : this.completed(old, time, missing, b);
+    const point = this.placed(old, plot, [a, b]);
     if (missing) this.guessed.add(point);
     const { track, index } = tracks.withPoint(old, point);
     const next = missing ? this.guessedAgain(track, missing) : track;
     if (this.change(tracks.withTrack(this.tracks, next))) this.select(next.id, index);
     return undefined;
+  }
+
+  // A place of a plot as time, x and y.
+  placed(track, plot, [a, b]) {
+    const missing = { along: 'y', across: 'x' }[plot];
+    return missing ? this.completed(track, a, missing, b) : [this.now, a, b];
+  }
+
+  // Asks the machine to follow what is at a place of a plot: a new way for the selected track, or a new track.
+  async follow(plot, place) {
+    if (!this.canWrite()) return this.say(READ_ONLY);
+    if (this.following) return undefined;
+    this.finish();
+    const before = this.track;
+    const track = before ?? { id: tracks.newId(this.tracks), class: this.kind, points: [] };
+    const click = this.placed(track, plot, place);
+    const others = this.tracks.filter((other) => other !== before && other.points.length > 1);
+    this.following = true;
+    this.say('Following.');
+    let answer = null;
+    try {
+      const body = JSON.stringify({ track, click, others });
+      answer = await fetch('follow', { method: 'POST', headers: { 'content-type': 'application/json' }, body });
+    } catch {
+      answer = null;
+    }
+    this.following = false;
+    if (answer?.status === 202) return this.say('The reflections are not sorted yet: press G again in a moment.');
+    if (answer?.status === 204) return this.say('There is nothing to follow: point at reflections of a vehicle, or set points with N.');
+    if (!answer?.ok) return this.say(answer ? (await answer.text()).trim() : 'The server does not answer: nothing was followed.');
+    const followed = await answer.json();
+    // it may have been changed or deleted meanwhile
+    if (tracks.find(this.tracks, track.id) !== before) return this.say('The track was changed meanwhile: press G again.');
+    if (!this.change(tracks.withTrack(this.tracks, followed))) return undefined;
+    this.select(followed.id);
+    return this.say(`Track ${followed.id}: ${tracks.begins(followed).toFixed(1)} to ${tracks.ends(followed).toFixed(1)} s; Ctrl+Z takes it back.`);
   }
 
   // A point with the coordinate that the plot does not show.
@@ -239,7 +278,10 @@ export class Session {
       current.track.class = kind;
       return this.changed('proposal');
     }
-    if (!this.track) return this.say('Select a track first.');
+    if (!this.track) {
+      this.kind = kind;
+      return this.say(`The class of new tracks is ${kind}.`);
+    }
     return this.change(tracks.withTrack(this.tracks, { ...this.track, class: kind }));
   }
 

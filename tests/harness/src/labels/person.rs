@@ -1,0 +1,361 @@
+//! A person who knows the truth and works at the label page: what it does, and how many actions that takes.
+//!
+//! # Model
+//! The person looks at each proposal, the best first. One that lies on a vehicle for most of its time is accepted; one
+//! that continues or precedes an accepted piece of the same vehicle is accepted and joined; one that lies elsewhere, or
+//! on a vehicle that is labelled there already, is rejected. Then it looks where a vehicle is seen well for a second and
+//! its label is missing or elsewhere: it clicks on the vehicle there, which is [followed](Follower) from the click, and
+//! takes back what did not help. What a click does not mend gets points. A vehicle that nothing was offered for begins
+//! with a click, too, and is drawn where that does not hold.
+//!
+//! # Actions
+//! Accepting, rejecting, joining, correcting a class, a click to follow and taking it back count one each; drawing one,
+//! and each point that is set one.
+
+use std::collections::BTreeMap;
+
+use super::Site;
+use super::near_face::{self, BoxStep, boxes};
+use super::proposals::Proposal;
+use super::proposals::follow::Follower;
+use super::tracks::{LabelPoint, LabelTrack};
+use crate::geometry::polygon::Convex;
+use crate::geometry::solid::Solid;
+use crate::recording::labels::class_size;
+use crate::recording::truth::{Label, Object, Truth};
+
+/// Share of the smaller footprint that two boxes of one vehicle have in common.
+const OVERLAP: f64 = 0.2;
+/// Share of its time a proposal has to lie on one vehicle to be accepted; where it leaves it, it is mended.
+const ACCEPTED: f64 = 0.5;
+/// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
+const SEEN: (u32, f64) = (15, 1.0);
+/// How often the person looks for something to mend.
+const LOOKS: usize = 3;
+/// How often it clicks on one vehicle, and how many clicks without success it takes to give up.
+const CLICKS: usize = 6;
+const FAILURES: usize = 2;
+/// Points of a streak that is straight, and from how many seconds on it is long.
+const STRAIGHT: (usize, f64) = (2, 5.0);
+/// Frames a click has to mend to be kept.
+const HELPS: usize = 10;
+/// The person clicks where most is seen within so many frames, not at the very ends of a stretch, a share of it.
+const AROUND: usize = 10;
+const ENDS: usize = 10;
+/// How far a drawn line is from the vehicle, metres.
+const DRAWN_M: f64 = 0.8;
+
+/// What the person did.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Actions {
+    pub accepted: u32,
+    pub rejected: u32,
+    pub joined: u32,
+    pub reclassed: u32,
+    /// Clicks from which a vehicle was followed, and those that were taken back.
+    pub followed: u32,
+    /// Points set to mend what was accepted.
+    pub mended: u32,
+    pub drawn: u32,
+    /// Points of what was drawn.
+    pub points: u32,
+}
+
+impl Actions {
+    pub fn all(&self) -> u32 {
+        let offered = self.accepted + self.rejected + self.joined + self.reclassed;
+        offered + self.followed + self.mended + self.drawn + self.points
+    }
+}
+
+/// Truth of one frame with what was detected of it.
+pub struct Instant {
+    pub time_ns: i64,
+    pub objects: Vec<Object>,
+    /// Detections of each.
+    pub detections: Vec<u32>,
+}
+
+impl Instant {
+    /// A road user with its detections.
+    fn of(&self, vehicle: usize) -> Option<(&Object, u32)> {
+        let k = self.objects.iter().position(|o| o.track == vehicle)?;
+        Some((&self.objects[k], self.detections[k]))
+    }
+}
+
+/// One vehicle over the recording.
+#[derive(Default)]
+pub struct Vehicle {
+    pub first: Option<usize>,
+    pub last: usize,
+    pub detections: u32,
+}
+
+/// What the person knows, and its tool.
+pub struct Person<'a> {
+    pub truth: &'a Truth,
+    pub instants: &'a [Instant],
+    /// Tracks of the truth that count.
+    pub moving: &'a [bool],
+    /// Those that were detected.
+    pub vehicles: &'a BTreeMap<usize, Vehicle>,
+    pub follower: &'a Follower,
+    pub site: Site,
+}
+
+/// Frames in which a vehicle is seen well and its label is missing or elsewhere.
+#[derive(Clone, Copy)]
+struct Missing {
+    begin: usize,
+    end: usize,
+    detections: u32,
+}
+
+impl Missing {
+    fn frames(&self) -> usize {
+        self.end + 1 - self.begin
+    }
+}
+
+impl Person<'_> {
+    /// Works through proposals: the labels with the vehicle each is of, and what that took.
+    pub fn works_through(&self, proposals: &[Proposal]) -> (Vec<(usize, LabelTrack)>, Actions) {
+        let mut actions = Actions::default();
+        let mut labels = self.accepts(proposals, &mut actions);
+        let offered = labels.len();
+        for (k, vehicle) in self.vehicles {
+            if labels.iter().all(|(l, _)| l != k) && self.is_seen(vehicle) {
+                let (id, class) = (self.truth.tracks[*k].id.clone(), self.truth.tracks[*k].class.clone());
+                labels.push((*k, LabelTrack { id, class, size_m: None, points: Vec::new() }));
+            }
+        }
+        for k in 0..labels.len() {
+            let Some(seen) = self.vehicles.get(&labels[k].0) else { continue };
+            if k >= offered {
+                // of another class than a car it is said before
+                actions.reclassed += u32::from(labels[k].1.class != "car");
+            }
+            self.clicks(&mut labels, k, seen, &mut actions);
+            let (vehicle, track) = &mut labels[k];
+            if track.points.is_empty() {
+                actions.drawn += 1;
+                let span = seen.first.map_or(0..=0, |first| first..=seen.last);
+                track.points = self.nears(&self.instants[span], *vehicle, track.size());
+                actions.points += track.points.len() as u32;
+                continue;
+            }
+            // what was set changes the boxes beside it, so the person looks again
+            for _ in 0..LOOKS {
+                let points = self.mends(*vehicle, track, seen);
+                actions.mended += points;
+                if points == 0 {
+                    break;
+                }
+            }
+        }
+        (labels, actions)
+    }
+
+    /// Accepted pieces, joined, by vehicle.
+    fn accepts(&self, proposals: &[Proposal], actions: &mut Actions) -> Vec<(usize, LabelTrack)> {
+        let mut pieces: BTreeMap<usize, Vec<LabelTrack>> = BTreeMap::new();
+        for (proposal, vehicle) in proposals.iter().zip(self.vehicles_of(proposals)) {
+            match vehicle {
+                Some(vehicle) => {
+                    actions.accepted += 1;
+                    pieces.entry(vehicle).or_default().push(proposal.track.clone());
+                }
+                None => actions.rejected += 1,
+            }
+        }
+        let mut labels = Vec::new();
+        for (vehicle, mut pieces) in pieces {
+            pieces.sort_by(|a, b| a.points[0].time_s.total_cmp(&b.points[0].time_s));
+            let joined = pieces.into_iter().map(Ok).reduce(|before, piece| {
+                actions.joined += 1;
+                before?.joined(&piece?)
+            });
+            let Some(Ok(mut whole)) = joined else { continue };
+            let Truth { tracks, .. } = self.truth;
+            whole.id = tracks[vehicle].id.clone();
+            if whole.class != tracks[vehicle].class {
+                actions.reclassed += 1;
+                whole.class = tracks[vehicle].class.clone();
+            }
+            labels.push((vehicle, whole));
+        }
+        labels
+    }
+
+    /// The vehicle each proposal is accepted for.
+    pub fn vehicles_of(&self, proposals: &[Proposal]) -> Vec<Option<usize>> {
+        let mut all: Vec<Option<usize>> = Vec::new();
+        for proposal in proposals {
+            let label = Truth::new(labels(&proposal.track, &self.site));
+            let (mut steps, mut hits) = (0_u64, BTreeMap::<usize, u64>::new());
+            for instant in self.instants {
+                let Some(own) = label.at(instant.time_ns).first().map(|o| o.solid) else { continue };
+                steps += 1;
+                for o in instant.objects.iter().filter(|o| self.moving[o.track] && overlaps(&own, &o.solid)) {
+                    *hits.entry(o.track).or_default() += 1;
+                }
+            }
+            let best = hits.into_iter().max_by_key(|(_, n)| *n).filter(|(_, n)| *n as f64 >= ACCEPTED * steps as f64);
+            let vehicle = best.map(|(vehicle, _)| vehicle);
+            // one that is labelled at that time already is rejected
+            let labelled = |before: &Proposal| same_time(&before.track, &proposal.track);
+            let again =
+                vehicle.is_some() && proposals.iter().zip(&all).any(|(before, v)| *v == vehicle && labelled(before));
+            all.push(vehicle.filter(|_| !again));
+        }
+        all
+    }
+
+    fn seconds(&self, frame: usize) -> f64 {
+        self.instants[frame].time_ns.saturating_sub(self.site.start_ns) as f64 * 1e-9
+    }
+
+    fn is_seen(&self, vehicle: &Vehicle) -> bool {
+        let lasts_s = vehicle.first.map_or(0.0, |first| self.seconds(vehicle.last) - self.seconds(first));
+        vehicle.detections >= SEEN.0 && lasts_s >= SEEN.1
+    }
+
+    /// Where something of a label is to be mended.
+    fn missing(&self, vehicle: usize, track: &LabelTrack, seen: &Vehicle) -> Vec<Missing> {
+        let label = Truth::new(labels(track, &self.site));
+        let Some(first) = seen.first else { return Vec::new() };
+        let mut all: Vec<Missing> = Vec::new();
+        let mut open = false;
+        for frame in first..=seen.last {
+            let instant = &self.instants[frame];
+            let Some((real, detections)) = instant.of(vehicle) else { continue };
+            let good = label.at(instant.time_ns).first().is_some_and(|l| overlaps(&l.solid, &real.solid));
+            match all.last_mut() {
+                Some(m) if open && !good => (m.end, m.detections) = (frame, m.detections + detections),
+                _ if !good => all.push(Missing { begin: frame, end: frame, detections }),
+                _ => {}
+            }
+            open = !good;
+        }
+        all.retain(|m| m.detections >= SEEN.0 && self.seconds(m.end) - self.seconds(m.begin) >= SEEN.1);
+        all
+    }
+
+    /// Frames in which there is a label, and the vehicle is not there.
+    fn elsewhere(&self, vehicle: usize, track: &LabelTrack) -> usize {
+        let label = Truth::new(labels(track, &self.site));
+        let wrong = |instant: &&Instant| {
+            let real = instant.of(vehicle).map(|(real, _)| real.solid);
+            label.at(instant.time_ns).first().is_some_and(|l| !real.is_some_and(|real| overlaps(&l.solid, &real)))
+        };
+        self.instants.iter().filter(wrong).count()
+    }
+
+    /// Clicks on a vehicle where its label is missing or elsewhere, and takes back what did not help.
+    fn clicks(&self, labels: &mut [(usize, LabelTrack)], k: usize, seen: &Vehicle, actions: &mut Actions) {
+        let others: Vec<LabelTrack> =
+            labels.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, (_, track))| track.clone()).collect();
+        let (vehicle, track) = &mut labels[k];
+        let missing = |all: &[Missing]| all.iter().map(Missing::frames).sum::<usize>();
+        let mut failed = Vec::new();
+        for _ in 0..CLICKS {
+            let all = self.missing(*vehicle, track, seen);
+            // a long straight streak has its two points as soon
+            let bent = |m: &Missing| {
+                let points = self.nears(&self.instants[m.begin..=m.end], *vehicle, track.size());
+                points.len() > STRAIGHT.0 || self.seconds(m.end) - self.seconds(m.begin) < STRAIGHT.1
+            };
+            let Some(stretch) = all.iter().find(|m| !failed.contains(&m.begin) && bent(m)) else { return };
+            let Some(click) = self.click(*vehicle, track, stretch) else { return };
+            let next = self.follower.through(track, click, &others);
+            let left = next.as_ref().map_or(usize::MAX, |next| {
+                missing(&self.missing(*vehicle, next, seen)) + self.elsewhere(*vehicle, next)
+            });
+            actions.followed += 1;
+            // of a vehicle without a label a click has to give most
+            let before = missing(&all) + self.elsewhere(*vehicle, track);
+            let enough = if track.points.is_empty() { before / 2 } else { before.saturating_sub(HELPS) };
+            match next.filter(|_| left < enough) {
+                Some(next) => *track = next,
+                None => {
+                    actions.followed += 1;
+                    failed.push(stretch.begin);
+                    if failed.len() >= FAILURES || track.points.is_empty() {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where the person clicks: on the near face where most is seen.
+    fn click(&self, vehicle: usize, track: &LabelTrack, missing: &Missing) -> Option<LabelPoint> {
+        let seen = |frame: &usize| -> u32 {
+            let near = &self.instants[frame.saturating_sub(AROUND)..(frame + AROUND).min(self.instants.len())];
+            near.iter().filter_map(|i| i.of(vehicle)).map(|(_, detections)| detections).sum()
+        };
+        let ends = (missing.end - missing.begin) / ENDS;
+        let frame = (missing.begin + ends..=missing.end - ends).max_by_key(seen)?;
+        self.nears(&self.instants[frame..=frame], vehicle, track.size()).first().copied()
+    }
+
+    /// Sets points where the label is missing or elsewhere; how many.
+    fn mends(&self, vehicle: usize, track: &mut LabelTrack, seen: &Vehicle) -> u32 {
+        let mut set = 0;
+        for missing in self.missing(vehicle, track, seen) {
+            let [from_s, to_s] = [missing.begin, missing.end].map(|frame| self.seconds(frame));
+            let points = self.nears(&self.instants[missing.begin..=missing.end], vehicle, track.size());
+            track.points.retain(|p| p.time_s < from_s || p.time_s > to_s);
+            track.points.extend(&points);
+            track.points.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+            set += points.len() as u32;
+        }
+        set
+    }
+
+    /// The near face of a real vehicle in few points.
+    fn nears(&self, instants: &[Instant], vehicle: usize, size: [f64; 3]) -> Vec<LabelPoint> {
+        let step = |instant: &Instant| {
+            let solid = instant.of(vehicle)?.0.solid;
+            let time_s = instant.time_ns.saturating_sub(self.site.start_ns) as f64 * 1e-9;
+            Some(BoxStep { time_s, center: [solid.center[0], solid.center[1]], heading_rad: solid.yaw_rad })
+        };
+        let steps: Vec<BoxStep> = instants.iter().filter_map(step).collect();
+        near_face::drawn(&steps, size, self.site.sensor, DRAWN_M)
+    }
+}
+
+/// Which tracks of the truth move and have a class with a size.
+pub fn road_users(truth: &Truth) -> Vec<bool> {
+    truth.tracks.iter().map(|t| t.moves() && class_size(&t.class).is_some()).collect()
+}
+
+/// The labels of a track, as reading its file gives them.
+pub fn labels(track: &LabelTrack, site: &Site) -> Vec<Label> {
+    let size = track.size();
+    let label = |b: BoxStep| Label {
+        time_ns: site.start_ns.saturating_add((b.time_s * 1e9).round() as i64),
+        id: track.id.clone(),
+        class: track.class.clone(),
+        solid: Solid { center: [b.center[0], b.center[1], size[2] / 2.0], yaw_rad: b.heading_rad, size },
+    };
+    let boxes = if track.points.is_empty() { Vec::new() } else { boxes(track, site.sensor) };
+    boxes.into_iter().map(label).collect()
+}
+
+pub fn overlaps(a: &Solid, b: &Solid) -> bool {
+    let reach = a.size[0].hypot(a.size[1]) + b.size[0].hypot(b.size[1]);
+    if (a.center[0] - b.center[0]).hypot(a.center[1] - b.center[1]) * 2.0 > reach {
+        return false;
+    }
+    let [p, q] = [a, b].map(|s| Convex::hull(s.footprint().to_vec()));
+    p.within(&q).area() >= OVERLAP * p.area().min(q.area())
+}
+
+fn same_time(a: &LabelTrack, b: &LabelTrack) -> bool {
+    match (a.span_s(), b.span_s()) {
+        (Some([a, b]), Some([c, d])) => a <= d && c <= b,
+        _ => false,
+    }
+}
