@@ -272,6 +272,10 @@ impl Page {
         self.mouse(MouseReleased, last, modifiers, None);
     }
 
+    pub fn hover(&self, at: [f64; 2]) {
+        self.mouse(DispatchMouseEventTypeOption::MouseMoved, at, 0, None);
+    }
+
     pub fn wheel(&self, at: [f64; 2], delta: f64) {
         self.mouse(DispatchMouseEventTypeOption::MouseWheel, at, 0, Some(delta));
     }

@@ -169,6 +169,70 @@ fn a_track_is_drawn_with_the_keyboard_alone_and_in_the_plan() {
 }
 
 #[test]
+fn a_vehicle_that_is_pointed_at_is_followed_by_one_key() {
+    let Some(browser) = Browser::start("following") else { return };
+    let server = Server::start(&recording("following"));
+    let page = browser.open(&server.url);
+    page.until_saved();
+    page.until("viewshed.session.proposals.shown");
+    // the machine's first proposal is right; it stands beside the file, so that it can be compared
+    let offered = page.ask("viewshed.session.proposals.current.track");
+    let span = [0, points(&offered).len() - 1].map(|k| points(&offered)[k][0]);
+    let at = |time: f64| {
+        let all = points(&offered);
+        let k = (1..all.len() - 1).find(|k| all[*k][0] >= time).unwrap_or(all.len() - 1);
+        let share = (time - all[k - 1][0]) / (all[k][0] - all[k - 1][0]);
+        [1, 2].map(|i| all[k - 1][i] + share * (all[k][i] - all[k - 1][i]))
+    };
+    let agrees = |track: &Value, what: &str| {
+        let of = points(track);
+        let [first, last] = [of[0][0], of[of.len() - 1][0]];
+        assert!(last - first > 0.8 * (span[1] - span[0]), "{what}: {first} to {last} s of {span:?}");
+        for [time, x, y] in of.iter().filter(|p| p[0] > span[0] && p[0] < span[1]) {
+            let place = at(*time);
+            assert!((x - place[0]).hypot(y - place[1]) < 3.0, "{what}: {x} {y} at {time} s, not {place:?}");
+        }
+    };
+    // from above, at the time of the slider
+    let middle = 0.5 * (span[0] + span[1]);
+    page.ask(&format!("viewshed.session.goTo({middle})"));
+    page.focus("plan");
+    page.hover(page.screen("plan", at(middle)[0], at(middle)[1]));
+    page.key("g");
+    page.until("viewshed.session.tracks.length === 1");
+    agrees(&tracks(&page)[0], "from above");
+    assert_eq!((&tracks(&page)[0]["id"], &tracks(&page)[0]["class"]), (&"1".into(), &"car".into()));
+    page.until_saved();
+    assert!(fs::read_to_string(&server.labels).unwrap().contains(",1,car,"));
+    // its second half cut off comes back, pointed at over time; one step back takes it away again
+    page.hover(page.screen("along", middle, at(middle)[0]));
+    page.focus("along");
+    page.key("s");
+    page.until("viewshed.session.tracks.length === 2 && viewshed.session.selected === '2'");
+    page.key_with("Delete", SHIFT);
+    page.until("viewshed.session.tracks.length === 1");
+    page.key("PageDown");
+    let half = tracks(&page);
+    let late = 0.25 * span[0] + 0.75 * span[1];
+    page.hover(page.screen("along", late, at(late)[0]));
+    page.key("g");
+    page.until(&format!("viewshed.session.tracks[0].points.at(-1)[0] > {late}"));
+    assert_eq!(tracks(&page).len(), 1);
+    agrees(&tracks(&page)[0], "over time");
+    page.key_with("z", CTRL);
+    assert_eq!(tracks(&page), half);
+    // where nothing is, nothing is followed, and the page says what to do
+    page.key("Escape");
+    page.key("0");
+    let [x, y] = [page.number("viewshed.plots.plan.view.right"), page.number("viewshed.plots.plan.view.top")];
+    page.focus("plan");
+    page.hover(page.screen("plan", x - 2.0, y - 2.0));
+    page.key("g");
+    page.until("viewshed.session.message.includes('nothing to follow')");
+    assert_eq!(tracks(&page), half);
+}
+
+#[test]
 fn a_second_tab_only_reads_until_the_first_is_closed() {
     let Some(browser) = Browser::start("two tabs") else { return };
     let server = Server::start(&recording("tabs"));

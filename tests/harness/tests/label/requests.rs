@@ -225,6 +225,40 @@ fn tracks_that_are_none_are_refused_by_name() {
 }
 
 #[test]
+fn what_is_no_click_is_refused_by_name_and_where_nothing_is_nothing_is_followed() {
+    let server = Server::start(&recording("click"));
+    let own = r#"{"id":"1","class":"car","points":[]}"#;
+    let ask = |track: &str, click: &str, others: &str| {
+        let body = format!(r#"{{"track":{track},"click":{click},"others":{others}}}"#);
+        // until the reflections are sorted
+        (0..500)
+            .map(|_| {
+                sleep(Duration::from_millis(20));
+                server.own("POST", "follow", &[], &body)
+            })
+            .find(|(status, _)| *status != 202)
+            .unwrap()
+    };
+    for (track, click, others, why) in [
+        (own, "[1,80]", "[]", "this is no click"),
+        (own, r#""here""#, "[]", "this is no click"),
+        (r#"{"id":"a","class":"ship","points":[]}"#, "[1,80,3]", "[]", "`ship`"),
+        (r#"{"id":"a","class":"car","points":[[4,80,3],[1,20,3]]}"#, "[1,80,3]", "[]", "track a, point 2"),
+        (own, "[1,80,3]", r#"[{"id":"b","class":"car","points":[[4,80,3],[1,20,3]]}]"#, "track b, point 2"),
+        (own, "[1,80,3]", r#"[{"id":"b","class":"car","points":[]}]"#, "track b"),
+    ] {
+        let (status, answer) = ask(track, click, others);
+        assert!(status == 422 && answer.contains(why), "{track} {click} {others}: {answer}");
+    }
+    for nothing in ["[1,-900,3]", "[1,1e300,3]", "[-1e300,80,3]"] {
+        assert_eq!(ask(own, nothing, "[]").0, 204, "{nothing}");
+    }
+    let (status, answer) = server.ask(&["POST /follow HTTP/1.1", &format!("Host: {}", server.host())], "{}");
+    assert!(matches!(status, 400 | 403), "{answer}");
+    assert!(!server.labels.exists(), "a click saves nothing by itself");
+}
+
+#[test]
 fn a_full_disk_is_said_and_what_was_saved_stays() {
     let folder = folder("full");
     let mount = |arguments: &[&str]| Command::new(arguments[0]).args(&arguments[1..]).arg(&folder).status();
