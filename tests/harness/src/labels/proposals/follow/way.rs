@@ -129,7 +129,8 @@ impl Around<'_> {
             Some(self.counts(step.frame, frame) * self.good(step.frame, &label.fitting(step.frame, self)))
         });
         let replaced = way.steps.iter().filter(|step| self.label(step.frame).is_some());
-        let ends = [replaced.clone().next(), replaced.last()].map(|s| s.map_or(0.0, |step| self.seconds(step.frame)));
+        let ends = [replaced.clone().next(), replaced.clone().next_back()]
+            .map(|s| s.map_or(0.0, |step| self.seconds(step.frame)));
         way.good - before.sum::<f64>() + end - REPLACED * (ends[1] - ends[0]).abs()
     }
 
