@@ -61,13 +61,16 @@ impl Follower {
         }
         let frame = self.nearest(click.time_s)?;
         let around = Around::of(track, others, &self.instants, &self.standing, self.site.sensor);
+        let both = |begin: State| [false, true].map(|backwards| around.follow(frame, begin, backwards));
         let tried = around.beginnings(frame, [click.x_m, click.y_m]).into_par_iter().map(|(likely, begin)| {
-            let both = [false, true].map(|backwards| around.follow(frame, begin, backwards));
-            let worth = both.iter().zip([false, true]).map(|(way, backwards)| around.worth(way, frame, backwards));
-            (likely + worth.sum::<f64>(), begin, both)
+            let ways = both(begin);
+            let worth = ways.iter().zip([false, true]).map(|(way, backwards)| around.worth(way, frame, backwards));
+            (likely + worth.sum::<f64>(), begin)
         });
-        let tried: Vec<(f64, State, [Way; 2])> = tried.collect();
-        let (_, begin, both) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        // only the best way is kept: those of a long recording are long
+        let tried: Vec<(f64, State)> = tried.collect();
+        let (_, begin) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let both = both(begin);
         if both.iter().map(|way| way.steps.len()).sum::<usize>() < FEWEST {
             return None;
         }
@@ -133,9 +136,9 @@ fn smoothed(around: &Around, [after, before]: &[Way; 2], click: usize, begin: St
     let smoothed = smooth(&filtered);
     let places: Vec<[f64; 2]> = smoothed.iter().map(|(_, m)| m.place()).collect();
     let by_place = headings(&places, HEADING_BASE_M);
+    let still = places.iter().all(|p| (p[0] - places[0][0]).hypot(p[1] - places[0][1]) < STANDS_M);
     let all = smoothed.iter().zip(by_place).zip(&steps);
     all.map(|(((time_s, m), by_place), step)| {
-        let still = places.iter().all(|p| (p[0] - places[0][0]).hypot(p[1] - places[0][1]) < STANDS_M);
         let heading_rad = if still { step.state.heading_rad } else { by_place };
         BoxStep { time_s: *time_s, center: m.place(), heading_rad }
     })
