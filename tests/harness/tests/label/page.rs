@@ -221,6 +221,18 @@ fn a_vehicle_that_is_pointed_at_is_followed_by_one_key() {
     agrees(&tracks(&page)[0], "over time");
     page.key_with("z", CTRL);
     assert_eq!(tracks(&page), half);
+    // the button waits for a click, for a new track where none is selected
+    page.key("Escape");
+    page.ask("(document.querySelector('button[data-key=follow]').click(), 1)");
+    assert_eq!((page.ask("viewshed.session.pointing"), tracks(&page)), (true.into(), half.clone()));
+    page.key("Escape");
+    assert_eq!(page.ask("viewshed.session.pointing"), false);
+    page.ask("(document.querySelector('button[data-key=follow]').click(), 1)");
+    page.click_plot("along", late, at(late)[0]);
+    page.until("viewshed.session.tracks.length === 2");
+    assert_eq!(page.ask("viewshed.session.pointing"), false);
+    page.key_with("z", CTRL);
+    assert_eq!(tracks(&page), half);
     // where nothing is, nothing is followed, and the page says what to do
     page.key("Escape");
     page.key("0");

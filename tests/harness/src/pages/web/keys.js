@@ -5,7 +5,8 @@ const STEP_PX = 12;
 const FINE_PX = 1;
 const SIDES = [['ArrowUp', 0, 1], ['ArrowDown', 0, -1], ['ArrowLeft', -1, 0], ['ArrowRight', 1, 0]];
 
-// [keys as KeyboardEvent.key, with modifiers before; group; what it does; action; may be held down]
+// [keys as KeyboardEvent.key, with modifiers before; group; what it does; action, told whether its button was pressed; may
+// be held down; its button]
 export function table(page) {
   const { session } = page;
   const plot = () => page.plot();
@@ -19,7 +20,7 @@ export function table(page) {
     ['n', 'Drawing', 'begin a new track', () => session.begin(), false, 'new'],
     ['e', 'Drawing', 'draw on with the selected track', () => session.extend(), false, 'extend'],
     [' ', 'Drawing', 'put a point at the cursor; when not drawing, select what is there', () => page.pick(), false],
-    ['g', 'Drawing', 'follow what is at the cursor to both sides: a way for the selected track, or a new one', () => page.follow(), false, 'follow'],
+    ['g', 'Drawing', 'follow what is at the cursor to both sides: a way for the selected track, or a new one', (button) => page.follow(button), false, 'follow'],
     ['Enter', 'Drawing', 'end the track that is drawn', () => session.finish(), false],
     ['Escape', 'Drawing', 'end drawing, deselect, clear the brush', () => page.escape(), false],
     ['Ctrl+z', 'Changes', 'undo', () => session.undo(), true, 'undo'],
@@ -84,13 +85,13 @@ export function listen(page, keys = table(page)) {
     const entry = keys.find(({ key }) => key === named(event));
     if (!entry) return;
     event.preventDefault();
-    if (!event.repeat || entry.repeats) entry.run();
+    if (!event.repeat || entry.repeats) entry.run(false);
   });
   for (const button of document.querySelectorAll('button[data-key]')) {
     const entry = keys.find((candidate) => candidate.button === button.dataset.key);
     button.title = `${entry.what} (${shown(entry.key)})`;
     button.setAttribute('aria-keyshortcuts', entry.key === ' ' ? 'Space' : entry.key);
-    button.addEventListener('click', () => entry.run());
+    button.addEventListener('click', () => entry.run(true));
   }
   const list = document.getElementById('keys');
   for (const group of new Set(keys.map((entry) => entry.group))) {

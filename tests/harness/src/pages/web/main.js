@@ -92,14 +92,15 @@ class Page {
   }
 
   press(plot, place) {
-    if (this.session.drawing !== null) return null;
+    if (this.session.drawing !== null || this.session.pointing) return null;
     return hit(plot, this.session, plot.toPixel(...place));
   }
 
   release(plot, place, moved, taken) {
     const { session } = this;
     if (moved) return;
-    if (session.drawing !== null) session.draw(plot.name, place);
+    if (session.pointing) session.follow(plot.name, place);
+    else if (session.drawing !== null) session.draw(plot.name, place);
     else if (taken) session.select(taken.id, taken.point);
     else {
       session.select(null);
@@ -114,8 +115,12 @@ class Page {
     this.release(this.active, cursor, false, taken);
   }
 
-  // From where the mouse is, or the cursor.
-  follow() {
+  // From where the mouse is, or the cursor; the button waits for a click, since the mouse is on it.
+  follow(button) {
+    if (button) {
+      this.session.pointAt();
+      return;
+    }
     const under = Object.values(this.plots).find((plot) => plot.element.matches(':hover'));
     const plot = under ?? this.active;
     this.session.follow(plot.name, plot.here());
@@ -184,7 +189,8 @@ class Page {
 
   escape() {
     const { session } = this;
-    if (session.drawing !== null) session.finish();
+    if (session.pointing) session.pointAt(false);
+    else if (session.drawing !== null) session.finish();
     else if (session.selected !== null) session.select(null);
     else session.brushed(null, null);
     session.joining = null;

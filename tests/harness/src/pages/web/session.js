@@ -23,8 +23,9 @@ export class Session {
     this.point = null;
     this.drawing = null;
     this.joining = null;
-    // the class of new tracks, and whether an answer to a click is waited for
+    // the class of new tracks, whether the next click is to be followed, and whether the answer to one is waited for
     this.kind = 'car';
+    this.pointing = false;
     this.following = false;
     this.now = 0;
     this.window = 0.25;
@@ -165,8 +166,16 @@ export class Session {
     return missing ? this.completed(track, a, missing, b) : [this.now, a, b];
   }
 
+  // The next click says what to follow.
+  pointAt(begins = true) {
+    this.pointing = begins && this.canWrite();
+    if (begins && !this.pointing) this.say(READ_ONLY);
+    else this.say(begins ? 'Click on a vehicle to have it followed; Escape leaves it.' : '');
+  }
+
   // Asks the machine to follow what is at a place of a plot: a new way for the selected track, or a new track.
   async follow(plot, place) {
+    this.pointing = false;
     if (!this.canWrite()) return this.say(READ_ONLY);
     if (this.following) return undefined;
     this.finish();
