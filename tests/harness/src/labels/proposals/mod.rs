@@ -10,6 +10,8 @@
 //! makes paths of them in place of the tracker's. `exclusion` drops mirror images, `standing` adds the time in which it
 //! stood before and after, `shape` puts a box around it, and of proposals for one place `exclusion` keeps the best.
 //!
+//! [`follow`] uses the same reflections for what a person points at.
+//!
 //! # Limits
 //! Made for roads with lanes, where it needs few mends. In queues some long vehicles come in pieces and some pairs of
 //! cars as one. At crossings vehicles that turn or stand change places with their neighbours: there expect to draw.

@@ -2,9 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::super::motion::Motion;
 use super::super::reflections::{Instant, Reflection, STANDS_MPS};
-use super::state::State;
 use crate::labels::near_face::{BoxStep, boxes};
 use crate::labels::tracks::LabelTrack;
 
@@ -94,13 +92,6 @@ impl<'a> Around<'a> {
         let beside = frame.checked_sub(1).and_then(|k| self.label(k)).or_else(|| self.label(frame + 1))?;
         let dt_s = beside.time_s - step.time_s;
         (dt_s.abs() > 1e-6).then(|| [0, 1].map(|k| (beside.center[k] - step.center[k]) / dt_s))
-    }
-
-    /// The state that its label tells.
-    pub fn labelled(&self, frame: usize) -> Option<State> {
-        let step = self.label(frame)?;
-        let motion = Motion::new(step.center, self.velocity(frame)?, 0.3, [1.0, 0.0], [0.5; 2]);
-        Some(State { motion, heading_rad: step.heading_rad })
     }
 
     /// Whether a reflection lies in another label's box, and not deeper in one that it is so far beyond.

@@ -54,7 +54,7 @@ impl Around<'_> {
         let near_s = |k: &usize| (self.seconds(*k) - now_s).abs();
         let labelled = (0..self.own.len()).filter(|k| self.label(*k).is_some());
         let nearest = labelled.min_by(|a, b| near_s(a).total_cmp(&near_s(b)));
-        let own = nearest.and_then(|k| self.labelled(k));
+        let own = nearest.and_then(|k| State::labelled(self, k));
         headings.extend(own.map(|own| (own.heading_rad, USUAL)));
         let here =
             self.others.iter().flatten().filter(|(step, size)| {

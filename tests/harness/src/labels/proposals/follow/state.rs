@@ -31,6 +31,13 @@ pub struct State {
 }
 
 impl State {
+    /// The one that its label tells.
+    pub fn labelled(around: &Around, frame: usize) -> Option<Self> {
+        let step = around.label(frame)?;
+        let motion = Motion::new(step.center, around.velocity(frame)?, 0.3, [1.0, 0.0], [0.5; 2]);
+        Some(Self { motion, heading_rad: step.heading_rad })
+    }
+
     pub fn stands(&self) -> bool {
         self.motion.speed() < STANDS_BELOW_MPS
     }

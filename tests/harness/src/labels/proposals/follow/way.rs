@@ -125,7 +125,7 @@ impl Around<'_> {
             (false, false) => 0.0,
         };
         let before = way.steps.iter().filter_map(|step| {
-            let label = self.labelled(step.frame)?;
+            let label = State::labelled(self, step.frame)?;
             Some(self.counts(step.frame, frame) * self.good(step.frame, &label.fitting(step.frame, self)))
         });
         let replaced = way.steps.iter().filter(|step| self.label(step.frame).is_some());
