@@ -1,6 +1,6 @@
 //! Upright boxes: vehicles and barriers as the ground truth knows them.
 
-use super::polygon::Point;
+use super::polygon::{Convex, Point};
 
 /// An upright box standing anywhere in the road frame; lengths in metres, yaw in radians from +x, counter-clockwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +64,16 @@ impl Solid {
         let dx = (x.abs() - self.size[0] / 2.0).max(0.0);
         let dy = (y.abs() - self.size[1] / 2.0).max(0.0);
         dx.hypot(dy)
+    }
+
+    /// Share of the smaller footprint that two boxes have in common.
+    pub fn shared(&self, other: &Self) -> f64 {
+        let reach = self.size[0].hypot(self.size[1]) + other.size[0].hypot(other.size[1]);
+        if (self.center[0] - other.center[0]).hypot(self.center[1] - other.center[1]) * 2.0 > reach {
+            return 0.0;
+        }
+        let [p, q] = [self, other].map(|s| Convex::hull(s.footprint().to_vec()));
+        p.within(&q).area() / p.area().min(q.area())
     }
 
     /// Cells (i, j) = [i, i+1) x [j, j+1) metres that share area with the footprint.

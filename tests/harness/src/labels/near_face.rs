@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use super::simplify::{error, kept};
 use super::tracks::{LabelPoint, LabelTrack};
+use crate::geometry::solid::Solid;
 
 /// Time between two boxes of a track, seconds.
 pub const STEP_S: f64 = 0.1;
@@ -51,6 +52,14 @@ pub struct BoxStep {
     pub center: [f64; 2],
     /// From +x, counter-clockwise.
     pub heading_rad: f64,
+}
+
+impl BoxStep {
+    /// The box of a road user of this size, on the ground.
+    pub fn solid(&self, size: [f64; 3]) -> Solid {
+        let [x, y] = self.center;
+        Solid { center: [x, y, size[2] / 2.0], yaw_rad: self.heading_rad, size }
+    }
 }
 
 impl From<[f64; 4]> for BoxStep {

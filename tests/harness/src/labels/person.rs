@@ -19,7 +19,6 @@ use super::near_face::{self, BoxStep, boxes};
 use super::proposals::Proposal;
 use super::proposals::follow::Follower;
 use super::tracks::{LabelPoint, LabelTrack};
-use crate::geometry::polygon::Convex;
 use crate::geometry::solid::Solid;
 use crate::recording::labels::class_size;
 use crate::recording::truth::{Label, Object, Truth};
@@ -338,19 +337,15 @@ pub fn labels(track: &LabelTrack, site: &Site) -> Vec<Label> {
         time_ns: site.start_ns.saturating_add((b.time_s * 1e9).round() as i64),
         id: track.id.clone(),
         class: track.class.clone(),
-        solid: Solid { center: [b.center[0], b.center[1], size[2] / 2.0], yaw_rad: b.heading_rad, size },
+        solid: b.solid(size),
     };
     let boxes = if track.points.is_empty() { Vec::new() } else { boxes(track, site.sensor) };
     boxes.into_iter().map(label).collect()
 }
 
+/// Whether two boxes are of one vehicle.
 pub fn overlaps(a: &Solid, b: &Solid) -> bool {
-    let reach = a.size[0].hypot(a.size[1]) + b.size[0].hypot(b.size[1]);
-    if (a.center[0] - b.center[0]).hypot(a.center[1] - b.center[1]) * 2.0 > reach {
-        return false;
-    }
-    let [p, q] = [a, b].map(|s| Convex::hull(s.footprint().to_vec()));
-    p.within(&q).area() >= OVERLAP * p.area().min(q.area())
+    a.shared(b) >= OVERLAP
 }
 
 fn same_time(a: &LabelTrack, b: &LabelTrack) -> bool {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::Proposal;
 use super::path::Path;
-use crate::geometry::polygon::Convex;
 use crate::geometry::solid::Solid;
 use crate::labels::near_face::boxes;
 
@@ -73,7 +72,8 @@ pub fn without_intruders(all: Vec<Proposal>, sensor: [f64; 2]) -> Vec<Proposal> 
     let mut kept = Vec::new();
     for proposal in all {
         let own = solids(&proposal, sensor);
-        let meets = |k: usize, s: &Solid| taken.get(k).is_some_and(|t| t.iter().any(|other| intrudes(s, other)));
+        let meets =
+            |k: usize, s: &Solid| taken.get(k).is_some_and(|t| t.iter().any(|other| s.shared(other) >= INTRUDES));
         let intruding = own.iter().filter(|(k, s)| meets(*k, s)).count();
         if intruding as f64 >= SHARE * own.len() as f64 {
             continue;
@@ -96,20 +96,10 @@ fn solids(proposal: &Proposal, sensor: [f64; 2]) -> Vec<(usize, Solid)> {
     for step in boxes(&proposal.track, sensor) {
         let k = (step.time_s / STEP_S).round().max(0.0) as usize;
         if all.last().is_none_or(|(last, _)| *last != k) {
-            let [x, y] = step.center;
-            all.push((k, Solid { center: [x, y, size[2] / 2.0], yaw_rad: step.heading_rad, size }));
+            all.push((k, step.solid(size)));
         }
     }
     all
-}
-
-fn intrudes(a: &Solid, b: &Solid) -> bool {
-    let reach = a.size[0].hypot(a.size[1]) + b.size[0].hypot(b.size[1]);
-    if (a.center[0] - b.center[0]).hypot(a.center[1] - b.center[1]) * 2.0 > reach {
-        return false;
-    }
-    let [p, q] = [a, b].map(|s| Convex::hull(s.footprint().to_vec()));
-    p.within(&q).area() >= INTRUDES * p.area().min(q.area())
 }
 
 #[cfg(test)]

@@ -102,6 +102,12 @@ impl Motion {
         }
     }
 
+    /// Measures that it stands, as well as this, m/s.
+    pub fn stop(&mut self, spread: f64) {
+        self.update([0.0, 0.0, 1.0, 0.0], 0.0, spread);
+        self.update([0.0, 0.0, 0.0, 1.0], 0.0, spread);
+    }
+
     /// The smoothed state before a step, from the filtered one before it and the smoothed one after it.
     fn smoothed(&self, dt_s: f64, after: [f64; 4]) -> Self {
         let mut predicted = *self;

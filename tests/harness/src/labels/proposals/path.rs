@@ -141,8 +141,7 @@ impl Path {
             if !own.is_empty() {
                 measure(&mut now, &own, 1.0, heading, length_m);
             } else if self.stood(begin, instants) {
-                now.update([0.0, 0.0, 1.0, 0.0], 0.0, 0.3);
-                now.update([0.0, 0.0, 0.0, 1.0], 0.0, 0.3);
+                now.stop(0.3);
             }
             if let Some(b) = self.lane_at(frame).and_then(|lane| lane.beside(now.place())) {
                 keep_to(&mut now, &b);

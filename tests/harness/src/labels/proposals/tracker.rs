@@ -27,7 +27,7 @@ const STOPPED_MPS: f64 = 1.0;
 /// Longest vehicle, metres.
 pub const LONGEST_M: f64 = 18.0;
 /// Doppler of one vehicle's reflections differs by about this, m/s.
-const DOPPLER_MPS: f64 = 0.35;
+pub const DOPPLER_MPS: f64 = 0.35;
 
 /// How closely vehicles keep to the middle of their lane, metres, and along it, m/s.
 const IN_LANE_M: f64 = 0.5;
@@ -54,6 +54,9 @@ struct Running {
     last_s: f64,
     lane: Option<usize>,
 }
+
+/// Neighbouring frames are wrong alike, so each counts for less.
+pub const ALIKE: f64 = 2.0;
 
 /// Spread of a place across the line of sight, metres.
 pub fn across_m(distance_m: f64) -> f64 {
@@ -209,15 +212,12 @@ pub fn measure(motion: &mut Motion, all: &[Reflection], sign: f64, heading: Opti
     let aspect = heading.map_or([0.7, 0.7], |[a, b]| [(a * c + b * s).abs(), (b * c - a * s).abs()]);
     let radial = 0.5_f64.hypot(anywhere * aspect[0]);
     let across = across_m(distance_m).hypot(anywhere * aspect[1]);
-    // neighbouring frames are wrong alike, so each counts for less
-    const ALIKE: f64 = 2.0;
     motion.update([c, s, 0.0, 0.0], c * x + s * y, ALIKE * radial);
     motion.update([-s, c, 0.0, 0.0], -s * x + c * y, ALIKE * across);
     let doppler = mean(&|r| sign * r.doppler_mps);
     motion.update([0.0, 0.0, ux, uy], doppler, DOPPLER_MPS);
     if doppler.abs() < STANDS_MPS && motion.speed() < STOPPED_MPS {
-        motion.update([0.0, 0.0, 1.0, 0.0], 0.0, DOPPLER_MPS);
-        motion.update([0.0, 0.0, 0.0, 1.0], 0.0, DOPPLER_MPS);
+        motion.stop(DOPPLER_MPS);
     }
 }
 

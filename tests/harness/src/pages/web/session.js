@@ -7,6 +7,8 @@ import { firstFrom, frameAt } from './recording.js';
 import * as tracks from './tracks.js';
 
 const READ_ONLY = 'This page may only read: see the line at the top.';
+// The coordinate that a plot does not show.
+const MISSING = { along: 'y', across: 'x' };
 // Reflections this far across from a track belong to its lane, metres.
 const LANE_M = 2.5;
 // A time after the last point of a track that still is of it, seconds.
@@ -151,7 +153,7 @@ export class Session {
     const old = tracks.find(this.tracks, this.drawing) ?? { id: this.drawing, class: this.kind, points: [] };
     const time = plot === 'plan' ? this.now : a;
     if (time < 0 || time > this.duration) return this.say('The recording has no reflections at this time.');
-    const missing = { along: 'y', across: 'x' }[plot];
+    const missing = MISSING[plot];
     const point = this.placed(old, plot, [a, b]);
     if (missing) this.guessed.add(point);
     const { track, index } = tracks.withPoint(old, point);
@@ -162,7 +164,7 @@ export class Session {
 
   // A place of a plot as time, x and y.
   placed(track, plot, [a, b]) {
-    const missing = { along: 'y', across: 'x' }[plot];
+    const missing = MISSING[plot];
     return missing ? this.completed(track, a, missing, b) : [this.now, a, b];
   }
 

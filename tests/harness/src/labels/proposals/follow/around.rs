@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::super::reflections::{Instant, Reflection, STANDS_MPS};
+use crate::geometry::solid::Solid;
 use crate::labels::near_face::{BoxStep, boxes};
 use crate::labels::tracks::LabelTrack;
 
@@ -51,8 +52,8 @@ pub struct Around<'a> {
     pub size: [f64; 3],
     /// Its label as it is: boxes by frame.
     pub own: Vec<Option<BoxStep>>,
-    /// Boxes and sizes of the others by frame.
-    pub others: Vec<Vec<(BoxStep, [f64; 3])>>,
+    /// Boxes of the others by frame.
+    pub others: Vec<Vec<Solid>>,
 }
 
 impl<'a> Around<'a> {
@@ -63,10 +64,10 @@ impl<'a> Around<'a> {
         standing: &'a Standing,
         sensor: [f64; 2],
     ) -> Self {
-        let mut all: Vec<Vec<(BoxStep, [f64; 3])>> = vec![Vec::new(); instants.len()];
+        let mut all: Vec<Vec<Solid>> = vec![Vec::new(); instants.len()];
         for other in others {
             for (own, step) in all.iter_mut().zip(by_frame(other, instants, sensor)) {
-                own.extend(step.map(|step| (step, other.size())));
+                own.extend(step.map(|step| step.solid(other.size())));
             }
         }
         let own = by_frame(track, instants, sensor);
@@ -96,20 +97,12 @@ impl<'a> Around<'a> {
 
     /// Whether a reflection lies in another label's box, and not deeper in one that it is so far beyond.
     pub fn is_another_s(&self, frame: usize, r: &Reflection, beyond_m: f64) -> bool {
-        let inside = |(step, size): &(BoxStep, [f64; 3])| {
-            let [x, y] = [0, 1].map(|k| r.place[k] - step.center[k]);
-            let [x, y] = beyond([x, y], step.heading_rad, *size);
-            x.hypot(y) < ANOTHER_S_M && x.hypot(y) <= beyond_m
+        let inside = |other: &Solid| {
+            let away_m = other.footprint_distance(r.place);
+            away_m < ANOTHER_S_M && away_m <= beyond_m
         };
         self.others.get(frame).is_some_and(|others| others.iter().any(inside))
     }
-}
-
-/// How far a place, seen from a box's centre, lies outside of it along and left of its heading.
-pub fn beyond([dx, dy]: [f64; 2], heading_rad: f64, size: [f64; 3]) -> [f64; 2] {
-    let (s, c) = heading_rad.sin_cos();
-    let local = [dx * c + dy * s, -dx * s + dy * c];
-    [0, 1].map(|k| local[k] - local[k].clamp(-0.5 * size[k], 0.5 * size[k]))
 }
 
 /// A label's box at every frame.

@@ -7,8 +7,9 @@ use std::f64::consts::TAU;
 
 use super::super::motion::Motion;
 use super::super::reflections::{Reflection, STANDS_MPS};
+use super::super::tracker::DOPPLER_MPS;
 use super::around::Around;
-use super::state::{DOPPLER_MPS, STANDS_BELOW_MPS, State};
+use super::state::{STANDS_BELOW_MPS, State};
 use crate::labels::near_face;
 
 /// How exact a click is, metres.
@@ -57,13 +58,13 @@ impl Around<'_> {
         let own = nearest.and_then(|k| State::labelled(self, k));
         headings.extend(own.map(|own| (own.heading_rad, USUAL)));
         let here =
-            self.others.iter().flatten().filter(|(step, size)| {
-                (step.center[0] - near[0]).hypot(step.center[1] - near[1]) < 0.5 * size[0] + 1.0
+            self.others.iter().flatten().filter(|other| {
+                (other.center[0] - near[0]).hypot(other.center[1] - near[1]) < 0.5 * other.size[0] + 1.0
             });
-        for (step, _) in here {
-            let known = |(heading, likely): &(f64, f64)| *likely > 0.0 && (heading - step.heading_rad).cos() > 0.98;
+        for other in here {
+            let known = |(heading, likely): &(f64, f64)| *likely > 0.0 && (heading - other.yaw_rad).cos() > 0.98;
             if !headings.iter().any(known) {
-                headings.push((step.heading_rad, USUAL));
+                headings.push((other.yaw_rad, USUAL));
             }
         }
         let stood = self.stood_there(frame, near);

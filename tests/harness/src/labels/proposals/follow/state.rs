@@ -2,20 +2,16 @@
 
 use super::super::motion::Motion;
 use super::super::reflections::{Reflection, STANDS_MPS};
-use super::super::tracker::across_m;
-use super::around::{Around, beyond};
+use super::super::tracker::{ALIKE, DOPPLER_MPS, across_m};
+use super::around::Around;
 use crate::labels::near_face;
 
-/// Doppler of one vehicle's reflections differs by about this, m/s.
-pub const DOPPLER_MPS: f64 = 0.35;
 /// Spread of a place along the line of sight, metres.
 const RADIAL_M: f64 = 0.4;
 /// Squares of standard deviations up to which a reflection fits.
 pub const FITS: f64 = 9.0;
 /// No reflection lies farther from its middle than its length and this, metres.
 const NEAR_M: f64 = 6.0;
-/// Neighbouring frames are wrong alike, so each counts for less.
-const ALIKE: f64 = 2.0;
 /// Longer ones reflect from anywhere, not from near the near face only, metres.
 const LONG_M: f64 = 7.0;
 /// Speed below which it stands, and from which on its heading is that of its velocity, m/s.
@@ -78,7 +74,7 @@ impl State {
         let motion = &mut self.motion;
         if all.is_empty() {
             if motion.speed() < STANDS_BELOW_MPS {
-                stand(motion);
+                motion.stop(DOPPLER_MPS);
             }
             return;
         }
@@ -108,7 +104,7 @@ impl State {
         let doppler = mean(&|r| r.doppler_mps);
         motion.update([0.0, 0.0, ux, uy], doppler, DOPPLER_MPS);
         if doppler.abs() < STANDS_MPS && motion.speed() < 2.0 * STANDS_BELOW_MPS {
-            stand(motion);
+            motion.stop(DOPPLER_MPS);
         }
         if motion.speed() >= HEADED_MPS {
             let [vx, vy] = motion.velocity();
@@ -117,7 +113,9 @@ impl State {
     }
 }
 
-fn stand(motion: &mut Motion) {
-    motion.update([0.0, 0.0, 1.0, 0.0], 0.0, DOPPLER_MPS);
-    motion.update([0.0, 0.0, 0.0, 1.0], 0.0, DOPPLER_MPS);
+/// How far a place, seen from a box's centre, lies outside of it along and left of its heading.
+fn beyond([dx, dy]: [f64; 2], heading_rad: f64, size: [f64; 3]) -> [f64; 2] {
+    let (s, c) = heading_rad.sin_cos();
+    let local = [dx * c + dy * s, -dx * s + dy * c];
+    [0, 1].map(|k| local[k] - local[k].clamp(-0.5 * size[k], 0.5 * size[k]))
 }
