@@ -28,7 +28,7 @@ const OVERLAP: f64 = 0.2;
 /// Share of its time a proposal has to lie on one vehicle to be accepted; where it leaves it, it is mended.
 const ACCEPTED: f64 = 0.5;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
-const SEEN: (u32, f64) = (15, 1.0);
+const SEEN: (u32, f64) = (5, 1.0);
 /// How often the person looks for something to mend.
 const LOOKS: usize = 3;
 /// How often it clicks on one vehicle, and how many clicks without success it takes to give up.
@@ -41,8 +41,10 @@ const HELPS: usize = 10;
 /// The person clicks where most is seen within so many frames, not at the very ends of a stretch, a share of it.
 const AROUND: usize = 10;
 const ENDS: usize = 10;
-/// How far a drawn line is from the vehicle, metres.
+/// How far a drawn line is from the vehicle, metres: of a long one this share of its length, at most so far.
+const DRAWN: f64 = 0.17;
 const DRAWN_M: f64 = 0.8;
+const DRAWN_MOST_M: f64 = 1.5;
 
 /// What the person did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -159,14 +161,28 @@ impl Person<'_> {
     /// Accepted pieces, joined, by vehicle.
     fn accepts(&self, proposals: &[Proposal], actions: &mut Actions) -> Vec<(usize, LabelTrack)> {
         let mut pieces: BTreeMap<usize, Vec<LabelTrack>> = BTreeMap::new();
+        // right and wrong ones of each way
+        let mut ways: BTreeMap<u32, [u32; 2]> = BTreeMap::new();
         for (proposal, vehicle) in proposals.iter().zip(self.vehicles_of(proposals)) {
+            let [right, wrong] = ways.entry(proposal.way).or_default();
             match vehicle {
                 Some(vehicle) => {
-                    actions.accepted += 1;
+                    *right += 1;
                     pieces.entry(vehicle).or_default().push(proposal.track.clone());
                 }
-                None => actions.rejected += 1,
+                None => *wrong += 1,
             }
+        }
+        for [right, wrong] in ways.into_values() {
+            // the few are pointed at, the others go with one key
+            let (accepted, rejected) = match (right, wrong) {
+                (0, _) => (0, 1),
+                (_, 0) => (1, 0),
+                _ if wrong <= right => (1, wrong),
+                _ => (right, 1),
+            };
+            actions.accepted += accepted;
+            actions.rejected += rejected;
         }
         let mut labels = Vec::new();
         for (vehicle, mut pieces) in pieces {
@@ -321,7 +337,7 @@ impl Person<'_> {
             Some(BoxStep { time_s, center: [solid.center[0], solid.center[1]], heading_rad: solid.yaw_rad })
         };
         let steps: Vec<BoxStep> = instants.iter().filter_map(step).collect();
-        near_face::drawn(&steps, size, self.site.sensor, DRAWN_M)
+        near_face::drawn(&steps, size, self.site.sensor, (DRAWN * size[0]).clamp(DRAWN_M, DRAWN_MOST_M))
     }
 }
 

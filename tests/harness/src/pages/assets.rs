@@ -38,6 +38,7 @@ static FILES: &[(&str, &[u8])] = &files![
     "viewer-marks.js",
     "viewer-panel.js",
     "viewer-source.js",
+    "ways.js",
 ];
 
 /// The file of a name, and what kind it is.

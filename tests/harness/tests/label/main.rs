@@ -7,6 +7,7 @@ mod appearance;
 #[allow(dead_code, reason = "pages of other commands need more of it")]
 mod browser;
 mod looks;
+mod offered;
 mod page;
 mod person;
 mod plots;

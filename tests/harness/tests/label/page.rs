@@ -5,6 +5,7 @@ use std::fs;
 use serde_json::Value;
 
 use crate::browser::{ALT, Browser, CTRL, Page, SHIFT};
+use crate::offered::{is_in_view, point_at};
 use crate::server::{Server, recording};
 
 /// Times and places of a track that is drawn by clicks, along the road.
@@ -321,19 +322,14 @@ fn proposals_are_shown_before_one_key_decides() {
     page.until("viewshed.session.proposals.shown");
     let offered = page.number("viewshed.session.proposals.waiting.length");
     assert!(offered > 4.0, "{offered}");
+    page.key("o");
+    page.until("!viewshed.session.proposals.together && viewshed.session.proposals.shown");
     // before it was drawn, no key takes it
-    page.ask("(viewshed.session.proposals.shown = false, viewshed.session.accept(false), 1)");
+    page.ask("(viewshed.session.proposals.shown = false, viewshed.session.accept(), 1)");
     assert_eq!(tracks(&page).len(), 0);
-    page.ask("(viewshed.session.proposals.shown = true, 1)");
+    page.until("viewshed.session.proposals.shown");
     let first = page.ask("viewshed.session.proposals.current.track");
-    // it lies within all plots
-    for (plot, [a, b]) in [("along", [0, 1]), ("across", [0, 2]), ("plan", [1, 2])] {
-        let inside = page.ask(&format!(
-            "viewshed.session.proposals.current.track.points.every((p) => {{ const v = viewshed.plots.{plot}.view;
-               return p[{a}] >= v.left && p[{a}] <= v.right && p[{b}] >= v.bottom && p[{b}] <= v.top; }})"
-        ));
-        assert_eq!(inside, true, "{plot}");
-    }
+    is_in_view(&page);
     page.key("a");
     page.until("viewshed.session.tracks.length === 1 && viewshed.session.proposals.shown");
     let taken = &tracks(&page)[0];
@@ -351,4 +347,66 @@ fn proposals_are_shown_before_one_key_decides() {
     page.until("viewshed.session.proposals.ready");
     assert!(page.number("viewshed.session.proposals.waiting.length") < offered);
     assert_eq!(tracks(&page).len(), 2);
+}
+
+#[test]
+fn proposals_of_one_way_are_decided_about_together() {
+    let Some(browser) = Browser::start("ways") else { return };
+    let server = Server::start(&recording("ways"));
+    let page = browser.open(&server.url);
+    page.until_saved();
+    page.until("viewshed.session.proposals.shown");
+    let waiting = || page.number("viewshed.session.proposals.waiting.length");
+    let ids = || page.ask("viewshed.session.proposals.offered.map(({ track }) => track.id)");
+    let (all, group) = (waiting(), ids());
+    let count = group.as_array().unwrap().len();
+    assert!(count > 3 && all > count as f64, "{count} of {all}");
+    is_in_view(&page);
+    assert!(page.ask("document.getElementById('proposal-text').textContent").as_str().unwrap().contains("together, of"));
+    // where nothing is pointed at, nothing is rejected
+    page.ask("(viewshed.session.pointed = null, 1)");
+    page.key("x");
+    assert!(page.ask("viewshed.session.message").as_str().unwrap().contains("Point at one"));
+    assert_eq!(waiting(), all);
+    // the second line, pointed at; the view stays, and what is left is offered still
+    point_at(&page, 1);
+    let view = page.ask("viewshed.plots.along.view");
+    page.key("3");
+    assert_eq!(page.ask("viewshed.session.proposals.offered[1].track.class"), "truck");
+    page.key("x");
+    page.until(&format!("viewshed.session.proposals.waiting.length === {}", all - 1.0));
+    assert_eq!(page.ask("viewshed.plots.along.view"), view);
+    let mut left = group.as_array().unwrap().clone();
+    let rejected = left.remove(1);
+    assert_eq!((ids(), page.ask("viewshed.session.proposals.shown")), (Value::Array(left.clone()), true.into()));
+    // one step back brings it back, another decision follows
+    page.key_with("z", CTRL);
+    page.until("viewshed.session.proposals.shown");
+    assert!(ids().as_array().unwrap().contains(&rejected));
+    point_at(&page, 1);
+    page.key("x");
+    // all others are taken over by one key, and one step takes them back, too
+    page.key("a");
+    page.until(&format!("viewshed.session.tracks.length === {}", count - 1));
+    page.until_saved();
+    assert_eq!(waiting(), all - count as f64);
+    let saved = tracks(&page);
+    page.key_with("z", CTRL);
+    page.until("viewshed.session.tracks.length === 0 && viewshed.session.proposals.shown");
+    assert_eq!(ids(), Value::Array(left));
+    page.key_with("y", CTRL);
+    page.until(&format!("viewshed.session.tracks.length === {}", count - 1));
+    assert_eq!((tracks(&page), waiting()), (saved, all - count as f64));
+    // one is taken out to be mended, the others of its way go
+    page.until("viewshed.session.proposals.shown");
+    let next = ids().as_array().unwrap().len();
+    point_at(&page, 0);
+    page.key("m");
+    page.until(&format!("viewshed.session.tracks.length === {count} && viewshed.session.selected !== null"));
+    if next > 1 {
+        page.key("d");
+    }
+    page.until(&format!("viewshed.session.proposals.waiting.length === {}", all - (count + next) as f64));
+    assert_eq!(tracks(&page).len(), count);
+    page.until_saved();
 }

@@ -142,7 +142,7 @@ mod tests {
     fn proposal(id: &str, points: &[[f64; 3]]) -> Proposal {
         let points = points.iter().map(|p| (*p).into()).collect();
         let track = LabelTrack { id: id.into(), class: "car".into(), size_m: None, points };
-        Proposal { track, score: 0.9, detections: 100 }
+        Proposal { track, score: 0.9, detections: 100, way: 0 }
     }
 
     #[test]

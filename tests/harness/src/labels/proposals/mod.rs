@@ -9,6 +9,7 @@
 //! what goes on in one place of a vehicle, `vehicles` puts together those whose distance stays while they move, `queues`
 //! makes paths of them in place of the tracker's. `exclusion` drops mirror images, `standing` adds the time in which it
 //! stood before and after, `shape` puts a box around it, and of proposals for one place `exclusion` keeps the best.
+//! `ways` tells which of them drive the same way.
 //!
 //! [`follow`] uses the same reflections for what a person points at.
 //!
@@ -36,6 +37,7 @@ mod standing;
 mod streaks;
 mod tracker;
 mod vehicles;
+mod ways;
 
 use std::sync::Arc;
 
@@ -56,7 +58,7 @@ const TRAVEL_M: f64 = 6.0;
 const IN_LANE_M: f64 = 2.0;
 
 /// Lowest score that is worth a look.
-const LEAST: f64 = 0.72;
+const LEAST: f64 = 0.8;
 
 /// A track that is offered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -66,6 +68,8 @@ pub struct Proposal {
     pub score: f64,
     /// Reflections it was made of.
     pub detections: u32,
+    /// Number of the way it drives: those of one way can be decided about together.
+    pub way: u32,
 }
 
 /// Tracks of a recording, the best first, with ids `p1`, `p2`, ... `progress` is told the share that is done.
@@ -105,9 +109,14 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         track: shape::track(path, &instants, recording, format!("p{}", k + 1)),
         score,
         detections: path.members.len() as u32,
+        way: 0,
     });
     let all: Vec<Proposal> = all.filter(|p| p.track.check().is_ok()).collect();
-    let all = exclusion::without_intruders(all, crate::labels::Site::of(recording).sensor);
+    let mut all = exclusion::without_intruders(all, crate::labels::Site::of(recording).sensor);
+    let ways = ways::ways(&all.iter().map(|p| &p.track).collect::<Vec<_>>());
+    for (proposal, way) in all.iter_mut().zip(ways) {
+        proposal.way = way;
+    }
     progress(1.0);
     all
 }

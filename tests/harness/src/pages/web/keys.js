@@ -13,9 +13,11 @@ export function table(page) {
   const arrows = ([modifier, group, what, run]) =>
     SIDES.map(([key, right, up], k) => [modifier + key, group, k === 0 ? what : null, () => run(right, up), true]);
   return [
-    ['a', 'Proposals', 'accept the proposal; the next is shown', () => session.accept(false), false, 'accept'],
-    ['m', 'Proposals', 'mend: accept it and select it for changes', () => session.accept(true), false, 'mend'],
-    ['x', 'Proposals', 'reject the proposal', () => session.reject(), false, 'reject'],
+    ['a', 'Proposals', 'accept all that are offered; the next are shown', () => session.accept(), false, 'accept'],
+    ['x', 'Proposals', 'reject the one at the mouse or cursor', () => session.reject(), false, 'reject'],
+    ['m', 'Proposals', 'mend: accept the one at the mouse or cursor and select it for changes', () => session.mend(), false, 'mend'],
+    ['d', 'Proposals', 'discard: reject all that are offered', () => session.discard(), false, 'discard'],
+    ['o', 'Proposals', 'offer them one by one, or all of a way together', () => page.together(), false, 'together'],
     ['k', 'Proposals', 'decide later; show the next', () => page.later(), false, 'next-proposal'],
     ['n', 'Drawing', 'begin a new track', () => session.begin(), false, 'new'],
     ['e', 'Drawing', 'draw on with the selected track', () => session.extend(), false, 'extend'],
@@ -31,7 +33,7 @@ export function table(page) {
     ['Shift+Delete', 'Changes', 'delete the selected track', () => session.removeTrack(), false, 'delete-track'],
     ['s', 'Changes', 'split the selected track at the cursor', () => page.split(), false, 'split'],
     ['j', 'Changes', 'join: remember this track; press again on the other', () => session.join(), false, 'join'],
-    ['1', 'Changes', 'car, 2 van, 3 truck, 4 bus, 5 motorcycle, 6 bicycle, 7 pedestrian; of what is offered, too; with neither, of new tracks', () => page.classify(0), false],
+    ['1', 'Changes', 'car, 2 van, 3 truck, 4 bus, 5 motorcycle, 6 bicycle, 7 pedestrian; of the proposal at the mouse, too; with neither, of new tracks', () => page.classify(0), false],
     ...[1, 2, 3, 4, 5, 6].map((k) => [String(k + 1), 'Changes', null, () => page.classify(k), false]),
     ['i', 'Changes', 'go to the id of the selected track', () => page.focusId(), false],
     ['PageDown', 'Selection', 'select the next track', () => session.selectNext(1), true],

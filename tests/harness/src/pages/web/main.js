@@ -4,7 +4,7 @@ import { Camera } from './camera.js';
 import { faint, rcsColours, STRONGEST_DBSM, trackColours, unlabelled, WEAKEST_DBSM } from './colours.js';
 import { Ground } from './ground.js';
 import { listen } from './keys.js';
-import { drawMarks, hit } from './marks.js';
+import { drawMarks, hit, hitOffered } from './marks.js';
 import { Panel } from './panel.js';
 import { Plot } from './plot.js';
 import { sizes } from './points.js';
@@ -72,6 +72,7 @@ class Page {
       drag: (plot, place, taken) => taken.point !== null && this.session.move(plot.name, taken.point, place, taken),
       release: (plot, place, moved, taken) => this.release(plot, place, moved, taken),
       brush: (plot, area) => this.session.brushed(plot.name, area),
+      point: (plot) => this.pointAt(plot),
     };
     const plot = new Plot(element(name), { name, ...axes }, source, on);
     plot.element.addEventListener('focus', () => {
@@ -115,6 +116,16 @@ class Page {
     this.release(this.active, cursor, false, taken);
   }
 
+  // The proposal at the mouse or cursor.
+  pointAt(plot) {
+    const { session } = this;
+    const before = session.pointed;
+    session.pointed = plot.cursor ? hitOffered(plot, session, plot.toPixel(...plot.cursor)) : null;
+    if (session.pointed === before) return;
+    this.panel.proposal();
+    for (const other of Object.values(this.plots)) other.changed();
+  }
+
   // From where the mouse is, or the cursor; the button waits for a click, since the mouse is on it.
   follow(button) {
     if (button) {
@@ -154,10 +165,11 @@ class Page {
     this.show('plan', { left: x0, right: x1, bottom: y0, top: y1 });
   }
 
-  fit(track = this.session.track ?? this.session.proposals.current?.track) {
-    if (!track) return;
+  fit(list = this.session.track ? [this.session.track] : this.session.proposals.offered.map(({ track }) => track)) {
+    if (list.length === 0) return;
+    const points = list.flatMap((track) => track.points);
     const of = (k, space) => {
-      const values = track.points.map((point) => point[k]);
+      const values = points.map((point) => point[k]);
       return [Math.min(...values) - space, Math.max(...values) + space];
     };
     const [[t0, t1], [x0, x1], [y0, y1]] = [of(0, AROUND_S), of(1, AROUND_M), of(2, AROUND_M)];
@@ -210,8 +222,16 @@ class Page {
   }
 
   later() {
-    const { proposals } = this.session;
-    if (proposals.shown) proposals.later();
+    const { proposals, track } = this.session;
+    // after mending it brings back what is offered
+    if (track) proposals.shown = false;
+    else if (proposals.shown) proposals.later();
+    this.session.select(null);
+    this.changed('proposal');
+  }
+
+  together() {
+    this.session.proposals.toggle();
     this.session.select(null);
     this.changed('proposal');
   }
@@ -304,16 +324,17 @@ class Page {
     for (const plot of Object.values(plots)) plot.changed();
   }
 
-  // The current proposal, fitted into all plots; it may be decided about once it has been drawn.
+  // What is offered, fitted into all plots; it may be decided about once it has been drawn. What is left of it stays.
   showProposal() {
     const { proposals } = this.session;
-    const { current } = proposals;
+    const { current, offered, shown, together } = proposals;
     if (!current && this.session.brush?.plot === 'lane') this.session.brushed(null, null);
     // what is being changed is not taken out of sight
-    if (!current || this.session.selected !== null) return;
-    this.fit(current.track);
+    if (!current || shown || this.session.selected !== null) return;
+    this.fit(offered.map(({ track }) => track));
     if (this.session.lanes) this.session.showLane();
-    requestAnimationFrame(() => requestAnimationFrame(() => proposals.current === current && proposals.seen()));
+    const same = () => proposals.current === current && proposals.together === together;
+    requestAnimationFrame(() => requestAnimationFrame(() => same() && proposals.seen()));
   }
 
   state(kind, text) {

@@ -3,6 +3,8 @@
 import { TRACKS, css } from './colours.js';
 import { begins, ends, positionAt } from './tracks.js';
 
+// How much is left of a line that is a hint only.
+const FAINT = 0.25;
 const DASHES = [[], [10, 4], [3, 3], [12, 3, 3, 3]];
 
 // Where a point [time, x, y] lies in a plot.
@@ -19,13 +21,26 @@ export function drawMarks(plot, context, session) {
   if (plot.name !== 'plan') drawNow(plot, context, now, window);
   else drawSensor(plot, context, session.recording.mount);
   if (plot.name === 'plan') session.boxes.forEach((box) => drawBox(plot, context, box, now));
+  // what is labelled on other ways is no more than a hint while proposals are looked at
+  const faint = session.selected === null && session.brush?.plot === 'lane' && proposals.current !== null;
   session.tracks.forEach((track, index) => {
     const chosen = track.id === session.selected;
     if (!chosen && !isShown(plot, track, now, window)) return;
-    drawTrack(plot, context, track, { colour: chosen ? css('--select') : colourOf(index), dash: DASHES[Math.floor(index / TRACKS.length) % 4], chosen, point: chosen ? session.point : null, now });
+    drawTrack(plot, context, track, { colour: chosen ? css('--select') : colourOf(index), dash: DASHES[Math.floor(index / TRACKS.length) % 4], chosen, point: chosen ? session.point : null, now, faint });
   });
-  const offered = proposals.current;
-  if (offered) drawTrack(plot, context, { ...offered.track, id: '?' }, { colour: css('--strong'), dash: [8, 5], chosen: true, point: null, now });
+  drawOffered(plot, context, session);
+}
+
+// One proposal with its points, of several that which is pointed at.
+function drawOffered(plot, context, session) {
+  const { now, window, one, proposals } = session;
+  const shown = proposals.offered.filter((proposal) => proposal === one || isShown(plot, proposal.track, now, window));
+  // what is pointed at lies above the others
+  for (const proposal of shown.sort((a, b) => (a === one) - (b === one))) {
+    const { track } = proposal;
+    const style = { colour: css('--strong'), dash: [8, 5], chosen: proposal === one, point: null, now };
+    drawTrack(plot, context, { ...track, id: proposal === one || track.class !== 'car' ? '?' : '' }, style);
+  }
 }
 
 // The plan shows those that are there about now, time plots all.
@@ -33,7 +48,7 @@ function isShown(plot, track, now, window) {
   return plot.name !== 'plan' || (begins(track) <= now + window && ends(track) >= now - window);
 }
 
-function drawTrack(plot, context, track, { colour, dash, chosen, point, now }) {
+function drawTrack(plot, context, track, { colour, dash, chosen, point, now, faint = false }) {
   const pixels = track.points.map((at) => plot.toPixel(...placed(plot, at)));
   if (pixels.length === 0) return;
   const line = () => {
@@ -42,6 +57,7 @@ function drawTrack(plot, context, track, { colour, dash, chosen, point, now }) {
     context.stroke();
   };
   context.lineJoin = 'round';
+  context.globalAlpha = faint ? FAINT : 1;
   context.strokeStyle = css('--paper');
   context.lineWidth = chosen ? 5 : 4;
   line();
@@ -50,6 +66,8 @@ function drawTrack(plot, context, track, { colour, dash, chosen, point, now }) {
   context.lineWidth = chosen ? 3 : 2;
   line();
   context.setLineDash([]);
+  context.globalAlpha = 1;
+  if (faint) return;
   if (chosen) pixels.forEach(([x, y], k) => drawPoint(context, x, y, colour, k === point));
   const here = positionAt(track, now);
   if (plot.name === 'plan' && here) {
@@ -130,6 +148,15 @@ function drawSensor(plot, context, [x, y, , heading]) {
   for (const [dx, dy] of [[10, 0], [-7, -7], [-3, 0], [-7, 7]]) context.lineTo(dx, dy);
   context.fill();
   context.restore();
+}
+
+// The proposal under a pixel.
+export function hitOffered(plot, session, [px, py]) {
+  const { now, window, proposals } = session;
+  const shown = proposals.offered.filter(({ track }) => isShown(plot, track, now, window));
+  const near = shown.map((proposal) => ({ proposal, distance: distanceTo(plot, proposal.track, px, py) }));
+  const best = near.sort((a, b) => a.distance - b.distance)[0];
+  return best && best.distance <= plot.reach ? best.proposal : null;
 }
 
 // What lies under a pixel: a point of the selected track first, then any track.

@@ -7,6 +7,13 @@ import { begins, CLASSES, ends, velocity } from './tracks.js';
 const element = (id) => document.getElementById(id);
 const span = (track) => `${begins(track).toFixed(1)} to ${ends(track).toFixed(1)} s`;
 
+// How many of each class.
+function counted(proposals) {
+  const of = (kind) => proposals.filter(({ track }) => track.class === kind).length;
+  const kinds = [...new Set(proposals.map(({ track }) => track.class))];
+  return kinds.map((kind) => `${of(kind)} ${kind}`).join(', ');
+}
+
 export class Panel {
   constructor(session, { select }) {
     this.session = session;
@@ -32,14 +39,21 @@ export class Panel {
 
   proposal() {
     const { proposals } = this.session;
-    const { current } = proposals;
-    const none = proposals.ready ? `none left; ${proposals.decided} decided` : 'looking for tracks';
-    const text = current
-      ? `${proposals.decided + 1} of ${proposals.decided + proposals.waiting.length}: ${current.track.class}, ${span(current.track)}, ` +
-        `${current.detections} detections, score ${current.score.toFixed(2)}`
-      : none;
+    const { offered, waiting, decided } = proposals;
+    const { one } = this.session;
+    let text = proposals.ready ? `none left; ${decided} decided` : 'looking for tracks';
+    if (offered.length > 1) text = `${offered.length} together, of ${waiting.length} that are left: ${counted(offered)}. `;
+    else if (one) text = `${decided + 1} of ${decided + waiting.length}: `;
+    if (one) text += `${offered.length > 1 ? 'Pointed at: ' : ''}${one.track.class}, ${span(one.track)}, ${one.detections} detections, score ${one.score.toFixed(2)}`;
+    else if (offered.length > 1) text += 'Point at one to reject or mend it alone.';
     element('proposal-text').textContent = text;
-    for (const button of document.querySelectorAll('#proposal button')) button.disabled = !current;
+    const button = (key) => document.querySelector(`#proposal button[data-key="${key}"]`);
+    for (const each of document.querySelectorAll('#proposal button')) each.disabled = offered.length === 0;
+    // the mouse is on the button then, and points at none
+    for (const key of ['reject', 'mend']) button(key).disabled = offered.length !== 1;
+    button('accept').textContent = offered.length > 1 ? 'Accept all' : 'Accept';
+    button('discard').hidden = offered.length < 2;
+    button('together').textContent = proposals.together ? 'One by one' : 'Together';
   }
 
   selected() {

@@ -16,7 +16,7 @@ const CLICK_PX = 4;
 
 export class Plot {
   // source: { layer(), range(view), chosen(), ground?, marks(plot) }, all asked for anew at each drawing.
-  // on: { view, press, drag, release, brush }, called with places in units of the axes.
+  // on: { view, press, drag, release, brush, point? }, called with places in units of the axes.
   constructor(element, { name, across, up, square = false, least = 0.05, most = 1e5 }, source, on) {
     Object.assign(this, { element, name, across, up, square, least, most, source, on });
     element.setAttribute('aria-label', `${name}: ${up} over ${across}. Arrow keys move the cursor; press ? for all keys.`);
@@ -249,6 +249,7 @@ export class Plot {
     const beyond = (at, low, high) => Math.max(0, at - high) + Math.min(0, at - low);
     const [dx, dy] = [beyond(this.cursor[0], view.left, view.right), beyond(this.cursor[1], view.bottom, view.top)];
     if (dx || dy) this.on.view(this, panned(view, dx, dy));
+    this.on.point?.(this);
     this.changed();
   }
 
@@ -284,6 +285,7 @@ export class Plot {
       const to = at(event);
       this.cursor = this.toPlace(...to);
       if (this.held) this.dragged(to);
+      this.on.point?.(this);
       this.changed();
     });
     element.addEventListener('pointerup', (event) => {

@@ -1,4 +1,5 @@
-// Tracks the machine offers, one after the other: each is shown before it can be accepted.
+// Tracks the machine offers: those that drive the same way together, or one after the other. Each is shown before it can
+// be accepted.
 
 import { begins, ends, positionAt } from './tracks.js';
 
@@ -11,7 +12,10 @@ export class Proposals {
     this.waiting = [];
     this.ready = false;
     this.shown = false;
+    this.together = true;
     this.decided = 0;
+    // how often something was put off
+    this.putOff = 0;
   }
 
   // Asks until the machine has looked.
@@ -19,8 +23,9 @@ export class Proposals {
     for (;;) {
       const answer = await fetch('proposals');
       if (answer.status === 200) {
-        const all = await answer.json();
+        const all = (await answer.json()).map((proposal, order) => ({ ...proposal, order, round: 0 }));
         this.waiting = all.filter((proposal) => !tracks().some((track) => covers(track, proposal.track)));
+        this.sort();
         this.ready = true;
         return;
       }
@@ -29,25 +34,54 @@ export class Proposals {
     }
   }
 
+  // Those of one way after one another, the better ones first; what was put off last.
+  sort() {
+    this.waiting.sort((a, b) => a.round - b.round || a.way - b.way || a.order - b.order);
+  }
+
   get current() {
     return this.waiting[0] ?? null;
   }
 
-  // The current one has been drawn.
+  // What is to be decided about.
+  get offered() {
+    const { current, together } = this;
+    if (!current) return [];
+    return together ? this.waiting.filter(({ way, round }) => way === current.way && round === current.round) : [current];
+  }
+
+  // What is offered has been drawn.
   seen() {
     this.shown = true;
   }
 
-  // Takes the current one out.
-  take() {
+  // One by one, or all of a way.
+  toggle() {
+    this.together = !this.together;
     this.shown = false;
-    this.decided += 1;
-    return this.waiting.shift();
+  }
+
+  // Takes some out; what is left of a way stays as it is shown.
+  take(some) {
+    const rest = this.offered.filter((proposal) => !some.includes(proposal));
+    this.shown &&= this.together && rest.length > 0;
+    this.decided += some.length;
+    this.waiting = this.waiting.filter((proposal) => !some.includes(proposal));
+  }
+
+  // Takes them in again.
+  put(some) {
+    this.waiting.push(...some);
+    this.sort();
+    this.decided -= some.length;
+    this.shown = false;
   }
 
   later() {
+    this.putOff += 1;
+    for (const proposal of this.offered) proposal.round = this.putOff;
+    this.sort();
     this.shown = false;
-    if (this.waiting.length > 1) this.waiting.push(this.waiting.shift());
   }
 }
 

@@ -5,6 +5,7 @@ import { History } from './history.js';
 import { Proposals } from './proposals.js';
 import { firstFrom, frameAt } from './recording.js';
 import * as tracks from './tracks.js';
+import { onWays } from './ways.js';
 
 const READ_ONLY = 'This page may only read: see the line at the top.';
 // The coordinate that a plot does not show.
@@ -21,6 +22,9 @@ export class Session {
     this.changed = changed;
     this.history = new History([]);
     this.proposals = new Proposals();
+    // what was decided about which proposals, with the tracks before and after; and the one at the mouse or cursor
+    this.decisions = [];
+    this.pointed = null;
     this.selected = null;
     this.point = null;
     this.drawing = null;
@@ -71,6 +75,7 @@ export class Session {
   // The tracks in the file; the way back begins anew.
   open(list) {
     this.history = new History(list);
+    this.decisions = [];
     this.drawing = null;
     this.select(null);
     this.changed('opened');
@@ -86,7 +91,14 @@ export class Session {
 
   stepped(what) {
     if (!this.canWrite()) return this.say(READ_ONLY);
+    const from = this.tracks;
     if (!this.history[what]()) return this.say(`There is nothing to ${what}.`);
+    const decided = this.decisions.find(({ before, after }) => (before === from && after === this.tracks) || (after === from && before === this.tracks));
+    if (decided) {
+      if (what === 'undo') this.proposals.put(decided.taken);
+      else this.proposals.take(decided.taken);
+      this.changed('proposal');
+    }
     this.drawing = null;
     if (!this.track) this.select(null);
     this.point = null;
@@ -282,11 +294,11 @@ export class Session {
     return undefined;
   }
 
-  // Of the selected track, or of the proposal that is shown.
+  // Of the selected track, or of the proposal that is pointed at.
   classify(kind) {
-    const { current, shown } = this.proposals;
-    if (!this.track && current && shown) {
-      current.track.class = kind;
+    const one = this.proposals.shown ? this.one : null;
+    if (!this.track && one) {
+      one.track.class = kind;
       return this.changed('proposal');
     }
     if (!this.track) {
@@ -296,30 +308,64 @@ export class Session {
     return this.change(tracks.withTrack(this.tracks, { ...this.track, class: kind }));
   }
 
-  // Takes the proposal over; to be mended, it is selected.
-  accept(mend) {
-    if (!this.decidable()) return undefined;
-    const { current } = this.proposals;
-    const track = { ...current.track, id: tracks.newId(this.tracks) };
-    if (!this.change([...this.tracks, track])) return undefined;
-    this.proposals.take();
-    this.select(mend ? track.id : null);
-    if (mend) this.say(`Track ${track.id}: drag its points; K shows the next proposal.`);
-    return this.changed('proposal');
+  // The proposal that a key is for: the one that is pointed at, or the only one that is offered.
+  get one() {
+    const { offered } = this.proposals;
+    return offered.length === 1 ? offered[0] : (offered.find((proposal) => proposal === this.pointed) ?? null);
+  }
+
+  // Takes all over that are offered.
+  accept() {
+    if (!this.decidable()) return;
+    const { offered } = this.proposals;
+    if (this.decide(offered, offered)) this.select(null);
+    this.changed('proposal');
+  }
+
+  // Takes one over and selects it, to be mended.
+  mend() {
+    const one = this.decidable() ? this.pointedOne() : null;
+    if (!one || !this.decide([one], [one])) return;
+    this.select(this.tracks.at(-1).id);
+    this.say(`Track ${this.selected}: drag its points; K shows what is offered.`);
+    this.changed('proposal');
   }
 
   reject() {
-    if (!this.decidable()) return;
-    this.proposals.take();
+    const one = this.decidable() ? this.pointedOne() : null;
+    if (!one || !this.decide([one], [])) return;
     this.select(null);
     this.changed('proposal');
+  }
+
+  // Rejects all that are offered.
+  discard() {
+    if (!this.decidable() || !this.decide(this.proposals.offered, [])) return;
+    this.select(null);
+    this.changed('proposal');
+  }
+
+  pointedOne() {
+    if (!this.one) this.say('Point at one of the proposals, or press O to see them one by one.');
+    return this.one;
+  }
+
+  // Takes proposals out, some of them as tracks; one step of the history.
+  decide(taken, accepted) {
+    const before = this.tracks;
+    const added = accepted.reduce((all, { track }) => [...all, { ...track, id: tracks.newId(all) }], [...before]);
+    if (!this.change(added)) return false;
+    this.decisions.push({ before, after: this.tracks, taken });
+    this.proposals.take(taken);
+    this.pointed = null;
+    return true;
   }
 
   // Whether there is a proposal that has been shown; one that has not is shown now.
   decidable() {
     const { current, shown } = this.proposals;
     if (current && shown) return true;
-    this.say(current ? 'This is the next proposal: press again to decide.' : 'There is no proposal.');
+    this.say(current ? 'These are the next proposals: press again to decide.' : 'There is no proposal.');
     if (current) {
       this.select(null);
       this.changed('proposal');
@@ -363,23 +409,13 @@ export class Session {
   }
 
   showLane() {
-    const track = this.track ?? this.proposals.current?.track;
-    if (!track) {
+    const shown = this.track ? [this.track] : this.proposals.offered.map(({ track }) => track);
+    if (shown.length === 0) {
       this.brushed(null, null);
       return;
     }
-    const { count, time, x, y } = this.recording;
-    const [vx, vy] = tracks.velocity(track);
-    const speed = Math.hypot(vx, vy) || 1;
     this.brush = { plot: 'lane', area: null };
-    this.chosen = new Uint8Array(count);
-    const [first, last] = [tracks.begins(track), tracks.ends(track)];
-    for (let i = 0; i < count; i += 1) {
-      const inside = Math.min(Math.max(time[i], first), last);
-      const at = tracks.positionAt(track, inside);
-      const across = ((y[i] - at[1]) * vx - (x[i] - at[0]) * vy) / speed;
-      this.chosen[i] = Math.abs(across) < LANE_M ? 1 : 0;
-    }
+    this.chosen = onWays(this.recording, shown.filter(({ points }) => points.length > 1), LANE_M);
     this.changed('points');
   }
 
