@@ -24,7 +24,7 @@ fn proposals_of_the_motorway_need_few_actions_and_give_labels_like_the_truth() {
     let judged = judged::judge(&recording, &offered, &evaluation::Options::default()).unwrap();
     println!("{}", judged.text());
     let share = |[all, part]: [u64; 2]| part as f64 / all as f64;
-    assert!(judged.vehicles > 100 && judged.actions_a_vehicle() <= 1.5);
+    assert!(judged.vehicles > 100 && judged.actions_a_vehicle() <= 0.5);
     assert!(share(judged.steps) >= 0.95 && share(judged.undetected) >= 0.8);
     assert!(share(judged.labelled) <= 0.02);
 }

@@ -1,16 +1,16 @@
 //! A person who knows the truth and works at the label page: what it does, and how many actions that takes.
 //!
 //! # Model
-//! The person looks at each proposal, the best first. One that lies on a vehicle for most of its time is accepted; one
-//! that continues or precedes an accepted piece of the same vehicle is accepted and joined; one that lies elsewhere, or
-//! on a vehicle that is labelled there already, is rejected. Then it looks where a vehicle is seen well for a second and
-//! its label is missing or elsewhere: it clicks on the vehicle there, which is [followed](Follower) from the click, and
+//! The person looks at the proposals way by way. One that lies on a vehicle for most of its time is right; one that
+//! continues or precedes a piece of the same vehicle is right, too, and is joined; one that lies elsewhere, or on a
+//! vehicle that has a better one there, is wrong. The fewer of a way are pointed at, the others go with one key. Then it
+//! looks where a vehicle is seen for a second, by a few detections at least, and its label is missing or elsewhere: it clicks on the vehicle there, which is [followed](Follower) from the click, and
 //! takes back what did not help. What a click does not mend gets points. A vehicle that nothing was offered for begins
 //! with a click, too, and is drawn where that does not hold.
 //!
 //! # Actions
-//! Accepting, rejecting, joining, correcting a class, a click to follow and taking it back count one each; drawing one,
-//! and each point that is set one.
+//! Each key for a way or for a proposal that is pointed at, joining, correcting a class, a click to follow and taking it
+//! back count one; drawing one, and each point that is set one. Looking does not count: views, zooms and the time slider.
 
 use std::collections::BTreeMap;
 

@@ -362,7 +362,9 @@ fn proposals_of_one_way_are_decided_about_together() {
     let count = group.as_array().unwrap().len();
     assert!(count > 3 && all > count as f64, "{count} of {all}");
     is_in_view(&page);
-    assert!(page.ask("document.getElementById('proposal-text').textContent").as_str().unwrap().contains("together, of"));
+    assert!(
+        page.ask("document.getElementById('proposal-text').textContent").as_str().unwrap().contains("together, of")
+    );
     // where nothing is pointed at, nothing is rejected
     page.ask("(viewshed.session.pointed = null, 1)");
     page.key("x");

@@ -24,6 +24,11 @@ type Place = ([f64; 2], [f64; 2]);
 /// The number of each track's way, from 0; ways on which more lie come first. Cost: the square of the tracks' number,
 /// 0.1 s for 300.
 pub fn ways(tracks: &[&LabelTrack]) -> Vec<u32> {
+    with_others(&apart(tracks))
+}
+
+/// The same, each that is alone on its way with a number of its own.
+fn apart(tracks: &[&LabelTrack]) -> Vec<u32> {
     let lines: Vec<Line> = tracks.iter().map(|t| Line::of(&t.points)).collect();
     let on: Vec<Vec<usize>> =
         lines.iter().map(|way| (0..lines.len()).filter(|k| way.carries(&lines[*k])).collect()).collect();
@@ -38,11 +43,10 @@ pub fn ways(tracks: &[&LabelTrack]) -> Vec<u32> {
             way[*k].get_or_insert(number);
         }
     }
-    let way: Vec<u32> = way.into_iter().flatten().collect();
-    with_others(&way)
+    way.into_iter().flatten().collect()
 }
 
-/// The same with those that are alone on their way put together, a few at a time.
+/// The ways with those that are alone on their way put together, a few at a time.
 fn with_others(ways: &[u32]) -> Vec<u32> {
     let of = |way: u32| ways.iter().filter(|w| **w == way).count();
     let first_alone = ways.iter().copied().filter(|way| of(*way) == 1).min();
@@ -134,7 +138,7 @@ mod tests {
     }
 
     fn of(all: &[LabelTrack]) -> Vec<u32> {
-        ways(&all.iter().collect::<Vec<_>>())
+        apart(&all.iter().collect::<Vec<_>>())
     }
 
     #[test]
@@ -161,6 +165,9 @@ mod tests {
         let [a, b] = [0.0, 20.0].map(|y| move |from: f64| track(&[[from, y], [from + 50.0, y]]));
         assert_eq!(of(&[a(0.0), b(0.0), b(5.0), b(9.0)]), [1, 0, 0, 0]);
         assert_eq!(of(&[]), Vec::<u32>::new());
+        // those that are alone are shown a few at a time
+        assert_eq!(with_others(&[1, 0, 0, 2, 3, 4, 5, 6, 7]), [1, 0, 0, 1, 1, 1, 1, 1, 2]);
+        assert_eq!(with_others(&[1, 0, 1, 0]), [1, 0, 1, 0]);
         // a line without a length is its own way, or lies on another
         assert_eq!(of(&[track(&[[5.0, 5.0], [5.0, 5.0]])]), [0]);
         assert_eq!(of(&[track(&[[5.0, 0.5], [5.0, 0.5]]), a(0.0)]), [0, 0]);
