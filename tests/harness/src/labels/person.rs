@@ -4,9 +4,10 @@
 //! The person looks at the proposals way by way. One that lies on a vehicle for most of its time is right; one that
 //! continues or precedes a piece of the same vehicle is right, too, and is joined; one that lies elsewhere, or on a
 //! vehicle that has a better one there, is wrong. The fewer of a way are pointed at, the others go with one key. Then it
-//! looks where a vehicle is seen for a second, by a few detections at least, and its label is missing or elsewhere: it clicks on the vehicle there, which is [followed](Follower) from the click, and
-//! takes back what did not help. What a click does not mend gets points. A vehicle that nothing was offered for begins
-//! with a click, too, and is drawn where that does not hold.
+//! looks where a vehicle is seen for a second, by a few detections at least, and its label is missing or elsewhere: it
+//! clicks on the vehicle there, which is [followed](Follower) from the click, and takes back what did not help. What a
+//! click does not mend gets points. A vehicle that nothing was offered for begins with a click, too, and is drawn where
+//! that does not hold.
 //!
 //! # Actions
 //! Each key for a way or for a proposal that is pointed at, joining, correcting a class, a click to follow and taking it
