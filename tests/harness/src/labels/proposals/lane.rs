@@ -20,6 +20,23 @@ pub struct Beside {
 }
 
 impl Lane {
+    /// The place so far along this lane, and the direction there; `None` beyond its end.
+    pub fn at(&self, along_m: f64) -> Option<([f64; 2], [f64; 2])> {
+        let mut rest = along_m;
+        for pair in self.points.windows(2) {
+            let [dx, dy] = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
+            let length = dx.hypot(dy);
+            if rest <= length && length > 1e-6 {
+                return Some((
+                    [pair[0][0] + dx * rest / length, pair[0][1] + dy * rest / length],
+                    [dx / length, dy / length],
+                ));
+            }
+            rest -= length;
+        }
+        None
+    }
+
     /// Where a place is beside this lane; `None` before its start and after its end.
     pub fn beside(&self, place: [f64; 2]) -> Option<Beside> {
         let mut best: Option<(f64, Beside)> = None;

@@ -194,22 +194,6 @@ impl Lane {
         let straight = Some((point(m[1] / m[0]), m[0]));
         (high - low > STEP_M).then_some(Self { points, straight })
     }
-
-    fn at(&self, along_m: f64) -> Option<([f64; 2], [f64; 2])> {
-        let mut rest = along_m;
-        for pair in self.points.windows(2) {
-            let [dx, dy] = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
-            let length = dx.hypot(dy);
-            if rest <= length && length > 1e-6 {
-                return Some((
-                    [pair[0][0] + dx * rest / length, pair[0][1] + dy * rest / length],
-                    [dx / length, dy / length],
-                ));
-            }
-            rest -= length;
-        }
-        None
-    }
 }
 
 /// How far left of its reflections the middle of a vehicle is: seen from the side, they lie on the flank.

@@ -3,6 +3,7 @@
 //! A line that lies on another for most of its length, in its direction, is of that way. Ways are taken in the order of
 //! how many lie on them, so a lane comes before the one that changes to it.
 
+use super::lane::Lane;
 use crate::labels::tracks::{LabelPoint, LabelTrack};
 
 /// How far beside a line another is of its way, metres: half a lane.
@@ -62,50 +63,35 @@ fn with_others(ways: &[u32]) -> Vec<u32> {
     all.collect()
 }
 
-/// A polyline without its times.
+/// Where a track goes, whenever that is.
 struct Line {
     corners: Vec<[f64; 2]>,
-    length_m: f64,
     places: Vec<Place>,
+    directed: bool,
 }
 
 impl Line {
     fn of(points: &[LabelPoint]) -> Self {
-        let corners: Vec<[f64; 2]> = points.iter().map(|p| [p.x_m, p.y_m]).collect();
-        let length_m = corners.windows(2).map(|s| distance(s[0], s[1])).sum();
-        let mut line = Self { corners, length_m, places: Vec::new() };
-        line.places = (0..PLACES).filter_map(|k| line.at(length_m * k as f64 / (PLACES - 1) as f64)).collect();
-        line
-    }
-
-    /// The place so far along it.
-    fn at(&self, along_m: f64) -> Option<Place> {
-        let mut left_m = along_m;
-        let mut last = self.corners.first().map(|corner| (*corner, [0.0, 0.0]));
-        for segment in self.corners.windows(2) {
-            let length = distance(segment[0], segment[1]);
-            if length < 1e-9 {
-                continue;
-            }
-            let direction = [0, 1].map(|i| (segment[1][i] - segment[0][i]) / length);
-            let on = left_m.min(length);
-            last = Some(([0, 1].map(|i| segment[0][i] + on * direction[i]), direction));
-            if left_m <= length {
-                break;
-            }
-            left_m -= length;
+        let lane = Lane { points: points.iter().map(|p| [p.x_m, p.y_m]).collect(), straight: None };
+        let length_m: f64 = lane.points.windows(2).map(|s| distance(s[0], s[1])).sum();
+        // the last place is not beyond the end by rounding
+        let along = |k: usize| length_m * k as f64 / (PLACES - 1) as f64 * (1.0 - 1e-9);
+        let mut places: Vec<Place> = (0..PLACES).filter_map(|k| lane.at(along(k))).collect();
+        if places.is_empty() {
+            places.extend(lane.points.first().map(|place| (*place, [0.0; 2])));
         }
-        last
+        Self { corners: lane.points, places, directed: length_m >= DIRECTED_M }
     }
 
     /// Whether another lies on this one.
     fn carries(&self, other: &Self) -> bool {
-        let on = other.places.iter().filter(|place| self.has(place, other.length_m >= DIRECTED_M)).count();
+        let on = other.places.iter().filter(|place| self.has(place, other.directed)).count();
         on as f64 >= SHARE * other.places.len() as f64
     }
 
     fn has(&self, &(place, direction): &Place, directed: bool) -> bool {
         let last = self.corners.len().saturating_sub(2);
+        // a place in a bend is beside several segments, and any of them may have its direction
         self.corners.windows(2).enumerate().any(|(k, segment)| {
             let length = distance(segment[0], segment[1]);
             if length < 1e-9 {

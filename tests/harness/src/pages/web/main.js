@@ -332,7 +332,8 @@ class Page {
     // what is being changed is not taken out of sight
     if (!current || shown || this.session.selected !== null) return;
     this.fit(offered.map(({ track }) => track));
-    if (this.session.lanes) this.session.showLane();
+    // fitting has shown it, where a lane was shown before
+    if (this.session.lanes && this.session.brush?.plot !== 'lane') this.session.showLane();
     const same = () => proposals.current === current && proposals.together === together;
     requestAnimationFrame(() => requestAnimationFrame(() => same() && proposals.seen()));
   }

@@ -316,48 +316,43 @@ export class Session {
 
   // Takes all over that are offered.
   accept() {
-    if (!this.decidable()) return;
     const { offered } = this.proposals;
-    if (this.decide(offered, offered)) this.select(null);
-    this.changed('proposal');
+    if (this.decidable()) this.decide(offered, offered);
   }
 
   // Takes one over and selects it, to be mended.
   mend() {
-    const one = this.decidable() ? this.pointedOne() : null;
-    if (!one || !this.decide([one], [one])) return;
-    this.select(this.tracks.at(-1).id);
-    this.say(`Track ${this.selected}: drag its points; K shows what is offered.`);
-    this.changed('proposal');
+    const one = this.decidableOne();
+    if (one && this.decide([one], [one], true)) this.say(`Track ${this.selected}: drag its points; K shows what is offered.`);
   }
 
   reject() {
-    const one = this.decidable() ? this.pointedOne() : null;
-    if (!one || !this.decide([one], [])) return;
-    this.select(null);
-    this.changed('proposal');
+    const one = this.decidableOne();
+    if (one) this.decide([one], []);
   }
 
   // Rejects all that are offered.
   discard() {
-    if (!this.decidable() || !this.decide(this.proposals.offered, [])) return;
-    this.select(null);
-    this.changed('proposal');
+    if (this.decidable()) this.decide(this.proposals.offered, []);
   }
 
-  pointedOne() {
+  // The one that is pointed at, once it has been shown.
+  decidableOne() {
+    if (!this.decidable()) return null;
     if (!this.one) this.say('Point at one of the proposals, or press O to see them one by one.');
     return this.one;
   }
 
-  // Takes proposals out, some of them as tracks; one step of the history.
-  decide(taken, accepted) {
+  // Takes proposals out, some of them as tracks, of which the last is selected to be mended; one step of the history.
+  decide(taken, accepted, mended = false) {
     const before = this.tracks;
     const added = accepted.reduce((all, { track }) => [...all, { ...track, id: tracks.newId(all) }], [...before]);
     if (!this.change(added)) return false;
     this.decisions.push({ before, after: this.tracks, taken });
     this.proposals.take(taken);
     this.pointed = null;
+    this.select(mended ? this.tracks.at(-1).id : null);
+    this.changed('proposal');
     return true;
   }
 
