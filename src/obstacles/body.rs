@@ -1,5 +1,6 @@
 //! The box an obstacle fills: what was seen of it, and what that leaves unseen.
 
+use super::hidden_end::ALL;
 use super::obstacle::Obstacle;
 use super::size::Size;
 use super::tracking::Tracking;
@@ -54,14 +55,14 @@ impl Obstacle {
 
     /// How far the middle of its width lies behind its detections, centimetres. A radar beside a
     /// vehicle sees the near side: its detections then spread over less than the width, and have their
-    /// centre near that side. One ahead or behind sees both.
+    /// centre near that side. One ahead or behind sees both, unless the end is hidden.
     #[allow(clippy::cast_possible_wrap)] // the root of a clamped variance
     fn beside_the_detections(&self, size: &Size, ahead: i32, left: i32) -> i32 {
         let (side, end) = (size.length_cm * left.abs(), size.width_cm * ahead.abs());
         // from where the side makes up half of what is seen, 2^-8
-        let shown = (side / ((side + end) / 512).max(1)).min(256);
+        let shown = (side / ((side + end) / (ALL * 2)).max(1)).min(ALL).max(i32::from(self.hidden_end));
         // an even spread over the width has a variance of a twelfth of its square; noise makes it a little more
-        let half_seen = root((self.spread + self.spread / 8).unsigned_abs()) as i32;
+        let half_seen = root((self.spread + self.spread / 8).max(0).unsigned_abs()) as i32;
         ((size.width_cm / 2 - half_seen).max(0) * shown) >> 8
     }
 }

@@ -156,6 +156,7 @@ mod body;
 mod by_hand;
 pub mod config;
 mod gathered;
+mod hidden_end;
 mod joining;
 mod lane;
 pub mod lanes;
@@ -263,6 +264,9 @@ impl<const N: usize> Obstacles<N> {
         }
         self.found(reflections, by_range, &mut claimed, t);
         self.join_parts(t);
+        for o in &mut self.list {
+            o.look_for_end(t, &in_view);
+        }
         self.doubt_the_unseen(step, t, in_view);
         claimed
     }

@@ -33,7 +33,8 @@ pub struct Obstacle {
     pub extent: Extent,
     /// Weight of the lateral estimate: the sum of its detections', fading.
     pub(super) lateral_weight: i32,
-    /// Variance of where across it the detections lie, their noise taken off, cm^2.
+    /// Variance of where across it the detections lie, their noise taken off, cm^2; below 0 where that was less than
+    /// assumed.
     pub(super) spread: i32,
     /// Length it has shown for long, 2^-4 cm.
     pub(super) shown_length: i32,
@@ -50,6 +51,8 @@ pub struct Obstacle {
     pub(super) free: FreeMotion,
     /// Frames in a row in which motion along its heading did not explain where it is.
     pub(super) unexplained: u8,
+    /// How much of the last frames hid the end that is turned to the sensor, 2^-8.
+    pub(super) hidden_end: i16,
     /// Whether it goes its own way, with speed and heading from `free`.
     pub(super) free_heading: bool,
     /// Segment of the lane it follows, or [`NO_LANE`](super::lane::NO_LANE).
@@ -83,6 +86,7 @@ impl Obstacle {
             velocity,
             free: FreeMotion::new(position, NEWBORN_PLACE, velocity, NEWBORN_SPEED),
             unexplained: 0,
+            hidden_end: 0,
             free_heading: false,
             lane: NO_LANE,
             heading,
@@ -226,7 +230,7 @@ impl Obstacle {
             }
         }
         self.lateral_weight = weight;
-        let off = g.spread(self.heading).clamp(0, 4 * EVEN_SPREAD) - self.spread;
+        let off = g.spread(self.heading).clamp(self.least_spread(), 4 * EVEN_SPREAD) - self.spread;
         self.spread += off * g.count / (g.count + SPREAD_MEMORY).max(1);
         self.question_heading(t);
         self.look_for_lane(t);
@@ -346,6 +350,29 @@ mod tests {
         o.absorb(&Reflection { across_cm: 400, ..seen_at(5000, -60, 2000) }, &t);
         o.settle(Step::from_micros(66_667), &t);
         assert!(o.anchor().1 > 50, "{:?}", o.anchor());
+    }
+
+    #[test]
+    fn what_lies_in_a_row_but_for_noise_has_no_spread_where_an_end_is_hidden() {
+        assert!(spread_of_noise(256).abs() < 300, "{} cm^2", spread_of_noise(256));
+        assert!(spread_of_noise(0) > 500, "{} cm^2", spread_of_noise(0));
+    }
+
+    /// Spread of detections in a row with noise as it is assumed to be, cm^2.
+    fn spread_of_noise(hidden_end: i16) -> i32 {
+        let t = rules();
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        for k in 0..400 {
+            o.predict(Step::from_micros(66_667), 1 << 16, &t);
+            (o.lateral_weight, o.hidden_end) = (MOST_WEIGHT, hidden_end);
+            let (x, y) = o.anchor();
+            // standard deviation 40 cm, as assumed: every other frame shows more than that
+            let off = if k % 2 == 0 { 55 } else { 14 };
+            o.absorb(&seen_at(x, y + off, 2000), &t);
+            (o.position.1, o.velocity.1) = (0, 0);
+            o.settle(Step::from_micros(66_667), &t);
+        }
+        o.spread
     }
 
     #[test]

@@ -43,6 +43,7 @@ impl Obstacles {
         self.list.iter_mut().for_each(|o| o.settle(dt, rules));
         self.found(placed, &mut claimed, rules);
         self.join_parts(rules);
+        self.list.iter_mut().filter(|o| o.seen()).for_each(|o| o.look_for_end(rules, &in_view));
         self.doubt_the_unseen(dt, rules, in_view);
         claimed
     }

@@ -30,6 +30,8 @@ pub struct Obstacle {
     pub lateral_weight: f64,
     /// Variance of where across it the detections lie, m^2.
     spread: f64,
+    /// How much of the last frames hid the end that is turned to the sensor.
+    hidden_end: f64,
     /// Length it has shown for long.
     shown_length: f64,
     /// Evidence that it is there, detections.
@@ -82,6 +84,7 @@ impl Obstacle {
             extent: Extent { rear: -BIN_M / 2.0, front: BIN_M / 2.0 },
             lateral_weight: 0.0,
             spread: EVEN_SPREAD,
+            hidden_end: 0.0,
             shown_length: 0.0,
             existence: 0.0,
             hits: 0.0,
@@ -246,7 +249,8 @@ impl Obstacle {
             self.go_along_heading(offset, dt, rules);
         }
         let noise = g.sigma_across * along(self.heading, g.sight);
-        let spread = (g.squares / g.count - noise.powi(2)).clamp(0.0, 4.0 * EVEN_SPREAD);
+        let least = if self.hidden_end > 0.5 { -4.0 * EVEN_SPREAD } else { 0.0 };
+        let spread = (g.squares / g.count - noise.powi(2)).clamp(least, 4.0 * EVEN_SPREAD);
         self.spread += (spread - self.spread) * g.count / (g.count + SPREAD_MEMORY);
         self.question_heading(rules);
         self.update_extent(rules);
@@ -381,6 +385,17 @@ impl Obstacle {
         if length(self.velocity) < rules.slow { self.shown_length } else { 0.0 }
     }
 
+    /// Whether the end that is turned to the sensor is hidden; what is fast keeps its distance.
+    pub fn look_for_end(&mut self, rules: &Rules, in_view: impl Fn(Ground) -> bool) {
+        let solid = self.solid(rules);
+        let [x, y, _] = solid.center;
+        let half = if along(self.heading, [x, y]) > 0.0 { -solid.size[0] / 2.0 } else { solid.size[0] / 2.0 };
+        let end = moved([x, y], self.heading, half);
+        let in_sight = [-0.5, 0.0, 0.5].iter().all(|s| in_view(moved(end, left(self.heading), s * solid.size[1])));
+        let hidden = if length(self.velocity) < rules.slow && !in_sight { 1.0 } else { 0.0 };
+        self.hidden_end += (hidden - self.hidden_end) / 4.0;
+    }
+
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
     pub fn solid(&self, rules: &Rules) -> Solid {
         let (seen, tall) = (self.extent.length(), self.tallness.floor());
@@ -391,7 +406,8 @@ impl Obstacle {
         // behind the end and behind the side that is seen
         let hidden = (length - seen).max(0.0) / 2.0;
         let (side, end) = (length * aside.abs(), width * ahead.abs());
-        let unseen = (width / 2.0 - (self.spread * 1.125).sqrt()).max(0.0) * (2.0 * side / (side + end)).min(1.0);
+        let shown = (1.5 * side / (side + end)).min(1.0).max(self.hidden_end);
+        let unseen = (width / 2.0 - (self.spread * 1.125).max(0.0).sqrt()).max(0.0) * shown;
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
         let [x, y] = moved(middle, left(self.heading), away(unseen, aside));

@@ -76,14 +76,18 @@ mod tests {
         }
 
         fn step(&mut self, measured: &[Measurement]) {
+            self.step_with(measured, true);
+        }
+
+        fn step_with(&mut self, measured: &[Measurement], in_view: bool) {
             let noise = self.noise.noise().unwrap();
             let reflections: Vec<Reflection> =
                 measured.iter().map(|m| reflection(m, &noise, &self.levelling)).collect();
             let step = Step::from_micros(PERIOD_US);
             let sorted = ByRange::<64>::sort(&reflections, self.tracking.limit_cm);
-            self.integer.step(&reflections, &sorted, step, &self.tracking, |_, _| true);
+            self.integer.step(&reflections, &sorted, step, &self.tracking, |_, _| in_view);
             let placed: Vec<Placed> = measured.iter().map(|m| place(m, &self.noise, &self.levelled)).collect();
-            self.exact.step(&placed, PERIOD_US as f64 * 1e-6, &self.rules, |_| true);
+            self.exact.step(&placed, PERIOD_US as f64 * 1e-6, &self.rules, |_| in_view);
         }
 
         /// The obstacle with the most detections, in integers and in real numbers.
@@ -168,6 +172,29 @@ mod tests {
         let (means, worst) = ([0.07, 0.35, 0.045, 0.6], [0.2, 1.6, 0.22, 0.75]);
         integer_off.limit("integer and truth", means, worst);
         exact_off.limit("exact and truth", means, worst);
+    }
+
+    #[test]
+    fn a_slow_car_whose_end_is_hidden_lies_behind_its_side_by_the_same() {
+        let car = Vehicle { length: 4.6, width: 0.0, start: [60.0, 5.0], speed: 2.5 };
+        for mount in mounts() {
+            let aside = |in_view: bool| {
+                let (mut both, mut random) = (Both::new(&mount), Random::new(35));
+                for frame in 0..150 {
+                    both.step_with(&car.measured(&both.levelled, frame, &mut random), in_view);
+                }
+                let (integer, exact) = both.followed();
+                let (integer, exact) = (integer.solid(&both.tracking), exact.solid(&both.rules));
+                let middle = car.middle(&both.levelled, 149);
+                let off = |x, y| across(both.levelled.road_axis(), difference([x, y], middle));
+                let [x, y, _] = exact.center;
+                [off(f64::from(integer.x_cm) / 100.0, f64::from(integer.y_cm) / 100.0), off(x, y)]
+            };
+            let ([hidden, hidden_exact], [seen, seen_exact]) = (aside(false), aside(true));
+            within("end hidden, m", (hidden - hidden_exact).abs(), 0.12);
+            within("end in sight, m", (seen - seen_exact).abs(), 0.12);
+            assert!((hidden - seen).abs() > 0.2, "{hidden} m aside, {seen} m with its end in sight");
+        }
     }
 
     #[test]
