@@ -13,20 +13,19 @@ pub(super) const LONGEST_LOW_CM: i32 = 900;
 const ACROSS: i32 = (1 << 14) / 4;
 
 impl Obstacle {
-    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
+    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees, or
+    /// before it where that is its farther end.
     pub fn solid(&self, t: &Tracking) -> Solid {
-        let tall = self.tallness.floor_cm();
-        let seen = self.extent.length_cm();
-        let size = t.sizes.of(seen.max(self.remembered_length_cm(t)).max(t.sizes.least_length_cm(tall)));
+        let size = self.size(t);
         // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
         let may_be_low = size.length_cm < LONGEST_LOW_CM || self.profile.is_a_row_of_cars(&self.extent);
         let lid = if may_be_low { self.tallness.ceiling_cm() } else { i32::MAX };
         let margin = self.margin_cm(t);
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
-        let hidden = (size.length_cm - seen).max(0) / 2;
+        let hidden = (size.length_cm - self.extent.length_cm()).max(0) / 2;
         let aside = self.beside_the_detections(&size, ahead, left);
-        let along = self.extent.middle_cm() + if ahead >= 0 { hidden } else { -hidden };
+        let along = self.extent.middle_cm() + if (ahead >= 0) == self.farther_end { -hidden } else { hidden };
         let aside = if left >= 0 { aside } else { -aside };
         let aside = aside + self.towards_lane(self.global(along, aside), t);
         let (x, y) = self.global(along, aside);
@@ -36,8 +35,14 @@ impl Obstacle {
             heading: self.heading,
             half_length_cm: size.length_cm / 2,
             half_width_cm: size.width_cm / 2 + margin,
-            height_cm: size.height_cm.min(lid).max(tall),
+            height_cm: size.height_cm.min(lid).max(self.tallness.floor_cm()),
         }
+    }
+
+    /// What its outline, what it has shown for long and its proven height make it.
+    pub(super) fn size(&self, t: &Tracking) -> Size {
+        let tall = t.sizes.least_length_cm(self.tallness.floor_cm());
+        t.sizes.of(self.extent.length_cm().max(self.remembered_length_cm(t)).max(tall))
     }
 
     /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its

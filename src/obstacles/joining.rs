@@ -15,6 +15,10 @@ const SPACING_CM: i32 = 480;
 const END_CM: i32 = 150;
 /// See [`END_CM`].
 const CAR_CM: RangeInclusive<i32> = 400..=520;
+/// The same of a delivery van, which is tall: its end, to behind the cab, and all of it.
+const VAN_END_CM: i32 = 250;
+/// See [`VAN_END_CM`].
+const VAN_CM: RangeInclusive<i32> = 400..=660;
 /// Largest difference of speed of the ends of one car, 2^-8 cm/s: a metre a second.
 const ENDS_SPEED: i32 = 100 << FRACTION;
 
@@ -60,16 +64,18 @@ impl Obstacle {
 
     /// Whether another obstacle, in line, as fast and together so long with this one, which is seen better, is the other end of the
     /// same car. Gaps do not tell: in a queue cars are as close to each other as their own ends are. But no face of another
-    /// car lies less than a car's length and a gap behind a face. And two ends as far apart as a car's are one car's; it
-    /// then has both, so the next end is the next car's.
+    /// car lies less than a car's length and a gap behind a face. And two ends as far apart as a car's are one car's, two tall
+    /// ones as a van's one van's; it then has both, so the next end is the next vehicle's.
     fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &Tracking) -> bool {
         let (x, y) = self.anchor();
         let ahead = along > self.extent.middle_cm();
         // what lies ahead of the sensor shows it the face that is nearer, and its other end is farther away
         let behind_its_face = ahead == (self.heading.along(x, y) > 0);
         let confirmed = self.existence.min(other.existence) >= t.confirmed;
-        let ends = self.extent.length_cm().max(other.extent.length_cm()) <= END_CM;
-        (behind_its_face && length < SPACING_CM) || (confirmed && ends && CAR_CM.contains(&length))
+        let tall = self.tallness.is_tall() && other.tallness.is_tall();
+        let (end_cm, over_all_cm) = if tall { (VAN_END_CM, VAN_CM) } else { (END_CM, CAR_CM) };
+        let ends = self.extent.length_cm().max(other.extent.length_cm()) <= end_cm;
+        (behind_its_face && length < SPACING_CM) || (confirmed && ends && over_all_cm.contains(&length))
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
@@ -203,6 +209,14 @@ mod tests {
         assert!(a.is_one_with(&b, &t), "8.5 m");
     }
 
+    /// Certain to be tall.
+    fn high() -> Tallness {
+        let mut t = Tallness::default();
+        (0..10).for_each(|_| t.add(290, 10));
+        assert!(t.is_tall());
+        t
+    }
+
     /// Two ends of cars that creep at 2 m/s, as long as given and so far apart between their outer ends, the second
     /// ahead of the first and both ahead of the sensor.
     fn ends(lengths_cm: [i32; 2], over_all_cm: i32, x_cm: i32) -> [Obstacle; 2] {
@@ -244,6 +258,13 @@ mod tests {
         assert!(!one([40, 40], 390, -3500).0, "too short for a car; its face is the other one");
         assert_eq!(one([490, 95], 900, 3000), (false, false), "one that has both its ends");
         assert_eq!(one([160, 95], 500, 3000), (false, false), "more than an end");
+        let van = |lengths: [i32; 2], over_all: i32, tall: usize| {
+            let mut pair = ends(lengths, over_all, 3000);
+            pair.iter_mut().take(tall).for_each(|o| o.tallness = high());
+            pair[0].is_one_with(&pair[1], &t)
+        };
+        assert!(van([100, 200], 640, 2) && !van([100, 200], 640, 1), "only what is tall at both ends is a van");
+        assert!(!van([100, 200], 680, 2) && !van([100, 260], 640, 2), "two vehicles");
         let [mut a, b] = ends([95, 95], 500, 3000);
         a.existence = t.confirmed - 1;
         assert!(!a.is_one_with(&b, &t) && !b.is_one_with(&a, &t), "perhaps it is nothing");

@@ -161,6 +161,7 @@ pub mod motion;
 pub mod obstacle;
 mod own_way;
 pub mod profile;
+mod room;
 mod search;
 pub mod size;
 pub mod solid;
@@ -261,6 +262,7 @@ impl<const N: usize> Obstacles<N> {
         }
         self.found(reflections, by_range, &mut claimed, t);
         self.join_parts(t);
+        self.look_for_room(t);
         self.list.iter_mut().for_each(|o| o.look_for_end(t, &in_view));
         self.doubt_the_unseen(step, t, in_view);
         claimed

@@ -53,6 +53,8 @@ pub struct Obstacle {
     pub(super) unexplained: u8,
     /// How much of the last frames hid the end that is turned to the sensor, 2^-8.
     pub(super) hidden_end: i16,
+    /// Whether what is seen of it can only be its [farther end](super::room).
+    pub(super) farther_end: bool,
     /// Whether it goes its own way, with speed and heading from `free`.
     pub(super) free_heading: bool,
     /// Segment of the lane it follows, or [`NO_LANE`](super::lane::NO_LANE).
@@ -87,6 +89,7 @@ impl Obstacle {
             free: FreeMotion::new(position, NEWBORN_PLACE, velocity, NEWBORN_SPEED),
             unexplained: 0,
             hidden_end: 0,
+            farther_end: false,
             free_heading: false,
             lane: NO_LANE,
             heading,

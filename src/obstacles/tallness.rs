@@ -86,6 +86,11 @@ impl Tallness {
         self.tall <= -SURE
     }
 
+    /// Whether it is as tall as a delivery van for certain.
+    pub fn is_tall(&self) -> bool {
+        self.floor_cm() >= TALL_CM
+    }
+
     /// Takes over another's counts.
     pub fn join(&mut self, other: &Self) {
         self.measured = self.measured.saturating_add(other.measured);

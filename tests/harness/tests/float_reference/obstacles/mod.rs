@@ -43,6 +43,8 @@ impl Obstacles {
         self.list.iter_mut().for_each(|o| o.settle(dt, rules));
         self.found(placed, &mut claimed, rules);
         self.join_parts(rules);
+        let farther: Vec<bool> = self.list.iter().map(|o| o.is_farther_end(&self.list, rules)).collect();
+        self.list.iter_mut().zip(farther).for_each(|(o, farther)| o.farther_end = farther);
         self.list.iter_mut().filter(|o| o.seen()).for_each(|o| o.look_for_end(rules, &in_view));
         self.doubt_the_unseen(dt, rules, in_view);
         claimed

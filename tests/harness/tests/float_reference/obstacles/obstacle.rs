@@ -2,7 +2,7 @@
 
 use viewshed_harness::geometry::solid::Solid;
 
-use super::outline::{BIN_M, Extent, Profile, Tallness, least_length, size};
+use super::outline::{BIN_M, Extent, Profile, TALL, Tallness, least_length, size};
 use super::own_way::FreeMotion;
 use super::rules::Rules;
 use crate::geometry::{Ground, Placed, across, along, difference, left, moved};
@@ -32,6 +32,8 @@ pub struct Obstacle {
     spread: f64,
     /// How much of the last frames hid the end that is turned to the sensor.
     hidden_end: f64,
+    /// Whether what is seen of it can only be its farther end.
+    pub farther_end: bool,
     /// Length it has shown for long.
     shown_length: f64,
     /// Evidence that it is there, detections.
@@ -85,6 +87,7 @@ impl Obstacle {
             lateral_weight: 0.0,
             spread: EVEN_SPREAD,
             hidden_end: 0.0,
+            farther_end: false,
             shown_length: 0.0,
             existence: 0.0,
             hits: 0.0,
@@ -190,6 +193,11 @@ impl Obstacle {
     /// Whether it is low for certain, and so no lorry.
     fn is_low(&self) -> bool {
         self.tallness.ceiling() < f64::INFINITY
+    }
+
+    /// Whether it is as tall as a delivery van for certain.
+    fn is_tall(&self) -> bool {
+        self.tallness.floor() >= TALL
     }
 
     /// Takes a detection that belongs to it.
@@ -321,12 +329,13 @@ impl Obstacle {
         let abreast = if gap <= 0.0 { rules.abreast } else { 0.0 };
         let near =
             gap <= widest && whole <= if self.is_low() && other.is_low() { LONGEST_LOW } else { rules.max_length };
-        // the ends of a car that is creeping
+        // the ends of a car that is creeping, or of a van
         let behind_its_face = (ahead > self.extent.middle()) == (along(self.heading, self.anchor) > 0.0);
         let confirmed = self.existence.min(other.existence) >= rules.confirm_hits;
-        let ends = self.extent.length().max(other.extent.length()) <= 1.5;
-        let other_end =
-            apart <= 1.0 && ((behind_its_face && whole < 4.8) || (confirmed && ends && (4.0..=5.2).contains(&whole)));
+        let (end, over_all) = if self.is_tall() && other.is_tall() { (2.5, 6.6) } else { (1.5, 5.2) };
+        let ends = self.extent.length().max(other.extent.length()) <= end;
+        let both_ends = confirmed && ends && (4.0..=over_all).contains(&whole);
+        let other_end = apart <= 1.0 && ((behind_its_face && whole < 4.8) || both_ends);
         apart <= rules.merge_speed
             && along(self.heading, other.heading) >= rules.merge_parallel
             && left.abs() <= abreast.max(rules.merge_lateral + uncertain)
@@ -396,17 +405,52 @@ impl Obstacle {
         self.hidden_end += (hidden - self.hidden_end) / 4.0;
     }
 
-    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees.
+    /// Whether it is one end of something tall behind which another vehicle, not tall, begins where its rest should be.
+    pub fn is_farther_end(&self, others: &[Self], rules: &Rules) -> bool {
+        let face = |o: &Self| {
+            let ends = [o.extent.rear, o.extent.front].map(|by| along(self.heading, o.ahead(by)));
+            let middle = (ends[0] + ends[1]) / 2.0;
+            if along(self.heading, self.anchor) > 0.0 {
+                (ends[0].min(ends[1]), middle)
+            } else {
+                (-ends[0].max(ends[1]), -middle)
+            }
+        };
+        let (begins, middle) = face(self);
+        let leaves_no_room = |next: &Self| {
+            let (next_begins, next_middle) = face(next);
+            let [_, left] = self.local(next.ahead(next.extent.middle()));
+            next.existence >= rules.confirm_hits
+                && next.is_mover(rules)
+                && !next.is_tall()
+                && along(self.heading, next.heading) >= rules.merge_parallel
+                && left.abs() <= rules.merge_lateral
+                && next_middle > middle
+                && next_begins - begins < self.size(rules)[0]
+        };
+        self.is_tall()
+            && length(self.velocity) < rules.slow
+            && self.extent.length() < 3.0
+            && others.iter().any(leaves_no_room)
+    }
+
+    /// Length, width and height that its outline, what it has shown for long and its proven height imply.
+    fn size(&self, rules: &Rules) -> [f64; 3] {
+        let tall = least_length(&rules.sizes, self.tallness.floor());
+        size(&rules.sizes, self.extent.length().max(self.remembered_length(rules)).max(tall))
+    }
+
+    /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees, or before it where
+    /// that is its farther end.
     pub fn solid(&self, rules: &Rules) -> Solid {
-        let (seen, tall) = (self.extent.length(), self.tallness.floor());
-        let [length, width, height] =
-            size(&rules.sizes, seen.max(self.remembered_length(rules)).max(least_length(&rules.sizes, tall)));
+        let [length, width, height] = self.size(rules);
         let middle = self.ahead(self.extent.middle());
         let [ahead, aside] = [along(self.heading, middle), across(self.heading, middle)];
         // behind the end and behind the side that is seen
-        let hidden = (length - seen).max(0.0) / 2.0;
+        let hidden = (length - self.extent.length()).max(0.0) / 2.0;
+        let hidden = if self.farther_end { -hidden } else { hidden };
         let (side, end) = (length * aside.abs(), width * ahead.abs());
-        let shown = (1.5 * side / (side + end)).min(1.0).max(self.hidden_end);
+        let shown = (2.0 * side / (side + end)).min(1.0).max(self.hidden_end);
         let unseen = (width / 2.0 - (self.spread * 1.125).max(0.0).sqrt()).max(0.0) * shown;
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
@@ -417,7 +461,7 @@ impl Obstacle {
         } else {
             f64::INFINITY
         };
-        let height = height.min(lid).max(tall);
+        let height = height.min(lid).max(self.tallness.floor());
         let across = along(left(rules.road), self.heading).abs() > ACROSS;
         let margin = match (self.free_heading, across) {
             (false, _) => 0.0,

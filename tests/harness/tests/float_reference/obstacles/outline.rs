@@ -125,7 +125,7 @@ const PROOF: (f64, f64) = (3.0, 1.0 / 20.0);
 const SURE: f64 = 6.0;
 const MOST: f64 = 16.0;
 /// Heights of what is tall and of what is low.
-const TALL: f64 = 2.6;
+pub const TALL: f64 = 2.6;
 const LOW: f64 = 1.6;
 
 /// Reflections counted by the levels they prove.
