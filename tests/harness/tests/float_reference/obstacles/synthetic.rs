@@ -36,6 +36,11 @@ mod tests {
 
         /// Noisy reflections of bumpers, axles and corners on both sides.
         fn measured(&self, levelled: &Levelled, frame: usize, random: &mut Random) -> Vec<Measurement> {
+            self.measured_at(0.8, levelled, frame, random)
+        }
+
+        /// The same at a height.
+        fn measured_at(&self, z: f64, levelled: &Levelled, frame: usize, random: &mut Random) -> Vec<Measurement> {
             let axis = levelled.road_axis();
             let middle = self.middle(levelled, frame);
             (0..10)
@@ -43,7 +48,7 @@ mod tests {
                     let ahead = (f64::from(k % 5) / 4.0 - 0.5) * self.length;
                     let aside = (f64::from(k / 5) - 0.5) * self.width;
                     let [x, y] = moved(moved(middle, axis, ahead), left(axis), aside);
-                    random.measured(levelled, [x, y, 0.8], axis.map(|c| c * self.speed))
+                    random.measured(levelled, [x, y, z], axis.map(|c| c * self.speed))
                 })
                 .collect()
         }
@@ -194,6 +199,40 @@ mod tests {
             within("end hidden, m", (hidden - hidden_exact).abs(), 0.12);
             within("end in sight, m", (seen - seen_exact).abs(), 0.12);
             assert!((hidden - seen).abs() > 0.2, "{hidden} m aside, {seen} m with its end in sight");
+        }
+    }
+
+    #[test]
+    fn a_tall_end_close_before_a_creeping_car_is_the_farther_end_of_its_vehicle_in_both() {
+        let car = Vehicle { length: 4.6, width: 1.8, start: [37.2, 5.0], speed: 2.0 };
+        for mount in mounts() {
+            // nearer face of the end's box, along the road from the middle of the end
+            let begins = |with_car: bool| {
+                let (mut both, mut random) = (Both::new(&mount), Random::new(36));
+                let end = Vehicle { length: 0.5, width: 1.8, start: [30.0, 5.0], speed: 2.0 };
+                for frame in 0..100 {
+                    let mut measured = end.measured_at(3.5, &both.levelled, frame, &mut random);
+                    measured.truncate(5);
+                    if with_car {
+                        measured.extend(car.measured(&both.levelled, frame, &mut random));
+                    }
+                    both.step(&measured);
+                }
+                let (axis, middle) = (both.levelled.road_axis(), end.middle(&both.levelled, 99));
+                let toward = along(axis, middle).signum();
+                let face = |place: Ground, length: f64| along(axis, difference(place, middle)) * toward - length / 2.0;
+                let nearest = |faces: Vec<f64>| faces.into_iter().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap();
+                let of_end = |height: f64| height > 2.0;
+                let integer = both.integer.solids(&both.tracking).filter(|s| of_end(f64::from(s.height_cm) / 100.0));
+                let integer = integer.map(|s| face(metres((s.x_cm, s.y_cm)), f64::from(s.half_length_cm) / 50.0));
+                let exact = both.exact.solids(&both.rules).filter(|s| of_end(s.size[2]));
+                let exact = exact.map(|s| face([s.center[0], s.center[1]], s.size[0]));
+                (nearest(integer.collect()), nearest(exact.collect()))
+            };
+            let ((alone, alone_exact), (before_car, before_car_exact)) = (begins(false), begins(true));
+            within("alone, m", (alone - alone_exact).abs(), 0.15);
+            within("before a car, m", (before_car - before_car_exact).abs(), 0.15);
+            assert!(alone > -1.0 && before_car < -4.0, "from {alone} m, before a car from {before_car} m");
         }
     }
 
