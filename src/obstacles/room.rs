@@ -3,6 +3,23 @@
 //! Of what is tall a radar can see the end that is farther away, and not the nearer one. Nothing tells the two apart but the
 //! next vehicle: one that begins where the rest of this one should still be leaves no room for it, so that lies before
 //! what is seen.
+//!
+//! # What it is worth
+//! Where tall vehicles creep in a line, a third of all boxes had their middle in a gap, most of them begun by a farther end (counted
+//! once). Cells FVR / FIR in percent and objects from `geometry-slice`, of a creeping queue and of a crossing of another
+//! generator; the eight training queues of `tests/recordings/tuning.toml`, pooled from their 30th second on, go from 19.7 / 8.5 and
+//! +12.6 / +4.8 to 19.8 / 8.3 and +12.7 / +4.7, and its sixteen training crossings from 18.5 / 12.1 and +4.5 / +8.6 to 18.4 / 12.1 and
+//! +4.1 / +8.6. Motorways that flow stay the same. Synthetic data.
+//!
+//! | rule | queue | objects | crossing | objects | kept |
+//! |---|---|---|---|---|---|
+//! | without | 12.5 / 8.3 | +1.4 / +13.8 | 16.4 / 16.0 | +11.6 / +7.9 | |
+//! | [two ends](super::joining) as far apart as a van's are one van's | 12.5 / 8.3 | +0.4 / +13.3 | 16.4 / 16.0 | +11.6 / +7.9 | yes |
+//! | and the rest lies before an end without room behind it | 12.3 / 8.1 | +0.3 / +11.7 | 16.0 / 15.3 | +11.7 / +8.0 | yes |
+//! | also where more than 3 m is seen: training queues' FVR 20.7 | 12.3 / 8.1 | +0.3 / +11.7 | 16.0 / 15.2 | +11.7 / +7.9 | no |
+//! | also of what is low | 12.4 / 8.1 | +0.2 / +11.7 | 16.0 / 15.2 | +11.7 / +8.1 | no |
+//! | tall parts up to 4 m apart are one, in place of both | 12.7 / 8.4 | +0.5 / +15.0 | 15.8 / 16.3 | +11.7 / +8.2 | no |
+//! | a car with both ends takes its own from what reaches beyond it | 12.3 / 8.1 | +0.3 / +11.7 | 16.0 / 15.2 | +11.6 / +8.5 | no |
 
 use super::Obstacles;
 use super::obstacle::Obstacle;
