@@ -4,13 +4,23 @@
 //! the end. What was detected then lies on that side, and the middle of the vehicle half its width behind. The last map
 //! tells where that is so.
 
+use super::Obstacles;
 use super::obstacle::Obstacle;
+use super::solid::Solid;
 use super::tracking::{EVEN_SPREAD, Tracking};
 
 /// A whole one, 2^-8.
 pub(super) const ALL: i32 = 1 << 8;
 /// Frames over which what the maps say is smoothed: a cell more or less in sight is no reason to move a box.
 const FRAMES: i32 = 4;
+
+impl<const N: usize> Obstacles<N> {
+    /// Boxes of the confirmed that do not creep. Nothing of their place was told from the side that is seen of a slow one, so
+    /// this is what bearings of two sensors are compared by.
+    pub fn driving<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
+        self.confirmed(t).filter(|o| o.speed() >= t.slow_speed).map(|o| o.solid(t))
+    }
+}
 
 impl Obstacle {
     /// Looks on the last map whether the nearer end of a slow one that was detected is hidden. The end of what is fast
@@ -48,8 +58,8 @@ fn middle(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Obstacles;
-    use super::super::by_hand::{PERIOD_S, reflection, rules};
+    use super::super::by_hand::{PERIOD_S, car, follow, reflection, rules};
+    use super::*;
     use crate::fixed::time::Step;
     use crate::frame::by_range::ByRange;
     use std::vec::Vec;
@@ -91,6 +101,18 @@ mod tests {
         assert!(hidden > in_sight + 0.4, "{hidden} m");
         // it is hidden where any part of it is
         assert!(behind_its_side(80.0, 2.0, 12.0, |_, left| left < 1.0) > in_sight + 0.2);
+    }
+
+    #[test]
+    fn what_creeps_does_not_drive() {
+        let t = rules();
+        let driving = |speed: f64| {
+            let mut list = Obstacles::<4>::new();
+            follow(&mut list, &mut [car([40.0, 4.0], [1.0, 0.0], speed)], 2.0, true);
+            assert_eq!(list.solids(&t).count(), 1, "{speed} m/s");
+            list.driving(&t).count()
+        };
+        assert_eq!([2.0, 3.5, 4.5, 15.0].map(driving), [0, 0, 1, 1]);
     }
 
     #[test]

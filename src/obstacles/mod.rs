@@ -236,8 +236,11 @@ impl<const N: usize> Obstacles<N> {
 
     /// Boxes of the confirmed.
     pub fn solids<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
-        let confirmed = self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t));
-        confirmed.map(|o| o.solid(t))
+        self.confirmed(t).map(|o| o.solid(t))
+    }
+
+    fn confirmed<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = &'a Obstacle> {
+        self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t))
     }
 
     /// Takes one frame's detections: moves every obstacle on, gives each detection to the obstacle

@@ -53,6 +53,10 @@ impl Estimator for AtRisk {
         self.inner.obstacles()
     }
 
+    fn driving(&self) -> Vec<Solid> {
+        self.inner.driving()
+    }
+
     fn counters(&self) -> Vec<(&'static str, u64)> {
         self.inner.counters()
     }

@@ -53,6 +53,11 @@ pub trait Estimator: Send {
         Vec::new()
     }
 
+    /// Those of them that do not creep, whose bearings can be compared with another sensor's.
+    fn driving(&self) -> Vec<Solid> {
+        self.obstacles()
+    }
+
     /// What was rejected or dropped since construction, by reason.
     fn counters(&self) -> Vec<(&'static str, u64)> {
         Vec::new()

@@ -147,6 +147,21 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
         Ok(Self { name: name.to_owned(), parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
     }
+
+    /// A box of the levelled frame, which is the road's, moved to the sensor and turned to its heading.
+    fn on_road(&self, s: &viewshed::obstacles::solid::Solid) -> Solid {
+        let (sin, cos) = f64::from(self.mount.yaw_deg).to_radians().sin_cos();
+        let metres = |cm: i32| f64::from(cm) / 100.0;
+        let (ahead, left, height_m) = (metres(s.x_cm), metres(s.y_cm), metres(s.height_cm));
+        let x = f64::from(self.mount.x_m) + cos * ahead - sin * left;
+        let y = f64::from(self.mount.y_m) + sin * ahead + cos * left;
+        let turned = f64::from(s.heading.y).atan2(f64::from(s.heading.x));
+        Solid {
+            center: [x, y, height_m / 2.0],
+            yaw_rad: turned + f64::from(self.mount.yaw_deg).to_radians(),
+            size: [2.0 * metres(s.half_length_cm), 2.0 * metres(s.half_width_cm), height_m],
+        }
+    }
 }
 
 impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> Estimator
@@ -176,21 +191,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     fn obstacles(&self) -> Vec<Solid> {
-        let (sin, cos) = f64::from(self.mount.yaw_deg).to_radians().sin_cos();
-        let metres = |cm: i32| f64::from(cm) / 100.0;
-        // the levelled frame is the road's, moved to the sensor and turned to its heading
-        let on_road = |s: viewshed::obstacles::solid::Solid| {
-            let (ahead, left, height_m) = (metres(s.x_cm), metres(s.y_cm), metres(s.height_cm));
-            let x = f64::from(self.mount.x_m) + cos * ahead - sin * left;
-            let y = f64::from(self.mount.y_m) + sin * ahead + cos * left;
-            let turned = f64::from(s.heading.y).atan2(f64::from(s.heading.x));
-            Solid {
-                center: [x, y, height_m / 2.0],
-                yaw_rad: turned + f64::from(self.mount.yaw_deg).to_radians(),
-                size: [2.0 * metres(s.half_length_cm), 2.0 * metres(s.half_width_cm), height_m],
-            }
-        };
-        self.state.obstacles().solids(self.parameters.tracking()).map(on_road).collect()
+        self.state.obstacles().solids(self.parameters.tracking()).map(|s| self.on_road(&s)).collect()
+    }
+
+    fn driving(&self) -> Vec<Solid> {
+        self.state.obstacles().driving(self.parameters.tracking()).map(|s| self.on_road(&s)).collect()
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {

@@ -5,13 +5,14 @@
 //! continues or precedes a piece of the same vehicle is right, too, and is joined; one that lies elsewhere, or on a
 //! vehicle that has a better one there, is wrong. The fewer of a way are pointed at, the others go with one key. Then it
 //! looks where a vehicle is seen for a second, by a few detections at least, and its label is missing or elsewhere: it
-//! clicks on the vehicle there, which is [followed](Follower) from the click, and takes back what did not help. What a
-//! click does not mend gets points. A vehicle that nothing was offered for begins with a click, too, and is drawn where
-//! that does not hold.
+//! rests the mouse on the vehicle at some places, sees where the vehicle would be [followed](Follower) to from there, and
+//! takes the way that mends most. What none mends gets points. A vehicle that nothing was offered for begins so, too, and
+//! is drawn where no way holds.
 //!
 //! # Actions
-//! Each key for a way or for a proposal that is pointed at, joining, correcting a class, a click to follow and taking it
-//! back count one; drawing one, and each point that is set one. Looking does not count: views, zooms and the time slider.
+//! Each key for a way or for a proposal that is pointed at, joining, correcting a class and taking a way that is followed
+//! count one; drawing one, and each point that is set one. Looking does not count: views, zooms, the time slider, and
+//! ways that are shown while the mouse rests.
 
 use std::collections::BTreeMap;
 
@@ -32,16 +33,15 @@ const ACCEPTED: f64 = 0.5;
 const SEEN: (u32, f64) = (5, 1.0);
 /// How often the person looks for something to mend.
 const LOOKS: usize = 3;
-/// How often it clicks on one vehicle, and how many clicks without success it takes to give up.
-const CLICKS: usize = 6;
-const FAILURES: usize = 2;
+/// How often it has one vehicle followed, and at how many places of a stretch it looks before.
+const FOLLOWED: usize = 6;
+const PLACES: usize = 8;
 /// Points of a streak that is straight, and from how many seconds on it is long.
 const STRAIGHT: (usize, f64) = (2, 5.0);
-/// Frames a click has to mend to be kept.
+/// Frames a way has to mend to be taken.
 const HELPS: usize = 10;
-/// The person clicks where most is seen within so many frames, not at the very ends of a stretch, a share of it.
+/// Most is seen where there are most detections within so many frames.
 const AROUND: usize = 10;
-const ENDS: usize = 10;
 /// How far a drawn line is from the vehicle, metres: of a long one this share of its length, at most so far.
 const DRAWN: f64 = 0.17;
 const DRAWN_M: f64 = 0.8;
@@ -54,7 +54,7 @@ pub struct Actions {
     pub rejected: u32,
     pub joined: u32,
     pub reclassed: u32,
-    /// Clicks from which a vehicle was followed, and those that were taken back.
+    /// Ways that were followed and taken.
     pub followed: u32,
     /// Points set to mend what was accepted.
     pub mended: u32,
@@ -138,7 +138,7 @@ impl Person<'_> {
                 // of another class than a car it is said before
                 actions.reclassed += u32::from(labels[k].1.class != "car");
             }
-            self.clicks(&mut labels, k, seen, &mut actions);
+            self.follows(&mut labels, k, seen, &mut actions);
             let (vehicle, track) = &mut labels[k];
             if track.points.is_empty() {
                 actions.drawn += 1;
@@ -268,52 +268,51 @@ impl Person<'_> {
         self.instants.iter().filter(wrong).count()
     }
 
-    /// Clicks on a vehicle where its label is missing or elsewhere, and takes back what did not help.
-    fn clicks(&self, labels: &mut [(usize, LabelTrack)], k: usize, seen: &Vehicle, actions: &mut Actions) {
+    /// Follows a vehicle where its label is missing or elsewhere: from the place at which the way that is shown mends
+    /// most of all stretches.
+    fn follows(&self, labels: &mut [(usize, LabelTrack)], k: usize, seen: &Vehicle, actions: &mut Actions) {
         let others: Vec<LabelTrack> =
             labels.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, (_, track))| track.clone()).collect();
         let (vehicle, track) = &mut labels[k];
-        let missing = |all: &[Missing]| all.iter().map(Missing::frames).sum::<usize>();
-        let mut failed = Vec::new();
-        for _ in 0..CLICKS {
-            let all = self.missing(*vehicle, track, seen);
+        let wrong = |track: &LabelTrack| {
+            let missing = self.missing(*vehicle, track, seen).iter().map(Missing::frames).sum::<usize>();
+            missing + self.elsewhere(*vehicle, track)
+        };
+        for _ in 0..FOLLOWED {
             // a long straight streak has its two points as soon
-            let bent = |m: &Missing| {
+            let bent = |m: &&Missing| {
                 let points = self.nears(&self.instants[m.begin..=m.end], *vehicle, track.size());
                 points.len() > STRAIGHT.0 || self.seconds(m.end) - self.seconds(m.begin) < STRAIGHT.1
             };
-            let Some(stretch) = all.iter().find(|m| !failed.contains(&m.begin) && bent(m)) else { return };
-            let Some(click) = self.click(*vehicle, track, stretch) else { return };
-            let next = self.follower.through(track, click, &others);
-            let left = next.as_ref().map_or(usize::MAX, |next| {
-                missing(&self.missing(*vehicle, next, seen)) + self.elsewhere(*vehicle, next)
-            });
-            actions.followed += 1;
-            // of a vehicle without a label a click has to give most
-            let before = missing(&all) + self.elsewhere(*vehicle, track);
+            let stretches = self.missing(*vehicle, track, seen);
+            let places = stretches.iter().filter(bent).flat_map(|m| self.looks_at(*vehicle, track, m));
+            let ways = places.filter_map(|place| self.follower.through(track, place, &others));
+            let Some((left, way)) = ways.map(|way| (wrong(&way), way)).min_by_key(|(left, _)| *left) else { return };
+            // of a vehicle without a label it has to give most
+            let before = wrong(track);
             let enough = if track.points.is_empty() { before / 2 } else { before.saturating_sub(HELPS) };
-            match next.filter(|_| left < enough) {
-                Some(next) => *track = next,
-                None => {
-                    actions.followed += 1;
-                    failed.push(stretch.begin);
-                    if failed.len() >= FAILURES || track.points.is_empty() {
-                        return;
-                    }
-                }
+            if left >= enough {
+                return;
             }
+            actions.followed += 1;
+            *track = way;
         }
     }
 
-    /// Where the person clicks: on the near face where most is seen.
-    fn click(&self, vehicle: usize, track: &LabelTrack, missing: &Missing) -> Option<LabelPoint> {
+    /// Places on the near face at which the person looks where a press would lead: where most is seen of each part of a
+    /// stretch.
+    fn looks_at(&self, vehicle: usize, track: &LabelTrack, missing: &Missing) -> Vec<LabelPoint> {
         let seen = |frame: &usize| -> u32 {
             let near = &self.instants[frame.saturating_sub(AROUND)..(frame + AROUND).min(self.instants.len())];
             near.iter().filter_map(|i| i.of(vehicle)).map(|(_, detections)| detections).sum()
         };
-        let ends = (missing.end - missing.begin) / ENDS;
-        let frame = (missing.begin + ends..=missing.end - ends).max_by_key(seen)?;
-        self.nears(&self.instants[frame..=frame], vehicle, track.size()).first().copied()
+        let part = |p: usize| {
+            missing.begin + p * missing.frames() / PLACES..missing.begin + (p + 1) * missing.frames() / PLACES
+        };
+        let places = (0..PLACES).filter_map(|p| part(p).max_by_key(seen));
+        places
+            .filter_map(|frame| self.nears(&self.instants[frame..=frame], vehicle, track.size()).first().copied())
+            .collect()
     }
 
     /// Sets points where the label is missing or elsewhere; how many.

@@ -234,6 +234,33 @@ fn a_vehicle_that_is_pointed_at_is_followed_by_one_key() {
     assert_eq!(page.ask("viewshed.session.pointing"), false);
     page.key_with("z", CTRL);
     assert_eq!(tracks(&page), half);
+    // while the mouse rests the way is shown, and nothing is changed; a key takes what is shown, without another request
+    page.key("PageDown");
+    page.until("viewshed.session.selected === '1'");
+    page.hover(page.screen("along", late, at(late)[0]));
+    page.until("viewshed.session.shownWay !== null");
+    assert_eq!(tracks(&page), half);
+    let shown = page.ask("viewshed.session.shownWay.track");
+    let requests = || page.requests().iter().filter(|r| r.ends_with("/follow")).count();
+    let asked = requests();
+    page.key("g");
+    page.until("viewshed.session.way === null");
+    assert_eq!((&tracks(&page)[0], requests()), (&shown, asked));
+    assert!(asked > 3, "{asked} requests");
+    agrees(&shown, "looked at");
+    page.key_with("z", CTRL);
+    assert_eq!(tracks(&page), half);
+    // moved away from it, it is gone, and it is not shown where it is not wanted
+    page.hover(page.screen("along", late, at(late)[0]));
+    page.until("viewshed.session.shownWay !== null");
+    page.hover(page.screen("along", middle, at(middle)[0]));
+    assert_eq!(page.ask("viewshed.session.way"), Value::Null);
+    page.key("h");
+    assert_eq!(page.ask("viewshed.session.looks"), false);
+    page.hover(page.screen("along", late, at(late)[0]));
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    assert_eq!(page.ask("viewshed.session.way"), Value::Null);
+    page.key("h");
     // where nothing is, nothing is followed, and the page says what to do
     page.key("Escape");
     page.key("0");

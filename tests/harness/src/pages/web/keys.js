@@ -23,6 +23,7 @@ export function table(page) {
     ['e', 'Drawing', 'draw on with the selected track', () => session.extend(), false, 'extend'],
     [' ', 'Drawing', 'put a point at the cursor; when not drawing, select what is there', () => page.pick(), false],
     ['g', 'Drawing', 'follow what is at the cursor to both sides: a way for the selected track, or a new one', (button) => page.follow(button), false, 'follow'],
+    ['h', 'Drawing', 'show where following would lead while the mouse rests, or not', () => page.looks(), false],
     ['Enter', 'Drawing', 'end the track that is drawn', () => session.finish(), false],
     ['Escape', 'Drawing', 'end drawing, deselect, clear the brush', () => page.escape(), false],
     ['Ctrl+z', 'Changes', 'undo', () => session.undo(), true, 'undo'],

@@ -22,6 +22,8 @@ const AROUND_S = 1;
 const AROUND_M = 12;
 // Seconds of a recording that are shown at first.
 const FIRST_S = 20;
+// How long the mouse rests before the way that following would give is shown, milliseconds.
+const LOOK_MS = 300;
 
 class Page {
   constructor(recording) {
@@ -116,9 +118,14 @@ class Page {
     this.release(this.active, cursor, false, taken);
   }
 
-  // The proposal at the mouse or cursor.
+  // The proposal at the mouse or cursor, and where following would lead from it.
   pointAt(plot) {
     const { session } = this;
+    session.lookAway();
+    clearTimeout(this.resting);
+    const place = plot.cursor;
+    const rests = () => plot.cursor === place;
+    if (place) this.resting = setTimeout(() => rests() && session.look(plot.name, place, rests), LOOK_MS);
     const before = session.pointed;
     session.pointed = plot.cursor ? hitOffered(plot, session, plot.toPixel(...plot.cursor)) : null;
     if (session.pointed === before) return;
@@ -135,6 +142,14 @@ class Page {
     const under = Object.values(this.plots).find((plot) => plot.element.matches(':hover'));
     const plot = under ?? this.active;
     this.session.follow(plot.name, plot.here());
+  }
+
+  // Whether the way from where the mouse rests is shown.
+  looks() {
+    const { session } = this;
+    session.looks = !session.looks;
+    session.lookAway();
+    session.say(session.looks ? 'Where following would lead is shown while the mouse rests.' : 'Where following would lead is not shown.');
   }
 
   nudge(right, up) {

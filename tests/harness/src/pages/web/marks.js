@@ -29,6 +29,8 @@ export function drawMarks(plot, context, session) {
     drawTrack(plot, context, track, { colour: chosen ? css('--select') : colourOf(index), dash: DASHES[Math.floor(index / TRACKS.length) % 4], chosen, point: chosen ? session.point : null, now, faint });
   });
   drawOffered(plot, context, session);
+  const way = session.shownWay;
+  if (way) drawTrack(plot, context, { ...way.track, id: '?' }, { colour: css('--select'), dash: [2, 4], chosen: false, point: null, now });
 }
 
 // One proposal with its points, of several that which is pointed at.

@@ -33,6 +33,11 @@ export class Session {
     this.kind = 'car';
     this.pointing = false;
     this.following = false;
+    // whether the way from where the mouse rests is shown, whether it is being looked for, and that way:
+    // { plot, place, tracks, before, track }
+    this.looks = true;
+    this.looking = false;
+    this.way = null;
     this.now = 0;
     this.window = 0.25;
     this.colouring = 'rcs';
@@ -187,32 +192,70 @@ export class Session {
     else this.say(begins ? 'Click on a vehicle to have it followed; Escape leaves it.' : '');
   }
 
-  // Asks the machine to follow what is at a place of a plot: a new way for the selected track, or a new track.
+  // The way of what is at a place of a plot, for the selected track or a new one: { track }, or { why } there is none.
+  async wayFrom(plot, place) {
+    const before = this.track;
+    const track = before ?? { id: tracks.newId(this.tracks), class: this.kind, points: [] };
+    const click = this.placed(track, plot, place);
+    const others = this.tracks.filter((other) => other !== before && other.points.length > 1);
+    let answer = null;
+    try {
+      const body = JSON.stringify({ track, click, others });
+      answer = await fetch('follow', { method: 'POST', headers: { 'content-type': 'application/json' }, body });
+    } catch {
+      return { why: 'The server does not answer: nothing was followed.' };
+    }
+    if (answer.status === 202) return { why: 'The reflections are not sorted yet: press G again in a moment.' };
+    if (answer.status === 204) return { why: 'There is nothing to follow: point at reflections of a vehicle, or set points with N.' };
+    return answer.ok ? { track: await answer.json() } : { why: (await answer.text()).trim() };
+  }
+
+  // Shows where following would lead from a place at which the mouse rests; `rests` says whether it still does.
+  async look(plot, place, rests) {
+    const mayFollow = this.pointing || this.track || !this.proposals.shown;
+    if (!this.looks || this.looking || this.following || this.drawing !== null || !mayFollow || !this.canWrite()) return;
+    const { tracks: all, track: before } = this;
+    this.looking = true;
+    const { track } = await this.wayFrom(plot, place);
+    this.looking = false;
+    if (!track || !rests() || this.tracks !== all || this.track !== before) return;
+    this.way = { plot, place, tracks: all, before, track };
+    this.changed('way');
+  }
+
+  // The way that is shown is none any more.
+  lookAway() {
+    if (this.way === null) return;
+    this.way = null;
+    this.changed('way');
+  }
+
+  // The way that is shown, unless something has changed since.
+  get shownWay() {
+    const { way } = this;
+    return way && way.tracks === this.tracks && way.before === this.track ? way : null;
+  }
+
+  // Follows what is at a place of a plot: a new way for the selected track, or a new track.
   async follow(plot, place) {
     this.pointing = false;
     if (!this.canWrite()) return this.say(READ_ONLY);
     if (this.following) return undefined;
     this.finish();
     const before = this.track;
-    const track = before ?? { id: tracks.newId(this.tracks), class: this.kind, points: [] };
-    const click = this.placed(track, plot, place);
-    const others = this.tracks.filter((other) => other !== before && other.points.length > 1);
-    this.following = true;
-    this.say('Following.');
-    let answer = null;
-    try {
-      const body = JSON.stringify({ track, click, others });
-      answer = await fetch('follow', { method: 'POST', headers: { 'content-type': 'application/json' }, body });
-    } catch {
-      answer = null;
+    const shown = this.shownWay;
+    let found = shown?.plot === plot && shown.place.every((v, k) => v === place[k]) ? shown : null;
+    this.lookAway();
+    if (!found) {
+      this.following = true;
+      this.say('Following.');
+      found = await this.wayFrom(plot, place);
+      this.following = false;
     }
-    this.following = false;
-    if (answer?.status === 202) return this.say('The reflections are not sorted yet: press G again in a moment.');
-    if (answer?.status === 204) return this.say('There is nothing to follow: point at reflections of a vehicle, or set points with N.');
-    if (!answer?.ok) return this.say(answer ? (await answer.text()).trim() : 'The server does not answer: nothing was followed.');
-    const followed = await answer.json();
+    const followed = found.track;
+    if (!followed) return this.say(found.why);
     // it may have been changed or deleted meanwhile
-    if (tracks.find(this.tracks, track.id) !== before) return this.say('The track was changed meanwhile: press G again.');
+    if (tracks.find(this.tracks, followed.id) !== before) return this.say('The track was changed meanwhile: press G again.');
     if (!this.change(tracks.withTrack(this.tracks, followed))) return undefined;
     this.select(followed.id);
     return this.say(`Track ${followed.id}: ${tracks.begins(followed).toFixed(1)} to ${tracks.ends(followed).toFixed(1)} s; Ctrl+Z takes it back.`);

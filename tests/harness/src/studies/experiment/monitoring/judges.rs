@@ -7,9 +7,8 @@ use viewshed::map::{CellState, Visibility, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 
 use super::turned::{PLACES, Pieces, alignment, at, observe};
-use super::{Follows, Judge, Sight};
+use super::{Followed, Follows, Judge, Sight};
 use crate::estimators::{self, camera_3d::time};
-use crate::geometry::solid::Solid;
 use crate::recording::{Frame, Recording};
 
 pub const SECTORS: usize = 6;
@@ -97,7 +96,7 @@ impl<'a> Judges<'a> {
         frame: &Frame,
         map: &dyn VisibilityMap,
         seen: &[[f64; 2]],
-        follows: &[Solid],
+        follows: &Followed,
     ) -> Result<[bool; SECTORS]> {
         let (own, now) = (&self.all[self.watched], time(frame.time_ns));
         let of = |k: usize| {
@@ -107,7 +106,7 @@ impl<'a> Judges<'a> {
         let mut missed = [false; SECTORS];
         for (other, monitors) in &mut self.others {
             let Some(theirs) = followed[*other] else { continue };
-            for solid in theirs {
+            for solid in &theirs.all {
                 let [x, y, _] = solid.center;
                 let place = own.pose.to_spherical([x, y, self.slice_m]);
                 if !own.sensor.field_of_view.contains(place) {

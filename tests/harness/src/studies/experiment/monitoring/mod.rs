@@ -16,7 +16,7 @@ use serde::Serialize;
 use self::fault::{Fault, THIRDS, dirt_db};
 use self::judges::{Judges, LEARNED_S, SECTORS, Said};
 use self::turned::Pieces;
-use crate::estimators::{self, camera_3d::lifted};
+use crate::estimators::{self, Estimator, camera_3d::lifted};
 use crate::evaluation::Settings;
 use crate::geometry::solid::Solid;
 use crate::recording::camera::RecordedCamera;
@@ -130,8 +130,26 @@ impl std::ops::AddAssign for Judged {
     }
 }
 
-/// What a sensor follows at each of its frames: a radar's confirmed obstacles, a camera's vehicles.
-pub type Follows = Vec<Vec<Solid>>;
+/// What a sensor follows at a frame: a radar's confirmed obstacles, a camera's vehicles.
+#[derive(Debug, Clone, Default)]
+pub struct Followed {
+    pub all: Vec<Solid>,
+    /// Those whose bearings are compared.
+    pub driving: Vec<Solid>,
+}
+
+impl Followed {
+    fn by(running: &dyn Estimator) -> Self {
+        Self { all: running.obstacles(), driving: running.driving() }
+    }
+
+    fn lifted(all: Vec<Solid>) -> Self {
+        Self { driving: all.clone(), all }
+    }
+}
+
+/// The same at each of its frames.
+pub type Follows = Vec<Followed>;
 
 /// Runs a sensor's estimator.
 ///
@@ -139,12 +157,13 @@ pub type Follows = Vec<Vec<Solid>>;
 /// Parameters of estimators that cannot be.
 pub fn follow(recording: &Recording, settings: &Settings) -> Result<Follows> {
     if let Some(camera) = recording.of_camera() {
-        return camera.frames.iter().map(|frame| lifted(camera, frame, &settings.estimators.camera_3d)).collect();
+        let lifts = |frame| lifted(camera, frame, &settings.estimators.camera_3d).map(Followed::lifted);
+        return camera.frames.iter().map(lifts).collect();
     }
     let mut running = estimators::own(recording, &settings.estimators)?;
     let obstacles = recording.frames.iter().map(|frame| {
         running.step(frame);
-        running.obstacles()
+        Followed::by(running.as_ref())
     });
     Ok(obstacles.collect())
 }
@@ -242,9 +261,10 @@ impl Site<'_> {
             let seen = lifts.as_ref().map_or_else(|| places(recording, frame, settings), |lifts| middles(lifts));
             // a camera's recording is with the fault from its beginning
             let in_order = broken.is_none() || (!is_radar && frame.time_ns < from_ns);
-            let with_fault = if in_order { Vec::new() } else { lifts.unwrap_or_else(|| running.obstacles()) };
-            let follows = if in_order { self.follows[k].get(n) } else { Some(&with_fault) };
-            let misses = judges.step(frame, running.map(), &seen, follows.map_or(&[], Vec::as_slice))?;
+            let broken_now = || lifts.map_or_else(|| Followed::by(running.as_ref()), Followed::lifted);
+            let with_fault = if in_order { Followed::default() } else { broken_now() };
+            let follows = if in_order { self.follows[k].get(n).unwrap_or(&with_fault) } else { &with_fault };
+            let misses = judges.step(frame, running.map(), &seen, follows)?;
             let since = (frame.time_ns - from_ns) as f64 * 1e-9;
             for (watched, sight) in watched.iter_mut().zip(Sight::ALL) {
                 if frame.time_ns < after(warm_s) {

@@ -10,7 +10,7 @@ use viewshed::fusion::{Alignment, AlignmentConfig};
 use viewshed::sensor::road::RoadPoint;
 
 use super::fault::{TURN_DEG, misplaced};
-use super::{Follows, follow};
+use super::{Followed, Follows, follow};
 use crate::estimators::{self, Lane, camera_3d::time};
 use crate::evaluation::Settings;
 use crate::evaluation::sensor_set::newest;
@@ -113,21 +113,21 @@ pub(super) fn alignment(poses: &[SensorPose]) -> Result<Alignment<PLACES>> {
 }
 
 /// What a sensor follows at a time; none without a frame that is new enough.
-pub(super) fn at<'f>(recording: &Recording, follows: &'f Follows, time_ns: i64) -> Option<&'f [Solid]> {
-    newest(recording, time_ns).map(|k| follows.get(k).map_or(&[][..], Vec::as_slice))
+pub(super) fn at<'f>(recording: &Recording, follows: &'f Follows, time_ns: i64) -> Option<&'f Followed> {
+    newest(recording, time_ns).and_then(|k| follows.get(k))
 }
 
-/// Compares what all sensors follow at a time, with each other and with the lanes.
+/// Compares what all sensors follow that drives at a time, with each other and with the lanes.
 ///
 /// # Errors
 /// Places that are none.
 pub(super) fn observe(
     alignment: &mut Alignment<PLACES>,
-    now: &[Option<&[Solid]>],
+    now: &[Option<&Followed>],
     lanes: &Pieces,
     time_ns: i64,
 ) -> Result<()> {
-    let now: Vec<&[Solid]> = now.iter().take(ROAD).map(|solids| solids.unwrap_or_default()).collect();
+    let now: Vec<&[Solid]> = now.iter().take(ROAD).map(|f| f.map_or(&[][..], |f| &f.driving)).collect();
     for a in 0..now.len() {
         for b in a + 1..now.len() {
             for (own, theirs) in the_same(now[a], now[b]) {
