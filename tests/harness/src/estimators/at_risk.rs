@@ -53,8 +53,8 @@ impl Estimator for AtRisk {
         self.inner.obstacles()
     }
 
-    fn driving(&self) -> Vec<Solid> {
-        self.inner.driving()
+    fn where_seen(&self) -> Vec<Solid> {
+        self.inner.where_seen()
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {

@@ -53,8 +53,8 @@ pub trait Estimator: Send {
         Vec::new()
     }
 
-    /// Those of them that do not creep, whose bearings can be compared with another sensor's.
-    fn driving(&self) -> Vec<Solid> {
+    /// The same about the middle of what is seen of them, for bearings that are compared with another sensor's.
+    fn where_seen(&self) -> Vec<Solid> {
         self.obstacles()
     }
 

@@ -194,8 +194,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         self.state.obstacles().solids(self.parameters.tracking()).map(|s| self.on_road(&s)).collect()
     }
 
-    fn driving(&self) -> Vec<Solid> {
-        self.state.obstacles().driving(self.parameters.tracking()).map(|s| self.on_road(&s)).collect()
+    fn where_seen(&self) -> Vec<Solid> {
+        self.state.obstacles().where_seen(self.parameters.tracking()).map(|s| self.on_road(&s)).collect()
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {

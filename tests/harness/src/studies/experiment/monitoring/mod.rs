@@ -134,17 +134,17 @@ impl std::ops::AddAssign for Judged {
 #[derive(Debug, Clone, Default)]
 pub struct Followed {
     pub all: Vec<Solid>,
-    /// Those whose bearings are compared.
-    pub driving: Vec<Solid>,
+    /// Places whose bearings are compared.
+    pub where_seen: Vec<Solid>,
 }
 
 impl Followed {
     fn by(running: &dyn Estimator) -> Self {
-        Self { all: running.obstacles(), driving: running.driving() }
+        Self { all: running.obstacles(), where_seen: running.where_seen() }
     }
 
     fn lifted(all: Vec<Solid>) -> Self {
-        Self { driving: all.clone(), all }
+        Self { where_seen: all.clone(), all }
     }
 }
 

@@ -117,7 +117,7 @@ pub(super) fn at<'f>(recording: &Recording, follows: &'f Follows, time_ns: i64) 
     newest(recording, time_ns).and_then(|k| follows.get(k))
 }
 
-/// Compares what all sensors follow that drives at a time, with each other and with the lanes.
+/// Compares what all sensors follow at a time, with each other and with the lanes.
 ///
 /// # Errors
 /// Places that are none.
@@ -127,7 +127,7 @@ pub(super) fn observe(
     lanes: &Pieces,
     time_ns: i64,
 ) -> Result<()> {
-    let now: Vec<&[Solid]> = now.iter().take(ROAD).map(|f| f.map_or(&[][..], |f| &f.driving)).collect();
+    let now: Vec<&[Solid]> = now.iter().take(ROAD).map(|f| f.map_or(&[][..], |f| &f.where_seen)).collect();
     for a in 0..now.len() {
         for b in a + 1..now.len() {
             for (own, theirs) in the_same(now[a], now[b]) {
