@@ -402,7 +402,7 @@ mod tests {
         let site = site();
         // both follow one vehicle that stands and still moves towards them
         let solid = Solid { center: [25.0, 6.7, 0.8], yaw_rad: 0.0, size: [4.0, 2.0, 1.6] };
-        let follows = [0, 1].map(|k| vec![vec![solid]; site[k].frames.len()]);
+        let follows = [0, 1].map(|k| vec![Followed::lifted(vec![solid]); site[k].frames.len()]);
         judge(&site, &follows, &Vec::new(), &settings, broken).unwrap()
     }
 
