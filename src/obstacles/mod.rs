@@ -29,7 +29,6 @@
 //! | height proven by one reflection in 8 or 12, not 20 | 27.2 / 13.7 | 20.9 / 12.2 | same | no |
 //! | length remembered for 10 s at any speed | 23.8 / 18.0 | 18.8 / 13.2 | 20.0 / 16.8 | no |
 //! | [shadows](crate::grid::shadow) with exact ends, not through cells | 25.1 / 14.2 | 19.4 / 12.7 | 19.1 / 15.9 | yes |
-//! | place of every detection shown | 26.8 / 14.6 | 22.7 / 12.9 | 21.2 / 15.3 | no |
 //! | middle of what is seen shown: objects' FIR 14.0 to 7.5 and 12.5 to 5.8 | 25.4 / 14.1 | 19.9 / 12.6 | 19.3 / 15.8 | no: right of what is detected by construction |
 //! | length remembered for 3 s below 4 m/s | 24.8 / 15.0 | 19.3 / 12.8 | same | yes |
 //! | low or tall by [all heights](tallness), low at any length | 28.1 / 10.6 | 37.2 / 8.8 | 23.7 / 13.0 | no |
@@ -46,7 +45,6 @@
 //! | a mover after 1 m instead of 2 m of way | 23.7 / 16.3 | 18.4 / 10.4 | same | yes |
 //! | speed along a kept heading from the places seen, not from Doppler alone | 23.3 / 16.0 | 18.5 / 10.1 | same | yes |
 //! | own way from a fifth of the speed to the side, not a quarter | 22.5 / 15.1 | 18.5 / 9.9 | 16.8 / 15.5 | yes |
-//! | quicker drift to a new heading: gain 0.015, 0.02 instead of 0.01 | 24.2 / 15.1, 23.2 / 14.9 | 18.4 / 10.1 | 16.6 / 15.5, 17.4 / 14.6 | no |
 //! | box behind its side only where that is most of what is seen, for what is shorter than 8 m | 22.8 / 16.0 | 18.9 / 10.2 | 17.3 / 14.6 | no |
 //!
 //! The last line was measured without the fourth. With three more crossings on other layouts and seeds (traffic made as
@@ -90,7 +88,6 @@
 //! | faster than 35 m/s | 18.8 / 14.7 | +5.4 / +9.6 | same | same | no: 2 points more on another generator's crossing |
 //! | confirmed by 2.25 detections, not 3, and 0.7 m wider across the road, not 0.6 | 17.9 / 15.2 | +5.2 / +9.9 | 18.5 / 9.5 | +0.2 FIR | yes |
 //! | own way from 2.6 standard deviations; heading from 3.5 | 19.3 / 15.6, 19.2 / 14.4 | +7.6 / +10.2, +7.4 / +9.3 | same | same | no |
-//! | turning noise 1.3 m/s | 20.7 / 14.4 | +8.2 / +9.9 | 18.8 / 8.9 | | no |
 //! | [lanes](lanes): heading only, no margin | 19.1 / 14.3 | +3.4 / +10.6 | none given | | |
 //! | and 0.6 of the way to the middle of the lane | 18.0 / 14.1 | +3.7 / +10.7 | | | yes |
 //! | and a quarter of the margin to either side | 16.3 / 15.0 | +1.7 / +11.6 | | | yes |
