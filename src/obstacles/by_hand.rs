@@ -4,6 +4,7 @@ use std::vec::Vec;
 
 use super::Obstacles;
 use super::config::ObstacleConfig;
+use super::tallness::Tallness;
 use super::tracking::Tracking;
 use crate::fixed::math::length;
 use crate::fixed::time::Step;
@@ -15,6 +16,14 @@ use crate::sensor::noise::NoiseConfig;
 /// Default rules for a road straight ahead, followed to 225 m.
 pub fn rules() -> Tracking {
     ObstacleConfig::default().tracking(NoiseConfig::default().noise().unwrap(), Direction::AHEAD, 22_500).unwrap()
+}
+
+/// Certain to be tall.
+pub fn tall() -> Tallness {
+    let mut t = Tallness::default();
+    (0..10).for_each(|_| t.add(290, 10));
+    assert!(t.is_tall());
+    t
 }
 
 /// A reflection at a place, with a radial velocity.

@@ -67,10 +67,9 @@ impl Obstacle {
     /// car lies less than a car's length and a gap behind a face. And two ends as far apart as a car's are one car's, two tall
     /// ones as a van's one van's; it then has both, so the next end is the next vehicle's.
     fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &Tracking) -> bool {
-        let (x, y) = self.anchor();
         let ahead = along > self.extent.middle_cm();
         // what lies ahead of the sensor shows it the face that is nearer, and its other end is farther away
-        let behind_its_face = ahead == (self.heading.along(x, y) > 0);
+        let behind_its_face = ahead == self.shows_its_rear();
         let confirmed = self.existence.min(other.existence) >= t.confirmed;
         let tall = self.tallness.is_tall() && other.tallness.is_tall();
         let (end_cm, over_all_cm) = if tall { (VAN_END_CM, VAN_CM) } else { (END_CM, CAR_CM) };
@@ -146,7 +145,7 @@ impl Obstacle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{rules, seen_at};
+    use super::super::by_hand::{rules, seen_at, tall};
     use super::super::obstacle::MOST_WEIGHT;
     use super::super::profile::Extent;
     use super::super::tallness::Tallness;
@@ -209,14 +208,6 @@ mod tests {
         assert!(a.is_one_with(&b, &t), "8.5 m");
     }
 
-    /// Certain to be tall.
-    fn high() -> Tallness {
-        let mut t = Tallness::default();
-        (0..10).for_each(|_| t.add(290, 10));
-        assert!(t.is_tall());
-        t
-    }
-
     /// Two ends of cars that creep at 2 m/s, as long as given and so far apart between their outer ends, the second
     /// ahead of the first and both ahead of the sensor.
     fn ends(lengths_cm: [i32; 2], over_all_cm: i32, x_cm: i32) -> [Obstacle; 2] {
@@ -258,9 +249,9 @@ mod tests {
         assert!(!one([40, 40], 390, -3500).0, "too short for a car; its face is the other one");
         assert_eq!(one([490, 95], 900, 3000), (false, false), "one that has both its ends");
         assert_eq!(one([160, 95], 500, 3000), (false, false), "more than an end");
-        let van = |lengths: [i32; 2], over_all: i32, tall: usize| {
+        let van = |lengths: [i32; 2], over_all: i32, ends_tall: usize| {
             let mut pair = ends(lengths, over_all, 3000);
-            pair.iter_mut().take(tall).for_each(|o| o.tallness = high());
+            pair.iter_mut().take(ends_tall).for_each(|o| o.tallness = tall());
             pair[0].is_one_with(&pair[1], &t)
         };
         assert!(van([100, 200], 640, 2) && !van([100, 200], 640, 1), "only what is tall at both ends is a van");

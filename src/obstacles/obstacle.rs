@@ -135,6 +135,12 @@ impl Obstacle {
         (ax + ((along * hx - left * hy) >> 14), ay + ((along * hy + left * hx) >> 14))
     }
 
+    /// Whether its rear is the end that is turned to the sensor, not its front.
+    pub(super) fn shows_its_rear(&self) -> bool {
+        let (x, y) = self.anchor();
+        self.heading.along(x, y) > 0
+    }
+
     /// Moves it on by a time step, which leaves a part (2^-16) of its lateral weight, and forgets the last
     /// frame's sums.
     pub fn predict(&mut self, step: Step, lateral_kept: i32, t: &Tracking) {

@@ -61,9 +61,7 @@ impl Obstacle {
             return false;
         }
         let half = next.extent.length_cm() / 2;
-        let (x, y) = self.anchor();
-        let is_ahead = self.heading.along(x, y) > 0;
-        let (beyond, begins) = if is_ahead {
+        let (beyond, begins) = if self.shows_its_rear() {
             (middle - self.extent.middle_cm(), middle - half - self.extent.rear_cm)
         } else {
             (self.extent.middle_cm() - middle, self.extent.front_cm - middle - half)
@@ -74,20 +72,20 @@ impl Obstacle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{rules, seen_at};
+    use super::super::by_hand::{rules, seen_at, tall};
     use super::super::profile::Extent;
     use super::*;
     use crate::fixed::trig::Direction;
 
     /// An obstacle in a creeping line, its outline from one place to another ahead of the sensor.
-    fn seen(from_cm: i32, to_cm: i32, tall: bool, heading: Direction) -> Obstacle {
+    fn seen(from_cm: i32, to_cm: i32, is_tall: bool, heading: Direction) -> Obstacle {
         let t = rules();
         let mut o = Obstacle::new(&seen_at((from_cm + to_cm) / 2, 0, 0), heading, 150);
         let half = (to_cm - from_cm) / 2;
         o.extent = Extent { rear_cm: -half, front_cm: half };
         (o.existence, o.travelled_cm) = (t.existence_max, 1000);
-        if tall {
-            (0..10).for_each(|_| o.tallness.add(290, 10));
+        if is_tall {
+            o.tallness = tall();
         }
         o
     }
