@@ -1,6 +1,9 @@
 //! The radar-3d estimator: all stages in order, from detections to a polar map.
 //!
 //! ```text
+//!                       azimuth's noise, by fixtures
+//!                                    ^ |
+//!                                    | v
 //! detections -> gate -> reflections on the ground -> moving obstacles -+-> boxes -> shadows -+
 //!                                                                      |                     |
 //!      unclaimed detections -> evidence -> spherical grid <------------+                     |
@@ -16,6 +19,7 @@ use crate::frame::detection::Detection;
 use crate::frame::gate::{Gate, GateConfig, Rejections};
 use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
 use crate::frame::reflection::Reflection;
+use crate::frame::repeatability::Repeatability;
 use crate::frame::scan::Scan;
 use crate::grid::axes::Axes;
 use crate::grid::evidence::{Around, BODY_CM, BODY_REFLECTIONS, EvidenceConfig, InverseSensor};
@@ -201,6 +205,7 @@ fn threshold(name: &'static str, share: f32) -> Result<u8, ConfigError> {
 #[derive(Debug, Clone)]
 pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize> {
     scan: Scan<D>,
+    repeatability: Repeatability,
     obstacles: Obstacles<N>,
     grid: SphericalGrid<R, A, E, W>,
     health: Health,
@@ -267,6 +272,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     pub const fn new() -> Self {
         Self {
             scan: Scan::new(),
+            repeatability: Repeatability::new(),
             obstacles: Obstacles::new(),
             grid: SphericalGrid::new(),
             health: Health::NEW,
@@ -276,6 +282,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
 
     /// Forgets everything but the counters.
     pub fn reset(&mut self) {
+        self.repeatability = Repeatability::new();
         self.obstacles.clear();
         self.grid.clear();
         self.health = Health::NEW;
@@ -306,7 +313,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         ended: &mut impl FnMut(),
     ) -> FrameReport {
         let FrameStatus { fault, refused } = status.into();
-        let place = |d: &Detection| p.noise.place_on(d, &p.levelling, p.axes.ground());
+        let noise = self.repeatability.noise(&p.noise);
+        let place = |d: &Detection| noise.place_on(d, &p.levelling, p.axes.ground());
         let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
         let points = self.scan.within_reach(points, |r| p.reaches(r));
         let continuity = self.health.frame(now, &points, fault, &p.health);
@@ -320,6 +328,9 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         };
         ended();
         let by_range = ByRange::sort(self.scan.reflections(), p.tracking.limit_cm);
+        if matches!(continuity, Continuity::Follows(_)) {
+            self.repeatability.compare(self.scan.reflections(), &by_range, &p.noise);
+        }
         let claimed = self.follow_obstacles(p, &by_range, step, map);
         ended();
         self.update_grid(p, step, continuity, (&by_range, &claimed), map, ended);
@@ -407,6 +418,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     /// Detections rejected since the start, by reason.
     pub fn rejections(&self) -> &Rejections {
         &self.rejections
+    }
+
+    /// How well the sensor measures vehicles, their azimuth as fixtures have shown it.
+    pub fn noise(&self, p: &Radar3dParameters<R, A, E>) -> Noise {
+        self.repeatability.noise(&p.noise)
     }
 
     /// The moving obstacles.

@@ -44,6 +44,13 @@ pub struct Noise {
     pub(crate) reflector_height_cm: i32,
 }
 
+impl Noise {
+    /// Standard deviation of the azimuth, degrees; for people.
+    pub fn azimuth_deg(&self) -> f32 {
+        (self.azimuth as f32 / 65536.0).to_degrees()
+    }
+}
+
 impl NoiseConfig {
     /// Checks the figures and rounds them.
     ///

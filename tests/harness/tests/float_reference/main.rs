@@ -14,6 +14,8 @@ mod geometry;
 
 mod gate;
 
+mod repeatability;
+
 mod obstacles;
 
 mod grid;

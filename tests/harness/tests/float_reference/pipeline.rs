@@ -18,6 +18,7 @@ use crate::geometry::{Levelled, Placed};
 use crate::grid::{Axes, Grid};
 use crate::obstacles::{Obstacles, Rules};
 use crate::raycast::{Map, cast};
+use crate::repeatability::Repeatability;
 use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
 use crate::shadow;
 
@@ -35,6 +36,7 @@ pub struct Pipeline {
     pub axes: Axes,
     health_limits: HealthLimits,
     health: Health,
+    repeatability: Repeatability,
     pub obstacles: Obstacles,
     grid: Grid,
     map: Map,
@@ -56,6 +58,7 @@ impl Pipeline {
             inverse_sensor: InverseSensor::new(&config.evidence, &sensor.noise, &axes),
             health_limits: config.health.limits().expect("checked before"),
             health: Health::NEW,
+            repeatability: Repeatability::default(),
             obstacles: Obstacles::new(OBSTACLES),
             grid: Grid::new(&axes),
             map: Map::unknown(&axes),
@@ -67,8 +70,8 @@ impl Pipeline {
 
     /// Takes a frame and brings the map up to its time.
     pub fn process(&mut self, now: Time, measurements: &[Measurement]) {
-        let (view, noise) = (&self.sensor.field_of_view, &self.sensor.noise);
-        let scan = Scan::new(measurements, &self.config.gate, view, noise, &self.levelled);
+        let (view, noise) = (&self.sensor.field_of_view, self.repeatability.noise(&self.sensor.noise));
+        let scan = Scan::new(measurements, &self.config.gate, view, &noise, &self.levelled);
         let mut points = scan.points;
         let reached = |d: &Placed| {
             let place = self.axes.column_place(d.bearing());
@@ -87,6 +90,9 @@ impl Pipeline {
             Continuity::Follows(micros) => (false, micros as f64 * 1e-6),
             _ => (true, 0.0),
         };
+        if !first {
+            self.repeatability.compare(&scan.placed, &self.sensor.noise);
+        }
         let (axes, map, visible_from) = (&self.axes, &self.map, self.visible_from());
         let in_view = |at| axes.locate(at).and_then(|(a, r)| map.grade(a, r)).is_some_and(|g| g >= visible_from);
         let claimed = self.obstacles.step(&scan.placed, dt, &self.rules, in_view);
@@ -134,6 +140,7 @@ impl Estimator for Pipeline {
     }
 
     fn reset(&mut self) {
+        self.repeatability = Repeatability::default();
         self.obstacles.list.clear();
         self.grid.clear();
         self.health = Health::NEW;
