@@ -183,6 +183,11 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
         &self.axes
     }
 
+    /// How well the sensor measures, as configured.
+    pub fn noise(&self) -> &Noise {
+        &self.noise
+    }
+
     /// The parameters of obstacle tracking.
     pub fn tracking(&self) -> &Tracking {
         &self.tracking

@@ -18,11 +18,14 @@
 //! 1 is assumed, but cars are then taken for tall more often than they were (training: crossings 18.8 / 13.6 to 16.6 / 18.2).
 //!
 //! # Measured
-//! Estimate of a minute's recording, configured 0.5 degrees, the error of a measurement growing as its echo gets weaker, from:
+//! What is assumed of vehicles after a minute, degrees, by the radar's own error (`model.accuracy.azimuth_deg` of a scene for
+//! `viewshed simulate`, weak echoes adding to it), where 0.5 is configured; `viewshed replay` says it below its table:
 //!
 //! | | 0.05 | 0.15 | 0.3 | 0.5 |
 //! |---|---|---|---|---|
-//! | motorway, training queue, training crossing | TABLE |
+//! | shipped motorway | 0.19 | 0.23 | 0.45 | 0.50 |
+//! | first training queue | 0.19 | 0.26 | 0.50 | 0.50 |
+//! | first training crossing | 0.19 | 0.25 | 0.46 | 0.50 |
 //!
 //! Which margin, by training recordings (cells FVR / FIR; of another generator's queue, vehicles too, from exact geometry):
 //!

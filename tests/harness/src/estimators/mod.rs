@@ -62,6 +62,11 @@ pub trait Estimator: Send {
     fn counters(&self) -> Vec<(&'static str, u64)> {
         Vec::new()
     }
+
+    /// Azimuth's noise that it now works with, degrees, where that is learnt and not the configured one.
+    fn azimuth_noise_deg(&self) -> Option<f64> {
+        None
+    }
 }
 
 /// The cells of a polar map: azimuths from right to left, ranges from near to far.

@@ -203,6 +203,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let full = [(no_room, u64::from(self.no_room))].into_iter().filter(|(_, n)| *n > 0);
         self.intake.counters(self.state.rejections()).into_iter().chain(full).collect()
     }
+
+    fn azimuth_noise_deg(&self) -> Option<f64> {
+        let noise = self.state.noise(&self.parameters);
+        (noise != *self.parameters.noise()).then(|| f64::from(noise.azimuth_deg()))
+    }
 }
 
 #[cfg(test)]

@@ -38,5 +38,6 @@ fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool)
         verdicts: samples.iter().map(|frame| frame.objects.iter().map(verdict).collect()).collect(),
         cells: Vec::new(),
         counters: Vec::new(),
+        azimuth_noise_deg: None,
     }
 }

@@ -30,6 +30,8 @@ pub struct Score {
     /// Road cells by frame; empty where cells are not judged at all.
     pub cells: Vec<CellTally>,
     pub counters: Vec<(String, u64)>,
+    /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
+    pub azimuth_noise_deg: Option<f64>,
 }
 
 impl Score {
@@ -85,6 +87,7 @@ pub fn score(
         verdicts,
         cells,
         counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
+        azimuth_noise_deg: estimator.azimuth_noise_deg(),
     }
 }
 
@@ -191,6 +194,7 @@ pub mod by_hand {
             verdicts: samples.iter().map(|frame| frame.objects.iter().map(verdict).collect()).collect(),
             cells: vec![CellTally::default(); samples.len()],
             counters: Vec::new(),
+            azimuth_noise_deg: None,
         }
     }
 }

@@ -37,6 +37,8 @@ pub struct Row {
     /// Object-time-steps with no known cell under them.
     pub unknown: u64,
     pub counters: Vec<(String, u64)>,
+    /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
+    pub azimuth_noise_deg: Option<f64>,
     /// Counts of each object unit, and of each block: what is drawn again.
     pub by_unit: Vec<Counts>,
     pub by_block: Vec<CellCounts>,
@@ -139,6 +141,7 @@ impl Summary {
                 cell_curve: if score.graded { trade_off(&cell_grades(score)) } else { Vec::new() },
                 unknown: if score.graded { unknown(score) } else { 0 },
                 counters: score.counters.clone(),
+                azimuth_noise_deg: score.azimuth_noise_deg,
                 by_unit: drawn.by_unit.clone(),
                 by_block: drawn.by_block.clone(),
             }

@@ -85,6 +85,9 @@ pub struct Estimator {
     curve: Vec<CurvePoint>,
     cell_curve: Vec<CurvePoint>,
     counters: Map<String, Value>,
+    /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    azimuth_noise_deg: Option<f64>,
     /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
     by_unit: Vec<String>,
     /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s.
@@ -204,6 +207,7 @@ pub(super) fn estimator(row: &Row) -> Estimator {
         curve: row.curve.clone(),
         cell_curve: row.cell_curve.clone(),
         counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
+        azimuth_noise_deg: row.azimuth_noise_deg,
         by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
         by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }

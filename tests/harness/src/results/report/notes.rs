@@ -63,6 +63,7 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     let cartesian = summary.rows.iter().filter(|r| !r.curve.is_empty() && r.grid != options.grid);
     lines.extend(cartesian.map(|r| format!("{} was judged on the {} grid: its map has no other.", r.name, r.grid)));
     lines.extend(summary.comparisons.iter().map(comparison));
+    lines.extend(noise_learnt(&summary.rows));
     lines.extend(left_out(recording, &summary.rows));
     if recording.problems.is_empty() {
         lines.push("Problems of the input: none.".into());
@@ -156,6 +157,18 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
     said.iter().map(line).collect()
 }
 
+/// What fixtures taught estimators of the azimuth's noise.
+fn noise_learnt(rows: &[Row]) -> Option<String> {
+    let learnt: Vec<String> = rows
+        .iter()
+        .filter_map(|row| Some((&row.name, row.azimuth_noise_deg?)))
+        .map(|(name, deg)| format!("{deg:.2} in {name}"))
+        .collect();
+    (!learnt.is_empty()).then(|| {
+        format!("Azimuth's noise of vehicles, degrees, by what fixtures showed until the end: {}.", learnt.join(", "))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -182,6 +195,17 @@ mod tests {
             ),
         ];
         assert_eq!(left_out(&recording, &summary.rows), expected);
+    }
+
+    #[test]
+    fn noise_that_was_learnt_is_said() {
+        let samples = frames([vec![sample(0, 50.0, true, true)]]);
+        let mut scores = ["a", "b", "c"].map(|name| score(name, &samples, |_| Some(255)));
+        (scores[0].azimuth_noise_deg, scores[2].azimuth_noise_deg) = (Some(0.234), Some(0.2));
+        let rows = Summary::new(&recording(1, 1), &samples, &scores, &Options::default()).rows;
+        let line = "Azimuth's noise of vehicles, degrees, by what fixtures showed until the end: 0.23 in a, 0.20 in c.";
+        assert_eq!(noise_learnt(&rows).as_deref(), Some(line));
+        assert_eq!(noise_learnt(&rows[1..2]), None);
     }
 
     #[test]
