@@ -33,10 +33,11 @@ export class Session {
     this.kind = 'car';
     this.pointing = false;
     this.following = false;
-    // whether the way from where the mouse rests is shown, whether it is being looked for, and that way:
-    // { plot, place, tracks, before, track }
+    // whether the way from where the mouse rests is shown, whether it is being looked for, what is then looked for next, and
+    // that way: { plot, place, tracks, before, track }
     this.looks = true;
     this.looking = false;
+    this.lookNext = null;
     this.way = null;
     this.now = 0;
     this.window = 0.25;
@@ -210,14 +211,18 @@ export class Session {
     return answer.ok ? { track: await answer.json() } : { why: (await answer.text()).trim() };
   }
 
-  // Shows where following would lead from a place at which the mouse rests; `rests` says whether it still does.
+  // Shows where following would lead from a place at which the mouse rests; `rests` says whether it still does. There is one
+  // question at a time: of the places at which the mouse comes to rest before its answer, the last is asked next.
   async look(plot, place, rests) {
     const mayFollow = this.pointing || this.track || !this.proposals.shown;
-    if (!this.looks || this.looking || this.following || this.drawing !== null || !mayFollow || !this.canWrite()) return;
+    if (!rests() || !this.looks || this.following || this.drawing !== null || !mayFollow || !this.canWrite()) return;
+    this.lookNext = this.looking ? [plot, place, rests] : null;
+    if (this.looking) return;
     const { tracks: all, track: before } = this;
     this.looking = true;
     const { track } = await this.wayFrom(plot, place);
     this.looking = false;
+    if (this.lookNext) this.look(...this.lookNext);
     if (!track || !rests() || this.tracks !== all || this.track !== before) return;
     this.way = { plot, place, tracks: all, before, track };
     this.changed('way');
