@@ -92,7 +92,7 @@
 //! |---|---|
 //! | `fixed` | integers with their scale: angles, time, directions, rows of bits |
 //! | `sensor` | a sensor as it is installed, in SI units, checked once: mount, field of view, noise |
-//! | `frame` | one radar frame: detections in, gated and counted, placed on the road; what a silent or blind sensor means |
+//! | `frame` | one radar frame: detections in, gated and counted, placed on the road; how well fixtures repeat; what a silent or blind sensor means |
 //! | `obstacles` | what moves is followed: place, length, width, height; solid boxes out |
 //! | `map` | what a map answers: the interface, the polar map, queries, the 1 m grid, the bitmap |
 //! | `fusion` | maps of several sensors in, one map of the road out: who sees what, and who contradicts whom |
@@ -158,6 +158,9 @@
 //!   together distinguish a car from a van or a lorry where none alone does; and what is as long as a lorry is never
 //!   called low. Seeing reflections *past* an obstacle was tried as a ceiling on its height and left out: road
 //!   bounce under trucks makes it lie, and each lie is a false "visible".
+//! - **An azimuth's noise is learnt**: two measurements of a post differ by noise alone, so posts, signs and walls show it
+//!   within a minute. How far from a vehicle its detections are looked for, and how far behind them its middle lies,
+//!   hangs on it; a data sheet says the worst case at best. It is never taken to be worse than configured.
 //! - **No floats after start-up**: angles are binary (2^16 a turn), lengths centimetres; `libm` makes
 //!   the start-up tables, `micromath` helps only where a test shows that its error cannot matter, and
 //!   both are named in one file. TI's radars send floats: their decoder computes in them, in software

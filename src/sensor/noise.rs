@@ -13,7 +13,7 @@ use crate::sensor::config::{ConfigError, within};
 pub struct NoiseConfig {
     /// Range.
     pub range_m: f32,
-    /// Azimuth.
+    /// Azimuth, at worst: radar-3d learns from fixtures that it is better.
     pub azimuth_deg: f32,
     /// Elevation.
     pub elevation_deg: f32,
