@@ -41,8 +41,8 @@ const G474: Board = Board {
     dma: 0x2000_0000..0x2000_0800,
     coupled: None,
     most_flash: 192_512,
-    most_ram: 106_496,
-    least_stack: 24_000,
+    most_ram: 108_000,
+    least_stack: 22_000,
 };
 
 /// Whose panics an image may hold: embassy's and the drivers', not the library's nor what it is made of.
