@@ -149,7 +149,7 @@ impl Class {
             TwoSenders => [65.0, 65.0, 63.0],
             // a clock that jumps forward is no other than a delay, which is waited out for 5.12 s
             ClockJumps => [61.5, 60.0, 62.0],
-            MailboxesFull => [96.0, 98.0, 98.0],
+            MailboxesFull => [94.5, 98.0, 98.0],
             DelayPasses => [86.0, 84.0, 78.0],
             DelayStays => [63.0, 61.0, 63.0],
             HeaderFaults => [70.0, 75.0, 75.0],
