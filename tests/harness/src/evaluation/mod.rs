@@ -13,6 +13,7 @@ pub mod bounds;
 pub mod breakdown;
 pub mod calibration;
 pub mod camera;
+pub mod causes;
 pub mod cells;
 pub mod comparison;
 pub mod counts;

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Result, bail, ensure};
+use rayon::prelude::*;
 use serde_json::Value;
 
 use self::fused::FusedReplay;
@@ -19,6 +20,7 @@ use super::progress::bar;
 use super::{BAD_INPUT, complain, print};
 use crate::command::options::{SettingsArgs, finite};
 use crate::evaluation::Settings;
+use crate::evaluation::causes::{Causes, causes};
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, camera_steps, steps};
@@ -99,6 +101,11 @@ pub struct Args {
         help_heading = "Results"
     )]
     mount_error: Option<Extent>,
+    /// Say why the cells of radar-3d are wrong: which vehicles have no box, one too low, one elsewhere
+    ///
+    /// Every fifth counted frame is looked at; the causes add up to the cells' FVR and FIR there. On a flat road only.
+    #[arg(long, help_heading = "Results")]
+    causes: bool,
     #[command(flatten)]
     risk: risk::RiskArgs,
     #[command(flatten)]
@@ -243,6 +250,7 @@ struct Replayed {
     replay: Replay,
     examples: Vec<Example>,
     mount_error: Option<Vec<Sensitivity>>,
+    causes: Vec<Causes>,
     /// The frame of --time.
     shown_frame: Option<usize>,
 }
@@ -314,9 +322,24 @@ fn replay(
     // without truth there are no rates that could move
     let labelled = replay.recording.truth.is_some();
     let mount_error = args.mount_error.filter(|_| labelled).map(wrong).transpose()?;
+    let causes = if args.causes { why(&replay, settings)? } else { Vec::new() };
     let shown = replay.score(SHOWN).or(replay.score(SHOWN_OF_CAMERA));
     let examples = shown.map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
-    Ok(Replayed { replay, examples, mount_error, shown_frame })
+    Ok(Replayed { replay, examples, mount_error, causes, shown_frame })
+}
+
+/// Why cells are wrong, of each estimator of this kind.
+fn why(replay: &Replay, settings: &Settings) -> Result<Vec<Causes>> {
+    let recording = &replay.recording;
+    let mut running = estimators::all(recording, &settings.estimators)?;
+    running.retain(|e| e.name().starts_with(SHOWN));
+    let frames = (recording.frames.len() * running.len()) as u64;
+    let again = bar(&format!("asking why cells of {} are wrong", recording.name), frames);
+    let height_m = settings.evaluation.slice_height_m;
+    let of = |e: &mut Box<dyn estimators::Estimator>| {
+        causes(recording, e.as_mut(), &replay.samples, height_m, &|| again.step())
+    };
+    Ok(running.par_iter_mut().filter_map(of).collect())
 }
 
 /// The frame nearest to a time since the first.
@@ -406,6 +429,9 @@ impl Replayed {
         if let Some(sensitivities) = &self.mount_error {
             text += &table::mount_error(sensitivities, extent);
         }
+        for causes in &self.causes {
+            text += &table::causes(causes, extent);
+        }
         text
     }
 
@@ -416,6 +442,7 @@ impl Replayed {
             estimators: &settings.estimators,
         };
         let mut report = json::report(&self.replay, self.mount_error.as_deref(), &self.examples, options);
+        report.causes = json::causes(&self.causes);
         report.fused = fused;
         report
     }

@@ -27,7 +27,7 @@ const TILE_PX: i32 = 720;
 /// # Errors
 /// A file that cannot be written.
 pub fn write(target: &Target, replayed: &Replayed, settings: &Settings) -> Result<()> {
-    let Replayed { replay, examples, mount_error, shown_frame } = replayed;
+    let Replayed { replay, examples, mount_error, causes, shown_frame } = replayed;
     let drawing = bar("writing the report", 1);
     let shown = if replay.recording.of_camera().is_some() { SHOWN_OF_CAMERA } else { SHOWN };
     let worst = worst(replay, shown);
@@ -66,6 +66,7 @@ pub fn write(target: &Target, replayed: &Replayed, settings: &Settings) -> Resul
         shown,
         settings,
         mount_error: mount_error.as_deref(),
+        causes,
         command: command(std::env::args()),
         pictures: drawn,
         strips,

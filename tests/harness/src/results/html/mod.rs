@@ -19,6 +19,7 @@ use viewshed::wire::header::fingerprint;
 use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::bootstrap::Interval;
+use crate::evaluation::causes::Causes;
 use crate::evaluation::counts::Outcome;
 use crate::evaluation::examples::Lasting;
 use crate::evaluation::mount_error::Sensitivity;
@@ -55,6 +56,7 @@ pub struct Report<'a> {
     pub shown: &'a str,
     pub settings: &'a Settings,
     pub mount_error: Option<&'a [Sensitivity]>,
+    pub causes: &'a [Causes],
     /// As it was typed.
     pub command: String,
     /// The first one stands at the head.
@@ -265,6 +267,9 @@ impl Report<'_> {
         let _ = writeln!(html, "<details><summary>By class, distance and occlusion</summary>\n{broken_down}</details>");
         if let Some(sensitivities) = self.mount_error {
             html += &tables::mount_error(sensitivities);
+        }
+        for causes in self.causes {
+            html += &tables::causes(causes);
         }
         html += "</section>\n";
         if let Some(camera) = &self.replay.camera {

@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use super::escaped;
 use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::breakdown::band_name;
+use crate::evaluation::causes::{Causes, WRONGLY_VISIBLE};
 use crate::evaluation::counts::Counts;
 use crate::evaluation::mount_error::Sensitivity;
 use crate::evaluation::summary::{Row, Summary};
 use crate::results::report::percent;
-use crate::results::report::table::signed;
+use crate::results::report::table::{CAUSES, causes_caption, causes_rows, signed};
 
 /// A table whose first column is text; cells are HTML.
 pub fn table(caption: &str, heading: &[String], rows: &[(bool, Vec<String>)]) -> String {
@@ -100,6 +101,15 @@ fn grouped(summary: &Summary, shown: &str, by: &str, groups: impl Fn(&Row) -> Ve
         (false, first.into_iter().chain(cells).collect())
     });
     table(&format!("FVR / FIR in % by {by}"), &heading, &rows.collect::<Vec<_>>())
+}
+
+/// Why cells are wrong.
+pub fn causes(causes: &Causes) -> String {
+    let rows = causes_rows(causes);
+    let sums = [0, 1 + WRONGLY_VISIBLE.len()];
+    let rows = rows.iter().enumerate().map(|(k, row)| (sums.contains(&k), row.iter().map(|c| escaped(c)).collect()));
+    let heading = CAUSES.map(str::to_owned);
+    table(&causes_caption(causes), &heading, &rows.collect::<Vec<_>>())
 }
 
 /// How the rates move with a wrong mount.

@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::ORIGIN;
 use crate::estimators;
 use crate::evaluation::breakdown::{Breakdown, band_name};
+use crate::evaluation::causes::Causes;
 use crate::evaluation::cells::CellCounts;
 use crate::evaluation::comparison::Comparison;
 use crate::evaluation::counts::Counts;
@@ -40,6 +41,9 @@ pub struct Report {
     coverage_interval: Option<Value>,
     comparisons: Vec<Comparison>,
     mount_error: Option<Vec<Sensitivity>>,
+    /// Why cells are wrong, where that was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub causes: Vec<Value>,
     examples: Vec<Example>,
     resampling: Resampling,
     /// What was drawn again for object rates, in the order of `by_unit`.
@@ -147,6 +151,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
         coverage_interval: summary.coverage_interval.map(|i| json!(i)),
         comparisons: summary.comparisons.clone(),
         mount_error: mount_error.map(<[_]>::to_vec),
+        causes: Vec::new(),
         examples: examples.to_vec(),
         resampling: resampling(summary),
         units: summary.unit_names.clone(),
@@ -166,6 +171,20 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
         origin: recording.sensor.synthetic.then_some(ORIGIN),
         fused: None,
     }
+}
+
+/// What adds up to the rates of cells, in points.
+pub fn causes(all: &[Causes]) -> Vec<Value> {
+    let of = |c: &Causes| {
+        json!({
+            "estimator": c.estimator,
+            "cell_fvr": c.cells.fvr(),
+            "cell_fir": c.cells.fir(),
+            "wrongly_visible": c.wrongly_visible(),
+            "wrongly_invisible": c.wrongly_invisible(),
+        })
+    };
+    all.iter().map(of).collect()
 }
 
 fn camera(replay: &Replay) -> Camera {

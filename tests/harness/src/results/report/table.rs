@@ -7,6 +7,7 @@ use crate::evaluation::Options;
 use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::bounds::SLICE;
 use crate::evaluation::breakdown::band_name;
+use crate::evaluation::causes::{Cause, Causes};
 use crate::evaluation::counts::Counts;
 use crate::evaluation::mount_error::Sensitivity;
 use crate::evaluation::replay::Replay;
@@ -181,6 +182,37 @@ fn grouped(summary: &Summary, by: &str, groups: impl Fn(&Row) -> Vec<(String, Co
     });
     let rows: Vec<Vec<String>> = rows.collect();
     format!("FVR / FIR in % by {by}:\n{}", tables(&heading, &rows, 3, extent))
+}
+
+/// Why cells of an estimator are wrong, in points of their rates.
+pub fn causes(causes: &Causes, extent: Extent) -> String {
+    format!("{}:\n{}\n", causes_caption(causes), tables(&CAUSES, &causes_rows(causes), 1, extent))
+}
+
+pub fn causes_caption(causes: &Causes) -> String {
+    format!("Why cells of {} are wrong, by how the vehicle moves that hides them or whose box does", causes.estimator)
+}
+
+/// Columns of [`causes_rows`].
+pub const CAUSES: [&str; 7] = ["in points", "all", "stands", "across", "along", "unmoving", "nobody"];
+
+/// Each rate with what adds up to it below.
+pub fn causes_rows(causes: &Causes) -> Vec<Vec<String>> {
+    let points = |v: f64| if v > 0.0 { format!("{v:.1}") } else { String::new() };
+    let row = |c: &Cause| {
+        let m = &c.by_motion;
+        let cells = [c.points, m.stands, m.across, m.along, m.unmoving, m.nobody].map(points);
+        std::iter::once(c.name.to_owned()).chain(cells).collect::<Vec<String>>()
+    };
+    let sum = |name: &str, rate: Option<f64>| {
+        let rest = std::iter::repeat_n(String::new(), CAUSES.len() - 2);
+        [name.to_owned(), percent(rate)].into_iter().chain(rest).collect::<Vec<String>>()
+    };
+    let mut rows = vec![sum("hidden, called visible", causes.cells.fvr())];
+    rows.extend(causes.wrongly_visible().iter().map(row));
+    rows.push(sum("clear, called invisible", causes.cells.fir()));
+    rows.extend(causes.wrongly_invisible().iter().map(row));
+    rows
 }
 
 /// How the rates of every estimator move with a wrong mount, in points.
