@@ -159,7 +159,7 @@ fn listed<const N: usize>(names: [&'static str; N], cells: &[ByMotion<f64>; N], 
     names.into_iter().zip(cells).map(cause).collect()
 }
 
-/// Runs an estimator that has boxes over a recording again; `None` where the road is not flat or nothing is labelled.
+/// Runs an estimator that has boxes over a recording again; `None` where the road is not flat or no cell is judged.
 /// `progress` is called after each frame.
 pub fn causes(
     recording: &Recording,
@@ -200,7 +200,7 @@ pub fn causes(
             }
         }
     }
-    Some(causes)
+    Some(causes).filter(|c| c.cells.blocked + c.cells.clear > 0)
 }
 
 /// Whether it is ever elsewhere than at first, beyond what labels round.
@@ -507,15 +507,20 @@ mod tests {
     }
 
     #[test]
-    fn a_road_that_is_not_flat_has_no_causes() {
+    fn without_labels_or_a_flat_road_nothing_is_said() {
         let mut recording = recording(1, 1);
+        let samples = [FrameSamples { counted: true, cells: vec![((50, 0), true)], ..FrameSamples::default() }];
+        let none = [FrameSamples { counted: true, ..FrameSamples::default() }];
+        let found = |recording: &Recording, samples: &[FrameSamples]| {
+            causes(recording, &mut Drawn::new(vec![vec![]]), samples, SLICE_M, &|| ())
+        };
+        assert!(found(&recording, &samples).is_some());
+        assert_eq!(found(&recording, &none), None);
         if let Some(truth) = &mut recording.truth {
             truth.ground = crate::geometry::ground::Ground::new(vec![[0.0, 0.0], [100.0, 4.0]]).unwrap();
         }
-        let samples = [FrameSamples { counted: true, ..FrameSamples::default() }];
-        let mut drawn = Drawn::new(vec![vec![]]);
-        assert_eq!(causes(&recording, &mut drawn, &samples, SLICE_M, &|| ()), None);
+        assert_eq!(found(&recording, &samples), None);
         recording.truth = None;
-        assert_eq!(causes(&recording, &mut drawn, &samples, SLICE_M, &|| ()), None);
+        assert_eq!(found(&recording, &samples), None);
     }
 }

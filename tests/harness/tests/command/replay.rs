@@ -233,3 +233,33 @@ fn points_that_are_all_rejected_are_a_problem_with_a_hint_and_no_free_road() {
     let (problems, _) = spoilt("spoilt_outside", |d| d.azimuth_rad = 1.5);
     assert_eq!(problems, [rejected("azimuth): angles in degrees, or a wrong field of view?")]);
 }
+
+#[test]
+fn causes_of_wrong_cells_add_up_to_their_rates_alone_and_together() {
+    let folder = folder("causes");
+    let scene = Scene::default();
+    scene.save(&folder, "one");
+    scene.save(&folder, "two");
+    let output = replay(&folder, &["one.mcap", "two.mcap", "--causes", "--json", "r.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    assert_eq!(text.matches("Why cells of radar-3d are wrong").count(), 3, "{text}");
+    assert!(text.contains("All recordings together"), "{text}");
+    let mut wrong = 0.0;
+    for report in json(&folder.join("r.json")).as_array().unwrap() {
+        let causes = &report["causes"][0];
+        assert_eq!(causes["estimator"], "radar-3d");
+        for (rate, parts) in [("cell_fvr", "wrongly_visible"), ("cell_fir", "wrongly_invisible")] {
+            let points = |c: &Value| c["points"].as_f64().unwrap();
+            let sum: f64 = causes[parts].as_array().unwrap().iter().map(points).sum();
+            assert!((sum - 100.0 * causes[rate].as_f64().unwrap()).abs() < 1e-9, "{causes}");
+            wrong += sum;
+        }
+    }
+    assert!(wrong > 0.0, "a scene of which every cell is right shows nothing");
+
+    let unlabelled = Scene { labelled: false, ..scene };
+    unlabelled.save(&folder, "unlabelled");
+    let output = replay(&folder, &["unlabelled.mcap", "--causes"]);
+    assert!(stdout(&output).contains("Why cells are wrong cannot be said"), "{}", stdout(&output));
+}

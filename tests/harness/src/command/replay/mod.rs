@@ -129,6 +129,9 @@ Labels beside the recording, in the road frame (x along the road, y to the left)
 
   Examples: example.labels.csv and example.occlusion.csv in tests/recordings.";
 
+const NO_CAUSES: &str =
+    "Why cells are wrong cannot be said: that takes labels, a flat road and an estimator with boxes.\n";
+
 /// Replays one recording after the other. One that cannot be replayed is reported, and the rest go on.
 ///
 /// # Errors
@@ -167,6 +170,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut samples = csv.map(|file| file.create()).transpose()?.map(SampleWriter::new);
     let mut reports = Vec::new();
     let (mut failed, mut synthetic) = (false, false);
+    let mut of_all: Vec<Causes> = Vec::new();
     for (k, path) in paths.iter().enumerate() {
         let radars = match radars(path, &settings, one_only) {
             Ok(radars) => radars,
@@ -199,6 +203,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 }
             };
             synthetic |= one.of_simulated_labels();
+            add_up(&mut of_all, &one.causes);
             let text = one.text(args, &settings) + &args.risk.told(&one.replay)?;
             print(&text)?;
             if let Some(csv) = &mut samples {
@@ -226,6 +231,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         if let Some(text) = fused_text {
             print(&text)?;
         }
+    }
+    if let [_, _, ..] = reports[..] {
+        let extent = table::Extent::of(args.wide);
+        let told = of_all.iter().map(|causes| table::causes(causes, extent)).collect::<String>();
+        print(&if told.is_empty() { told } else { format!("\nAll recordings together\n{told}") })?;
     }
     for csv in [samples.filter(|_| !reports.is_empty()), camera_samples].into_iter().flatten() {
         csv.finish()?.finish()?;
@@ -326,6 +336,16 @@ fn replay(
     let shown = replay.score(SHOWN).or(replay.score(SHOWN_OF_CAMERA));
     let examples = shown.map(|s| examples::find(&replay.recording, &replay.samples, s)).unwrap_or_default();
     Ok(Replayed { replay, examples, mount_error, causes, shown_frame })
+}
+
+/// Adds up the wrong cells of each estimator.
+fn add_up(all: &mut Vec<Causes>, causes: &[Causes]) {
+    for one in causes {
+        match all.iter_mut().find(|known| known.estimator == one.estimator) {
+            Some(known) => *known += one,
+            None => all.push(one.clone()),
+        }
+    }
 }
 
 /// Why cells are wrong, of each estimator of this kind.
@@ -431,6 +451,9 @@ impl Replayed {
         }
         for causes in &self.causes {
             text += &table::causes(causes, extent);
+        }
+        if args.causes && self.causes.is_empty() {
+            text += NO_CAUSES;
         }
         text
     }
