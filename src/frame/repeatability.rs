@@ -278,7 +278,8 @@ mod tests {
 
     #[test]
     fn what_moves_is_near_or_has_company_at_its_range_shows_nothing() {
-        let steady: [(&str, fn(f64) -> Vec<Reflection>); 4] = [
+        type Seen = fn(f64) -> Vec<Reflection>;
+        let steady: [(&str, Seen); 4] = [
             ("a vehicle", |b| [at(50.0, b, 40)].into()),
             ("near", |b| [at(9.0, b, 0)].into()),
             ("two at one range", |b| [at(50.0, b, 0), at(50.9, 30.0, 0)].into()),

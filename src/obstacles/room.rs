@@ -105,7 +105,7 @@ mod tests {
         // whatever way it drives, ahead of the sensor and behind it
         for heading in [Direction::AHEAD, Direction::AHEAD.reversed()] {
             let (end, car) = (seen(5000, 5100, true, heading), seen(5540, 5990, false, heading));
-            assert_eq!(first_of(&[end.clone()]), [5000, 5600], "nothing is known: behind what is seen");
+            assert_eq!(first_of(std::slice::from_ref(&end)), [5000, 5600], "nothing is known: behind what is seen");
             assert_eq!(first_of(&[end.clone(), car.clone()]), [4500, 5100]);
             assert_eq!(first_of(&[end, seen(5610, 6060, false, heading)]), [5000, 5600], "room enough");
             let (end, car) = (seen(-5100, -5000, true, heading), seen(-5990, -5540, false, heading));

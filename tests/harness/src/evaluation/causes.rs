@@ -53,20 +53,20 @@ const NO_BOX_NEAR: &str = "no box near";
 
 /// Cells by how the vehicle moves that they are put down to, as the sensor sees it; shares of several vehicles add up.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct ByMotion<T> {
-    pub stands: T,
+pub struct ByMotion {
+    pub stands: f64,
     /// More across the line of sight than along it.
-    pub across: T,
-    pub along: T,
+    pub across: f64,
+    pub along: f64,
     /// What never moves: masts, parked cars.
-    pub unmoving: T,
-    /// Of no vehicle.
-    pub nobody: T,
+    pub unmoving: f64,
+    /// Put down to no vehicle.
+    pub none: f64,
 }
 
-impl ByMotion<f64> {
+impl ByMotion {
     pub fn all(&self) -> f64 {
-        self.stands + self.across + self.along + self.unmoving + self.nobody
+        self.stands + self.across + self.along + self.unmoving + self.none
     }
 
     fn of(&mut self, motion: Option<Motion>) -> &mut f64 {
@@ -75,7 +75,7 @@ impl ByMotion<f64> {
             Some(Motion::Across) => &mut self.across,
             Some(Motion::Along) => &mut self.along,
             Some(Motion::Unmoving) => &mut self.unmoving,
-            None => &mut self.nobody,
+            None => &mut self.none,
         }
     }
 
@@ -87,7 +87,7 @@ impl ByMotion<f64> {
             across: points(self.across),
             along: points(self.along),
             unmoving: points(self.unmoving),
-            nobody: points(self.nobody),
+            none: points(self.none),
         }
     }
 }
@@ -107,9 +107,9 @@ pub struct Causes {
     /// All cells that were looked at.
     pub cells: CellCounts,
     /// In the order of [`WRONGLY_VISIBLE`].
-    visible: [ByMotion<f64>; WRONGLY_VISIBLE.len()],
+    visible: [ByMotion; WRONGLY_VISIBLE.len()],
     /// In the order of [`WRONGLY_INVISIBLE`].
-    invisible: [ByMotion<f64>; WRONGLY_INVISIBLE.len()],
+    invisible: [ByMotion; WRONGLY_INVISIBLE.len()],
 }
 
 /// What one cause adds to a rate, points.
@@ -117,7 +117,7 @@ pub struct Causes {
 pub struct Cause {
     pub name: &'static str,
     pub points: f64,
-    pub by_motion: ByMotion<f64>,
+    pub by_motion: ByMotion,
 }
 
 impl Causes {
@@ -135,7 +135,7 @@ impl Causes {
 impl std::ops::AddAssign<&Self> for Causes {
     fn add_assign(&mut self, o: &Self) {
         self.cells += o.cells;
-        let both = |a: &mut [ByMotion<f64>], b: &[ByMotion<f64>]| {
+        let both = |a: &mut [ByMotion], b: &[ByMotion]| {
             for (a, b) in a.iter_mut().zip(b) {
                 for motion in MOTIONS {
                     let mut b = *b;
@@ -151,8 +151,8 @@ impl std::ops::AddAssign<&Self> for Causes {
 const MOTIONS: [Option<Motion>; 5] =
     [Some(Motion::Stands), Some(Motion::Across), Some(Motion::Along), Some(Motion::Unmoving), None];
 
-fn listed<const N: usize>(names: [&'static str; N], cells: &[ByMotion<f64>; N], of: u64) -> Vec<Cause> {
-    let cause = |(name, cells): (&'static str, &ByMotion<f64>)| {
+fn listed<const N: usize>(names: [&'static str; N], cells: &[ByMotion; N], of: u64) -> Vec<Cause> {
+    let cause = |(name, cells): (&'static str, &ByMotion)| {
         let by_motion = cells.points(of);
         Cause { name, points: by_motion.all(), by_motion }
     };
@@ -420,14 +420,14 @@ mod tests {
         let with: Vec<&Cause> = all.iter().filter(|c| c.points > 0.0).collect();
         assert_eq!(with.len(), 1, "{all:?}");
         let m = with[0].by_motion;
-        (with[0].name, [m.stands, m.across, m.along, m.unmoving, m.nobody].map(|points| points > 0.0))
+        (with[0].name, [m.stands, m.across, m.along, m.unmoving, m.none].map(|points| points > 0.0))
     }
 
     const STANDS: [bool; 5] = [true, false, false, false, false];
     const ACROSS: [bool; 5] = [false, true, false, false, false];
     const ALONG: [bool; 5] = [false, false, true, false, false];
     const UNMOVING: [bool; 5] = [false, false, false, true, false];
-    const NOBODY: [bool; 5] = [false, false, false, false, true];
+    const NONE: [bool; 5] = [false, false, false, false, true];
 
     fn moved(solid: Solid, ahead_m: f64, left_m: f64) -> Solid {
         let [x, y, z] = solid.center;
@@ -464,9 +464,9 @@ mod tests {
     }
 
     #[test]
-    fn a_box_of_no_vehicle_is_named_and_its_shadow_is_nobodys() {
+    fn a_box_of_no_vehicle_is_named_and_its_shadow_is_no_vehicles() {
         let causes = drawn_as(vec![CAR, moved(CAR, 0.0, 8.0)]);
-        assert_eq!(only(&causes.wrongly_invisible()), (NO_VEHICLE, NOBODY));
+        assert_eq!(only(&causes.wrongly_invisible()), (NO_VEHICLE, NONE));
     }
 
     #[test]
@@ -477,7 +477,7 @@ mod tests {
         let beside = Drawn { blind_behind: wider, ..Drawn::new(vec![vec![CAR]]) };
         assert_eq!(only(&found(&[CAR], beside).wrongly_invisible()), (BESIDE, UNMOVING));
         let far = Drawn { blind_from_x_cm: 7900, ..Drawn::new(vec![vec![CAR]]) };
-        assert_eq!(only(&found(&[CAR], far).wrongly_invisible()), (NO_BOX_NEAR, NOBODY));
+        assert_eq!(only(&found(&[CAR], far).wrongly_invisible()), (NO_BOX_NEAR, NONE));
     }
 
     #[test]

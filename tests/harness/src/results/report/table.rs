@@ -194,14 +194,14 @@ pub fn causes_caption(causes: &Causes) -> String {
 }
 
 /// Columns of [`causes_rows`].
-pub const CAUSES: [&str; 7] = ["in points", "all", "stands", "across", "along", "unmoving", "nobody"];
+pub const CAUSES: [&str; 7] = ["in points", "all", "stands", "across", "along", "unmoving", "none"];
 
 /// Each rate with what adds up to it below.
 pub fn causes_rows(causes: &Causes) -> Vec<Vec<String>> {
     let points = |v: f64| if v > 0.0 { format!("{v:.1}") } else { String::new() };
     let row = |c: &Cause| {
         let m = &c.by_motion;
-        let cells = [c.points, m.stands, m.across, m.along, m.unmoving, m.nobody].map(points);
+        let cells = [c.points, m.stands, m.across, m.along, m.unmoving, m.none].map(points);
         std::iter::once(c.name.to_owned()).chain(cells).collect::<Vec<String>>()
     };
     let sum = |name: &str, rate: Option<f64>| {
