@@ -12,6 +12,8 @@
 //! Box and vehicle belong together where the middle of one lies on the other's footprint, or [`NEAR_M`] beside it; of several
 //! the nearest.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use viewshed::sensor::road::RoadPoint;
 
@@ -30,8 +32,6 @@ const EVERY: usize = 5;
 const NEAR_M: f64 = 0.7;
 /// Slower stands, m/s.
 const STANDS_MPS: f64 = 0.5;
-/// What never is so far from where it was first never moves, metres.
-const LEAVES_M: f64 = 0.3;
 /// A cell is beside a shadow where the box would hide it if it were so much wider and longer, and so much higher, metres.
 const BESIDE_M: (f64, f64) = (1.0, 0.3);
 
@@ -51,8 +51,38 @@ const TOO_LARGE: &str = "box elsewhere or too large";
 const BESIDE: &str = "beside the shadow of a box";
 const NO_BOX_NEAR: &str = "no box near";
 
-/// Cells by how the vehicle moves that they are put down to, as the sensor sees it; shares of several vehicles add up.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+/// How a vehicle moves that a cell is put down to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Motion {
+    Stands,
+    Across,
+    Along,
+    Unmoving,
+}
+
+/// Cells by cause and motion, `None` where they are put down to no vehicle; shares of several vehicles add up.
+type Shares = BTreeMap<(&'static str, Option<Motion>), f64>;
+
+/// Wrong cells of one estimator by cause.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Causes {
+    pub estimator: String,
+    /// All cells that were looked at.
+    pub cells: CellCounts,
+    visible: Shares,
+    invisible: Shares,
+}
+
+/// What one cause adds to a rate, points.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cause {
+    pub name: &'static str,
+    pub points: f64,
+    pub by_motion: ByMotion,
+}
+
+/// The same by how the vehicle moves, as the sensor sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ByMotion {
     pub stands: f64,
     /// More across the line of sight than along it.
@@ -62,62 +92,6 @@ pub struct ByMotion {
     pub unmoving: f64,
     /// Put down to no vehicle.
     pub none: f64,
-}
-
-impl ByMotion {
-    pub fn all(&self) -> f64 {
-        self.stands + self.across + self.along + self.unmoving + self.none
-    }
-
-    fn of(&mut self, motion: Option<Motion>) -> &mut f64 {
-        match motion {
-            Some(Motion::Stands) => &mut self.stands,
-            Some(Motion::Across) => &mut self.across,
-            Some(Motion::Along) => &mut self.along,
-            Some(Motion::Unmoving) => &mut self.unmoving,
-            None => &mut self.none,
-        }
-    }
-
-    /// In points of a rate.
-    fn points(&self, of: u64) -> Self {
-        let points = |cells: f64| if of == 0 { 0.0 } else { 100.0 * cells / of as f64 };
-        Self {
-            stands: points(self.stands),
-            across: points(self.across),
-            along: points(self.along),
-            unmoving: points(self.unmoving),
-            none: points(self.none),
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Motion {
-    Stands,
-    Across,
-    Along,
-    Unmoving,
-}
-
-/// Wrong cells of one estimator by cause.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Causes {
-    pub estimator: String,
-    /// All cells that were looked at.
-    pub cells: CellCounts,
-    /// In the order of [`WRONGLY_VISIBLE`].
-    visible: [ByMotion; WRONGLY_VISIBLE.len()],
-    /// In the order of [`WRONGLY_INVISIBLE`].
-    invisible: [ByMotion; WRONGLY_INVISIBLE.len()],
-}
-
-/// What one cause adds to a rate, points.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cause {
-    pub name: &'static str,
-    pub points: f64,
-    pub by_motion: ByMotion,
 }
 
 impl Causes {
@@ -135,28 +109,28 @@ impl Causes {
 impl std::ops::AddAssign<&Self> for Causes {
     fn add_assign(&mut self, o: &Self) {
         self.cells += o.cells;
-        let both = |a: &mut [ByMotion], b: &[ByMotion]| {
-            for (a, b) in a.iter_mut().zip(b) {
-                for motion in MOTIONS {
-                    let mut b = *b;
-                    *a.of(motion) += *b.of(motion);
-                }
+        for (own, others) in [(&mut self.visible, &o.visible), (&mut self.invisible, &o.invisible)] {
+            for (of, cells) in others {
+                *own.entry(*of).or_default() += cells;
             }
-        };
-        both(&mut self.visible, &o.visible);
-        both(&mut self.invisible, &o.invisible);
+        }
     }
 }
 
-const MOTIONS: [Option<Motion>; 5] =
-    [Some(Motion::Stands), Some(Motion::Across), Some(Motion::Along), Some(Motion::Unmoving), None];
-
-fn listed<const N: usize>(names: [&'static str; N], cells: &[ByMotion; N], of: u64) -> Vec<Cause> {
-    let cause = |(name, cells): (&'static str, &ByMotion)| {
-        let by_motion = cells.points(of);
-        Cause { name, points: by_motion.all(), by_motion }
+fn listed<const N: usize>(names: [&'static str; N], cells: &Shares, of: u64) -> Vec<Cause> {
+    let cause = |name| {
+        let points = |motion| cells.get(&(name, motion)).map_or(0.0, |cells| 100.0 * cells / of as f64);
+        let by_motion = ByMotion {
+            stands: points(Some(Motion::Stands)),
+            across: points(Some(Motion::Across)),
+            along: points(Some(Motion::Along)),
+            unmoving: points(Some(Motion::Unmoving)),
+            none: points(None),
+        };
+        let ByMotion { stands, across, along, unmoving, none } = by_motion;
+        Cause { name, points: stands + across + along + unmoving + none, by_motion }
     };
-    names.into_iter().zip(cells).map(cause).collect()
+    names.map(cause).into()
 }
 
 /// Runs an estimator that has boxes over a recording again; `None` where the road is not flat or no cell is judged.
@@ -171,7 +145,7 @@ pub fn causes(
     let truth = recording.truth.as_ref().filter(|truth| truth.ground.is_level())?;
     let mut causes = Causes { estimator: estimator.name().to_owned(), ..Causes::default() };
     let mut had_box = vec![false; truth.tracks.len()];
-    let moves: Vec<bool> = truth.tracks.iter().map(leaves_its_place).collect();
+    let moves: Vec<bool> = truth.tracks.iter().map(Track::moves).collect();
     let counted = samples.iter().map(|s| s.counted).scan(0, |n, counted| {
         *n += usize::from(counted);
         Some(counted && (*n - 1).is_multiple_of(EVERY))
@@ -201,12 +175,6 @@ pub fn causes(
         }
     }
     Some(causes).filter(|c| c.cells.blocked + c.cells.clear > 0)
-}
-
-/// Whether it is ever elsewhere than at first, beyond what labels round.
-fn leaves_its_place(track: &Track) -> bool {
-    let first = track.solids().next().map_or([0.0; 3], |s| s.center);
-    track.solids().any(|s| (s.center[0] - first[0]).hypot(s.center[1] - first[1]) > LEAVES_M)
 }
 
 /// Vehicles and boxes of one frame, with their shadows.
@@ -276,13 +244,13 @@ impl Instant {
                 Some(_) => TOO_SMALL,
             };
             let share = 1.0 / hidden_by.len() as f64;
-            *causes.visible[place(WRONGLY_VISIBLE, cause)].of(Some(self.motion(object, moves))) += share;
+            *causes.visible.entry((cause, Some(self.motion(object, moves)))).or_default() += share;
         }
     }
 
     fn wrongly_invisible(&self, at: Point, moves: &[bool], causes: &mut Causes) {
         let hidden_by: Vec<usize> = in_any(&self.box_shadows, at).collect();
-        let mut add = |cause, motion, share| *causes.invisible[place(WRONGLY_INVISIBLE, cause)].of(motion) += share;
+        let mut add = |cause, motion, share: f64| *causes.invisible.entry((cause, motion)).or_default() += share;
         if hidden_by.is_empty() {
             let beside = self.boxes.iter().position(|b| self.hides(&larger(b), at));
             let object = beside.and_then(|b| self.object_of[b]).map(|k| &self.objects[k]);
@@ -305,10 +273,6 @@ impl Instant {
 fn in_any(shadows: &[Option<Convex>], at: Point) -> impl Iterator<Item = usize> + '_ {
     let holds = move |s: &Option<Convex>| s.as_ref().is_some_and(|s| s.contains(at));
     shadows.iter().enumerate().filter(move |(_, s)| holds(s)).map(|(k, _)| k)
-}
-
-fn place<const N: usize>(names: [&str; N], name: &str) -> usize {
-    names.iter().position(|n| *n == name).unwrap_or(0)
 }
 
 /// The box with another height, still on the road.

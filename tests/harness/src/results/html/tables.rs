@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::escaped;
 use crate::evaluation::bootstrap::Interval;
 use crate::evaluation::breakdown::band_name;
-use crate::evaluation::causes::{Causes, WRONGLY_VISIBLE};
+use crate::evaluation::causes::Causes;
 use crate::evaluation::counts::Counts;
 use crate::evaluation::mount_error::Sensitivity;
 use crate::evaluation::summary::{Row, Summary};
@@ -105,11 +105,10 @@ fn grouped(summary: &Summary, shown: &str, by: &str, groups: impl Fn(&Row) -> Ve
 
 /// Why cells are wrong.
 pub fn causes(causes: &Causes) -> String {
-    let rows = causes_rows(causes);
-    let sums = [0, 1 + WRONGLY_VISIBLE.len()];
-    let rows = rows.iter().enumerate().map(|(k, row)| (sums.contains(&k), row.iter().map(|c| escaped(c)).collect()));
+    let escaped = |(sum, row): (bool, Vec<String>)| (sum, row.iter().map(|cell| escaped(cell)).collect());
+    let rows: Vec<(bool, Vec<String>)> = causes_rows(causes).into_iter().map(escaped).collect();
     let heading = CAUSES.map(str::to_owned);
-    table(&causes_caption(causes), &heading, &rows.collect::<Vec<_>>())
+    table(&causes_caption(causes), &heading, &rows)
 }
 
 /// How the rates move with a wrong mount.

@@ -186,7 +186,8 @@ fn grouped(summary: &Summary, by: &str, groups: impl Fn(&Row) -> Vec<(String, Co
 
 /// Why cells of an estimator are wrong, in points of their rates.
 pub fn causes(causes: &Causes, extent: Extent) -> String {
-    format!("{}:\n{}\n", causes_caption(causes), tables(&CAUSES, &causes_rows(causes), 1, extent))
+    let rows: Vec<Vec<String>> = causes_rows(causes).into_iter().map(|(_, row)| row).collect();
+    format!("{}:\n{}\n", causes_caption(causes), tables(&CAUSES, &rows, 1, extent))
 }
 
 pub fn causes_caption(causes: &Causes) -> String {
@@ -196,17 +197,17 @@ pub fn causes_caption(causes: &Causes) -> String {
 /// Columns of [`causes_rows`].
 pub const CAUSES: [&str; 7] = ["in points", "all", "stands", "across", "along", "unmoving", "none"];
 
-/// Each rate with what adds up to it below.
-pub fn causes_rows(causes: &Causes) -> Vec<Vec<String>> {
+/// Each rate, marked, with what adds up to it below.
+pub fn causes_rows(causes: &Causes) -> Vec<(bool, Vec<String>)> {
     let points = |v: f64| if v > 0.0 { format!("{v:.1}") } else { String::new() };
     let row = |c: &Cause| {
         let m = &c.by_motion;
         let cells = [c.points, m.stands, m.across, m.along, m.unmoving, m.none].map(points);
-        std::iter::once(c.name.to_owned()).chain(cells).collect::<Vec<String>>()
+        (false, std::iter::once(c.name.to_owned()).chain(cells).collect())
     };
     let sum = |name: &str, rate: Option<f64>| {
         let rest = std::iter::repeat_n(String::new(), CAUSES.len() - 2);
-        [name.to_owned(), percent(rate)].into_iter().chain(rest).collect::<Vec<String>>()
+        (true, [name.to_owned(), percent(rate)].into_iter().chain(rest).collect())
     };
     let mut rows = vec![sum("hidden, called visible", causes.cells.fvr())];
     rows.extend(causes.wrongly_visible().iter().map(row));
