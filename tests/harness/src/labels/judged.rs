@@ -203,7 +203,7 @@ impl Judged {
         let a = self.actions;
         format!(
             "{}: {} vehicles, {} proposals; {:.2} actions a vehicle \
-             (accept {}, reject {}, join {}, class {}, follow {}, mend {} points, draw {} with {} points)\n  \
+             (accept {}, reject {}, join {}, class {}, follow {}, cut {}, mend {} points, draw {} with {} points)\n  \
              labelled {:.1} % of {} steps; {:.1} % of {} without detection are labelled so; \
              {:.1} % of {} labelled steps without a vehicle; off by {:.1} m along, {:.1} m across\n",
             self.name,
@@ -215,6 +215,7 @@ impl Judged {
             a.joined,
             a.reclassed,
             a.followed,
+            a.cut,
             a.mended,
             a.drawn,
             a.points,

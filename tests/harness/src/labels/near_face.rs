@@ -13,10 +13,13 @@
 //! geometry, and between end and flank the point slides without a jump. Between two points of a track the centre moves
 //! in a straight line, not the near face: that slides along a vehicle that passes the sensor, the faster the closer it
 //! passes. The heading is that of the centres' path; a vehicle that stands keeps the heading it came with, or leaves
-//! with, and one that never moves looks along the road.
+//! with, and one that never moves looks along the road. A step aside in a moment, as simulators change lanes, turns
+//! nobody: headings are not taken across it.
 //!
 //! # Limits
 //! In a turn the heading is the mean over the few metres it is taken over; a test has 0.12 rad and 0.3 m for a car.
+
+use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +40,11 @@ const HALVINGS: usize = 20;
 pub const STANDS_M: f64 = 0.5;
 /// How far the drawn line may be from the near face between two points, metres.
 const LINE_M: f64 = 2.0;
+/// A step aside: between two points so near in time, seconds, so far, metres, and so much across the way that it came or
+/// goes on, as a cosine.
+const STEP_ASIDE_S: f64 = 0.25;
+const STEP_ASIDE_M: f64 = 1.5;
+const STEP_ASIDE_COS: f64 = 0.7;
 /// Cosine of the aspect from which on the near face is the rear or the front.
 const END_COS: f64 = 0.5;
 /// Sine of the aspect from which on it is the flank.
@@ -132,16 +140,63 @@ pub fn boxes(track: &LabelTrack, sensor: [f64; 2]) -> Vec<BoxStep> {
     let size = track.size();
     let mut centers = between(&nears, &times, &at);
     let base_m = HEADING_BASE_M.max(HEADING_LENGTHS * size[0]);
-    let mut headings = headings(&centers, base_m);
+    let pieces = pieces(&track.points, &at, centers.len());
+    let mut headings = headings_of(&centers, &pieces, base_m);
     // the heading is that of the centres, which depend on it
     for _ in 0..4 {
         let own: Vec<[f64; 2]> =
             nears.iter().zip(&at).map(|(near, k)| center(*near, headings[*k], size, sensor)).collect();
         centers = between(&own, &times, &at);
-        headings = self::headings(&centers, base_m);
+        headings = headings_of(&centers, &pieces, base_m);
     }
     let all = times.into_iter().zip(centers).zip(headings);
     all.map(|((time_s, center), heading_rad)| BoxStep { time_s, center, heading_rad }).collect()
+}
+
+/// The parts of a track between steps aside, as ranges of its times; `at` are the numbers of its points' times.
+fn pieces(points: &[LabelPoint], at: &[usize], times: usize) -> Vec<Range<usize>> {
+    let way = |a: &LabelPoint, b: &LabelPoint| [b.x_m - a.x_m, b.y_m - a.y_m];
+    let length = |[x, y]: [f64; 2]| x.hypot(y);
+    let cos = |a: [f64; 2], b: [f64; 2]| (a[0] * b[0] + a[1] * b[1]) / (length(a) * length(b)).max(1e-9);
+    let far = |from: &LabelPoint, to: &LabelPoint| Some(way(from, to)).filter(|w| length(*w) >= STANDS_M);
+    let aside = |k: usize| {
+        let (from, to) = (&points[k], &points[k + 1]);
+        let step = way(from, to);
+        if to.time_s - from.time_s > STEP_ASIDE_S || length(step) < STEP_ASIDE_M {
+            return false;
+        }
+        let came = points[..k].iter().rev().find_map(|p| far(p, from));
+        let goes = points[k + 2..].iter().find_map(|p| far(to, p));
+        let mut ways = [came, goes].into_iter().flatten().peekable();
+        ways.peek().is_some() && ways.all(|w| cos(w, step).abs() < STEP_ASIDE_COS)
+    };
+    let ends = (0..points.len().saturating_sub(1)).filter(|k| aside(*k)).map(|k| at[k + 1]);
+    let mut begin = 0;
+    ends.chain([times]).map(|end| std::mem::replace(&mut begin, end)..end).collect()
+}
+
+/// Headings at all places, those of each piece by itself; a piece that stands has its neighbour's.
+fn headings_of(path: &[[f64; 2]], pieces: &[Range<usize>], base_m: f64) -> Vec<f64> {
+    let moves = |piece: &Range<usize>| moves(&path[piece.clone()]);
+    if !pieces.iter().any(moves) {
+        return headings(path, base_m);
+    }
+    let mut all = vec![0.0; path.len()];
+    for piece in pieces.iter().filter(|p| moves(p)) {
+        all[piece.clone()].copy_from_slice(&headings(&path[piece.clone()], base_m));
+    }
+    for (k, piece) in pieces.iter().enumerate().filter(|(_, p)| !moves(p)) {
+        let before = pieces[..k].iter().rev().find(|p| moves(p)).map(|p| p.end - 1);
+        let after = pieces[k + 1..].iter().find(|p| moves(p)).map(|p| p.start);
+        let heading = before.or(after).map_or(0.0, |i| all[i]);
+        all[piece.clone()].fill(heading);
+    }
+    all
+}
+
+/// Whether a path gets away from its start.
+fn moves(path: &[[f64; 2]]) -> bool {
+    path.first().is_some_and(|first| path.iter().any(|p| (p[0] - first[0]).hypot(p[1] - first[1]) >= STANDS_M))
 }
 
 /// Places at all times, from those at the times with these numbers.
@@ -201,8 +256,7 @@ fn times(points: &[LabelPoint]) -> (Vec<f64>, Vec<usize>) {
 /// enough away. So standing changes nothing.
 pub fn headings(path: &[[f64; 2]], base_m: f64) -> Vec<f64> {
     let distance = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]).hypot(b[1] - a[1]);
-    let moves = path.first().is_some_and(|first| path.iter().any(|p| distance(*first, *p) >= STANDS_M));
-    if !moves {
+    if !moves(path) {
         return vec![0.0; path.len()];
     }
     // both pointers only go forward; where nothing is far enough, the end of the path is taken
@@ -341,6 +395,30 @@ mod tests {
         let parked = boxes(&track("car", &[[0.0, 30.0, 5.0], [9.0, 30.1, 5.0]]), [0.0, 0.0]);
         assert!(parked.iter().all(|s| s.heading_rad == 0.0));
         close(parked[0].center, [32.3, 5.0 + 0.9 * (5.0_f64.atan2(30.0).sin() / FLANK_SIN)], 1e-6);
+    }
+
+    #[test]
+    fn a_step_aside_as_simulators_change_lanes_turns_nobody() {
+        // a truck beside the sensor drives up, stands for 10 s, is in the lane beside and drives on
+        let at = |time_s: f64, x: f64, y: f64| BoxStep { time_s, center: [x, y], heading_rad: 0.0 };
+        let truth = [
+            at(0.0, -2.5, -1.75),
+            at(4.0, 5.5, -1.75),
+            at(14.0, 5.5, -1.75),
+            at(14.1, 5.5, -5.25),
+            at(18.0, 26.0, -5.25),
+        ];
+        let drawn = LabelTrack { points: nears(&truth, TRUCK, [-10.0, 3.0]), ..track("truck", &[]) };
+        for b in boxes(&drawn, [-10.0, 3.0]) {
+            assert!(b.heading_rad.abs() < 0.02, "{b:?}");
+        }
+        // what comes after the step alone tells the way of what stood before it
+        let stood = LabelTrack { points: drawn.points[2..].to_vec(), ..drawn.clone() };
+        assert!(boxes(&stood, [-10.0, 3.0]).iter().all(|b| b.heading_rad.abs() < 0.02));
+        // who takes two seconds for it turns
+        let slow = [truth[0], truth[1], at(6.0, 15.5, -5.25), at(8.0, 26.0, -5.25)];
+        let slow = LabelTrack { points: nears(&slow, TRUCK, [-10.0, 3.0]), ..drawn };
+        assert!(boxes(&slow, [-10.0, 3.0]).iter().any(|b| b.heading_rad < -0.1));
     }
 
     #[test]

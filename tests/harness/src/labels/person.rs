@@ -31,6 +31,8 @@ const OVERLAP: f64 = 0.2;
 const ACCEPTED: f64 = 0.5;
 /// Detections, and seconds between the first and the last, from which on a person sees that a vehicle is missing.
 const SEEN: (u32, f64) = (5, 1.0);
+/// How long an end of a label has to be elsewhere to be cut off, seconds.
+const CUT_S: f64 = 2.0;
 /// How often the person looks for something to mend.
 const LOOKS: usize = 3;
 /// How often it has one vehicle followed, and at how many places of a stretch it looks before.
@@ -56,6 +58,8 @@ pub struct Actions {
     pub reclassed: u32,
     /// Ways that were followed and taken.
     pub followed: u32,
+    /// Ends that were cut off.
+    pub cut: u32,
     /// Points set to mend what was accepted.
     pub mended: u32,
     pub drawn: u32,
@@ -66,7 +70,7 @@ pub struct Actions {
 impl Actions {
     pub fn all(&self) -> u32 {
         let offered = self.accepted + self.rejected + self.joined + self.reclassed;
-        offered + self.followed + self.mended + self.drawn + self.points
+        offered + self.followed + self.cut + self.mended + self.drawn + self.points
     }
 }
 
@@ -140,6 +144,7 @@ impl Person<'_> {
             }
             self.follows(&mut labels, k, seen, &mut actions);
             let (vehicle, track) = &mut labels[k];
+            actions.cut += self.cuts(*vehicle, track);
             if track.points.is_empty() {
                 actions.drawn += 1;
                 let span = seen.first.map_or(0..=0, |first| first..=seen.last);
@@ -237,8 +242,15 @@ impl Person<'_> {
         vehicle.detections >= SEEN.0 && lasts_s >= SEEN.1
     }
 
-    /// Where something of a label is to be mended.
+    /// Where something of a label is to be mended: where enough of the vehicle is seen.
     fn missing(&self, vehicle: usize, track: &LabelTrack, seen: &Vehicle) -> Vec<Missing> {
+        let mut all = self.lacking(vehicle, track, seen);
+        all.retain(|m| m.detections >= SEEN.0 && self.seconds(m.end) - self.seconds(m.begin) >= SEEN.1);
+        all
+    }
+
+    /// Where a label is missing or elsewhere, hidden as the vehicle may be.
+    fn lacking(&self, vehicle: usize, track: &LabelTrack, seen: &Vehicle) -> Vec<Missing> {
         let label = Truth::new(labels(track, &self.site));
         let Some(first) = seen.first else { return Vec::new() };
         let mut all: Vec<Missing> = Vec::new();
@@ -254,7 +266,6 @@ impl Person<'_> {
             }
             open = !good;
         }
-        all.retain(|m| m.detections >= SEEN.0 && self.seconds(m.end) - self.seconds(m.begin) >= SEEN.1);
         all
     }
 
@@ -275,8 +286,8 @@ impl Person<'_> {
             labels.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, (_, track))| track.clone()).collect();
         let (vehicle, track) = &mut labels[k];
         let wrong = |track: &LabelTrack| {
-            let missing = self.missing(*vehicle, track, seen).iter().map(Missing::frames).sum::<usize>();
-            missing + self.elsewhere(*vehicle, track)
+            let lacking = self.lacking(*vehicle, track, seen).iter().map(Missing::frames).sum::<usize>();
+            lacking + self.elsewhere(*vehicle, track)
         };
         for _ in 0..FOLLOWED {
             // a long straight streak has its two points as soon
@@ -286,6 +297,8 @@ impl Person<'_> {
             };
             let stretches = self.missing(*vehicle, track, seen);
             let places = stretches.iter().filter(bent).flat_map(|m| self.looks_at(*vehicle, track, m));
+            // and where the label begins: it may have stood before
+            let places = places.chain(track.points.first().copied());
             let ways = places.filter_map(|place| self.follower.through(track, place, &others));
             let Some((left, way)) = ways.map(|way| (wrong(&way), way)).min_by_key(|(left, _)| *left) else { return };
             // of a vehicle without a label it has to give most
@@ -297,6 +310,31 @@ impl Person<'_> {
             actions.followed += 1;
             *track = way;
         }
+    }
+
+    /// Cuts off what of both ends of a label is elsewhere for long; how many.
+    fn cuts(&self, vehicle: usize, track: &mut LabelTrack) -> u32 {
+        let label = Truth::new(labels(track, &self.site));
+        let good = |instant: &Instant| {
+            let real = instant.of(vehicle).map(|(real, _)| real.solid);
+            label.at(instant.time_ns).first().zip(real).is_some_and(|(l, real)| overlaps(&l.solid, &real))
+        };
+        let first = self.instants.iter().position(good);
+        let last = self.instants.iter().rposition(good);
+        let (Some([first_s, last_s]), Some(span)) =
+            (first.zip(last).map(|(a, b)| [a, b].map(|k| self.seconds(k))), track.span_s())
+        else {
+            return 0;
+        };
+        let [front, back] = [first_s - span[0] >= CUT_S, span[1] - last_s >= CUT_S];
+        let [from, to] = [if front { first_s } else { span[0] }, if back { last_s } else { span[1] }];
+        if to <= from || !(front || back) {
+            return 0;
+        }
+        let ends = [from, to].map(|time_s| track.near_at(time_s).map(|[x_m, y_m]| LabelPoint { time_s, x_m, y_m }));
+        let inside = track.points.iter().copied().filter(|p| from < p.time_s && p.time_s < to);
+        track.points = ends[0].into_iter().chain(inside).chain(ends[1]).collect();
+        u32::from(front) + u32::from(back)
     }
 
     /// Places on the near face at which the person looks where a press would lead: where most is seen of each part of a

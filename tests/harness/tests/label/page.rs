@@ -97,6 +97,19 @@ fn tracks_are_dragged_split_joined_renamed_and_every_step_is_undone() {
     page.key("j");
     page.until("viewshed.session.tracks.length === 1");
     assert_eq!(points(&tracks(&page)[0]).len(), 4);
+    // either end is cut off at the cursor, one step each
+    let whole = points(&tracks(&page)[0]);
+    for (key, kept) in [("(", &whole[2..]), (")", &whole[..2])] {
+        page.click_plot("along", 2.5, 190.0);
+        page.key("PageDown");
+        page.key(key);
+        page.until(&format!("viewshed.session.tracks[0].points.length === {}", kept.len() + 1));
+        let cut = points(&tracks(&page)[0]);
+        let (at, rest) = if key == "(" { (cut[0], &cut[1..]) } else { (cut[2], &cut[..2]) };
+        assert!((at[0] - 2.5).abs() < 0.1 && rest == kept, "{key}: {cut:?}");
+        page.key_with("z", CTRL);
+        page.until("viewshed.session.tracks[0].points.length === 4");
+    }
     // a name in use is refused, another is taken
     page.key("i");
     page.ask("(document.getElementById('track-id').value = 'lorry', document.getElementById('track-id').dispatchEvent(new Event('change')), 1)");

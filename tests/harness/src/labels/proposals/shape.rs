@@ -15,7 +15,7 @@ const END_COS: f64 = 0.4;
 const BEYOND_S: f64 = 3.0;
 const STEP_S: f64 = 0.25;
 /// Speed from which on something is fast, m/s.
-const FAST_MPS: f64 = 10.0;
+const FAST_MPS: f64 = 6.0;
 /// Extents that only buses have, metres: a truck that is seen well is longer.
 const BUS_M: std::ops::RangeInclusive<f64> = 12.6..=13.8;
 /// Cars are not higher than this, by so many reflections, metres.

@@ -209,9 +209,17 @@ class Page {
     element('track-id').select();
   }
 
+  // The time of the cursor; seen from above that of the slider.
+  time() {
+    return this.active.name === 'plan' ? this.session.now : this.active.here()[0];
+  }
+
   split() {
-    const { active, session } = this;
-    session.split(active.name === 'plan' ? session.now : active.here()[0]);
+    this.session.split(this.time());
+  }
+
+  cut(after) {
+    this.session.cut(this.time(), after);
   }
 
   escape() {

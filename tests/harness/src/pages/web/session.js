@@ -317,6 +317,15 @@ export class Session {
     return undefined;
   }
 
+  // What the selected track has before a time goes, or what it has after.
+  cut(time, after) {
+    if (!this.track) return this.say('Select a track first.');
+    const left = tracks.cut(this.tracks, this.selected, time, after);
+    if (!left) return this.say(`Track ${this.selected} has nothing on both sides of ${time.toFixed(2)} s.`);
+    if (this.change(left)) this.select(this.selected);
+    return undefined;
+  }
+
   // The first time it remembers the track, the second time it joins.
   join() {
     if (!this.track) return this.say('Select a track first.');

@@ -61,6 +61,14 @@ export function split(tracks, id, time) {
   return { tracks: [...withTrack(tracks, first), second], id: second.id };
 }
 
+// The tracks with what one has before a time cut off, or what it has after. Null where nothing would be left, or nothing goes.
+export function cut(tracks, id, time, after) {
+  const halves = split(tracks, id, time);
+  if (!halves) return null;
+  const kept = find(halves.tracks, after ? id : halves.id);
+  return withTrack(tracks, { ...kept, id });
+}
+
 // The tracks with two of them one, under the id and class of the longer. They may meet, as after a split. Null where
 // they overlap in time.
 export function join(tracks, one, other) {

@@ -10,6 +10,7 @@
 
 mod around;
 mod beginnings;
+mod hidden;
 mod state;
 mod way;
 
@@ -61,6 +62,11 @@ impl Follower {
         }
         let frame = self.nearest(click.time_s)?;
         let around = Around::of(track, others, &self.instants, &self.standing, self.site.sensor);
+        if let Some(hidden) = around.hidden([click.time_s, click.x_m, click.y_m]) {
+            let before = drawn(&hidden, around.size, around.sensor, TOLERANCE_M);
+            let points = before.into_iter().chain(track.points.iter().copied()).collect();
+            return Some(LabelTrack { points, ..track.clone() }).filter(|track| track.check().is_ok());
+        }
         let both = |begin: State| [false, true].map(|backwards| around.follow(frame, begin, backwards));
         let tried = around.beginnings(frame, [click.x_m, click.y_m]).into_par_iter().map(|(likely, begin)| {
             let ways = both(begin);
