@@ -6,7 +6,8 @@
 //! is known, with the Doppler of the predicted velocity, and in no other label's box. Which way it goes is tried out all
 //! around; the way stays on which most reflections fit. It ends where it meets the label that is there already, or where
 //! nothing fits any more. Smoothed over all of it, with the click and the label at both ends as measurements, it takes
-//! the place of the label between.
+//! the place of the label between. On the beginning of a label a click asks for what was before it: `hidden`, where the
+//! vehicle stood that nothing but one reflection shows.
 
 mod around;
 mod beginnings;
