@@ -153,7 +153,8 @@ pub fn boxes(track: &LabelTrack, sensor: [f64; 2]) -> Vec<BoxStep> {
     all.map(|((time_s, center), heading_rad)| BoxStep { time_s, center, heading_rad }).collect()
 }
 
-/// The parts of a track between steps aside, as ranges of its times; `at` are the numbers of its points' times.
+/// The parts of a track between steps aside, as ranges of its times; `at` are the numbers of its points' times. What lies
+/// within a step is in none.
 fn pieces(points: &[LabelPoint], at: &[usize], times: usize) -> Vec<Range<usize>> {
     let way = |a: &LabelPoint, b: &LabelPoint| [b.x_m - a.x_m, b.y_m - a.y_m];
     let length = |[x, y]: [f64; 2]| x.hypot(y);
@@ -170,28 +171,31 @@ fn pieces(points: &[LabelPoint], at: &[usize], times: usize) -> Vec<Range<usize>
         let mut ways = [came, goes].into_iter().flatten().peekable();
         ways.peek().is_some() && ways.all(|w| cos(w, step).abs() < STEP_ASIDE_COS)
     };
-    let ends = (0..points.len().saturating_sub(1)).filter(|k| aside(*k)).map(|k| at[k + 1]);
+    let steps = (0..points.len().saturating_sub(1)).filter(|k| aside(*k)).map(|k| (at[k] + 1, at[k + 1]));
     let mut begin = 0;
-    ends.chain([times]).map(|end| std::mem::replace(&mut begin, end)..end).collect()
+    steps.chain([(times, times)]).map(|(end, next)| std::mem::replace(&mut begin, next)..end).collect()
 }
 
-/// Headings at all places, those of each piece by itself; a piece that stands has its neighbour's.
+/// Headings at all places, those of each piece by itself; what is in no piece or stands has its neighbour's.
 fn headings_of(path: &[[f64; 2]], pieces: &[Range<usize>], base_m: f64) -> Vec<f64> {
-    let moves = |piece: &Range<usize>| moves(&path[piece.clone()]);
-    if !pieces.iter().any(moves) {
-        return headings(path, base_m);
+    let mut all = vec![None; path.len()];
+    for piece in pieces.iter().filter(|p| moves(&path[(*p).clone()])) {
+        for (heading, known) in all[piece.clone()].iter_mut().zip(headings(&path[piece.clone()], base_m)) {
+            *heading = Some(known);
+        }
     }
-    let mut all = vec![0.0; path.len()];
-    for piece in pieces.iter().filter(|p| moves(p)) {
-        all[piece.clone()].copy_from_slice(&headings(&path[piece.clone()], base_m));
-    }
-    for (k, piece) in pieces.iter().enumerate().filter(|(_, p)| !moves(p)) {
-        let before = pieces[..k].iter().rev().find(|p| moves(p)).map(|p| p.end - 1);
-        let after = pieces[k + 1..].iter().find(|p| moves(p)).map(|p| p.start);
-        let heading = before.or(after).map_or(0.0, |i| all[i]);
-        all[piece.clone()].fill(heading);
-    }
-    all
+    carried(all)
+}
+
+/// Headings that nobody knows: as before, or as after.
+fn carried(all: Vec<Option<f64>>) -> Vec<f64> {
+    let first = all.iter().flatten().next().copied().unwrap_or(0.0);
+    all.into_iter()
+        .scan(first, |last, heading| {
+            *last = heading.unwrap_or(*last);
+            Some(*last)
+        })
+        .collect()
 }
 
 /// Whether a path gets away from its start.
@@ -269,14 +273,8 @@ pub fn headings(path: &[[f64; 2]], base_m: f64) -> Vec<f64> {
         let clear = distance(*a, *b) >= STANDS_M;
         all.push(clear.then_some(heading));
     }
-    // too short a way to tell: as before it, or as after it
-    let first = all.iter().flatten().next().copied().unwrap_or(0.0);
-    all.into_iter()
-        .scan(first, |last, heading| {
-            *last = heading.unwrap_or(*last);
-            Some(*last)
-        })
-        .collect()
+    // too short a way to tell
+    carried(all)
 }
 
 #[cfg(test)]
@@ -412,6 +410,10 @@ mod tests {
         for b in boxes(&drawn, [-10.0, 3.0]) {
             assert!(b.heading_rad.abs() < 0.02, "{b:?}");
         }
+        // of a slower radar, with times between those of the step
+        let mut slower = drawn.clone();
+        slower.points[2].time_s = 13.86;
+        assert!(boxes(&slower, [-10.0, 3.0]).iter().all(|b| b.heading_rad.abs() < 0.02));
         // what comes after the step alone tells the way of what stood before it
         let stood = LabelTrack { points: drawn.points[2..].to_vec(), ..drawn.clone() };
         assert!(boxes(&stood, [-10.0, 3.0]).iter().all(|b| b.heading_rad.abs() < 0.02));

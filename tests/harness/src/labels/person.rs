@@ -257,8 +257,8 @@ impl Person<'_> {
         let mut open = false;
         for frame in first..=seen.last {
             let instant = &self.instants[frame];
-            let Some((real, detections)) = instant.of(vehicle) else { continue };
-            let good = label.at(instant.time_ns).first().is_some_and(|l| overlaps(&l.solid, &real.solid));
+            let Some((_, detections)) = instant.of(vehicle) else { continue };
+            let good = lies_on(&label, instant, vehicle) == Some(true);
             match all.last_mut() {
                 Some(m) if open && !good => (m.end, m.detections) = (frame, m.detections + detections),
                 _ if !good => all.push(Missing { begin: frame, end: frame, detections }),
@@ -272,10 +272,7 @@ impl Person<'_> {
     /// Frames in which there is a label, and the vehicle is not there.
     fn elsewhere(&self, vehicle: usize, track: &LabelTrack) -> usize {
         let label = Truth::new(labels(track, &self.site));
-        let wrong = |instant: &&Instant| {
-            let real = instant.of(vehicle).map(|(real, _)| real.solid);
-            label.at(instant.time_ns).first().is_some_and(|l| !real.is_some_and(|real| overlaps(&l.solid, &real)))
-        };
+        let wrong = |instant: &&Instant| lies_on(&label, instant, vehicle) == Some(false);
         self.instants.iter().filter(wrong).count()
     }
 
@@ -315,26 +312,23 @@ impl Person<'_> {
     /// Cuts off what of both ends of a label is elsewhere for long; how many.
     fn cuts(&self, vehicle: usize, track: &mut LabelTrack) -> u32 {
         let label = Truth::new(labels(track, &self.site));
-        let good = |instant: &Instant| {
-            let real = instant.of(vehicle).map(|(real, _)| real.solid);
-            label.at(instant.time_ns).first().zip(real).is_some_and(|(l, real)| overlaps(&l.solid, &real))
-        };
-        let first = self.instants.iter().position(good);
-        let last = self.instants.iter().rposition(good);
-        let (Some([first_s, last_s]), Some(span)) =
-            (first.zip(last).map(|(a, b)| [a, b].map(|k| self.seconds(k))), track.span_s())
-        else {
-            return 0;
-        };
-        let [front, back] = [first_s - span[0] >= CUT_S, span[1] - last_s >= CUT_S];
-        let [from, to] = [if front { first_s } else { span[0] }, if back { last_s } else { span[1] }];
-        if to <= from || !(front || back) {
-            return 0;
+        let good = |instant: &Instant| lies_on(&label, instant, vehicle) == Some(true);
+        let first_s = self.instants.iter().position(good).map(|k| self.seconds(k));
+        let last_s = self.instants.iter().rposition(good).map(|k| self.seconds(k));
+        let mut cut = 0;
+        if let Some((time_s, [begin_s, _])) = first_s.zip(track.span_s())
+            && time_s - begin_s >= CUT_S
+            && let Ok([_, kept]) = track.split(time_s, &track.id)
+        {
+            (*track, cut) = (kept, cut + 1);
         }
-        let ends = [from, to].map(|time_s| track.near_at(time_s).map(|[x_m, y_m]| LabelPoint { time_s, x_m, y_m }));
-        let inside = track.points.iter().copied().filter(|p| from < p.time_s && p.time_s < to);
-        track.points = ends[0].into_iter().chain(inside).chain(ends[1]).collect();
-        u32::from(front) + u32::from(back)
+        if let Some((time_s, [_, end_s])) = last_s.zip(track.span_s())
+            && end_s - time_s >= CUT_S
+            && let Ok([kept, _]) = track.split(time_s, &track.id)
+        {
+            (*track, cut) = (kept, cut + 1);
+        }
+        cut
     }
 
     /// Places on the near face at which the person looks where a press would lead: where most is seen of each part of a
@@ -395,6 +389,12 @@ pub fn labels(track: &LabelTrack, site: &Site) -> Vec<Label> {
     };
     let boxes = if track.points.is_empty() { Vec::new() } else { boxes(track, site.sensor) };
     boxes.into_iter().map(label).collect()
+}
+
+/// Whether the label of an instant lies on the vehicle; `None` without a label.
+fn lies_on(label: &Truth, instant: &Instant, vehicle: usize) -> Option<bool> {
+    let label = label.at(instant.time_ns).first()?.solid;
+    Some(instant.of(vehicle).is_some_and(|(real, _)| overlaps(&label, &real.solid)))
 }
 
 /// Whether two boxes are of one vehicle.

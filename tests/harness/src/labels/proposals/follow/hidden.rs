@@ -7,18 +7,20 @@
 //! to the beginning with the speed it has there. Of several such places the one with most reflections is taken. Whether
 //! it is right is the person's to say, who sees it before taking it.
 
+use std::ops::Range;
+
 use super::super::reflections::{Reflection, STANDS_MPS};
 use super::super::tracker::across_m;
 use super::around::Around;
-use crate::geometry::solid::Solid;
 use crate::labels::near_face::{self, BoxStep, STEP_S};
+use crate::labels::tracks::LabelPoint;
 
 /// A click means the beginning of a label so near to it, seconds and metres.
 const AFTER_S: f64 = 1.0;
 const BEFORE_S: f64 = 0.2;
 const NEAR_M: f64 = 3.0;
 /// Speeds at the beginning of what stood shortly before, m/s, taken over so many seconds.
-const SPEEDS_MPS: std::ops::Range<f64> = 1.0..8.0;
+const SPEEDS_MPS: Range<f64> = 1.0..8.0;
 const SPEED_S: f64 = 1.0;
 /// How hard road users drive off, m/s².
 const LEAST_MPS2: f64 = 0.7;
@@ -28,34 +30,70 @@ const LONGEST_S: f64 = 60.0;
 /// How far beside its way a reflection of it lies, and how far apart along it those of one place, metres.
 const BESIDE_M: f64 = 1.0;
 const ALIKE_M: f64 = 1.0;
+/// Share of a box that another one has at most.
+const SHARED: f64 = 0.1;
 
-/// A reflection that may be of the vehicle as it stood.
+/// How it drove off from where it stood.
 #[derive(Debug, Clone, Copy)]
-struct Stood {
-    frame: usize,
-    /// From the vehicle's centre then to where its label begins, metres.
+struct Departure {
+    /// Where its label begins, and its speed there, m/s.
+    begin: BoxStep,
+    speed: f64,
+    /// From its centre when it stood to that place, metres.
     back_m: f64,
+}
+
+impl Departure {
+    fn lasts_s(&self) -> f64 {
+        2.0 * self.back_m / self.speed
+    }
+
+    fn begins_s(&self) -> f64 {
+        self.begin.time_s - self.lasts_s()
+    }
+
+    fn mps2(&self) -> f64 {
+        self.speed / self.lasts_s()
+    }
+
+    /// Where it is at a time before its label begins.
+    fn at(&self, time_s: f64) -> BoxStep {
+        let on = ((time_s - self.begins_s()) / self.lasts_s()).clamp(0.0, 1.0);
+        let behind_m = self.back_m * (1.0 - on * on);
+        let [x, y] = self.begin.center;
+        let (s, c) = self.begin.heading_rad.sin_cos();
+        BoxStep { time_s, center: [x - behind_m * c, y - behind_m * s], ..self.begin }
+    }
+
+    /// It stands from a time on and drives off.
+    fn way(&self, from_s: f64) -> Vec<BoxStep> {
+        let parts = (self.lasts_s() / STEP_S).ceil();
+        let moving = (1..parts as u32).map(|k| self.begins_s() + self.lasts_s() * f64::from(k) / parts);
+        [from_s, self.begins_s()].into_iter().chain(moving).map(|time_s| self.at(time_s)).collect()
+    }
 }
 
 impl Around<'_> {
     /// The way from where the vehicle stood to where its label begins, for a click on that beginning. `None` where it did
     /// not stand before, or nothing shows where.
-    pub fn hidden(&self, click: [f64; 3]) -> Option<Vec<BoxStep>> {
+    pub fn hidden(&self, click: LabelPoint) -> Option<Vec<BoxStep>> {
         let first = self.own.iter().position(Option::is_some)?;
         let begin = self.label(first)?;
-        let [time_s, x, y] = click;
         let near = near_face::near(begin.center, begin.heading_rad, self.size, self.sensor);
-        let meant =
-            (-BEFORE_S..=AFTER_S).contains(&(time_s - begin.time_s)) && (x - near[0]).hypot(y - near[1]) <= NEAR_M;
+        let meant = (-BEFORE_S..=AFTER_S).contains(&(click.time_s - begin.time_s))
+            && (click.x_m - near[0]).hypot(click.y_m - near[1]) <= NEAR_M;
         let speed = self.speed_at(first)?;
         if !meant || !SPEEDS_MPS.contains(&speed) {
             return None;
         }
-        let stood = self.candidates(first, &begin, speed);
-        let alike = |s: &Stood| stood.iter().filter(|o| (o.back_m - s.back_m).abs() <= ALIKE_M).count();
-        let place = stood.iter().max_by_key(|s| (alike(s), s.frame))?;
-        let from = stood.iter().filter(|o| (o.back_m - place.back_m).abs() <= ALIKE_M).map(|o| o.frame).min()?;
-        Some(self.drives_off(from, &begin, place.back_m, speed))
+        let stood = self.candidates(first, begin, speed);
+        let alike = |d: &Departure| {
+            let back_m = d.back_m;
+            stood.iter().filter(move |(_, o)| (o.back_m - back_m).abs() <= ALIKE_M)
+        };
+        let (_, departure) = stood.iter().max_by_key(|(frame, d)| (alike(d).count(), *frame))?;
+        let from = alike(departure).map(|(frame, _)| *frame).min()?;
+        Some(departure.way(self.seconds(from)))
     }
 
     /// Over the first second of its label, m/s.
@@ -67,22 +105,20 @@ impl Around<'_> {
         Some(way_m / (end.time_s - begin.time_s))
     }
 
-    /// Reflections that may be of it as it stood: those after the last time that another one was there.
-    fn candidates(&self, first: usize, begin: &BoxStep, speed: f64) -> Vec<Stood> {
+    /// Reflections that may be of it as it stood, by their frames: those after the last time that another one was there.
+    fn candidates(&self, first: usize, begin: BoxStep, speed: f64) -> Vec<(usize, Departure)> {
         let mut found = Vec::new();
         for frame in (0..first).rev().take_while(|k| begin.time_s - self.seconds(*k) <= LONGEST_S) {
-            for r in self.instants[frame].reflections.iter().filter(|r| r.doppler_mps.abs() <= STANDS_MPS && !r.fixture)
-            {
-                let Some(back_m) = self.back_m(r, begin) else { continue };
-                let mps2 = speed * speed / (2.0 * back_m);
-                // it stood until it drove off
-                let stood = begin.time_s - self.seconds(frame) >= 2.0 * back_m / speed;
-                if stood
-                    && (LEAST_MPS2..=MOST_MPS2).contains(&mps2)
+            let stand = |r: &&Reflection| r.doppler_mps.abs() <= STANDS_MPS && !r.fixture;
+            for r in self.instants[frame].reflections.iter().filter(stand) {
+                let Some(back_m) = self.back_m(r, &begin) else { continue };
+                let departure = Departure { begin, speed, back_m };
+                if self.seconds(frame) <= departure.begins_s()
+                    && (LEAST_MPS2..=MOST_MPS2).contains(&departure.mps2())
                     && !self.is_another_s(frame, r, f64::INFINITY)
-                    && !self.was_another_s(frame..first, begin, back_m, speed)
+                    && !self.was_another_s(frame..first, &departure)
                 {
-                    found.push(Stood { frame, back_m });
+                    found.push((frame, departure));
                 }
             }
         }
@@ -92,43 +128,17 @@ impl Around<'_> {
     /// How far behind the beginning the vehicle's centre was whose near face is this reflection.
     fn back_m(&self, r: &Reflection, begin: &BoxStep) -> Option<f64> {
         let center = near_face::center(r.place, begin.heading_rad, self.size, self.sensor);
-        let (s, c) = begin.heading_rad.sin_cos();
-        let [dx, dy] = [0, 1].map(|k| center[k] - begin.center[k]);
-        let (back_m, left_m) = (-(dx * c + dy * s), dy * c - dx * s);
-        (back_m > 0.0 && left_m.abs() <= BESIDE_M + 0.5 * across_m(r.distance_m)).then_some(back_m)
+        let [ahead_m, left_m] = begin.solid(self.size).local(center);
+        (ahead_m < 0.0 && left_m.abs() <= BESIDE_M + 0.5 * across_m(r.distance_m)).then_some(-ahead_m)
     }
 
     /// Whether another label's box lies where it would have been in one of these frames.
-    fn was_another_s(&self, frames: std::ops::Range<usize>, begin: &BoxStep, back_m: f64, speed: f64) -> bool {
-        let shares = |solid: &Solid, frame: usize| {
-            let there = place(begin, back_m, speed, self.seconds(frame)).solid(self.size);
-            solid.shared(&there) > 0.1
-        };
-        frames.into_iter().any(|k| self.others.get(k).is_some_and(|others| others.iter().any(|o| shares(o, k))))
+    fn was_another_s(&self, mut frames: Range<usize>, departure: &Departure) -> bool {
+        frames.any(|frame| {
+            let there = departure.at(self.seconds(frame)).solid(self.size);
+            self.others.get(frame).is_some_and(|others| others.iter().any(|o| o.shared(&there) > SHARED))
+        })
     }
-
-    /// It stands from this frame on and drives off.
-    fn drives_off(&self, from: usize, begin: &BoxStep, back_m: f64, speed: f64) -> Vec<BoxStep> {
-        let from_s = self.seconds(from);
-        let off_s = begin.time_s - 2.0 * back_m / speed;
-        let moving = ((begin.time_s - off_s) / STEP_S).ceil() as u32;
-        let times = (1..moving).map(|k| off_s + (begin.time_s - off_s) * f64::from(k) / f64::from(moving));
-        [from_s, off_s]
-            .into_iter()
-            .chain(times)
-            .map(|t| BoxStep { time_s: t, ..place(begin, back_m, speed, t) })
-            .collect()
-    }
-}
-
-/// Where it is at a time before its label begins, when it drives off with one acceleration.
-fn place(begin: &BoxStep, back_m: f64, speed: f64, time_s: f64) -> BoxStep {
-    let needs_s = 2.0 * back_m / speed;
-    let on = ((time_s - begin.time_s + needs_s) / needs_s).clamp(0.0, 1.0);
-    let (s, c) = begin.heading_rad.sin_cos();
-    let behind_m = back_m * (1.0 - on * on);
-    let center = [begin.center[0] - behind_m * c, begin.center[1] - behind_m * s];
-    BoxStep { time_s, center, heading_rad: begin.heading_rad }
 }
 
 #[cfg(test)]
@@ -138,7 +148,7 @@ mod tests {
     use super::super::around::Standing;
     use super::*;
     use crate::labels::near_face::{boxes, drawn};
-    use crate::labels::tracks::{LabelPoint, LabelTrack};
+    use crate::labels::tracks::LabelTrack;
 
     const LEFT_M: f64 = 30.0;
     const OFF_S: f64 = 20.0;
@@ -162,7 +172,7 @@ mod tests {
     fn hidden(
         stood: [f64; 2],
         doppler_mps: f64,
-        click: impl Fn(&LabelPoint) -> [f64; 3],
+        click: impl Fn(&LabelPoint) -> LabelPoint,
         others: &[LabelTrack],
     ) -> Option<LabelTrack> {
         let instants: Vec<Instant> = (0..300)
@@ -179,8 +189,8 @@ mod tests {
         Some(LabelTrack { points: drawn(&steps, around.size, [0.0; 2], 0.1), ..label })
     }
 
-    fn on_it(p: &LabelPoint) -> [f64; 3] {
-        [p.time_s, p.x_m, p.y_m]
+    fn on_it(p: &LabelPoint) -> LabelPoint {
+        *p
     }
 
     const FACE: [f64; 2] = [5.2, LEFT_M - 0.9];
@@ -211,7 +221,7 @@ mod tests {
     #[test]
     fn only_a_click_on_the_beginning_asks_for_it() {
         for (ds, dx, meant) in [(0.5, 1.0, true), (-1.0, 0.0, false), (2.0, 0.0, false), (0.0, 5.0, false)] {
-            let click = |p: &LabelPoint| [p.time_s + ds, p.x_m + dx, p.y_m];
+            let click = |p: &LabelPoint| LabelPoint { time_s: p.time_s + ds, x_m: p.x_m + dx, ..*p };
             assert_eq!(hidden(FACE, 0.0, click, &[]).is_some(), meant, "{ds} s, {dx} m");
         }
     }

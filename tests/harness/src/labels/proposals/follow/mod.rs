@@ -63,7 +63,7 @@ impl Follower {
         }
         let frame = self.nearest(click.time_s)?;
         let around = Around::of(track, others, &self.instants, &self.standing, self.site.sensor);
-        if let Some(hidden) = around.hidden([click.time_s, click.x_m, click.y_m]) {
+        if let Some(hidden) = around.hidden(click) {
             let before = drawn(&hidden, around.size, around.sensor, TOLERANCE_M);
             let points = before.into_iter().chain(track.points.iter().copied()).collect();
             return Some(LabelTrack { points, ..track.clone() }).filter(|track| track.check().is_ok());
