@@ -202,7 +202,7 @@ impl Person<'_> {
             whole.id = tracks[vehicle].id.clone();
             if whole.class != tracks[vehicle].class {
                 actions.reclassed += 1;
-                whole.class = tracks[vehicle].class.clone();
+                whole.classify(&tracks[vehicle].class);
             }
             labels.push((vehicle, whole));
         }

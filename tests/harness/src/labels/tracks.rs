@@ -74,6 +74,13 @@ pub enum TrackError {
 pub const FARTHEST: f64 = 1e6;
 
 impl LabelTrack {
+    /// Says that it is of a class; a size that was known was that of another one.
+    pub fn classify(&mut self, class: &str) {
+        if self.class != class {
+            (self.class, self.size_m) = (class.to_owned(), None);
+        }
+    }
+
     /// Length, width, height in metres; of a class nobody knows, a car's.
     pub fn size(&self) -> [f64; 3] {
         self.size_m.or_else(|| class_size(&self.class)).unwrap_or([4.6, 1.8, 1.5])
@@ -231,5 +238,15 @@ mod tests {
         let text = serde_json::to_string(&t).unwrap();
         assert_eq!(text, r#"{"id":"7","class":"car","points":[[0.5,80.0,-3.5],[1.0,70.0,-3.5]]}"#);
         assert_eq!(serde_json::from_str::<LabelTrack>(&text).unwrap(), t);
+    }
+
+    #[test]
+    fn what_is_of_another_class_has_another_size() {
+        let mut lorry =
+            LabelTrack { class: "truck".into(), size_m: Some([9.2, 2.5, 3.6]), ..track("a", &[[0.0, 9.0, 1.0]]) };
+        lorry.classify("truck");
+        assert_eq!(lorry.size(), [9.2, 2.5, 3.6]);
+        lorry.classify("bus");
+        assert_eq!((lorry.class.as_str(), lorry.size()), ("bus", [13.0, 2.55, 3.6]));
     }
 }

@@ -322,6 +322,28 @@ fn a_second_tab_only_reads_until_the_first_is_closed() {
 }
 
 #[test]
+fn a_size_is_shown_and_is_kept_until_the_class_is_another() {
+    let Some(browser) = Browser::start("sizes") else { return };
+    let recording = recording("sizes");
+    let sized = "time_s,object_id,class,x_m,y_m,heading_rad,length_m,width_m,height_m\n\
+                 0.5,a,truck,90,4,3.14159,9.2,2.5,3.6\n2.5,a,truck,50,4,3.14159,9.2,2.5,3.6\n";
+    fs::write(recording.with_extension("labels.csv"), sized).unwrap();
+    let server = Server::start(&recording);
+    let page = browser.open(&server.url);
+    page.until_saved();
+    page.key("PageDown");
+    page.until("document.getElementById('selected-text').textContent.includes('9.2 × 2.5 × 3.6 m')");
+    let saved = || fs::read_to_string(&server.labels).unwrap();
+    page.key("3");
+    page.until_saved();
+    assert!(saved().contains(",9.200,2.500,3.600"), "{}", saved());
+    page.key("4");
+    page.until_saved();
+    assert!(saved().contains(",bus,") && !saved().contains("9.200"), "{}", saved());
+    assert_eq!(page.ask("document.getElementById('selected-text').textContent.includes('×')"), false);
+}
+
+#[test]
 fn what_cannot_be_saved_is_said_and_stays_in_the_page() {
     let Some(browser) = Browser::start("not saved") else { return };
     let recording = recording("unsaved");

@@ -23,9 +23,6 @@ const REFLECTIONS: usize = 40;
 const WITHIN_M: f64 = 1.2;
 /// Two lanes of one direction are at least this far apart, metres.
 const APART_M: f64 = 2.4;
-/// Where on the flank reflections lie on average, from the middle, metres; sine of the aspect from which on all do.
-const FLANK_M: f64 = 0.6;
-const FLANK_SIN: f64 = 0.7;
 /// Straight lanes of directions closer than this are of one road, there and back.
 const ONE_ROAD_COS: f64 = 0.99;
 /// Cosine of the angle up to which two headings are one direction.
@@ -61,11 +58,9 @@ impl Driven {
             while let Some((_, r)) = seen.next_if(|(frame, _)| *frame <= path.first + k) {
                 last = r;
             }
-            let (s, c) = path.heading_at(path.first + k)?.sin_cos();
-            let ([x, y], flank, distance_m) = (motion.place(), flank_m([c, s], last.sight), last.distance_m);
-            let [x, y] = [x - flank * s, y + flank * c];
+            let [x, y] = motion.place();
             if places.last().is_none_or(|([a, b], _)| (x - a).hypot(y - b) >= STEP_M) {
-                places.push(([x, y], across_m(distance_m)));
+                places.push(([x, y], across_m(last.distance_m)));
             }
         }
         (places.len() > 4).then_some(Self { places })
@@ -194,11 +189,6 @@ impl Lane {
         let straight = Some((point(m[1] / m[0]), m[0]));
         (high - low > STEP_M).then_some(Self { points, straight })
     }
-}
-
-/// How far left of its reflections the middle of a vehicle is: seen from the side, they lie on the flank.
-pub fn flank_m([c, s]: [f64; 2], sight: [f64; 2]) -> f64 {
-    FLANK_M * ((-sight[0] * s + sight[1] * c) / FLANK_SIN).clamp(-1.0, 1.0)
 }
 
 /// The lanes these paths keep to.

@@ -18,11 +18,26 @@ const STEP_S: f64 = 0.25;
 const FAST_MPS: f64 = 6.0;
 /// Extents that only buses have, metres: a truck that is seen well is longer.
 const BUS_M: std::ops::RangeInclusive<f64> = 12.6..=13.8;
-/// Cars are not higher than this, by so many reflections, metres.
+/// Cars are not higher than this, by so many reflections, metres, and nothing of them is higher than that.
 const LOW_M: f64 = 1.7;
+const HIGH_M: f64 = 2.7;
 const WELL: usize = 60;
+/// A lorry that reaches less far than this, metres, by so many reflections from near, is a short one: what of it does
+/// not reflect, metres, and between which heights it is, metres.
+const SHORT_M: f64 = 12.0;
+const SHORT_BY: usize = 500;
+const ENDS_M: f64 = 0.7;
+const SHORT_HIGH_M: [f64; 2] = [3.0, 4.0];
 /// How long a car looks at most with reflections of another one, metres.
 const BESIDES_M: f64 = 12.5;
+/// Sine of the aspect from which on reflections tell the flank, from how far at most, metres, and how many.
+const SIDE_SIN: f64 = 0.06;
+const SIDE_WITHIN_M: f64 = 60.0;
+const SIDE_BY: usize = 20;
+/// How far from the middle the flank seems, of the width: noise spreads it. Reflections that do not spread over as much
+/// of the width show no flank.
+const HALF: f64 = 0.52;
+const WIDE: f64 = 0.6;
 /// Fewest reflections an end is told by.
 const FEWEST: usize = 5;
 
@@ -36,6 +51,9 @@ pub struct Extent {
     pub reach: [f64; 2],
     /// Height of the higher ones.
     pub top_m: f64,
+    /// Height of the highest ones, and how many reflections from near that is of; 0 without a radar that measures it.
+    pub highest_m: f64,
+    pub heights: usize,
     /// Seen well enough to know that nothing of it is high.
     pub low: bool,
 }
@@ -59,16 +77,22 @@ impl Extent {
         let heights: Vec<f64> = near.map(|(_, r)| r.height_m).collect();
         // a radar without elevation gives all reflections one height
         let measured = heights.iter().any(|h| (h - heights[0]).abs() > 1e-6);
-        let low = heights.len() >= WELL && measured && path.top_m < LOW_M;
-        Self { rear: end(&behind, 0.1), front: end(&ahead, 0.9), reach: path.reach, top_m: path.top_m, low }
+        let highest_m = quantile(&heights, 0.95).unwrap_or(0.0);
+        let low = heights.len() >= WELL && measured && path.top_m < LOW_M && highest_m < HIGH_M;
+        Self {
+            rear: end(&behind, 0.1),
+            front: end(&ahead, 0.9),
+            reach: path.reach,
+            top_m: path.top_m,
+            highest_m,
+            heights: if measured { heights.len() } else { 0 },
+            low,
+        }
     }
 
     /// The class whose size is nearest to what is seen.
     pub fn class(&self) -> &'static str {
-        let length_m = match (self.rear, self.front) {
-            (Some(rear), Some(front)) => (front - rear).max(self.reach[1] - self.reach[0]),
-            _ => self.reach[1] - self.reach[0],
-        };
+        let length_m = self.seen_m();
         match () {
             // with the reflections of the car behind it it looks long
             () if self.low && length_m < BESIDES_M => "car",
@@ -77,6 +101,21 @@ impl Extent {
             () if length_m > 5.5 || self.top_m > 2.4 => "van",
             () => "car",
         }
+    }
+
+    /// Length, width and height where it is surely not that of the class: lorries are 7 to 19 m long. One that may only
+    /// be hidden in part has that of the class.
+    pub fn size(&self, class: &str) -> Option<[f64; 3]> {
+        let [length_m, width_m, _] = class_size(class)?;
+        let seen_m = self.seen_m() + ENDS_M;
+        let short = class == "truck" && seen_m < SHORT_M && self.heights >= SHORT_BY && seen_m < length_m;
+        short.then_some([seen_m, width_m, self.highest_m.clamp(SHORT_HIGH_M[0], SHORT_HIGH_M[1])])
+    }
+
+    /// From the rearmost to the foremost of it that reflects.
+    fn seen_m(&self) -> f64 {
+        let reach_m = self.reach[1] - self.reach[0];
+        self.rear.zip(self.front).map_or(reach_m, |(rear, front)| (front - rear).max(reach_m))
     }
 
     /// Where the centre of a vehicle of this length is along the heading, from the path on.
@@ -88,6 +127,32 @@ impl Extent {
             (None, None) => 0.5 * (self.reach[0] + self.reach[1]),
         }
     }
+}
+
+/// How far to the left of a path the middle of a vehicle of this width is, metres. Its flank is where the reflections
+/// end on the side of the sensor: they may come from that flank, from all around or from what is under it.
+fn left_m(path: &Path, instants: &[Instant], width_m: f64) -> f64 {
+    let mut sides = [Vec::new(), Vec::new()];
+    let mut all = Vec::new();
+    for (frame, r) in path.reflections(instants) {
+        let Some((heading_rad, [_, left])) = path.heading_at(frame).zip(path.local(frame, r)) else { continue };
+        let (s, c) = heading_rad.sin_cos();
+        let sin = -r.sight[0] * s + r.sight[1] * c;
+        all.push(left);
+        if sin.abs() >= SIDE_SIN && r.distance_m < SIDE_WITHIN_M {
+            sides[usize::from(sin > 0.0)].push(if sin > 0.0 { left } else { -left });
+        }
+    }
+    let half_m = HALF * width_m;
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (values, sign) in sides.iter().zip([-1.0, 1.0]) {
+        let Some(edge) = quantile(values, 0.1).filter(|_| values.len() >= SIDE_BY) else { continue };
+        let (Some(middle), Some(other)) = (quantile(values, 0.5), quantile(values, 0.9)) else { continue };
+        let share = ((other - edge) / (WIDE * width_m)).min(1.0);
+        sum += sign * (middle + share * (edge + half_m - middle)) * values.len() as f64;
+        weight += values.len() as f64;
+    }
+    if weight > 0.0 { sum / weight } else { quantile(&all, 0.5).unwrap_or(0.0) }
 }
 
 /// Mean velocity around a time, if that is fast enough to go on.
@@ -108,18 +173,10 @@ pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: Strin
     let sensor = [sensor_x, sensor_y];
     let extent = Extent::of(path, instants);
     let class = extent.class();
-    let size = class_size(class).unwrap_or([4.6, 1.8, 1.5]);
+    let size_m = extent.size(class);
+    let size = size_m.or_else(|| class_size(class)).unwrap_or([4.6, 1.8, 1.5]);
     let along = extent.center_m(size[0]);
-    // of the flank that is seen, reflections come from the side of the sensor
-    let left: Vec<f64> = path
-        .reflections(instants)
-        .filter_map(|(frame, r)| {
-            let (s, c) = path.heading_at(frame)?.sin_cos();
-            let sin = -r.sight[0] * s + r.sight[1] * c;
-            Some(path.local(frame, r)?[1] + 0.6 * 0.5 * size[1] * (sin / 0.7).clamp(-1.0, 1.0))
-        })
-        .collect();
-    let left = quantile(&left, 0.5).unwrap_or(0.0);
+    let left = left_m(path, instants, size[1]);
     let mut steps: Vec<BoxStep> = path
         .motions
         .iter()
@@ -150,15 +207,17 @@ pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: Strin
     }
     steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let points = drawn(&steps, size, sensor, TOLERANCE_M);
-    LabelTrack { id, class: class.to_owned(), size_m: None, points }
+    LabelTrack { id, class: class.to_owned(), size_m, points }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::labels::proposals::motion::Motion;
+    use crate::labels::proposals::reflections::tests::seen_from_origin;
 
     fn extent(reach: [f64; 2], top_m: f64, low: bool) -> Extent {
-        Extent { rear: Some(reach[0]), front: None, reach, top_m, low }
+        Extent { rear: Some(reach[0]), front: None, reach, top_m, highest_m: top_m, heights: 0, low }
     }
 
     #[test]
@@ -171,5 +230,54 @@ mod tests {
         assert_eq!(extent([-4.0, 7.0], 1.4, true).class(), "car");
         assert_eq!(extent([-4.0, 7.0], 1.4, false).class(), "truck");
         assert_eq!(extent([-8.0, 8.0], 1.6, true).class(), "truck");
+    }
+
+    #[test]
+    fn only_lorries_that_are_seen_well_and_short_have_a_size_of_their_own() {
+        let lorry = |reach, heights| Extent { highest_m: 3.5, heights, ..extent(reach, 2.4, false) };
+        assert_eq!(lorry([-4.0, 4.5], 900).size("truck"), Some([9.2, 2.55, 3.5]));
+        assert_eq!(Extent { highest_m: 2.1, ..lorry([-4.0, 4.5], 900) }.size("truck"), Some([9.2, 2.55, 3.0]));
+        // it may be hidden in part, it is a long one, it is none
+        assert_eq!(lorry([-4.0, 4.5], 100).size("truck"), None);
+        assert_eq!(lorry([-8.0, 7.5], 900).size("truck"), None);
+        assert_eq!(lorry([-4.0, 4.5], 900).size("van"), None);
+        assert_eq!(lorry([-4.0, 4.5], 900).size("nobody"), None);
+    }
+
+    /// Where the middle of a lorry is told to be that drives along x past a sensor at the origin and reflects at these
+    /// distances from its middle, to its left; the path is as far left of the middle.
+    fn told_m(y: f64, reflects: &[f64], path_left_m: f64, speed: f64) -> f64 {
+        let frame = |k: usize| {
+            let x = 50.0 - 0.1 * k as f64 * speed;
+            let all = reflects.iter().map(|left| seen_from_origin([x, y - left], -speed)).collect();
+            (Instant { time_s: 0.1 * k as f64, reflections: all }, [x, y - path_left_m])
+        };
+        let (instants, places): (Vec<Instant>, Vec<[f64; 2]>) = (0..30).map(frame).unzip();
+        let members = (0..30).flat_map(|k| (0..reflects.len()).map(move |i| (k, i))).collect();
+        let motions = places
+            .iter()
+            .enumerate()
+            .map(|(k, p)| (0.1 * k as f64, Motion::new(*p, [-speed, 0.0], 0.1, [-1.0, 0.0], [0.1, 0.1])));
+        let headings_rad = vec![std::f64::consts::PI; 30];
+        let motions = motions.collect();
+        let (lane, queued) = (None, Vec::new());
+        let path = Path { members, first: 0, motions, headings_rad, reach: [0.0; 2], top_m: 1.5, lane, queued };
+        left_m(&path, &instants, 2.55) + path_left_m
+    }
+
+    #[test]
+    fn the_flank_is_where_reflections_end_on_the_side_of_the_sensor() {
+        // towards -x: its left is -y, so the sensor sees the left flank of what is at +y, the right one at -y
+        let flank: Vec<f64> = (0..20).map(|k| 1.275 - 0.02 * f64::from(k * k % 19) * 5.0).collect();
+        for path_left_m in [0.0, 0.7, -0.7] {
+            for (y, side) in [(6.0, 1.0), (-6.0, -1.0)] {
+                let one: Vec<f64> = flank.iter().map(|left| left * side).collect();
+                let both: Vec<f64> = one.iter().chain(&[-1.3, -1.2, 1.3, 1.2]).copied().collect();
+                assert!(told_m(y, &one, path_left_m, 15.0).abs() < 0.2, "{}", told_m(y, &one, path_left_m, 15.0));
+                assert!(told_m(y, &both, path_left_m, 15.0).abs() < 0.2, "{}", told_m(y, &both, path_left_m, 15.0));
+            }
+        }
+        // one place that reflects tells no flank
+        assert!((told_m(6.0, &[0.3], 0.0, 15.0) - 0.3).abs() < 0.01);
     }
 }

@@ -14,6 +14,9 @@ function counted(proposals) {
   return kinds.map((kind) => `${of(kind)} ${kind}`).join(', ');
 }
 
+// Length, width and height, where they are not those of the class.
+const size = ({ size_m: all }) => (all ? `, ${all.map((m) => m.toFixed(1)).join(' × ')} m` : '');
+
 export class Panel {
   constructor(session, { select }) {
     this.session = session;
@@ -44,7 +47,7 @@ export class Panel {
     let text = proposals.ready ? `none left; ${decided} decided` : 'looking for tracks';
     if (offered.length > 1) text = `${offered.length} together, of ${waiting.length} that are left: ${counted(offered)}. `;
     else if (one) text = `${decided + 1} of ${decided + waiting.length}: `;
-    if (one) text += `${offered.length > 1 ? 'Pointed at: ' : ''}${one.track.class}, ${span(one.track)}, ${one.detections} detections, score ${one.score.toFixed(2)}`;
+    if (one) text += `${offered.length > 1 ? 'Pointed at: ' : ''}${one.track.class}${size(one.track)}, ${span(one.track)}, ${one.detections} detections, score ${one.score.toFixed(2)}`;
     else if (offered.length > 1) text += 'Point at one to reject or mend it alone.';
     element('proposal-text').textContent = text;
     const button = (key) => document.querySelector(`#proposal button[data-key="${key}"]`);
@@ -60,7 +63,7 @@ export class Panel {
     const { track } = this.session;
     element('selected-form').hidden = !track;
     const speed = track ? Math.hypot(...velocity(track)).toFixed(1) : 0;
-    element('selected-text').textContent = track ? `${track.points.length} points, ${span(track)}, ${speed} m/s` : 'none';
+    element('selected-text').textContent = track ? `${track.points.length} points${size(track)}, ${span(track)}, ${speed} m/s` : 'none';
     if (!track) return;
     element('track-id').value = track.id;
     const choice = element('track-class');

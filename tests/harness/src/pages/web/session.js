@@ -355,14 +355,14 @@ export class Session {
   classify(kind) {
     const one = this.proposals.shown ? this.one : null;
     if (!this.track && one) {
-      one.track.class = kind;
+      one.track = tracks.classified(one.track, kind);
       return this.changed('proposal');
     }
     if (!this.track) {
       this.kind = kind;
       return this.say(`The class of new tracks is ${kind}.`);
     }
-    return this.change(tracks.withTrack(this.tracks, { ...this.track, class: kind }));
+    return this.change(tracks.withTrack(this.tracks, tracks.classified(this.track, kind)));
   }
 
   // The proposal that a key is for: the one that is pointed at, or the only one that is offered.

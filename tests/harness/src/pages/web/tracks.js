@@ -1,4 +1,5 @@
-// Label tracks: { id, class, points: [[time_s, x_m, y_m], ...] } in the order of time. Nothing is changed in place.
+// Label tracks: { id, class, size_m, points: [[time_s, x_m, y_m], ...] } in the order of time; without a size, it is
+// that of the class. Nothing is changed in place.
 
 // Least time between two points of a track, seconds.
 const LEAST_S = 0.001;
@@ -25,6 +26,12 @@ export const without = (tracks, id) => tracks.filter((track) => track.id !== id)
 // The tracks with one replaced, or added.
 export function withTrack(tracks, track, id = track.id) {
   return find(tracks, id) ? tracks.map((old) => (old.id === id ? track : old)) : [...tracks, track];
+}
+
+// Of a class; a size that was known was that of another one.
+export function classified(track, kind) {
+  const { size_m: size, ...rest } = track;
+  return kind === track.class && size ? track : { ...rest, class: kind };
 }
 
 // A number no track has as its id.
