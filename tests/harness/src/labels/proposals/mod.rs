@@ -9,6 +9,7 @@
 //! what goes on in one place of a vehicle, `vehicles` puts together those whose distance stays while they move, `queues`
 //! makes paths of them in place of the tracker's. `exclusion` drops mirror images, `standing` adds the time in which it
 //! stood before and after, `shape` puts a box around it, and of proposals for one place `exclusion` keeps the best.
+//! `following` goes on with those that creep where the ones ahead and behind tell it.
 //! `ways` tells which of them drive the same way.
 //!
 //! [`follow`] uses the same reflections for what a person points at.
@@ -24,6 +25,7 @@
 mod assembly;
 mod exclusion;
 pub mod follow;
+mod following;
 mod joining;
 mod lane;
 mod lanes;
@@ -112,7 +114,14 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         way: 0,
     });
     let all: Vec<Proposal> = all.filter(|p| p.track.check().is_ok()).collect();
-    let mut all = exclusion::without_intruders(all, crate::labels::Site::of(recording).sensor);
+    let sensor = crate::labels::Site::of(recording).sensor;
+    let all = exclusion::without_intruders(all, sensor);
+    let view = following::View {
+        sensor,
+        contains: &|[x, y]| recording.sensor.field_of_view.contains(recording.pose.to_spherical([x, y, 1.0])),
+        latest_s: instants.last().map_or(0.0, |i| i.time_s),
+    };
+    let mut all = following::gone_on(all, &view);
     let ways = ways::ways(&all.iter().map(|p| &p.track).collect::<Vec<_>>());
     for (proposal, way) in all.iter_mut().zip(ways) {
         proposal.way = way;

@@ -12,7 +12,7 @@ const TOLERANCE_M: f64 = 0.4;
 /// Cosine of the aspect from which on the end that is seen tells where the vehicle is.
 const END_COS: f64 = 0.4;
 /// How long a fast path goes on at both ends, seconds, and in which steps.
-const BEYOND_S: f64 = 3.0;
+const BEYOND_S: f64 = 5.0;
 const STEP_S: f64 = 0.25;
 /// Speed from which on something is fast, m/s.
 const FAST_MPS: f64 = 6.0;
