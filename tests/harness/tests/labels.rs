@@ -70,15 +70,15 @@ fn figures_of_proposals() {
         print!("{}", judged.text());
         let rows = judged.tables(&recording, &evaluation, &estimators::Options::default()).unwrap();
         println!(
-            "  TVR, FVR, TIR, FIR of objects, FVR and FIR of cells, in %; seen: truth of vehicles that were detected"
+            "  TVR, FVR, TIR, FIR of objects, FVR and FIR of cells, in %; perfect: truth from first to last detection"
         );
-        for ((of_truth, of_seen), of_labels) in rows[0].iter().zip(&rows[1]).zip(&rows[2]) {
+        for ((of_truth, of_perfect), of_labels) in rows[0].iter().zip(&rows[1]).zip(&rows[2]) {
             let rates = |r: &Row| {
                 let all = [r.counts.tvr(), r.counts.fvr(), r.counts.tir(), r.counts.fir(), r.cell_fvr(), r.cell_fir()];
                 all.map(|v| v.map_or(f64::NAN, |v| 100.0 * v))
             };
             println!("  {:15} truth  {:5.1?}", of_truth.name, rates(of_truth));
-            println!("  {:15} seen   {:5.1?}", "", rates(of_seen));
+            println!("  {:15} perfect{:5.1?}", "", rates(of_perfect));
             println!("  {:15} labels {:5.1?}", "", rates(of_labels));
         }
     }

@@ -3,7 +3,7 @@
 //!
 //! The ground truth plays the person and judges the result; proposals, and what is followed from a click, never see it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use anyhow::Result;
 
@@ -18,7 +18,7 @@ use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::associate;
 use crate::evaluation::summary::Row;
 use crate::recording::Recording;
-use crate::recording::truth::Truth;
+use crate::recording::truth::{Label, Object, Truth};
 
 /// A recording's proposals, judged.
 #[derive(Debug)]
@@ -38,8 +38,8 @@ pub struct Judged {
     pub off_m: [f64; 2],
     /// Labels that were made.
     pub tracks: Vec<LabelTrack>,
-    /// Ids of those vehicles.
-    detected: BTreeSet<String>,
+    /// Ids of those vehicles, and when each was detected first and last.
+    detected: BTreeMap<String, [i64; 2]>,
 }
 
 impl Judged {
@@ -64,7 +64,13 @@ pub fn judge(recording: &Recording, proposals: &[Proposal], options: &Options) -
         labelled: [0; 2],
         off_m: [0.0; 2],
         tracks: labels.iter().map(|(_, track)| track.clone()).collect(),
-        detected: vehicles.keys().map(|k| truth.tracks[*k].id.clone()).collect(),
+        detected: vehicles
+            .iter()
+            .filter_map(|(k, v)| {
+                let times_ns = [instants.get(v.first?)?.time_ns, instants.get(v.last)?.time_ns];
+                Some((truth.tracks[*k].id.clone(), times_ns))
+            })
+            .collect(),
     };
     judged.compare(recording, &instants, &vehicles, &moving, options);
     Some(judged)
@@ -172,8 +178,9 @@ impl Judged {
         self.off_m = off.map(|v| v / compared.max(1) as f64);
     }
 
-    /// The radar rows of the table of `replay`: with the ground truth, with its vehicles that were detected at least
-    /// once, with these labels. Labels cannot hold what nobody saw, so the first two differ as much as the purpose does.
+    /// The radar rows of the table of `replay`: with the ground truth, with perfect labels, with these labels. Perfect
+    /// are the real boxes of each detected vehicle from its first to its last detection: labels cannot hold what nobody
+    /// saw, so the first two differ as much as the purpose does.
     ///
     /// # Errors
     /// A recording that cannot be replayed.
@@ -184,8 +191,7 @@ impl Judged {
         estimators: &estimators::Options,
     ) -> Result<[Vec<Row>; 3]> {
         let site = Site::of(recording);
-        let mut seen = recording.truth.clone().unwrap_or_default();
-        seen.tracks.retain(|t| self.detected.contains(&t.id));
+        let perfect = Truth::new(recording.frames.iter().flat_map(|f| self.perfect(recording, f.time_ns)).collect());
         let made = Truth::new(self.tracks.iter().flat_map(|t| labels(t, &site)).collect());
         let rows = |truth: Option<Truth>| -> Result<Vec<Row>> {
             let recording = Recording { truth, ..recording.clone() };
@@ -194,7 +200,19 @@ impl Judged {
             let options = Options { bootstrap: 0, ..options.clone() };
             Ok(Replay::new(recording, &mut radar, &options, &|| ()).summary.rows)
         };
-        Ok([rows(recording.truth.clone())?, rows(Some(seen))?, rows(Some(made))?])
+        Ok([rows(recording.truth.clone())?, rows(Some(perfect))?, rows(Some(made))?])
+    }
+
+    /// The real boxes of the vehicles that have been detected before and will be again.
+    fn perfect(&self, recording: &Recording, time_ns: i64) -> Vec<Label> {
+        let Some(truth) = &recording.truth else { return Vec::new() };
+        let label = |o: Object| {
+            let track = &truth.tracks[o.track];
+            let [first, last] = self.detected.get(&track.id)?;
+            let (id, class, solid) = (track.id.clone(), track.class.clone(), o.solid);
+            (*first..=*last).contains(&time_ns).then_some(Label { time_ns, id, class, solid })
+        };
+        truth.at(time_ns).into_iter().filter_map(label).collect()
     }
 
     /// The figures as lines of text.
