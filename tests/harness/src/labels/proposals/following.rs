@@ -15,7 +15,7 @@
 //! Lane changes while hidden. It ends where nobody near tells it, at the end of the field of view, and where it would be
 //! in the place of another one.
 
-use super::Proposal;
+use super::{Proposal, View};
 use crate::geometry::solid::Solid;
 use crate::labels::near_face::{BoxStep, boxes, drawn};
 
@@ -35,15 +35,6 @@ const SHORTEST_S: f64 = 1.0;
 const SHARED: f64 = 0.1;
 /// How far the line may be from the places, metres.
 const TOLERANCE_M: f64 = 0.8;
-
-/// Where and how long the sensor looks.
-pub struct View<'a> {
-    pub sensor: [f64; 2],
-    /// Whether it could see something there.
-    pub contains: &'a dyn Fn([f64; 2]) -> bool,
-    /// Last frame, seconds since the first.
-    pub latest_s: f64,
-}
 
 /// An offered vehicle's boxes.
 struct Boxes {

@@ -62,6 +62,15 @@ const IN_LANE_M: f64 = 2.0;
 /// Lowest score that is worth a look.
 const LEAST: f64 = 0.8;
 
+/// Where and how long the sensor looks.
+struct View<'a> {
+    sensor: [f64; 2],
+    /// Whether it could see something there.
+    contains: &'a dyn Fn([f64; 2]) -> bool,
+    /// Last frame, seconds since the first.
+    latest_s: f64,
+}
+
 /// A track that is offered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Proposal {
@@ -107,20 +116,19 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     // of two in one place the one that stood in a queue has more to show for it
     let queued = |p: &Path| if p.queued.is_empty() { 0 } else { p.members.len() };
     scored.sort_by(|a, b| queued(b.1).cmp(&queued(a.1)).then(b.0.total_cmp(&a.0)));
+    let view = View {
+        sensor: crate::labels::Site::of(recording).sensor,
+        contains: &|[x, y]| recording.sensor.field_of_view.contains(recording.pose.to_spherical([x, y, 1.0])),
+        latest_s: instants.last().map_or(0.0, |i| i.time_s),
+    };
     let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {
-        track: shape::track(path, &instants, recording, format!("p{}", k + 1)),
+        track: shape::track(path, &instants, &view, format!("p{}", k + 1)),
         score,
         detections: path.members.len() as u32,
         way: 0,
     });
     let all: Vec<Proposal> = all.filter(|p| p.track.check().is_ok()).collect();
-    let sensor = crate::labels::Site::of(recording).sensor;
-    let all = exclusion::without_intruders(all, sensor);
-    let view = following::View {
-        sensor,
-        contains: &|[x, y]| recording.sensor.field_of_view.contains(recording.pose.to_spherical([x, y, 1.0])),
-        latest_s: instants.last().map_or(0.0, |i| i.time_s),
-    };
+    let all = exclusion::without_intruders(all, view.sensor);
     let mut all = following::gone_on(all, &view);
     let ways = ways::ways(&all.iter().map(|p| &p.track).collect::<Vec<_>>());
     for (proposal, way) in all.iter_mut().zip(ways) {

@@ -1,10 +1,10 @@
 //! What stands around the reflections of a path: class by extent, and the box centres.
 
+use super::View;
 use super::path::{HEIGHT_WITHIN_M, Path, quantile};
 use super::reflections::Instant;
 use crate::labels::near_face::{BoxStep, drawn};
 use crate::labels::tracks::LabelTrack;
-use crate::recording::Recording;
 use crate::recording::labels::class_size;
 
 /// How far the polyline may be from the path, metres.
@@ -168,9 +168,7 @@ fn speed_near(path: &Path, time_s: f64) -> Option<[f64; 2]> {
 
 /// The near face of the vehicle around a path. What is fast comes from somewhere and goes somewhere: up to
 /// [`BEYOND_S`] in the field of view are added at both ends.
-pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: String) -> LabelTrack {
-    let [sensor_x, sensor_y, _] = recording.pose.position;
-    let sensor = [sensor_x, sensor_y];
+pub fn track(path: &Path, instants: &[Instant], view: &View, id: String) -> LabelTrack {
     let extent = Extent::of(path, instants);
     let class = extent.class();
     let size_m = extent.size(class);
@@ -190,7 +188,6 @@ pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: Strin
             }
         })
         .collect();
-    let latest_s = instants.last().map_or(0.0, |i| i.time_s);
     let ends = [(steps.first().copied(), -STEP_S), (steps.last().copied(), STEP_S)];
     for (end, step_s) in ends {
         let Some(end) = end else { continue };
@@ -198,15 +195,14 @@ pub fn track(path: &Path, instants: &[Instant], recording: &Recording, id: Strin
         for k in 1..=(BEYOND_S / STEP_S) as u32 {
             let dt_s = step_s * f64::from(k);
             let (time_s, center) = (end.time_s + dt_s, [end.center[0] + vx * dt_s, end.center[1] + vy * dt_s]);
-            let seen = recording.pose.to_spherical([center[0], center[1], 1.0]);
-            if !(0.0..=latest_s).contains(&time_s) || !recording.sensor.field_of_view.contains(seen) {
+            if !(0.0..=view.latest_s).contains(&time_s) || !(view.contains)(center) {
                 break;
             }
             steps.push(BoxStep { time_s, center, ..end });
         }
     }
     steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-    let points = drawn(&steps, size, sensor, TOLERANCE_M);
+    let points = drawn(&steps, size, view.sensor, TOLERANCE_M);
     LabelTrack { id, class: class.to_owned(), size_m, points }
 }
 
