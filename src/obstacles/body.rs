@@ -9,6 +9,8 @@ use crate::obstacles::solid::Solid;
 
 /// Greatest length of what is low, centimetres.
 pub(super) const LONGEST_LOW_CM: i32 = 900;
+/// Shortest length of what shows its side alone, centimetres.
+const SHORTEST_LORRY_CM: i32 = 800;
 /// Sine of the angle to the road's axis from which a thing goes across it, 2^-14: 14.5 degrees.
 const ACROSS: i32 = (1 << 14) / 4;
 
@@ -60,14 +62,16 @@ impl Obstacle {
 
     /// How far the middle of its width lies behind its detections, centimetres. A radar beside a
     /// vehicle sees the near side: its detections then spread over less than the width, and have their
-    /// centre near that side. One ahead or behind sees both, unless the end is hidden.
+    /// centre near that side. One ahead or behind sees both, unless the end is hidden. Waves go under what is shorter
+    /// than a lorry and through its windows, so that it reflects all over: as much spread tells more of both sides.
     #[allow(clippy::cast_possible_wrap)] // the root of a clamped variance
     fn beside_the_detections(&self, size: &Size, ahead: i32, left: i32) -> i32 {
         let (side, end) = (size.length_cm * left.abs(), size.width_cm * ahead.abs());
         // from where the side makes up half of what is seen, 2^-8
         let shown = (side / ((side + end) / (ALL * 2)).max(1)).min(ALL).max(i32::from(self.hidden_end));
         // an even spread over the width has a variance of a twelfth of its square; noise makes it a little more
-        let half_seen = root((self.spread + self.spread / 8).max(0).unsigned_abs()) as i32;
+        let weight = if size.length_cm < SHORTEST_LORRY_CM { 16 } else { 9 };
+        let half_seen = root((self.spread.max(0) * weight / 8).unsigned_abs()) as i32;
         ((size.width_cm / 2 - half_seen).max(0) * shown) >> 8
     }
 }

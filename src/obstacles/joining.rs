@@ -7,7 +7,8 @@ use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::BIN_CM;
 use super::tracking::{MERGE_PARALLEL, Tracking};
-use crate::fixed::math::hypot_gate;
+use crate::fixed::math::{hypot_gate, length};
+use crate::fixed::trig::Direction;
 
 /// Least distance between the faces of two cars in a row: a short car's length and a gap, centimetres.
 const SPACING_CM: i32 = 480;
@@ -19,6 +20,11 @@ const CAR_CM: RangeInclusive<i32> = 400..=520;
 const VAN_END_CM: i32 = 250;
 /// See [`VAN_END_CM`].
 const VAN_CM: RangeInclusive<i32> = 400..=660;
+/// Widest gap between parts of a lorry that stands, centimetres: less than anybody leaves behind one.
+const TOUCHING_CM: i32 = 150;
+/// Least cosine between their headings, 2^-14: 43 degrees. What stopped while it turned was not seen to drive where it
+/// points.
+const CROOKED: i32 = 12_000;
 /// Largest difference of speed of the ends of one car, 2^-8 cm/s: a metre a second.
 const ENDS_SPEED: i32 = 100 << FRACTION;
 
@@ -39,7 +45,7 @@ impl Obstacle {
             return false;
         }
         if self.heading.cosine(other.heading) < MERGE_PARALLEL {
-            return false;
+            return self.is_one_lorry_with(other, t);
         }
         let (ox, oy) = other.global(other.extent.middle_cm(), 0);
         let (along, left) = self.local(ox, oy);
@@ -60,6 +66,25 @@ impl Obstacle {
         let low = self.tallness.is_low() && other.tallness.is_low();
         let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
         (gap <= widest && length <= longest) || (apart <= ENDS_SPEED && self.has_other_end(other, along, length, t))
+    }
+
+    /// Whether another obstacle that points elsewhere is a part of the same lorry: both stand, are tall, and touch along
+    /// the line between their middles, which lies more ahead of this one than beside it.
+    fn is_one_lorry_with(&self, other: &Self, t: &Tracking) -> bool {
+        let both = |is: fn(&Self, &Tracking) -> bool| is(self, t) && is(other, t);
+        if !both(Self::is_standing)
+            || !both(|o, _| o.tallness.is_tall())
+            || self.heading.cosine(other.heading) < CROOKED
+        {
+            return false;
+        }
+        let ((x, y), (other_x, other_y)) = (self.middle(), other.middle());
+        let (dx, dy) = (other_x - x, other_y - y);
+        let beside = self.heading.across(dx, dy).abs();
+        let (apart, shown) = (length(dx, dy), self.extent.length_cm() + other.extent.length_cm());
+        2 * beside < self.heading.along(dx, dy).abs()
+            && apart < shown / 2 + TOUCHING_CM
+            && apart + shown / 2 <= t.max_length_cm
     }
 
     /// Whether another obstacle, in line, as fast and together so long with this one, which is seen better, is the other end of the
@@ -107,6 +132,13 @@ impl Obstacle {
         self.tallness.join(&before.tallness);
     }
 
+    /// Turns about its middle into the line between the middles of both.
+    fn point_along_the_line_to(&mut self, other: &Self) {
+        let ((x, y), (other_x, other_y)) = (self.middle(), other.middle());
+        let line = Direction::of(other_x - x, other_y - y);
+        self.turn_to(if self.heading.cosine(line) < 0 { line.reversed() } else { line });
+    }
+
     /// Where this frame's detections of both have their centre: it has moved, but neither of them has.
     fn centre_with(&self, other: &Self) -> (i32, i32) {
         let ((x, y), count) = (self.free.place, other.gathered.count);
@@ -122,6 +154,9 @@ impl Obstacle {
     /// Takes over what another obstacle knows of the same vehicle.
     #[allow(clippy::cast_possible_truncation)] // a share of the offset
     pub fn join(&mut self, other: &Self, t: &Tracking) {
+        if self.heading.cosine(other.heading) < MERGE_PARALLEL {
+            self.point_along_the_line_to(other);
+        }
         // the histogram is no longer than the longest vehicle: its middle first
         let (ax, ay) = other.anchor();
         let (along, _) = self.local(ax, ay);
@@ -259,6 +294,51 @@ mod tests {
         let [mut a, b] = ends([95, 95], 500, 3000);
         a.existence = t.confirmed - 1;
         assert!(!a.is_one_with(&b, &t) && !b.is_one_with(&a, &t), "perhaps it is nothing");
+    }
+
+    /// Two parts of a lorry that stands, in line, so far apart, that point so many degrees to either side.
+    fn crooked(apart_cm: i32, degrees: f64) -> [Obstacle; 2] {
+        let t = rules();
+        let part = |x: i32, degrees: f64| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let heading = Direction::of((cos * 1e4) as i32, (sin * 1e4) as i32);
+            let mut o = Obstacle::new(&seen_at(x, 0, 0), heading, 0);
+            o.extent = Extent { rear_cm: -350, front_cm: 350 };
+            (0..20).for_each(|k| o.profile.add(if k % 2 == 0 { -340 } else { 340 }));
+            (o.travelled_cm, o.existence, o.tallness) = (1000, t.existence_max, tall());
+            o
+        };
+        [part(3000, -degrees), part(3700 + apart_cm, degrees)]
+    }
+
+    #[test]
+    fn parts_of_a_standing_lorry_that_touch_are_one_along_their_line_though_they_point_elsewhere() {
+        let t = rules();
+        for (apart, degrees, one) in [(100, 15.0, true), (100, 25.0, false), (200, 15.0, false), (-300, 15.0, true)] {
+            let [a, b] = crooked(apart, degrees);
+            assert_eq!((a.is_one_with(&b, &t), b.is_one_with(&a, &t)), (one, one), "{apart} cm, {degrees} degrees");
+        }
+        let [a, b] = crooked(100, 15.0);
+        let not = |change: &dyn Fn(&mut Obstacle)| {
+            let mut changed = b.clone();
+            change(&mut changed);
+            assert!(!a.is_one_with(&changed, &t) && !changed.is_one_with(&a, &t), "{changed:?}");
+        };
+        not(&|b| b.tallness = Tallness::default());
+        not(&|b| b.velocity.0 = t.standing_speed + 1);
+        not(&|b| b.travelled_cm = 0);
+        not(&|b| b.position.1 += 450 << FRACTION);
+        not(&|b| b.extent.front_cm = 2000);
+        for reversed in [false, true] {
+            let [mut a, mut b] = crooked(100, 15.0);
+            if reversed {
+                (a.heading, b.heading) = (a.heading.reversed(), b.heading.reversed());
+            }
+            a.join(&b, &t);
+            assert_eq!(a.heading, if reversed { AHEAD.reversed() } else { AHEAD }, "the way it drove");
+            let (x, y) = a.middle();
+            assert!((x - 3400).abs() < 300 && y.abs() < 30, "{x} {y}");
+        }
     }
 
     #[test]

@@ -21,7 +21,7 @@ const MOST_ASIDE_CM: i32 = 150;
 
 impl Obstacle {
     /// Middle of what is seen of it, centimetres.
-    fn middle(&self) -> (i32, i32) {
+    pub(super) fn middle(&self) -> (i32, i32) {
         self.global(self.extent.middle_cm(), 0)
     }
 
@@ -67,14 +67,19 @@ impl Obstacle {
     }
 
     /// Turns about its middle.
-    fn head(&mut self, heading: Direction, speed: i32) {
-        let part = |c: i16| mul_shift(speed, i32::from(c), 14);
+    pub(super) fn turn_to(&mut self, heading: Direction) {
         let (x, y) = self.middle();
         self.heading = heading;
-        self.velocity = (part(heading.x), part(heading.y));
         let (turned_x, turned_y) = self.middle();
         self.position.0 += (x - turned_x) << FRACTION;
         self.position.1 += (y - turned_y) << FRACTION;
+    }
+
+    /// Turns about its middle and goes on at a speed.
+    fn head(&mut self, heading: Direction, speed: i32) {
+        let part = |c: i16| mul_shift(speed, i32::from(c), 14);
+        self.velocity = (part(heading.x), part(heading.y));
+        self.turn_to(heading);
     }
 
     /// Turns with the lane it is on; at its end, into the next.

@@ -53,12 +53,12 @@ macro_rules! size {
 }
 
 size!(
-    /// 200 x 120 x 16 cells: parts with 512 kB.
-    reference, 200, 120, 16, 96, 256
+    /// 200 x 128 x 12 cells: parts with 512 kB.
+    reference, 200, 128, 12, 96, 256
 );
 size!(
-    /// 100 x 64 x 8 cells: parts with 128 kB.
-    small, 100, 64, 8, 28, 176
+    /// 100 x 96 x 4 cells: parts with 128 kB.
+    small, 100, 96, 4, 28, 176
 );
 
 /// A camera's unit, 200 m ahead and 30 m to each side.

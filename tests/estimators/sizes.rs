@@ -5,7 +5,6 @@ use std::mem::size_of;
 use viewshed::inputs::ars408::Ars408;
 use viewshed::inputs::native::{NativeReceiver, NativeSerialReceiver};
 use viewshed::inputs::ti::Ti;
-use viewshed::map::polar::PolarMap;
 use viewshed::radar_2d::{Radar2d, Radar2dParameters};
 use viewshed::unit::profile::{reference, small};
 use viewshed::wire::broadcast::Broadcaster;
@@ -15,7 +14,7 @@ use viewshed::wire::receive::SensorReceiver;
 fn the_reference_grid_fits_450_kb() {
     let state = size_of::<reference::State>();
     let parameters = size_of::<reference::Parameters>();
-    println!("radar-3d 200 x 120 x 16: state {state} B, parameters {parameters} B");
+    println!("radar-3d 200 x 128 x 12: state {state} B, parameters {parameters} B");
     assert!(state + parameters <= 450_000, "{state} + {parameters}");
 }
 
@@ -23,7 +22,7 @@ fn the_reference_grid_fits_450_kb() {
 fn the_small_profile_fits_72_kb_in_all() {
     let state = size_of::<small::State>();
     let parameters = size_of::<small::Parameters>();
-    println!("radar-3d 100 x 64 x 8: state {state} B, parameters {parameters} B");
+    println!("radar-3d 100 x 96 x 4: state {state} B, parameters {parameters} B");
     assert!(state + parameters <= 72_000, "{state} + {parameters}");
 }
 
@@ -37,9 +36,9 @@ fn the_flat_baseline_fits_450_kb() {
 
 #[test]
 fn a_polar_map_takes_two_bytes_a_cell() {
-    let map = size_of::<PolarMap<200, 120>>();
-    println!("polar map 200 x 120: {map} B");
-    assert!(map <= 2 * 200 * 120 + 128, "{map}");
+    let map = size_of::<reference::Map>();
+    println!("polar map 200 x 128: {map} B");
+    assert!(map <= 2 * 200 * 128 + 128, "{map}");
 }
 
 #[test]

@@ -89,10 +89,10 @@ fn a_sector_without_what_stands_in_it_is_unknown_until_it_is_back() {
     let geometry = watched.map.geometry();
     let middle_deg = |azimuth: usize| {
         let right = f64::from(geometry.azimuth_origin.radians()).to_degrees();
-        right + (azimuth as f64 + 0.5) / 64.0 * f64::from(geometry.azimuth_span) / 65_536.0 * 360.0
+        right + (azimuth as f64 + 0.5) / State::AZIMUTHS as f64 * f64::from(geometry.azimuth_span) / 65_536.0 * 360.0
     };
-    assert!(middle_deg(63) > 60.0, "beyond the view's edge: it is pitched");
-    assert!((0..64).all(|azimuth| unknown(azimuth) == (middle_deg(azimuth) > 40.0)));
+    assert!(middle_deg(State::AZIMUTHS - 1) > 60.0, "beyond the view's edge: it is pitched");
+    assert!((0..State::AZIMUTHS).all(|azimuth| unknown(azimuth) == (middle_deg(azimuth) > 40.0)));
     // it stays so while no frame comes, and while the radar is silent nothing is known at all
     let last = Time::from_micros(100_000 * watched.frame);
     assert_eq!(watched.state.expire(&watched.parameters, last, &mut watched.map), Condition::SectorBlind);

@@ -20,10 +20,10 @@ use crate::state;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grid {
-    /// 200 x 120 x 16 cells.
+    /// 200 x 128 x 12 cells.
     #[default]
     Reference,
-    /// 100 x 64 x 8 cells: half the resolution for less than half of the work.
+    /// 100 x 96 x 4 cells: half the resolution for less than half of the work.
     Small,
 }
 

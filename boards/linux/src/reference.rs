@@ -1,4 +1,4 @@
-//! The loop and its inputs on the grid of 200 x 120 x 16 cells; `small` has the same two files with another size.
+//! The loop and its inputs on the grid of 200 x 128 x 12 cells; `small` has the same two files with another size.
 
 use viewshed::reference as size;
 

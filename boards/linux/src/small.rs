@@ -1,4 +1,4 @@
-//! The loop and its inputs on the grid of 100 x 64 x 8 cells; `reference` has the same two files with another size.
+//! The loop and its inputs on the grid of 100 x 96 x 4 cells; `reference` has the same two files with another size.
 
 use viewshed::small as size;
 

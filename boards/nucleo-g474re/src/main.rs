@@ -117,7 +117,7 @@ async fn main(_spawner: Spawner) {
     line.baudrate = UnitConfig::SERVICE_BAUD;
     let line = Uart::new(p.LPUART1, p.PA3, p.PA2, p.DMA1_CH1, p.DMA1_CH2, Irqs, line).expect("a baud rate it has");
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
-    let identity = stm32::identity("nucleo-g474re", [100, 64]);
+    let identity = stm32::identity("nucleo-g474re", [100, 96]);
     let cycles = Some(CycleCounter { count: DWT::cycle_count, hz: 170_000_000 });
     let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into(), cycles };
     let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PA5, Level::Low, Speed::Low), watchdog };

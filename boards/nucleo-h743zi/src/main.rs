@@ -133,7 +133,7 @@ async fn main(_spawner: Spawner) {
     line.baudrate = UnitConfig::SERVICE_BAUD;
     let line = Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, line).expect("a baud rate it has");
     let epoch = Epoch::new(rng::Rng::new(p.RNG, Irqs).next_u32() as u8);
-    let identity = stm32::identity("nucleo-h743zi", [200, 120]);
+    let identity = stm32::identity("nucleo-h743zi", [200, 128]);
     let cycles = Some(CycleCounter { count: DWT::cycle_count, hz: 480_000_000 });
     let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into(), cycles };
     let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PB0, Level::Low, Speed::Low), watchdog };

@@ -24,7 +24,8 @@ use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
 use viewshed::sensor::noise::NoiseConfig;
 use viewshed::sensor::road::RoadPoint;
-use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
+use viewshed::unit::profile::{reference, small};
+use viewshed::wire::broadcast::{BroadcastConfig, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::header::Header;
 use viewshed::wire::message::{Addresses, Epoch, Packet, Plane};
@@ -205,10 +206,10 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
     match estimator {
         "radar-3d-blurred" => {
             let noise = NoiseConfig { range_m: 5.0, ..sensor.noise };
-            run_3d::<200, 120, 16, 7, 96, 256>(&Sensor { noise, ..sensor }, &even, &frames);
+            of_reference(&Sensor { noise, ..sensor }, &even, &frames);
         }
-        "radar-3d" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &even, &frames),
-        "radar-3d-narrow" => run_3d::<200, 120, 16, 7, 96, 256>(&sensor, &narrow, &frames),
+        "radar-3d" => of_reference(&sensor, &even, &frames),
+        "radar-3d-narrow" => of_reference(&sensor, &narrow, &frames),
         "send-can" | "receive-can" => run_wire(&sensor, &even, &frames, Medium::Can(Addresses::STANDARD)),
         "send-can-narrow" | "receive-can-narrow" => {
             run_wire(&sensor, &narrow, &frames, Medium::Can(Addresses::STANDARD));
@@ -217,13 +218,35 @@ fn work(estimator: &str, scene: &str, recording: &Path) {
         "send-long" | "receive-long" => run_wire(&sensor, &even, &frames, Medium::Serial),
         FUSION => run_fusion(&sensor, &frames),
         MONITOR => run_monitor(&sensor, &frames),
-        "radar-3d-small" => run_3d::<100, 64, 8, 4, 28, 176>(&sensor, &even, &frames),
+        "radar-3d-small" => of_small(&sensor, &even, &frames),
         _ => run_2d(&sensor, &frames),
     }
 }
 
 fn detection(d: &viewshed_harness::recording::RadarDetection) -> Option<Detection> {
     Detection::new(&estimators::measurement(d)).ok()
+}
+
+fn of_reference(sensor: &Sensor, config: &Radar3dConfig, frames: &[(Time, Vec<Detection>)]) {
+    run_3d::<
+        { reference::State::RANGES },
+        { reference::State::AZIMUTHS },
+        { reference::State::ELEVATIONS },
+        { reference::State::WORDS },
+        { reference::State::OBSTACLES },
+        { reference::State::DETECTIONS },
+    >(sensor, config, frames);
+}
+
+fn of_small(sensor: &Sensor, config: &Radar3dConfig, frames: &[(Time, Vec<Detection>)]) {
+    run_3d::<
+        { small::State::RANGES },
+        { small::State::AZIMUTHS },
+        { small::State::ELEVATIONS },
+        { small::State::WORDS },
+        { small::State::OBSTACLES },
+        { small::State::DETECTIONS },
+    >(sensor, config, frames);
 }
 
 fn run_3d<const R: usize, const A: usize, const E: usize, const W: usize, const N: usize, const D: usize>(
@@ -253,9 +276,8 @@ fn measured_frame_3d<const R: usize, const A: usize, const E: usize, const W: us
 
 /// Radar-3d's map as that of two sensors, a scan at a time.
 fn run_fusion(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
-    let parameters =
-        Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
+    let parameters = reference::Parameters::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(reference::State::new());
     let mut map = Box::new(parameters.map());
     let mut road = Box::new(Road::NOWHERE);
     road.set(RoadPoint::new(0, -1600), 100, FusionConfig::default()).expect("defaults are valid");
@@ -267,7 +289,7 @@ fn run_fusion(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
 }
 
 #[inline(never)]
-fn measured_fusion(road: &mut Road, now: Time, map: &PolarMap<200, 120>) {
+fn measured_fusion(road: &mut Road, now: Time, map: &reference::Map) {
     for sensor in 0..2 {
         let _ = black_box(road.offer_polar(sensor, now, now, map));
     }
@@ -282,9 +304,8 @@ struct Watch {
 
 /// Radar-3d's obstacles as those of two sensors, a scan at a time.
 fn run_monitor(sensor: &Sensor, frames: &[(Time, Vec<Detection>)]) {
-    let parameters =
-        Radar3dParameters::<200, 120, 16>::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
+    let parameters = reference::Parameters::new(sensor, &Radar3dConfig::default()).expect("defaults are valid");
+    let mut state = Box::new(reference::State::new());
     let mut map = Box::new(parameters.map());
     let levelling = sensor.mount.levelling().expect("the recording's mount");
     let view = [sensor.field_of_view.azimuth_min_deg, sensor.field_of_view.azimuth_max_deg];
@@ -311,7 +332,7 @@ fn measured_monitor(
     now: Time,
     places: &[RoadPoint],
     detections: &[Detection],
-    map: &PolarMap<200, 120>,
+    map: &reference::Map,
 ) {
     for place in places {
         for monitor in &mut watch.monitors {
@@ -325,19 +346,28 @@ fn measured_monitor(
     watch.fixtures.advance(now, |place| map.at(place).visible());
 }
 
+type OneReceiver = Receiver<1, { reference::State::AZIMUTHS }, { reference::State::WORDS }>;
+
 /// Radar-3d's maps from a sender to a receiver, a scan at a time.
 fn run_wire(sensor: &Sensor, config: &Radar3dConfig, frames: &[(Time, Vec<Detection>)], medium: Medium) {
-    let parameters = Radar3dParameters::<200, 120, 16>::new(sensor, config).expect("defaults are valid");
-    let mut state = Box::new(Radar3d::<200, 120, 16, 7, 96, 256>::new());
+    let parameters = reference::Parameters::new(sensor, config).expect("defaults are valid");
+    let mut state = Box::new(reference::State::new());
     let mut map = Box::new(parameters.map());
     let config = BroadcastConfig { gap_us: 0, ..BroadcastConfig::new(0, medium) };
     let view = parameters.axes().view(60);
     let usual = Known::new(view.start, view.end);
-    let header = Header::new::<200, 120>(&sensor.mount, map.geometry(), usual, 1, 0).expect("sendable");
+    let header = Header::new::<{ reference::State::RANGES }, { reference::State::AZIMUTHS }>(
+        &sensor.mount,
+        map.geometry(),
+        usual,
+        1,
+        0,
+    )
+    .expect("sendable");
     let begin = frames.first().map_or(Time::from_micros(0), |f| f.0);
     let mut sender =
-        Box::new(Broadcaster::<120, 7>::new(config, header, Epoch::new(1), begin).expect("defaults are valid"));
-    let mut receiver = Box::new(Receiver::<1, 120, 7>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));
+        Box::new(reference::Sender::new(config, header, Epoch::new(1), begin).expect("defaults are valid"));
+    let mut receiver = Box::new(OneReceiver::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT));
     for (now, detections) in frames {
         state.process(&parameters, *now, detections, false, &mut map);
         let mut packets = Vec::with_capacity(1000);
@@ -348,7 +378,7 @@ fn run_wire(sensor: &Sensor, config: &Radar3dConfig, frames: &[(Time, Vec<Detect
 }
 
 #[inline(never)]
-fn measured_send(sender: &mut Broadcaster<120, 7>, now: Time, map: &PolarMap<200, 120>, packets: &mut Vec<Packet>) {
+fn measured_send(sender: &mut reference::Sender, now: Time, map: &reference::Map, packets: &mut Vec<Packet>) {
     let _ = black_box(sender.scan(now, map));
     while let Some(packet) = sender.next_packet(now) {
         packets.push(packet);
@@ -356,7 +386,7 @@ fn measured_send(sender: &mut Broadcaster<120, 7>, now: Time, map: &PolarMap<200
 }
 
 #[inline(never)]
-fn measured_receive(receiver: &mut Receiver<1, 120, 7>, now: Time, packets: &[Packet], medium: Medium) {
+fn measured_receive(receiver: &mut OneReceiver, now: Time, packets: &[Packet], medium: Medium) {
     for packet in packets {
         let _ = black_box(match medium {
             Medium::Serial => receiver.message(now, packet.bytes()),

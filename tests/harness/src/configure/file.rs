@@ -108,7 +108,7 @@ pub fn read(path: &Path) -> Result<UnitFile> {
 }
 
 /// The table as a block. Tables are fitted on the reference grid.
-#[allow(clippy::cast_possible_truncation)] // 200, 120
+#[allow(clippy::cast_possible_truncation)] // 200, 128
 fn table(given: &Given) -> Result<Vec<u8>> {
     let share = given.risk.is_none_or(|risk| risk > 0.0 && risk < 1.0);
     ensure!(share, "probability.risk is not between 0 and 1: 0.1 is 10 %");

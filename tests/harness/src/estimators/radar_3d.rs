@@ -28,10 +28,10 @@ const _: () = assert!(State::OBSTACLES == 96 && small::State::OBSTACLES == 28, "
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grid {
-    /// 200 x 120 x 16 cells, for parts with 512 kB
+    /// 200 x 128 x 12 cells, for parts with 512 kB
     #[default]
     Reference,
-    /// 100 x 64 x 8 cells, 28 vehicles and 176 detections a frame, for parts with 128 kB
+    /// 100 x 96 x 4 cells, 28 vehicles and 176 detections a frame, for parts with 128 kB
     Small,
 }
 
@@ -45,8 +45,8 @@ impl Grid {
     /// Ranges and azimuths.
     pub const fn grid(self) -> [u8; 2] {
         match self {
-            Self::Reference => [200, 120],
-            Self::Small => [100, 64],
+            Self::Reference => [RANGES as u8, AZIMUTHS as u8],
+            Self::Small => [small::State::RANGES as u8, small::State::AZIMUTHS as u8],
         }
     }
 

@@ -200,7 +200,7 @@ fn what_a_unit_cannot_keep_is_said_before_anything_is_written() {
     std::fs::write(folder.join("t.toml"), table.text().unwrap()).unwrap();
     std::fs::write(folder.join("unit.toml"), example.clone() + "[probability]\nfile = \"t.toml\"\n").unwrap();
     let (code, _, error) = said(&folder, &["unit.toml", "--port", &port]);
-    assert!(code == 2 && error.contains("the table was fitted on a grid of 200 x 120"), "{error}");
+    assert!(code == 2 && error.contains("the table was fitted on a grid of 200 x 128"), "{error}");
 }
 
 #[test]

@@ -127,7 +127,7 @@ fn nothing_is_written_to_a_port_before_a_bench_of_that_grid_has_named_itself() {
     let folder = folder("port-product");
     for (is_bench, profile, what) in [
         (false, "small", "this-computer is no test bench: its image takes no scans on this line"),
-        (true, "reference", "has the grid 100 x 64, which is --profile small"),
+        (true, "reference", "has the grid 100 x 96, which is --profile small"),
     ] {
         let path = device(Profile::Small, is_bench, Some);
         let (output, _) = replay(&folder, "motorway.mcap", &["--port", &path, "--profile", profile, "--to", "1"]);

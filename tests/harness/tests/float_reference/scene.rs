@@ -9,14 +9,15 @@ use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::ground::Ground as Level;
 use viewshed::sensor::mount::{Levelling, Mount};
 use viewshed::sensor::noise::{Noise, NoiseConfig};
+use viewshed::unit::profile::reference;
 
 use crate::geometry::{Ground, Levelled, along};
 use crate::grid::{Axes, Grid};
 
 /// Range cells, azimuths and elevations of the reference grid.
-pub const RANGES: usize = 200;
-pub const AZIMUTHS: usize = 120;
-pub const ELEVATIONS: usize = 16;
+pub const RANGES: usize = reference::State::RANGES;
+pub const AZIMUTHS: usize = reference::State::AZIMUTHS;
+pub const ELEVATIONS: usize = reference::State::ELEVATIONS;
 
 pub type IntegerAxes = viewshed::grid::axes::Axes<RANGES, AZIMUTHS, ELEVATIONS>;
 pub type IntegerGrid = SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>;

@@ -248,7 +248,7 @@ fn linux_the_first_try_without_hardware_works_from_the_projects_folder() {
     assert!(output.status.success() && said.contains("35 maps, "), "{said}");
     let output = Command::new(env!("CARGO_BIN_EXE_viewshed")).arg("listen").arg(&log).output().unwrap();
     let heard = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(heard.contains("64 azimuths from") && heard.contains("100 ranges of 2 m"), "{heard}");
+    assert!(heard.contains("96 azimuths from") && heard.contains("100 ranges of 2 m"), "{heard}");
 }
 
 #[test]
