@@ -243,14 +243,15 @@ mod tests {
             }
             for a in 0..AZIMUTHS {
                 let (got, exact) = (integer.view(a), &exact.view[a]);
-                assert!(got.start.abs_diff(exact.start) <= 1 && got.end.abs_diff(exact.end) <= 1, "{got:?} {exact:?}");
+                // at a limit of elevation the view may end anywhere between two azimuths
+                assert!(got.start.abs_diff(exact.start) <= 1 && got.end.abs_diff(exact.end) <= 2, "{got:?} {exact:?}");
                 view_differs += f64::from(u8::from(got != *exact));
             }
         }
         within("outer edges, degrees", edge_deg, 0.004);
         within("edges and places of slopes, rows", row, 0.021);
         within("slice points, rows", slice, 0.017);
-        // whole centimetres at the near end: 3 of 360 columns
+        // whole centimetres at the near end: 3 of 384 columns
         within("columns with another cell in view", view_differs, 4.0);
     }
 
