@@ -112,7 +112,7 @@ fn a_cell_says_how_often_a_vehicle_there_is_detected() {
     let last = overview(&server)["count"].as_u64().unwrap() - 1;
     // by state: unknown, invisible, visible
     let mut said: [Vec<Option<f64>>; 3] = Default::default();
-    for (azimuth, range) in (0..120).step_by(12).flat_map(|a| (0..200).step_by(8).map(move |r| (a, r))) {
+    for (azimuth, range) in (0..128).step_by(12).flat_map(|a| (0..200).step_by(8).map(move |r| (a, r))) {
         let (_, answer) = server.own("GET", &format!("cell/{last}/0/{azimuth}/{range}"), &[], "");
         let cell: Value = serde_json::from_str(answer.split("\r\n\r\n").nth(1).unwrap_or_default()).unwrap();
         said[cell["state"].as_u64().unwrap() as usize & 3].push(cell["probability"].as_f64());

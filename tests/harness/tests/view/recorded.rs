@@ -276,7 +276,7 @@ fn with_a_table_a_cell_says_how_often_a_vehicle_there_is_detected_and_what_a_rec
     };
     let edges = [2, 26, 51, 76, 102, 128, 153, 179, 204, 230, 255];
     let (mut known, mut lower, mut both) = (0, 0, 0);
-    for (azimuth, range) in (0..120).step_by(7).flat_map(|a| (0..200).step_by(9).map(move |r| (a, r))) {
+    for (azimuth, range) in (0..128).step_by(7).flat_map(|a| (0..200).step_by(9).map(move |r| (a, r))) {
         let (own, received) = (cell(0, azimuth, range), cell(1, azimuth, range));
         let grade = own["grade"].as_u64().unwrap();
         let step = edges.iter().filter(|edge| grade >= **edge).count();

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use viewshed::fixed::time::Time;
 use viewshed::inputs::ti::TiFamily;
 use viewshed::map::Visibility;
+use viewshed::unit::profile::reference::State;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{Kind, Settings, Which};
 use viewshed::wire::message::{Addresses, Message, Received};
@@ -100,7 +101,7 @@ fn linux_in_a_test_bench_every_message_of_five_seconds_is_the_same() {
 const LIMITS: ReceiverLimits = ReceiverLimits { max_age_us: 1_000_000, max_delay_us: 500_000 };
 const PATIENT: &str = "gap_us = 0\nstale_ms = 500\nmax_age_ms = 1000\nmax_delay_ms = 500\n";
 
-type Far = Receiver<1, 120, 7>;
+type Far = Receiver<1, { State::AZIMUTHS }, { State::WORDS }>;
 
 /// What a receiver has of these messages.
 struct Heard {
@@ -131,7 +132,9 @@ impl Heard {
 
     fn cells(&self) -> Vec<Visibility> {
         let map = self.receiver.map(SENSOR, self.now);
-        (0..120 * 200).map(|k| map.cell(k / 200, k % 200).visibility).collect()
+        (0..State::AZIMUTHS * State::RANGES)
+            .map(|k| map.cell(k / State::RANGES, k % State::RANGES).visibility)
+            .collect()
     }
 
     /// Listens until something is so; `false` if it is not within ten seconds.

@@ -7,7 +7,7 @@ use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
 use viewshed::map::Visibility;
-use viewshed::unit::profile::reference::Map;
+use viewshed::unit::profile::reference::{Map, State};
 use viewshed::unit::said::Said;
 use viewshed::unit::service::Request;
 use viewshed::unit::settings::{BLOCK_LEN, BlockError, Kind, Settings, Which};
@@ -66,7 +66,14 @@ fn messages(bytes: &[u8]) -> Vec<Vec<u8>> {
     all
 }
 
-type Hearing = Receiver<1, 120, 7>;
+/// Azimuths and ranges of the reference grid.
+const AZIMUTHS: usize = State::AZIMUTHS;
+/// See [`AZIMUTHS`].
+const RANGES: usize = State::RANGES;
+/// All of its cells but one in 120.
+const NEARLY_ALL: usize = AZIMUTHS * RANGES * 119 / 120;
+
+type Hearing = Receiver<1, AZIMUTHS, { State::WORDS }>;
 
 /// A receiver that heard everything when it was sent.
 fn listen(answered: &Answered) -> Hearing {
@@ -74,7 +81,7 @@ fn listen(answered: &Answered) -> Hearing {
 }
 
 /// The same with so many planes.
-fn listen_to<const P: usize>(answered: &Answered) -> Receiver<1, 120, 7, P> {
+fn listen_to<const P: usize>(answered: &Answered) -> Receiver<1, AZIMUTHS, { State::WORDS }, P> {
     let mut receiver = Receiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let mut from = 0;
     for (to, now) in &answered.times {
@@ -124,7 +131,8 @@ fn every_byte_of_five_seconds_is_the_same() {
     let now = on_the_line(scans.last().unwrap().time, scans[0].time);
     let far = listen(board.expected.as_ref().unwrap());
     let map = far.map(SENSOR, now);
-    let visible = (0..120 * 200).filter(|k| map.cell(k / 200, k % 200).visibility == Visibility::Visible).count();
+    let visible =
+        (0..AZIMUTHS * RANGES).filter(|k| map.cell(k / RANGES, k % RANGES).visibility == Visibility::Visible).count();
     assert!(visible > 5000, "{visible}");
 }
 
@@ -179,7 +187,7 @@ fn a_radar_that_stops_makes_the_map_unknown_and_the_status_blind() {
     let now = on_the_line(later(1200), first);
     let far = listen(board.expected.as_ref().unwrap());
     let map = far.map(SENSOR, now);
-    assert!((0..120 * 200).all(|k| map.cell(k / 200, k % 200).visibility == Visibility::Unknown));
+    assert!((0..AZIMUTHS * RANGES).all(|k| map.cell(k / RANGES, k % RANGES).visibility == Visibility::Unknown));
     let status = far.sensor(SENSOR).and_then(|s| s.status()).unwrap();
     assert_eq!((status.state, status.reason), (UnitState::Blind, Reason::RadarSilent));
 }
@@ -219,12 +227,13 @@ fn a_supervised_radar_that_goes_blind_to_the_left_is_unknown_there_and_its_statu
     assert_eq!((status.state, status.reason), (UnitState::Degraded, Reason::SectorBlind));
     let map = far.map(SENSOR, now);
     let known = |azimuths: std::ops::Range<usize>| {
-        let cells = azimuths.flat_map(|a| (0..200).map(move |r| (a, r)));
+        let cells = azimuths.flat_map(|a| (0..RANGES).map(move |r| (a, r)));
         cells.filter(|(a, r)| map.cell(*a, *r).visibility != Visibility::Unknown).count()
     };
-    // six sectors of 20 azimuths, from right to left
-    assert!((0..5).all(|sector| known(20 * sector..20 * sector + 20) > 1000));
-    assert_eq!((100..120).map(|a| known(a..a + 1)).collect::<Vec<_>>(), [0; 20]);
+    // six sectors of 20 degrees, from right to left; the view and a degree beside it on either side are 122
+    let from_deg = |degrees: usize| (degrees + 1) * AZIMUTHS / 122;
+    assert!((0..5).all(|sector| known(from_deg(20 * sector)..from_deg(20 * sector + 20)) > 1000));
+    assert!((from_deg(100) + 1..AZIMUTHS).all(|a| known(a..a + 1) == 0) && known(from_deg(100) - 2..from_deg(100)) > 0);
 }
 
 #[test]
@@ -322,14 +331,19 @@ fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_map
         let quantised = Quantised { map, quantiser: &quantiser };
         let of_ray = |a| {
             let ray = Planes::<7>::ray(&quantised, Plane::Visibility, a);
-            (0..200).filter(|r| ray.bits().get(*r) == (received.cell(a, *r).visibility == Visibility::Visible)).count()
+            (0..RANGES)
+                .filter(|r| ray.bits().get(*r) == (received.cell(a, *r).visibility == Visibility::Visible))
+                .count()
         };
-        (0..120).map(of_ray).sum()
+        (0..AZIMUTHS).map(of_ray).sum()
     };
     let (_, flat, _) = kept::on_a_pc(&settings, &scans);
     let (equal, of_flat) = (cells(&map), cells(&flat));
     // rays that were not sent again since are of a scan before
-    assert!(equal > 23_900 && of_flat < 23_500, "{equal} of 24000 cells are the PC's, {of_flat} those of a flat road");
+    assert!(
+        equal > NEARLY_ALL && of_flat < AZIMUTHS * RANGES * 47 / 48,
+        "{equal} cells are the PC's, {of_flat} those of a flat road"
+    );
 }
 
 #[test]
@@ -345,8 +359,10 @@ fn azimuths_narrower_along_the_road_are_those_of_a_pc_and_told_in_the_header() {
     let [first, end, times] = told.narrow.to_bytes();
     assert!(end - first > 40 && times == 4 && told.narrow == header.narrow, "{first} {end} {times}");
     let visible = |a, r| received.cell(a, r).visibility == Visibility::Visible;
-    let equal = (0..120 * 200).filter(|k| visible(k / 200, k % 200) == map.cell(k / 200, k % 200).visible()).count();
-    assert!(equal > 23_900, "{equal} of 24000 cells are the PC's");
+    let equal = (0..AZIMUTHS * RANGES)
+        .filter(|k| visible(k / RANGES, k % RANGES) == map.cell(k / RANGES, k % RANGES).visible())
+        .count();
+    assert!(equal > NEARLY_ALL, "{equal} cells are the PC's");
 }
 
 #[test]
