@@ -66,7 +66,7 @@ fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
         assert_eq!(map.header().unwrap().probability, Some(quantiser(threshold).levels()));
         let cells = (0..State::AZIMUTHS).flat_map(|a| (0..State::RANGES).map(move |r| (a, r)));
         let given = cells.filter(|(a, r)| map.probability(*a, *r).is_some_and(|p| p.raw() > 200)).count();
-        assert!(given > 4000, "{risk}: {given} cells above 0.78");
+        assert!(given > 1000, "{risk}: {given} cells above 0.78");
     }
 }
 
