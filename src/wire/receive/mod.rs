@@ -51,7 +51,7 @@
 //! every first word of a map before any second one.
 //!
 //! # ReceiverLimits
-//! For 120 azimuths by 200 ranges 8.0 kB a sensor, ages included.
+//! For 128 azimuths by 200 ranges 8.5 kB a sensor, ages included.
 
 mod assembly;
 mod collector;

@@ -76,7 +76,7 @@ const WIRE: [&str; 8] = [
 type Road = Fusion<2, 200, 32>;
 
 /// Instructions a scan that sending and receiving may take, median, on every bus.
-const WIRE_BUDGET: u64 = 150_000;
+const WIRE_BUDGET: u64 = 160_000;
 /// The same of azimuths of which some are narrow: of a road that is drawn finer there is more to say.
 const NARROW_WIRE_BUDGET: u64 = 180_000;
 
