@@ -136,7 +136,7 @@ fn narrow_azimuths_are_drawn_where_they_lie_on_the_senders_and_the_receivers_map
             let told = page.ask("viewshed.told");
             let [at_x, at_y] = ["x_m", "y_m"].map(|key| told[key].as_f64().unwrap());
             // half a column to each side of its middle, and what a pixel is wide
-            let wide = if (y.atan2(x)).to_degrees().abs() < 10.0 { 0.38_f64 } else { 1.53 };
+            let wide = if (y.atan2(x)).to_degrees().abs() < 10.0 { 0.36_f64 } else { 1.43 };
             let across = (at_y.atan2(at_x) - y.atan2(x)).abs() * x.hypot(y);
             let most = x.hypot(y) * wide.to_radians() / 2.0 + 0.15;
             assert!(across <= most, "map {map}, ({x}, {y}): {across} m beside {told}, {most}");
