@@ -13,6 +13,7 @@ use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
 use viewshed::unit::can_service::{Answers, Tool};
+use viewshed::unit::profile::reference::State;
 use viewshed::unit::said::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
@@ -105,7 +106,7 @@ impl Drop for Daemon {
 struct Bench {
     radar: CanFdSocket,
     maps: CanFdSocket,
-    receiver: Box<Receiver<1, 120, 7>>,
+    receiver: Box<Receiver<1, { State::AZIMUTHS }, { State::WORDS }>>,
     begin: Instant,
     heard: usize,
     tool: Tool,
@@ -207,7 +208,9 @@ impl Bench {
 
     fn visible(&self) -> usize {
         let map = self.receiver.map(0, self.now());
-        (0..120 * 200).filter(|k| map.cell(k / 200, k % 200).visibility == Visibility::Visible).count()
+        let ranges = State::RANGES;
+        let seen = |k: &usize| map.cell(k / ranges, k % ranges).visibility == Visibility::Visible;
+        (0..State::AZIMUTHS * ranges).filter(seen).count()
     }
 }
 
