@@ -34,7 +34,7 @@ fi
 
 debian=/usr/bin/rustc
 library=/usr/lib/rustlib/src/rust/library
-if ! [ -x "$debian" ] || ! [ -x /usr/bin/cargo ] || ! [ -d "$library/core" ]; then
+if ! [ -x "$debian" ] || ! [ -x /usr/bin/cargo ] || ! [ -d "$library/core" ] || ! [ -d "$library/vendor" ]; then
     echo "no core library for $targets: \`rustup target add $targets\`, or on Debian" \
         "\`apt-get install rustc-web cargo-web rust-web-src lld\`" >&2
     exit 1

@@ -144,7 +144,7 @@ impl Class {
             LateAndRepeated => [94.0, 97.5, 97.5],
             // nothing is shown while a queue drains, nor before the next header
             DrainAtStart => [92.0, 91.5, 92.0],
-            DrainAfterStall => [65.5, 61.0, 61.0],
+            DrainAfterStall => [63.0, 61.0, 61.0],
             Cuts => [60.0; 3],
             SenderRestarts => [77.0, 76.0, 76.0],
             ReceiverRestarts => [84.2, 87.2, 87.0],
@@ -155,7 +155,7 @@ impl Class {
             DelayPasses => [86.0, 84.0, 78.0],
             DelayStays => [63.0, 61.0, 63.0],
             HeaderFaults => [70.0, 75.0, 75.0],
-            MadeUpMaps => [89.0, 97.8, 97.4],
+            MadeUpMaps => [87.3, 97.8, 97.4],
         };
         match bus {
             Bus::Can => can,
