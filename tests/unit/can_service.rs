@@ -5,6 +5,7 @@ use viewshed::fixed::time::Time;
 use viewshed::unit::Flow;
 use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig, INCOMPLETE, REQUEST, Tool};
 use viewshed::unit::identity::Identity;
+use viewshed::unit::profile::reference::State;
 use viewshed::unit::profile::small;
 use viewshed::unit::said::{Piece, Said};
 use viewshed::unit::settings::{
@@ -21,6 +22,9 @@ use crate::common::gantry;
 const SENSOR: u8 = 2;
 const CLASSIC: Medium = Medium::Can(Addresses::STANDARD);
 const FD: Medium = Medium::CanFd(Addresses::STANDARD);
+
+/// A receiver of the reference grid's maps.
+type MapReceiver = Receiver<1, { State::AZIMUTHS }, { State::WORDS }>;
 
 #[derive(Clone)]
 struct InRam([[u8; BLOCK_LEN]; 2], usize);
@@ -138,7 +142,7 @@ fn a_corrupted_block_is_refused_with_its_reason_and_the_unit_is_in_its_safe_stat
         let said = answers(&mut unit, &slots, medium);
         assert!(matches!(said[..], [Said::Started(None), Said::Refused(r)] if r.reason == 4), "{said:?}");
         // the status says it to everybody, at least twice a second
-        let mut receiver = Receiver::<1, 128, 7>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+        let mut receiver = MapReceiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
         let mut last = 0;
         for ms in 0..3000 {
             let Some(frame) = unit.next_status(at(ms), Status::starting(0)) else { continue };
@@ -199,7 +203,7 @@ fn receivers_of_maps_and_other_sensors_units_leave_these_messages_alone() {
     let (mut slots, mut tool) = (empty(), Tool::new(SENSOR, CLASSIC));
     let block = settings(6.0).to_block(1);
     let mut other = CanService::start(CanServiceConfig::new(3, CLASSIC), Epoch::new(1), at(0), stored(&slots));
-    let mut receiver = Receiver::<1, 128, 7>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+    let mut receiver = MapReceiver::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);
     let mut unit = start(CLASSIC, &slots);
     let status = unit.next_status(at(0), Status::starting(0)).unwrap();
     assert_eq!(receiver.frame(at(0), &status), Err(Refused::FirstOfEpoch));

@@ -134,7 +134,7 @@ impl Class {
     pub fn least(self, bus: Bus) -> f64 {
         let [can, canfd, serial] = match self {
             Lossless | Others | Repeated20 | Strays | Echo => [97.5; 3],
-            // the longest maps of 128 azimuths fill the time to the next at a frame's millisecond
+            // the longest maps, 56 frames, nearly fill the time to the next at a millisecond a frame
             Mailboxes => [95.7, 97.5, 97.5],
             Loss1 | Late1 => [97.5, 98.0, 98.0],
             Loss5 | Probabilities | NarrowAzimuths => [94.0, 97.5, 97.5],
