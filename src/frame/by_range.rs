@@ -100,6 +100,7 @@ mod tests {
             radial_velocity_cm_s: 0,
             across_cm: 1,
             height_cm: None,
+            rcs_half_dbsm: None,
             strength: 0,
         };
         // the fourth is as far away as the others, in another direction
@@ -125,6 +126,7 @@ mod tests {
                 radial_velocity_cm_s: 0,
                 across_cm: 1,
                 height_cm: None,
+                rcs_half_dbsm: None,
                 strength: 0,
             })
             .collect();

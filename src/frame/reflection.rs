@@ -29,6 +29,8 @@ pub struct Reflection {
     pub across_cm: u16,
     /// Measured height above the road and its standard deviation, centimetres.
     pub height_cm: Option<(i16, u16)>,
+    /// Radar cross section, half dBsm, where the radar measures it.
+    pub rcs_half_dbsm: Option<i16>,
     /// What decides who stays when a list is full, half dB.
     pub strength: i16,
 }
@@ -78,6 +80,7 @@ impl Noise {
             radial_velocity_cm_s: d.radial_velocity_cm_s,
             across_cm: math::mul_shift(range, self.azimuth, 16).clamp(1, 65_535) as u16,
             height_cm: None,
+            rcs_half_dbsm: d.rcs_half_dbsm,
             strength: d.strength(),
         }
     }

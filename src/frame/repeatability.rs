@@ -220,6 +220,7 @@ mod tests {
             radial_velocity_cm_s,
             across_cm: 1,
             height_cm: None,
+            rcs_half_dbsm: None,
             strength: 0,
         }
     }

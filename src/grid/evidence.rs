@@ -423,6 +423,7 @@ mod tests {
             radial_velocity_cm_s: 0,
             across_cm: 20,
             height_cm: None,
+            rcs_half_dbsm: None,
             strength: 0,
         }
     }

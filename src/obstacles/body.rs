@@ -9,6 +9,10 @@ use crate::obstacles::solid::Solid;
 
 /// Greatest length of what is low, centimetres.
 pub(super) const LONGEST_LOW_CM: i32 = 900;
+/// Greatest length of a car, centimetres: longer ones are vans, or two things in one outline.
+const LONGEST_CAR_CM: i32 = 530;
+/// Greatest length that a pedestrian or rider shows, centimetres.
+const LONGEST_RIDER_CM: i32 = 250;
 /// Shortest length of what shows its side alone, centimetres.
 const SHORTEST_LORRY_CM: i32 = 800;
 /// Sine of the angle to the road's axis from which a thing goes across it, 2^-14: 14.5 degrees.
@@ -19,9 +23,7 @@ impl Obstacle {
     /// before it where that is its farther end.
     pub fn solid(&self, t: &Tracking) -> Solid {
         let size = self.size(t);
-        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
-        let may_be_low = size.length_cm < LONGEST_LOW_CM || self.profile.is_a_row_of_cars(&self.extent);
-        let lid = if may_be_low { self.tallness.ceiling_cm() } else { i32::MAX };
+        let lid = if self.may_be_low(&size, t) { self.tallness.ceiling_cm() } else { i32::MAX };
         let margin = self.margin_cm(t);
         let (x, y) = self.global(self.extent.middle_cm(), 0);
         let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
@@ -44,7 +46,20 @@ impl Obstacle {
     /// What its outline, what it has shown for long and its proven height make it.
     pub(super) fn size(&self, t: &Tracking) -> Size {
         let tall = t.sizes.least_length_cm(self.tallness.floor_cm());
-        t.sizes.of(self.extent.length_cm().max(self.remembered_length_cm(t)).max(tall))
+        let shown = self.extent.length_cm();
+        if shown < LONGEST_RIDER_CM && tall == 0 && self.reflectivity.is_below(t.weak_rcs) {
+            return Size { length_cm: shown.max(Size::RIDER.length_cm), ..Size::RIDER };
+        }
+        t.sizes.of(shown.max(self.remembered_length_cm(t)).max(tall))
+    }
+
+    /// Whether something of this size that shows nothing high is low. What is as long as a lorry may be one, unless it is
+    /// several cars in a row or hardly reflects; so may what is longer than a car and reflects like a lorry.
+    fn may_be_low(&self, size: &Size, t: &Tracking) -> bool {
+        if size.length_cm >= LONGEST_LOW_CM {
+            return self.profile.is_a_row_of_cars(&self.extent) || self.reflectivity.is_below(t.low_rcs);
+        }
+        self.extent.length_cm() < LONGEST_CAR_CM || !self.reflectivity.is_above(t.lorry_rcs)
     }
 
     /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its
@@ -81,6 +96,7 @@ mod tests {
     use super::super::Obstacles;
     use super::super::by_hand::{PERIOD_S, reflection, rules, seen_at};
     use super::super::obstacle::Obstacle;
+    use super::super::size::Size;
     use crate::fixed::time::Step;
     use crate::fixed::trig::Direction;
     use crate::frame::by_range::ByRange;
@@ -148,6 +164,52 @@ mod tests {
         {
             assert!(height_of(lorry, 40, 70) > 3.0, "{lorry:?}: {}", height_of(lorry, 40, 70));
         }
+    }
+
+    /// An obstacle that shows so much of itself, and reflects so much in each of ten frames.
+    fn reflecting(length_cm: i32, dbsm: Option<i16>) -> Obstacle {
+        let mut o = Obstacle::new(&seen_at(5000, 0, 2000), AHEAD, 2000);
+        for _ in 0..10 {
+            o.predict(Step::from_micros(1), 1 << 16, &rules());
+            for (along, less) in [(-length_cm / 2, 10), (length_cm / 2, 0)] {
+                let r = seen_at(5000 + along, 0, 2000);
+                o.absorb(&Reflection { rcs_half_dbsm: dbsm.map(|v| 2 * (v - less)), ..r }, &rules());
+            }
+            o.settle(Step::from_micros(1), &rules());
+        }
+        o
+    }
+
+    #[test]
+    fn what_is_short_and_reflects_weakly_is_a_rider_and_without_a_cross_section_everything_is_a_vehicle() {
+        let t = rules();
+        let size = |length_cm, dbsm| reflecting(length_cm, dbsm).size(&t);
+        assert_eq!(size(100, Some(-7)), Size::RIDER);
+        assert!((180..=250).contains(&size(200, Some(-7)).length_cm), "no shorter than it shows");
+        for vehicle in [size(100, Some(0)), size(100, None), size(400, Some(-7))] {
+            assert_eq!((vehicle.width_cm, vehicle.length_cm >= 380), (180, true), "{vehicle:?}");
+        }
+        let mut high = reflecting(100, Some(-7));
+        high.tallness = super::super::by_hand::tall();
+        assert!(high.size(&t).length_cm >= 600, "a weak echo of something that is tall for certain");
+    }
+
+    #[test]
+    fn what_reflects_like_a_lorry_is_not_low_and_what_hardly_reflects_is_no_lorry() {
+        let t = rules();
+        let height = |length_cm, dbsm| {
+            let mut o = reflecting(length_cm, dbsm);
+            (0..100).for_each(|_| o.tallness.add(70, 30));
+            assert!(o.tallness.is_low());
+            o.solid(&t).height_cm
+        };
+        for (length_cm, dbsm, is_low) in
+            [(440, 14, true), (700, 14, false), (700, 8, true), (1200, 8, false), (1200, 3, true)]
+        {
+            let height_cm = height(length_cm, Some(dbsm));
+            assert_eq!(height_cm <= 160, is_low, "{length_cm} cm, {dbsm} dBsm: {height_cm} cm high");
+        }
+        assert!(height(700, None) <= 160 && height(1200, None) > 300, "where the radar does not measure it");
     }
 
     #[test]

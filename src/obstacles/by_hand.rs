@@ -36,6 +36,7 @@ pub fn seen_at(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
         radial_velocity_cm_s,
         across_cm: 40,
         height_cm: None,
+        rcs_half_dbsm: None,
         strength: 0,
     }
 }
@@ -52,6 +53,7 @@ pub fn reflection([x, y]: [f64; 2], [vx, vy]: [f64; 2]) -> Reflection {
         radial_velocity_cm_s: ((vx * x + vy * y) / distance * 100.0).round() as i16,
         across_cm: (distance * 0.87).round().max(1.0) as u16,
         height_cm: None,
+        rcs_half_dbsm: None,
         strength: 0,
     }
 }

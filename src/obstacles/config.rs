@@ -2,6 +2,7 @@
 
 use super::lanes::Lanes;
 use super::profile::HIT;
+use super::reflectivity;
 use super::size::SizeConfig;
 #[cfg(feature = "tuned")]
 use super::size::SizePoint;
@@ -104,6 +105,12 @@ pub struct ObstacleConfig {
     pub standing_visible_loss_per_s: f32,
     /// Loss of evidence of what stands in a shadow, detections per second: as long as a red light lasts.
     pub standing_hidden_loss_per_s: f32,
+    /// [Radar cross section](super::reflectivity) below which what is short is a pedestrian or rider, dBsm.
+    pub weak_rcs_dbsm: f32,
+    /// Radar cross section below which nothing of any length is a lorry that shows nothing high, dBsm.
+    pub low_rcs_dbsm: f32,
+    /// Radar cross section half way between a car's and a lorry's, dBsm.
+    pub lorry_rcs_dbsm: f32,
     /// Widths and heights by length.
     pub sizes: SizeConfig,
 }
@@ -152,6 +159,9 @@ impl Default for ObstacleConfig {
             standing_speed_mps: 0.7,
             standing_visible_loss_per_s: 5.0,
             standing_hidden_loss_per_s: 0.1,
+            weak_rcs_dbsm: -3.0,
+            low_rcs_dbsm: 5.0,
+            lorry_rcs_dbsm: 11.0,
             sizes: SizeConfig::default(),
         }
     }
@@ -169,7 +179,8 @@ impl ObstacleConfig {
             merge_lateral_m, abreast_m, merge_speed_mps, half_width_m, mover_way_m, turning_speed_mps,
             outline_sigmas, turning_noise_mps, own_way_sigmas, own_way_mps, own_way_share,
             own_way_follow, own_way_margin_m, length_growth_s, length_memory_s, slow_mps,
-            heading_sigmas, standing_speed_mps, standing_visible_loss_per_s, standing_hidden_loss_per_s;
+            heading_sigmas, standing_speed_mps, standing_visible_loss_per_s, standing_hidden_loss_per_s,
+            weak_rcs_dbsm, low_rcs_dbsm, lorry_rcs_dbsm;
             but sizes
         );
         let SizeConfig { points, min_length_m } = self.sizes;
@@ -189,6 +200,8 @@ impl ObstacleConfig {
         let fine = |name, v, min, max| within(name, v, min, max).map(|s| math::round_i32(s * 25_600.0));
         let turning = within("obstacles.turning_noise_mps", self.turning_noise_mps, 0.1, 10.0)?;
         let hits = |name, v| within(name, v, 0.0, 1000.0).map(|h| math::round_i32(h * 256.0));
+        let half_db = (2 << reflectivity::FRACTION) as f32;
+        let rcs = |name, v| within(name, v, -60.0, 60.0).map(|dbsm| math::round_i32(dbsm * half_db));
         let gap_cm = cm("obstacles.gap_m", self.gap_m, 0.5, 20.0)?;
         let max_length_cm = cm("obstacles.max_length_m", self.max_length_m, 2.0, 22.0)?;
         let confirmed = hits("obstacles.confirm_hits", self.confirm_hits)?;
@@ -246,6 +259,9 @@ impl ObstacleConfig {
             standing_speed: fine("obstacles.standing_speed_mps", self.standing_speed_mps, 0.0, 5.0)?,
             standing_visible_loss: hits("obstacles.standing_visible_loss_per_s", self.standing_visible_loss_per_s)?,
             standing_hidden_loss: hits("obstacles.standing_hidden_loss_per_s", self.standing_hidden_loss_per_s)?,
+            weak_rcs: rcs("obstacles.weak_rcs_dbsm", self.weak_rcs_dbsm)?,
+            low_rcs: rcs("obstacles.low_rcs_dbsm", self.low_rcs_dbsm)?,
+            lorry_rcs: rcs("obstacles.lorry_rcs_dbsm", self.lorry_rcs_dbsm)?,
             sizes: self.sizes.sizes()?,
             noise,
             road,

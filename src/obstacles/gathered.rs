@@ -29,6 +29,8 @@ pub(super) struct Gathered {
     pub sight: Direction,
     /// Its standard deviation across that, cm.
     pub across_cm: i32,
+    /// Greatest radar cross section, half dBsm.
+    pub rcs_half_dbsm: Option<i16>,
 }
 
 impl Gathered {
@@ -41,6 +43,7 @@ impl Gathered {
         radial: 0,
         sight: Direction::AHEAD,
         across_cm: 0,
+        rcs_half_dbsm: None,
     };
 
     /// Adds a detection `along` ahead of the anchor and `left` of it (cm), whose radial velocity is
@@ -59,6 +62,7 @@ impl Gathered {
         self.radial += error;
         self.sight = r.sight;
         self.across_cm = i32::from(r.across_cm);
+        self.rcs_half_dbsm = self.rcs_half_dbsm.max(r.rcs_half_dbsm);
     }
 
     /// Standard deviation along a heading that comes from azimuth alone, cm.

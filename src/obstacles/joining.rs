@@ -130,6 +130,7 @@ impl Obstacle {
         self.travelled_cm = self.travelled_cm.max(before.travelled_cm);
         self.shown_length = self.shown_length.max(before.shown_length);
         self.tallness.join(&before.tallness);
+        self.reflectivity.join(&before.reflectivity);
     }
 
     /// Turns about its middle into the line between the middles of both.
@@ -174,6 +175,8 @@ impl Obstacle {
         self.hits = self.hits.saturating_add(other.hits);
         self.travelled_cm = self.travelled_cm.max(other.travelled_cm);
         self.tallness.join(&other.tallness);
+        self.reflectivity.join(&other.reflectivity);
+        self.tallness.set_reflected(self.reflectivity.evidence(t.lorry_rcs));
         self.update_extent(t);
     }
 }

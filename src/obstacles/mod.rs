@@ -157,6 +157,7 @@ pub mod motion;
 pub mod obstacle;
 mod own_way;
 pub mod profile;
+pub mod reflectivity;
 mod room;
 mod search;
 pub mod size;
@@ -456,22 +457,13 @@ impl<const N: usize> Obstacles<N> {
 
 #[cfg(test)]
 mod tests {
-    use super::by_hand::rules as tracking;
+    use super::by_hand::{rules as tracking, seen_at};
     use super::*;
     use crate::fixed::trig::Direction;
     use std::vec::Vec as StdVec;
 
     fn reflection(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
-        Reflection {
-            x_cm,
-            y_cm,
-            ground_cm: x_cm as u16,
-            sight: Direction::AHEAD,
-            radial_velocity_cm_s,
-            across_cm: 40,
-            height_cm: None,
-            strength: 0,
-        }
+        Reflection { ground_cm: x_cm as u16, sight: Direction::AHEAD, ..seen_at(x_cm, y_cm, radial_velocity_cm_s) }
     }
 
     fn sorted<const D: usize>(reflections: &[Reflection]) -> ByRange<D> {

@@ -4,6 +4,7 @@ use super::gathered::Gathered;
 use super::lanes::NO_LANE;
 use super::motion::FreeMotion;
 use super::profile::{BIN_CM, Extent, Profile};
+use super::reflectivity::Reflectivity;
 use super::tallness::Tallness;
 use super::tracking::{
     EVEN_SPREAD, INERTIA, MOST_HITS_A_FRAME, RECENTRE_BINS, Tracking, YOUNG_FRAMES, YOUNG_INERTIA, speed_error,
@@ -47,6 +48,7 @@ pub struct Obstacle {
     /// Way made so far, centimetres, saturating.
     pub(super) travelled_cm: u16,
     pub(super) tallness: Tallness,
+    pub(super) reflectivity: Reflectivity,
     /// Its motion where the road's direction is not assumed.
     pub(super) free: FreeMotion,
     /// Frames in a row in which motion along its heading did not explain where it is.
@@ -103,6 +105,7 @@ impl Obstacle {
             age: 0,
             travelled_cm: 0,
             tallness: Tallness::default(),
+            reflectivity: Reflectivity::default(),
             gathered: Gathered::NONE,
         }
     }
@@ -218,6 +221,10 @@ impl Obstacle {
         let g = self.gathered;
         if g.count == 0 {
             return;
+        }
+        if let Some(rcs) = g.rcs_half_dbsm {
+            self.reflectivity.add(rcs);
+            self.tallness.set_reflected(self.reflectivity.evidence(t.lorry_rcs));
         }
         self.follow(t);
         let weight = self.lateral_weight.saturating_add(g.lateral.1).clamp(1, MOST_WEIGHT);

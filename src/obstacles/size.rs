@@ -64,6 +64,11 @@ pub struct Size {
     pub height_cm: i32,
 }
 
+impl Size {
+    /// Someone on a bicycle; a pedestrian, whose legs and arms spread what he shows, takes no more room.
+    pub const RIDER: Self = Self { length_cm: 180, width_cm: 70, height_cm: 170 };
+}
+
 impl SizeConfig {
     /// Checks the table and rounds it.
     ///

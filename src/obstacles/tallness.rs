@@ -8,8 +8,8 @@
 //! road; of something tall one reflection in twelve comes from around 2.6 m, the others from where a car's do.
 //! With reflections of a car spread by 0.35 m and the standard deviation `s` of elevation beside that, a
 //! height `h` is `1 - w + w exp((h - 1.65 m) 1.9 m / (s^2 + (0.35 m)^2))` times as likely of something tall
-//! (`w` = 0.08). The logarithms are added up. Some lorries show nothing high for long, so what is as long
-//! as one is never called low.
+//! (`w` = 0.08). The logarithms are added up, with what the [radar cross section](super::reflectivity) says. Some lorries
+//! show nothing high for long, so what is as long as one is never called low, unless it hardly reflects.
 
 /// Heights that are distinguished, centimetres.
 const LEVELS_CM: [i32; 5] = [180, 220, 260, 310, 360];
@@ -47,6 +47,8 @@ pub struct Tallness {
     above: [u16; LEVELS_CM.len()],
     /// 2^-8 nats.
     tall: i16,
+    /// What the radar cross section adds to that.
+    reflected: i16,
 }
 
 impl Tallness {
@@ -76,6 +78,15 @@ impl Tallness {
         self.tall = (self.tall + LIKELIER.get(place).copied().unwrap_or(0)).clamp(-MOST, MOST);
     }
 
+    /// Takes how much likelier its radar cross section makes something tall, 2^-8 nats.
+    pub fn set_reflected(&mut self, nats: i16) {
+        self.reflected = nats;
+    }
+
+    fn evidence(&self) -> i16 {
+        self.tall.saturating_add(self.reflected)
+    }
+
     /// The height it does not exceed, centimetres, if it is short.
     pub fn ceiling_cm(&self) -> i32 {
         if self.is_low() { LOW_CM } else { i32::MAX }
@@ -83,7 +94,7 @@ impl Tallness {
 
     /// Whether it is low for certain.
     pub fn is_low(&self) -> bool {
-        self.tall <= -SURE
+        self.evidence() <= -SURE
     }
 
     /// Whether it is as tall as a delivery van for certain.
@@ -102,7 +113,7 @@ impl Tallness {
 
     /// The height that is proven, centimetres; 0 while nothing is.
     pub fn floor_cm(&self) -> i32 {
-        let tall = if self.tall >= SURE { TALL_CM } else { 0 };
+        let tall = if self.evidence() >= SURE { TALL_CM } else { 0 };
         let proven = |n: &u16| *n >= PROOF && u32::from(*n) * u32::from(ONE_IN) >= u32::from(self.measured);
         let mut levels = self.above.iter().zip(&LEVELS_CM).rev();
         levels.find(|(n, _)| proven(n)).map_or(0, |(_, level)| *level).max(tall)
@@ -132,6 +143,17 @@ mod tests {
         assert!(lorry.above == [0; 5] && lorry.ceiling_cm() == i32::MAX, "{lorry:?}");
         let lorry = of(&[(80, 50, 160), (265, 50, 40)]);
         assert_eq!((lorry.above[0], lorry.floor_cm()), (0, 260), "{lorry:?}");
+    }
+
+    #[test]
+    fn what_it_reflects_tips_the_balance_towards_low() {
+        let mut t = of(&[(70, 40, 40)]);
+        assert!(!t.is_low() && t.tall < -2 * 256, "{t:?}");
+        t.set_reflected(-4 * 256);
+        assert!(t.is_low());
+        let mut t = of(&[(70, 40, 5)]);
+        t.set_reflected(-4 * 256);
+        assert!(!t.is_low(), "and decides nothing alone");
     }
 
     #[test]

@@ -83,6 +83,12 @@ pub struct Tracking {
     pub standing_visible_loss: i32,
     /// 2^-8 detections per second
     pub standing_hidden_loss: i32,
+    /// 2^-6 half dBsm
+    pub weak_rcs: i32,
+    /// 2^-6 half dBsm
+    pub low_rcs: i32,
+    /// 2^-6 half dBsm
+    pub lorry_rcs: i32,
     pub sizes: Sizes,
     pub noise: Noise,
     /// The road's axis in the levelled frame.
@@ -181,6 +187,7 @@ mod tests {
                 radial_velocity_cm_s,
                 across_cm: 40,
                 height_cm: None,
+                rcs_half_dbsm: None,
                 strength: 0,
             })
         };

@@ -18,6 +18,7 @@ fn what_was_not_seen_of_a_vehicle_lies_behind_the_face_that_was() {
         radial_velocity_cm_s: 0,
         across_cm: 40,
         height_cm: None,
+        rcs_half_dbsm: None,
         strength: 0,
     };
     for heading in [Direction::AHEAD, Direction::AHEAD.reversed()] {

@@ -129,6 +129,9 @@ pub const OF_RADAR_3D: &[Parameter] = parameters! {
     "obstacles.standing_speed_mps" 0.0 5.0 radar_3d.obstacles.standing_speed_mps;
     "obstacles.standing_visible_loss_per_s" 0.0 1000.0 radar_3d.obstacles.standing_visible_loss_per_s;
     "obstacles.standing_hidden_loss_per_s" 0.0 1000.0 radar_3d.obstacles.standing_hidden_loss_per_s;
+    "obstacles.weak_rcs_dbsm" -60.0 60.0 radar_3d.obstacles.weak_rcs_dbsm;
+    "obstacles.low_rcs_dbsm" -60.0 60.0 radar_3d.obstacles.low_rcs_dbsm;
+    "obstacles.lorry_rcs_dbsm" -60.0 60.0 radar_3d.obstacles.lorry_rcs_dbsm;
     "sizes.min_length_m" 0.3 20.0 radar_3d.obstacles.sizes.min_length_m;
     "evidence.gain" 0.0 1.0 radar_3d.evidence.gain;
     "evidence.clearing" 0.0 1.0 radar_3d.evidence.clearing;

@@ -9,7 +9,7 @@ use viewshed::sensor::noise::NoiseConfig;
 use crate::geometry::{Levelled, Placed, place};
 
 /// Half dB, the step quality and size are judged in.
-fn half_db(value: Option<f32>) -> Option<f64> {
+pub fn half_db(value: Option<f32>) -> Option<f64> {
     value.filter(|v| v.is_finite()).map(|v| (f64::from(v) * 2.0).round())
 }
 

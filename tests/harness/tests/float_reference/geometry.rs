@@ -79,6 +79,8 @@ pub struct Placed {
     pub sigma_across: f64,
     /// Measured height above the road and its standard deviation.
     pub height: Option<(f64, f64)>,
+    /// Radar cross section, dBsm.
+    pub rcs: Option<f64>,
     /// SNR, else RCS, half dB.
     pub strength: f64,
 }
@@ -109,6 +111,7 @@ pub fn place(m: &Measurement, noise: &NoiseConfig, levelled: &Levelled) -> Place
         radial_velocity: f64::from(m.radial_velocity_mps),
         sigma_across: sigma(noise.azimuth_deg),
         height,
+        rcs: super::gate::half_db(m.rcs_dbsm).map(|half| half / 2.0),
         strength: super::gate::strength(m),
     }
 }

@@ -25,6 +25,8 @@ mod tests {
         middle: Ground,
         size: Ground,
         speed: f64,
+        /// What it reflects, dBsm.
+        rcs: f64,
     }
 
     /// Cars, lorries and posts beside the road.
@@ -40,10 +42,14 @@ mod tests {
                 // none through a sensor
                 let lane = [-10.0, -6.5, 1.0, 4.5][k % 4];
                 let speed = random.between(18.0, 33.0) * f64::signum(-1.0 - lane);
-                let size = if random.whole(0, 2) == 0 { [random.between(9.0, 16.5), 2.5] } else { [4.5, 1.8] };
+                let (size, rcs) = match random.whole(0, 4) {
+                    0 | 1 => ([random.between(6.0, 16.5), 2.5], random.between(5.0, 20.0)),
+                    2 => ([1.5, 0.6], random.between(-12.0, 0.0)),
+                    _ => ([4.5, 1.8], random.between(-2.0, 13.0)),
+                };
                 // an even spacing keeps lanes apart from start to end
                 let middle = [20.0 + 50.0 * (k / 4) as f64 + random.between(-15.0, 15.0), lane];
-                Vehicle { middle, size, speed }
+                Vehicle { middle, size, speed, rcs }
             });
             let posts = (0..12).map(|k| [20.0 * f64::from(k), if k % 2 == 0 { 12.0 } else { -14.0 }]);
             Self { vehicles: vehicles.collect(), posts: posts.collect(), has_elevation }
@@ -58,16 +64,17 @@ mod tests {
                 for k in 0..12 {
                     let ahead = (f64::from(k % 6) / 5.0 - 0.5) * v.size[0];
                     let aside = (f64::from(k / 6) - 0.5) * v.size[1];
-                    points.push((moved(moved(middle, axis, ahead), left(axis), aside), 0.8, v.speed));
+                    points.push((moved(moved(middle, axis, ahead), left(axis), aside), 0.8, v.speed, v.rcs));
                 }
             }
-            points.extend(self.posts.iter().map(|p| (levelled.place(*p), 1.6, 0.0)));
+            points.extend(self.posts.iter().map(|p| (levelled.place(*p), 1.6, 0.0, 0.0)));
             points.retain(|_| random.whole(0, 2) == 0);
             points
                 .into_iter()
-                .map(|([x, y], z, speed)| {
+                .map(|([x, y], z, speed, rcs)| {
                     let m = random.measured(levelled, [x, y, z], axis.map(|c| c * speed));
-                    Measurement { elevation_rad: m.elevation_rad.filter(|_| self.has_elevation), ..m }
+                    let rcs_dbsm = Some((rcs + random.normal(4.0)) as f32);
+                    Measurement { elevation_rad: m.elevation_rad.filter(|_| self.has_elevation), rcs_dbsm, ..m }
                 })
                 .collect()
         }

@@ -2,7 +2,7 @@
 
 use viewshed_harness::geometry::solid::Solid;
 
-use super::outline::{BIN_M, Extent, Profile, TALL, Tallness, least_length, size};
+use super::outline::{BIN_M, Extent, Profile, Reflectivity, TALL, Tallness, least_length, size};
 use super::own_way::FreeMotion;
 use super::rules::Rules;
 use crate::geometry::{Ground, Placed, across, along, difference, left, moved};
@@ -42,6 +42,7 @@ pub struct Obstacle {
     pub age: u32,
     travelled: f64,
     tallness: Tallness,
+    reflectivity: Reflectivity,
     pub free: FreeMotion,
     pub unexplained: u32,
     pub free_heading: bool,
@@ -63,6 +64,8 @@ pub struct Gathered {
     /// Of the last.
     pub sight: Ground,
     pub sigma_across: f64,
+    /// Greatest, dBsm.
+    rcs: Option<f64>,
 }
 
 fn length(v: Ground) -> f64 {
@@ -94,6 +97,7 @@ impl Obstacle {
             age: 0,
             travelled: 0.0,
             tallness: Tallness::default(),
+            reflectivity: Reflectivity::default(),
             free: FreeMotion::newborn(seed.at, heading.map(|c| c * speed)),
             unexplained: 0,
             free_heading: false,
@@ -218,6 +222,7 @@ impl Obstacle {
         g.radial += error;
         g.sight = d.sight;
         g.sigma_across = d.sigma_across;
+        g.rcs = d.rcs.map(|rcs| g.rcs.map_or(rcs, |most| most.max(rcs))).or(g.rcs);
         self.profile.add(ahead, 1.0);
         if let Some((height, sigma)) = d.height {
             self.tallness.add(height, sigma);
@@ -245,6 +250,10 @@ impl Obstacle {
         let g = self.gathered;
         if !self.seen() {
             return;
+        }
+        if let Some(rcs) = g.rcs {
+            self.reflectivity.add(rcs);
+            self.tallness.reflected = self.reflectivity.evidence(rules.lorry_rcs);
         }
         self.follow(rules);
         self.lateral_weight += g.lateral.1;
@@ -362,6 +371,7 @@ impl Obstacle {
         self.travelled = self.travelled.max(before.travelled);
         self.shown_length = self.shown_length.max(before.shown_length);
         self.tallness.join(&before.tallness);
+        self.reflectivity.join(&before.reflectivity);
     }
 
     fn lateral_sigma(&self) -> f64 {
@@ -386,6 +396,8 @@ impl Obstacle {
         self.hits += other.hits;
         self.travelled = self.travelled.max(other.travelled);
         self.tallness.join(&other.tallness);
+        self.reflectivity.join(&other.reflectivity);
+        self.tallness.reflected = self.reflectivity.evidence(rules.lorry_rcs);
         self.update_extent(rules);
     }
 
@@ -437,7 +449,12 @@ impl Obstacle {
     /// Length, width and height that its outline, what it has shown for long and its proven height imply.
     fn size(&self, rules: &Rules) -> [f64; 3] {
         let tall = least_length(&rules.sizes, self.tallness.floor());
-        size(&rules.sizes, self.extent.length().max(self.remembered_length(rules)).max(tall))
+        let (shown, rcs) = (self.extent.length(), self.reflectivity.known());
+        if shown < 2.5 && tall == 0.0 && rcs.is_some_and(|rcs| rcs < rules.weak_rcs) {
+            // a pedestrian or rider
+            return [shown.max(1.8), 0.7, 1.7];
+        }
+        size(&rules.sizes, shown.max(self.remembered_length(rules)).max(tall))
     }
 
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees, or before it where
@@ -455,12 +472,15 @@ impl Obstacle {
         let away = |by: f64, place: f64| if place >= 0.0 { by } else { -by };
         let middle = moved(middle, self.heading, away(hidden, ahead));
         let [x, y] = moved(middle, left(self.heading), away(unseen, aside));
-        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row
-        let lid = if length < LONGEST_LOW || self.profile.is_a_row_of_cars(&self.extent) {
-            self.tallness.ceiling()
+        // what is as long as a lorry may be one that shows nothing high, unless it is several cars in a row or hardly
+        // reflects; what is longer than a car and reflects like a lorry may be one, too
+        let rcs = self.reflectivity.known();
+        let may_be_low = if length >= LONGEST_LOW {
+            self.profile.is_a_row_of_cars(&self.extent) || rcs.is_some_and(|rcs| rcs < rules.low_rcs)
         } else {
-            f64::INFINITY
+            self.extent.length() < 5.3 || !rcs.is_some_and(|rcs| rcs > rules.lorry_rcs)
         };
+        let lid = if may_be_low { self.tallness.ceiling() } else { f64::INFINITY };
         let height = height.min(lid).max(self.tallness.floor());
         let across = along(left(rules.road), self.heading).abs() > ACROSS;
         let margin = match (self.free_heading, across) {

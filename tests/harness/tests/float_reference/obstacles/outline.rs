@@ -135,6 +135,39 @@ pub struct Tallness {
     above: [f64; LEVELS.len()],
     /// How much likelier all heights are of something tall than of a car, nats.
     tall: f64,
+    /// What the radar cross section adds to that, nats.
+    pub reflected: f64,
+}
+
+/// Mean of the greatest radar cross section of each of the last frames, dBsm.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Reflectivity {
+    mean: f64,
+    frames: f64,
+}
+
+impl Reflectivity {
+    pub fn add(&mut self, greatest: f64) {
+        self.frames = (self.frames + 1.0).min(16.0);
+        self.mean += (greatest.clamp(-100.0, 100.0) - self.mean) / self.frames;
+    }
+
+    pub fn join(&mut self, other: &Self) {
+        if other.frames > 0.0 && (self.frames == 0.0 || other.mean > self.mean) {
+            self.mean = other.mean;
+        }
+        self.frames = self.frames.max(other.frames);
+    }
+
+    /// The mean, once four frames tell it.
+    pub fn known(&self) -> Option<f64> {
+        (self.frames >= 4.0).then_some(self.mean)
+    }
+
+    /// How much likelier something tall is than a car: Gaussians 8 dB apart with 4.8 dB either, against it only.
+    pub fn evidence(&self, half_way: f64) -> f64 {
+        self.known().map_or(0.0, |mean| ((mean - half_way) * 8.0 / 4.8_f64.powi(2)).clamp(-4.0, 0.0))
+    }
 }
 
 impl Tallness {
@@ -151,7 +184,7 @@ impl Tallness {
 
     /// The height it does not exceed, if it is short.
     pub fn ceiling(&self) -> f64 {
-        if self.tall <= -SURE { LOW } else { f64::INFINITY }
+        if self.tall + self.reflected <= -SURE { LOW } else { f64::INFINITY }
     }
 
     pub fn join(&mut self, other: &Self) {
@@ -162,7 +195,7 @@ impl Tallness {
 
     /// The height that is proven; 0 while nothing is.
     pub fn floor(&self) -> f64 {
-        let tall = if self.tall >= SURE { TALL } else { 0.0 };
+        let tall = if self.tall + self.reflected >= SURE { TALL } else { 0.0 };
         let proven = |n: f64| n >= PROOF.0 && n >= PROOF.1 * self.measured;
         self.above.iter().zip(LEVELS).rfind(|(n, _)| proven(**n)).map_or(0.0, |(_, level)| level).max(tall)
     }

@@ -69,6 +69,10 @@ pub struct Rules {
     pub standing_speed: f64,
     pub standing_visible_loss: f64,
     pub standing_hidden_loss: f64,
+    /// dBsm.
+    pub weak_rcs: f64,
+    pub low_rcs: f64,
+    pub lorry_rcs: f64,
     /// Frames.
     pub young: u32,
     pub young_inertia: f64,
@@ -129,6 +133,9 @@ impl Rules {
             standing_speed: real(c.standing_speed_mps),
             standing_visible_loss: real(c.standing_visible_loss_per_s),
             standing_hidden_loss: real(c.standing_hidden_loss_per_s),
+            weak_rcs: real(c.weak_rcs_dbsm),
+            low_rcs: real(c.low_rcs_dbsm),
+            lorry_rcs: real(c.lorry_rcs_dbsm),
             young: u32::from(YOUNG_FRAMES),
             young_inertia: f64::from(YOUNG_INERTIA) / 16384.0,
             inertia: f64::from(INERTIA) / 16384.0,

@@ -237,6 +237,39 @@ mod tests {
     }
 
     #[test]
+    fn what_reflects_like_a_rider_a_lorry_or_neither_has_the_same_box_in_both() {
+        // length, what it reflects, and the length, width and height of its box
+        let (rider, car) = ((1.2, -7.0), (4.6, 6.0));
+        let (strong_van, van, weak_row) = ((6.2, 15.0), (6.2, 7.0), (11.0, 0.0));
+        let low = Some(1.6);
+        let cases = [(rider, low), (car, low), (strong_van, None), (van, low), (weak_row, low), ((11.0, 8.0), None)];
+        for (mount, ((length, rcs), height)) in mounts().iter().flat_map(|m| cases.iter().map(move |c| (m, *c))) {
+            let (mut both, mut random) = (Both::new(mount), Random::new(37));
+            let v = Vehicle { length, width: 0.5, start: [25.0, 5.0], speed: 6.0 };
+            for frame in 0..90 {
+                let mut measured = v.measured(&both.levelled, frame, &mut random);
+                for m in &mut measured {
+                    m.rcs_dbsm = Some((rcs + random.normal(1.0) - 1.5) as f32);
+                }
+                both.step(&measured);
+            }
+            let (integer, exact) = both.followed();
+            let (integer, exact) = (integer.solid(&both.tracking), exact.solid(&both.rules));
+            let sizes = [2 * integer.half_length_cm, 2 * integer.half_width_cm, integer.height_cm];
+            for (got, exact) in sizes.into_iter().zip(exact.size) {
+                within("size, m", (f64::from(got) / 100.0 - exact).abs(), 0.1);
+            }
+            let expected = if rcs < -3.0 { Some(1.7) } else { height };
+            let found = f64::from(integer.height_cm) / 100.0;
+            match expected {
+                Some(height) => assert!(found <= height, "{length} m, {rcs} dBsm: {found} m high"),
+                None => assert!(found > 2.2, "{length} m, {rcs} dBsm: {found} m high"),
+            }
+            assert_eq!(sizes[1] < 100, rcs < -3.0, "{length} m, {rcs} dBsm: {sizes:?} cm");
+        }
+    }
+
+    #[test]
     fn an_unseen_vehicle_is_given_up_at_the_same_frame() {
         let car = Vehicle { length: 4.6, width: 1.8, start: [30.0, 5.0], speed: 10.0 };
         let c = ObstacleConfig::default();
