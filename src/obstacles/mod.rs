@@ -139,7 +139,8 @@
 //! | everywhere: motorways' cells 15.8 / 8.8, not 15.5 / 8.9 | 19.9 / 10.3 | +13.6 / +4.5 | 12.4 / 8.2 | +1.4 / +13.8 | no |
 //! | what is lower than 3 m only | 20.4 / 9.8 | +13.3 / +5.6 | 12.5 / 8.6 | +0.8 / +15.5 | no |
 //!
-//! What [farther ends](room) without a box of their own gave there stands with them.
+//! What [farther ends](room) without a box of their own gave there stands with them, and what
+//! [radar cross sections](reflectivity) gave everywhere, last of all, with theirs.
 //!
 //! A speed gate that opens by 2 m/s in a second while a vehicle is not seen was not kept either: from the 30th second on crossings
 //! went from 22.5 / 16.2 to 21.7 / 18.0 and queues from 19.2 / 9.7 to 17.4 / 11.1, for what it finds is often the next vehicle.
