@@ -53,7 +53,7 @@ pub struct Reflectivity {
 impl Reflectivity {
     /// Takes a frame's greatest radar cross section, half dBsm.
     pub fn add(&mut self, greatest_half_dbsm: i16) {
-        self.frames = (self.frames + 1).min(MEMORY);
+        self.frames = (self.frames + 1).clamp(1, MEMORY);
         let off = (greatest_half_dbsm.clamp(-MOST, MOST) << FRACTION) - self.mean;
         self.mean += off / self.frames;
     }
