@@ -350,14 +350,14 @@ fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_map
     };
     let cells = |map: &Map| -> usize { (0..AZIMUTHS).map(|a| equal_of_ray(map, a)).sum() };
     // rays that were not sent again since are of a scan before
-    let of_scans = |back: usize| kept::on_a_pc(&kept::with_place(&settings), &scans[..scans.len() - back]).1;
-    let recent: Vec<_> = (0..=SCANS_OF_A_RAY).map(of_scans).collect();
+    let before = |back: usize| kept::on_a_pc(&kept::with_place(&settings), &scans[..scans.len() - back]).1;
+    let recent: Vec<_> = std::iter::once(map).chain((1..=SCANS_OF_A_RAY).map(before)).collect();
     for a in 0..AZIMUTHS {
         let of_one = recent.iter().any(|map| equal_of_ray(map, a) == RANGES);
         assert!(of_one, "ray {a} is of none of the last scans on the PC");
     }
     let (_, flat, _) = kept::on_a_pc(&settings, &scans);
-    let (equal, of_flat) = (cells(&map), cells(&flat));
+    let (equal, of_flat) = (cells(&recent[0]), cells(&flat));
     assert!(
         equal > NEARLY_ALL && of_flat < AZIMUTHS * RANGES * 47 / 48,
         "{equal} cells are the PC's, {of_flat} those of a flat road"
