@@ -8,7 +8,7 @@
 //! one long vehicle from two that creep in one lane. What stands in lanes is followed there by place alone: `streaks` are
 //! what goes on in one place of a vehicle, `vehicles` puts together those whose distance stays while they move, `queues`
 //! makes paths of them in place of the tracker's. `exclusion` drops mirror images, `standing` adds the time in which it
-//! stood before and after, `shape` puts a box around it, and of proposals for one place `exclusion` keeps the best.
+//! stood before and after, `shape` puts a box around it, in its lane where `across` tells, and of proposals for one place `exclusion` keeps the best.
 //! `following` goes on with those that creep where the ones ahead and behind tell it.
 //! `ways` tells which of them drive the same way.
 //!
@@ -22,6 +22,7 @@
 //! Three to six seconds of two busy cores for a minute of recording with 256 detections a frame; a crossing with 300,
 //! where much stands, has taken ten.
 
+mod across;
 mod assembly;
 mod exclusion;
 pub mod follow;
@@ -48,6 +49,7 @@ use serde::Serialize;
 
 use super::tracks::LabelTrack;
 use crate::recording::Recording;
+use across::Middles;
 use lane::Lane;
 use path::Path;
 
@@ -121,8 +123,10 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         contains: &|[x, y]| recording.sensor.field_of_view.contains(recording.pose.to_spherical([x, y, 1.0])),
         latest_s: instants.last().map_or(0.0, |i| i.time_s),
     };
+    let kept: Vec<&Path> = scored.iter().map(|(_, path)| *path).collect();
+    let middles = Middles::of(&kept, &instants);
     let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {
-        track: shape::track(path, &instants, &view, format!("p{}", k + 1)),
+        track: shape::track(path, &instants, &middles, &view, format!("p{}", k + 1)),
         score,
         detections: path.members.len() as u32,
         way: 0,

@@ -1,6 +1,7 @@
 //! What stands around the reflections of a path: class by extent, and the box centres.
 
 use super::View;
+use super::across::Middles;
 use super::path::{HEIGHT_WITHIN_M, Path, quantile};
 use super::reflections::Instant;
 use crate::labels::near_face::{BoxStep, drawn};
@@ -30,14 +31,6 @@ const ENDS_M: f64 = 0.7;
 const SHORT_HIGH_M: [f64; 2] = [3.0, 4.0];
 /// How long a car looks at most with reflections of another one, metres.
 const BESIDES_M: f64 = 12.5;
-/// Sine of the aspect from which on reflections tell the flank, from how far at most, metres, and how many.
-const SIDE_SIN: f64 = 0.06;
-const SIDE_WITHIN_M: f64 = 60.0;
-const SIDE_BY: usize = 20;
-/// How far from the middle the flank seems, of the width: noise spreads it. Reflections that do not spread over as much
-/// of the width show no flank.
-const HALF: f64 = 0.52;
-const WIDE: f64 = 0.6;
 /// Fewest reflections an end is told by.
 const FEWEST: usize = 5;
 
@@ -112,6 +105,12 @@ impl Extent {
         short.then_some([seen_m, width_m, self.highest_m.clamp(SHORT_HIGH_M[0], SHORT_HIGH_M[1])])
     }
 
+    /// Length, width and height of its box.
+    pub fn box_m(&self) -> [f64; 3] {
+        let class = self.class();
+        self.size(class).or_else(|| class_size(class)).unwrap_or([4.6, 1.8, 1.5])
+    }
+
     /// From the rearmost to the foremost of it that reflects.
     fn seen_m(&self) -> f64 {
         let reach_m = self.reach[1] - self.reach[0];
@@ -129,32 +128,6 @@ impl Extent {
     }
 }
 
-/// How far to the left of a path the middle of a vehicle of this width is, metres. Its flank is where the reflections
-/// end on the side of the sensor: they may come from that flank, from all around or from what is under it.
-fn left_m(path: &Path, instants: &[Instant], width_m: f64) -> f64 {
-    let mut sides = [Vec::new(), Vec::new()];
-    let mut all = Vec::new();
-    for (frame, r) in path.reflections(instants) {
-        let Some((heading_rad, [_, left])) = path.heading_at(frame).zip(path.local(frame, r)) else { continue };
-        let (s, c) = heading_rad.sin_cos();
-        let sin = -r.sight[0] * s + r.sight[1] * c;
-        all.push(left);
-        if sin.abs() >= SIDE_SIN && r.distance_m < SIDE_WITHIN_M {
-            sides[usize::from(sin > 0.0)].push(if sin > 0.0 { left } else { -left });
-        }
-    }
-    let half_m = HALF * width_m;
-    let (mut sum, mut weight) = (0.0, 0.0);
-    for (values, sign) in sides.iter().zip([-1.0, 1.0]) {
-        let Some(edge) = quantile(values, 0.1).filter(|_| values.len() >= SIDE_BY) else { continue };
-        let (Some(middle), Some(other)) = (quantile(values, 0.5), quantile(values, 0.9)) else { continue };
-        let share = ((other - edge) / (WIDE * width_m)).min(1.0);
-        sum += sign * (middle + share * (edge + half_m - middle)) * values.len() as f64;
-        weight += values.len() as f64;
-    }
-    if weight > 0.0 { sum / weight } else { quantile(&all, 0.5).unwrap_or(0.0) }
-}
-
 /// Mean velocity around a time, if that is fast enough to go on.
 fn speed_near(path: &Path, time_s: f64) -> Option<[f64; 2]> {
     let near = path.motions.iter().filter(|(t, _)| (t - time_s).abs() <= 1.0);
@@ -168,13 +141,11 @@ fn speed_near(path: &Path, time_s: f64) -> Option<[f64; 2]> {
 
 /// The near face of the vehicle around a path. What is fast comes from somewhere and goes somewhere: up to
 /// [`BEYOND_S`] in the field of view are added at both ends.
-pub fn track(path: &Path, instants: &[Instant], view: &View, id: String) -> LabelTrack {
+pub fn track(path: &Path, instants: &[Instant], middles: &Middles, view: &View, id: String) -> LabelTrack {
     let extent = Extent::of(path, instants);
-    let class = extent.class();
-    let size_m = extent.size(class);
-    let size = size_m.or_else(|| class_size(class)).unwrap_or([4.6, 1.8, 1.5]);
+    let (class, size) = (extent.class(), extent.box_m());
     let along = extent.center_m(size[0]);
-    let left = left_m(path, instants, size[1]);
+    let left = middles.left_m(path, instants, size[1]);
     let mut steps: Vec<BoxStep> = path
         .motions
         .iter()
@@ -203,14 +174,12 @@ pub fn track(path: &Path, instants: &[Instant], view: &View, id: String) -> Labe
     }
     steps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let points = drawn(&steps, size, view.sensor, TOLERANCE_M);
-    LabelTrack { id, class: class.to_owned(), size_m, points }
+    LabelTrack { id, class: class.to_owned(), size_m: extent.size(class), points }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::labels::proposals::motion::Motion;
-    use crate::labels::proposals::reflections::tests::seen_from_origin;
 
     fn extent(reach: [f64; 2], top_m: f64, low: bool) -> Extent {
         Extent { rear: Some(reach[0]), front: None, reach, top_m, highest_m: top_m, heights: 0, low }
@@ -238,42 +207,5 @@ mod tests {
         assert_eq!(lorry([-8.0, 7.5], 900).size("truck"), None);
         assert_eq!(lorry([-4.0, 4.5], 900).size("van"), None);
         assert_eq!(lorry([-4.0, 4.5], 900).size("nobody"), None);
-    }
-
-    /// Where the middle of a lorry is told to be that drives along x past a sensor at the origin and reflects at these
-    /// distances from its middle, to its left; the path is as far left of the middle.
-    fn told_m(y: f64, reflects: &[f64], path_left_m: f64, speed: f64) -> f64 {
-        let frame = |k: usize| {
-            let x = 50.0 - 0.1 * k as f64 * speed;
-            let all = reflects.iter().map(|left| seen_from_origin([x, y - left], -speed)).collect();
-            (Instant { time_s: 0.1 * k as f64, reflections: all }, [x, y - path_left_m])
-        };
-        let (instants, places): (Vec<Instant>, Vec<[f64; 2]>) = (0..30).map(frame).unzip();
-        let members = (0..30).flat_map(|k| (0..reflects.len()).map(move |i| (k, i))).collect();
-        let motions = places
-            .iter()
-            .enumerate()
-            .map(|(k, p)| (0.1 * k as f64, Motion::new(*p, [-speed, 0.0], 0.1, [-1.0, 0.0], [0.1, 0.1])));
-        let headings_rad = vec![std::f64::consts::PI; 30];
-        let motions = motions.collect();
-        let (lane, queued) = (None, Vec::new());
-        let path = Path { members, first: 0, motions, headings_rad, reach: [0.0; 2], top_m: 1.5, lane, queued };
-        left_m(&path, &instants, 2.55) + path_left_m
-    }
-
-    #[test]
-    fn the_flank_is_where_reflections_end_on_the_side_of_the_sensor() {
-        // towards -x: its left is -y, so the sensor sees the left flank of what is at +y, the right one at -y
-        let flank: Vec<f64> = (0..20).map(|k| 1.275 - 0.02 * f64::from(k * k % 19) * 5.0).collect();
-        for path_left_m in [0.0, 0.7, -0.7] {
-            for (y, side) in [(6.0, 1.0), (-6.0, -1.0)] {
-                let one: Vec<f64> = flank.iter().map(|left| left * side).collect();
-                let both: Vec<f64> = one.iter().chain(&[-1.3, -1.2, 1.3, 1.2]).copied().collect();
-                assert!(told_m(y, &one, path_left_m, 15.0).abs() < 0.2, "{}", told_m(y, &one, path_left_m, 15.0));
-                assert!(told_m(y, &both, path_left_m, 15.0).abs() < 0.2, "{}", told_m(y, &both, path_left_m, 15.0));
-            }
-        }
-        // one place that reflects tells no flank
-        assert!((told_m(6.0, &[0.3], 0.0, 15.0) - 0.3).abs() < 0.01);
     }
 }
