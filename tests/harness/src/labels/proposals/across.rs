@@ -30,6 +30,8 @@ use super::shape::Extent;
 const SIDE_SIN: f64 = 0.06;
 const SIDE_WITHIN_M: f64 = 60.0;
 const SIDE_BY: usize = 20;
+/// How far beyond the side of a vehicle the sensor has to be to see that, metres.
+const CLEAR_M: f64 = 1.0;
 /// How far from the middle the flank seems, of the width: noise spreads it. Reflections that do not spread over as much
 /// of the width show no flank.
 const HALF: f64 = 0.52;
@@ -59,7 +61,9 @@ impl Beside {
             let (s, c) = heading_rad.sin_cos();
             let sin = -r.sight[0] * s + r.sight[1] * c;
             all.push(left);
-            if sin.abs() >= SIDE_SIN && r.distance_m < SIDE_WITHIN_M {
+            // of what drives under the sensor, what lies to its left is left of the sensor, and no flank
+            let sensor_m = left - sin * r.distance_m;
+            if sin.abs() >= SIDE_SIN && r.distance_m < SIDE_WITHIN_M && sensor_m.abs() > 0.5 * width_m + CLEAR_M {
                 sides[usize::from(sin > 0.0)].push(if sin > 0.0 { left } else { -left });
             }
         }
@@ -175,6 +179,8 @@ mod tests {
                 assert!(told_m(y, &both, path_left_m).abs() < 0.2, "{}", told_m(y, &both, path_left_m));
             }
         }
+        // the sensor is above it: what lies to its left is no flank
+        assert!(told_m(0.3, &[1.0, 0.9, -1.0, -0.9, 0.1], 0.0).abs() < 0.15);
         // one place that reflects tells no flank
         assert!((told_m(6.0, &[0.3], 0.0) - 0.3).abs() < 0.01);
     }
