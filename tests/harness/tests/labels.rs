@@ -3,11 +3,15 @@
 use std::path::Path;
 use std::time::Instant;
 
-use viewshed_harness::estimators;
+use viewshed::obstacles::lanes::{MOST_LANES, MOST_SEGMENTS};
+use viewshed_harness::estimators::{self, Lane};
 use viewshed_harness::evaluation;
 use viewshed_harness::evaluation::summary::Row;
-use viewshed_harness::labels::{judged, proposals};
+use viewshed_harness::geometry::polyline;
+use viewshed_harness::labels::{judged, lanes, proposals};
 use viewshed_harness::recording::{self, ReadOptions, Recording};
+use viewshed_harness::twin::scene::Scene;
+use viewshed_harness::twin::simulate::Simulation;
 
 fn read(path: &Path) -> Recording {
     recording::read(path, &ReadOptions { to_s: Some(60.0), ..Default::default() }).unwrap()
@@ -53,6 +57,71 @@ fn single_frames_and_silence_have_no_proposals() {
     assert_eq!(proposals::propose(&recording, &|_| ()), []);
     recording.frames.clear();
     assert_eq!(proposals::propose(&recording, &|_| ()), []);
+}
+
+/// Of all positions of moving vehicles within so far of the sensor, the share that lies within a metre of a lane of their
+/// direction; and of the lanes, how many such vehicles keep to for 20 m at least.
+fn on_lanes(recording: &Recording, lanes: &[Lane], within_m: f64) -> (f64, usize) {
+    let truth = recording.truth.as_ref().unwrap();
+    let [sx, sy, _] = recording.pose.position;
+    let (mut on, mut all) = (0_u32, 0_u32);
+    let mut driven = vec![0.0; lanes.len()];
+    for frame in recording.frames.iter().step_by(15) {
+        for o in truth.at(frame.time_ns) {
+            let ([x, y, _], [length, width, _]) = (o.solid.center, o.solid.size);
+            let Some([vx, vy]) = o.velocity else { continue };
+            let speed = vx.hypot(vy);
+            // bicycles and walkers have lanes of their own
+            if speed < 2.0 || length < 3.0 || width < 1.5 || (x - sx).hypot(y - sy) > within_m {
+                continue;
+            }
+            all += 1;
+            let beside = |lane: &Lane| {
+                lane.points.windows(2).any(|pair| {
+                    let [a, b] = [pair[0], pair[1]].map(|p| p.map(f64::from));
+                    let [c, s] = polyline::direction(a, b);
+                    let (dx, dy) = (x - a[0], y - a[1]);
+                    let along = dx * c + dy * s;
+                    (-2.0..=(b[0] - a[0]).hypot(b[1] - a[1]) + 2.0).contains(&along)
+                        && (dy * c - dx * s).abs() < 1.0
+                        && vx * c + vy * s > 0.94 * speed
+                })
+            };
+            let own: Vec<usize> = (0..lanes.len()).filter(|k| beside(&lanes[*k])).collect();
+            on += u32::from(!own.is_empty());
+            // a second between two looks
+            own.iter().for_each(|k| driven[*k] += speed);
+        }
+    }
+    (f64::from(on) / f64::from(all), driven.iter().filter(|m| **m >= 20.0).count())
+}
+
+#[test]
+fn lanes_learnt_on_the_motorway_are_its_lanes() {
+    let recording = motorway();
+    let learnt = lanes::learnt(std::slice::from_ref(&recording), &|_| ());
+    let (share, driven) = on_lanes(&recording, &learnt, 120.0);
+    println!("{} lanes, {driven} driven, {:.1} % of vehicles on one", learnt.len(), 100.0 * share);
+    assert!(share > 0.95 && driven == learnt.len() && (6..=8).contains(&driven), "{share} {driven} {}", learnt.len());
+    assert_eq!(lanes::learnt(&[], &|_| ()), []);
+}
+
+#[test]
+fn lanes_learnt_at_a_crossing_are_those_of_other_traffic_there() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/crossing");
+    let seen = |fcd: Option<&str>, duration_s: f64| {
+        let scene = Scene { duration_s, ..Scene::read(&folder.join("train-2.toml")).unwrap() };
+        let fcd = fcd.map(|name| folder.join(name));
+        let simulation = Simulation::new(scene, fcd.as_deref()).unwrap();
+        let (bytes, _) = simulation.record(std::io::Cursor::new(Vec::new()), &|| ()).unwrap();
+        recording::mcap::parse(bytes.get_ref(), "train-2".into(), &ReadOptions::default()).unwrap()
+    };
+    let learnt = lanes::learnt(&[seen(Some("wide-day-1.fcd.xml.gz"), 90.0)], &|_| ());
+    let segments = lanes::segments(&learnt);
+    assert!(learnt.len() <= MOST_LANES && segments <= MOST_SEGMENTS, "{} lanes, {segments}", learnt.len());
+    let (share, driven) = on_lanes(&seen(None, 60.0), &learnt, 80.0);
+    println!("{} lanes, {driven} driven, {:.1} % of other traffic on one", learnt.len(), 100.0 * share);
+    assert!(share > 0.8 && driven * 3 >= learnt.len() * 2, "{share} {driven}");
 }
 
 /// `VIEWSHED_LABELLED=a.mcap:b.mcap cargo test --release -p viewshed-harness --test labels -- --ignored --nocapture`

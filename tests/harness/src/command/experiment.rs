@@ -21,7 +21,7 @@ use crate::results::report::{
     scenes as scenes_report, several_sensors as sensors_report, table,
 };
 use crate::studies::experiment::plan::{Day, Plan};
-use crate::studies::experiment::scenes::{self, Extent, Variant};
+use crate::studies::experiment::scenes::{self, Extent, LanesFrom, Variant};
 use crate::studies::experiment::{Experiment, calibration, gantry_camera, several_sensors, total_steps};
 use crate::twin::simulate::Simulation;
 use crate::{estimators, recording};
@@ -97,7 +97,7 @@ pub struct Args {
     ///
     /// PLAN is calibration.toml of the same folder. Recordings of --beside are fitted on the first half of their frames
     /// and judged on the second.
-    #[arg(long, conflicts_with_all = ["scene", "train", "only_elevation", "keep"])]
+    #[arg(long, conflicts_with_all = ["scene", "train", "only_elevation", "learn_lanes", "keep"])]
     calibration: bool,
     /// Write each unit's table, NAME.probability.toml, and reliability diagram, NAME.png, into this folder
     #[arg(long, value_name = "DIR", requires = "calibration", help_heading = "Results")]
@@ -111,6 +111,11 @@ pub struct Args {
     /// Leave out the runs without elevation, which is faster (crossing, queue)
     #[arg(long)]
     only_elevation: bool,
+    /// Give lanes learnt from 90 s of another day, not those of the traffic's net (crossing)
+    ///
+    /// As `viewshed lanes RECORDING` learns them: the row radar-3d-lanes.
+    #[arg(long)]
+    learn_lanes: bool,
     /// Print tables as wide as they are: all intervals, and distances to the bound geometry-slice, too
     #[arg(long, help_heading = "Results")]
     wide: bool,
@@ -154,8 +159,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn motorway(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.every > 1 || args.only_elevation;
-    ensure!(!asked, "--train, --every and --only-elevation go with --scene crossing or --scene queue");
+    let asked = args.train || args.every > 1 || args.only_elevation || args.learn_lanes;
+    ensure!(!asked, "--train, --every, --only-elevation and --learn-lanes go with --scene crossing or --scene queue");
     let plan = Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
@@ -188,11 +193,15 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
     let on_grades = all.iter().all(|scene| !scene.ground.is_empty());
-    let more = [scenes::with_lanes(&all), on_grades, settings.estimators.far_road.is_some()];
+    let lanes = plan.lanes(set, &all, args.learn_lanes)?;
+    if let LanesFrom::OtherDays(days) = &lanes {
+        outputs.reads(days.iter().cloned());
+    }
+    let more = [lanes != LanesFrom::Nowhere, on_grades, settings.estimators.far_road.is_some()];
     let estimators = ESTIMATORS + estimators::site_rows(more.map(u64::from).iter().sum());
-    let running = bar("simulating and replaying", scenes::total_steps(&all, extent, estimators));
+    let running = bar("simulating and replaying", scenes::total_steps(&all, extent, &lanes, estimators));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
-    let results = scenes::run(&all, settings, extent, &keep, &|| running.step())?;
+    let results = scenes::run(&all, settings, extent, &lanes, &keep, &|| running.step())?;
     drop(running);
     let counted: Vec<_> =
         Variant::ALL.iter().filter_map(|v| scenes::count(&results, *v, set.warm_up_s, settings)).collect();
@@ -201,6 +210,7 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
         set: if args.train { "training" } else { "reporting" },
         warm_up_s: set.warm_up_s,
         every: extent.every,
+        lanes_learnt: args.learn_lanes,
         extent: table::Extent::of(args.wide),
     };
     print(&scenes_report::text(&title, &plan, &counted, &settings.evaluation))?;
@@ -213,8 +223,11 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
 }
 
 fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.only_elevation || args.keep.is_some() || !args.beside.is_empty();
-    ensure!(!asked, "--train, --only-elevation, --keep and --beside do not go with --scene gantry-camera");
+    let asked = args.train || args.only_elevation || args.learn_lanes || args.keep.is_some() || !args.beside.is_empty();
+    ensure!(
+        !asked,
+        "--train, --only-elevation, --learn-lanes, --keep and --beside do not go with --scene gantry-camera"
+    );
     let plan = gantry_camera::Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
@@ -230,8 +243,12 @@ fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Ou
 }
 
 fn several_sensors(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.only_elevation || !args.beside.is_empty();
-    ensure!(!asked, "--train, --only-elevation and --beside do not go with --scene {}", args.scene.name());
+    let asked = args.train || args.only_elevation || args.learn_lanes || !args.beside.is_empty();
+    ensure!(
+        !asked,
+        "--train, --only-elevation, --learn-lanes and --beside do not go with --scene {}",
+        args.scene.name()
+    );
     let plan = several_sensors::Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;

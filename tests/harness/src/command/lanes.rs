@@ -1,25 +1,52 @@
-//! `viewshed lanes`: which way traffic goes, from a SUMO net.
+//! `viewshed lanes`: which way traffic goes, learnt from recordings or read from a SUMO net.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use viewshed::obstacles::lanes::{MOST_LANES, MOST_SEGMENTS};
 
+use super::options::ReadingArgs;
 use super::print;
+use super::progress::bar;
+use crate::estimators::Lane;
+use crate::labels::lanes::{self, segments};
+use crate::recording::{self, Recording};
 use crate::twin::traffic::frame::RoadFrame;
 use crate::twin::traffic::net::{self, Reach};
 
-/// Lanes of a SUMO net as the tables [[lanes]] of a daemon's file
+/// Lanes of a site as the tables [[lanes]] of a daemon's file, learnt from recordings or read from a SUMO net
 ///
 /// At a crossing a radar's speeds alone do not tell where a vehicle heads. With lanes the estimator knows from the first
-/// frame. Lanes of walkers, bicycles and rails are left out. Of a file for `replay` and `experiment` the tables are
-/// [[estimators.lanes]].
+/// frame. Of a file for `replay` and `experiment` the tables are [[estimators.lanes]]:
+///
+///   viewshed lanes monday.mcap --table estimators.lanes > lanes.toml
+///   viewshed replay tuesday.mcap --config lanes.toml
+///
+/// Recordings of one radar in one place show where vehicles drive: a minute or two with traffic on every lane are
+/// enough. Judge the lanes on other recordings than they are learnt from. In a net, lanes of walkers, bicycles and rails
+/// are left out.
 #[derive(Debug, clap::Args)]
+#[command(verbatim_doc_comment)]
 pub struct Args {
-    /// The net, plain or gzip; of a map, `netconvert --osm-files map.osm.xml -o map.net.xml` makes one
-    #[arg(value_name = "NET")]
-    net: PathBuf,
+    /// Recordings of the site, or a net NAME.net.xml, plain or gzip
+    ///
+    /// Of a map, `netconvert --osm-files map.osm.xml -o map.net.xml` makes a net.
+    #[arg(value_name = "RECORDING|NET", required = true)]
+    sources: Vec<PathBuf>,
+    /// Name of the tables
+    #[arg(long, value_name = "NAME", default_value = "lanes")]
+    table: String,
+    #[command(flatten)]
+    net: NetArgs,
+    #[command(flatten)]
+    reading: ReadingArgs,
+}
+
+/// Where a net's coordinates lie.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Of a net")]
+struct NetArgs {
     /// Origin of the road coordinates in those of the net, without the offset the net says, in metres: X,Y
     #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = pair, allow_hyphen_values = true)]
     origin: [f64; 2],
@@ -32,9 +59,6 @@ pub struct Args {
     /// Range of the radar, in metres
     #[arg(long, value_name = "METRES", default_value_t = 200.0)]
     range: f64,
-    /// Name of the tables
-    #[arg(long, value_name = "NAME", default_value = "lanes")]
-    table: String,
 }
 
 fn pair(text: &str) -> Result<[f64; 2], String> {
@@ -43,35 +67,74 @@ fn pair(text: &str) -> Result<[f64; 2], String> {
     <[f64; 2]>::try_from(numbers).map_err(|_| "not two numbers X,Y".into())
 }
 
-/// Reads and prints.
+/// Reads, learns and prints.
 ///
 /// # Errors
-/// A net that cannot be used, and one with more lanes than a unit has room for.
+/// A source that cannot be used, recordings of radars in different places, nothing that drives, and a net with more
+/// lanes than a unit has room for.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    ensure!(args.range > 0.0 && args.range <= 300.0, "--range {} is outside 0 to 300 m", args.range);
-    ensure!(args.heading.abs() <= 360.0, "--heading {} is outside -360 to 360 degrees", args.heading);
-    let frame = RoadFrame { origin: args.origin, heading_rad: args.heading.to_radians(), net_offset: [0.0; 2] };
-    let reach = Reach { from: args.at, reach_m: args.range + Reach::MARGIN_M };
-    let lanes = net::lanes(&args.net, &frame, &reach)?;
-    let segments: usize = lanes.iter().map(|lane| lane.points.len() - 1).sum();
-    ensure!(
-        lanes.len() <= MOST_LANES && segments <= MOST_SEGMENTS,
-        "{}: {} lanes with {segments} segments, and a unit has room for {MOST_LANES} with {MOST_SEGMENTS}: take a shorter --range",
-        args.net.display(),
-        lanes.len()
-    );
-    let mut text = format!(
-        "# {} lanes with {segments} segments of {}, within {} m of ({}, {})\n",
-        lanes.len(),
-        args.net.file_name().unwrap_or_default().display(),
-        reach.reach_m,
-        args.at[0],
-        args.at[1]
-    );
+    let is_net = |path: &PathBuf| {
+        let name = path.to_string_lossy();
+        name.ends_with(".xml") || name.ends_with(".xml.gz")
+    };
+    let (lanes, told) = match &args.sources[..] {
+        [net] if is_net(net) => of_net(net, &args.net)?,
+        all => {
+            ensure!(!all.iter().any(is_net), "a net goes alone: give one net, or recordings");
+            of_recordings(all, &args.reading)?
+        }
+    };
+    let mut text = format!("# {} lanes with {} segments {told}\n", lanes.len(), segments(&lanes));
     for lane in &lanes {
         let points: Vec<String> = lane.points.iter().map(|[x, y]| format!("[{x:?}, {y:?}]")).collect();
         text += &format!("[[{}]]\npoints = [{}]\n", args.table, points.join(", "));
     }
     print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Lanes and where they are from.
+fn of_net(net: &Path, args: &NetArgs) -> Result<(Vec<Lane>, String)> {
+    ensure!(args.range > 0.0 && args.range <= 300.0, "--range {} is outside 0 to 300 m", args.range);
+    ensure!(args.heading.abs() <= 360.0, "--heading {} is outside -360 to 360 degrees", args.heading);
+    let frame = RoadFrame { origin: args.origin, heading_rad: args.heading.to_radians(), net_offset: [0.0; 2] };
+    let reach = Reach { from: args.at, reach_m: args.range + Lane::BEYOND_RANGE_M };
+    let lanes = net::lanes(net, &frame, &reach)?;
+    ensure!(
+        lanes.len() <= MOST_LANES && segments(&lanes) <= MOST_SEGMENTS,
+        "{}: {} lanes with {} segments, and a unit has room for {MOST_LANES} with {MOST_SEGMENTS}: take a shorter --range",
+        net.display(),
+        lanes.len(),
+        segments(&lanes)
+    );
+    let [x, y] = args.at;
+    Ok((lanes, format!("of {}, within {} m of ({x}, {y})", name(net), reach.reach_m)))
+}
+
+fn of_recordings(paths: &[PathBuf], reading: &ReadingArgs) -> Result<(Vec<Lane>, String)> {
+    let reading = reading.options();
+    let read = |path: &PathBuf| recording::read(path, &reading).with_context(|| path.display().to_string());
+    let all: Vec<Recording> = paths.iter().map(read).collect::<Result<_>>()?;
+    for (path, recording) in paths.iter().zip(&all) {
+        ensure!(
+            recording.pose == all[0].pose,
+            "{}: its radar does not hang where that of {} does; lanes of another place are learnt on their own",
+            path.display(),
+            paths[0].display()
+        );
+    }
+    let learning = bar("learning lanes", 100);
+    let lanes = lanes::learnt(&all, &|share| learning.reach(share));
+    drop(learning);
+    ensure!(
+        !lanes.is_empty(),
+        "{}: no two vehicles drive 15 m one behind the other there; take a longer recording",
+        paths[0].display()
+    );
+    let names: Vec<String> = paths.iter().map(|path| name(path)).collect();
+    Ok((lanes, format!("learnt from {}", names.join(", "))))
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().display().to_string()
 }

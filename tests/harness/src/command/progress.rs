@@ -20,6 +20,11 @@ impl Bar {
         self.0.inc(1);
     }
 
+    /// Stands at a share of its steps, 0 to 1.
+    pub fn reach(&self, share: f64) {
+        self.0.set_position((share * self.0.length().unwrap_or_default() as f64) as u64);
+    }
+
     /// Says something else in front of the bar.
     pub fn say(&self, what: &str) {
         self.0.set_message(what.to_owned());

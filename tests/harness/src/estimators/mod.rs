@@ -26,6 +26,7 @@ use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::azimuths;
 use crate::geometry::ground::Ground;
+use crate::geometry::polyline::spaced;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::{Frame, RadarDetection, Recording};
@@ -178,6 +179,20 @@ impl Profile {
 pub struct Lane {
     /// Metres in road coordinates.
     pub points: Vec<[f32; 2]>,
+}
+
+impl Lane {
+    /// Shortest segment, metres: the library refuses half a metre.
+    const SHORTEST_M: f64 = 0.6;
+    /// How far beyond its range a radar's obstacles are followed, metres.
+    pub const BEYOND_RANGE_M: f64 = 25.0;
+
+    /// Of these places, in whole centimetres; `None` of a single place.
+    pub fn of(places: &[[f64; 2]]) -> Option<Self> {
+        let places = spaced(places.to_vec(), Self::SHORTEST_M);
+        let points = places.iter().map(|p| p.map(|v| (v * 100.0).round() as f32 / 100.0));
+        (places.len() > 1).then(|| Self { points: points.collect() })
+    }
 }
 
 /// Lanes as the library takes them, kept as long as the program runs: they are few.

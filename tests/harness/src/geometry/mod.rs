@@ -3,6 +3,7 @@
 pub mod azimuths;
 pub mod ground;
 pub mod polygon;
+pub mod polyline;
 pub mod pose;
 pub mod sight;
 pub mod solid;

@@ -3,10 +3,12 @@
 //! In the order of the data: a [`tracks`] polyline says where the near face of a vehicle was, [`near_face`] makes box
 //! centres of it, [`file`](mod@file) keeps both as `NAME.labels.csv`. [`proposals`] offers tracks found in the radar's
 //! detections, to be accepted, mended or rejected; [`follow`](proposals::follow) mends from a click. [`person`] plays the
-//! one who does that, and [`judged`] counts its actions and judges the labels.
+//! one who does that, and [`judged`] counts its actions and judges the labels. What is found for proposals tells the
+//! [`lanes`] of a site, too.
 
 pub mod file;
 pub mod judged;
+pub mod lanes;
 pub mod near_face;
 pub mod person;
 pub mod proposals;

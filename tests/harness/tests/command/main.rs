@@ -5,6 +5,7 @@ mod calibration;
 mod camera;
 mod can_log;
 mod foxglove;
+mod lanes;
 mod native_capture;
 mod outputs;
 mod own_data;

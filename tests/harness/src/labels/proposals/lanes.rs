@@ -42,7 +42,7 @@ const STRAIGHT_SPREAD: f64 = 0.8;
 const SMOOTH: usize = 6;
 
 /// A path's places every [`STEP_M`], each with its spread.
-struct Driven {
+pub struct Driven {
     places: Vec<([f64; 2], f64)>,
 }
 
@@ -191,9 +191,13 @@ impl Lane {
     }
 }
 
-/// The lanes these paths keep to.
-pub fn learn(paths: &[Path], instants: &[Instant]) -> Vec<Lane> {
-    let mut left: Vec<Driven> = paths.iter().filter_map(|p| Driven::of(p, instants)).collect();
+/// What the paths of a recording tell of lanes.
+pub fn driven(paths: &[Path], instants: &[Instant]) -> Vec<Driven> {
+    paths.iter().filter_map(|p| Driven::of(p, instants)).collect()
+}
+
+/// The lanes that are driven on, those that most speak for first.
+pub fn learn(mut left: Vec<Driven>) -> Vec<Lane> {
     left.sort_by(|a, b| b.length_m().total_cmp(&a.length_m()));
     let mut lanes: Vec<Lane> = Vec::new();
     while let Some((first, _)) = left
@@ -321,7 +325,7 @@ mod tests {
         }
         // two vehicles abreast that look like one
         paths.push(drive(&mut instants, |_| 0.2));
-        let lanes = learn(&paths, &instants);
+        let lanes = learn(driven(&paths, &instants));
         assert_eq!(lanes.len(), 2);
         // wrong in opposite ways far away: both are parallel to the road
         for lane in &lanes {
@@ -343,7 +347,7 @@ mod tests {
         let mut instants = Vec::new();
         let bend = |x: f64| 0.002 * (x - 10.0).powi(2);
         let paths: Vec<Path> = (0..4).map(|k| drive(&mut instants, |x| bend(x) + 0.1 * f64::from(k))).collect();
-        let lanes = learn(&paths, &instants);
+        let lanes = learn(driven(&paths, &instants));
         assert_eq!(lanes.len(), 1);
         for x in [40.0, 80.0, 120.0] {
             assert!(lanes[0].beside([x, bend(x) + 0.15]).unwrap().left_m.abs() < 1.0, "{x}");

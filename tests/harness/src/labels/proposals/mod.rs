@@ -92,7 +92,8 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     }
     let mut instants = reflections::instants(recording);
     // the first time what drives shows the lanes, the second time they tell what is side by side
-    let lanes = lanes::learn(&paths(&instants, &[], &[], &|share| progress(0.3 * share)), &instants);
+    let first = paths(&instants, &[], &[], &|share| progress(0.3 * share));
+    let lanes = lanes::learn(lanes::driven(&first, &instants));
     reflections::free_lanes(&mut instants, &lanes);
     let shared: Vec<Arc<Lane>> = lanes.iter().cloned().map(Arc::new).collect();
     let paths = paths(&instants, &lanes, &shared, &|share| progress(0.3 + 0.3 * share));
@@ -140,6 +141,29 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
     }
     progress(1.0);
     all
+}
+
+/// Lanes that were driven on in these recordings of one site, as places along their middles in the direction of travel;
+/// those that most speak for first. `progress` is told the share that is done.
+pub fn lanes(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<Vec<[f64; 2]>> {
+    let mut all: Vec<Vec<reflections::Instant>> =
+        recordings.iter().filter(|r| !r.sensor.frames_independent).map(reflections::instants).collect();
+    let mut known: Vec<Lane> = Vec::new();
+    // as for proposals: the second time nobody is mixed up with the vehicle beside
+    for pass in 0..2 {
+        let shared: Vec<Arc<Lane>> = known.iter().cloned().map(Arc::new).collect();
+        let mut driven = Vec::new();
+        let steps = 2.0 * all.len() as f64;
+        for (k, instants) in all.iter_mut().enumerate() {
+            reflections::free_lanes(instants, &known);
+            let done = (pass * steps as usize / 2 + k) as f64;
+            let paths = paths(instants, &known, &shared, &|share| progress((done + share) / steps));
+            driven.extend(lanes::driven(&paths, instants));
+        }
+        known = lanes::learn(driven);
+    }
+    progress(1.0);
+    known.into_iter().map(|lane| lane.points).collect()
 }
 
 /// What moves, followed in both directions of time.

@@ -10,7 +10,7 @@ use super::{ORIGIN, notes};
 use crate::evaluation::Options as EvaluationOptions;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
-use crate::studies::experiment::scenes::{Counted, Goal, Plan};
+use crate::studies::experiment::scenes::{Counted, Goal, LEARNT_S, Plan};
 use crate::twin::scene::Scene;
 
 /// The estimator that is developed here.
@@ -26,6 +26,8 @@ pub struct Title<'a> {
     pub set: &'a str,
     pub warm_up_s: f64,
     pub every: usize,
+    /// Whether lanes were learnt from other days.
+    pub lanes_learnt: bool,
     /// How much of the tables.
     pub extent: Extent,
 }
@@ -34,9 +36,11 @@ pub struct Title<'a> {
 pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &EvaluationOptions) -> String {
     let Some((main, beside)) = counted.split_first() else { return String::new() };
     let every = if title.every > 1 { format!(", one frame in {} judged", title.every) } else { String::new() };
+    let learnt =
+        if title.lanes_learnt { format!("; lanes learnt from {LEARNT_S} s of another day") } else { String::new() };
     let summary = &main.pooled.summary;
     let mut text = format!(
-        "{}, {}: {} scenes, {}; the first {} s of each not counted{every}\n\
+        "{}, {}: {} scenes, {}; the first {} s of each not counted{every}{learnt}\n\
          {} frames, {} trajectories, coverage {} %\n{}\n",
         title.name,
         title.set,
@@ -201,6 +205,7 @@ pub fn json(
         "set": title.set,
         "warm_up_s": title.warm_up_s,
         "every": title.every,
+        "lanes_learnt": title.lanes_learnt,
         "variants": counted.iter().map(variant).collect::<Vec<_>>(),
         "scenes": scenes,
         "beside": beside,

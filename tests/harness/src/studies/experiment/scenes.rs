@@ -6,17 +6,18 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::plan;
-use crate::estimators;
+use crate::estimators::{self, Lane};
 use crate::evaluation::Settings;
 use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::score;
+use crate::labels::lanes;
 use crate::recording::Recording;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
@@ -45,6 +46,9 @@ pub struct Set {
     pub warm_up_s: f64,
     /// Scene files, seen from the plan's folder.
     pub scenes: Vec<PathBuf>,
+    /// Traffic of another day at each of them, which its lanes can be learnt from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub other_days: Vec<PathBuf>,
 }
 
 /// Rates to be reached, FVR and FIR, in points.
@@ -73,6 +77,12 @@ impl Plan {
         let (mut seeds, mut files) = (BTreeSet::new(), BTreeSet::new());
         for (name, set) in [("training", &self.training), ("reporting", &self.reporting)] {
             ensure!(!set.scenes.is_empty(), "[{name}] has no scenes");
+            ensure!(
+                set.other_days.is_empty() || set.other_days.len() == set.scenes.len(),
+                "[{name}] names other_days of {} of its {} scenes",
+                set.other_days.len(),
+                set.scenes.len()
+            );
             for scene in self.scenes(set)? {
                 let traffic = scene.source(None)?.path;
                 ensure!(
@@ -81,6 +91,12 @@ impl Plan {
                     set.warm_up_s,
                     scene.name,
                     scene.duration_s
+                );
+                let other_days = set.other_days.iter().map(|day| self.folder.join(day));
+                ensure!(
+                    other_days.clone().all(|day| day != traffic),
+                    "[{name}] other_days has the traffic `{}` is judged on",
+                    scene.name
                 );
                 ensure!(seeds.insert(scene.seed), "`{}` has the seed {} of another scene", scene.name, scene.seed);
                 ensure!(
@@ -100,6 +116,54 @@ impl Plan {
     /// Those of reading a scene.
     pub fn scenes(&self, set: &Set) -> Result<Vec<Scene>> {
         set.scenes.iter().map(|path| Scene::read(&self.folder.join(path))).collect()
+    }
+
+    /// Lanes of a set's scenes, from their nets where all name one.
+    ///
+    /// # Errors
+    /// `learnt`, and the set names no traffic they can be learnt from.
+    pub fn lanes(&self, set: &Set, scenes: &[Scene], learnt: bool) -> Result<LanesFrom> {
+        let has_net = |scene: &Scene| scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some());
+        match learnt {
+            true if set.other_days.is_empty() => {
+                bail!("these scenes name no other_days that lanes could be learnt from")
+            }
+            true => Ok(LanesFrom::OtherDays(set.other_days.iter().map(|day| self.folder.join(day)).collect())),
+            false if scenes.iter().all(has_net) => Ok(LanesFrom::Nets),
+            false => Ok(LanesFrom::Nowhere),
+        }
+    }
+}
+
+/// Where estimators have the lanes of each scene from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LanesFrom {
+    Nowhere,
+    /// The net of its traffic.
+    Nets,
+    /// [Learnt](lanes::learnt) from [`LEARNT_S`] of other traffic, seen by the same radar.
+    OtherDays(Vec<PathBuf>),
+}
+
+/// How much of another day lanes are learnt from, seconds.
+pub const LEARNT_S: f64 = 90.0;
+/// What the seed of another day is greater by.
+const OTHER_SEED: u64 = 1 << 32;
+
+impl LanesFrom {
+    /// Lanes of scene number `k`.
+    fn of(&self, k: usize, scene: &Scene, settings: &Settings, progress: &(dyn Fn() + Sync)) -> Result<Vec<Lane>> {
+        match self {
+            Self::Nowhere => Ok(settings.estimators.lanes.clone()),
+            Self::Nets => scene.lanes(),
+            Self::OtherDays(days) => {
+                let (duration_s, seed) = (scene.duration_s.min(LEARNT_S), scene.seed + OTHER_SEED);
+                let other = Scene { duration_s, seed, ..scene.clone() };
+                let simulation = Simulation::new(other, days.get(k).map(PathBuf::as_path))?;
+                let (_, recording) = plan::recorded(&simulation, &scene.name, settings, progress)?;
+                Ok(lanes::learnt(&[recording], &|_| ()))
+            }
+        }
     }
 }
 
@@ -161,15 +225,13 @@ pub fn run(
     scenes: &[Scene],
     settings: &Settings,
     extent: Extent,
+    lanes: &LanesFrom,
     keep: &(dyn Fn(&str, &[u8]) -> Result<()> + Sync),
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<SceneResult>> {
-    let with_lanes = with_lanes(scenes);
-    let one = |scene: &Scene| -> Result<SceneResult> {
+    let one = |k: usize, scene: &Scene| -> Result<SceneResult> {
         let mut settings = settings.clone();
-        if with_lanes {
-            settings.estimators.lanes = scene.lanes()?;
-        }
+        settings.estimators.lanes = lanes.of(k, scene, &settings, progress)?;
         let settings = &settings;
         let recording = record(scene, settings, keep, progress)?;
         let mut samples = samples::collect_every(&recording, &settings.evaluation, extent.every, progress);
@@ -186,12 +248,8 @@ pub fn run(
             .transpose()?;
         Ok(SceneResult { scene: scene.clone(), with_elevation, without_elevation })
     };
-    scenes.par_iter().map(|scene| one(scene).with_context(|| format!("scene `{}`", scene.name))).collect()
-}
-
-/// Whether estimators are run with lanes too: where every scene has the net of its traffic.
-pub fn with_lanes(scenes: &[Scene]) -> bool {
-    scenes.iter().all(|scene| scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some()))
+    let all = scenes.par_iter().enumerate();
+    all.map(|(k, scene)| one(k, scene).with_context(|| format!("scene `{}`", scene.name))).collect()
 }
 
 fn record(
@@ -236,10 +294,12 @@ pub fn count(results: &[SceneResult], variant: Variant, warm_up_s: f64, settings
 }
 
 /// Calls of `progress` by [`run`].
-pub fn total_steps(scenes: &[Scene], extent: Extent, estimators: u64) -> u64 {
-    let frames: u64 = scenes.iter().map(|s| (s.duration_s * s.radar.rate_hz).ceil() as u64).sum();
+pub fn total_steps(scenes: &[Scene], extent: Extent, lanes: &LanesFrom, estimators: u64) -> u64 {
+    let steps = |most_s: f64| scenes.iter().map(|s| (s.duration_s.min(most_s) * s.radar.rate_hz).ceil() as u64).sum();
+    let frames: u64 = steps(f64::INFINITY);
+    let learnt: u64 = if matches!(lanes, LanesFrom::OtherDays(_)) { steps(LEARNT_S) } else { 0 };
     // simulated and sampled, and once an estimator; without elevation the samples are there
-    frames * (2 + estimators + if extent.without_elevation { 1 + estimators } else { 0 })
+    learnt + frames * (2 + estimators + if extent.without_elevation { 1 + estimators } else { 0 })
 }
 
 #[cfg(test)]

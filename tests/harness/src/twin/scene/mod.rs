@@ -455,7 +455,7 @@ impl Scene {
         let source = self.source(None)?;
         let net = source.net.with_context(|| format!("scene `{}` names no net: [traffic] net", self.name))?;
         let Mount { x_m, y_m, .. } = self.radar.mount;
-        let reach = Reach { from: [x_m, y_m], reach_m: self.radar.field_of_view.range_m[1] + Reach::MARGIN_M };
+        let reach = Reach { from: [x_m, y_m], reach_m: self.radar.field_of_view.range_m[1] + Lane::BEYOND_RANGE_M };
         net::lanes(&net, &source.frame, &reach)
     }
 

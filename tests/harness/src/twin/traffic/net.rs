@@ -11,11 +11,10 @@ use quick_xml::events::{BytesStart, Event};
 use super::frame::RoadFrame;
 use super::opened;
 use crate::estimators::Lane;
+use crate::geometry::polyline::{direction, straightened, within};
 
 /// How far a bend may be from its chord, metres.
 const STRAIGHT_M: f64 = 0.2;
-/// Least length of a segment, metres: the library refuses half a metre.
-const SHORTEST_M: f64 = 0.6;
 /// How far apart an end and a beginning of one lane are, metres.
 const JOINED_M: f64 = 0.3;
 /// Least cosine between two lanes of which one goes on as the other: 2.5 degrees.
@@ -27,38 +26,6 @@ pub struct Reach {
     /// The radar's place, road coordinates, metres.
     pub from: [f64; 2],
     pub reach_m: f64,
-}
-
-impl Reach {
-    /// How far beyond its range a radar's obstacles are followed, metres.
-    pub const MARGIN_M: f64 = 25.0;
-
-    /// The part of a polyline from its first to its last point within.
-    fn cut(&self, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let mut kept: Vec<[f64; 2]> = Vec::new();
-        for pair in points.windows(2) {
-            let [a, b] = [pair[0], pair[1]];
-            // where along the segment the circle is entered and left
-            let d = [b[0] - a[0], b[1] - a[1]];
-            let f = [a[0] - self.from[0], a[1] - self.from[1]];
-            let (square, half) = (d[0] * d[0] + d[1] * d[1], f[0] * d[0] + f[1] * d[1]);
-            let rest = half * half - square * (f[0] * f[0] + f[1] * f[1] - self.reach_m * self.reach_m);
-            if square == 0.0 || rest <= 0.0 {
-                continue;
-            }
-            let (enter, leave) = ((-half - rest.sqrt()) / square, (-half + rest.sqrt()) / square);
-            let (enter, leave) = (enter.max(0.0), leave.min(1.0));
-            if enter >= leave {
-                continue;
-            }
-            let at = |t: f64| [a[0] + t * d[0], a[1] + t * d[1]];
-            if kept.is_empty() {
-                kept.push(at(enter));
-            }
-            kept.push(at(leave));
-        }
-        kept
-    }
 }
 
 /// Reads the lanes of a net, in its order.
@@ -83,12 +50,8 @@ pub fn lanes(path: &Path, frame: &RoadFrame, reach: &Reach) -> Result<Vec<Lane>>
             _ => {}
         }
     }
-    let cut = joined(found).into_iter().map(|lane| straightened(&reach.cut(&lane)));
-    let lanes: Vec<Lane> = cut
-        .map(spaced)
-        .filter(|lane| lane.len() > 1)
-        .map(|lane| Lane { points: lane.into_iter().map(|p| p.map(|v| (v * 100.0).round() as f32 / 100.0)).collect() })
-        .collect();
+    let cut = joined(found).into_iter().map(|lane| within(&lane, reach.from, reach.reach_m));
+    let lanes: Vec<Lane> = cut.filter_map(|lane| Lane::of(&straightened(&lane, STRAIGHT_M))).collect();
     let [x, y] = reach.from;
     ensure!(
         !lanes.is_empty(),
@@ -120,12 +83,6 @@ fn shape(lane: &BytesStart) -> Result<Option<Vec<[f64; 2]>>> {
     Ok(Some(points))
 }
 
-fn direction(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-    let long = dx.hypot(dy).max(1e-9);
-    [dx / long, dy / long]
-}
-
 /// Lanes, each with those that it goes straight on into.
 fn joined(lanes: Vec<Vec<[f64; 2]>>) -> Vec<Vec<[f64; 2]>> {
     let mut all = lanes;
@@ -147,33 +104,6 @@ fn joined(lanes: Vec<Vec<[f64; 2]>>) -> Vec<Vec<[f64; 2]>> {
         }
     }
     all
-}
-
-/// Without points that lie on the way between others (Douglas and Peucker).
-fn straightened(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return Vec::new() };
-    let [x, y] = direction(first, last);
-    let aside = |p: &[f64; 2]| ((p[0] - first[0]) * y - (p[1] - first[1]) * x).abs();
-    let far = (1..points.len().saturating_sub(1)).max_by(|&a, &b| aside(&points[a]).total_cmp(&aside(&points[b])));
-    match far.filter(|&k| aside(&points[k]) > STRAIGHT_M) {
-        Some(k) => {
-            let mut all = straightened(&points[..=k]);
-            all.extend(straightened(&points[k..]).into_iter().skip(1));
-            all
-        }
-        None => vec![first, last],
-    }
-}
-
-/// Without points next to others.
-fn spaced(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    let mut kept: Vec<[f64; 2]> = Vec::new();
-    for p in points {
-        if kept.last().is_none_or(|last| (last[0] - p[0]).hypot(last[1] - p[1]) >= SHORTEST_M) {
-            kept.push(p);
-        }
-    }
-    kept
 }
 
 #[cfg(test)]

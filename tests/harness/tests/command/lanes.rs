@@ -1,0 +1,57 @@
+//! `viewshed lanes`: learnt from recordings, and what it refuses.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::scene::{folder, json, stderr, stdout};
+
+fn shipped() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings").canonicalize().unwrap()
+}
+
+fn viewshed(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_viewshed")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+#[test]
+fn lanes_of_a_recording_are_a_configuration_that_replay_takes() {
+    let folder = folder("lanes-learnt");
+    let motorway = shipped().join("motorway.mcap");
+    let motorway = motorway.to_str().unwrap();
+    let output = viewshed(&folder, &["lanes", motorway, "--to", "20", "--table", "estimators.lanes"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.lines().next().unwrap().ends_with("learnt from motorway.mcap"), "{text}");
+    std::fs::write(folder.join("lanes.toml"), text).unwrap();
+    let replayed = viewshed(
+        &folder,
+        &["replay", motorway, "--from", "20", "--to", "22", "--config", "lanes.toml", "--json", "r.json"],
+    );
+    assert!(replayed.status.success(), "{}", stderr(&replayed));
+    let report = json(&folder.join("r.json"));
+    assert!(report["estimators"].as_array().unwrap().iter().any(|e| e["name"] == "radar-3d-lanes"));
+    assert!(report["options"]["estimators"]["lanes"].as_array().unwrap().len() >= 6);
+}
+
+#[test]
+fn what_no_lanes_can_be_learnt_from_is_named() {
+    let folder = folder("lanes-refused");
+    let motorway = shipped().join("motorway.mcap");
+    let net = shipped().join("crossing/wide.net.xml.gz");
+    let [motorway, net] = [&motorway, &net].map(|path| path.to_str().unwrap());
+    let said = |arguments: &[&str]| {
+        let output = viewshed(&folder, &[&["lanes"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));
+        stderr(&output)
+    };
+    assert!(said(&[net, motorway]).contains("a net goes alone"));
+    let short = said(&[motorway, "--to", "0.5"]);
+    assert!(short.contains("motorway.mcap: no two vehicles drive") && short.contains("longer recording"), "{short}");
+    assert!(said(&["nowhere.mcap"]).contains("nowhere.mcap"));
+    // the same radar, said to hang elsewhere in the second recording
+    let queue = shipped().join("queue/train-1.toml");
+    let made = viewshed(&folder, &["simulate", queue.to_str().unwrap(), "--duration", "1", "--out", "q.mcap"]);
+    assert!(made.status.success(), "{}", stderr(&made));
+    let elsewhere = said(&[motorway, "q.mcap"]);
+    assert!(elsewhere.contains("q.mcap: its radar does not hang where that of"), "{elsewhere}");
+}
