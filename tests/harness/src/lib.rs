@@ -17,7 +17,7 @@
 //! | [`twin`] | a scene and traffic in, a recording with ground truth out |
 //! | [`estimators`] | frames in, maps out: the library's estimators, and what perfect occupancy would give |
 //! | [`evaluation`] | maps and truth in; rates, intervals, trade-offs and examples out |
-//! | [`labels`] | lines a person draws, and tracks the machine offers; boxes and `NAME.labels.csv` out |
+//! | [`labels`] | lines a person draws, and tracks the machine offers; boxes, `NAME.labels.csv` and lanes of traffic out |
 //! | [`studies`] | the paper's experiment on the twin, and the search for a mount |
 //! | [`bus`] | maps in, their load on CAN, CAN FD and serial lines out; what a receiver of a log has |
 //! | [`doctor`] | a radar's log in, what is wrong with it and what to do out |

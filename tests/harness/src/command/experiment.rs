@@ -14,6 +14,7 @@ use super::replay::shipped;
 use crate::command::options::JudgingArgs;
 use crate::evaluation::Settings;
 use crate::evaluation::replay::{Replay, steps};
+use crate::labels::lanes;
 use crate::results::files::{OutputArgs, Outputs, Target};
 use crate::results::pictures::reliability::{self, Reliability};
 use crate::results::report::{
@@ -193,11 +194,14 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     let kept = kept(args, all.iter().map(|scene| scene.name.clone()), outputs)?;
     let extent = Extent { every: usize::from(args.every), without_elevation: !args.only_elevation };
     let on_grades = all.iter().all(|scene| !scene.ground.is_empty());
-    let lanes = plan.lanes(set, &all, args.learn_lanes)?;
-    if let LanesFrom::OtherDays(days) = &lanes {
+    let lanes = if args.learn_lanes {
+        let days = plan.other_days(set)?;
         outputs.reads(days.iter().cloned());
-    }
-    let more = [lanes != LanesFrom::Nowhere, on_grades, settings.estimators.far_road.is_some()];
+        LanesFrom::OtherDays(days, |recordings| lanes::learnt(recordings, &|_| ()))
+    } else {
+        LanesFrom::nets(&all)
+    };
+    let more = [!matches!(lanes, LanesFrom::Settings), on_grades, settings.estimators.far_road.is_some()];
     let estimators = ESTIMATORS + estimators::site_rows(more.map(u64::from).iter().sum());
     let running = bar("simulating and replaying", scenes::total_steps(&all, extent, &lanes, estimators));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));

@@ -45,6 +45,25 @@ fn row<'a>(report: &'a Value, name: &str) -> &'a Value {
 }
 
 #[test]
+fn lanes_are_learnt_only_where_another_day_is_named() {
+    let folder = prepared("scenes-learnt", str::to_owned);
+    let none = experiment(&folder, "plan.toml --scene crossing --learn-lanes");
+    assert!(stderr(&none).contains("name no other_days"), "{}", stderr(&none));
+    let motorway = experiment(&folder, "--scene motorway --learn-lanes");
+    assert!(stderr(&motorway).contains("--learn-lanes go with --scene crossing"), "{}", stderr(&motorway));
+    let plan = std::fs::read_to_string(folder.join("plan.toml")).unwrap();
+    let day = shipped().join("wide-day-1.fcd.xml.gz");
+    std::fs::write(folder.join("plan.toml"), format!("{plan}other_days = [\"{}\"]\n", day.display())).unwrap();
+    let learnt =
+        experiment(&folder, "plan.toml --scene crossing --learn-lanes --only-elevation --every 9 --json e.json");
+    assert!(learnt.status.success(), "{}", stderr(&learnt));
+    assert!(stdout(&learnt).contains("lanes learnt from another day"));
+    let report = json(&folder.join("e.json"));
+    assert_eq!(report["lanes_learnt"], true);
+    assert!(!row(&report["variants"][0]["pooled"], "radar-3d-lanes").is_null());
+}
+
+#[test]
 fn scenes_are_pooled_and_told_apart_with_and_without_elevation_and_warm_up() {
     let both = |text: &str| {
         text.replace("[\"train-2.toml\"]", "[\"train-2.toml\", \"train-1.toml\"]").replace("[\"train-1.toml\"]", "[]")

@@ -24,7 +24,6 @@ use std::sync::Arc;
 use super::lane::Lane;
 use super::path::{Path, quantile};
 use super::reflections::Instant;
-use super::shape::Extent;
 
 /// Sine of the aspect from which on reflections tell the flank, from how far at most, metres, and how many.
 const SIDE_SIN: f64 = 0.06;
@@ -93,11 +92,11 @@ impl Beside {
 pub struct Middles(HashMap<*const Lane, f64>);
 
 impl Middles {
-    pub fn of(paths: &[&Path], instants: &[Instant]) -> Self {
+    /// Of paths with the width of each vehicle, metres.
+    pub fn of<'a>(paths: impl Iterator<Item = (&'a Path, f64)>, instants: &[Instant]) -> Self {
         let mut lanes: HashMap<*const Lane, Vec<Beside>> = HashMap::new();
-        for path in paths {
+        for (path, width_m) in paths {
             let Some(lane) = &path.lane else { continue };
-            let [_, width_m, _] = Extent::of(path, instants).box_m();
             lanes.entry(Arc::as_ptr(lane)).or_default().push(Beside::of(path, instants, width_m));
         }
         Self(lanes.into_iter().filter_map(|(lane, all)| Some((lane, median(all)?))).collect())
@@ -200,7 +199,7 @@ mod tests {
             paths.extend(
                 [0.9, 1.1].map(|left| lorry(&mut instants, [130.0, y], &[left * side], 0.2 * side, Some(&lane))),
             );
-            let middles = Middles::of(&paths.iter().collect::<Vec<_>>(), &instants);
+            let middles = Middles::of(paths.iter().map(|path| (path, 2.55)), &instants);
             let told_m = |path: &Path| middles.left_m(path, &instants, 2.55) + 0.2 * side;
             let off: Vec<f64> = paths.iter().map(told_m).collect();
             assert!(off[0] > off[1] && off[1] > off[2], "{off:?}");

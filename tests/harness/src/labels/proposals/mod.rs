@@ -64,6 +64,9 @@ const IN_LANE_M: f64 = 2.0;
 /// Lowest score that is worth a look.
 const LEAST: f64 = 0.8;
 
+/// Lowest score of what tells where a lane is.
+const ON_A_LANE: f64 = 0.6;
+
 /// Where and how long the sensor looks.
 struct View<'a> {
     sensor: [f64; 2],
@@ -124,8 +127,8 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         contains: &|[x, y]| recording.sensor.field_of_view.contains(recording.pose.to_spherical([x, y, 1.0])),
         latest_s: instants.last().map_or(0.0, |i| i.time_s),
     };
-    let kept: Vec<&Path> = scored.iter().map(|(_, path)| *path).collect();
-    let middles = Middles::of(&kept, &instants);
+    let widths = scored.iter().map(|(_, path)| (*path, shape::Extent::of(path, &instants).box_m()[1]));
+    let middles = Middles::of(widths, &instants);
     let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {
         track: shape::track(path, &instants, &middles, &view, format!("p{}", k + 1)),
         score,
@@ -158,6 +161,11 @@ pub fn lanes(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<V
             reflections::free_lanes(instants, &known);
             let done = (pass * steps as usize / 2 + k) as f64;
             let paths = paths(instants, &known, &shared, &|share| progress((done + share) / steps));
+            // mirror images in rails and walls drive side by side, too
+            let mut paths = exclusion::without_images(paths);
+            if pass > 0 {
+                paths.retain(|path| score(path, instants) >= ON_A_LANE);
+            }
             driven.extend(lanes::driven(&paths, instants));
         }
         known = lanes::learn(driven);

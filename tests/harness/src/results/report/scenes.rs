@@ -10,7 +10,7 @@ use super::{ORIGIN, notes};
 use crate::evaluation::Options as EvaluationOptions;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
-use crate::studies::experiment::scenes::{Counted, Goal, LEARNT_S, Plan};
+use crate::studies::experiment::scenes::{Counted, Goal, Plan};
 use crate::twin::scene::Scene;
 
 /// The estimator that is developed here.
@@ -36,8 +36,7 @@ pub struct Title<'a> {
 pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &EvaluationOptions) -> String {
     let Some((main, beside)) = counted.split_first() else { return String::new() };
     let every = if title.every > 1 { format!(", one frame in {} judged", title.every) } else { String::new() };
-    let learnt =
-        if title.lanes_learnt { format!("; lanes learnt from {LEARNT_S} s of another day") } else { String::new() };
+    let learnt = if title.lanes_learnt { "; lanes learnt from another day" } else { "" };
     let summary = &main.pooled.summary;
     let mut text = format!(
         "{}, {}: {} scenes, {}; the first {} s of each not counted{every}{learnt}\n\

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,6 @@ use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::score;
-use crate::labels::lanes;
 use crate::recording::Recording;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
@@ -118,50 +117,53 @@ impl Plan {
         set.scenes.iter().map(|path| Scene::read(&self.folder.join(path))).collect()
     }
 
-    /// Lanes of a set's scenes, from their nets where all name one.
+    /// Traffic of another day at each scene of a set.
     ///
     /// # Errors
-    /// `learnt`, and the set names no traffic they can be learnt from.
-    pub fn lanes(&self, set: &Set, scenes: &[Scene], learnt: bool) -> Result<LanesFrom> {
-        let has_net = |scene: &Scene| scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some());
-        match learnt {
-            true if set.other_days.is_empty() => {
-                bail!("these scenes name no other_days that lanes could be learnt from")
-            }
-            true => Ok(LanesFrom::OtherDays(set.other_days.iter().map(|day| self.folder.join(day)).collect())),
-            false if scenes.iter().all(has_net) => Ok(LanesFrom::Nets),
-            false => Ok(LanesFrom::Nowhere),
-        }
+    /// The set names none.
+    pub fn other_days(&self, set: &Set) -> Result<Vec<PathBuf>> {
+        ensure!(!set.other_days.is_empty(), "these scenes name no other_days that lanes could be learnt from");
+        Ok(set.other_days.iter().map(|day| self.folder.join(day)).collect())
     }
 }
 
 /// Where estimators have the lanes of each scene from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub enum LanesFrom {
-    Nowhere,
+    /// What the settings say.
+    Settings,
     /// The net of its traffic.
     Nets,
-    /// [Learnt](lanes::learnt) from [`LEARNT_S`] of other traffic, seen by the same radar.
-    OtherDays(Vec<PathBuf>),
+    /// [`LEARNT_S`] of other traffic, seen by the same radar, and what learns them from that.
+    OtherDays(Vec<PathBuf>, fn(&[Recording]) -> Vec<Lane>),
 }
 
-/// How much of another day lanes are learnt from, seconds.
-pub const LEARNT_S: f64 = 90.0;
+/// How much of another day lanes are learnt from at most, seconds.
+const LEARNT_S: f64 = 90.0;
 /// What the seed of another day is greater by.
 const OTHER_SEED: u64 = 1 << 32;
 
 impl LanesFrom {
+    /// The nets of scenes, where all name one.
+    pub fn nets(scenes: &[Scene]) -> Self {
+        let has_net = |scene: &Scene| scene.traffic.as_ref().is_some_and(|traffic| traffic.net.is_some());
+        if scenes.iter().all(has_net) { Self::Nets } else { Self::Settings }
+    }
+
     /// Lanes of scene number `k`.
     fn of(&self, k: usize, scene: &Scene, settings: &Settings, progress: &(dyn Fn() + Sync)) -> Result<Vec<Lane>> {
         match self {
-            Self::Nowhere => Ok(settings.estimators.lanes.clone()),
+            Self::Settings => Ok(settings.estimators.lanes.clone()),
             Self::Nets => scene.lanes(),
-            Self::OtherDays(days) => {
+            Self::OtherDays(days, learn) => {
                 let (duration_s, seed) = (scene.duration_s.min(LEARNT_S), scene.seed + OTHER_SEED);
                 let other = Scene { duration_s, seed, ..scene.clone() };
-                let simulation = Simulation::new(other, days.get(k).map(PathBuf::as_path))?;
+                let day = days.get(k).with_context(|| format!("`{}` has no other day", scene.name))?;
+                let simulation = Simulation::new(other, Some(day))?;
                 let (_, recording) = plan::recorded(&simulation, &scene.name, settings, progress)?;
-                Ok(lanes::learnt(&[recording], &|_| ()))
+                let lanes = learn(&[recording]);
+                ensure!(!lanes.is_empty(), "{}: no lanes can be learnt from {duration_s} s of it", day.display());
+                Ok(lanes)
             }
         }
     }
@@ -297,7 +299,7 @@ pub fn count(results: &[SceneResult], variant: Variant, warm_up_s: f64, settings
 pub fn total_steps(scenes: &[Scene], extent: Extent, lanes: &LanesFrom, estimators: u64) -> u64 {
     let steps = |most_s: f64| scenes.iter().map(|s| (s.duration_s.min(most_s) * s.radar.rate_hz).ceil() as u64).sum();
     let frames: u64 = steps(f64::INFINITY);
-    let learnt: u64 = if matches!(lanes, LanesFrom::OtherDays(_)) { steps(LEARNT_S) } else { 0 };
+    let learnt: u64 = if matches!(lanes, LanesFrom::OtherDays(..)) { steps(LEARNT_S) } else { 0 };
     // simulated and sampled, and once an estimator; without elevation the samples are there
     learnt + frames * (2 + estimators + if extent.without_elevation { 1 + estimators } else { 0 })
 }
@@ -384,6 +386,50 @@ mod tests {
             used.sort_by(|a, b| a.0.cmp(&b.0));
             assert_eq!(made, used, "{name}");
         }
+    }
+
+    #[test]
+    fn other_days_are_one_for_each_scene_and_not_the_one_that_is_judged() {
+        let plan = shipped("crossing");
+        let days = plan.other_days(&plan.reporting).unwrap();
+        assert!(days.len() == plan.reporting.scenes.len() && days.iter().all(|day| day.exists()), "{days:?}");
+        let refused = |change: &dyn Fn(&mut Vec<PathBuf>)| {
+            let mut plan = shipped("crossing");
+            change(&mut plan.reporting.other_days);
+            plan.check().unwrap_err().to_string()
+        };
+        let few = refused(&|days| drop(days.pop()));
+        assert!(few.contains("[reporting] names other_days of 5 of its 6 scenes"), "{few}");
+        let same = refused(&|days| days[3] = "tee-1.fcd.xml.gz".into());
+        assert!(same.contains("other_days has the traffic `tee-1` is judged on"), "{same}");
+        let none = plan.other_days(&plan.training).unwrap_err().to_string();
+        assert!(none.contains("no other_days"), "{none}");
+    }
+
+    #[test]
+    fn lanes_are_learnt_from_the_other_day_alone_seen_from_the_same_place() {
+        let plan = shipped("crossing");
+        let mut scene = plan.scenes(&plan.reporting).unwrap().remove(0);
+        scene.duration_s = 2.0;
+        let learn = |recordings: &[Recording]| {
+            let [x, y, _] = recordings[0].pose.position;
+            let ids = recordings[0].truth.as_ref().map_or(0, |truth| truth.tracks.len());
+            vec![Lane { points: vec![[x as f32, y as f32], [recordings[0].frames.len() as f32, ids as f32]] }]
+        };
+        let settings = Settings::default();
+        let of = |day: &str| {
+            let days = vec![plan.folder.join(day)];
+            LanesFrom::OtherDays(days, learn).of(0, &scene, &settings, &|| ()).unwrap().remove(0).points
+        };
+        let [there, seen] = of("wide-day-1.fcd.xml.gz")[..] else { panic!("two points") };
+        assert_eq!((there, seen[0]), ([scene.radar.mount.x_m as f32, scene.radar.mount.y_m as f32], 30.0));
+        assert_ne!(seen[1], of("wide-day-2.fcd.xml.gz")[1][1], "other vehicles on another day");
+        let nothing = LanesFrom::OtherDays(vec![plan.folder.join("wide-day-1.fcd.xml.gz")], |_| Vec::new());
+        let error = nothing.of(0, &scene, &settings, &|| ()).unwrap_err().to_string();
+        assert!(error.contains("wide-day-1") && error.contains("no lanes can be learnt from 2 s"), "{error}");
+        assert!(matches!(LanesFrom::nets(&[scene.clone()]), LanesFrom::Nets));
+        scene.traffic.as_mut().unwrap().net = None;
+        assert!(matches!(LanesFrom::nets(&[scene]), LanesFrom::Settings));
     }
 
     #[test]
