@@ -44,21 +44,21 @@ pub struct Args {
 }
 
 /// Where a net's coordinates lie.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 #[command(next_help_heading = "Of a net")]
 struct NetArgs {
-    /// Origin of the road coordinates in those of the net, without the offset the net says, in metres: X,Y
-    #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = pair, allow_hyphen_values = true)]
-    origin: [f64; 2],
-    /// Direction of the road's x axis from east, counter-clockwise, in degrees
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true)]
-    heading: f64,
-    /// Place of the radar in road coordinates, in metres: X,Y
-    #[arg(long, value_name = "X,Y", default_value = "0,0", value_parser = pair, allow_hyphen_values = true)]
-    at: [f64; 2],
-    /// Range of the radar, in metres
-    #[arg(long, value_name = "METRES", default_value_t = 200.0)]
-    range: f64,
+    /// Origin of the road coordinates in those of the net, without the offset the net says, in metres: X,Y [default: 0,0]
+    #[arg(long, value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
+    origin: Option<[f64; 2]>,
+    /// Direction of the road's x axis from east, counter-clockwise, in degrees [default: 0]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    heading: Option<f64>,
+    /// Place of the radar in road coordinates, in metres: X,Y [default: 0,0]
+    #[arg(long, value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
+    at: Option<[f64; 2]>,
+    /// Range of the radar, in metres [default: 200]
+    #[arg(long, value_name = "METRES")]
+    range: Option<f64>,
 }
 
 fn pair(text: &str) -> Result<[f64; 2], String> {
@@ -81,6 +81,11 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         [net] if is_net(net) => of_net(net, &args.net)?,
         all => {
             ensure!(!all.iter().any(is_net), "a net goes alone: give one net, or recordings");
+            let NetArgs { origin, heading, at, range } = &args.net;
+            ensure!(
+                origin.is_none() && heading.is_none() && at.is_none() && range.is_none(),
+                "--origin, --heading, --at and --range are of a net; where the radar hangs a recording says, or --mount"
+            );
             of_recordings(all, &args.reading)?
         }
     };
@@ -95,10 +100,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 /// Lanes and where they are from.
 fn of_net(net: &Path, args: &NetArgs) -> Result<(Vec<Lane>, String)> {
-    ensure!(args.range > 0.0 && args.range <= 300.0, "--range {} is outside 0 to 300 m", args.range);
-    ensure!(args.heading.abs() <= 360.0, "--heading {} is outside -360 to 360 degrees", args.heading);
-    let frame = RoadFrame { origin: args.origin, heading_rad: args.heading.to_radians(), net_offset: [0.0; 2] };
-    let reach = Reach { from: args.at, reach_m: args.range + Lane::BEYOND_RANGE_M };
+    let (range_m, heading) = (args.range.unwrap_or(200.0), args.heading.unwrap_or(0.0));
+    ensure!(range_m > 0.0 && range_m <= 300.0, "--range {range_m} is outside 0 to 300 m");
+    ensure!(heading.abs() <= 360.0, "--heading {heading} is outside -360 to 360 degrees");
+    let origin = args.origin.unwrap_or_default();
+    let frame = RoadFrame { origin, heading_rad: heading.to_radians(), net_offset: [0.0; 2] };
+    let reach = Reach { from: args.at.unwrap_or_default(), reach_m: range_m + Lane::BEYOND_RANGE_M };
     let lanes = net::lanes(net, &frame, &reach)?;
     ensure!(
         lanes.len() <= MOST_LANES && segments(&lanes) <= MOST_SEGMENTS,
@@ -107,7 +114,7 @@ fn of_net(net: &Path, args: &NetArgs) -> Result<(Vec<Lane>, String)> {
         lanes.len(),
         segments(&lanes)
     );
-    let [x, y] = args.at;
+    let [x, y] = reach.from;
     Ok((lanes, format!("of {}, within {} m of ({x}, {y})", name(net), reach.reach_m)))
 }
 

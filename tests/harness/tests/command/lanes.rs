@@ -47,6 +47,7 @@ fn what_no_lanes_can_be_learnt_from_is_named() {
     assert!(said(&[net, motorway]).contains("a net goes alone"));
     let short = said(&[motorway, "--to", "0.5"]);
     assert!(short.contains("motorway.mcap: no two vehicles drive") && short.contains("longer recording"), "{short}");
+    assert!(said(&[motorway, "--range", "50"]).contains("--range are of a net"));
     assert!(said(&["nowhere.mcap"]).contains("nowhere.mcap"));
     // the same radar, said to hang elsewhere in the second recording
     let queue = shipped().join("queue/train-1.toml");

@@ -187,8 +187,9 @@ fn scene<'a>(
     estimator: &'a dyn Estimator,
     frame: usize,
     highlight: Option<Highlight>,
-    settings: &Settings,
+    settings: &'a Settings,
 ) -> Scene<'a> {
+    let knows_lanes = WITH_LANES.contains(&estimator.name());
     let recording = &replay.recording;
     Scene {
         map: estimator.map(),
@@ -199,11 +200,15 @@ fn scene<'a>(
         detections: recording.frames.get(frame).map_or(&[], |f| &f.detections),
         boxes: boxes(replay, estimator.name(), frame),
         road: &[],
+        lanes: if knows_lanes { &settings.estimators.lanes } else { &[] },
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),
         highlight,
     }
 }
+
+/// Estimators that are given the lanes.
+const WITH_LANES: [&str; 2] = ["radar-3d-lanes", "radar-3d-site"];
 
 /// Said where a box called visible stands on cells of which most are not.
 const ANY_CELL: &str =

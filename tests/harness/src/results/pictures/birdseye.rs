@@ -61,6 +61,9 @@ fn layout(scene: &Scene) -> Layout {
     if !scene.road.is_empty() {
         ground.push(overlay::samples::road());
     }
+    if !scene.lanes.is_empty() {
+        ground.push(overlay::samples::lanes());
+    }
     let mut legend = vec![ground];
     if !scene.boxes.is_empty() {
         legend.push(overlay::samples::boxes());
@@ -83,6 +86,7 @@ fn panel(canvas: &mut Canvas, scene: &Scene, plot: &Plot, enlarged: bool) {
         ground(canvas, scene.map, plot);
         plot.grid(canvas, Colour::hex(0x3C434C).opacity(38));
         overlay::road(canvas, plot, scene.road);
+        scene.lanes.iter().for_each(|lane| overlay::lane(canvas, plot, lane));
         overlay::field_of_view(canvas, plot, pose, &scene.field_of_view, scene.slice_height_m);
         if let Some(highlight) = &scene.highlight {
             let [x, y, _] = highlight.solid.center;
@@ -165,6 +169,7 @@ mod tests {
             detections: &[],
             boxes: Vec::new(),
             road: &[],
+            lanes: &[],
             title: "title".into(),
             caption: None,
             highlight: None,

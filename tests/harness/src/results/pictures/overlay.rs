@@ -3,6 +3,7 @@
 use super::axes::Plot;
 use super::canvas::{Canvas, Colour, Pen, Pixel};
 use super::palette::{DETECTION, INK, Outcome, outline};
+use crate::estimators::Lane;
 use crate::evaluation::samples::Cell;
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::geometry::solid::Solid;
@@ -17,6 +18,9 @@ const DETECTION_PX: f32 = 2.3;
 const SENSOR_PX: f32 = 11.0;
 const FIELD_OF_VIEW: Pen = Pen::new(Colour::hex(0x3C434C), 1.3).dashed(&[7.0, 5.0]);
 const ROAD: Pen = Pen::new(Colour::hex(0xFFFFFF), 1.4);
+const LANE: Pen = Pen::new(Colour::hex(0x6A3D9A), 1.6);
+/// Length of the arrow head at the end of a lane, pixels.
+const ARROW_PX: f32 = 9.0;
 
 /// A ground-truth box: outline by outcome, a tick from its centre to its front.
 pub fn truth_box(canvas: &mut Canvas, plot: &Plot, solid: &Solid, outcome: Option<Outcome>) {
@@ -93,6 +97,22 @@ pub fn road(canvas: &mut Canvas, plot: &Plot, cells: &[Cell]) {
     }
 }
 
+/// A lane of traffic, with an arrow head where it ends.
+pub fn lane(canvas: &mut Canvas, plot: &Plot, lane: &Lane) {
+    let points: Vec<Pixel> = lane.points.iter().map(|p| plot.at(p.map(f64::from))).collect();
+    arrow(canvas, &points);
+}
+
+fn arrow(canvas: &mut Canvas, points: &[Pixel]) {
+    canvas.polyline(points, false, LANE);
+    let [.., from, to] = points else { return };
+    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+    let length = dx.hypot(dy).max(1e-6);
+    let (c, s) = (dx / length * ARROW_PX, dy / length * ARROW_PX);
+    let barb = |right: f32| [to[0] - c - right * s, to[1] - s + right * c];
+    canvas.polyline(&[barb(0.5), *to, barb(-0.5)], false, LANE);
+}
+
 /// Samples of the pens, for the legend.
 pub mod samples {
     use super::{DOPPLER_PX_PER_MPS, FIELD_OF_VIEW, Outcome, Pen, ROAD, outline};
@@ -157,6 +177,13 @@ pub mod samples {
         ]
     }
 
+    pub fn lanes() -> Entry {
+        Entry::new("lane of traffic", 36, |canvas, area| {
+            let y = middle(area);
+            super::arrow(canvas, &[[area.left as f32, y], [area.right() as f32, y]]);
+        })
+    }
+
     pub fn road() -> Entry {
         Entry::new("road cells", 36, |canvas, area| {
             canvas.rectangle(area, Colour::hex(0x9CCBEC));
@@ -168,6 +195,25 @@ pub mod samples {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lane_has_its_arrow_head_where_its_traffic_goes_to() {
+        let window = crate::results::pictures::scene::Window { x_m: [0.0, 100.0], y_m: [-10.0, 10.0] };
+        let plot = window.filling(500);
+        let dark = |points: Vec<[f32; 2]>, [x, y]: [f64; 2]| {
+            let mut canvas = Canvas::new(plot.area.width, plot.area.height);
+            lane(&mut canvas, &plot, &Lane { points });
+            let [right, down] = plot.at([x, y]).map(|v| v as i32);
+            let near = |d: i32| (-3..=3).any(|e| canvas.pixel(right + e, down + d) == LANE.colour);
+            // the line itself is here, too: its barbs are 4 pixels beside it
+            near(-3) && near(3)
+        };
+        let [begin, end] = [[20.0, 2.0], [80.0, 2.0]];
+        let along = vec![[20.0, 2.0], [80.0, 2.0]];
+        let back: Vec<[f32; 2]> = along.iter().rev().copied().collect();
+        assert!(dark(along.clone(), [78.8, end[1]]) && !dark(along, [21.2, begin[1]]));
+        assert!(dark(back.clone(), [21.2, begin[1]]) && !dark(back, [78.8, end[1]]));
+    }
     use crate::results::pictures::canvas::Area;
 
     fn dark(canvas: &Canvas, columns: std::ops::Range<i32>, row: i32) -> usize {

@@ -6,6 +6,7 @@ use super::axes::{LEFT_PX, Plot, RIGHT_PX};
 use super::canvas::Area;
 use super::legend::WIDTH_PX;
 use super::palette::Outcome;
+use crate::estimators::Lane;
 use crate::evaluation::samples::Cell;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
@@ -72,6 +73,8 @@ pub struct Scene<'a> {
     pub boxes: Vec<TruthBox>,
     /// Cells whose common border is drawn; may be empty.
     pub road: &'a [Cell],
+    /// Lanes of traffic that the map was made with; may be empty.
+    pub lanes: &'a [Lane],
     /// Recording, estimator, time.
     pub title: String,
     /// What has to be said of the data.
