@@ -25,9 +25,23 @@ fn lanes_of_a_recording_are_a_configuration_that_replay_takes() {
     std::fs::write(folder.join("lanes.toml"), text).unwrap();
     let replayed = viewshed(
         &folder,
-        &["replay", motorway, "--from", "20", "--to", "22", "--config", "lanes.toml", "--json", "r.json"],
+        &[
+            "replay",
+            motorway,
+            "--from",
+            "20",
+            "--to",
+            "22",
+            "--config",
+            "lanes.toml",
+            "--json",
+            "r.json",
+            "--out",
+            "map",
+        ],
     );
     assert!(replayed.status.success(), "{}", stderr(&replayed));
+    assert!(folder.join("map/birdseye-radar-3d-lanes.png").exists());
     let report = json(&folder.join("r.json"));
     assert!(report["estimators"].as_array().unwrap().iter().any(|e| e["name"] == "radar-3d-lanes"));
     assert!(report["options"]["estimators"]["lanes"].as_array().unwrap().len() >= 6);
