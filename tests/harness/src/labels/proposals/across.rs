@@ -16,7 +16,8 @@
 //!
 //! # Limits
 //! A lane of which no vehicle is seen from the side lies where the median of its reflections is. Who drives along the
-//! edge of its lane for long and was never seen from the side is put into its middle.
+//! edge of its lane for long is put into its middle where it was never seen from the side, and 0.4 of the way to it where
+//! 400 reflections show its flank.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -204,10 +205,11 @@ mod tests {
             let off: Vec<f64> = paths.iter().map(told_m).collect();
             assert!(off[0] > off[1] && off[1] > off[2], "{off:?}");
             assert!(off.iter().all(|told| told.abs() < 0.25), "{off:?}");
-            // who is seen well and drives to the side stays there; who keeps to no lane is told by its own
+            // who is seen well and drives to the side goes less than half of the way; who keeps to no lane stays
             let aside: Vec<f64> = flank(side).iter().map(|left| left + 0.8).collect();
             let aside = lorry(&mut instants, [50.0, y], &aside, 0.2 * side, Some(&lane));
-            assert!((middles.left_m(&aside, &instants, 2.55) + 0.2 * side - 0.8).abs() < 0.35);
+            let told = middles.left_m(&aside, &instants, 2.55) + 0.2 * side;
+            assert!((0.35..0.8).contains(&told), "{told}");
             let alone = lorry(&mut instants, [130.0, y], &[0.9 * side], 0.2 * side, None);
             assert!((middles.left_m(&alone, &instants, 2.55) - 0.7 * side).abs() < 0.05);
         }

@@ -528,6 +528,7 @@ mod tests {
     fn what_is_reported_is_not_trained_on() {
         let mut plan = shipped("crossing");
         plan.reporting.scenes.push(plan.training.scenes[0].clone());
+        plan.reporting.other_days.clear();
         let error = plan.check().unwrap_err().to_string();
         assert!(error.contains("`train-1` has the seed 1101 of another scene"), "{error}");
         let mut plan = shipped("queue");
