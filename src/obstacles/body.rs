@@ -1,6 +1,7 @@
 //! The box an obstacle fills: what was seen of it, and what that leaves unseen.
 
 use super::hidden_end::ALL;
+use super::lanes::{LEARNT, NO_LANE};
 use super::obstacle::Obstacle;
 use super::size::Size;
 use super::tracking::Tracking;
@@ -17,20 +18,17 @@ const LONGEST_RIDER_CM: i32 = 250;
 const SHORTEST_LORRY_CM: i32 = 800;
 /// Sine of the angle to the road's axis from which a thing goes across it, 2^-14: 14.5 degrees.
 const ACROSS: i32 = (1 << 14) / 4;
+/// The same below which it goes along the road: 7.2 degrees.
+const ALONG: i32 = (1 << 14) / 8;
 
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees, or
     /// before it where that is its farther end.
     pub fn solid(&self, t: &Tracking) -> Solid {
         let size = self.size(t);
+        let (along, aside) = self.middle_of_box(&size);
         let lid = if self.may_be_low(&size, t) { self.tallness.ceiling_cm() } else { i32::MAX };
         let margin = self.margin_cm(t);
-        let (x, y) = self.global(self.extent.middle_cm(), 0);
-        let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
-        let hidden = (size.length_cm - self.extent.length_cm()).max(0) / 2;
-        let aside = self.beside_the_detections(&size, ahead, left);
-        let along = self.extent.middle_cm() + if (ahead >= 0) == self.farther_end { -hidden } else { hidden };
-        let aside = if left >= 0 { aside } else { -aside };
         let aside = aside + self.towards_lane(self.global(along, aside), t);
         let (x, y) = self.global(along, aside);
         Solid {
@@ -41,6 +39,16 @@ impl Obstacle {
             half_width_cm: size.width_cm / 2 + margin,
             height_cm: size.height_cm.min(lid).max(self.tallness.floor_cm()),
         }
+    }
+
+    /// The middle of a box of this size, ahead of the anchor and to its left, centimetres.
+    pub(super) fn middle_of_box(&self, size: &Size) -> (i32, i32) {
+        let (x, y) = self.global(self.extent.middle_cm(), 0);
+        let (ahead, left) = (self.heading.along(x, y), self.heading.across(x, y));
+        let hidden = (size.length_cm - self.extent.length_cm()).max(0) / 2;
+        let aside = self.beside_the_detections(size, ahead, left);
+        let along = self.extent.middle_cm() + if (ahead >= 0) == self.farther_end { -hidden } else { hidden };
+        (along, if left >= 0 { aside } else { -aside })
     }
 
     /// What its outline, what it has shown for long and its proven height make it.
@@ -63,15 +71,16 @@ impl Obstacle {
     }
 
     /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its
-    /// own way nearly along the road, whose axis it had for a heading until then, and a quarter on a lane.
+    /// own way nearly along the road, whose axis it had for a heading until then, and a quarter on a lane. On a lane
+    /// that was learnt it goes its own way, too, but for an eighth along the road.
     fn margin_cm(&self, t: &Tracking) -> i32 {
-        if self.is_on_lane(t) {
-            return t.own_way_margin_cm / 4;
-        }
-        match (self.free_heading, t.road.sine(self.heading).abs() > ACROSS) {
-            (false, _) => 0,
-            (true, false) => t.own_way_margin_cm / 2,
-            (true, true) => t.own_way_margin_cm,
+        let off_axis = t.road.sine(self.heading).abs();
+        match (self.lane, self.free_heading) {
+            (NO_LANE, false) => 0,
+            (LEARNT, _) if off_axis < ALONG => t.own_way_margin_cm / 8,
+            (NO_LANE | LEARNT, _) if off_axis > ACROSS => t.own_way_margin_cm,
+            (NO_LANE | LEARNT, _) => t.own_way_margin_cm / 2,
+            _ => t.own_way_margin_cm / 4,
         }
     }
 

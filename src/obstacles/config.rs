@@ -111,6 +111,9 @@ pub struct ObstacleConfig {
     pub low_rcs_dbsm: f32,
     /// Radar cross section half way between a car's and a lorry's, dBsm.
     pub lorry_rcs_dbsm: f32,
+    /// Vehicles that must have driven on a place before the way they went is [learnt](super::learnt_lanes) as
+    /// a lane; 0: none is learnt.
+    pub lane_vehicles: f32,
     /// Widths and heights by length.
     pub sizes: SizeConfig,
 }
@@ -162,6 +165,7 @@ impl Default for ObstacleConfig {
             weak_rcs_dbsm: -3.0,
             low_rcs_dbsm: 5.0,
             lorry_rcs_dbsm: 11.0,
+            lane_vehicles: 0.0,
             sizes: SizeConfig::default(),
         }
     }
@@ -180,7 +184,7 @@ impl ObstacleConfig {
             outline_sigmas, turning_noise_mps, own_way_sigmas, own_way_mps, own_way_share,
             own_way_follow, own_way_margin_m, length_growth_s, length_memory_s, slow_mps,
             heading_sigmas, standing_speed_mps, standing_visible_loss_per_s, standing_hidden_loss_per_s,
-            weak_rcs_dbsm, low_rcs_dbsm, lorry_rcs_dbsm;
+            weak_rcs_dbsm, low_rcs_dbsm, lorry_rcs_dbsm, lane_vehicles;
             but sizes
         );
         let SizeConfig { points, min_length_m } = self.sizes;
@@ -267,6 +271,7 @@ impl ObstacleConfig {
             road,
             limit_cm,
             lanes: Lanes::default(),
+            lane_vehicles: math::round_i32(within("obstacles.lane_vehicles", self.lane_vehicles, 0.0, 80.0)?),
         })
     }
 }

@@ -1,6 +1,7 @@
 //! An obstacle that follows a lane.
 
-use super::lanes::{Motion, NO_LANE, OnLane};
+use super::lanes::{LEARNT, Motion, NO_LANE};
+use super::learnt_lanes::LearntLanes;
 use super::motion::FreeMotion;
 use super::obstacle::{FRACTION, NEWBORN_PLACE, NEWBORN_SPEED, Obstacle};
 use super::tracking::{LEAST_PROJECTION, Tracking};
@@ -19,6 +20,14 @@ const TO_THE_MIDDLE: i32 = 160;
 /// See [`TO_THE_MIDDLE`].
 const MOST_ASIDE_CM: i32 = 150;
 
+/// Detections of a vehicle that shows where a lane is, its least speed, 2^-8 cm/s, and how many standard deviations of what
+/// is measured across the line of sight that is, 2^-4.
+const TEACHING_HITS: u16 = 12;
+/// See [`TEACHING_HITS`].
+const TEACHING_SPEED: i32 = 300 << FRACTION;
+/// See [`TEACHING_HITS`].
+const TEACHING_SIGMAS: i32 = 10 << 4;
+
 impl Obstacle {
     /// Middle of what is seen of it, centimetres.
     pub(super) fn middle(&self) -> (i32, i32) {
@@ -30,12 +39,19 @@ impl Obstacle {
         if t.lanes.is_empty() {
             return;
         }
+        let motion = self.motion_for_lanes();
+        if let Some(on) = t.lanes.best(&motion) {
+            self.take(on.segment, on.heading, motion.radial, motion.sight);
+        }
+    }
+
+    fn motion_for_lanes(&self) -> Motion {
         let place = self.middle();
         let sight = Direction::of(place.0, place.1);
         let (vx, vy) = (self.free.velocity.0 >> FRACTION, self.free.velocity.1 >> FRACTION);
         let newborn = self.age == 0;
         let radial = sight.along(vx, vy);
-        let motion = Motion {
+        Motion {
             place,
             place_variance: ASIDE_VARIANCE + self.gathered.across_cm * self.gathered.across_cm,
             sight,
@@ -43,24 +59,21 @@ impl Obstacle {
             across: if newborn { 0 } else { sight.across(vx, vy) },
             across_variance: if newborn { NEWBORN_SPEED } else { self.free.speed_variance() + BESIDE_VARIANCE },
             heading: (self.lane != NO_LANE || self.free_heading).then_some(self.heading),
-        };
-        if let Some(on) = t.lanes.best(&motion) {
-            self.take(on, radial, sight);
         }
     }
 
-    fn take(&mut self, on: OnLane, radial: i32, sight: Direction) {
+    fn take(&mut self, lane: u8, heading: Direction, radial: i32, sight: Direction) {
         let speed = if self.lane == NO_LANE {
             // what it showed along the line of sight, where that says anything
-            let along = on.heading.along(self.free.velocity.0, self.free.velocity.1);
-            speed_along(on.heading, sight, radial).map_or(along, |s| s.clamp(0, 7000) << FRACTION)
+            let along = heading.along(self.free.velocity.0, self.free.velocity.1);
+            speed_along(heading, sight, radial).map_or(along, |s| s.clamp(0, 7000) << FRACTION)
         } else {
             self.heading.along(self.velocity.0, self.velocity.1)
         };
-        self.lane = on.segment;
+        self.lane = lane;
         self.free_heading = false;
         self.unexplained = 0;
-        self.head(on.heading, speed);
+        self.head(heading, speed);
         if self.age == 0 {
             self.free = FreeMotion::new(self.position, NEWBORN_PLACE, self.velocity, NEWBORN_SPEED);
         }
@@ -84,7 +97,7 @@ impl Obstacle {
 
     /// Turns with the lane it is on; at its end, into the next.
     pub(super) fn keep_to_lane(&mut self, t: &Tracking) {
-        if !self.is_on_lane(t) {
+        if !self.is_on_given_lane() {
             return;
         }
         if let Some(on) = t.lanes.along(self.lane, self.middle()) {
@@ -107,17 +120,66 @@ impl Obstacle {
         }
     }
 
-    /// Whether it follows a lane.
+    /// Takes the [learnt lane](super::learnt_lanes) that its motion fits best, where none is given.
+    pub(super) fn find_learnt(&mut self, lanes: &LearntLanes, t: &Tracking) {
+        if t.lane_vehicles == 0 || !matches!(self.lane, NO_LANE | LEARNT) {
+            return;
+        }
+        let motion = self.motion_for_lanes();
+        if let Some(heading) = lanes.heading(&motion, t.lane_vehicles) {
+            self.take(LEARNT, heading, motion.radial, motion.sight);
+        }
+    }
+
+    /// Turns with the learnt lane it is on.
+    pub(super) fn keep_to_learnt(&mut self, lanes: &LearntLanes, t: &Tracking) {
+        if self.lane != LEARNT {
+            return;
+        }
+        if let Some(heading) = lanes.heading(&self.motion_for_lanes(), t.lane_vehicles) {
+            self.head(heading, self.heading.along(self.velocity.0, self.velocity.1));
+        } else {
+            self.lane = NO_LANE;
+        }
+    }
+
+    /// Looks for a better learnt lane now and then.
+    pub(super) fn look_for_learnt(&mut self, lanes: &LearntLanes, t: &Tracking) {
+        if self.age % LOOK_EVERY == 1 {
+            self.find_learnt(lanes, t);
+        }
+    }
+
+    /// Shows where a lane is, if it is a vehicle that drives and its heading is known.
+    pub(super) fn teach(&mut self, lanes: &mut LearntLanes, t: &Tracking) {
+        let drives = self.seen() && self.existence >= t.confirmed && self.hits >= TEACHING_HITS && self.is_mover(t);
+        let speed = self.speed();
+        let known = speed >= TEACHING_SPEED && self.free.is_sure_of(speed >> FRACTION, TEACHING_SIGMAS);
+        if t.lane_vehicles == 0 || !drives || !known {
+            return;
+        }
+        // along the road its axis is better known than what is measured of one vehicle
+        let measured = self.free_heading || self.lane != NO_LANE;
+        let (vx, vy) = self.free.velocity;
+        let heading = if measured { Direction::of(vx, vy) } else { self.heading };
+        let (along, aside) = self.middle_of_box(&self.size(t));
+        self.taught_in = lanes.learn(self.global(along, aside), heading, self.taught_in);
+    }
+
+    /// Whether it follows a lane that was given.
     #[inline]
-    pub(super) fn is_on_lane(&self, t: &Tracking) -> bool {
-        !t.lanes.is_empty() && self.lane != NO_LANE
+    fn is_on_given_lane(&self) -> bool {
+        !matches!(self.lane, NO_LANE | LEARNT)
+    }
+
+    /// Whether it follows a lane, given or learnt.
+    #[inline]
+    pub(super) fn is_on_lane(&self) -> bool {
+        self.lane != NO_LANE
     }
 
     /// How far to the left its middle is moved towards the middle of its lane, centimetres.
     pub(super) fn towards_lane(&self, place: (i32, i32), t: &Tracking) -> i32 {
-        if !self.is_on_lane(t) {
-            return 0;
-        }
         let Some(on) = t.lanes.along(self.lane, place) else { return 0 };
         -mul_shift(on.left_cm.clamp(-MOST_ASIDE_CM, MOST_ASIDE_CM), TO_THE_MIDDLE, 8)
     }
@@ -226,5 +288,70 @@ mod tests {
         };
         let (off, on) = (middle(&rules()), middle(&with_lanes(&[&[[20.0, 10.0], [120.0, 10.0]]])));
         assert!(off > 1050 && (off - on - (off - 1000) * TO_THE_MIDDLE / 256).abs() < 12, "{off} and {on}");
+    }
+
+    /// The default rules, and lanes are learnt from three vehicles.
+    fn learning() -> Tracking {
+        Tracking { lane_vehicles: 3, ..rules() }
+    }
+
+    /// After so many cars have crossed at 40 m, one after the other.
+    fn after_cars(cars: usize, t: &Tracking) -> Obstacles<16> {
+        let mut list = Obstacles::new();
+        for _ in 0..cars {
+            follow(&mut list, &mut car([40.0, -35.0], [0.0, 1.0], 9.0), 90, t);
+            list.clear();
+        }
+        list
+    }
+
+    #[test]
+    fn where_cars_have_crossed_the_next_has_its_heading_in_the_first_frame() {
+        // ahead of the sensor Doppler says nothing: from the right, it still comes nearer
+        let first = |cars, t: &Tracking, velocity| {
+            let mut list = after_cars(cars, t);
+            follow(&mut list, &mut car([40.0, -13.0 * velocity], [0.0, velocity], 9.0), 1, t);
+            degrees(&list)
+        };
+        assert!((first(4, &learning(), 1.0) - 90.0).abs() < 4.0, "{}", first(4, &learning(), 1.0));
+        for (cars, t, velocity) in [(1, learning(), 1.0), (4, rules(), 1.0), (4, learning(), -1.0)] {
+            assert!(
+                (first(cars, &t, velocity).abs() - 180.0).abs() < 1.0,
+                "along the road: {}",
+                first(cars, &t, velocity)
+            );
+        }
+    }
+
+    #[test]
+    fn learnt_lanes_outlast_the_vehicles_until_they_are_forgotten() {
+        let t = learning();
+        let mut list = after_cars(4, &t);
+        list.forget_lanes();
+        follow(&mut list, &mut car([40.0, -13.0], [0.0, 1.0], 9.0), 1, &t);
+        assert!((degrees(&list).abs() - 180.0).abs() < 1.0, "{}", degrees(&list));
+    }
+
+    #[test]
+    fn what_leaves_a_learnt_lane_goes_its_own_way() {
+        let t = learning();
+        let (mut list, mut car) = (after_cars(4, &t), car([40.0, -14.0], [0.0, 1.0], 9.0));
+        follow(&mut list, &mut car, 10, &t);
+        assert_eq!(list.iter().max_by_key(|o| o.hits).unwrap().lane, LEARNT);
+        (car.heading, car.velocity) = ([0.8, -0.6], [7.2, -5.4]);
+        follow(&mut list, &mut car, 30, &t);
+        let o = list.iter().max_by_key(|o| o.existence).unwrap();
+        assert_eq!(o.lane, NO_LANE);
+        assert!((degrees(&list) + 37.0).abs() < 15.0, "{}", degrees(&list));
+    }
+
+    #[test]
+    fn given_lanes_go_before_learnt_ones() {
+        let crossing = after_cars(4, &learning());
+        let given = Tracking { lane_vehicles: 3, ..with_lanes(&[&[[38.5, -60.0], [41.5, 60.0]]]) };
+        let mut list = crossing.clone();
+        follow(&mut list, &mut car([40.0, -13.0], [0.0, 1.0], 9.0), 1, &given);
+        let o = list.iter().max_by_key(|o| o.hits).unwrap();
+        assert_eq!((o.lane, (degrees(&list) - 88.6).abs() < 0.5), (0, true), "{}", degrees(&list));
     }
 }

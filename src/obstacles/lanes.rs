@@ -33,6 +33,8 @@ pub const MOST_SEGMENTS: usize = if ROOM { 128 } else { 0 };
 
 /// The segment of what follows no lane.
 pub(super) const NO_LANE: u8 = u8::MAX;
+/// The segment of what follows a lane that was [learnt](super::learnt_lanes).
+pub(super) const LEARNT: u8 = u8::MAX - 1;
 
 /// Farthest that a point may lie from the sensor along either axis, centimetres: [`Levelling::place`] ends at 450 m.
 const FARTHEST_CM: i32 = 40_000;
@@ -91,9 +93,9 @@ pub(super) struct Motion {
 /// Standard deviation of the radial speed that vehicles on a lane show beside its direction, squared, (cm/s)^2.
 const RADIAL_VARIANCE: i32 = 50 * 50;
 /// One, in the scale of a misfit.
-const UNIT: i32 = 16;
+pub(super) const UNIT: i32 = 16;
 /// Greatest misfit of a motion on a lane: three standard deviations.
-const MOST_MISFIT: i32 = 9 * UNIT;
+pub(super) const MOST_MISFIT: i32 = 9 * UNIT;
 /// Speeds above this are no vehicle's, cm/s.
 const MOST_SPEED: i32 = 8000;
 /// Farthest from a lane's middle, centimetres.
@@ -262,7 +264,7 @@ impl Segment {
 
 impl Motion {
     /// How badly it fits a direction of traffic; `None` for the opposite one.
-    fn misfit(&self, heading: Direction) -> Option<i32> {
+    pub(super) fn misfit(&self, heading: Direction) -> Option<i32> {
         // speed s along the heading shows as s c along the line of sight and s k across it; the best s leaves
         // (radial k - across c)^2 / (k^2 radial variance + c^2 across variance)
         let (c, k) = (self.sight.cosine(heading), self.sight.sine(heading));

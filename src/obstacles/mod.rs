@@ -154,6 +154,7 @@ mod hidden_end;
 mod joining;
 mod lane;
 pub mod lanes;
+pub mod learnt_lanes;
 pub mod motion;
 pub mod obstacle;
 mod own_way;
@@ -174,6 +175,7 @@ use crate::fixed::time::Step;
 use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 use crate::obstacles::solid::Solid;
+use learnt_lanes::LearntLanes;
 use obstacle::Obstacle;
 use tracking::Tracking;
 
@@ -184,6 +186,7 @@ const BEHIND_CM: i32 = -2000;
 #[derive(Debug, Clone)]
 pub struct Obstacles<const N: usize> {
     list: Vec<Obstacle, N, u16>,
+    lanes: LearntLanes,
     dropped: u32,
 }
 
@@ -215,12 +218,17 @@ impl<const N: usize> Default for Obstacles<N> {
 impl<const N: usize> Obstacles<N> {
     /// No obstacles.
     pub const fn new() -> Self {
-        Self { list: Vec::new(), dropped: 0 }
+        Self { list: Vec::new(), lanes: LearntLanes::new(), dropped: 0 }
     }
 
-    /// Forgets all.
+    /// Forgets all but the lanes they drove on.
     pub fn clear(&mut self) {
         self.list.clear();
+    }
+
+    /// Forgets the lanes that were [learnt](learnt_lanes).
+    pub fn forget_lanes(&mut self) {
+        self.lanes.clear();
     }
 
     /// All, confirmed or not.
@@ -256,16 +264,19 @@ impl<const N: usize> Obstacles<N> {
         let kept = t.kept_over(step);
         for o in &mut self.list {
             o.predict(step, kept.lateral, t);
+            o.keep_to_learnt(&self.lanes, t);
         }
         let mut claimed = self.associate(reflections, by_range, kept.outline, t);
         for o in &mut self.list {
             o.settle(step, t);
+            o.look_for_learnt(&self.lanes, t);
         }
         self.found(reflections, by_range, &mut claimed, t);
         self.join_parts(t);
         self.look_for_room(t);
         self.list.iter_mut().for_each(|o| o.look_for_end(t, &in_view));
         self.doubt_the_unseen(step, t, in_view);
+        self.list.iter_mut().for_each(|o| o.teach(&mut self.lanes, t));
         claimed
     }
 
@@ -361,6 +372,7 @@ impl<const N: usize> Obstacles<N> {
             room -= 1;
             let mut newborn = Obstacle::new(seed, heading, speed);
             newborn.find_lane(t);
+            newborn.find_learnt(&self.lanes, t);
             newborn.absorb(seed, t);
             claimed.insert(i);
             let mut search = newborn.search(t);

@@ -2,6 +2,7 @@
 
 use super::gathered::Gathered;
 use super::lanes::NO_LANE;
+use super::learnt_lanes::Cell;
 use super::motion::FreeMotion;
 use super::profile::{BIN_CM, Extent, Profile};
 use super::reflectivity::Reflectivity;
@@ -59,8 +60,10 @@ pub struct Obstacle {
     pub(super) farther_end: bool,
     /// Whether it goes its own way, with speed and heading from `free`.
     pub(super) free_heading: bool,
-    /// Segment of the lane it follows, or [`NO_LANE`](super::lane::NO_LANE).
+    /// Segment of the lane it follows, [`LEARNT`](super::lanes::LEARNT), or [`NO_LANE`].
     pub(super) lane: u8,
+    /// Cell where [lanes were last learnt](super::learnt_lanes) from it.
+    pub(super) taught_in: Option<Cell>,
     /// What this frame's detections add up to.
     pub(super) gathered: Gathered,
 }
@@ -94,6 +97,7 @@ impl Obstacle {
             farther_end: false,
             free_heading: false,
             lane: NO_LANE,
+            taught_in: None,
             heading,
             profile: Profile::EMPTY,
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
@@ -241,7 +245,7 @@ impl Obstacle {
                 self.push_along(ratio::<12>(g.speed.0, g.speed.1 + inertia));
             }
             self.move_left(offset);
-            if self.age >= YOUNG_FRAMES && !self.is_on_lane(t) {
+            if self.age >= YOUNG_FRAMES && !self.is_on_lane() {
                 self.turn(offset, step, t);
             }
         }

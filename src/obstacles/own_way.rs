@@ -77,7 +77,7 @@ impl Obstacle {
         if self.unexplained >= OWN_WAY_FRAMES {
             self.lane = NO_LANE;
             self.find_lane(t);
-            if !self.is_on_lane(t) {
+            if !self.is_on_lane() {
                 self.go_own_way();
             }
         }

@@ -97,6 +97,8 @@ pub struct Tracking {
     pub limit_cm: i32,
     /// Which way traffic goes at a place, where that is given.
     pub lanes: Lanes,
+    /// Vehicles that make a lane; 0: none is learnt.
+    pub lane_vehicles: i32,
 }
 
 /// Frames an obstacle is young: its motion follows its detections quickly.
