@@ -114,7 +114,8 @@ pub struct Args {
     only_elevation: bool,
     /// Give lanes learnt from 90 s of another day, not those of the traffic's net (crossing)
     ///
-    /// As `viewshed lanes RECORDING` learns them: the row radar-3d-lanes.
+    /// As `viewshed lanes RECORDING` learns them: the row radar-3d-lanes. And as a unit learns them that has run over
+    /// these 90 s before: the row radar-3d-learning.
     #[arg(long)]
     learn_lanes: bool,
     /// Print tables as wide as they are: all intervals, and distances to the bound geometry-slice, too
@@ -201,8 +202,10 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
     } else {
         LanesFrom::nets(&all)
     };
-    let more = [!matches!(lanes, LanesFrom::Settings), on_grades, settings.estimators.far_road.is_some()];
-    let estimators = ESTIMATORS + estimators::site_rows(more.map(u64::from).iter().sum());
+    let has_lanes = !matches!(lanes, LanesFrom::Settings);
+    let more = [has_lanes, on_grades, settings.estimators.far_road.is_some()];
+    let learning = u64::from(args.learn_lanes);
+    let estimators = ESTIMATORS + learning + estimators::site_rows(more.map(u64::from).iter().sum());
     let running = bar("simulating and replaying", scenes::total_steps(&all, extent, &lanes, estimators));
     let keep = |name: &str, bytes: &[u8]| kept.get(name).map_or(Ok(()), |file| file.write(bytes));
     let results = scenes::run(&all, settings, extent, &lanes, &keep, &|| running.step())?;

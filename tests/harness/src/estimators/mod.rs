@@ -7,6 +7,9 @@ mod radar_2d;
 pub mod radar_3d;
 mod reference;
 
+use std::fmt;
+use std::sync::Arc;
+
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use viewshed::camera::Camera3dConfig;
@@ -38,6 +41,11 @@ pub trait Estimator: Send {
     /// Forgets every frame seen, but not what was counted (called before each frame of a recording
     /// of independent frames).
     fn reset(&mut self);
+
+    /// Runs over what was before the recording that is judged: what is learnt of that stays, and nothing of it is counted.
+    fn run_in(&mut self, frames: &[Frame]) {
+        frames.iter().for_each(|frame| self.step(frame));
+    }
 
     /// Takes a radar frame and brings the map up to its time.
     fn step(&mut self, frame: &Frame);
@@ -114,6 +122,40 @@ pub struct Options {
     /// What is wrong with the heights that estimators are given.
     #[serde(skip_serializing_if = "GroundError::is_none")]
     pub ground_error: GroundError,
+    /// What a unit has seen of the place before, and learnt its lanes from: the row `radar-3d-learning`.
+    #[serde(skip)]
+    pub before: Before,
+}
+
+/// Frames of other recordings of a radar, oldest first; none where nothing was learnt from any.
+#[derive(Clone, Default)]
+pub struct Before(Option<Arc<[Frame]>>);
+
+impl Before {
+    /// Vehicles that make a learnt lane, where the parameters do not say.
+    const LANE_VEHICLES: f32 = 3.0;
+
+    /// These recordings, if there are any.
+    pub fn of(recordings: impl IntoIterator<Item = Recording>) -> Self {
+        let mut recordings = recordings.into_iter().peekable();
+        let any = recordings.peek().is_some();
+        Self(any.then(|| recordings.flat_map(|recording| recording.frames).collect()))
+    }
+}
+
+impl fmt::Debug for Before {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} frames", self.0.as_ref().map_or(0, |frames| frames.len()))
+    }
+}
+
+impl PartialEq for Before {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+    }
 }
 
 /// Where the far road lies.
@@ -214,6 +256,7 @@ impl Default for Options {
             lanes: Vec::new(),
             ground: Profile::default(),
             ground_error: GroundError::default(),
+            before: Before::default(),
         }
     }
 }
@@ -269,6 +312,15 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     }
     for (what, config) in site(&radar_3d, &told) {
         estimators.push(radar_3d::new(options.grid, &format!("{name}-{what}"), &sensor, &config)?);
+    }
+    if let Some(frames) = &options.before.0 {
+        let mut config = radar_3d;
+        if config.obstacles.lane_vehicles == 0.0 {
+            config.obstacles.lane_vehicles = Before::LANE_VEHICLES;
+        }
+        let mut learning = radar_3d::new(options.grid, &format!("{name}-learning"), &sensor, &config)?;
+        learning.run_in(frames);
+        estimators.push(learning);
     }
     if let Some(truth) = &recording.truth {
         estimators.push(reference::new(recording, truth, &sensor, &ground(recording, options)?, options)?);
@@ -528,6 +580,21 @@ mod tests {
         for said in 0..4 {
             assert_eq!(site_rows(said), [0, 1, 3, 4][said as usize]);
         }
+    }
+
+    #[test]
+    fn a_unit_that_ran_before_learns_lanes_and_counts_only_what_is_judged() {
+        let judged = recording(1, 3);
+        let rows = |before| {
+            let running = all(&judged, &Options { before, ..Options::default() }).unwrap();
+            running.into_iter().map(|e| (e.name().to_owned(), e.counters())).filter(|(n, _)| n.starts_with("radar-3d"))
+        };
+        assert_eq!(rows(Before::default()).count(), 1);
+        let mut hour = recording(1, 20);
+        let wrong = RadarDetection { azimuth_rad: 3.0, ..hour.frames[0].detections[0] };
+        hour.frames.iter_mut().for_each(|frame| frame.detections.push(wrong));
+        let both = rows(Before::of([hour.clone(), hour])).collect::<Vec<_>>();
+        assert_eq!(both, ["radar-3d", "radar-3d-learning"].map(|name| (name.to_owned(), Vec::new())));
     }
 
     #[test]

@@ -67,6 +67,8 @@ struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, co
     mount: Mount,
     intake: Intake,
     no_room: u32,
+    /// What was counted before the recording that is judged.
+    counted_before: Vec<(&'static str, u64)>,
 }
 
 type OfReference<const D: usize> = Driver<RANGES, AZIMUTHS, ELEVATIONS, { State::WORDS }, { State::OBSTACLES }, D>;
@@ -145,7 +147,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let parameters = Box::new(Radar3dParameters::new(sensor, config)?);
         let map = Box::new(parameters.map());
         let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
-        Ok(Self { name: name.to_owned(), parameters, state, map, mount: sensor.mount, intake, no_room: 0 })
+        let (name, mount) = (name.to_owned(), sensor.mount);
+        Ok(Self { name, parameters, state, map, mount, intake, no_room: 0, counted_before: Vec::new() })
     }
 
     /// A box of the levelled frame, which is the road's, moved to the sensor and turned to its heading.
@@ -176,6 +179,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         self.map.forget();
     }
 
+    fn run_in(&mut self, frames: &[Frame]) {
+        frames.iter().for_each(|frame| self.step(frame));
+        self.counted_before = self.counters();
+    }
+
     fn step(&mut self, frame: &Frame) {
         let (now, detections, status) = self.intake.take(frame);
         let report = self.state.process(&self.parameters, now, detections, status, &mut self.map);
@@ -201,7 +209,9 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     fn counters(&self) -> Vec<(&'static str, u64)> {
         let no_room = NO_ROOM[usize::from(N != State::OBSTACLES)];
         let full = [(no_room, u64::from(self.no_room))].into_iter().filter(|(_, n)| *n > 0);
-        self.intake.counters(self.state.rejections()).into_iter().chain(full).collect()
+        let all = self.intake.counters(self.state.rejections()).into_iter().chain(full);
+        let before = |name| self.counted_before.iter().find(|(of, _)| *of == name).map_or(0, |(_, n)| *n);
+        all.map(|(name, n)| (name, n - before(name))).filter(|(_, n)| *n > 0).collect()
     }
 
     fn azimuth_noise_deg(&self) -> Option<f64> {

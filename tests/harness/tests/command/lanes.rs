@@ -70,3 +70,38 @@ fn what_no_lanes_can_be_learnt_from_is_named() {
     let elsewhere = said(&[motorway, "q.mcap"]);
     assert!(elsewhere.contains("q.mcap: its radar does not hang where that of"), "{elsewhere}");
 }
+
+#[test]
+fn a_unit_that_ran_over_other_recordings_of_its_radar_has_a_row() {
+    let folder = folder("lanes-run-in");
+    let crossing = shipped().join("crossing/train-2.toml");
+    let day = shipped().join("crossing/wide-day-1.fcd.xml.gz");
+    let make = |name: &str, more: &[&str]| {
+        let made = ["simulate", crossing.to_str().unwrap(), "--out", name];
+        let made = viewshed(&folder, &[&made, more].concat());
+        assert!(made.status.success(), "{}", stderr(&made));
+    };
+    make("monday.mcap", &["--duration", "30", "--seed", "7", "--fcd", day.to_str().unwrap()]);
+    make("tuesday.mcap", &["--duration", "12"]);
+    let motorway = shipped().join("motorway.mcap");
+    let replayed =
+        |arguments: &[&str]| viewshed(&folder, &[&["replay", "tuesday.mcap", "--run-in"], arguments].concat());
+    let output = replayed(&["monday.mcap", "--from", "3", "--json", "r.json", "--out", "map"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(folder.join("map/birdseye-radar-3d-learning.png").exists());
+    let report = json(&folder.join("r.json"));
+    let row = |name| report["estimators"].as_array().unwrap().iter().find(|e| e["name"] == name).unwrap();
+    let [usual, learning] = ["radar-3d", "radar-3d-learning"].map(row);
+    assert_eq!(usual["counters"], learning["counters"], "what it ran over before is not counted");
+    assert_ne!(usual["cells"], learning["cells"]);
+    let said = |arguments: &[&str]| {
+        let output = replayed(arguments);
+        assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));
+        stderr(&output)
+    };
+    let itself = said(&["tuesday.mcap", "--to", "5"]);
+    assert!(itself.contains("--run-in tuesday: it has frames of tuesday itself"), "{itself}");
+    let elsewhere = said(&[motorway.to_str().unwrap()]);
+    assert!(elsewhere.contains("--run-in motorway: its radar does not hang where that of tuesday does"), "{elsewhere}");
+    assert!(said(&["nowhere.mcap"]).contains("--run-in nowhere.mcap"));
+}

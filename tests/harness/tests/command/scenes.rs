@@ -60,7 +60,12 @@ fn lanes_are_learnt_only_where_another_day_is_named() {
     assert!(stdout(&learnt).contains("lanes learnt from another day"));
     let report = json(&folder.join("e.json"));
     assert_eq!(report["lanes_learnt"], true);
-    assert!(!row(&report["variants"][0]["pooled"], "radar-3d-lanes").is_null());
+    let pooled = &report["variants"][0]["pooled"];
+    let [usual, lanes, learning] = ["radar-3d", "radar-3d-lanes", "radar-3d-learning"].map(|name| row(pooled, name));
+    assert!(
+        usual["cells"] != lanes["cells"] && usual["cells"] != learning["cells"] && lanes["cells"] != learning["cells"]
+    );
+    assert_eq!(usual["counters"], learning["counters"], "what it ran over before is not counted");
 }
 
 #[test]

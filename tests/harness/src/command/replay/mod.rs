@@ -6,6 +6,7 @@ mod out;
 mod pictures;
 mod report;
 pub mod risk;
+mod run_in;
 pub mod shipped;
 
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use self::fused::FusedReplay;
+use self::run_in::RunIn;
 use super::progress::bar;
 use super::{BAD_INPUT, complain, print};
 use crate::command::options::{SettingsArgs, finite};
@@ -106,6 +108,11 @@ pub struct Args {
     /// Every fifth counted frame is looked at; the causes add up to the cells' FVR and FIR there. On a flat road only.
     #[arg(long, help_heading = "Results")]
     causes: bool,
+    /// Let a unit run over this recording of the same radar before and learn its lanes: the row radar-3d-learning
+    ///
+    /// Of other hours than the one that is replayed; may be repeated, oldest first.
+    #[arg(long, value_name = "RECORDING", help_heading = "Estimators")]
+    run_in: Vec<PathBuf>,
     #[command(flatten)]
     risk: risk::RiskArgs,
     #[command(flatten)]
@@ -137,9 +144,11 @@ const NO_CAUSES: &str =
 /// # Errors
 /// Options that cannot be used at all, and files that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let settings = args.settings.settings()?;
+    let mut settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
-    let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
+    let run_in = RunIn::read(&args.run_in, &settings.reading)?;
+    settings.estimators.before = run_in.before();
+    let mut outputs = args.outputs.beside(paths.iter().chain(&args.run_in).flat_map(|path| recording::files(path)));
     outputs.reads(args.settings.files().chain(args.risk.files()));
     let json_file = outputs.file("--json", args.json.as_deref())?;
     let out = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
@@ -194,7 +203,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
         for (recording, reading) in radars {
             let settings = Settings { reading, ..settings.clone() };
-            let one = match replay(path, recording, args, mcap.as_ref(), &settings) {
+            let one = run_in.check(&recording).and_then(|()| replay(path, recording, args, mcap.as_ref(), &settings));
+            let one = match one {
                 Ok(one) => one,
                 Err(error) => {
                     complain(&error);

@@ -25,7 +25,7 @@ use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKin
 use crate::results::pictures::{canvas::Canvas, palette};
 
 /// Estimators that are drawn from above at the chosen frame, beside the one examples are of.
-const ALSO_DRAWN: [&str; 4] = ["radar-2d", "radar-3d-lanes", "reference", "camera-reference"];
+const ALSO_DRAWN: [&str; 5] = ["radar-2d", "radar-3d-lanes", "radar-3d-learning", "reference", "camera-reference"];
 
 /// Draws everything into a folder.
 pub fn write(

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::plan;
-use crate::estimators::{self, Lane};
+use crate::estimators::{self, Before, Lane};
 use crate::evaluation::Settings;
 use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
@@ -150,21 +150,37 @@ impl LanesFrom {
         if scenes.iter().all(has_net) { Self::Nets } else { Self::Settings }
     }
 
-    /// Lanes of scene number `k`.
-    fn of(&self, k: usize, scene: &Scene, settings: &Settings, progress: &(dyn Fn() + Sync)) -> Result<Vec<Lane>> {
-        match self {
-            Self::Settings => Ok(settings.estimators.lanes.clone()),
-            Self::Nets => scene.lanes(),
-            Self::OtherDays(days, learn) => {
-                let (duration_s, seed) = (scene.duration_s.min(LEARNT_S), scene.seed + OTHER_SEED);
-                let other = Scene { duration_s, seed, ..scene.clone() };
-                let day = days.get(k).with_context(|| format!("`{}` has no other day", scene.name))?;
-                let simulation = Simulation::new(other, Some(day))?;
-                let (_, recording) = plan::recorded(&simulation, &scene.name, settings, progress)?;
-                let lanes = learn(&[recording]);
-                ensure!(!lanes.is_empty(), "{}: no lanes can be learnt from {duration_s} s of it", day.display());
+    /// What the radar of scene number `k` saw on another day.
+    fn other_day(
+        &self,
+        k: usize,
+        scene: &Scene,
+        settings: &Settings,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Option<Recording>> {
+        let Self::OtherDays(days, _) = self else { return Ok(None) };
+        let (duration_s, seed) = (scene.duration_s.min(LEARNT_S), scene.seed + OTHER_SEED);
+        let other = Scene { duration_s, seed, ..scene.clone() };
+        let day = days.get(k).with_context(|| format!("`{}` has no other day", scene.name))?;
+        let simulation = Simulation::new(other, Some(day))?;
+        plan::recorded(&simulation, &scene.name, settings, progress).map(|(_, recording)| Some(recording))
+    }
+
+    /// Lanes of a scene, of which this was seen on another day.
+    fn of(&self, scene: &Scene, other: Option<&Recording>, settings: &Settings) -> Result<Vec<Lane>> {
+        match (self, other) {
+            (Self::Nets, _) => scene.lanes(),
+            (Self::OtherDays(_, learn), Some(other)) => {
+                let lanes = learn(std::slice::from_ref(other));
+                ensure!(
+                    !lanes.is_empty(),
+                    "`{}`: no lanes can be learnt from {} s of another day",
+                    scene.name,
+                    other.duration_s().round()
+                );
                 Ok(lanes)
             }
+            _ => Ok(settings.estimators.lanes.clone()),
         }
     }
 }
@@ -233,19 +249,21 @@ pub fn run(
 ) -> Result<Vec<SceneResult>> {
     let one = |k: usize, scene: &Scene| -> Result<SceneResult> {
         let mut settings = settings.clone();
-        settings.estimators.lanes = lanes.of(k, scene, &settings, progress)?;
-        let settings = &settings;
-        let recording = record(scene, settings, keep, progress)?;
+        let other = lanes.other_day(k, scene, &settings, progress)?;
+        settings.estimators.lanes = lanes.of(scene, other.as_ref(), &settings)?;
+        settings.estimators.before = Before::of(other);
+        let recording = record(scene, &settings, keep, progress)?;
         let mut samples = samples::collect_every(&recording, &settings.evaluation, extent.every, progress);
-        let with_elevation = seconds(recording, &samples, settings, progress)?;
+        let with_elevation = seconds(recording, &samples, &settings, progress)?;
         let without_elevation = extent
             .without_elevation
             .then(|| {
                 let mut flat = scene.clone();
                 flat.radar.has_elevation = false;
-                let recording = record(&flat, settings, &|_, _| Ok(()), progress)?;
+                settings.estimators.before = Before::of(lanes.other_day(k, &flat, &settings, progress)?);
+                let recording = record(&flat, &settings, &|_, _| Ok(()), progress)?;
                 samples::detect_again(&recording, &mut samples, &settings.evaluation);
-                seconds(recording, &samples, settings, progress)
+                seconds(recording, &samples, &settings, progress)
             })
             .transpose()?;
         Ok(SceneResult { scene: scene.clone(), with_elevation, without_elevation })
@@ -299,9 +317,10 @@ pub fn count(results: &[SceneResult], variant: Variant, warm_up_s: f64, settings
 pub fn total_steps(scenes: &[Scene], extent: Extent, lanes: &LanesFrom, estimators: u64) -> u64 {
     let steps = |most_s: f64| scenes.iter().map(|s| (s.duration_s.min(most_s) * s.radar.rate_hz).ceil() as u64).sum();
     let frames: u64 = steps(f64::INFINITY);
-    let learnt: u64 = if matches!(lanes, LanesFrom::OtherDays(..)) { steps(LEARNT_S) } else { 0 };
+    let other_day: u64 = if matches!(lanes, LanesFrom::OtherDays(..)) { steps(LEARNT_S) } else { 0 };
     // simulated and sampled, and once an estimator; without elevation the samples are there
-    learnt + frames * (2 + estimators + if extent.without_elevation { 1 + estimators } else { 0 })
+    other_day * (1 + u64::from(extent.without_elevation))
+        + frames * (2 + estimators + if extent.without_elevation { 1 + estimators } else { 0 })
 }
 
 #[cfg(test)]
@@ -419,7 +438,9 @@ mod tests {
         let settings = Settings::default();
         let of = |day: &str| {
             let days = vec![plan.folder.join(day)];
-            LanesFrom::OtherDays(days, learn).of(0, &scene, &settings, &|| ()).unwrap().remove(0).points
+            let lanes = LanesFrom::OtherDays(days, learn);
+            let other = lanes.other_day(0, &scene, &settings, &|| ()).unwrap();
+            lanes.of(&scene, other.as_ref(), &settings).unwrap().remove(0).points
         };
         let [there, seen] = of("wide-day-1.fcd.xml.gz")[..] else { panic!("two points") };
         assert_eq!((there, seen[0]), ([scene.radar.mount.x_m as f32, scene.radar.mount.y_m as f32], 30.0));
