@@ -121,7 +121,7 @@ impl Obstacle {
     }
 
     /// Takes the [learnt lane](super::learnt_lanes) that its motion fits best, where none is given.
-    pub(super) fn find_learnt(&mut self, lanes: &LearntLanes, t: &Tracking) {
+    pub(super) fn find_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
         if t.lane_vehicles == 0 || !matches!(self.lane, NO_LANE | LEARNT) {
             return;
         }
@@ -132,7 +132,7 @@ impl Obstacle {
     }
 
     /// Turns with the learnt lane it is on.
-    pub(super) fn keep_to_learnt(&mut self, lanes: &LearntLanes, t: &Tracking) {
+    pub(super) fn keep_to_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
         if self.lane != LEARNT {
             return;
         }
@@ -144,14 +144,14 @@ impl Obstacle {
     }
 
     /// Looks for a better learnt lane now and then.
-    pub(super) fn look_for_learnt(&mut self, lanes: &LearntLanes, t: &Tracking) {
+    pub(super) fn look_for_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
         if self.age % LOOK_EVERY == 1 {
             self.find_learnt(lanes, t);
         }
     }
 
     /// Shows where a lane is, if it is a vehicle that drives and its heading is known.
-    pub(super) fn teach(&mut self, lanes: &mut LearntLanes, t: &Tracking) {
+    pub(super) fn teach<const N: usize>(&mut self, lanes: &mut LearntLanes<N>, t: &Tracking) {
         let drives = self.seen() && self.existence >= t.confirmed && self.hits >= TEACHING_HITS && self.is_mover(t);
         let speed = self.speed();
         let known = speed >= TEACHING_SPEED && self.free.is_sure_of(speed >> FRACTION, TEACHING_SIGMAS);

@@ -11,12 +11,12 @@
 //! of them, not the one they were given here, so that the lanes do not confirm themselves.
 //!
 //! # Limits
-//! 164 m ahead, behind and to either side. Cells 82 m apart share a set of four directions; one that is full
-//! gives up the direction that fewest drove on. What is learnt stays over gaps and steps of the clock, changes by a twelfth
+//! 164 m ahead, behind and to either side; 2688 courses on the reference grid, 784 on the small one. Cells share sets of
+//! four courses; one that is full gives up the course that fewest drove. What is learnt stays over gaps and steps of the clock, changes by a twelfth
 //! with each vehicle, and is lost with the power. None without the feature `lanes`.
 //!
 //! # Cost
-//! 24.6 kB. Nine cells are looked at for every obstacle that follows a learnt lane in every frame, and for the others in
+//! 16.1 kB on the reference grid, 4.7 kB on the small one. Nine cells are looked at for every obstacle that follows a learnt lane in every frame, and for the others in
 //! one of four.
 //!
 //! # What was tried
@@ -36,68 +36,74 @@
 //!
 //! Two vehicles may be two parts of one that was not yet joined, so that three are asked for.
 
+use core::num::NonZeroU16;
+
 use heapless::Vec;
 
 use super::lanes::{MOST_MISFIT, Motion, ROOM, UNIT};
 use crate::fixed::angle::Angle;
 use crate::fixed::trig::{self, Direction};
 
+/// Vehicles that make a lane, where a unit is told to learn and not told of how many.
+pub const VEHICLES: f32 = 3.0;
+
 /// Side of a cell, 2^8 cm.
 const CELL_SHIFT: u32 = 8;
-/// Cells along either axis: the sensor is in the middle.
-const CELLS: i32 = 1 << 7;
-/// Of these, as many have sets of their own, 2^.
-const OWN_SHIFT: u32 = 5;
-const SETS: usize = if ROOM { 1 << (2 * OWN_SHIFT) } else { 0 };
-/// Directions of traffic in a set.
-const WAYS: usize = 4;
+/// Cells along either axis, 2^7: the sensor is in the middle.
+const CELLS_SHIFT: u32 = 7;
+const CELLS: i32 = 1 << CELLS_SHIFT;
+/// Sets of courses for each obstacle there is room for, and courses of a set.
+const SETS_EACH: usize = if ROOM { 7 } else { 0 };
+const COURSES: usize = 4;
 /// Vehicles over which a course is averaged.
 const MEMORY: u8 = 12;
-/// Fraction bits of a place across.
-const FRACTION: u32 = 6;
+/// Least cosine of what drives one course, 2^-14: 30 degrees.
+const ONE_COURSE: i32 = 14_189;
 /// Least cosine of what goes the same way, 2^-14: 20 degrees.
 const PARALLEL: i32 = 15_396;
 /// Farthest that places of one lane lie beside each other, centimetres.
 const ONE_LANE_CM: i32 = 120;
 /// Cells of its way that are looked at around a place: each vehicle counts in all of them.
 const CELLS_AROUND: i32 = 3;
-/// Flag of a tag that is one.
-const TAKEN: u8 = 1 << 7;
-/// Bits of a tag that say which cell it is.
-const CELL_BITS: u8 = TAKEN | 0xF;
 
 /// What drove through a cell in one direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Course {
-    /// Which of the cells that share the set, and in which eighth of all directions; 0: none.
-    tag: u8,
-    /// Vehicles, saturating.
-    vehicles: u8,
+    cell: Option<Cell>,
     /// Mean heading.
     heading: Angle,
-    /// How far to the left of the cell's middle they drove, 2^-6 cm.
-    left: i16,
+    /// Vehicles, saturating.
+    vehicles: u8,
+    /// How far to the left of the cell's middle they drove, 2 cm.
+    left: i8,
 }
 
-/// Lanes as they were driven.
+/// Lanes as they were driven, for a list of `N` obstacles.
 #[derive(Debug, Clone)]
-pub struct LearntLanes {
-    sets: [[Course; WAYS]; SETS],
+pub struct LearntLanes<const N: usize> {
+    sets: [[[Course; COURSES]; SETS_EACH]; N],
 }
 
-/// Number of a cell.
+/// Number of a cell, one more than that: 1 to 2^14.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Cell {
-    x: u8,
-    y: u8,
-}
+pub(super) struct Cell(NonZeroU16);
 
 impl Course {
-    const NONE: Self = Self { tag: 0, vehicles: 0, heading: Angle::ZERO, left: 0 };
+    const NONE: Self = Self { cell: None, vehicles: 0, heading: Angle::ZERO, left: 0 };
 
-    /// How far a place lies to the left of it, in a cell around this middle, centimetres.
-    fn left_of(&self, heading: Direction, middle: (i32, i32), place: (i32, i32)) -> i32 {
-        heading.across(place.0 - middle.0, place.1 - middle.1) - (i32::from(self.left) >> FRACTION)
+    /// How far a place lies to the left of it, centimetres.
+    fn left_of(&self, heading: Direction, cell: Cell, place: (i32, i32)) -> i32 {
+        cell.left_cm(heading, place) - i32::from(self.left) * 2
+    }
+
+    /// Takes one more vehicle.
+    #[allow(clippy::cast_possible_truncation)] // means lie between what they are of
+    fn add(&mut self, angle: Angle, left: i8) {
+        let seen = i32::from(self.vehicles.min(MEMORY - 1)) + 1;
+        self.vehicles = self.vehicles.saturating_add(1);
+        let turn = i32::from(angle.raw().wrapping_sub(self.heading.raw()));
+        self.heading = Angle::from_raw(self.heading.raw().wrapping_add((turn / seen) as i16));
+        self.left += ((i32::from(left) - i32::from(self.left)) / seen) as i8;
     }
 }
 
@@ -108,76 +114,69 @@ impl Cell {
     }
 
     fn numbered(x: i32, y: i32) -> Option<Self> {
-        let number = |v: i32| u8::try_from(v).ok().filter(|_| v < CELLS);
-        number(x).zip(number(y)).map(|(x, y)| Self { x, y })
+        let exists = ROOM && (0..CELLS).contains(&x) && (0..CELLS).contains(&y);
+        let number = u16::try_from((x << CELLS_SHIFT) + y + 1).ok().filter(|_| exists)?;
+        NonZeroU16::new(number).map(Self)
+    }
+
+    /// Along x and along y.
+    fn numbers(self) -> [i32; 2] {
+        let number = i32::from(self.0.get()) - 1;
+        [number >> CELLS_SHIFT, number & (CELLS - 1)]
     }
 
     /// It and those around it.
     fn and_around(self) -> impl Iterator<Item = Self> {
-        let beside = |v: u8| i32::from(v) - 1..=i32::from(v) + 1;
-        beside(self.x).flat_map(move |x| beside(self.y).filter_map(move |y| Self::numbered(x, y)))
+        let [x, y] = self.numbers();
+        (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).filter_map(move |y| Self::numbered(x, y)))
     }
 
-    fn set(self) -> usize {
-        let own = |v: u8| usize::from(v) & ((1 << OWN_SHIFT) - 1);
-        (own(self.x) << OWN_SHIFT) | own(self.y)
-    }
-
-    /// Tag without a direction.
-    fn tag(self) -> u8 {
-        TAKEN | (self.x >> OWN_SHIFT) << 2 | self.y >> OWN_SHIFT
-    }
-
-    fn middle(self) -> (i32, i32) {
-        let at = |v: u8| ((i32::from(v) - CELLS / 2) << CELL_SHIFT) + (1 << (CELL_SHIFT - 1));
-        (at(self.x), at(self.y))
+    /// How far a place lies to the left of a line in this direction through its middle, centimetres.
+    fn left_cm(self, heading: Direction, (x, y): (i32, i32)) -> i32 {
+        let [middle_x, middle_y] = self.numbers().map(|v| ((v - CELLS / 2) << CELL_SHIFT) + (1 << (CELL_SHIFT - 1)));
+        heading.across(x - middle_x, y - middle_y)
     }
 }
 
-/// Number of an eighth of all directions, the first about that of x, in its bits of a tag.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // angles wrap
-fn eighth(heading: Angle) -> u8 {
-    ((heading.raw() as u16).wrapping_add(1 << 12) >> 13 << 4) as u8
-}
-
-impl Default for LearntLanes {
+impl<const N: usize> Default for LearntLanes<N> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl LearntLanes {
+impl<const N: usize> LearntLanes<N> {
     /// Nothing was seen yet.
     pub const fn new() -> Self {
-        Self { sets: [[Course::NONE; WAYS]; SETS] }
+        Self { sets: [[[Course::NONE; COURSES]; SETS_EACH]; N] }
     }
 
     /// Forgets all.
     pub fn clear(&mut self) {
-        self.sets.as_flattened_mut().fill(Course::NONE);
+        self.sets.as_flattened_mut().as_flattened_mut().fill(Course::NONE);
     }
 
-    /// Takes that a vehicle drove here; in which cell.
-    #[allow(clippy::cast_possible_truncation)] // places are within a cell, turns within an eighth
+    /// Where a cell's courses are, among those of others.
+    fn set(&self, cell: Cell) -> Option<usize> {
+        usize::from(cell.0.get()).checked_rem(self.sets.as_flattened().len())
+    }
+
+    /// Takes that a vehicle drove here, unless it was seen in this cell last; in which cell.
+    #[allow(clippy::cast_possible_truncation)] // a place is within 2 m of its cell's middle
     pub(super) fn learn(&mut self, place: (i32, i32), heading: Direction, last: Option<Cell>) -> Option<Cell> {
-        let cell = Cell::at(place).filter(|_| ROOM)?;
+        let cell = Cell::at(place)?;
         if last == Some(cell) {
             return last;
         }
         let angle = trig::bearing(i32::from(heading.x), i32::from(heading.y));
-        let middle = cell.middle();
-        let left = heading.across(place.0 - middle.0, place.1 - middle.1) << FRACTION;
-        let tag = cell.tag() | eighth(angle);
-        let set = self.sets.get_mut(cell.set())?;
-        if let Some(course) = set.iter_mut().find(|course| course.tag == tag) {
-            let seen = i32::from(course.vehicles.min(MEMORY - 1)) + 1;
-            course.vehicles = course.vehicles.saturating_add(1);
-            let turn = i32::from(angle.raw().wrapping_sub(course.heading.raw()));
-            course.heading = Angle::from_raw(course.heading.raw().wrapping_add((turn / seen) as i16));
-            course.left = (i32::from(course.left) + (left - i32::from(course.left)) / seen) as i16;
+        let left = (cell.left_cm(heading, place) / 2) as i8;
+        let number = self.set(cell)?;
+        let set = self.sets.as_flattened_mut().get_mut(number)?;
+        let same = |c: &&mut Course| c.cell == Some(cell) && trig::direction(c.heading).cosine(heading) > ONE_COURSE;
+        if let Some(course) = set.iter_mut().find(same) {
+            course.add(angle, left);
         } else if let Some(least) = set.iter_mut().min_by_key(|course| course.vehicles) {
             if least.vehicles <= 1 {
-                *least = Course { tag, vehicles: 1, heading: angle, left: left as i16 };
+                *least = Course { cell: Some(cell), vehicles: 1, heading: angle, left };
             } else {
                 least.vehicles -= 1;
             }
@@ -186,17 +185,17 @@ impl LearntLanes {
     }
 
     /// Direction of the lane that a motion fits best, of those that at least so many vehicles drove on.
-    #[allow(clippy::cast_possible_truncation)] // a mean of turns within an eighth
+    #[allow(clippy::cast_possible_truncation)] // a mean of turns of less than a right angle
     pub(super) fn heading(&self, motion: &Motion, vehicles: i32) -> Option<Direction> {
-        let here = Cell::at(motion.place).filter(|_| ROOM)?;
-        let mut around: Vec<(Angle, Direction, i32, i32), { 9 * WAYS }> = Vec::new();
+        let here = Cell::at(motion.place)?;
+        let mut around: Vec<(Angle, Direction, i32, i32), { 9 * COURSES }> = Vec::new();
         let mut best = None;
         let mut least = MOST_MISFIT;
         for cell in here.and_around() {
-            let Some(set) = self.sets.get(cell.set()) else { continue };
-            for course in set.iter().filter(|course| course.tag & CELL_BITS == cell.tag()) {
+            let Some(set) = self.set(cell).and_then(|number| self.sets.as_flattened().get(number)) else { continue };
+            for course in set.iter().filter(|course| course.cell == Some(cell)) {
                 let heading = trig::direction(course.heading);
-                let left = course.left_of(heading, cell.middle(), motion.place);
+                let left = course.left_of(heading, cell, motion.place);
                 let _ = around.push((course.heading, heading, left, i32::from(course.vehicles)));
                 let Some(by_motion) = motion.misfit(heading) else { continue };
                 let misfit = by_motion + left * left / (motion.place_variance / UNIT).max(1);
@@ -224,7 +223,7 @@ mod tests {
     use super::*;
 
     /// Learns from so many vehicles that go from one place to another, centimetres, a frame every 60 cm.
-    fn drive(lanes: &mut LearntLanes, vehicles: usize, from: (i32, i32), to: (i32, i32)) {
+    fn drive(lanes: &mut LearntLanes<96>, vehicles: usize, from: (i32, i32), to: (i32, i32)) {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let steps = dx.abs().max(dy.abs()) / 60;
         for _ in 0..vehicles {
@@ -251,7 +250,7 @@ mod tests {
     #[test]
     fn where_three_have_driven_the_fourth_goes_the_same_way_and_not_back() {
         let at = |vehicles, x, y, radial| {
-            let mut lanes = LearntLanes::new();
+            let mut lanes = LearntLanes::<96>::new();
             drive(&mut lanes, vehicles, (5000, -3000), (3000, 3000));
             degrees(lanes.heading(&newborn(x, y, radial), 3))
         };
@@ -262,12 +261,12 @@ mod tests {
         assert_eq!(at(3, 4500, -1500, 800), None, "against the traffic");
         assert_eq!(at(2, 4500, -1500, -800), None, "two make no lane");
         assert_eq!(at(3, 5200, -1500, -800), None, "seven metres beside it");
-        assert_eq!(LearntLanes::new().heading(&newborn(4500, -1500, -800), 0), None);
+        assert_eq!(LearntLanes::<96>::new().heading(&newborn(4500, -1500, -800), 0), None);
     }
 
     #[test]
     fn each_of_two_ways_through_a_place_is_kept_and_doppler_tells_which() {
-        let mut lanes = LearntLanes::new();
+        let mut lanes = LearntLanes::<96>::new();
         drive(&mut lanes, 4, (2000, 0), (8000, 0));
         drive(&mut lanes, 4, (5000, -3000), (5000, 3000));
         let along = degrees(lanes.heading(&newborn(5000, 10, 1000), 3)).unwrap();
@@ -279,40 +278,55 @@ mod tests {
 
     #[test]
     fn a_vehicle_counts_once_a_cell_and_a_changed_lane_is_learnt_anew() {
-        let mut lanes = LearntLanes::new();
+        let mut lanes = LearntLanes::<96>::new();
         let ahead = Direction::AHEAD;
         let cell = lanes.learn((5000, 100), ahead, None);
         (0..10).for_each(|k| assert_eq!(lanes.learn((5000 + k, 100), ahead, cell), cell));
-        assert_eq!(lanes.sets.as_flattened().iter().map(|c| c.vehicles).sum::<u8>(), 1);
+        assert_eq!(lanes.sets.as_flattened().as_flattened().iter().map(|c| c.vehicles).sum::<u8>(), 1);
         // 15 degrees to the left from now on: within one eighth
         let turned = Direction::of(9659, 2588);
         (0..60).for_each(|_| assert!(lanes.learn((5000, 100), turned, None).is_some()));
-        let course = lanes.sets.as_flattened().iter().find(|c| c.vehicles > 0).unwrap();
+        let course = lanes.sets.as_flattened().as_flattened().iter().find(|c| c.vehicles > 0).unwrap();
         assert!((course.heading.radians().to_degrees() - 15.0).abs() < 0.5, "{course:?}");
         lanes.clear();
-        assert!(lanes.sets.as_flattened().iter().all(|c| *c == Course::NONE));
+        assert!(lanes.sets.as_flattened().as_flattened().iter().all(|c| *c == Course::NONE));
     }
 
     #[test]
     fn cells_that_share_a_set_are_told_apart_and_the_least_driven_goes() {
-        let mut lanes = LearntLanes::new();
-        let far = 32 << CELL_SHIFT;
-        for (x, y) in [(4000, 700), (4000 + far, 700), (4000, 700 - far), (4000 - far, 700 - far)] {
-            assert_eq!(Cell::at((x, y)).unwrap().set(), Cell::at((4000, 700)).unwrap().set());
-            (0..9).for_each(|_| drive(&mut lanes, 1, (x - 500, y), (x + 500, y)));
-        }
-        assert!(lanes.heading(&newborn(4000, 700, 500), 3).is_some());
+        let mut lanes = LearntLanes::<96>::new();
+        let set = |lanes: &LearntLanes<96>, (x, y)| lanes.set(Cell::numbered(x, y).unwrap()).unwrap();
+        let sharing: Vec<(i32, i32), 16> = (0..CELLS)
+            .flat_map(|x| (0..CELLS).map(move |y| (x, y)))
+            .filter(|cell| set(&lanes, *cell) == set(&lanes, (80, 70)))
+            .take(5)
+            .collect();
+        let at = |(x, y): (i32, i32)| ((x - CELLS / 2) * 256 + 128, (y - CELLS / 2) * 256 + 128);
+        let mut drive = |cell, vehicles| {
+            (0..vehicles).for_each(|_| {
+                let _ = lanes.learn(at(cell), Direction::AHEAD, None);
+            })
+        };
+        sharing[..4].iter().for_each(|cell| drive(*cell, 9));
         // a fifth has to be driven on as often as one of them before it finds room
-        let fifth = |lanes: &LearntLanes| lanes.heading(&newborn(4000 + far, 700 + far, 500), 1).is_some();
-        drive(&mut lanes, 3, (3500 + far, 700 + far), (4500 + far, 700 + far));
-        assert!(!fifth(&lanes));
-        drive(&mut lanes, 20, (3500 + far, 700 + far), (4500 + far, 700 + far));
-        assert!(fifth(&lanes));
+        drive(sharing[4], 8);
+        let seen = |lanes: &LearntLanes<96>| {
+            let of = |cell: &(i32, i32)| {
+                let own = Cell::numbered(cell.0, cell.1);
+                let courses =
+                    lanes.sets.as_flattened().as_flattened().iter().filter(move |c| c.cell == own && own.is_some());
+                courses.map(|c| c.vehicles).sum::<u8>()
+            };
+            sharing.iter().map(of).collect::<Vec<u8, 16>>()
+        };
+        assert_eq!((seen(&lanes)[4], seen(&lanes).iter().sum::<u8>()), (0, 28));
+        (0..30).for_each(|_| _ = lanes.learn(at(sharing[4]), Direction::AHEAD, None));
+        assert!(seen(&lanes)[4] > 0 && seen(&lanes).iter().filter(|n| **n > 0).count() == 4, "{:?}", seen(&lanes));
     }
 
     #[test]
     fn beyond_all_cells_nothing_is_learnt() {
-        let mut lanes = LearntLanes::new();
+        let mut lanes = LearntLanes::<96>::new();
         for place in [(16_400, 0), (0, -16_500), (i32::MAX, i32::MIN)] {
             assert_eq!(lanes.learn(place, Direction::AHEAD, None), None);
             assert_eq!(lanes.heading(&newborn(place.0 / 2, place.1 / 2, 100), 0), None);
@@ -322,7 +336,7 @@ mod tests {
 
     #[test]
     fn headings_on_either_side_of_straight_back_have_a_mean_between_them() {
-        let mut lanes = LearntLanes::new();
+        let mut lanes = LearntLanes::<96>::new();
         for y in [-300, 300, -300, 300] {
             let back = Direction::of(-10_000, y);
             (0..20).fold(None, |last, k| lanes.learn((5000 - 60 * k, 0), back, last));

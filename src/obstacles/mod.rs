@@ -186,7 +186,7 @@ const BEHIND_CM: i32 = -2000;
 #[derive(Debug, Clone)]
 pub struct Obstacles<const N: usize> {
     list: Vec<Obstacle, N, u16>,
-    lanes: LearntLanes,
+    lanes: LearntLanes<N>,
     dropped: u32,
 }
 

@@ -111,7 +111,7 @@ fn where_the_far_road_lies_is_in_two_bytes_and_has_the_limits_of_the_field_of_vi
     let outside = check(&read([1, 51]).unwrap()).unwrap_err();
     assert_eq!(outside.parameter, "visibility.far_road_deg");
     assert_eq!(outside.problem, Problem::OutOfLimits { min: -60.0, max: 50.0 });
-    let Err(BlockError::Parameter(neither)) = read([2, 0]) else { panic!("neither said nor not") };
+    let Err(BlockError::Parameter(neither)) = read([4, 0]) else { panic!("neither said nor not") };
     assert_eq!(neither.parameter, "visibility.far_road_deg");
     // and the fingerprint goes on with it, as on the page
     let mut with = [0; 12];
@@ -119,6 +119,22 @@ fn where_the_far_road_lies_is_in_two_bytes_and_has_the_limits_of_the_field_of_vi
     with[4..8].copy_from_slice(&(1_u32 << 20).to_le_bytes());
     with[8..].copy_from_slice(&(-12_i32).to_le_bytes());
     assert_eq!(said.fingerprint(), CRC.checksum(&with));
+}
+
+#[test]
+fn whether_lanes_are_learnt_is_a_flag_beside_the_far_road() {
+    let read = |flags: u8| Settings::from_block(&changed(154, &[flags, 7])).unwrap().1;
+    let told = |flags| (read(flags).unit.learn_lanes, read(flags).visibility.far_road_deg);
+    assert_eq!([1, 2, 3].map(told), [(false, Some(7)), (true, None), (true, Some(7))]);
+    let mut learns = settings();
+    learns.unit.learn_lanes = true;
+    assert_eq!((learns.to_block(7)[154..156].to_vec(), check(&learns)), (vec![2, 0], Ok(())));
+    assert_eq!((settings().radar_3d().obstacles.lane_vehicles, learns.radar_3d().obstacles.lane_vehicles), (0.0, 3.0));
+    // and the fingerprint goes on with it, as on the page
+    let mut with = [0; 12];
+    with[..4].copy_from_slice(&settings().fingerprint().to_le_bytes());
+    with[4..8].copy_from_slice(&(1_u32 << 21).to_le_bytes());
+    assert_eq!(learns.fingerprint(), CRC.checksum(&with));
 }
 
 #[test]

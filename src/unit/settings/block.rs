@@ -50,7 +50,7 @@ impl Settings {
     /// Identifies what maps depend on: the check sum of the block in layout 1, with sequence 0, and of each point of
     /// each lane together with the check sum so far; a lane begins with its number. After them in the same way each
     /// tuned number with its place, from 2^16 on for obstacles, from 2^17 on for evidence and from 2^18 on
-    /// for fixtures; the number 2^20 and where the far road lies, if that is
+    /// for fixtures; the number 2^21, if the unit learns lanes; the number 2^20 and where the far road lies, if that is
     /// said; and where the road is not flat the number 2^19 and each point of its profile.
     pub fn fingerprint(&self) -> u32 {
         self.fingerprint_at(&self.place())
@@ -88,6 +88,9 @@ impl Settings {
             let fixtures = self.fixtures().into_iter().flat_map(|fixtures| fixtures.numbers());
             (1 << 18..).zip(fixtures).for_each(|(place, number)| take([place, number.to_bits()]));
         }
+        if self.unit.learn_lanes {
+            take([1 << 21, 0]);
+        }
         if let Some(far_road) = self.visibility.far_road_deg {
             take([1 << 20, i32::from(far_road).cast_unsigned()]);
         }
@@ -121,6 +124,7 @@ impl Settings {
             w.put(self.unit.serial_baud.to_le_bytes());
             let far_road = self.visibility.far_road_deg;
             let [said, towards] = far_road.map_or([0, 0], |degrees| [1, degrees.cast_unsigned()]);
+            let said = said | u8::from(self.unit.learn_lanes) << 1;
             w.put([self.unit.configure_radar as u8, u8::from(self.unit.supervise), said, towards]);
         }
         if let Some((body, sum)) = block.split_last_chunk_mut::<SUM_LEN>() {
@@ -281,12 +285,13 @@ fn unit(r: &mut Reader) -> Option<Result<(UnitConfig, Option<i8>), ConfigError>>
     if supervise > 1 {
         return Some(refused("unit.supervise", supervise, 1.0));
     }
-    if said > 1 {
-        return Some(refused("visibility.far_road_deg", said, 1.0));
+    if said > 3 {
+        return Some(refused("visibility.far_road_deg", said, 3.0));
     }
-    let supervise = supervise == 1;
-    let far_road_deg = (said == 1).then_some(towards.cast_signed());
-    Some(Ok((UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar, supervise }, far_road_deg)))
+    let (supervise, learn_lanes) = (supervise == 1, said & 2 != 0);
+    let far_road_deg = (said & 1 != 0).then_some(towards.cast_signed());
+    let unit = UnitConfig { sensor, radar_id, max_delay_ms, serial_baud, configure_radar, supervise, learn_lanes };
+    Some(Ok((unit, far_road_deg)))
 }
 
 #[cfg(test)]
@@ -317,7 +322,7 @@ pub(super) mod tests {
         s.broadcast_bus.bit_rate = 250_000;
         let configure_radar = ConfigureRadar::Objects;
         let unit = UnitConfig { sensor: 3, radar_id: 1, max_delay_ms: 120, serial_baud: 921_600, ..s.unit };
-        s.unit = UnitConfig { configure_radar, supervise: true, ..unit };
+        s.unit = UnitConfig { configure_radar, supervise: true, learn_lanes: true, ..unit };
         s.visibility.far_road_deg = Some(-3);
         s
     }
@@ -359,11 +364,13 @@ pub(super) mod tests {
         let far_road = |far_road_deg| Settings { visibility: VisibilityConfig { far_road_deg, ..a.visibility }, ..a };
         let plain = Settings { unit: UnitConfig::default(), ..far_road(None) };
         assert_eq!(plain.fingerprint(), fingerprint(&layout_1(&a, 0)[..LAYOUT_1_LEN - SUM_LEN]));
-        b.unit = UnitConfig { supervise: true, ..UnitConfig::default() };
+        b.unit = UnitConfig { supervise: true, learn_lanes: true, ..UnitConfig::default() };
         assert_eq!(a.fingerprint(), b.fingerprint());
         b.unit.supervise = false;
         assert_ne!(a.fingerprint(), b.fingerprint(), "which sectors are known");
-        b.unit.supervise = true;
+        b.unit = UnitConfig { supervise: true, learn_lanes: false, ..b.unit };
+        assert_ne!(a.fingerprint(), b.fingerprint(), "which lanes are known");
+        b.unit.learn_lanes = true;
         b.sensor.mount.height_m += 0.5;
         assert_ne!(a.fingerprint(), b.fingerprint());
         // of lanes each point, each end and the order

@@ -15,7 +15,7 @@
 //! | 4 | sequence: the newer slot has the higher one, modulo 2^32 |
 //! | 4 x 29 | `f32`: mount, field of view, noise, gate, visibility, health, each in the order of its fields |
 //! | 2 x 8 | radar bus, broadcast bus: bit rate, sample point in thousandths (2 bytes), listen-only start (2 bytes) |
-//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), whether it is supervised by what stands in its view (1 byte: 0 or 1), whether it is said where the far road lies (1 byte: 0 or 1) and where, whole degrees (1 byte, signed) |
+//! | 12 | the unit: sensor (1 byte), the radar's id (1 byte), greatest delay in milliseconds (2 bytes), baud rate (4 bytes), whether the radar is configured (1 byte: 0 no, 1 clusters, 2 objects), whether it is supervised by what stands in its view (1 byte: 0 or 1), what it is told (1 byte: 1 where the far road lies, 2 to learn lanes, or both) and where that is, whole degrees (1 byte, signed) |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |
 //!
 //! Blocks of what is known of a place, in slots of their own: `kept`. Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
@@ -48,6 +48,7 @@ use crate::grid::evidence::EvidenceConfig;
 #[cfg(feature = "tuned")]
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::Lane;
+use crate::obstacles::learnt_lanes;
 #[cfg(feature = "probability")]
 use crate::probability::TableError;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
@@ -232,13 +233,15 @@ impl Settings {
     /// The estimator's configuration; what an integrator does not set is the library's.
     pub fn radar_3d(&self) -> Radar3dConfig {
         let Self { gate, visibility, health, lanes, ground, .. } = *self;
-        let config = Radar3dConfig { gate, visibility, health, lanes, ground, ..Radar3dConfig::default() };
+        let mut config = Radar3dConfig { gate, visibility, health, lanes, ground, ..Radar3dConfig::default() };
         #[cfg(feature = "tuned")]
-        let config = Radar3dConfig {
-            obstacles: self.obstacles.copied().unwrap_or_default(),
-            evidence: self.evidence.copied().unwrap_or_default(),
-            ..config
-        };
+        {
+            config.obstacles = self.obstacles.copied().unwrap_or_default();
+            config.evidence = self.evidence.copied().unwrap_or_default();
+        }
+        if self.unit.learn_lanes && config.obstacles.lane_vehicles < 1.0 {
+            config.obstacles.lane_vehicles = learnt_lanes::VEHICLES;
+        }
         config
     }
 

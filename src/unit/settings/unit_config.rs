@@ -1,6 +1,7 @@
 //! What an integrator sets of a unit that its maps do not depend on: numbers, rates, delays.
 
 use crate::inputs::ars408::configuration::Ars408Configuration;
+use crate::obstacles::lanes;
 use crate::sensor::config::{ConfigError, within};
 
 /// What a unit does about the settings of its radar.
@@ -55,6 +56,8 @@ pub struct UnitConfig {
     pub configure_radar: ConfigureRadar,
     /// Whether what usually stands in the view tells that the radar is in order; by firmware with the feature `monitoring`.
     pub supervise: bool,
+    /// Whether the unit [learns](crate::obstacles::learnt_lanes) which way traffic goes; by firmware with the feature `lanes`.
+    pub learn_lanes: bool,
 }
 
 impl Default for UnitConfig {
@@ -66,6 +69,7 @@ impl Default for UnitConfig {
             serial_baud: Self::SERVICE_BAUD,
             configure_radar: ConfigureRadar::No,
             supervise: false,
+            learn_lanes: false,
         }
     }
 }
@@ -96,7 +100,9 @@ impl UnitConfig {
         within("unit.max_delay_ms", f32::from(self.max_delay_ms), 40.0, 500.0)?;
         within("unit.serial_baud", self.serial_baud as f32, 57_600.0, 1_000_000.0)?;
         let most = if cfg!(feature = "monitoring") { 1.0 } else { 0.0 };
-        within("unit.supervise", f32::from(u8::from(self.supervise)), 0.0, most).map(|_| ())
+        within("unit.supervise", f32::from(u8::from(self.supervise)), 0.0, most)?;
+        let most = if lanes::ROOM { 1.0 } else { 0.0 };
+        within("unit.learn_lanes", f32::from(u8::from(self.learn_lanes)), 0.0, most).map(|_| ())
     }
 }
 

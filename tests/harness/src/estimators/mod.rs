@@ -19,7 +19,7 @@ use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, VisibilityMap};
-use viewshed::obstacles::lanes;
+use viewshed::obstacles::{lanes, learnt_lanes};
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
@@ -132,9 +132,6 @@ pub struct Options {
 pub struct Before(Option<Arc<[Frame]>>);
 
 impl Before {
-    /// Vehicles that make a learnt lane, where the parameters do not say.
-    const LANE_VEHICLES: f32 = 3.0;
-
     /// These recordings, if there are any.
     pub fn of(recordings: impl IntoIterator<Item = Recording>) -> Self {
         let mut recordings = recordings.into_iter().peekable();
@@ -316,7 +313,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     if let Some(frames) = &options.before.0 {
         let mut config = radar_3d;
         if config.obstacles.lane_vehicles == 0.0 {
-            config.obstacles.lane_vehicles = Before::LANE_VEHICLES;
+            config.obstacles.lane_vehicles = learnt_lanes::VEHICLES;
         }
         let mut learning = radar_3d::new(options.grid, &format!("{name}-learning"), &sensor, &config)?;
         learning.run_in(frames);

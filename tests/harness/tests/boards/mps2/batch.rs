@@ -40,6 +40,28 @@ fn every_frame_of_the_shipped_recording_is_the_same_within_the_budget() {
 
 #[test]
 #[ignore = "needs QEMU"]
+fn lanes_that_are_learnt_are_the_same_within_the_budget() {
+    let (mut settings, scans) = shipped(f64::INFINITY);
+    let maps = |settings: &Settings| {
+        let (answer, _) = host::answer(Profile::Reference, settings, &scans, None).unwrap();
+        let records =
+            answer.chunks_exact(RECORD_LEN).filter_map(|record| Record::from_bytes(record.try_into().unwrap()));
+        let map = |record| if let Record::Frame(frame) = record { Some(frame.fingerprint) } else { None };
+        records.filter_map(map).collect::<Vec<_>>()
+    };
+    let without = maps(&settings);
+    settings.unit.learn_lanes = true;
+    let differ = maps(&settings).iter().zip(&without).filter(|(a, b)| a != b).count();
+    assert!(2 * differ > scans.len(), "lanes change {differ} of {} maps", scans.len());
+    for (profile, budget) in BUDGET {
+        let checked = run(Board::Mps2An386, profile, "motorway, lanes learnt", &settings, &scans);
+        println!("{}: at most {} instructions", profile.name(), worst(&checked));
+        assert!(worst(&checked) <= budget);
+    }
+}
+
+#[test]
+#[ignore = "needs QEMU"]
 fn scans_nobody_should_send_are_the_same_within_their_budget() {
     let (settings, _) = shipped(0.1);
     for scene in stress::SCENES {
