@@ -75,6 +75,7 @@
 //! | `defmt` | who reads a controller's log | `Format` on public types, and events |
 //! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
 //! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
+//! | `learning` | the same with 19 kB more, 8 kB on the small grid | room for lanes that the unit learns by itself, and that for others |
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
 //! | `probability` | units with a table of probabilities, and receivers of theirs | module `probability`: the table, thresholds of an accepted risk, what goes on the wire; `QuantisedSender` of the two grids, for units that have one |

@@ -1,6 +1,7 @@
 //! What can be set of obstacle tracking, in SI units.
 
 use super::lanes::Lanes;
+use super::learnt_lanes;
 use super::profile::HIT;
 use super::reflectivity;
 use super::size::SizeConfig;
@@ -206,6 +207,7 @@ impl ObstacleConfig {
         let hits = |name, v| within(name, v, 0.0, 1000.0).map(|h| math::round_i32(h * 256.0));
         let half_db = (2 << reflectivity::FRACTION) as f32;
         let rcs = |name, v| within(name, v, -60.0, 60.0).map(|dbsm| math::round_i32(dbsm * half_db));
+        let most = if learnt_lanes::ROOM { 80.0 } else { 0.0 };
         let gap_cm = cm("obstacles.gap_m", self.gap_m, 0.5, 20.0)?;
         let max_length_cm = cm("obstacles.max_length_m", self.max_length_m, 2.0, 22.0)?;
         let confirmed = hits("obstacles.confirm_hits", self.confirm_hits)?;
@@ -271,7 +273,7 @@ impl ObstacleConfig {
             road,
             limit_cm,
             lanes: Lanes::default(),
-            lane_vehicles: math::round_i32(within("obstacles.lane_vehicles", self.lane_vehicles, 0.0, 80.0)?),
+            lane_vehicles: math::round_i32(within("obstacles.lane_vehicles", self.lane_vehicles, 0.0, most)?),
         })
     }
 }

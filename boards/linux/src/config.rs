@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck};
+use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck, UnitConfig};
 use viewshed::fusion::FixturesConfig;
 use viewshed::{
     Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, EvidenceConfig, FieldOfView, GateConfig,
@@ -52,6 +52,9 @@ impl Grid {
 pub struct Config {
     #[serde(default)]
     pub grid: Grid,
+    /// Whether the unit learns which way traffic goes.
+    #[serde(default)]
+    pub learn_lanes: bool,
     /// Where the epoch and the configuration blocks are kept.
     pub state_dir: Option<PathBuf>,
     pub input: Input,
@@ -379,7 +382,10 @@ impl Config {
     /// Settings with what the file says of the place and no configuration block does.
     pub fn of_place(&self, settings: Settings) -> Settings {
         let Self { lanes, ground, obstacles, evidence, fixtures, .. } = *self;
-        Settings { lanes, ground, obstacles, evidence, fixtures, ..settings }
+        // a block may say so, too
+        let learn_lanes = self.learn_lanes || settings.unit.learn_lanes;
+        let unit = UnitConfig { learn_lanes, ..settings.unit };
+        Settings { unit, lanes, ground, obstacles, evidence, fixtures, ..settings }
     }
 
     /// The table of probabilities for the file's own settings, if both are given.
@@ -572,6 +578,19 @@ mod tests {
         assert!(check("[[-50.0, 2.0], [50.0, 2.0]]").is_ok());
         let refused = check("[[-50.0, 2.0]]").unwrap_err().to_string();
         assert_eq!(refused, "lanes: lane 0 has fewer than two points");
+    }
+
+    #[test]
+    fn lanes_are_learnt_where_the_file_or_a_block_says_so() {
+        let mut config = with("").unwrap();
+        let plain = config.settings().unwrap();
+        assert!(!plain.unit.learn_lanes && !config.of_place(plain).unit.learn_lanes);
+        let block = Settings { unit: UnitConfig { learn_lanes: true, ..plain.unit }, ..plain };
+        assert!(config.of_place(block).unit.learn_lanes);
+        config.learn_lanes = true;
+        let learns = config.settings().unwrap();
+        assert_eq!(learns.radar_3d().obstacles.lane_vehicles, 3.0);
+        assert_ne!(learns.fingerprint(), plain.fingerprint());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What an integrator sets of a unit that its maps do not depend on: numbers, rates, delays.
 
 use crate::inputs::ars408::configuration::Ars408Configuration;
-use crate::obstacles::lanes;
+use crate::obstacles::learnt_lanes;
 use crate::sensor::config::{ConfigError, within};
 
 /// What a unit does about the settings of its radar.
@@ -56,7 +56,7 @@ pub struct UnitConfig {
     pub configure_radar: ConfigureRadar,
     /// Whether what usually stands in the view tells that the radar is in order; by firmware with the feature `monitoring`.
     pub supervise: bool,
-    /// Whether the unit [learns](crate::obstacles::learnt_lanes) which way traffic goes; by firmware with the feature `lanes`.
+    /// Whether the unit [learns](crate::obstacles::learnt_lanes) which way traffic goes; by firmware with the feature `learning`.
     pub learn_lanes: bool,
 }
 
@@ -101,7 +101,7 @@ impl UnitConfig {
         within("unit.serial_baud", self.serial_baud as f32, 57_600.0, 1_000_000.0)?;
         let most = if cfg!(feature = "monitoring") { 1.0 } else { 0.0 };
         within("unit.supervise", f32::from(u8::from(self.supervise)), 0.0, most)?;
-        let most = if lanes::ROOM { 1.0 } else { 0.0 };
+        let most = if learnt_lanes::ROOM { 1.0 } else { 0.0 };
         within("unit.learn_lanes", f32::from(u8::from(self.learn_lanes)), 0.0, most).map(|_| ())
     }
 }

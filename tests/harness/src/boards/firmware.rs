@@ -12,9 +12,10 @@ use super::{Board, Profile};
 /// # Errors
 /// What the compiler says, or that there is none for the board.
 pub fn build(board: Board, profile: Profile, program: &str) -> Result<PathBuf> {
-    // the small grid is for small controllers, which want fewer instructions and have the flash for that
+    // the small grid is for small controllers, which have no room for learnt lanes, and want fewer instructions and have the
+    // flash for that
     let options: &[&str] = match profile {
-        Profile::Reference => &[],
+        Profile::Reference => &["--features", "learning"],
         Profile::Small => &["--features", "small", "--config", "profile.release.opt-level=2"],
     };
     build_in(board.folder(), program, options)

@@ -588,7 +588,14 @@ mod tests {
         };
         assert_eq!(rows(Before::default()).count(), 1);
         let mut hour = recording(1, 20);
-        let wrong = RadarDetection { azimuth_rad: 3.0, ..hour.frames[0].detections[0] };
+        let wrong = RadarDetection {
+            range_m: 50.0,
+            azimuth_rad: 3.0,
+            elevation_rad: None,
+            radial_velocity_mps: 0.0,
+            rcs_dbsm: None,
+            snr_db: None,
+        };
         hour.frames.iter_mut().for_each(|frame| frame.detections.push(wrong));
         let both = rows(Before::of([hour.clone(), hour])).collect::<Vec<_>>();
         assert_eq!(both, ["radar-3d", "radar-3d-learning"].map(|name| (name.to_owned(), Vec::new())));

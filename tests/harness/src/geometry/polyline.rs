@@ -36,20 +36,35 @@ pub fn within(points: &[Point], from: Point, reach_m: f64) -> Vec<Point> {
     kept
 }
 
-/// Without points that lie within so far of the way between others (Douglas and Peucker).
-pub fn straightened(points: &[Point], tolerance_m: f64) -> Vec<Point> {
-    let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return Vec::new() };
-    let [x, y] = direction(first, last);
-    let aside = |p: &Point| ((p[0] - first[0]) * y - (p[1] - first[1]) * x).abs();
-    let far = (1..points.len().saturating_sub(1)).max_by(|&a, &b| aside(&points[a]).total_cmp(&aside(&points[b])));
-    match far.filter(|&k| aside(&points[k]) > tolerance_m) {
-        Some(k) => {
-            let mut all = straightened(&points[..=k], tolerance_m);
-            all.extend(straightened(&points[k..], tolerance_m).into_iter().skip(1));
-            all
+/// Which of `count` points stay, the fewest, chosen greedily; first and last always. Without those between `a` and `b`,
+/// `wrong(a, b, k)` tells how wrong `k` is; up to 1 it may be left out.
+///
+/// # References
+/// Douglas, Peucker, *Algorithms for the reduction of the number of points required to represent a digitized line*, 1973.
+pub fn kept(count: usize, wrong: &dyn Fn(usize, usize, usize) -> f64) -> Vec<usize> {
+    let Some(last) = count.checked_sub(1) else { return Vec::new() };
+    let mut kept = vec![false; count];
+    (kept[0], kept[last]) = (true, true);
+    let mut spans = vec![(0, last)];
+    while let Some((a, b)) = spans.pop() {
+        let farthest = (a + 1..b).map(|k| (k, wrong(a, b, k))).max_by(|x, y| x.1.total_cmp(&y.1));
+        if let Some((k, wrong)) = farthest
+            && wrong > 1.0
+        {
+            kept[k] = true;
+            spans.extend([(a, k), (k, b)]);
         }
-        None => vec![first, last],
     }
+    (0..count).filter(|k| kept[*k]).collect()
+}
+
+/// Without points that lie within so far of the way between others.
+pub fn straightened(points: &[Point], tolerance_m: f64) -> Vec<Point> {
+    let aside = |a: usize, b: usize, k: usize| {
+        let [x, y] = direction(points[a], points[b]);
+        ((points[k][0] - points[a][0]) * y - (points[k][1] - points[a][1]) * x).abs() / tolerance_m
+    };
+    kept(points.len(), &aside).into_iter().map(|k| points[k]).collect()
 }
 
 /// Without points closer than this to the one before.

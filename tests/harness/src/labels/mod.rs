@@ -12,7 +12,6 @@ pub mod lanes;
 pub mod near_face;
 pub mod person;
 pub mod proposals;
-pub mod simplify;
 pub mod tracks;
 
 use crate::recording::Recording;

@@ -23,8 +23,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::simplify::{error, kept};
 use super::tracks::{LabelPoint, LabelTrack};
+use crate::geometry::polyline::kept;
 use crate::geometry::solid::Solid;
 
 /// Time between two boxes of a track, seconds.
@@ -277,6 +277,12 @@ pub fn headings(path: &[[f64; 2]], base_m: f64) -> Vec<f64> {
     carried(all)
 }
 
+/// Distance of `p` from where the line from `a` to `b` is at its time.
+fn error(a: LabelPoint, b: LabelPoint, p: LabelPoint) -> f64 {
+    let f = (p.time_s - a.time_s) / (b.time_s - a.time_s);
+    (a.x_m + f * (b.x_m - a.x_m) - p.x_m).hypot(a.y_m + f * (b.y_m - a.y_m) - p.y_m)
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
@@ -437,6 +443,37 @@ mod tests {
         for (a, b) in truth.iter().zip(boxes(&drawn, [0.0, 0.0])) {
             assert!((a.heading_rad - b.heading_rad).abs() < 0.12, "{a:?} {b:?}");
             close(a.center, b.center, 0.3);
+        }
+    }
+
+    fn simplify(points: &[LabelPoint], tolerance_m: f64) -> Vec<LabelPoint> {
+        let wrong = |a: usize, b: usize, k: usize| error(points[a], points[b], points[k]) / tolerance_m;
+        kept(points.len(), &wrong).into_iter().map(|k| points[k]).collect()
+    }
+
+    fn points(all: &[[f64; 3]]) -> Vec<LabelPoint> {
+        all.iter().map(|p| (*p).into()).collect()
+    }
+
+    #[test]
+    fn constant_speed_needs_two_points_and_a_stop_one_more_at_each_end() {
+        let at = |k: f64| [k, (4.0 * k).min(20.0), 0.0];
+        let stop: Vec<[f64; 3]> = (0..20).map(|k| at(f64::from(k))).collect();
+        let few = simplify(&points(&stop), 0.1);
+        assert_eq!(few, points(&[[0.0, 0.0, 0.0], [5.0, 20.0, 0.0], [19.0, 20.0, 0.0]]));
+        assert_eq!(simplify(&few[..2], 0.1), few[..2]);
+        assert!(simplify(&[], 1.0).is_empty());
+    }
+
+    #[test]
+    fn nothing_that_is_left_out_was_farther_than_the_tolerance() {
+        let wave: Vec<LabelPoint> =
+            (0..400).map(|k| f64::from(k) * 0.1).map(|t| [t, 20.0 * t, 3.0 * t.sin()].into()).collect();
+        let few = simplify(&wave, 0.5);
+        assert!((10..60).contains(&few.len()), "{} points", few.len());
+        for p in &wave {
+            let next = few.partition_point(|q| q.time_s < p.time_s).max(1);
+            assert!(error(few[next - 1], few[next], *p) <= 0.5);
         }
     }
 }

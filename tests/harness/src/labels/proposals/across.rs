@@ -89,26 +89,20 @@ impl Beside {
     }
 }
 
-/// How far to the left of their paths the middles of vehicles are, by lane.
-pub struct Middles(HashMap<*const Lane, f64>);
-
-impl Middles {
-    /// Of paths with the width of each vehicle, metres.
-    pub fn of<'a>(paths: impl Iterator<Item = (&'a Path, f64)>, instants: &[Instant]) -> Self {
-        let mut lanes: HashMap<*const Lane, Vec<Beside>> = HashMap::new();
-        for (path, width_m) in paths {
-            let Some(lane) = &path.lane else { continue };
-            lanes.entry(Arc::as_ptr(lane)).or_default().push(Beside::of(path, instants, width_m));
-        }
-        Self(lanes.into_iter().filter_map(|(lane, all)| Some((lane, median(all)?))).collect())
+/// How far to the left of its path the middle of each vehicle is, metres; of paths with the width of their vehicles.
+pub fn lefts_m(vehicles: &[(&Path, f64)], instants: &[Instant]) -> Vec<f64> {
+    let own: Vec<Beside> = vehicles.iter().map(|(path, width_m)| Beside::of(path, instants, *width_m)).collect();
+    let lanes = || vehicles.iter().map(|(path, _)| path.lane.as_ref().map(Arc::as_ptr));
+    let mut by_lane: HashMap<*const Lane, Vec<Beside>> = HashMap::new();
+    for (lane, beside) in lanes().zip(&own) {
+        let Some(lane) = lane else { continue };
+        by_lane.entry(lane).or_default().push(*beside);
     }
-
-    /// How far to the left of a path the middle of its vehicle of this width is, metres.
-    pub fn left_m(&self, path: &Path, instants: &[Instant], width_m: f64) -> f64 {
-        let own = Beside::of(path, instants, width_m);
-        let others_m = path.lane.as_ref().and_then(|lane| self.0.get(&Arc::as_ptr(lane)));
-        others_m.map_or(own.left_m, |others_m| own.in_lane(*others_m))
-    }
+    let medians: HashMap<_, _> = by_lane.into_iter().filter_map(|(lane, all)| Some((lane, median(all)?))).collect();
+    let left_m = |(lane, own): (Option<*const Lane>, &Beside)| {
+        lane.and_then(|lane| medians.get(&lane)).map_or(own.left_m, |others_m| own.in_lane(*others_m))
+    };
+    lanes().zip(&own).map(left_m).collect()
 }
 
 /// The median, each counting as often as its flank was seen.
@@ -200,18 +194,23 @@ mod tests {
             paths.extend(
                 [0.9, 1.1].map(|left| lorry(&mut instants, [130.0, y], &[left * side], 0.2 * side, Some(&lane))),
             );
-            let middles = Middles::of(paths.iter().map(|path| (path, 2.55)), &instants);
-            let told_m = |path: &Path| middles.left_m(path, &instants, 2.55) + 0.2 * side;
-            let off: Vec<f64> = paths.iter().map(told_m).collect();
+            let told_m = |paths: &[&Path], instants: &[Instant]| -> Vec<f64> {
+                let vehicles: Vec<(&Path, f64)> = paths.iter().map(|path| (*path, 2.55)).collect();
+                lefts_m(&vehicles, instants).into_iter().map(|left_m| left_m + 0.2 * side).collect()
+            };
+            let all: Vec<&Path> = paths.iter().collect();
+            let off = told_m(&all, &instants);
             assert!(off[0] > off[1] && off[1] > off[2], "{off:?}");
             assert!(off.iter().all(|told| told.abs() < 0.25), "{off:?}");
             // who is seen well and drives to the side goes less than half of the way; who keeps to no lane stays
             let aside: Vec<f64> = flank(side).iter().map(|left| left + 0.8).collect();
             let aside = lorry(&mut instants, [50.0, y], &aside, 0.2 * side, Some(&lane));
-            let told = middles.left_m(&aside, &instants, 2.55) + 0.2 * side;
+            let all: Vec<&Path> = paths.iter().chain([&aside]).collect();
+            let told = told_m(&all, &instants)[5];
             assert!((0.35..0.8).contains(&told), "{told}");
             let alone = lorry(&mut instants, [130.0, y], &[0.9 * side], 0.2 * side, None);
-            assert!((middles.left_m(&alone, &instants, 2.55) - 0.7 * side).abs() < 0.05);
+            let all: Vec<&Path> = paths.iter().chain([&alone]).collect();
+            assert!((told_m(&all, &instants)[5] - 0.9 * side).abs() < 0.05);
         }
     }
 

@@ -49,9 +49,9 @@ use serde::Serialize;
 
 use super::tracks::LabelTrack;
 use crate::recording::Recording;
-use across::Middles;
 use lane::Lane;
 use path::Path;
+use shape::Extent;
 
 /// Fewest reflections of a proposal.
 const FEWEST: usize = 12;
@@ -127,14 +127,18 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
         contains: &|[x, y]| recording.sensor.field_of_view.contains(recording.pose.to_spherical([x, y, 1.0])),
         latest_s: instants.last().map_or(0.0, |i| i.time_s),
     };
-    let widths = scored.iter().map(|(_, path)| (*path, shape::Extent::of(path, &instants).box_m()[1]));
-    let middles = Middles::of(widths, &instants);
-    let all = scored.into_iter().enumerate().map(|(k, (score, path))| Proposal {
-        track: shape::track(path, &instants, &middles, &view, format!("p{}", k + 1)),
-        score,
-        detections: path.members.len() as u32,
-        way: 0,
-    });
+    let extents: Vec<Extent> = scored.iter().map(|(_, path)| Extent::of(path, &instants)).collect();
+    let vehicles: Vec<_> = scored.iter().zip(&extents).map(|((_, path), extent)| (*path, extent.box_m()[1])).collect();
+    let lefts_m = across::lefts_m(&vehicles, &instants);
+    let all =
+        scored.into_iter().zip(extents.iter().zip(lefts_m)).zip(1..).map(|(((score, path), (extent, left_m)), k)| {
+            Proposal {
+                track: shape::track(path, extent, left_m, &view, format!("p{k}")),
+                score,
+                detections: path.members.len() as u32,
+                way: 0,
+            }
+        });
     let all: Vec<Proposal> = all.filter(|p| p.track.check().is_ok()).collect();
     let all = exclusion::without_intruders(all, view.sensor);
     let mut all = following::gone_on(all, &view);
@@ -156,11 +160,11 @@ pub fn lanes(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<V
     for pass in 0..2 {
         let shared: Vec<Arc<Lane>> = known.iter().cloned().map(Arc::new).collect();
         let mut driven = Vec::new();
-        let steps = 2.0 * all.len() as f64;
+        let count = all.len();
         for (k, instants) in all.iter_mut().enumerate() {
             reflections::free_lanes(instants, &known);
-            let done = (pass * steps as usize / 2 + k) as f64;
-            let paths = paths(instants, &known, &shared, &|share| progress((done + share) / steps));
+            let done = (pass * count + k) as f64;
+            let paths = paths(instants, &known, &shared, &|share| progress((done + share) / (2 * count) as f64));
             // mirror images in rails and walls drive side by side, too
             let mut paths = exclusion::without_images(paths);
             if pass > 0 {

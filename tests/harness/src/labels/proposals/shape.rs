@@ -1,7 +1,6 @@
 //! What stands around the reflections of a path: class by extent, and the box centres.
 
 use super::View;
-use super::across::Middles;
 use super::path::{HEIGHT_WITHIN_M, Path, quantile};
 use super::reflections::Instant;
 use crate::labels::near_face::{BoxStep, drawn};
@@ -141,11 +140,9 @@ fn speed_near(path: &Path, time_s: f64) -> Option<[f64; 2]> {
 
 /// The near face of the vehicle around a path. What is fast comes from somewhere and goes somewhere: up to
 /// [`BEYOND_S`] in the field of view are added at both ends.
-pub fn track(path: &Path, instants: &[Instant], middles: &Middles, view: &View, id: String) -> LabelTrack {
-    let extent = Extent::of(path, instants);
+pub fn track(path: &Path, extent: &Extent, left_m: f64, view: &View, id: String) -> LabelTrack {
     let (class, size) = (extent.class(), extent.box_m());
     let along = extent.center_m(size[0]);
-    let left = middles.left_m(path, instants, size[1]);
     let mut steps: Vec<BoxStep> = path
         .motions
         .iter()
@@ -154,7 +151,7 @@ pub fn track(path: &Path, instants: &[Instant], middles: &Middles, view: &View, 
             let ([x, y], (s, c)) = (m.place(), heading_rad.sin_cos());
             BoxStep {
                 time_s: *time_s,
-                center: [x + along * c - left * s, y + along * s + left * c],
+                center: [x + along * c - left_m * s, y + along * s + left_m * c],
                 heading_rad: *heading_rad,
             }
         })

@@ -446,8 +446,9 @@ mod tests {
         assert_eq!((there, seen[0]), ([scene.radar.mount.x_m as f32, scene.radar.mount.y_m as f32], 30.0));
         assert_ne!(seen[1], of("wide-day-2.fcd.xml.gz")[1][1], "other vehicles on another day");
         let nothing = LanesFrom::OtherDays(vec![plan.folder.join("wide-day-1.fcd.xml.gz")], |_| Vec::new());
-        let error = nothing.of(0, &scene, &settings, &|| ()).unwrap_err().to_string();
-        assert!(error.contains("wide-day-1") && error.contains("no lanes can be learnt from 2 s"), "{error}");
+        let other = nothing.other_day(0, &scene, &settings, &|| ()).unwrap();
+        let error = nothing.of(&scene, other.as_ref(), &settings).unwrap_err().to_string();
+        assert!(error.contains(&scene.name) && error.contains("no lanes can be learnt from 2 s"), "{error}");
         assert!(matches!(LanesFrom::nets(&[scene.clone()]), LanesFrom::Nets));
         scene.traffic.as_mut().unwrap().net = None;
         assert!(matches!(LanesFrom::nets(&[scene]), LanesFrom::Settings));
