@@ -13,7 +13,7 @@
 //! # Limits
 //! 164 m ahead, behind and to either side; 2688 courses on the reference grid, 784 on the small one. Cells share sets of
 //! four courses; one that is full gives up the course that fewest drove. What is learnt stays over gaps and steps of the clock, changes by a twelfth
-//! with each vehicle, and is lost with the power. None without the feature `learning`.
+//! with each vehicle, and is lost with the power. Mirror images that pass for vehicles teach, too. None without the feature `learning`.
 //!
 //! # Cost
 //! 16.1 kB on the reference grid, 4.7 kB on the small one. Nine cells are looked at for every obstacle that follows a learnt lane in every frame, and for the others in

@@ -9,6 +9,8 @@ use viewshed::frame::gate::Rejection;
 use viewshed::frame::health::{Condition, Continuity, FrameStatus};
 use viewshed::map::Visibility;
 use viewshed::map::query::{self, Answer, Footprint};
+use viewshed::obstacles::config::ObstacleConfig;
+use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
 
 #[test]
@@ -300,6 +302,40 @@ fn a_gap_or_a_step_back_of_the_clock_forgets_the_obstacles() {
         assert_eq!((report.obstacles, report.condition), (0, Condition::Healthy));
         assert!(!rig.draw(20..190, -15..15).contains('#'));
     }
+}
+
+/// A car that crosses the road 60 m ahead, in the `frames`-th frame; and the heading of what is followed of it, degrees.
+fn crosses(rig: &mut Rig, frames: std::ops::Range<u32>) -> f64 {
+    for frame in frames {
+        let y = -30.0 + 9.0 * f64::from(frame) * FRAME_US as f64 * 1e-6;
+        let places = (0..4).flat_map(|k| [59.2, 60.8].map(|x| [x, y + 1.5 * f64::from(k) - 2.25, 0.8]));
+        let seen: Vec<Detection> = places.filter_map(|p| detection(&rig.sensor, p, [0.0, 9.0], true)).collect();
+        rig.frame(&seen);
+    }
+    let followed = rig.state.obstacles().iter().max_by_key(|o| o.hits).map(|o| o.heading);
+    followed.map_or(f64::NAN, |h| f64::from(h.y).atan2(f64::from(h.x)).to_degrees())
+}
+
+#[test]
+fn what_was_learnt_of_lanes_outlasts_gaps_and_steps_of_the_clock_and_is_lost_by_a_reset() {
+    let learning = Radar3dConfig {
+        obstacles: ObstacleConfig { lane_vehicles: 3.0, ..ObstacleConfig::default() },
+        ..Radar3dConfig::default()
+    };
+    let mut rig = Rig::with(gantry(6.0, 0.0), &learning);
+    for _ in 0..5 {
+        crosses(&mut rig, 0..90);
+        // two seconds without frames
+        rig.frames += 30;
+    }
+    let known = crosses(&mut rig, 25..26);
+    assert!((known - 90.0).abs() < 5.0, "{known} degrees in the first frame");
+    rig.frames -= 60;
+    let known = crosses(&mut rig, 25..26);
+    assert!((known - 90.0).abs() < 5.0, "{known} degrees after a step of the clock");
+    rig.state.reset();
+    let unknown = crosses(&mut rig, 25..26);
+    assert!((unknown.abs() - 180.0).abs() < 5.0, "{unknown} degrees after a reset");
 }
 
 #[test]
