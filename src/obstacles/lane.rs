@@ -45,6 +45,12 @@ impl Obstacle {
         }
     }
 
+    /// Takes a given lane, or else one that was learnt.
+    pub(super) fn find_any_lane<const N: usize>(&mut self, learnt: &LearntLanes<N>, t: &Tracking) {
+        self.find_lane(t);
+        self.find_learnt(learnt, t);
+    }
+
     fn motion_for_lanes(&self) -> Motion {
         let place = self.middle();
         let sight = Direction::of(place.0, place.1);
@@ -121,7 +127,7 @@ impl Obstacle {
     }
 
     /// Takes the [learnt lane](super::learnt_lanes) that its motion fits best, where none is given.
-    pub(super) fn find_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
+    fn find_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
         if t.lane_vehicles == 0 || !matches!(self.lane, NO_LANE | LEARNT) {
             return;
         }

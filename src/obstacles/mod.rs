@@ -141,9 +141,6 @@
 //!
 //! What [farther ends](room) without a box of their own gave there stands with them, and what
 //! [radar cross sections](reflectivity) gave everywhere, last of all, with theirs.
-//!
-//! A speed gate that opens by 2 m/s in a second while a vehicle is not seen was not kept either: from the 30th second on crossings
-//! went from 22.5 / 16.2 to 21.7 / 18.0 and queues from 19.2 / 9.7 to 17.4 / 11.1, for what it finds is often the next vehicle.
 
 mod body;
 #[cfg(test)]
@@ -371,8 +368,7 @@ impl<const N: usize> Obstacles<N> {
             }
             room -= 1;
             let mut newborn = Obstacle::new(seed, heading, speed);
-            newborn.find_lane(t);
-            newborn.find_learnt(&self.lanes, t);
+            newborn.find_any_lane(&self.lanes, t);
             newborn.absorb(seed, t);
             claimed.insert(i);
             let mut search = newborn.search(t);

@@ -1,14 +1,12 @@
 //! The library's estimators, driven by recordings.
 
 pub mod at_risk;
+mod before;
 pub mod camera_3d;
 pub mod fused;
 mod radar_2d;
 pub mod radar_3d;
 mod reference;
-
-use std::fmt;
-use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
@@ -125,34 +123,6 @@ pub struct Options {
     /// What a unit has seen of the place before, and learnt its lanes from: the row `radar-3d-learning`.
     #[serde(skip)]
     pub before: Before,
-}
-
-/// Frames of other recordings of a radar, oldest first; none where nothing was learnt from any.
-#[derive(Clone, Default)]
-pub struct Before(Option<Arc<[Frame]>>);
-
-impl Before {
-    /// These recordings, if there are any.
-    pub fn of(recordings: impl IntoIterator<Item = Recording>) -> Self {
-        let mut recordings = recordings.into_iter().peekable();
-        let any = recordings.peek().is_some();
-        Self(any.then(|| recordings.flat_map(|recording| recording.frames).collect()))
-    }
-}
-
-impl fmt::Debug for Before {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} frames", self.0.as_ref().map_or(0, |frames| frames.len()))
-    }
-}
-
-impl PartialEq for Before {
-    fn eq(&self, other: &Self) -> bool {
-        match (&self.0, &other.0) {
-            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-            (a, b) => a.is_none() && b.is_none(),
-        }
-    }
 }
 
 /// Where the far road lies.
@@ -283,6 +253,7 @@ impl Options {
 /// Most detections a frame that storage is compiled for.
 pub const MOST_DETECTIONS: usize = 4096;
 
+pub use before::Before;
 pub use radar_2d::MOST_RANGE_M;
 pub use radar_3d::Grid;
 
@@ -310,7 +281,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     for (what, config) in site(&radar_3d, &told) {
         estimators.push(radar_3d::new(options.grid, &format!("{name}-{what}"), &sensor, &config)?);
     }
-    if let Some(frames) = &options.before.0 {
+    if let Some(frames) = options.before.frames() {
         let mut config = radar_3d;
         if config.obstacles.lane_vehicles == 0.0 {
             config.obstacles.lane_vehicles = learnt_lanes::VEHICLES;
