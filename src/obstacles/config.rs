@@ -193,6 +193,11 @@ impl ObstacleConfig {
         own.into_iter().chain(sizes).chain([min_length_m])
     }
 
+    /// The same where lanes are learnt, from the usual number of vehicles if it says none.
+    pub fn learning(self) -> Self {
+        if self.lane_vehicles < 1.0 { Self { lane_vehicles: learnt_lanes::VEHICLES, ..self } } else { self }
+    }
+
     /// Checks the parameters and rounds them. `road` is the road's axis in the levelled frame, and
     /// obstacles are followed as far as `limit_cm`.
     ///

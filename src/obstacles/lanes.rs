@@ -93,7 +93,7 @@ pub(super) struct Motion {
 /// Standard deviation of the radial speed that vehicles on a lane show beside its direction, squared, (cm/s)^2.
 const RADIAL_VARIANCE: i32 = 50 * 50;
 /// One, in the scale of a misfit.
-pub(super) const UNIT: i32 = 16;
+const UNIT: i32 = 16;
 /// Greatest misfit of a motion on a lane: three standard deviations.
 pub(super) const MOST_MISFIT: i32 = 9 * UNIT;
 /// Speeds above this are no vehicle's, cm/s.
@@ -195,9 +195,7 @@ impl Lanes {
             if left.abs() > WIDEST_CM || along < -BEYOND_CM || along > s.length_cm() + BEYOND_CM {
                 continue;
             }
-            let Some(by_motion) = m.misfit(s.heading) else { continue };
-            let by_place = left * left / (m.place_variance / UNIT).max(1);
-            let misfit = by_motion + by_place;
+            let Some(misfit) = m.misfit(s.heading, left) else { continue };
             if misfit < least {
                 least = misfit;
                 found = Some(OnLane { segment: k as u8, heading: s.heading, left_cm: left });
@@ -263,8 +261,8 @@ impl Segment {
 }
 
 impl Motion {
-    /// How badly it fits a direction of traffic; `None` for the opposite one.
-    pub(super) fn misfit(&self, heading: Direction) -> Option<i32> {
+    /// How badly it fits a lane in this direction, to the left of whose middle it lies so far (centimetres); `None` for the opposite direction.
+    pub(super) fn misfit(&self, heading: Direction, left: i32) -> Option<i32> {
         // speed s along the heading shows as s c along the line of sight and s k across it; the best s leaves
         // (radial k - across c)^2 / (k^2 radial variance + c^2 across variance)
         let (c, k) = (self.sight.cosine(heading), self.sight.sine(heading));
@@ -279,7 +277,8 @@ impl Motion {
             return None;
         }
         let turned = self.heading.map_or(0, |h| (trig::ONE - h.cosine(heading)) >> 6);
-        Some(by_speed + turned)
+        let by_place = left * left / (self.place_variance / UNIT).max(1);
+        Some(by_speed + turned + by_place)
     }
 }
 

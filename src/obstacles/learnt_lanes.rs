@@ -1,28 +1,29 @@
 //! Lanes that a unit learns while it runs: which way vehicles were seen to drive at a place.
 //!
-//! At a crossing nobody may have said where [lanes](super::lanes) are. But the next vehicle goes where the last ones went:
-//! of a newborn, and of what stands or crawls, that tells the heading which Doppler alone does not.
+//! At a crossing nobody may have said where [lanes](super::lanes) are. But the next vehicle goes where the last ones
+//! went: of a newborn, and of what stands or crawls, that tells the heading which Doppler alone does not.
 //!
 //! # Model
-//! The road is cut into cells of 2.56 m. Once a cell, a vehicle whose heading is known for certain leaves it there, with
-//! how far beside the cell's middle it drove; each cell keeps the running means of up to four directions. A motion fits
-//! the directions around it as it fits given lanes, and the mean of what lies within 1.2 m across, one cell along and 20
-//! degrees of the best is its lane, once enough vehicles have driven there. Vehicles teach the heading that is measured
-//! of them, not the one they were given here, so that the lanes do not confirm themselves.
+//! The road is cut into cells of 2.56 m. Once a cell, a vehicle whose heading is known for certain leaves it there,
+//! with how far beside the cell's middle it drove; each cell keeps the running means of up to four directions. A motion
+//! fits the directions around it as it fits given lanes, and the mean of what lies within 1.2 m across, one cell along
+//! and 20 degrees of the best is its lane, once enough vehicles have driven there. Vehicles teach the heading that is
+//! measured of them, not the one they were given here, so that the lanes do not confirm themselves.
 //!
 //! # Limits
-//! 164 m ahead, behind and to either side; 2688 courses on the reference grid, 784 on the small one. Cells share sets of
-//! four courses; one that is full gives up the course that fewest drove. What is learnt stays over gaps and steps of the clock, changes by a twelfth
-//! with each vehicle, and is lost with the power. Mirror images that pass for vehicles teach, too. None without the feature `learning`.
+//! 164 m ahead, behind and to either side; 2688 courses on the reference grid, 784 on the small one. Cells share sets
+//! of four courses; one that is full gives up the course that fewest drove. What is learnt stays over gaps and steps of
+//! the clock, changes by a twelfth with each vehicle, and is lost with the power. Mirror images that pass for vehicles
+//! teach, too. None without the feature `learning`.
 //!
 //! # Cost
-//! 16.1 kB on the reference grid, 4.7 kB on the small one. Nine cells are looked at for every obstacle that follows a learnt lane in every frame, and for the others in
-//! one of four.
+//! 16.1 kB on the reference grid, 4.7 kB on the small one. Nine cells are looked at for every obstacle that follows a
+//! learnt lane in every frame, and for the others in one of four.
 //!
 //! # What was tried
-//! On thirteen of the training crossings of `tests/recordings/tuning.toml`, after the unit had run over twice 90 s of other
-//! days there; cells FVR / FIR in percent from the 30th second on, vehicles from `geometry-slice`. Synthetic data. Then
-//! what the same rules did to training queues and motorways, within the recording alone.
+//! On thirteen of the training crossings of `tests/recordings/tuning.toml`, after the unit had run over twice 90 s of
+//! other days there; cells FVR / FIR in percent from the 30th second on, vehicles from `geometry-slice`. Synthetic
+//! data. Then what the same rules did to training queues and motorways, within the recording alone.
 //!
 //! | rule | crossings | vehicles | queues | motorways |
 //! |---|---|---|---|---|
@@ -35,23 +36,23 @@
 //! | three, and one course is what lies within 30 degrees, not in one eighth of all directions: kept | 14.5 / 11.2 | +2.0 / +8.5 | 17.9 / 7.5 | 12.1 / 14.3 |
 //! | that after 90 s of one other day; within the recording alone | 15.2 / 11.0; 16.7 / 10.9 | +1.4 / +8.3; +5.4 / +7.5 | | |
 //!
-//! Two vehicles may be two parts of one that was not yet joined, so that three are asked for. On the fourteenth crossing a
-//! bus and a lorry that stand side by side 12 m from the radar are the greater part of what is hidden; it called 15 to 45 %
-//! of that visible, more often with lanes. On six crossings that are reported 21.3 / 12.1 became 17.7 / 11.6, and vehicles
-//! +6.7 / +8.3 became +4.9 / +7.2 (`viewshed experiment --scene crossing --learn-lanes`).
+//! Two vehicles may be two parts of one that was not yet joined, so that three are asked for. On the fourteenth
+//! crossing a bus and a lorry that stand side by side 12 m from the radar are the greater part of what is hidden; it
+//! called 15 to 45 % of that visible, more often with lanes. On six crossings that are reported 21.3 / 12.1 became 17.7
+//! / 11.6, and vehicles +6.7 / +8.3 became +4.9 / +7.2 (`viewshed experiment --scene crossing --learn-lanes`).
 
 use core::num::NonZeroU16;
 
 use heapless::Vec;
 
-use super::lanes::{MOST_MISFIT, Motion, UNIT};
+use super::lanes::{MOST_MISFIT, Motion};
 use crate::fixed::angle::Angle;
 use crate::fixed::trig::{self, Direction};
 
 /// Whether there is room for any.
 pub const ROOM: bool = cfg!(feature = "learning");
 /// Vehicles that make a lane, where a unit is told to learn and not told of how many.
-pub const VEHICLES: f32 = 3.0;
+pub(super) const VEHICLES: f32 = 3.0;
 
 /// Side of a cell, 2^8 cm.
 const CELL_SHIFT: u32 = 8;
@@ -203,8 +204,7 @@ impl<const N: usize> LearntLanes<N> {
                 let heading = trig::direction(course.heading);
                 let left = course.left_of(heading, cell, motion.place);
                 let _ = around.push((course.heading, heading, left, i32::from(course.vehicles)));
-                let Some(by_motion) = motion.misfit(heading) else { continue };
-                let misfit = by_motion + left * left / (motion.place_variance / UNIT).max(1);
+                let Some(misfit) = motion.misfit(heading, left) else { continue };
                 if misfit < least {
                     least = misfit;
                     best = Some((course.heading, heading, left));

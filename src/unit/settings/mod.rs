@@ -48,7 +48,6 @@ use crate::grid::evidence::EvidenceConfig;
 #[cfg(feature = "tuned")]
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::Lane;
-use crate::obstacles::learnt_lanes;
 #[cfg(feature = "probability")]
 use crate::probability::TableError;
 use crate::radar_3d::{Radar3dConfig, VisibilityConfig};
@@ -239,8 +238,8 @@ impl Settings {
             config.obstacles = self.obstacles.copied().unwrap_or_default();
             config.evidence = self.evidence.copied().unwrap_or_default();
         }
-        if self.unit.learn_lanes && config.obstacles.lane_vehicles < 1.0 {
-            config.obstacles.lane_vehicles = learnt_lanes::VEHICLES;
+        if self.unit.learn_lanes {
+            config.obstacles = config.obstacles.learning();
         }
         config
     }

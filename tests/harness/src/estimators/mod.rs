@@ -17,7 +17,7 @@ use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, VisibilityMap};
-use viewshed::obstacles::{lanes, learnt_lanes};
+use viewshed::obstacles::lanes;
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
@@ -282,10 +282,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
         estimators.push(radar_3d::new(options.grid, &format!("{name}-{what}"), &sensor, &config)?);
     }
     if let Some(frames) = options.before.frames() {
-        let mut config = radar_3d;
-        if config.obstacles.lane_vehicles == 0.0 {
-            config.obstacles.lane_vehicles = learnt_lanes::VEHICLES;
-        }
+        let config = Radar3dConfig { obstacles: radar_3d.obstacles.learning(), ..radar_3d };
         let mut learning = radar_3d::new(options.grid, &format!("{name}-learning"), &sensor, &config)?;
         learning.run_in(frames);
         estimators.push(learning);

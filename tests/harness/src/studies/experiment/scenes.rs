@@ -17,7 +17,7 @@ use crate::evaluation::pool::{Seconds, pool};
 use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::score;
-use crate::recording::Recording;
+use crate::recording::{Recording, file};
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 
@@ -163,7 +163,7 @@ impl LanesFrom {
         let other = Scene { duration_s, seed, ..scene.clone() };
         let day = days.get(k).with_context(|| format!("`{}` has no other day", scene.name))?;
         let simulation = Simulation::new(other, Some(day))?;
-        plan::recorded(&simulation, &scene.name, settings, progress).map(|(_, recording)| Some(recording))
+        plan::recorded(&simulation, &file::stem(day), settings, progress).map(|(_, recording)| Some(recording))
     }
 
     /// Lanes of a scene, of which this was seen on another day.
@@ -174,8 +174,8 @@ impl LanesFrom {
                 let lanes = learn(std::slice::from_ref(other));
                 ensure!(
                     !lanes.is_empty(),
-                    "`{}`: no lanes can be learnt from {} s of another day",
-                    scene.name,
+                    "{}: no lanes can be learnt from {} s of it",
+                    other.name,
                     other.duration_s().round()
                 );
                 Ok(lanes)
@@ -448,7 +448,7 @@ mod tests {
         let nothing = LanesFrom::OtherDays(vec![plan.folder.join("wide-day-1.fcd.xml.gz")], |_| Vec::new());
         let other = nothing.other_day(0, &scene, &settings, &|| ()).unwrap();
         let error = nothing.of(&scene, other.as_ref(), &settings).unwrap_err().to_string();
-        assert!(error.contains(&scene.name) && error.contains("no lanes can be learnt from 2 s"), "{error}");
+        assert!(error.contains("wide-day-1") && error.contains("no lanes can be learnt from 2 s"), "{error}");
         assert!(matches!(LanesFrom::nets(&[scene.clone()]), LanesFrom::Nets));
         scene.traffic.as_mut().unwrap().net = None;
         assert!(matches!(LanesFrom::nets(&[scene]), LanesFrom::Settings));
