@@ -77,11 +77,16 @@ impl Obstacle {
         let off_axis = t.road.sine(self.heading).abs();
         match (self.lane, self.free_heading) {
             (NO_LANE, false) => 0,
-            (LEARNT, _) if off_axis < ALONG => t.own_way_margin_cm / 8,
+            (LEARNT, _) if self.goes_along_the_road(t) => t.own_way_margin_cm / 8,
             (NO_LANE | LEARNT, _) if off_axis > ACROSS => t.own_way_margin_cm,
             (NO_LANE | LEARNT, _) => t.own_way_margin_cm / 2,
             _ => t.own_way_margin_cm / 4,
         }
+    }
+
+    /// Whether it goes along the road's axis, either way, within 7.2 degrees.
+    pub(super) fn goes_along_the_road(&self, t: &Tracking) -> bool {
+        t.road.sine(self.heading).abs() < ALONG
     }
 
     /// How far the middle of its width lies behind its detections, centimetres. A radar beside a

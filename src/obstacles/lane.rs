@@ -1,11 +1,11 @@
 //! An obstacle that follows a lane.
 
 use super::lanes::{LEARNT, Motion, NO_LANE};
-use super::learnt_lanes::LearntLanes;
+use super::learnt_lanes::{LearntLanes, spacing_cm};
 use super::motion::FreeMotion;
 use super::obstacle::{FRACTION, NEWBORN_PLACE, NEWBORN_SPEED, Obstacle};
 use super::tracking::{LEAST_PROJECTION, Tracking};
-use crate::fixed::math::mul_shift;
+use crate::fixed::math::{hypot_gate, mul_shift};
 use crate::fixed::trig::Direction;
 
 /// Every how many frames an obstacle looks for a better lane.
@@ -27,6 +27,13 @@ const TEACHING_HITS: u16 = 12;
 const TEACHING_SPEED: i32 = 300 << FRACTION;
 /// See [`TEACHING_HITS`].
 const TEACHING_SIGMAS: i32 = 10 << 4;
+
+/// Outline from which a vehicle's heading is known by its length, centimetres.
+const SETTLED_CM: i32 = 800;
+/// Least cosine between its heading and that of a lane it may then take, 2^-14: 20 degrees.
+const PARALLEL: i32 = 15_396;
+/// The same between the road's axis and a motion that is measured, where they agree: 8 degrees.
+const AGREES: i32 = 16_225;
 
 impl Obstacle {
     /// Middle of what is seen of it, centimetres.
@@ -126,27 +133,52 @@ impl Obstacle {
         }
     }
 
-    /// Takes the [learnt lane](super::learnt_lanes) that its motion fits best, where none is given.
+    /// Takes the [learnt lane](super::learnt_lanes) that its motion fits best, where none is given and its own way is not
+    /// known better.
     fn find_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
-        if t.lane_vehicles == 0 || !matches!(self.lane, NO_LANE | LEARNT) {
+        let knows = self.free_heading && self.knows_its_way(t) && !self.goes_along_the_road(t);
+        if t.lane_vehicles == 0 || knows || !matches!(self.lane, NO_LANE | LEARNT) {
             return;
         }
-        let motion = self.motion_for_lanes();
-        if let Some(heading) = lanes.heading(&motion, t.lane_vehicles) {
+        let motion = self.motion_for_learnt(self.gathered.across_cm, t);
+        if let Some(heading) = self.learnt_heading(&motion, lanes, t) {
             self.take(LEARNT, heading, motion.radial, motion.sight);
         }
     }
 
-    /// Turns with the learnt lane it is on.
+    /// Turns with the learnt lane it is on. Where that ends it goes on as it goes, along the road or its own way.
     pub(super) fn keep_to_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
         if self.lane != LEARNT {
             return;
         }
-        if let Some(heading) = lanes.heading(&self.motion_for_lanes(), t.lane_vehicles) {
+        // nothing is detected of it yet in this frame, so it is taken for measured as badly as the sensor may
+        let (x, y) = self.middle();
+        let across_cm = mul_shift(hypot_gate(x, y), t.noise.azimuth, 16);
+        if let Some(heading) = self.learnt_heading(&self.motion_for_learnt(across_cm, t), lanes, t) {
             self.head(heading, self.heading.along(self.velocity.0, self.velocity.1));
         } else {
             self.lane = NO_LANE;
+            self.free_heading = !self.goes_along_the_road(t);
         }
+    }
+
+    /// The same as for given lanes, but for the place: lanes are learnt from the middles of boxes.
+    fn motion_for_learnt(&self, across_cm: i32, t: &Tracking) -> Motion {
+        let motion = self.motion_for_lanes();
+        let place_variance = ASIDE_VARIANCE + across_cm * across_cm;
+        if self.age == 0 {
+            return Motion { place_variance, ..motion };
+        }
+        let (along, aside) = self.middle_of_box(&self.size(t));
+        Motion { place: self.global(along, aside), place_variance, ..motion }
+    }
+
+    /// Direction of the learnt lane a motion fits best. What stands, or is drawn as long as a lorry, was seen to drive where it
+    /// points, and keeps to that within 20 degrees.
+    fn learnt_heading<const N: usize>(&self, motion: &Motion, lanes: &LearntLanes<N>, t: &Tracking) -> Option<Direction> {
+        let is_settled = self.is_standing(t) || (self.is_mover(t) && self.extent.length_cm() >= SETTLED_CM);
+        let heading = lanes.heading(motion, t.lane_vehicles)?;
+        (!is_settled || heading.cosine(self.heading) > PARALLEL).then_some(heading)
     }
 
     /// Looks for a better learnt lane now and then.
@@ -156,20 +188,28 @@ impl Obstacle {
         }
     }
 
-    /// Shows where a lane is, if it is a vehicle that drives and its heading is known.
+    /// Shows where a lane is, if it is a vehicle that drives and its heading is known: what is measured of it, or the road's
+    /// axis where that agrees with it.
     pub(super) fn teach<const N: usize>(&mut self, lanes: &mut LearntLanes<N>, t: &Tracking) {
         let drives = self.seen() && self.existence >= t.confirmed && self.hits >= TEACHING_HITS && self.is_mover(t);
         let speed = self.speed();
         let known = speed >= TEACHING_SPEED && self.free.is_sure_of(speed >> FRACTION, TEACHING_SIGMAS);
-        if t.lane_vehicles == 0 || !drives || !known {
+        if t.lane_vehicles == 0 || !drives || !known || self.travelled_cm < self.teaches_from_cm {
             return;
         }
-        // along the road its axis is better known than what is measured of one vehicle
-        let measured = self.free_heading || self.lane != NO_LANE;
         let (vx, vy) = self.free.velocity;
-        let heading = if measured { Direction::of(vx, vy) } else { self.heading };
+        let measured = Direction::of(vx, vy);
+        let follows_axis = self.lane == NO_LANE && !self.free_heading;
+        if follows_axis && measured.cosine(self.heading) < AGREES {
+            return;
+        }
+        let heading = if follows_axis { self.heading } else { measured };
         let (along, aside) = self.middle_of_box(&self.size(t));
-        self.taught_in = lanes.learn(self.global(along, aside), heading, self.taught_in);
+        lanes.learn(self.global(along, aside), heading);
+        // in the mean as often, whatever way it makes in a frame
+        let spacing = spacing_cm(heading);
+        let next = self.teaches_from_cm.saturating_add(spacing);
+        self.teaches_from_cm = if next > self.travelled_cm { next } else { self.travelled_cm.saturating_add(spacing) };
     }
 
     /// Whether it follows a lane that was given.
@@ -349,6 +389,49 @@ mod tests {
         let o = list.iter().max_by_key(|o| o.existence).unwrap();
         assert_eq!(o.lane, NO_LANE);
         assert!((degrees(&list) + 37.0).abs() < 15.0, "{}", degrees(&list));
+    }
+
+    /// What crosses at 40 m and then crawls, as one that is drawn 16 m long along the road's axis or as a car.
+    fn stopped(length_cm: i32, speed_cm_s: i32, t: &Tracking) -> f64 {
+        let lanes = after_cars(6, t);
+        let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 100, 0), Direction::AHEAD, speed_cm_s);
+        o.travelled_cm = 2000;
+        o.age = 20;
+        (o.extent.rear_cm, o.extent.front_cm) = (-length_cm / 2, length_cm / 2);
+        (0..20).for_each(|_| {
+            o.age += 1;
+            o.look_for_learnt(&lanes.lanes, t);
+            o.keep_to_learnt(&lanes.lanes, t);
+        });
+        f64::from(o.heading.y).atan2(f64::from(o.heading.x)).to_degrees()
+    }
+
+    #[test]
+    fn what_stands_or_is_as_long_as_a_lorry_is_not_turned_onto_a_lane_across() {
+        let t = learning();
+        for (length_cm, speed) in [(1600, 0), (1600, 150), (400, 0)] {
+            assert!(stopped(length_cm, speed, &t).abs() < 1.0, "{length_cm} cm at {speed} cm/s");
+        }
+        assert!((stopped(400, 150, &t) - 90.0).abs() < 4.0, "a car that crawls is");
+    }
+
+    #[test]
+    fn where_a_learnt_lane_across_the_road_ends_the_box_keeps_the_margin_of_its_own_way() {
+        let t = learning();
+        let mut list = after_cars(4, &t);
+        // 4 s after the last cell that was driven on
+        follow(&mut list, &mut car([40.0, -13.0], [0.0, 1.0], 9.0), 20, &t);
+        let on = list.iter().max_by_key(|o| o.hits).unwrap().clone();
+        assert_eq!(on.lane, LEARNT);
+        let width = |o: &Obstacle| o.solid(&t).half_width_cm;
+        let mut off = on.clone();
+        off.keep_to_learnt(&LearntLanes::<16>::new(), &t);
+        assert_eq!((off.lane, off.free_heading, width(&off)), (NO_LANE, true, width(&on)));
+        // along the road it is one of the road's again
+        let mut along = on;
+        along.heading = Direction::AHEAD;
+        along.keep_to_learnt(&LearntLanes::<16>::new(), &t);
+        assert_eq!((along.lane, along.free_heading), (NO_LANE, false));
     }
 
     #[test]

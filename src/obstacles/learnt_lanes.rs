@@ -45,7 +45,9 @@ use core::num::NonZeroU16;
 
 use heapless::Vec;
 
+use super::Obstacles;
 use super::lanes::{MOST_MISFIT, Motion};
+use super::tracking::Tracking;
 use crate::fixed::angle::Angle;
 use crate::fixed::trig::{self, Direction};
 
@@ -70,8 +72,16 @@ const ONE_COURSE: i32 = 14_189;
 const PARALLEL: i32 = 15_396;
 /// Farthest that places of one lane lie beside each other, centimetres.
 const ONE_LANE_CM: i32 = 120;
-/// Cells of its way that are looked at around a place: each vehicle counts in all of them.
-const CELLS_AROUND: i32 = 3;
+/// A vehicle that drives straight through the nine cells around a place is counted so many times in them.
+const COUNTS_EACH: i32 = 3;
+
+/// Way between two places that a vehicle teaches, centimetres: a cell's side where it drives along the cells, and as much
+/// more as its way through them is longer where it drives across them.
+#[allow(clippy::cast_possible_truncation)] // at most the diagonal of a cell
+pub(super) fn spacing_cm(heading: Direction) -> u16 {
+    let (x, y) = (heading.x.unsigned_abs(), heading.y.unsigned_abs());
+    (((u32::from(x) + u32::from(y)) << CELL_SHIFT) >> 14) as u16
+}
 
 /// What drove through a cell in one direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,9 +118,18 @@ impl Course {
     fn add(&mut self, angle: Angle, left: i8) {
         let seen = i32::from(self.vehicles.min(MEMORY - 1)) + 1;
         self.vehicles = self.vehicles.saturating_add(1);
+        let share = |off: i32| (off + off.signum() * seen / 2) / seen;
         let turn = i32::from(angle.raw().wrapping_sub(self.heading.raw()));
-        self.heading = Angle::from_raw(self.heading.raw().wrapping_add((turn / seen) as i16));
-        self.left += ((i32::from(left) - i32::from(self.left)) / seen) as i8;
+        self.heading = Angle::from_raw(self.heading.raw().wrapping_add(share(turn) as i16));
+        self.left += share(i32::from(left) - i32::from(self.left)) as i8;
+    }
+
+    /// Forgets half of the vehicles it has seen; one that has seen one is no more.
+    fn forget_half(&mut self) {
+        self.vehicles /= 2;
+        if self.vehicles == 0 {
+            *self = Self::NONE;
+        }
     }
 }
 
@@ -138,10 +157,20 @@ impl Cell {
         (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).filter_map(move |y| Self::numbered(x, y)))
     }
 
+    fn middle(self) -> [i32; 2] {
+        self.numbers().map(|v| ((v - CELLS / 2) << CELL_SHIFT) + (1 << (CELL_SHIFT - 1)))
+    }
+
     /// How far a place lies to the left of a line in this direction through its middle, centimetres.
     fn left_cm(self, heading: Direction, (x, y): (i32, i32)) -> i32 {
-        let [middle_x, middle_y] = self.numbers().map(|v| ((v - CELLS / 2) << CELL_SHIFT) + (1 << (CELL_SHIFT - 1)));
+        let [middle_x, middle_y] = self.middle();
         heading.across(x - middle_x, y - middle_y)
+    }
+
+    /// The place so far to the left of its middle, centimetres.
+    fn beside(self, heading: Direction, left_cm: i32) -> (i32, i32) {
+        let ([x, y], left) = (self.middle(), heading.left());
+        (x + ((i32::from(left.x) * left_cm) >> 14), y + ((i32::from(left.y) * left_cm) >> 14))
     }
 }
 
@@ -167,20 +196,20 @@ impl<const N: usize> LearntLanes<N> {
         usize::from(cell.0.get()).checked_rem(self.sets.as_flattened().len())
     }
 
-    /// Takes that a vehicle drove here, unless it was seen in this cell last; in which cell.
+    /// Takes that a vehicle drove here. When a course has seen all that it can count, all forget half of what they saw: so
+    /// where nobody drives any more there is no lane, after some hundred vehicles elsewhere.
     #[allow(clippy::cast_possible_truncation)] // a place is within 2 m of its cell's middle
-    pub(super) fn learn(&mut self, place: (i32, i32), heading: Direction, last: Option<Cell>) -> Option<Cell> {
-        let cell = Cell::at(place)?;
-        if last == Some(cell) {
-            return last;
-        }
+    pub(super) fn learn(&mut self, place: (i32, i32), heading: Direction) {
+        let Some(cell) = Cell::at(place) else { return };
         let angle = trig::bearing(i32::from(heading.x), i32::from(heading.y));
         let left = (cell.left_cm(heading, place) / 2) as i8;
-        let number = self.set(cell)?;
-        let set = self.sets.as_flattened_mut().get_mut(number)?;
+        let Some(set) = self.set(cell).and_then(|number| self.sets.as_flattened_mut().get_mut(number)) else { return };
         let same = |c: &&mut Course| c.cell == Some(cell) && trig::direction(c.heading).cosine(heading) > ONE_COURSE;
         if let Some(course) = set.iter_mut().find(same) {
             course.add(angle, left);
+            if course.vehicles == u8::MAX {
+                self.sets.as_flattened_mut().as_flattened_mut().iter_mut().for_each(Course::forget_half);
+            }
         } else if let Some(least) = set.iter_mut().min_by_key(|course| course.vehicles) {
             if least.vehicles <= 1 {
                 *least = Course { cell: Some(cell), vehicles: 1, heading: angle, left };
@@ -188,55 +217,98 @@ impl<const N: usize> LearntLanes<N> {
                 least.vehicles -= 1;
             }
         }
-        Some(cell)
     }
 
     /// Direction of the lane that a motion fits best, of those that at least so many vehicles drove on.
-    #[allow(clippy::cast_possible_truncation)] // a mean of turns of less than a right angle
     pub(super) fn heading(&self, motion: &Motion, vehicles: i32) -> Option<Direction> {
-        let here = Cell::at(motion.place)?;
-        let mut around: Vec<(Angle, Direction, i32, i32), { 9 * COURSES }> = Vec::new();
+        let around = self.around(Cell::at(motion.place)?, motion.place);
         let mut best = None;
         let mut least = MOST_MISFIT;
-        for cell in here.and_around() {
+        for course in &around {
+            let Some(misfit) = motion.misfit(course.direction, course.left_cm).filter(|misfit| *misfit < least) else {
+                continue;
+            };
+            // one that strayed across a lane does not take it away
+            if let Some(heading) = agreed(course, &around, vehicles) {
+                least = misfit;
+                best = Some(heading);
+            }
+        }
+        best
+    }
+
+    /// Where lanes are known, and which way each goes there: a place for each cell and course that at least so many
+    /// vehicles drove, centimetres in the levelled frame.
+    pub fn places(&self, vehicles: i32) -> impl Iterator<Item = ((i32, i32), Direction)> {
+        self.sets.as_flattened().as_flattened().iter().filter_map(move |course| {
+            let cell = course.cell?;
+            let place = cell.beside(trig::direction(course.heading), i32::from(course.left) * 2);
+            let around = self.around(cell, place);
+            let own = around.iter().find(|near| near.angle == course.heading && near.left_cm.abs() <= 2)?;
+            Some((place, agreed(own, &around, vehicles)?))
+        })
+    }
+
+    /// Courses of a cell and those around it, as seen from a place in it.
+    fn around(&self, cell: Cell, place: (i32, i32)) -> Vec<Near, { 9 * COURSES }> {
+        let mut around = Vec::new();
+        for cell in cell.and_around() {
             let Some(set) = self.set(cell).and_then(|number| self.sets.as_flattened().get(number)) else { continue };
             for course in set.iter().filter(|course| course.cell == Some(cell)) {
-                let heading = trig::direction(course.heading);
-                let left = course.left_of(heading, cell, motion.place);
-                let _ = around.push((course.heading, heading, left, i32::from(course.vehicles)));
-                let Some(misfit) = motion.misfit(heading, left) else { continue };
-                if misfit < least {
-                    least = misfit;
-                    best = Some((course.heading, heading, left));
-                }
+                let direction = trig::direction(course.heading);
+                let left_cm = course.left_of(direction, cell, place);
+                let vehicles = i32::from(course.vehicles);
+                let _ = around.push(Near { angle: course.heading, direction, left_cm, vehicles });
             }
         }
-        let (angle, heading, left) = best?;
-        let (mut seen, mut turn) = (0, 0);
-        for (a, h, l, n) in around {
-            if h.cosine(heading) > PARALLEL && (l - left).abs() < ONE_LANE_CM {
-                seen += n;
-                turn += i32::from(a.raw().wrapping_sub(angle.raw())) * n;
-            }
-        }
-        let mean = turn.checked_div(seen)? as i16;
-        (seen >= CELLS_AROUND * vehicles).then(|| trig::direction(Angle::from_raw(angle.raw().wrapping_add(mean))))
+        around
     }
+}
+
+impl<const N: usize> Obstacles<N> {
+    /// Where lanes were learnt, a place for each cell and course, and which way they go there; centimetres in the
+    /// levelled frame. None where none are to be learnt.
+    pub fn learnt_lanes(&self, t: &Tracking) -> impl Iterator<Item = ((i32, i32), Direction)> {
+        self.lanes.places(t.lane_vehicles)
+    }
+}
+
+/// A course near a place, which lies so far to the left of it.
+struct Near {
+    angle: Angle,
+    direction: Direction,
+    left_cm: i32,
+    vehicles: i32,
+}
+
+/// Mean direction of a course and of those around it that are of its lane, if at least so many vehicles drove there.
+#[allow(clippy::cast_possible_truncation)] // a mean of turns of less than a right angle
+fn agreed(best: &Near, around: &[Near], vehicles: i32) -> Option<Direction> {
+    let (mut seen, mut turn) = (0, 0);
+    for near in around {
+        if near.direction.cosine(best.direction) > PARALLEL && (near.left_cm - best.left_cm).abs() < ONE_LANE_CM {
+            seen += near.vehicles;
+            turn += i32::from(near.angle.raw().wrapping_sub(best.angle.raw())) * near.vehicles;
+        }
+    }
+    let mean = turn.checked_div(seen)? as i16;
+    (seen >= COUNTS_EACH * vehicles).then(|| trig::direction(Angle::from_raw(best.angle.raw().wrapping_add(mean))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Learns from so many vehicles that go from one place to another, centimetres, a frame every 60 cm.
-    fn drive(lanes: &mut LearntLanes<96>, vehicles: usize, from: (i32, i32), to: (i32, i32)) {
+    /// Learns from so many vehicles that go from one place to another, centimetres.
+    fn drive<const N: usize>(lanes: &mut LearntLanes<N>, vehicles: usize, from: (i32, i32), to: (i32, i32)) {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-        let steps = dx.abs().max(dy.abs()) / 60;
-        for _ in 0..vehicles {
-            let mut last = None;
-            for k in 0..=steps {
-                let place = (from.0 + dx * k / steps, from.1 + dy * k / steps);
-                last = lanes.learn(place, Direction::of(dx, dy), last);
+        let heading = Direction::of(dx, dy);
+        let (length, spacing) = (crate::fixed::math::length(dx, dy), i32::from(spacing_cm(heading)));
+        for vehicle in 0..vehicles as i32 {
+            // each begins somewhere else on its way
+            for k in 0..length / spacing {
+                let way = k * spacing + vehicle * 71 % spacing;
+                lanes.learn((from.0 + dx * way / length, from.1 + dy * way / length), heading);
             }
         }
     }
@@ -283,19 +355,81 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_counts_once_a_cell_and_a_changed_lane_is_learnt_anew() {
+    fn places_lie_where_vehicles_drove_and_point_where_they_went() {
         let mut lanes = LearntLanes::<96>::new();
-        let ahead = Direction::AHEAD;
-        let cell = lanes.learn((5000, 100), ahead, None);
-        (0..10).for_each(|k| assert_eq!(lanes.learn((5000 + k, 100), ahead, cell), cell));
-        assert_eq!(lanes.sets.as_flattened().as_flattened().iter().map(|c| c.vehicles).sum::<u8>(), 1);
-        // 15 degrees to the left from now on: within one eighth
+        drive(&mut lanes, 4, (5000, -3000), (3000, 3000));
+        drive(&mut lanes, 2, (9000, 3000), (9000, -3000));
+        let known: std::vec::Vec<_> = lanes.places(3).collect();
+        // every cell of 63 m of way
+        assert!((18..=40).contains(&known.len()), "{known:?}");
+        let lane = Direction::of(-2000, 6000);
+        for ((x, y), heading) in known {
+            assert!(lane.across(x - 5000, y + 3000).abs() < 60, "({x}, {y}) beside the lane");
+            assert!(degrees(Some(heading)).is_some_and(|h| (h - 108.4).abs() < 1.5), "({x}, {y}): {heading:?}");
+        }
+        assert!(lanes.places(2).any(|((x, y), heading)| x > 8900 && y.abs() < 3000 && heading.y < -16_000));
+    }
+
+    #[test]
+    fn two_vehicles_make_no_lane_whichever_way_they_go_and_four_do() {
+        for degrees in [0, 15, 30, 45, 60, 90, 135, 200] {
+            let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+            let at = |metres: f64| (5000 + (metres * 100.0 * cos) as i32, (metres * 100.0 * sin) as i32);
+            let known = |vehicles| {
+                let mut lanes = LearntLanes::<96>::new();
+                drive(&mut lanes, vehicles, at(-30.0), at(30.0));
+                // what comes nearer or goes away as it would on this way
+                let newborn = |m: f64| {
+                    let sight = Direction::of(at(m).0, at(m).1);
+                    newborn(at(m).0, at(m).1, sight.along((900.0 * cos) as i32, (900.0 * sin) as i32))
+                };
+                (-20..20).filter(|m| lanes.heading(&newborn(f64::from(*m)), 3).is_some()).count()
+            };
+            assert!(known(2) <= 4 && known(4) >= 36, "{degrees} degrees: {} and {} of 40 places", known(2), known(4));
+        }
+    }
+
+    #[test]
+    fn one_that_strays_across_a_lane_does_not_take_it_away() {
+        let mut lanes = LearntLanes::<96>::new();
+        drive(&mut lanes, 20, (3000, 0), (9000, 0));
+        for degrees in [20.0_f64, 45.0, 90.0] {
+            let mut lanes = lanes.clone();
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let at = |m: f64| (6000 + (m * cos) as i32, (m * sin) as i32);
+            drive(&mut lanes, 1, at(-1500.0), at(1500.0));
+            for x in (5500..6500).step_by(50) {
+                let heading = self::degrees(lanes.heading(&newborn(x, 20, 1000), 3)).unwrap();
+                assert!(heading.abs() < 4.0, "{degrees} degrees, at {x} cm: {heading}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_changed_lane_is_learnt_anew() {
+        let mut lanes = LearntLanes::<96>::new();
+        lanes.learn((5000, 100), Direction::AHEAD);
+        // 15 degrees to the left from now on, and half a metre
         let turned = Direction::of(9659, 2588);
-        (0..60).for_each(|_| assert!(lanes.learn((5000, 100), turned, None).is_some()));
+        (0..60).for_each(|_| lanes.learn((5000, 150), turned));
         let course = lanes.sets.as_flattened().as_flattened().iter().find(|c| c.vehicles > 0).unwrap();
         assert!((course.heading.radians().to_degrees() - 15.0).abs() < 0.5, "{course:?}");
+        let cell = Cell::at((5000, 150)).unwrap();
+        assert!(course.left_of(turned, cell, (5000, 150)).abs() <= 12, "{course:?}");
         lanes.clear();
         assert!(lanes.sets.as_flattened().as_flattened().iter().all(|c| *c == Course::NONE));
+    }
+
+    #[test]
+    fn where_nobody_drives_any_more_there_is_no_lane_after_some_hundred_vehicles_elsewhere() {
+        let mut lanes = LearntLanes::<96>::new();
+        let (old, new) = (newborn(6000, 10, 1000), newborn(6000, 1000, 1000));
+        drive(&mut lanes, 200, (3000, 0), (9000, 0));
+        assert!(lanes.heading(&old, 3).is_some());
+        drive(&mut lanes, 500, (3000, 1000), (9000, 1000));
+        assert!(lanes.heading(&old, 3).is_some() && lanes.heading(&new, 3).is_some(), "a quiet lane stays one");
+        drive(&mut lanes, 1000, (3000, 1000), (9000, 1000));
+        assert!(lanes.heading(&old, 3).is_none() && lanes.heading(&new, 3).is_some());
     }
 
     #[test]
@@ -309,9 +443,7 @@ mod tests {
             .collect();
         let at = |(x, y): (i32, i32)| ((x - CELLS / 2) * 256 + 128, (y - CELLS / 2) * 256 + 128);
         let mut drive = |cell, vehicles| {
-            (0..vehicles).for_each(|_| {
-                let _ = lanes.learn(at(cell), Direction::AHEAD, None);
-            })
+            (0..vehicles).for_each(|_| lanes.learn(at(cell), Direction::AHEAD));
         };
         sharing[..4].iter().for_each(|cell| drive(*cell, 9));
         // a fifth has to be driven on as often as one of them before it finds room
@@ -326,7 +458,7 @@ mod tests {
             sharing.iter().map(of).collect::<Vec<u8, 16>>()
         };
         assert_eq!((seen(&lanes)[4], seen(&lanes).iter().sum::<u8>()), (0, 28));
-        (0..30).for_each(|_| _ = lanes.learn(at(sharing[4]), Direction::AHEAD, None));
+        (0..30).for_each(|_| lanes.learn(at(sharing[4]), Direction::AHEAD));
         assert!(seen(&lanes)[4] > 0 && seen(&lanes).iter().filter(|n| **n > 0).count() == 4, "{:?}", seen(&lanes));
     }
 
@@ -334,10 +466,13 @@ mod tests {
     fn beyond_all_cells_nothing_is_learnt() {
         let mut lanes = LearntLanes::<96>::new();
         for place in [(16_400, 0), (0, -16_500), (i32::MAX, i32::MIN)] {
-            assert_eq!(lanes.learn(place, Direction::AHEAD, None), None);
+            lanes.learn(place, Direction::AHEAD);
             assert_eq!(lanes.heading(&newborn(place.0 / 2, place.1 / 2, 100), 0), None);
         }
-        assert!(lanes.learn((16_383, -16_384), Direction::AHEAD, None).is_some());
+        let known = |lanes: &LearntLanes<96>| lanes.sets.as_flattened().as_flattened().iter().any(|c| c.cell.is_some());
+        assert!(!known(&lanes));
+        lanes.learn((16_383, -16_384), Direction::AHEAD);
+        assert!(known(&lanes));
     }
 
     #[test]
@@ -345,7 +480,7 @@ mod tests {
         let mut lanes = LearntLanes::<96>::new();
         for y in [-300, 300, -300, 300] {
             let back = Direction::of(-10_000, y);
-            (0..20).fold(None, |last, k| lanes.learn((5000 - 60 * k, 0), back, last));
+            (0..5).for_each(|k| lanes.learn((5000 - 256 * k, 0), back));
         }
         let heading = degrees(lanes.heading(&newborn(4400, 0, -900), 1)).unwrap();
         assert!(heading.abs() > 179.0, "{heading}");

@@ -2,7 +2,6 @@
 
 use super::gathered::Gathered;
 use super::lanes::NO_LANE;
-use super::learnt_lanes::Cell;
 use super::motion::FreeMotion;
 use super::profile::{BIN_CM, Extent, Profile};
 use super::reflectivity::Reflectivity;
@@ -62,8 +61,8 @@ pub struct Obstacle {
     pub(super) free_heading: bool,
     /// Segment of the lane it follows, [`LEARNT`](super::lanes::LEARNT), or [`NO_LANE`].
     pub(super) lane: u8,
-    /// Cell where [lanes were last learnt](super::learnt_lanes) from it.
-    pub(super) taught_in: Option<Cell>,
+    /// Way after which [lanes are learnt](super::learnt_lanes) from it again, centimetres.
+    pub(super) teaches_from_cm: u16,
     /// What this frame's detections add up to.
     pub(super) gathered: Gathered,
 }
@@ -97,7 +96,7 @@ impl Obstacle {
             farther_end: false,
             free_heading: false,
             lane: NO_LANE,
-            taught_in: None,
+            teaches_from_cm: 0,
             heading,
             profile: Profile::EMPTY,
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },

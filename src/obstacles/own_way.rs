@@ -4,7 +4,7 @@
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
 //! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
 
-use super::lanes::NO_LANE;
+use super::lanes::{LEARNT, NO_LANE};
 use super::motion::Seen;
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};
@@ -60,9 +60,10 @@ impl Obstacle {
         self.velocity = (part(self.heading.x), part(self.heading.y));
     }
 
-    /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way.
+    /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way. What stands
+    /// on a learnt lane has driven there: what is seen of a lorry beside the radar moves though it does not.
     pub(super) fn question_heading(&mut self, t: &Tracking) {
-        if self.free_heading {
+        if self.free_heading || (self.lane == LEARNT && self.is_standing(t)) {
             return;
         }
         let (fx, fy) = self.free.velocity;

@@ -65,6 +65,11 @@ pub trait Estimator: Send {
         self.obstacles()
     }
 
+    /// Where it has learnt lanes, each a short piece in the direction of its traffic.
+    fn learnt_lanes(&self) -> Vec<Lane> {
+        Vec::new()
+    }
+
     /// What was rejected or dropped since construction, by reason.
     fn counters(&self) -> Vec<(&'static str, u64)> {
         Vec::new()

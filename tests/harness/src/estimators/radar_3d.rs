@@ -3,6 +3,7 @@
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use viewshed::fixed::time::Time;
+use viewshed::fixed::trig::Direction;
 use viewshed::map::VisibilityMap;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
@@ -10,7 +11,7 @@ use viewshed::sensor::Sensor;
 use viewshed::sensor::mount::Mount;
 use viewshed::unit::profile::{reference::State, small};
 
-use super::{Estimator, PolarCells};
+use super::{Estimator, Lane, PolarCells};
 use super::{Intake, MOST_DETECTIONS, polar_cells};
 use crate::geometry::solid::Solid;
 use crate::recording::Frame;
@@ -23,6 +24,9 @@ pub const ELEVATIONS: usize = State::ELEVATIONS;
 /// Vehicles for which the list had no room, as reports say it.
 const NO_ROOM: [&str; 2] = ["no room in the list of 96 obstacles", "no room in the list of 28 obstacles"];
 const _: () = assert!(State::OBSTACLES == 96 && small::State::OBSTACLES == 28, "the report names the list's limit");
+
+/// Length of a piece of a learnt lane, a little less than its cell is wide, metres.
+const PIECE_M: f64 = 2.0;
 
 /// A size of the grid, and of the lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
@@ -151,13 +155,17 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         Ok(Self { name, parameters, state, map, mount, intake, no_room: 0, counted_before: Vec::new() })
     }
 
+    /// A place ahead of the sensor and to its left, in road coordinates, metres.
+    fn place_on_road(&self, [ahead, left]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = f64::from(self.mount.yaw_deg).to_radians().sin_cos();
+        let (x, y) = (f64::from(self.mount.x_m), f64::from(self.mount.y_m));
+        [x + cos * ahead - sin * left, y + sin * ahead + cos * left]
+    }
+
     /// A box of the levelled frame, which is the road's, moved to the sensor and turned to its heading.
     fn on_road(&self, s: &viewshed::obstacles::solid::Solid) -> Solid {
-        let (sin, cos) = f64::from(self.mount.yaw_deg).to_radians().sin_cos();
         let metres = |cm: i32| f64::from(cm) / 100.0;
-        let (ahead, left, height_m) = (metres(s.x_cm), metres(s.y_cm), metres(s.height_cm));
-        let x = f64::from(self.mount.x_m) + cos * ahead - sin * left;
-        let y = f64::from(self.mount.y_m) + sin * ahead + cos * left;
+        let ([x, y], height_m) = (self.place_on_road([metres(s.x_cm), metres(s.y_cm)]), metres(s.height_cm));
         let turned = f64::from(s.heading.y).atan2(f64::from(s.heading.x));
         Solid {
             center: [x, y, height_m / 2.0],
@@ -204,6 +212,17 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
 
     fn where_seen(&self) -> Vec<Solid> {
         self.state.obstacles().where_seen(self.parameters.tracking()).map(|s| self.on_road(&s)).collect()
+    }
+
+    fn learnt_lanes(&self) -> Vec<Lane> {
+        let pieces = self.state.obstacles().learnt_lanes(self.parameters.tracking());
+        let piece = |((x_cm, y_cm), heading): ((i32, i32), Direction)| {
+            let middle = [x_cm, y_cm].map(|cm| f64::from(cm) / 100.0);
+            let half = [heading.x, heading.y].map(|part| f64::from(part) / 16_384.0 * PIECE_M / 2.0);
+            let ends = [-1.0, 1.0].map(|end| self.place_on_road([middle[0] + end * half[0], middle[1] + end * half[1]]));
+            Lane { points: ends.map(|end| end.map(|v| v as f32)).to_vec() }
+        };
+        pieces.map(piece).collect()
     }
 
     fn counters(&self) -> Vec<(&'static str, u64)> {

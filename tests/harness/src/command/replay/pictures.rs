@@ -189,7 +189,7 @@ fn scene<'a>(
     highlight: Option<Highlight>,
     settings: &'a Settings,
 ) -> Scene<'a> {
-    let knows_lanes = WITH_LANES.contains(&estimator.name());
+    let told = WITH_LANES.contains(&estimator.name());
     let recording = &replay.recording;
     Scene {
         map: estimator.map(),
@@ -200,7 +200,7 @@ fn scene<'a>(
         detections: recording.frames.get(frame).map_or(&[], |f| &f.detections),
         boxes: boxes(replay, estimator.name(), frame),
         road: &[],
-        lanes: if knows_lanes { &settings.estimators.lanes } else { &[] },
+        lanes: if told { settings.estimators.lanes.as_slice().into() } else { estimator.learnt_lanes().into() },
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),
         highlight,

@@ -169,7 +169,7 @@ mod tests {
             detections: &[],
             boxes: Vec::new(),
             road: &[],
-            lanes: &[],
+            lanes: [].as_slice().into(),
             title: "title".into(),
             caption: None,
             highlight: None,

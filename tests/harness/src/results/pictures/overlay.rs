@@ -19,7 +19,7 @@ const SENSOR_PX: f32 = 11.0;
 const FIELD_OF_VIEW: Pen = Pen::new(Colour::hex(0x3C434C), 1.3).dashed(&[7.0, 5.0]);
 const ROAD: Pen = Pen::new(Colour::hex(0xFFFFFF), 1.4);
 const LANE: Pen = Pen::new(Colour::hex(0x6A3D9A), 1.6);
-/// Length of the arrow head at the end of a lane, pixels.
+/// Length of the arrow head at the end of a lane, pixels; of a short one its half.
 const ARROW_PX: f32 = 9.0;
 
 /// A ground-truth box: outline by outcome, a tick from its centre to its front.
@@ -108,7 +108,8 @@ fn arrow(canvas: &mut Canvas, points: &[Pixel]) {
     let [.., from, to] = points else { return };
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length = dx.hypot(dy).max(1e-6);
-    let (c, s) = (dx / length * ARROW_PX, dy / length * ARROW_PX);
+    let head = ARROW_PX.min(length / 2.0);
+    let (c, s) = (dx / length * head, dy / length * head);
     let barb = |right: f32| [to[0] - c - right * s, to[1] - s + right * c];
     canvas.polyline(&[barb(0.5), *to, barb(-0.5)], false, LANE);
 }
@@ -195,6 +196,7 @@ pub mod samples {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::pictures::canvas::Area;
 
     #[test]
     fn a_lane_has_its_arrow_head_where_its_traffic_goes_to() {
@@ -214,8 +216,6 @@ mod tests {
         assert!(dark(along.clone(), [78.8, end[1]]) && !dark(along, [21.2, begin[1]]));
         assert!(dark(back.clone(), [21.2, begin[1]]) && !dark(back, [78.8, end[1]]));
     }
-    use crate::results::pictures::canvas::Area;
-
     fn dark(canvas: &Canvas, columns: std::ops::Range<i32>, row: i32) -> usize {
         columns.filter(|&x| canvas.pixel(x, row).red < 90).count()
     }

@@ -1,5 +1,7 @@
 //! What there is to be drawn of one frame, and the part of the road that is shown.
 
+use std::borrow::Cow;
+
 use viewshed::map::VisibilityMap;
 
 use super::axes::{LEFT_PX, Plot, RIGHT_PX};
@@ -73,8 +75,8 @@ pub struct Scene<'a> {
     pub boxes: Vec<TruthBox>,
     /// Cells whose common border is drawn; may be empty.
     pub road: &'a [Cell],
-    /// Lanes of traffic that the map was made with; may be empty.
-    pub lanes: &'a [Lane],
+    /// Lanes of traffic that the map was made with, given or learnt; may be empty.
+    pub lanes: Cow<'a, [Lane]>,
     /// Recording, estimator, time.
     pub title: String,
     /// What has to be said of the data.
