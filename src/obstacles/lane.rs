@@ -175,7 +175,12 @@ impl Obstacle {
 
     /// Direction of the learnt lane a motion fits best. What stands, or is drawn as long as a lorry, was seen to drive where it
     /// points, and keeps to that within 20 degrees.
-    fn learnt_heading<const N: usize>(&self, motion: &Motion, lanes: &LearntLanes<N>, t: &Tracking) -> Option<Direction> {
+    fn learnt_heading<const N: usize>(
+        &self,
+        motion: &Motion,
+        lanes: &LearntLanes<N>,
+        t: &Tracking,
+    ) -> Option<Direction> {
         let is_settled = self.is_standing(t) || (self.is_mover(t) && self.extent.length_cm() >= SETTLED_CM);
         let heading = lanes.heading(motion, t.lane_vehicles)?;
         (!is_settled || heading.cosine(self.heading) > PARALLEL).then_some(heading)

@@ -52,9 +52,8 @@ impl Grid {
 pub struct Config {
     #[serde(default)]
     pub grid: Grid,
-    /// Whether the unit learns which way traffic goes.
-    #[serde(default)]
-    pub learn_lanes: bool,
+    /// Whether the unit learns which way traffic goes; without it, as a configuration block says.
+    pub learn_lanes: Option<bool>,
     /// Where the epoch and the configuration blocks are kept.
     pub state_dir: Option<PathBuf>,
     pub input: Input,
@@ -382,8 +381,7 @@ impl Config {
     /// Settings with what the file says of the place and no configuration block does.
     pub fn of_place(&self, settings: Settings) -> Settings {
         let Self { lanes, ground, obstacles, evidence, fixtures, .. } = *self;
-        // a block may say so, too
-        let learn_lanes = self.learn_lanes || settings.unit.learn_lanes;
+        let learn_lanes = self.learn_lanes.unwrap_or(settings.unit.learn_lanes);
         let unit = UnitConfig { learn_lanes, ..settings.unit };
         Settings { unit, lanes, ground, obstacles, evidence, fixtures, ..settings }
     }
@@ -581,13 +579,15 @@ mod tests {
     }
 
     #[test]
-    fn lanes_are_learnt_where_the_file_or_a_block_says_so() {
+    fn lanes_are_learnt_where_the_file_says_so_or_a_block_and_the_file_does_not() {
         let mut config = with("").unwrap();
         let plain = config.settings().unwrap();
         assert!(!plain.unit.learn_lanes && !config.of_place(plain).unit.learn_lanes);
         let block = Settings { unit: UnitConfig { learn_lanes: true, ..plain.unit }, ..plain };
         assert!(config.of_place(block).unit.learn_lanes);
-        config.learn_lanes = true;
+        config.learn_lanes = Some(false);
+        assert!(!config.of_place(block).unit.learn_lanes);
+        config.learn_lanes = Some(true);
         let learns = config.settings().unwrap();
         assert_eq!(learns.radar_3d().obstacles.lane_vehicles, 3.0);
         assert_ne!(learns.fingerprint(), plain.fingerprint());

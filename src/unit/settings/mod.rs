@@ -20,7 +20,7 @@
 //!
 //! Blocks of what is known of a place, in slots of their own: `kept`. Layout 1 ends after the buses. It is still read: what it does not say is kept as the unit has it, or is by default.
 //! What maps depend on is in layout 1, so the header's fingerprint is of that form, and where there are any, of lanes,
-//! of tuned parameters, of what is said of fixtures, of where the far road lies and of the road's heights.
+//! of tuned parameters, of what is said of fixtures, of where the far road lies, of whether lanes are learnt and of the road's heights.
 
 mod block;
 mod flash;

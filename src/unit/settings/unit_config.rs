@@ -1,4 +1,4 @@
-//! What an integrator sets of a unit that its maps do not depend on: numbers, rates, delays.
+//! What an integrator sets of a unit beside its sensor and its place: numbers, rates, delays, whether it learns lanes.
 
 use crate::inputs::ars408::configuration::Ars408Configuration;
 use crate::obstacles::learnt_lanes;

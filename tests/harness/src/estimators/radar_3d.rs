@@ -219,7 +219,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let piece = |((x_cm, y_cm), heading): ((i32, i32), Direction)| {
             let middle = [x_cm, y_cm].map(|cm| f64::from(cm) / 100.0);
             let half = [heading.x, heading.y].map(|part| f64::from(part) / 16_384.0 * PIECE_M / 2.0);
-            let ends = [-1.0, 1.0].map(|end| self.place_on_road([middle[0] + end * half[0], middle[1] + end * half[1]]));
+            let ends =
+                [-1.0, 1.0].map(|end| self.place_on_road([middle[0] + end * half[0], middle[1] + end * half[1]]));
             Lane { points: ends.map(|end| end.map(|v| v as f32)).to_vec() }
         };
         pieces.map(piece).collect()

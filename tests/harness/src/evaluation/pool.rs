@@ -85,8 +85,11 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
     let mut frames = Vec::new();
     let mut counted = 0;
     let mut samples = Vec::new();
-    let mut scores: Vec<Score> =
-        first.scores.iter().map(|s| Score { counters: Vec::new(), azimuth_noise_deg: None, ..s.clone() }).collect();
+    let mut scores: Vec<Score> = first
+        .scores
+        .iter()
+        .map(|s| Score { counters: Vec::new(), azimuth_noise_deg: None, learnt_lanes: 0, ..s.clone() })
+        .collect();
     for part in parts {
         let known = tracks.len();
         tracks.extend(part.recording.truth.iter().flat_map(|t| t.tracks.iter().cloned()));

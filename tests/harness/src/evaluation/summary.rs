@@ -39,6 +39,8 @@ pub struct Row {
     pub counters: Vec<(String, u64)>,
     /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
     pub azimuth_noise_deg: Option<f64>,
+    /// Places at which it has learnt a lane.
+    pub learnt_lanes: usize,
     /// Counts of each object unit, and of each block: what is drawn again.
     pub by_unit: Vec<Counts>,
     pub by_block: Vec<CellCounts>,
@@ -142,6 +144,7 @@ impl Summary {
                 unknown: if score.graded { unknown(score) } else { 0 },
                 counters: score.counters.clone(),
                 azimuth_noise_deg: score.azimuth_noise_deg,
+                learnt_lanes: score.learnt_lanes,
                 by_unit: drawn.by_unit.clone(),
                 by_block: drawn.by_block.clone(),
             }

@@ -92,6 +92,9 @@ pub struct Estimator {
     /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
     #[serde(skip_serializing_if = "Option::is_none")]
     azimuth_noise_deg: Option<f64>,
+    /// Places at which it has learnt a lane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    learnt_lanes: Option<usize>,
     /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
     by_unit: Vec<String>,
     /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s.
@@ -227,6 +230,7 @@ pub(super) fn estimator(row: &Row) -> Estimator {
         cell_curve: row.cell_curve.clone(),
         counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
         azimuth_noise_deg: row.azimuth_noise_deg,
+        learnt_lanes: Some(row.learnt_lanes).filter(|places| *places > 0),
         by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
         by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }

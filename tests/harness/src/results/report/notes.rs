@@ -64,6 +64,7 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines.extend(cartesian.map(|r| format!("{} was judged on the {} grid: its map has no other.", r.name, r.grid)));
     lines.extend(summary.comparisons.iter().map(comparison));
     lines.extend(noise_learnt(&summary.rows));
+    lines.extend(lanes_learnt(&summary.rows));
     lines.extend(left_out(recording, &summary.rows));
     if recording.problems.is_empty() {
         lines.push("Problems of the input: none.".into());
@@ -123,6 +124,9 @@ fn in_words(reason: &str) -> Option<&str> {
     })
 }
 
+/// The row of a unit that has run over other recordings, which may have taught it nothing.
+const LEARNING: &str = "radar-3d-learning";
+
 /// How often each reason came.
 type Counters<'a> = &'a [(String, u64)];
 
@@ -169,6 +173,16 @@ fn noise_learnt(rows: &[Row]) -> Option<String> {
     })
 }
 
+/// Where lanes were learnt, of the rows that may.
+fn lanes_learnt(rows: &[Row]) -> Option<String> {
+    let learns = |row: &&Row| row.learnt_lanes > 0 || row.name == LEARNING;
+    let learnt: Vec<String> =
+        rows.iter().filter(learns).map(|row| format!("{} in {}", row.learnt_lanes, row.name)).collect();
+    (!learnt.is_empty()).then(|| {
+        format!("Places with a learnt lane at the end, of 2.6 m where enough vehicles drove: {}.", learnt.join(", "))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +220,17 @@ mod tests {
         let line = "Azimuth's noise of vehicles, degrees, by what fixtures showed until the end: 0.23 in a, 0.20 in c.";
         assert_eq!(noise_learnt(&rows).as_deref(), Some(line));
         assert_eq!(noise_learnt(&rows[1..2]), None);
+    }
+
+    #[test]
+    fn what_was_learnt_of_lanes_is_said_and_that_nothing_was() {
+        let samples = frames([vec![sample(0, 50.0, true, true)]]);
+        let mut scores = ["a", "b", LEARNING].map(|name| score(name, &samples, |_| Some(255)));
+        scores[0].learnt_lanes = 412;
+        let rows = Summary::new(&recording(1, 1), &samples, &scores, &Options::default()).rows;
+        let said = lanes_learnt(&rows).unwrap();
+        assert!(said.ends_with(": 412 in a, 0 in radar-3d-learning."), "{said}");
+        assert_eq!(lanes_learnt(&rows[1..2]), None);
     }
 
     #[test]
