@@ -94,6 +94,9 @@ fn a_unit_that_ran_over_other_recordings_of_its_radar_has_a_row() {
     let [usual, learning] = ["radar-3d", "radar-3d-learning"].map(row);
     assert_eq!(usual["counters"], learning["counters"], "what it ran over before is not counted");
     assert_ne!(usual["cells"], learning["cells"]);
+    // azimuth's noise alone, which is learnt before too, would change cells
+    assert!(learning["learnt_lanes"].as_u64().is_some_and(|places| places > 100), "{}", learning["learnt_lanes"]);
+    assert!(usual["learnt_lanes"].is_null() && stdout(&output).contains("in radar-3d-learning."));
     let said = |arguments: &[&str]| {
         let output = replayed(arguments);
         assert_eq!(output.status.code(), Some(2), "{}", stdout(&output));

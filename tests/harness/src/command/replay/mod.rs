@@ -111,7 +111,7 @@ pub struct Args {
     /// Let a unit run over this recording of the same radar before and learn its lanes: the row radar-3d-learning
     ///
     /// Of other hours than the one that is replayed; may be repeated, oldest first.
-    #[arg(long, value_name = "RECORDING", help_heading = "Estimators")]
+    #[arg(long, value_name = "RECORDING", conflicts_with = "board", help_heading = "Estimators")]
     run_in: Vec<PathBuf>,
     #[command(flatten)]
     risk: risk::RiskArgs,
