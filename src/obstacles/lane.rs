@@ -1,7 +1,7 @@
 //! An obstacle that follows a lane.
 
 use super::lanes::{LEARNT, Motion, NO_LANE};
-use super::learnt_lanes::{LearntLanes, spacing_cm};
+use super::learnt_lanes::{LearntLanes, PARALLEL, spacing_cm};
 use super::motion::FreeMotion;
 use super::obstacle::{FRACTION, NEWBORN_PLACE, NEWBORN_SPEED, Obstacle};
 use super::tracking::{LEAST_PROJECTION, Tracking};
@@ -30,9 +30,7 @@ const TEACHING_SIGMAS: i32 = 10 << 4;
 
 /// Outline from which a vehicle's heading is known by its length, centimetres.
 const SETTLED_CM: i32 = 800;
-/// Least cosine between its heading and that of a lane it may then take, 2^-14: 20 degrees.
-const PARALLEL: i32 = 15_396;
-/// The same between the road's axis and a motion that is measured, where they agree: 8 degrees.
+/// Least cosine between the road's axis and a motion that is measured, where they agree, 2^-14: 8 degrees.
 const AGREES: i32 = 16_225;
 
 impl Obstacle {

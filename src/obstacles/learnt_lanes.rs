@@ -76,7 +76,7 @@ const MEMORY: u8 = 12;
 /// Least cosine of what drives one course, 2^-14: 30 degrees.
 const ONE_COURSE: i32 = 14_189;
 /// Least cosine of what goes the same way, 2^-14: 20 degrees.
-const PARALLEL: i32 = 15_396;
+pub(super) const PARALLEL: i32 = 15_396;
 /// Farthest that places of one lane lie beside each other, centimetres.
 const ONE_LANE_CM: i32 = 120;
 /// A vehicle that drives straight through the nine cells around a place is counted so many times in them.
