@@ -216,6 +216,7 @@ mod tests {
         assert!(dark(along.clone(), [78.8, end[1]]) && !dark(along, [21.2, begin[1]]));
         assert!(dark(back.clone(), [21.2, begin[1]]) && !dark(back, [78.8, end[1]]));
     }
+
     fn dark(canvas: &Canvas, columns: std::ops::Range<i32>, row: i32) -> usize {
         columns.filter(|&x| canvas.pixel(x, row).red < 90).count()
     }
