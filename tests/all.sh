@@ -20,13 +20,14 @@ python=${CARGO_TARGET_DIR:-$PWD/target}/mcap_ros2/bin/python
 [ ! -x "$python" ] || export VIEWSHED_PYTHON=$python
 run tests/detector.sh --install
 export VIEWSHED_DETECTOR=${CARGO_TARGET_DIR:-$PWD/target}/detector
-run cargo test --release --locked --workspace --no-fail-fast
+# the library's own tests run once, below: they take longer to optimise than to run with overflow checks
+run cargo test --release --locked --workspace --exclude viewshed --no-fail-fast
 # made by it: another selection of packages would build the harness again, with other features of what both use
 export VIEWSHED=${CARGO_TARGET_DIR:-$PWD/target}/release/viewshed
 run tests/cantools.sh
 run tests/your_data.sh
-# overflow checks are on in this one
-run cargo test --locked --package viewshed --test properties
+# overflow checks and debug assertions are on in these
+run cargo test --locked --package viewshed --features secoc,serde --no-fail-fast
 run tests/recordings/make.sh --check
 run tests/linux.sh
 run tests/linux_kernel.sh

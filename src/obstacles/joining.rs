@@ -115,6 +115,17 @@ impl Obstacle {
         left.abs() <= t.merge_lateral_cm && self.extent.beyond_cm(along) == 0
     }
 
+    /// Whether another obstacle lies within this one, which has far more detections, so that it is nothing of its own.
+    pub(super) fn takes_away(&self, other: &Self, t: &Tracking) -> bool {
+        self.hits / 2 >= other.hits && self.encloses(other, t) && !self.coasts_over(other, t)
+    }
+
+    /// Whether it moves on without being seen, and has come over a vehicle that is seen to stand: where it is was guessed.
+    fn coasts_over(&self, other: &Self, t: &Tracking) -> bool {
+        let guessed = !self.seen() && !self.is_standing(t);
+        guessed && other.seen() && other.is_standing(t) && other.existence >= t.confirmed
+    }
+
     /// Whether what moves within this one can be itself, which leaves: it stands, and nothing of it is seen
     /// standing any more.
     pub fn may_be_leaving_as(&self, mover: &Self, t: &Tracking) -> bool {
@@ -183,6 +194,7 @@ impl Obstacle {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Obstacles;
     use super::super::by_hand::{rules, seen_at, tall};
     use super::super::obstacle::MOST_WEIGHT;
     use super::super::profile::Extent;
@@ -244,6 +256,34 @@ mod tests {
         let (mut a, mut b) = two(50, 0, 2000);
         (a.tallness, b.tallness) = (low(), low());
         assert!(a.is_one_with(&b, &t), "8.5 m");
+    }
+
+    /// Evidence left of a car that stands within a lorry that drives.
+    fn left_of_a_car_within_a_lorry(change: impl Fn(&mut Obstacle, &mut Obstacle)) -> i32 {
+        let t = rules();
+        let (mut lorry, mut car) = two(-400, 0, 0);
+        (lorry.hits, car.hits) = (500, 100);
+        (lorry.existence, car.existence) = (t.existence_max, t.confirmed);
+        (lorry.travelled_cm, car.travelled_cm) = (5000, 1000);
+        car.gathered.count = 4;
+        change(&mut lorry, &mut car);
+        let mut all = Obstacles::<2>::new();
+        [lorry, car].into_iter().for_each(|o| all.list.push(o).unwrap());
+        all.join_parts(&t);
+        all.iter().nth(1).unwrap().existence
+    }
+
+    #[test]
+    fn a_lorry_that_is_not_seen_and_only_seems_to_have_come_so_far_takes_no_standing_car_away() {
+        let t = rules();
+        assert_eq!(left_of_a_car_within_a_lorry(|_, _| ()), t.confirmed);
+        let gone = |change: fn(&mut Obstacle, &mut Obstacle)| left_of_a_car_within_a_lorry(change) == 0;
+        assert!(gone(|lorry, _| lorry.gathered.count = 4), "it is seen there, and nothing else can be");
+        assert!(gone(|_, car| car.gathered.count = 0), "nothing says that the car is still there");
+        assert!(gone(|_, car| car.existence -= 1), "perhaps nothing");
+        assert!(gone(|_, car| car.travelled_cm = 0), "a fixture it passes");
+        assert!(gone(|_, car| car.velocity.0 = 500 << FRACTION), "a part of it that is seen again");
+        assert!(gone(|lorry, _| lorry.velocity.0 = 0), "it stands itself, and this is a part of it");
     }
 
     /// Two ends of cars that creep at 2 m/s, as long as given and so far apart between their outer ends, the second

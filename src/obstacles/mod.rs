@@ -404,8 +404,8 @@ impl<const N: usize> Obstacles<N> {
     }
 
     /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
-    /// which is left without evidence and so dropped. So is what lies within a vehicle, unless that stands and
-    /// is not seen: then it is that vehicle itself, which leaves.
+    /// which is left without evidence and so dropped. So is what lies within a vehicle, unless one of them stands and the other
+    /// is not seen: then it is that vehicle itself, which leaves, or another that one only seems to have reached.
     fn join_parts(&mut self, t: &Tracking) {
         let mut rest = self.list.as_mut_slice();
         while let Some((a, others)) = rest.split_first_mut() {
@@ -425,7 +425,7 @@ impl<const N: usize> Obstacles<N> {
                         younger.inherit(elder);
                         elder.existence = 0;
                     }
-                } else if elder.hits / 2 >= younger.hits && elder.encloses(younger, t) {
+                } else if elder.takes_away(younger, t) {
                     younger.existence = 0;
                 }
             }

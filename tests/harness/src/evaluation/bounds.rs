@@ -39,6 +39,6 @@ fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool)
         cells: Vec::new(),
         counters: Vec::new(),
         azimuth_noise_deg: None,
-        learnt_lanes: 0,
+        learnt_lanes: None,
     }
 }

@@ -32,8 +32,8 @@ pub struct Score {
     pub counters: Vec<(String, u64)>,
     /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
     pub azimuth_noise_deg: Option<f64>,
-    /// Places at which it has learnt a lane until the end.
-    pub learnt_lanes: usize,
+    /// Places at which it has learnt a lane until the end; `None` of several recordings together.
+    pub learnt_lanes: Option<usize>,
 }
 
 impl Score {
@@ -90,7 +90,7 @@ pub fn score(
         cells,
         counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
         azimuth_noise_deg: estimator.azimuth_noise_deg(),
-        learnt_lanes: estimator.learnt_lanes().len(),
+        learnt_lanes: Some(estimator.learnt_lanes().len()),
     }
 }
 
@@ -198,7 +198,7 @@ pub mod by_hand {
             cells: vec![CellTally::default(); samples.len()],
             counters: Vec::new(),
             azimuth_noise_deg: None,
-            learnt_lanes: 0,
+            learnt_lanes: None,
         }
     }
 }

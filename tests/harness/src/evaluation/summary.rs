@@ -39,8 +39,8 @@ pub struct Row {
     pub counters: Vec<(String, u64)>,
     /// Azimuth's noise that the estimator worked with at the end, degrees, where it learns that.
     pub azimuth_noise_deg: Option<f64>,
-    /// Places at which it has learnt a lane.
-    pub learnt_lanes: usize,
+    /// Places at which it has learnt a lane; `None` of several recordings together.
+    pub learnt_lanes: Option<usize>,
     /// Counts of each object unit, and of each block: what is drawn again.
     pub by_unit: Vec<Counts>,
     pub by_block: Vec<CellCounts>,

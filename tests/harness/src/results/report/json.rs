@@ -230,7 +230,7 @@ pub(super) fn estimator(row: &Row) -> Estimator {
         cell_curve: row.cell_curve.clone(),
         counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
         azimuth_noise_deg: row.azimuth_noise_deg,
-        learnt_lanes: Some(row.learnt_lanes).filter(|places| *places > 0),
+        learnt_lanes: row.learnt_lanes.filter(|places| *places > 0),
         by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
         by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }

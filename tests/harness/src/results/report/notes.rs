@@ -175,9 +175,12 @@ fn noise_learnt(rows: &[Row]) -> Option<String> {
 
 /// Where lanes were learnt, of the rows that may.
 fn lanes_learnt(rows: &[Row]) -> Option<String> {
-    let learns = |row: &&Row| row.learnt_lanes > 0 || row.name == LEARNING;
-    let learnt: Vec<String> =
-        rows.iter().filter(learns).map(|row| format!("{} in {}", row.learnt_lanes, row.name)).collect();
+    let learnt: Vec<String> = rows
+        .iter()
+        .filter_map(|row| Some((&row.name, row.learnt_lanes?)))
+        .filter(|(name, places)| *places > 0 || *name == LEARNING)
+        .map(|(name, places)| format!("{places} in {name}"))
+        .collect();
     (!learnt.is_empty()).then(|| {
         format!("Places with a learnt lane at the end, of 2.6 m where enough vehicles drove: {}.", learnt.join(", "))
     })
@@ -226,11 +229,14 @@ mod tests {
     fn what_was_learnt_of_lanes_is_said_and_that_nothing_was() {
         let samples = frames([vec![sample(0, 50.0, true, true)]]);
         let mut scores = ["a", "b", LEARNING].map(|name| score(name, &samples, |_| Some(255)));
-        scores[0].learnt_lanes = 412;
+        (scores[0].learnt_lanes, scores[2].learnt_lanes) = (Some(412), Some(0));
         let rows = Summary::new(&recording(1, 1), &samples, &scores, &Options::default()).rows;
         let said = lanes_learnt(&rows).unwrap();
         assert!(said.ends_with(": 412 in a, 0 in radar-3d-learning."), "{said}");
         assert_eq!(lanes_learnt(&rows[1..2]), None);
+        scores[2].learnt_lanes = None;
+        let pooled = Summary::new(&recording(1, 1), &samples, &scores, &Options::default()).rows;
+        assert_eq!(lanes_learnt(&pooled[1..]), None, "what is pooled has no number");
     }
 
     #[test]

@@ -125,7 +125,7 @@ impl Obstacles {
     }
 
     /// Joins parts of one vehicle: the one with more detections takes the other, which is dropped. So is
-    /// what lies within a vehicle.
+    /// what lies within a vehicle, unless that moves unseen over one that is seen to stand.
     fn join_parts(&mut self, rules: &Rules) {
         for i in 0..self.list.len() {
             for j in i + 1..self.list.len() {
@@ -146,6 +146,8 @@ impl Obstacles {
                     }
                     continue;
                 } else if (elder.hits / 2.0).floor() < other.hits || !elder.encloses(&other, rules) {
+                    continue;
+                } else if elder.coasts_over(&other, rules) {
                     continue;
                 }
                 self.list[younger].existence = 0.0;

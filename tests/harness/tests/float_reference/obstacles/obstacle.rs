@@ -357,6 +357,12 @@ impl Obstacle {
         left.abs() <= rules.merge_lateral && self.extent.beyond(ahead) <= 0.0
     }
 
+    /// Whether it moves on without being seen, and has come over a vehicle that is seen to stand.
+    pub fn coasts_over(&self, other: &Self, rules: &Rules) -> bool {
+        let guessed = !self.seen() && !self.is_standing(rules);
+        guessed && other.seen() && other.is_standing(rules) && other.existence >= rules.confirm_hits
+    }
+
     /// Whether what moves within this one can be itself, which leaves.
     pub fn may_be_leaving_as(&self, mover: &Self, rules: &Rules) -> bool {
         self.is_standing(rules)
