@@ -120,7 +120,7 @@ impl Obstacle {
         self.hits / 2 >= other.hits && self.encloses(other, t) && !self.coasts_over(other, t)
     }
 
-    /// Whether it moves on without being seen, and has come over a vehicle that is seen to stand: where it is was guessed.
+    /// Whether it moves on without being seen, so that its place is guessed, and the other is seen to stand.
     fn coasts_over(&self, other: &Self, t: &Tracking) -> bool {
         let guessed = !self.seen() && !self.is_standing(t);
         guessed && other.seen() && other.is_standing(t) && other.existence >= t.confirmed

@@ -145,9 +145,7 @@ impl Obstacles {
                         self.list[younger].existence = 0.0;
                     }
                     continue;
-                } else if (elder.hits / 2.0).floor() < other.hits || !elder.encloses(&other, rules) {
-                    continue;
-                } else if elder.coasts_over(&other, rules) {
+                } else if !elder.takes_away(&other, rules) {
                     continue;
                 }
                 self.list[younger].existence = 0.0;

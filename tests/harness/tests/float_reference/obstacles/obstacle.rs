@@ -357,8 +357,13 @@ impl Obstacle {
         left.abs() <= rules.merge_lateral && self.extent.beyond(ahead) <= 0.0
     }
 
-    /// Whether it moves on without being seen, and has come over a vehicle that is seen to stand.
-    pub fn coasts_over(&self, other: &Self, rules: &Rules) -> bool {
+    /// Whether another obstacle lies within this one and is nothing of its own.
+    pub fn takes_away(&self, other: &Self, rules: &Rules) -> bool {
+        (self.hits / 2.0).floor() >= other.hits && self.encloses(other, rules) && !self.coasts_over(other, rules)
+    }
+
+    /// Whether it moves on without being seen, and the other is seen to stand.
+    fn coasts_over(&self, other: &Self, rules: &Rules) -> bool {
         let guessed = !self.seen() && !self.is_standing(rules);
         guessed && other.seen() && other.is_standing(rules) && other.existence >= rules.confirm_hits
     }
