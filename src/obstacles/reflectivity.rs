@@ -44,8 +44,9 @@
 //! None is kept. A mast beside which a vehicle stopped keeps that vehicle's box after it left, as long as one of a van: its
 //! boxes are 0.7 points of FIR. But lorries of which a gap shows no more are as short and as high, one for every six masts, and
 //! what these rules take from one rate they give the other. The first looked best on what it was found on and is why
-//! the reported crossings are looked at last: near the radar at one of them such a mast, 2 m wide with what is unsure of its own
-//! way, hides 7 more of 100 clear cells. The fastest that something has gone tells riders from cars well (of
+//! the reported crossings are looked at last: at one of them two masts 36 and 49 m away, 2 m wide with what is unsure of their own
+//! way, hide 7 more of 100 clear cells. As wide and high as they are, masts hide hardly anything; where more is called
+//! visible then, a box of a van had hidden by chance what others hide. The fastest that something has gone tells riders from cars well (of
 //! what is short, below 1 dBsm and has been faster than 8 m/s, 71 in 100 are vehicles; of the slower 15 in 100), and is worth 0.3 points where lanes are learnt.
 //!
 //! Small boxes for what reflects weakly in one frame were worth nothing: of cars in a queue most is hidden, and they do too.
