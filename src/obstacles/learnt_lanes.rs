@@ -61,8 +61,8 @@
 //! | what stands; what goes across the road | 12.4 / 9.5; 13.0 / 10.2 |
 //! | every box of something that is there | 8.8 / 1.7 |
 //!
-//! So no single one is wrong: boxes are a little too wide and long all over, which is what uncertainty costs. Masts, and
-//! pedestrians that are drawn as cars, are the greatest part with a cause of their own ([what was tried](super::reflectivity)).
+//! So most clear cells called invisible lie beside boxes that are a little too wide and too long, all over: they are drawn as
+//! large as they may be. Masts, and pedestrians drawn as cars, have a cause of their own ([what was tried](super::reflectivity)).
 
 use core::num::NonZeroU16;
 

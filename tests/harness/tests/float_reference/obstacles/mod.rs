@@ -138,17 +138,16 @@ impl Obstacles {
                 let elder = &mut self.list[elder];
                 if elder.is_one_with(&other, rules) {
                     elder.join(&other, rules);
+                    self.list[younger].existence = 0.0;
                 } else if elder.may_be_leaving_as(&other, rules) {
                     if other.existence >= rules.confirm_hits {
                         let before = std::mem::replace(elder, other);
                         elder.inherit(&before);
                         self.list[younger].existence = 0.0;
                     }
-                    continue;
-                } else if !elder.takes_away(&other, rules) {
-                    continue;
+                } else if elder.takes_away(&other, rules) {
+                    self.list[younger].existence = 0.0;
                 }
-                self.list[younger].existence = 0.0;
             }
         }
     }
