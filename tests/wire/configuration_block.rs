@@ -111,8 +111,8 @@ fn where_the_far_road_lies_is_in_two_bytes_and_has_the_limits_of_the_field_of_vi
     let outside = check(&read([1, 51]).unwrap()).unwrap_err();
     assert_eq!(outside.parameter, "visibility.far_road_deg");
     assert_eq!(outside.problem, Problem::OutOfLimits { min: -60.0, max: 50.0 });
-    let Err(BlockError::Parameter(neither)) = read([4, 0]) else { panic!("neither said nor not") };
-    assert_eq!(neither.parameter, "visibility.far_road_deg");
+    let Err(BlockError::Parameter(neither)) = read([4, 0]) else { panic!("a flag that nothing knows") };
+    assert_eq!((neither.parameter, neither.value), ("unit.flags", 4.0));
     // and the fingerprint goes on with it, as on the page
     let mut with = [0; 12];
     with[..4].copy_from_slice(&settings().fingerprint().to_le_bytes());

@@ -286,7 +286,7 @@ fn unit(r: &mut Reader) -> Option<Result<(UnitConfig, Option<i8>), ConfigError>>
         return Some(refused("unit.supervise", supervise, 1.0));
     }
     if said > 3 {
-        return Some(refused("visibility.far_road_deg", said, 3.0));
+        return Some(refused("unit.flags", said, 3.0));
     }
     let (supervise, learn_lanes) = (supervise == 1, said & 2 != 0);
     let far_road_deg = (said & 1 != 0).then_some(towards.cast_signed());
