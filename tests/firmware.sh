@@ -1,7 +1,7 @@
 #!/bin/sh
 # Builds the boards' firmware and runs it on emulated controllers.
 #
-#   tests/firmware.sh
+#   tests/firmware.sh              with --install what it needs is only made ready
 #
 # Installs what it needs where it may (root on Debian or Ubuntu), and says in one line what it skipped
 # and why. The last line is `firmware: N passed, M skipped`; the exit code is 0 unless something failed.
@@ -39,6 +39,12 @@ cargo_tests() {
     fi
     rm -f "$log"
 }
+
+if [ "${1:-}" = --install ]; then
+    command -v qemu-system-arm >/dev/null || install qemu-system-arm
+    for target in thumbv7em-none-eabihf armv7r-none-eabihf; do compiler "$target"; done
+    exit 0
+fi
 
 command -v qemu-system-arm >/dev/null || install qemu-system-arm
 if ! command -v qemu-system-arm >/dev/null; then

@@ -2,13 +2,14 @@
 # Runs the daemon, and `viewshed listen`, `view` and `doctor`, on virtual CAN buses under Debian's kernel in QEMU: for
 # machines whose own kernel has no CAN. Downloads 80 MB, once, into the target folder; takes about a minute then.
 #
-#   tests/linux_kernel.sh
+#   tests/linux_kernel.sh              with --install what it needs is only made ready
 set -eu
 
 cd "$(dirname "$0")/.."
 . tests/tools.sh
+only=${1:-}
 skip() {
-    echo "skipped: virtual CAN buses under QEMU: $1"
+    [ "$only" = --install ] || echo "skipped: virtual CAN buses under QEMU: $1"
     exit 0
 }
 
@@ -28,6 +29,7 @@ if [ ! -e "$kernel/done" ]; then
     (cd "$kernel" && apt-get download "$package" >/dev/null 2>&1 && dpkg -x ./*.deb files) || skip "cannot download $package"
     touch "$kernel/done"
 fi
+[ "$only" != --install ] || exit 0
 
 # the test's program, and what the kernel is to run
 cargo build --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target"

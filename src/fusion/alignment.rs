@@ -116,7 +116,7 @@ impl<const S: usize> Alignment<S> {
     }
 
     /// Two sensors follow what may be one vehicle, the first at `own`, the other at `theirs`. Whether it counted. Radars tell
-    /// [where it is seen](crate::obstacles::Obstacles::where_seen), not where its middle is inferred to be.
+    /// where it is seen (`Obstacles::where_seen`), not where its middle is inferred to be.
     pub fn observe(&mut self, first: usize, own: RoadPoint, other: usize, theirs: RoadPoint) -> bool {
         let apart = |a: i32, b: i32| a.saturating_sub(b).clamp(-SAME_CM - 1, SAME_CM + 1);
         if first == other || math::length(apart(own.x_cm, theirs.x_cm), apart(own.y_cm, theirs.y_cm)) > SAME_CM {

@@ -22,7 +22,7 @@
 //!
 //! # Limits
 //! `N` fixtures, the most often seen; 1.6 kB with 64 of them and six sectors. A mount that is wrong from the first day
-//! is learned as it is: other sensors tell ([`Alignment`](super::Alignment)). Learning should see some minutes of a
+//! is learned as it is: other sensors tell ([`Alignment`](crate::fusion::alignment::Alignment)). Learning should see some minutes of a
 //! sensor in order.
 
 use crate::fixed::angle::Angle;

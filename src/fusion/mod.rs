@@ -20,7 +20,7 @@
 //! makes a difference. Mount and kind are those of its first map until it is [forgotten](Fusion::forget), which is also
 //! due when it starts over: a map does not say so.
 //!
-//! [`fill`] puts it into the cells of a [`polar`] map around a place of one's choice, which a
+//! [`fill`] puts it into the cells of a polar map around a place of one's choice, which a
 //! [`Broadcaster`](crate::wire::broadcast::Broadcaster) sends.
 //!
 //! # Limits

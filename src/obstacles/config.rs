@@ -106,13 +106,13 @@ pub struct ObstacleConfig {
     pub standing_visible_loss_per_s: f32,
     /// Loss of evidence of what stands in a shadow, detections per second: as long as a red light lasts.
     pub standing_hidden_loss_per_s: f32,
-    /// [Radar cross section](super::reflectivity) below which what is short is a pedestrian or rider, dBsm.
+    /// Radar cross section (`reflectivity.rs`) below which what is short is a pedestrian or rider, dBsm.
     pub weak_rcs_dbsm: f32,
     /// Radar cross section below which nothing of any length is a lorry that shows nothing high, dBsm.
     pub low_rcs_dbsm: f32,
     /// Radar cross section half way between a car's and a lorry's, dBsm.
     pub lorry_rcs_dbsm: f32,
-    /// Vehicles that must have driven on a place before the way they went is [learnt](super::learnt_lanes) as
+    /// Vehicles that must have driven on a place before the way they went is learnt (`learnt_lanes.rs`) as
     /// a lane; 0: none is learnt.
     pub lane_vehicles: f32,
     /// Widths and heights by length.

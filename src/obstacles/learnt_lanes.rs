@@ -41,7 +41,7 @@
 //! | own way where a lane across the road ends | 13.5 / 11.4 | -0.8 / +8.7 | 19.2 / 7.3 | 11.8 / 15.4 |
 //! | what stands on a learnt lane is not questioned; lanes along the road for what knows its own way | 13.4 / 10.9 | -0.6 / +8.4 | 18.2 / 7.1 | 12.2 / 14.5 |
 //! | as often in the mean, whatever way it makes in a frame: kept | 13.6 / 11.4 | -0.6 / +8.7 | 17.8 / 7.9 | 12.2 / 14.5 |
-//! | [what coasts](super::joining) takes no box away that is seen to stand: kept | 13.5 / 11.4 | -0.8 / +8.7 | 17.8 / 7.9 | 12.2 / 14.5 |
+//! | what coasts (`joining.rs`) takes no box away that is seen to stand: kept | 13.5 / 11.4 | -0.8 / +8.7 | 17.8 / 7.9 | 12.2 / 14.5 |
 //! | the last but one after 90 s of one other day; within the recording alone | 13.4 / 11.2; 15.3 / 11.7 | -1.0 / +8.6; +2.9 / +8.5 | | |
 //!
 //! On the fourteenth crossing a bus and a lorry that stand side by side 12 m from the radar are the greater part of what is

@@ -19,7 +19,7 @@
 //! | rule | crossings | queues | motorway | kept |
 //! |---|---|---|---|---|
 //! | along the road only, a standing box is forgotten | 37.5 / 23.0 | 24.3 / 10.1 | 19.9 / 17.8 | |
-//! | [motion](motion) without a heading beside it, gaps of 1.6 m in a queue | 29.1 / 17.8 | 22.7 / 11.8 | 19.7 / 18.7 | yes |
+//! | [motion] without a heading beside it, gaps of 1.6 m in a queue | 29.1 / 17.8 | 22.7 / 11.8 | 19.7 / 18.7 | yes |
 //! | what stands and what moves is not joined, outline less azimuth's noise | 31.0 / 13.8 | 23.6 / 11.4 | 20.1 / 18.0 | yes |
 //! | outline and place across remembered by way, not by time | 31-32 / 15-21 | 25-29 / 10 | same | no |
 //! | box behind the side that is seen | 32.4 / 13.8 | 21.9 / 10.9 | 20.6 / 15.6 | yes |
@@ -88,7 +88,7 @@
 //! | faster than 35 m/s | 18.8 / 14.7 | +5.4 / +9.6 | same | same | no: 2 points more on another generator's crossing |
 //! | confirmed by 2.25 detections, not 3, and 0.7 m wider across the road, not 0.6 | 17.9 / 15.2 | +5.2 / +9.9 | 18.5 / 9.5 | +0.2 FIR | yes |
 //! | own way from 2.6 standard deviations; heading from 3.5 | 19.3 / 15.6, 19.2 / 14.4 | +7.6 / +10.2, +7.4 / +9.3 | same | same | no |
-//! | [lanes](lanes): heading only, no margin | 19.1 / 14.3 | +3.4 / +10.6 | none given | | |
+//! | [lanes]: heading only, no margin | 19.1 / 14.3 | +3.4 / +10.6 | none given | | |
 //! | and 0.6 of the way to the middle of the lane | 18.0 / 14.1 | +3.7 / +10.7 | | | yes |
 //! | and a quarter of the margin to either side | 16.3 / 15.0 | +1.7 / +11.6 | | | yes |
 //! | and turned about the middle, not the anchor | 15.7 / 14.9 | +1.6 / +11.4 | | | yes |
@@ -100,7 +100,7 @@
 //! | rule | crossings | queues | other crossing's objects | other queue's objects | kept |
 //! |---|---|---|---|---|---|
 //! | the rules kept above | 19.1 / 15.4 | 19.7 / 9.0 | +11.0 / +13.9 | -10.2 / +33.9 | |
-//! | [what begins behind a face](joining) by less than a car and a gap is its other end | 19.0 / 15.5 | 19.7 / 9.0 | +10.0 / +8.1 | -10.6 / +33.0 | yes |
+//! | what begins behind a face (`joining.rs`) by less than a car and a gap is its other end | 19.0 / 15.5 | 19.7 / 9.0 | +10.0 / +8.1 | -10.6 / +33.0 | yes |
 //! | and two ends as far apart as a car's are one car's | 19.0 / 15.4 | 19.6 / 9.0 | +12.0 / +8.0 | -10.0 / +28.2 | yes |
 //! | ends before they are confirmed, too | 19.0 / 15.5 | 19.5 / 9.3 | +12.0 / +8.0 | -9.4 / +34.3 | no |
 //!
@@ -128,8 +128,8 @@
 //! | the height of every box; its place, heading and length | 12.5 / 17.8; 13.6 / 11.4 |
 //! | every box; every vehicle without one | 8.1 / 1.9; 12.2 / 17.0 |
 //!
-//! In the creeping queue of another generator boxes from 60 to 150 m ahead lay 0.5 to 0.8 m too near to the sensor's side, [their
-//! ends hidden](hidden_end). Cells, and objects from slice, there and in the eight training queues of `tests/recordings/tuning.toml`:
+//! In the creeping queue of another generator boxes from 60 to 150 m ahead lay 0.5 to 0.8 m too near to the sensor's side, their
+//! ends hidden (`hidden_end.rs`). Cells, and objects from slice, there and in the eight training queues of `tests/recordings/tuning.toml`:
 //!
 //! | rule | training | objects | other queue | objects | kept |
 //! |---|---|---|---|---|---|
@@ -139,7 +139,7 @@
 //! | everywhere: motorways' cells 15.8 / 8.8, not 15.5 / 8.9 | 19.9 / 10.3 | +13.6 / +4.5 | 12.4 / 8.2 | +1.4 / +13.8 | no |
 //! | what is lower than 3 m only | 20.4 / 9.8 | +13.3 / +5.6 | 12.5 / 8.6 | +0.8 / +15.5 | no |
 //!
-//! What [farther ends](room) without a box of their own gave there stands with them, and what
+//! What farther ends (`room.rs`) without a box of their own gave there stands with them, and what
 //! [radar cross sections](reflectivity) gave everywhere, last of all, with theirs.
 
 mod body;

@@ -80,6 +80,8 @@ fn cargo(arguments: &[&str]) -> String {
     let (command, rest) = arguments.split_first().unwrap();
     let output = Command::new(env!("CARGO"))
         .current_dir(env!("CARGO_MANIFEST_DIR"))
+        // a link in the documentation that leads nowhere
+        .env("RUSTDOCFLAGS", "-D rustdoc::broken_intra_doc_links -D rustdoc::private_intra_doc_links")
         .args([command, "--quiet", "--offline", "--locked"])
         .args(rest)
         .arg("--target-dir")

@@ -17,7 +17,7 @@
 //! |---|---|
 //! | heights | number of points (2 bytes), 0 (2 bytes), points as [`place`](crate::sensor::place) has them |
 //! | lanes | number of lanes (2 bytes), bytes of their points (2 bytes), points as there |
-//! | probabilities | ranges and azimuths of the grid it was fitted on (1 byte each); what is visible: 0 what has the map's least grade, 1 what has at least the next byte's probability, 2 nothing (1 byte); that probability in 1/255 (1 byte); the table as [`probability`](crate::probability) has it |
+//! | probabilities | ranges and azimuths of the grid it was fitted on (1 byte each); what is visible: 0 what has the map's least grade, 1 what has at least the next byte's probability, 2 nothing (1 byte); that probability in 1/255 (1 byte); the table as [`crate::probability`] has it |
 
 use super::BlockError;
 #[cfg(feature = "probability")]

@@ -56,7 +56,7 @@ pub struct UnitConfig {
     pub configure_radar: ConfigureRadar,
     /// Whether what usually stands in the view tells that the radar is in order; by firmware with the feature `monitoring`.
     pub supervise: bool,
-    /// Whether the unit [learns](crate::obstacles::learnt_lanes) which way traffic goes; by firmware with the feature `learning`.
+    /// Whether the unit learns (`src/obstacles/learnt_lanes.rs`) which way traffic goes; by firmware with the feature `learning`.
     pub learn_lanes: bool,
 }
 

@@ -1,6 +1,7 @@
 //! The `viewshed` command on small recordings made here: results, files, and input that is bad.
 
 mod bad_input;
+mod bag;
 mod calibration;
 mod camera;
 mod can_log;

@@ -8,11 +8,9 @@ use std::process::{Command, Output, Stdio};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use viewshed_harness::recording::can_log::candump;
-use viewshed_harness::recording::ros::{
-    Header, PointCloud2, PointField, Quaternion, Stamp, TfMessage, Transform, TransformStamped, Vector3, encode,
-};
 use viewshed_harness::recording::{ReadOptions, Recording, read};
 
+use crate::bag::Bag;
 use crate::scene::{FRAMES, PERIOD_NS, Scene, folder, json, replay, stderr, stdout};
 
 const LOG: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/ars408-made-up.log");
@@ -123,97 +121,6 @@ fn an_interface_is_chosen_by_name() {
     assert!((1..28).contains(&frames(Some("can1")).unwrap()));
     let error = frames(Some("can7")).unwrap_err().to_string();
     assert!(error.contains("no frame on interface can7; interfaces found: can0, can1"), "{error}");
-}
-
-/// A bag of somebody's driver: clouds with these fields of each detection, in a frame of its own.
-#[derive(Clone)]
-struct Bag {
-    topics: Vec<&'static str>,
-    fields: Vec<&'static str>,
-    encoding: &'static str,
-    schema: &'static str,
-    road: &'static str,
-    velocity_sign: f32,
-}
-
-impl Default for Bag {
-    fn default() -> Self {
-        Self {
-            topics: vec!["/sensing/front/cloud"],
-            fields: vec!["x", "y", "z", "doppler"],
-            encoding: "cdr",
-            schema: "sensor_msgs/msg/PointCloud2",
-            road: "road",
-            velocity_sign: 1.0,
-        }
-    }
-}
-
-impl Bag {
-    fn bytes(&self) -> Vec<u8> {
-        let mut bytes = Cursor::new(Vec::new());
-        let mut writer = mcap::Writer::new(&mut bytes).unwrap();
-        self.write(&mut writer);
-        writer.finish().unwrap();
-        drop(writer);
-        bytes.into_inner()
-    }
-
-    fn write(&self, writer: &mut mcap::Writer<&mut Cursor<Vec<u8>>>) {
-        let scene = Scene::default();
-        let mut channel = |topic: &str, schema: &str| {
-            let schema = writer.add_schema(schema, "ros2msg", b"").unwrap();
-            writer.add_channel(schema, topic, self.encoding, &BTreeMap::new()).unwrap()
-        };
-        let mut sent: Vec<(u16, i64, Vec<u8>)> = Vec::new();
-        let p = &scene.pose;
-        let half = p.pitch_rad() / 2.0;
-        let mount = Transform {
-            translation: Vector3 { x: p.position[0], y: p.position[1], z: p.position[2] },
-            rotation: Quaternion { x: 0.0, y: half.sin(), z: 0.0, w: half.cos() },
-        };
-        let header = |frame: &str| Header { frame_id: frame.into(), ..Header::default() };
-        let tf = TransformStamped { header: header(self.road), child_frame_id: "front".into(), transform: mount };
-        let tf = encode(&TfMessage { transforms: vec![tf] }).unwrap();
-        sent.push((channel("/tf_static", "tf2_msgs/msg/TFMessage"), scene.steps[0].0.time_ns, tf));
-        for topic in &self.topics {
-            let channel_id = channel(topic, self.schema);
-            for (frame, _) in &scene.steps {
-                let values = frame.detections.iter().flat_map(|d| {
-                    let (r, a, e) = (d.range_m, d.azimuth_rad, d.elevation_rad.unwrap());
-                    self.fields.iter().map(move |field| match *field {
-                        "x" => r * e.cos() * a.cos(),
-                        "y" => r * e.cos() * a.sin(),
-                        "z" => r * e.sin(),
-                        "range" => r,
-                        "azimuth" => a,
-                        "elevation" => e,
-                        _ => self.velocity_sign * d.radial_velocity_mps,
-                    })
-                });
-                let step = 4 * self.fields.len() as u32;
-                let width = frame.detections.len() as u32;
-                let field =
-                    |(k, name): (u32, &&str)| PointField { name: (*name).into(), offset: 4 * k, datatype: 7, count: 1 };
-                let cloud = PointCloud2 {
-                    header: Header { stamp: Stamp::from_nanoseconds(frame.time_ns), frame_id: "front".into() },
-                    height: 1,
-                    width,
-                    fields: (0..).zip(&self.fields).map(field).collect(),
-                    is_bigendian: false,
-                    point_step: step,
-                    row_step: step * width,
-                    data: values.flat_map(f32::to_le_bytes).collect(),
-                    is_dense: true,
-                };
-                sent.push((channel_id, frame.time_ns, encode(&cloud).unwrap()));
-            }
-        }
-        for (channel_id, at, data) in sent {
-            let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: at as u64, publish_time: 0 };
-            writer.write_to_known_channel(&header, &data).unwrap();
-        }
-    }
 }
 
 /// With a field of view, which no foreign bag has.
