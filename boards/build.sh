@@ -12,6 +12,8 @@ program=$2
 shift 2
 cd "$here/$board"
 target=$(sed -n 's/^target = "\(.*\)"/\1/p' .cargo/config.toml)
+# an image is built as the board's Cargo.toml says, whatever the environment says of other programs
+for setting in $(env | sed -n 's/^\(CARGO_PROFILE_RELEASE_[A-Z_]*\)=.*/\1/p'); do unset "$setting"; done
 settings=$("$here/toolchain.sh" "$target")
 eval "$settings"
 # features share a file name, so each set has a folder

@@ -21,7 +21,7 @@ fetch() {
     for needs in mcap_ros2 detector cantools linux_kernel firmware; do tests/$needs.sh --install || true; done
 }
 fetch >"$fetched" 2>&1 &
-# without optimising across parts of a crate, a quarter less to build; the tests take a tenth longer
+# without optimising across parts of a crate, a quarter less to build; the tests take a tenth longer; images of boards do not heed it
 export CARGO_PROFILE_RELEASE_LTO=off
 # the library's own tests run once, below: they take longer to optimise than to run with overflow checks
 run cargo test --release --locked --workspace --exclude viewshed --no-run
