@@ -18,14 +18,17 @@ run() {
 # what has to be fetched is, while the harness is built
 fetch() {
     need_browser
-    for needs in mcap_ros2 detector cantools linux_kernel firmware; do tests/$needs.sh --install || true; done
+    local failed=0
+    for needs in mcap_ros2 detector cantools linux_kernel firmware; do tests/$needs.sh --install || failed=1; done
+    return $failed
 }
 fetch >"$fetched" 2>&1 &
+fetching=$!
 # without optimising across parts of a crate, a quarter less to build; the tests take a tenth longer; images of boards do not heed it
 export CARGO_PROFILE_RELEASE_LTO=off
 # the library's own tests run once, below: they take longer to optimise than to run with overflow checks
 run cargo test --release --locked --workspace --exclude viewshed --no-run
-wait
+wait $fetching || status=1
 tee -a "$log" <"$fetched"
 python=${CARGO_TARGET_DIR:-$PWD/target}/mcap_ros2/bin/python
 [ ! -x "$python" ] || export VIEWSHED_PYTHON=$python

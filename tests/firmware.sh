@@ -40,13 +40,12 @@ cargo_tests() {
     rm -f "$log"
 }
 
+command -v qemu-system-arm >/dev/null || install qemu-system-arm
 if [ "${1:-}" = --install ]; then
-    command -v qemu-system-arm >/dev/null || install qemu-system-arm
     for target in thumbv7em-none-eabihf armv7r-none-eabihf; do compiler "$target"; done
     exit 0
 fi
 
-command -v qemu-system-arm >/dev/null || install qemu-system-arm
 if ! command -v qemu-system-arm >/dev/null; then
     skip "emulated boards" "no qemu-system-arm (apt-get install qemu-system-arm)"
 elif ! compiler thumbv7em-none-eabihf; then
