@@ -82,6 +82,30 @@ impl Step {
     }
 }
 
+/// How far into a second a row of steps has come: what goes on at a rate is counted from it, so that the parts of steps
+/// add up. Rounded down step by step, a slow rate would come to nothing where steps are short.
+///
+/// # Units
+/// 1 LSB = 2^-16 s, up to one second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Phase(i32);
+
+impl Phase {
+    /// At the start of a second.
+    pub const START: Self = Self(0);
+
+    /// What a rate, a whole number a second, comes to over the next step.
+    pub const fn times(self, step: Step, per_second: i32) -> i32 {
+        let until = self.0.saturating_add(step.0);
+        crate::fixed::math::mul_shift(per_second, until, 16) - crate::fixed::math::mul_shift(per_second, self.0, 16)
+    }
+
+    /// After a step. A second more or less makes no difference: a rate comes to a whole number in it.
+    pub const fn after(self, step: Step) -> Self {
+        Self(self.0.saturating_add(step.0) & 0xFFFF)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,5 +148,23 @@ mod tests {
     #[test]
     fn time_running_backwards_has_no_length() {
         assert_eq!(Time::from_micros(5).since(Time::from_micros(6)), None);
+    }
+
+    #[test]
+    fn parts_of_steps_add_up_whatever_the_rate_of_frames_is() {
+        for frames in [1, 7, 15, 26, 30, 60, 1000] {
+            for rate in [1, 15, 26, 1280, 100_000] {
+                let (mut phase, mut sum) = (Phase::START, 0);
+                let step = Step::from_micros(1_000_000 / frames);
+                for _ in 0..10 * frames {
+                    let part = phase.times(step, rate);
+                    assert!(part >= 0);
+                    sum += part;
+                    phase = phase.after(step);
+                }
+                let exact = i64::from(rate) * i64::from(step.raw()) * 10 * frames as i64 >> 16;
+                assert!((i64::from(sum) - exact).abs() <= 1, "{frames} frames and {rate} a second: {sum}, {exact}");
+            }
+        }
     }
 }

@@ -419,6 +419,20 @@ mod tests {
     }
 
     #[test]
+    fn after_an_hour_it_still_looks_for_a_lane_and_is_no_newborn() {
+        let (step, t) = (Step::from_micros(0), rules());
+        let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 100, 0), Direction::AHEAD, 0);
+        o.age = u16::MAX - 9;
+        let mut looks = 0;
+        for _ in 0..40 {
+            o.predict(step, 1 << 16, &t);
+            looks += usize::from(o.age % LOOK_EVERY == 1);
+            assert!(o.age > 1000, "{}", o.age);
+        }
+        assert_eq!(looks, 10);
+    }
+
+    #[test]
     fn where_a_learnt_lane_across_the_road_ends_the_box_keeps_the_margin_of_its_own_way() {
         let t = learning();
         let mut list = after_cars(4, &t);

@@ -162,14 +162,15 @@ impl Lanes {
             }
             if let Some((fx, fy)) = last.replace(place) {
                 let (dx, dy) = (place.0 - fx, place.1 - fy);
-                let long = length(dx, dy);
-                if long < SHORTEST_CM {
+                // in units: across the whole view a segment is longer than a length in centimetres may be
+                let long = length(dx >> UNIT_SHIFT, dy >> UNIT_SHIFT);
+                if long < SHORTEST_CM >> UNIT_SHIFT {
                     return refuse(Problem::PointTwice);
                 }
                 let segment = Segment {
                     start: ((fx >> UNIT_SHIFT) as i16, (fy >> UNIT_SHIFT) as i16),
                     heading: Direction::of(dx, dy),
-                    length: (long >> UNIT_SHIFT) as u16,
+                    length: long as u16,
                     lane,
                 };
                 let crosses = self.segments.iter().skip(first).any(|other| other.crosses(&segment));
@@ -357,6 +358,20 @@ mod tests {
         assert_eq!(found(&Motion { across: -900, ..across }), None, "against the traffic of all");
         assert_eq!(found(&newborn(5000, 900, 1000)), None, "beside all of them");
         assert_eq!(found(&newborn(10_500, 0, 1000)), None, "beyond its end");
+    }
+
+    #[test]
+    fn a_lane_from_one_end_of_the_view_to_the_other_has_no_end_in_between() {
+        let all = lanes(&[&[[-399.0, 0.0], [399.0, 0.0]], &[[-399.0, -399.0], [399.0, 399.0]]]);
+        let at = |segment, x, y| all.along(segment, (x, y)).map(|on| on.left_cm);
+        for x in [-39_800, 0, 6_000, 7_000, 20_000, 39_800] {
+            assert_eq!(at(0, x, 150), Some(150), "{x}");
+            assert!(at(1, x, x).is_some_and(|left| left.abs() <= 3), "{x}: {:?}", at(1, x, x));
+        }
+        assert_eq!((at(0, 40_200, 0), at(0, -40_200, 0)), (None, None));
+        let across: Lane = &[[-399.0, 0.0], [399.0, 0.0], [399.0, 20.0], [200.0, 20.0], [200.0, -20.0]];
+        let e = Lanes::new(&level(), LaneList::Metres(&[across])).unwrap_err();
+        assert_eq!(e.problem, Problem::CrossesItself, "200 m ahead");
     }
 
     #[test]

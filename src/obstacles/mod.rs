@@ -168,7 +168,7 @@ pub mod tracking;
 
 use heapless::Vec;
 
-use crate::fixed::time::Step;
+use crate::fixed::time::{Phase, Step};
 use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 use crate::obstacles::solid::Solid;
@@ -185,6 +185,7 @@ pub struct Obstacles<const N: usize> {
     list: Vec<Obstacle, N, u16>,
     lanes: LearntLanes<N>,
     dropped: u32,
+    phase: Phase,
 }
 
 /// Which detections found an obstacle: a flag each, in the scan's order.
@@ -215,12 +216,13 @@ impl<const N: usize> Default for Obstacles<N> {
 impl<const N: usize> Obstacles<N> {
     /// No obstacles.
     pub const fn new() -> Self {
-        Self { list: Vec::new(), lanes: LearntLanes::new(), dropped: 0 }
+        Self { list: Vec::new(), lanes: LearntLanes::new(), dropped: 0, phase: Phase::START }
     }
 
     /// Forgets all but the lanes they drove on.
     pub fn clear(&mut self) {
         self.list.clear();
+        self.phase = Phase::START;
     }
 
     /// Forgets the lanes that were [learnt](learnt_lanes).
@@ -455,8 +457,9 @@ impl<const N: usize> Obstacles<N> {
                     (true, false) => t.standing_hidden_loss,
                 }
             };
-            o.existence -= step.times(loss);
+            o.existence -= self.phase.times(step, loss);
         }
+        self.phase = self.phase.after(step);
         self.list.retain(|o| {
             let (x, y) = o.anchor();
             o.existence > 0 && !o.is_fixture(t) && x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
@@ -574,8 +577,7 @@ mod tests {
 
     #[test]
     fn a_frame_starts_half_as_many_as_there_is_room_for() {
-        let t = tracking();
-        let mut all = Obstacles::<4>::new();
+        let (t, mut all) = (tracking(), Obstacles::<4>::new());
         let seen = [-900, -300, 300, 900].map(|y| reflection(5000, y, 2000));
         let _: Claimed<4> = all.step(&seen, &sorted(&seen), Step::from_micros(0), &t, |_, _| true);
         assert_eq!(all.iter().count(), 2);
@@ -585,9 +587,7 @@ mod tests {
 
     #[test]
     fn only_confirmed_movers_become_boxes() {
-        let t = tracking();
-        let mut all = Obstacles::<4>::new();
-        let mut frames = 0;
+        let (t, mut all, mut frames) = (tracking(), Obstacles::<4>::new(), 0);
         while all.solids(&t).next().is_none() {
             assert!(frames < 20, "never");
             let seen = [reflection(5000 + 133 * frames, 0, 2000), reflection(5200 + 133 * frames, 0, 2000)];

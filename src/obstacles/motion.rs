@@ -16,6 +16,8 @@ const MOST_PUSH: i32 = 2000 << 8;
 const MOST_SPEED: i32 = 7000 << 8;
 /// Greatest variance of a place, cm^2, and of a speed, (cm/s)^2: 20 m and 20 m/s.
 const MOST_VARIANCE: i32 = 2000 * 2000;
+/// Most that the first grows a second, so that the longest gap, a minute, fits into 32 bits.
+const MOST_GROWTH: i32 = i32::MAX / 64;
 
 /// Place and velocity without a heading.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +73,7 @@ impl FreeMotion {
         let [place, both, speed] = self.variance;
         let grown = step.times(speed);
         self.variance = [
-            (place + step.times(2 * both + grown)).min(MOST_VARIANCE),
+            (place + step.times((2 * both + grown).min(MOST_GROWTH))).min(MOST_VARIANCE),
             (both + grown).min(MOST_VARIANCE),
             (speed + step.times(turning_noise)).min(MOST_VARIANCE),
         ];
@@ -168,6 +170,19 @@ mod tests {
         assert!(motion.is_sure_of(500, 3 << 4) && !motion.is_sure_of(200, 3 << 4));
         (0..300).for_each(|_| motion.predict(Step::from_micros(STEP_US), TURNING));
         assert!(!motion.is_sure_of(500, 3 << 4));
+    }
+
+    #[test]
+    fn the_longest_gap_leaves_nothing_sure_and_nothing_negative() {
+        for variance in [1, 1000 * 1000, MOST_VARIANCE] {
+            let mut motion = FreeMotion::new((0, 0), 150 * 150, (0, 0), variance);
+            for _ in 0..3 {
+                motion.predict(Step::from_micros(60_000_000), MOST_VARIANCE);
+                let [place, both, speed] = motion.variance;
+                assert!(place > 0 && both > 0 && speed == MOST_VARIANCE, "{:?} from {variance}", motion.variance);
+            }
+            assert_eq!(motion.variance, [MOST_VARIANCE; 3]);
+        }
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub struct Obstacle {
     pub existence: i32,
     /// Detections so far, saturating.
     pub hits: u16,
-    /// Frames since it appeared, saturating.
+    /// Frames since it appeared; goes round in the upper half of its range.
     pub age: u16,
     /// Way made so far, centimetres, saturating.
     pub(super) travelled_cm: u16,
@@ -158,7 +158,8 @@ impl Obstacle {
         self.free.predict(step, t.turning_noise);
         self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
         self.gathered = Gathered::NONE;
-        self.age = self.age.saturating_add(1);
+        // goes round high up, so that what is done every few frames goes on
+        self.age = self.age.checked_add(1).unwrap_or(u16::MAX / 2 + 1);
         self.keep_to_lane(t);
     }
 

@@ -186,3 +186,22 @@ fn a_scene_and_its_mirror_image_give_boxes_that_are_mirror_images() {
         assert!((a.half_length_cm - b.half_length_cm).abs() <= 30 && a.height_cm == b.height_cm, "{a:?} {b:?}");
     }
 }
+
+#[test]
+fn a_standing_vehicle_nobody_sees_is_doubted_as_quickly_whatever_the_rate_of_frames() {
+    let (list, _) = stopped();
+    let lost = |frames_a_second: u64| {
+        let mut list = list.clone();
+        let evidence = |list: &Obstacles<16>| list.iter().map(|o| o.existence).sum::<i32>();
+        let before = evidence(&list);
+        let step = Step::from_micros(1_000_000 / frames_a_second);
+        for _ in 0..20 * frames_a_second {
+            list.step(&[], &ByRange::<256>::sort(&[], rules().limit_cm), step, &rules(), |_, _| false);
+        }
+        before - evidence(&list)
+    };
+    let expected = 20 * rules().standing_hidden_loss;
+    for frames in [10, 15, 26, 30, 50] {
+        assert!((lost(frames) - expected).abs() <= 2, "{frames} frames a second: {}, not {expected}", lost(frames));
+    }
+}
