@@ -26,6 +26,8 @@ fetch >"$fetched" 2>&1 &
 fetching=$!
 # without optimising across parts of a crate, a quarter less to build; the tests take a tenth longer; images of boards do not heed it
 export CARGO_PROFILE_RELEASE_LTO=off
+# nothing is built twice
+export CARGO_INCREMENTAL=0
 # the library's own tests run once, below: they take longer to optimise than to run with overflow checks
 run cargo test --release --locked --workspace --exclude viewshed --no-run
 wait $fetching || status=1
