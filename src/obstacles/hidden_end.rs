@@ -19,7 +19,8 @@ impl<const N: usize> Obstacles<N> {
     /// a vehicle from both sides each tell its middle from their own, and all that is wrong with that has one sign; so
     /// bearings are compared by these.
     pub fn where_seen<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
-        self.confirmed(t).map(|o| if i32::from(o.hidden_end) > ALL / FRAMES { o.about_what_is_seen().solid(t) } else { o.solid(t) })
+        self.confirmed(t)
+            .map(|o| if i32::from(o.hidden_end) > ALL / FRAMES { o.about_what_is_seen().solid(t) } else { o.solid(t) })
     }
 }
 

@@ -49,6 +49,9 @@
 //! short, below 1 dBsm and has been faster than 8 m/s, 71 in 100 are vehicles; of the slower 15 in 100), and is worth 0.3
 //! points where lanes are learnt.
 //!
+//! The second and the rider's speed together: 16.4 / 11.5 without lanes, 14.1 / 10.7 learnt (from 13.9 / 11.0),
+//! 18.0 / 13.7 on the other generator's.
+//!
 //! Small boxes for what reflects weakly in one frame were worth nothing: of cars in a queue most is hidden, and they do too.
 
 /// Frames over which it is averaged.
