@@ -420,6 +420,11 @@ pub enum NotAMessage {
     Foreign,
     /// Protection failed.
     Protection(E2eError),
+    /// More bytes than the longest message has.
+    TooLong {
+        /// Bytes there are.
+        length: usize,
+    },
     /// Number or sensor inside do not fit the identifier.
     Mislabelled {
         /// The message number inside.
@@ -502,6 +507,9 @@ impl<'a> Received<'a> {
         let [_, _, _, number, sensor, epoch, own @ ..] = bytes else {
             return Err(NotAMessage::Protection(E2eError::TooShort { length: bytes.len() }));
         };
+        if bytes.len() > MOST_BYTES {
+            return Err(NotAMessage::TooLong { length: bytes.len() });
+        }
         let Some(message) = Message::from_number(*number) else {
             return Err(NotAMessage::Mislabelled { number: *number, sensor: *sensor });
         };

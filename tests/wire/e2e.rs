@@ -5,6 +5,7 @@
 
 use crate::shadows::Random;
 use viewshed::wire::e2e::Profile;
+use viewshed::wire::message::{Message, NotAMessage, Received};
 
 /// A check sum is linear: whether an error passes does not depend on the message, only the syndrome of
 /// each flipped bit counts.
@@ -167,5 +168,17 @@ fn another_implementation_of_the_standard_takes_our_messages_and_we_take_its() {
         assert_eq!(Profile5::new(config.clone()).unwrap().check(&message).unwrap(), E2EStatus::Ok);
         Profile5::new(config).unwrap().protect(&mut message).unwrap();
         assert_eq!(Profile::P05.check(&message, data_id), Ok(0));
+    }
+}
+
+#[test]
+fn an_intact_message_of_more_than_64_bytes_is_none() {
+    for length in [6, 64, 65, 240] {
+        let mut bytes = vec![0; length];
+        (bytes[3], bytes[5]) = (1, 5);
+        Profile::P05.protect(&mut bytes, 0x8001, 3);
+        let received = Received::from_bytes(&bytes).map(|received| received.message);
+        let expected = if length > 64 { Err(NotAMessage::TooLong { length }) } else { Ok(Message::Header) };
+        assert_eq!(received, expected);
     }
 }
