@@ -344,6 +344,9 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         }
         let port = &mut ports.broadcast;
         let late = self.outbox.take_back(now, port);
+        if let Some(maps) = &mut self.maps {
+            maps.unit.broadcast().count_dropped(late);
+        }
         if !self.outbox.flush(now, &mut self.broadcast_bus, port) {
             return;
         }
@@ -352,7 +355,6 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         let (frame, deadline) = match &mut self.maps {
             Some(maps) => {
                 let sender = maps.unit.broadcast();
-                sender.count_dropped(late);
                 (answer.or_else(|| sender.next_frame(now)), sender.deadline())
             }
             None => (answer.or_else(|| self.can_service.next_status(now, safe)), None),

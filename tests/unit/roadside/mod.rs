@@ -48,6 +48,9 @@ struct Bus {
     silent: bool,
     lost: u32,
     aborted: usize,
+    /// What is aborted takes its room until after the next frame was to be sent.
+    slow: bool,
+    aborting: bool,
 }
 
 impl CanPort for Bus {
@@ -60,7 +63,7 @@ impl CanPort for Bus {
     }
     fn send(&mut self, frame: &CanFrame) -> bool {
         assert!(!self.silent && !self.off, "a silent controller does not send");
-        let room = self.mailboxes.len() < 3;
+        let room = self.mailboxes.len() < 3 && !std::mem::take(&mut self.aborting);
         if room {
             self.mailboxes.push_back(*frame);
         }
@@ -68,6 +71,7 @@ impl CanPort for Bus {
     }
     fn abort(&mut self) {
         self.aborted += self.mailboxes.len();
+        self.aborting = self.slow;
         self.mailboxes.clear();
     }
     fn bus_off(&mut self) -> bool {
@@ -396,6 +400,27 @@ fn what_nobody_acknowledges_is_taken_back_and_never_sent_late() {
     world.run(1000);
     assert!(world.visible()[0] > 1000);
     assert!(world.status()[0].dropped > 0);
+}
+
+#[test]
+fn what_is_taken_back_is_counted_also_where_its_room_is_not_free_at_once() {
+    let dropped = |from, slow| {
+        let mut world = World::with_settings();
+        world.run(1500 + from);
+        (world.ports.broadcast.stuck, world.ports.broadcast.slow) = (true, slow);
+        let until = world.ms + 500;
+        while world.ports.broadcast.aborted == 0 && world.ms < until {
+            world.step();
+        }
+        assert!(world.ports.broadcast.aborted > 0);
+        world.ports.broadcast.stuck = false;
+        world.run(700);
+        world.status()[0].dropped
+    };
+    for from in 0..SCAN_MS {
+        let (fast, slow) = (dropped(from, false), dropped(from, true));
+        assert!(slow >= fast && fast >= 3, "{slow} after {fast}, from {from} ms on");
+    }
 }
 
 #[test]
