@@ -332,6 +332,7 @@ fn emptied_slots_count_from_the_restart_on() {
 fn a_block_of_layout_1_is_taken_and_the_units_own_figures_stay() {
     let mut own = settings(6.0);
     own.unit.serial_baud = 921_600;
+    own.visibility.far_road_deg = Some(12);
     let mut slots = InRam([own.to_block(1), [0xFF; BLOCK_LEN]], 0);
     let (mut unit, mut tool) = (start(CLASSIC, &slots), Tool::new(SENSOR, CLASSIC));
     // as tools before layout 2 make it
@@ -342,7 +343,8 @@ fn a_block_of_layout_1_is_taken_and_the_units_own_figures_stay() {
     send(tool.write(&old), &mut unit, &mut slots);
     assert!(answers(&mut unit, &slots, CLASSIC).contains(&Said::Written(2)));
     let now = stored(&slots);
-    assert_eq!(now.settings().map(|s| (s.sensor.mount.height_m, s.unit.serial_baud)), Some((7.0, 921_600)));
+    let said = now.settings().map(|s| (s.sensor.mount.height_m, s.unit.serial_baud, s.visibility.far_road_deg));
+    assert_eq!(said, Some((7.0, 921_600, Some(12))));
     // one that an older firmware left in its slot is read back as it is
     let slot: [u8; BLOCK_LEN] = std::array::from_fn(|k| old.get(k).copied().unwrap_or(0xFF));
     let slots = InRam([slot, [0xFF; BLOCK_LEN]], 0);

@@ -137,6 +137,8 @@ pub struct StoredSettings {
     /// where it was.
     unit: UnitConfig,
     buses: [BusConfig; 2],
+    /// Where they say the far road lies.
+    far_road_deg: Option<i8>,
     /// Slots of the blocks in use, by kind.
     in_use: [Option<usize>; Kind::ALL.len()],
     check: SettingsCheck,
@@ -154,7 +156,8 @@ impl StoredSettings {
         let of_unit = found.or_else(|_| alone()).ok().map(|newest| newest.settings);
         let buses = of_unit.map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus]);
         let unit = of_unit.map_or_else(UnitConfig::default, |s| s.unit);
-        Self { found, unit, buses, in_use, check }
+        let far_road_deg = of_unit.and_then(|s| s.visibility.far_road_deg);
+        Self { found, unit, buses, far_road_deg, in_use, check }
     }
 
     /// What to work with; none in the safe state. Lanes and heights are not among them: [`place`](Self::place).
@@ -247,7 +250,7 @@ impl StoredSettings {
     fn write_settings(&self, block: &[u8], slots: &mut impl SettingsSlots) -> Result<u32, StoredError> {
         let (_, mut settings) = Settings::from_block(block).map_err(StoredError::of_settings)?;
         if is_layout_1(block) {
-            settings.unit = self.unit();
+            (settings.unit, settings.visibility.far_road_deg) = (self.unit, self.far_road_deg);
         }
         let place = place(slots)?;
         let refused = |error| StoredError::of_settings(BlockError::Parameter(error));
