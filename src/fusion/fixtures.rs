@@ -392,12 +392,13 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         }
         for (sector, (expected, seen)) in self.sectors.iter_mut().zip(expected.iter().zip(&seen)) {
             sector.expects = *expected >= EXPECTED;
-            if !sector.expects {
-                continue;
-            }
             // twice what is needed at most, so that a mended sensor is trusted again soon
-            let missed =
-                if *seen == 0 && sector.others < OTHERS { sector.missed + 1 } else { sector.missed.saturating_sub(2) };
+            let missed = match *seen > 0 || sector.others >= OTHERS {
+                // also where what stands is hidden
+                true => sector.missed.saturating_sub(2),
+                false if sector.expects => sector.missed + 1,
+                false => continue,
+            };
             sector.missed = missed.min(2 * self.limits.blind_windows);
             sector.blind = sector.missed >= self.limits.blind_windows || (sector.blind && sector.missed > 0);
         }

@@ -131,6 +131,23 @@ fn where_anything_else_is_detected_a_sector_is_not_blind() {
 }
 
 #[test]
+fn a_blind_sector_that_detects_anything_again_is_not_blind_also_while_what_stands_there_is_hidden() {
+    let dark = |d: Detection| (d.azimuth.raw() < Angle::from_degrees(30.0).raw()).then_some(d);
+    // the heading is along y: what lies to the left has the smaller x
+    let hidden = |at: RoadPoint| at.x_cm > -500;
+    for (detections, blind) in [(3, false), (2, true)] {
+        let mut standing = learned();
+        run(&mut standing, 32, 20, everywhere, dark);
+        assert!(standing.is_blind(5));
+        for second in 52..62 {
+            run(&mut standing, second, 1, hidden, dark);
+            (0..detections).for_each(|_| standing.observe(&post(70.0, 45.0, 10)));
+        }
+        assert_eq!((standing.is_blind(5), standing.expects(5)), (blind, false), "{detections} in a second");
+    }
+}
+
+#[test]
 fn a_turned_mount_is_named_with_its_side_and_a_tilted_one_with_its_own() {
     for (left, up) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
         let mut standing = learned();
