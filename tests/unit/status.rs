@@ -6,6 +6,7 @@ use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::{Addresses, Message, Received};
+use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::status::{Reason, Status, UnitState};
 
 use crate::common::{SmallState, Vehicle, gantry, small_unit};
@@ -50,6 +51,54 @@ fn run(until: u64, scan: impl Fn(u64) -> Option<(bool, bool)>, time: impl Fn(u64
         }
     }
     sent
+}
+
+/// A radar that is silent from 3 s on and comes back at a time, in milliseconds: its scans are stamped with their start and
+/// complete 50 ms later. How often the epoch changed, and how long after its return its map is shown.
+fn silence_until(back: u64) -> (usize, Option<u64>) {
+    let settings = Settings::of(gantry(6.0, 0.0));
+    let (parameters, mut sender) = small_unit(&settings, Medium::Can(Addresses::STANDARD), 1, Time::from_micros(0));
+    let mut state = Box::new(SmallState::new());
+    let mut map = parameters.map();
+    let mut unit = Unit::new(&parameters, &mut *state, &mut map, &mut sender);
+    let mut receiver = Receiver::<1, 40, 2>::new([0], Addresses::STANDARD, ReceiverLimits::DEFAULT);
+    let car = Vehicle::car(40.0, 2.0, 0.0);
+    let (mut epochs, mut shown) = (Vec::new(), None);
+    for ms in 0..back + 1000 {
+        let now = Time::from_micros(1000 * ms);
+        let began = ms.checked_sub(50).filter(|began| *began < 3000 || *began >= back);
+        match began.filter(|began| began % PERIOD == if *began < 3000 { 0 } else { back % PERIOD }) {
+            Some(began) => {
+                let (measured, input) =
+                    (Time::from_micros(1000 * began), &car.at(0.0).detections(&gantry(6.0, 0.0), true)[..]);
+                unit.frame(&Frame { measured, input, incomplete: false, status: false.into() }, &mut |_| {});
+            }
+            None => drop(unit.idle(now)),
+        }
+        while let Some(frame) = unit.next_frame(now) {
+            epochs.push(Received::from_frame(&frame, &Addresses::STANDARD).unwrap().epoch);
+            let _ = receiver.frame(now, &frame);
+        }
+        let map = receiver.map(0, now);
+        let any = (0..40).any(|azimuth| (0..50).any(|range| map.cell(azimuth, range).visible()));
+        assert!(any || !(2000..3000).contains(&ms) && (ms < back || shown.is_none()), "{ms} ms");
+        if any && ms >= back {
+            shown = shown.or(Some(ms - back));
+        }
+    }
+    epochs.dedup();
+    (epochs.len() - 1, shown)
+}
+
+#[test]
+fn a_radar_that_comes_back_is_shown_at_once_though_unknown_was_sent_after_its_first_scan_began() {
+    for back in (4000..4100).step_by(7) {
+        let (changes, shown) = silence_until(back);
+        assert!(
+            changes == 0 && shown.is_some_and(|ms| ms < 50 + 2 * PERIOD + 20),
+            "back at {back} ms: {changes} {shown:?}"
+        );
+    }
 }
 
 fn states(sent: &Sent) -> Vec<(UnitState, Reason)> {

@@ -20,8 +20,8 @@
 //! measurement is dropped too. Azimuths dropped are counted in the status. Nothing is sent late: a
 //! caller aborts what its mailboxes still hold after [`Broadcaster::deadline`].
 //!
-//! *Quiet.* After the start, after [`Broadcaster::restart`] and after a clock that stepped back the epoch
-//! is a new one, and no map is sent for the greatest age and delay together: by then nothing of the old
+//! *Quiet.* After the start, after [`Broadcaster::restart`] and after a clock that stepped back by more than the greatest
+//! delay the epoch is a new one, and no map is sent for the greatest age and delay together: by then nothing of the old
 //! epoch is under way.
 //!
 //! # Limits
@@ -60,7 +60,7 @@ const PROBABILITY_US: u64 = 60_000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum NotSent {
-    /// Within 20 ms of the one before.
+    /// Within 20 ms of the one before, or before that by no more than the greatest delay.
     TooSoon,
     /// The epoch is new and nothing of the old one may be under way.
     Quiet,
@@ -276,17 +276,17 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
     /// The map is not sent: `NotSent` says why.
     pub fn scan(&mut self, measured: Time, map: &impl Planes<W>) -> Result<(), NotSent> {
         let number = ScanNumber::at(measured);
-        let since = match self.last.map(|last| measured.since(last)) {
+        let back = self.last.and_then(|last| last.since(measured)).unwrap_or(0);
+        if back > u64::from(self.config.max_delay_ms) * 1000 {
             // the clock stepped back: numbers would come again
-            Some(None) => {
-                self.epoch = self.epoch.next();
-                self.quiet(measured);
-                return Err(NotSent::Quiet);
-            }
-            Some(since) => since,
-            None => None,
-        };
-        if self.last.is_some_and(|last| ScanNumber::at(last) == number && since.is_some_and(|us| us < 40_000)) {
+            self.epoch = self.epoch.next();
+            self.quiet(measured);
+            return Err(NotSent::Quiet);
+        }
+        let since = self.last.and_then(|last| measured.since(last));
+        let same = self.last.is_some_and(|last| ScanNumber::at(last) == number);
+        // the first scan after a silence may have begun before the last map that said so
+        if back > 0 || (same && since.is_some_and(|us| us < 40_000)) {
             return Err(NotSent::TooSoon);
         }
         let wait = self.quiet_until.since(measured).unwrap_or(0);
