@@ -38,6 +38,8 @@ impl<const NX: usize, const NY: usize> CameraMap<NX, NY> {
         visible_from: u8,
         occupied_from: u8,
     ) -> Self {
+        // places farther away are not told apart
+        const { assert!(NX * NX + NY * NY / 4 < 449 * 449) }
         let none = [[0; NY]; NX];
         Self { grades: none, occupancy: none, levelling, azimuth, visible_from, occupied_from }
     }

@@ -8,6 +8,9 @@ use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
 
+/// Places from here on are on no map: [`Levelling::place`] has them at 450 m along an axis, less what rounding takes.
+const FARTHEST_CM: i32 = 44_900;
+
 /// Where the cells of a polar map lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PolarGeometry {
@@ -34,12 +37,14 @@ impl PolarGeometry {
         Columns { span: self.azimuth_span, number, narrow: self.narrow }
     }
 
-    /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size.
+    /// The cell (azimuth, range) a place of the levelled frame lies in, on a map of this size; none from 449 m on, where
+    /// places are not told apart.
     pub fn locate(&self, x_cm: i32, y_cm: i32, ranges: usize, azimuths: usize) -> Option<(usize, usize)> {
         let from_origin = trig::bearing(x_cm, y_cm) - self.azimuth_origin;
         let azimuth = self.columns(azimuths).column(from_origin)?;
-        let range = usize::try_from(math::length(x_cm, y_cm) / self.cell_cm.max(1)).ok()?;
-        (range < ranges).then_some((azimuth, range))
+        let length = math::length(x_cm, y_cm);
+        let range = usize::try_from(length / self.cell_cm.max(1)).ok()?;
+        (range < ranges && length < FARTHEST_CM).then_some((azimuth, range))
     }
 }
 
@@ -190,6 +195,23 @@ mod tests {
         assert_eq!(m.locate(1000, -1100), None);
         assert_eq!(m.locate(3999, 0), Some((5, 19)));
         assert_eq!(m.locate(4000, 0), None, "beyond the last cell");
+    }
+
+    #[test]
+    fn what_is_farther_than_places_reach_is_unknown_on_the_longest_map() {
+        for yaw_deg in 0_u8..120 {
+            let yaw_deg = 3.0 * f32::from(yaw_deg);
+            let mount = Mount { x_m: 5.0, y_m: -3.0, height_m: 6.0, yaw_deg, pitch_deg: 0.0, roll_deg: 0.0 };
+            let geometry = PolarGeometry { levelling: mount.levelling().unwrap(), cell_cm: 3000, ..map().geometry };
+            let mut m = PolarMap::<256, 10>::unknown(geometry, 100, 50);
+            (0..10).for_each(|azimuth| *m.rows_mut(azimuth).unwrap().0 = [255; 256]);
+            let ahead = |x_cm, y_cm| m.at(geometry.levelling.unplace(x_cm, y_cm)).visible();
+            for y_cm in [-20_000, 0, 20_000] {
+                assert!(ahead(40_000, y_cm), "{yaw_deg} degrees, {y_cm}");
+                let far = [45_000, 46_000, 60_000, 100_000, 1_000_000];
+                assert!(far.iter().all(|x_cm| !ahead(*x_cm, y_cm)), "{yaw_deg} degrees, {y_cm}");
+            }
+        }
     }
 
     #[test]

@@ -119,11 +119,12 @@ impl Levelling {
         core::array::from_fn(|k| [x, y, z].iter().zip(v).map(|(row, v)| row.get(k).copied().unwrap_or(0.0) * v).sum())
     }
 
-    /// Levelled ground coordinates of a road point, centimetres.
+    /// Levelled ground coordinates of a road point, centimetres. One farther away than 450 m along an axis of the road comes
+    /// out somewhere beyond 449 m: it is on no map.
     #[allow(clippy::cast_possible_truncation)] // clamped
     pub fn place(&self, p: RoadPoint) -> (i32, i32) {
         let (dx, dy) = (p.x_cm.wrapping_sub(self.origin.x_cm), p.y_cm.wrapping_sub(self.origin.y_cm));
-        // beyond 400 m nothing is seen; the clamp keeps squares of the result in 32 bits
+        // beyond 400 m no sensor sees; the clamp keeps squares of the result in 32 bits
         let (dx, dy) = (dx.clamp(-REACH_CM, REACH_CM), dy.clamp(-REACH_CM, REACH_CM));
         let (hx, hy) = (i64::from(self.heading.x), i64::from(self.heading.y));
         let (dx, dy) = (i64::from(dx), i64::from(dy));

@@ -10,6 +10,7 @@ use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
+use viewshed::wire::header::Header;
 use viewshed::wire::message::{Addresses, Epoch, Message, Packing, Plane, Received};
 use viewshed::wire::planes::Planes;
 use viewshed::wire::receive::{Accepted, Receiver, ReceiverLimits, Refused, SenderCondition};
@@ -271,6 +272,32 @@ fn a_map_that_was_measured_a_little_before_the_last_one_is_left_out_without_a_ne
     }
     assert_eq!((line.sender.scan(ms(920), &map), line.sender.epoch()), (Ok(()), Epoch::new(3)));
     assert_eq!((line.sender.scan(ms(819), &map), line.sender.epoch()), (Err(NotSent::Quiet), Epoch::new(4)));
+}
+
+/// All cells are known and visible.
+struct Clear;
+
+impl Planes<W> for Clear {
+    fn ray(&self, _: Plane, _: usize) -> Ray<W> {
+        Ray::new(Known::new(0, R), Bits::span(0, R))
+    }
+}
+
+#[test]
+fn places_farther_than_maps_reach_are_unknown_whatever_the_header_says() {
+    let mut line = Line::<1>::new(MEDIA[1], BroadcastConfig::new(SENSOR, MEDIA[1]));
+    line.sender.restart(Header { cell_cm: 3000, ..header(7) }, ms(0)).unwrap();
+    for now in 0..2000 {
+        if now % 60 == 0 {
+            let _ = line.sender.scan(ms(now), &Clear);
+        }
+        line.pass(ms(now));
+    }
+    let map = line.receiver.map(SENSOR, ms(2000));
+    let answers = [30_000, 44_000, 45_000, 100_000, 150_000].map(|x| query::point(&map, RoadPoint::new(x, 0)));
+    assert!(map.cell(A / 2, 40).visible());
+    assert_eq!(answers[2..], [Answer::Unknown; 3]);
+    assert!(answers[..2].iter().all(|answer| *answer > Answer::Invisible), "{answers:?}");
 }
 
 /// Mailboxes that send by identifier: of a whole map the first words come before all second ones.
