@@ -15,6 +15,12 @@ pub const TICK_US: u32 = 20_000;
 /// Time after which numbers come again, microseconds.
 pub const PERIOD_US: u32 = 5_120_000;
 
+/// Greatest age A that may be agreed upon, and greatest delay D, microseconds: both together are less than half a period,
+/// and what is dropped by its age is gone before its number comes again.
+pub const MOST_AGE_US: u32 = 1_000_000;
+/// See [`MOST_AGE_US`].
+pub const MOST_DELAY_US: u32 = 500_000;
+
 /// Time after which the header's clock comes again, microseconds: 2^40 ms.
 pub const CLOCK_US: u64 = (1 << 40) * 1000;
 

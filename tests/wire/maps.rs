@@ -300,6 +300,35 @@ fn places_farther_than_maps_reach_are_unknown_whatever_the_header_says() {
     assert!(answers[..2].iter().all(|answer| *answer > Answer::Invisible), "{answers:?}");
 }
 
+#[test]
+fn limits_beyond_what_a_sender_may_say_do_not_make_old_cells_new() {
+    for limits in [
+        ReceiverLimits { max_age_us: 2_500_000, max_delay_us: 100_000 },
+        ReceiverLimits { max_age_us: u32::MAX, max_delay_us: u32::MAX },
+    ] {
+        let mut line = Line::<2>::new(MEDIA[0], BroadcastConfig::new(SENSOR, MEDIA[0]));
+        line.receiver = Receiver::new([1, SENSOR], addresses(MEDIA[0]), limits);
+        let mut shadows = Shadows::new(4);
+        for now in 0..10_000 {
+            if now % 60 == 0 {
+                let _ = line.sender.scan(ms(now), &shadows.next());
+            }
+            // from 4 s on everything is heard but the first plane
+            if let Some(frame) = line.sender.next_frame(ms(now)) {
+                let message = Received::from_frame(&frame, &addresses(MEDIA[0])).unwrap();
+                let first = matches!(message.message, Message::Map(Plane::Visibility, _));
+                if now < 4000 || !first {
+                    let _ = line.receiver.frame(ms(now), &frame);
+                }
+            }
+            let condition = line.receiver.sensor(SENSOR).unwrap().condition(ms(now), &limits);
+            assert!(now < 3500 || condition == SenderCondition::Ok, "{condition:?} at {now} ms");
+            let shown = line.receiver.map(SENSOR, ms(now)).scan(0).is_some();
+            assert!(if shown { now < 5000 } else { !(3500..4500).contains(&now) }, "at {now} ms");
+        }
+    }
+}
+
 /// Mailboxes that send by identifier: of a whole map the first words come before all second ones.
 #[test]
 fn words_in_the_order_of_their_identifiers_bring_the_same_maps() {

@@ -2,6 +2,7 @@
 
 use crate::sensor::config::{ConfigError, Problem};
 use crate::wire::message::{Addresses, Packing};
+use crate::wire::scan_number::{MOST_AGE_US, MOST_DELAY_US};
 
 /// What messages travel on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,9 +88,8 @@ impl BroadcastConfig {
         within("broadcast.secured", u32::from(self.secured), 0, most_secured)?;
         within("broadcast.gap_us", self.gap_us, 0, 20_000)?;
         within("broadcast.stale_ms", u32::from(self.stale_ms), 10, u32::from(self.max_delay_ms))?;
-        // half a period of the scan numbers is more than both together
-        within("broadcast.max_age_ms", u32::from(self.max_age_ms), 50, 1000)?;
-        within("broadcast.max_delay_ms", u32::from(self.max_delay_ms), 10, 500)?;
+        within("broadcast.max_age_ms", u32::from(self.max_age_ms), 50, MOST_AGE_US / 1000)?;
+        within("broadcast.max_delay_ms", u32::from(self.max_delay_ms), 10, MOST_DELAY_US / 1000)?;
         within("broadcast.status_ms", u32::from(self.status_ms), 10, 500)?;
         within("broadcast.header_ms", u32::from(self.header_ms), 10, 500)?;
         within("broadcast.planes", u32::from(self.planes), 1, 3)?;

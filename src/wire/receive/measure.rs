@@ -3,7 +3,7 @@
 //! The rules that use them, with their reasons, are in [`session`](super::session).
 
 use crate::fixed::time::Time;
-use crate::wire::scan_number::{CLOCK_US, PERIOD_US, TICK_US};
+use crate::wire::scan_number::{CLOCK_US, MOST_AGE_US, MOST_DELAY_US, PERIOD_US, TICK_US};
 
 /// Map frames a measure must be of before it is trusted.
 pub const ENOUGH: u8 = 8;
@@ -14,19 +14,30 @@ pub(super) const MARGIN_US: u32 = TICK_US + 5000;
 /// The smallest lag, and the bound of the sender's clock, give way by 2^-11 of the time passed.
 const CREEP: u32 = 11;
 
-/// Age and delay a receiver works with.
+/// Age and delay a receiver works with. More than a sender may be set to counts as that: numbers of scans would come again
+/// before a receiver drops what they say.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ReceiverLimits {
-    /// Greatest age of what is shown, microseconds: A.
+    /// Greatest age of what is shown, microseconds: A. At most 1 s.
     pub max_age_us: u32,
-    /// Greatest delay from measurement to reception, microseconds: D.
+    /// Greatest delay from measurement to reception, microseconds: D. At most 500 ms.
     pub max_delay_us: u32,
 }
 
 impl ReceiverLimits {
     /// 300 ms and 100 ms.
     pub const DEFAULT: Self = Self { max_age_us: 300_000, max_delay_us: 100_000 };
+
+    /// No more than a sender may be set to.
+    pub(super) fn bounded(self) -> Self {
+        Self { max_age_us: self.max_age_us.min(MOST_AGE_US), max_delay_us: self.max_delay_us.min(MOST_DELAY_US) }
+    }
+
+    /// Age from which what a scan said is dropped, microseconds: what a delta may name, and a late delta's delay.
+    pub(super) fn dropped_us(&self) -> u32 {
+        400_000 + 2 * self.max_delay_us.max(self.max_age_us)
+    }
 
     /// `A + D`, microseconds.
     pub(super) fn sum_us(&self) -> u64 {

@@ -15,8 +15,8 @@
 //! - *The scan is the one its number says.* Numbers come again after 5.12 s. What is accepted was
 //!   measured at most `2 D` before it came: the measure refuses what is later by less than half a
 //!   period, the sender's clock in the header what is later by more. Sectors, refreshes and words are
-//!   dropped long before 5.12 s: a second after their scan while frames come, all of them after a second
-//!   without any.
+//!   dropped long before 5.12 s: 400 ms and twice the greater of `A` and `D` after their scan while frames come (1 s if
+//!   `A` is 300 ms, 2.4 s at most), all of them after a second without any.
 //! - *The scan was measured at most `A + D` ago.* A sector is shown while its number is at most `A` (less
 //!   25 ms for a tick and for drifting clocks) behind the clocks' difference as the fastest frame of
 //!   the measure showed it. So it is enough that this frame took at most `D`. Suppose all frames of a measure
@@ -50,7 +50,7 @@
 //! Words of a block may come in any order, between those of other blocks: 36 of them wait for the others, which is
 //! every first word of a map before any second one.
 //!
-//! # ReceiverLimits
+//! # Limits
 //! For 128 azimuths by 200 ranges 8.5 kB a sensor, ages included.
 
 mod assembly;
@@ -97,7 +97,7 @@ impl<const N: usize, const A: usize, const W: usize, const P: usize> Receiver<N,
     pub fn new(sensors: [u8; N], addresses: Addresses, limits: ReceiverLimits) -> Self {
         Self {
             addresses,
-            limits,
+            limits: limits.bounded(),
             sensors: sensors.map(|number| (number, SensorReceiver::new())),
             foreign: 0,
             latest: Cell::new(Time::from_micros(0)),

@@ -196,7 +196,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             () if !self.fits || self.session.speaks_otherwise(now) => SenderCondition::Unusable,
             () if self.session.epoch().is_none() => SenderCondition::Waiting,
             () if self.collector.header().is_none() => SenderCondition::NoHeader,
-            () if self.session.trusted(now, limits) => SenderCondition::Ok,
+            () if self.session.trusted(now, &limits.bounded()) => SenderCondition::Ok,
             () => SenderCondition::Waiting,
         }
     }
@@ -422,9 +422,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             return;
         }
         self.purged = Some(scan);
-        // what a delta may name, and a late delta's delay
-        let most_us = 400_000 + 2 * limits.max_delay_us.max(limits.max_age_us);
-        let too_old = self.session.older_than(now, most_us);
+        let too_old = self.session.older_than(now, limits.dropped_us());
         self.planes.iter_mut().for_each(|sectors| sectors.purge(&too_old));
         self.assemblies.iter_mut().for_each(|assembly| assembly.purge(&too_old));
     }
