@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use anyhow::{Result, bail, ensure};
 use viewshed::bench::stage::Stage;
-use viewshed::unit::profile::{reference, small};
 use viewshed::unit::settings::{BlockError, Kind, Settings, Which};
 use viewshed::unit::timing::Count;
 
@@ -14,6 +13,7 @@ use serde_json::{Map, Value, json};
 
 use super::print;
 use crate::configure::file::{self, EXAMPLE, UnitFile};
+use crate::configure::grids::GRIDS;
 use crate::configure::kept::{self, Blocks, KINDS, Kept};
 use crate::configure::link::Link;
 use crate::configure::{Found, Stored, Wanted, find, name};
@@ -29,7 +29,7 @@ use crate::results::files::OutputArgs;
 #[command(after_long_help = EXAMPLES)]
 pub struct Args {
     /// TOML file of the configuration; one of the daemon's does as well
-    #[arg(value_name = "FILE", required_unless_present_any = ["read", "restart", "factory", "timing", "example"])]
+    #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// CAN interface of the bus the unit broadcasts on
     #[arg(long, value_name = "INTERFACE", conflicts_with = "port")]
@@ -117,11 +117,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
     ensure!(args.wait.is_finite() && args.wait > 0.0, "--wait {} is not above 0", args.wait);
+    ensure!(
+        args.file.is_some() || args.read || args.restart || args.factory || args.timing,
+        "say what to write: FILE, which `viewshed configure --example > unit.toml` begins; or without one what to do with the unit at --port PATH or --can INTERFACE: --read, --restart, --factory, --timing"
+    );
     let file = args.file.as_deref().map(file::read).transpose()?;
     if let Some(file) = &file {
         left_out(file)?;
         if args.check && args.can.is_none() && args.port.is_none() {
-            return on_grids(&file.settings, told);
+            return on_grids(file, told);
         }
     }
     let mut link = open(args)?;
@@ -158,8 +162,8 @@ fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
         return compare(&mut unit, file, told);
     }
     let mut written = None;
-    if let Some(UnitFile { settings, blocks, .. }) = &file {
-        unit.check(settings)?;
+    if let Some(file @ UnitFile { settings, blocks, .. }) = &file {
+        unit.check(file)?;
         written = Some(write(&mut unit, settings, blocks, told)?);
     }
     if !args.restart {
@@ -234,15 +238,21 @@ fn left_out(file: &UnitFile) -> Result<()> {
 }
 
 /// Whether a file can be used, without a unit.
-fn on_grids(settings: &Settings, told: &mut Told) -> Result<ExitCode> {
-    let (mut any, mut refusals) = (false, Map::new());
-    for (grid, check) in [("reference", reference::CHECK), ("small", small::CHECK)] {
-        let refused = check.settings(settings).err().map(|error| error.to_string());
+fn on_grids(file: &UnitFile, told: &mut Told) -> Result<ExitCode> {
+    let (mut any, mut refusals, mut without) = (false, Map::new(), Map::new());
+    for grid in &GRIDS {
+        let refused = grid.refused(file);
         any |= refused.is_none();
-        print(&format!("{grid} grid: {}\n", refused.as_deref().unwrap_or("can be used")))?;
-        refusals.insert(grid.into(), refused.into());
+        print(&format!("{} grid: {}\n", grid.name, refused.as_deref().unwrap_or("can be used")))?;
+        let boards = if refused.is_none() { grid.not_on(file) } else { Vec::new() };
+        for (board, what) in &boards {
+            print(&format!("  not on {board}: no room for {what}\n"))?;
+        }
+        refusals.insert(grid.name.into(), refused.into());
+        without.insert(grid.name.into(), boards.into_iter().map(|(board, what)| (board.to_owned(), what)).collect());
     }
     told.insert("refused_by_grid".into(), refusals.into());
+    told.insert("no_room_by_board".into(), without.into());
     ensure!(any, "no unit can run with this");
     Ok(ExitCode::SUCCESS)
 }
@@ -322,7 +332,7 @@ fn timing(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
 
 fn compare(unit: &mut Found<'_>, file: &UnitFile, told: &mut Told) -> Result<ExitCode> {
     let UnitFile { settings, blocks, .. } = file;
-    unit.check(settings)?;
+    unit.check(file)?;
     let Ok(stored) = unit.newest()? else {
         print("the unit has no configuration; the file can be used\n")?;
         return Ok(ExitCode::FAILURE);

@@ -11,6 +11,7 @@ use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
+use crate::configure::file as unit_file;
 use crate::estimators::{self, FarRoad, GroundError, MOST_RANGE_M};
 use crate::evaluation::{self, Grid, Settings};
 use crate::recording::{FieldOfView, ReadOptions};
@@ -245,7 +246,9 @@ impl JudgingArgs {
 
 fn read_config(path: &Path) -> Result<Config> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    toml::from_str(&text).with_context(|| format!("configuration {}", path.display()))
+    toml::from_str(&text)
+        .map_err(|error| unit_file::for_config(&text).map_or_else(|| error.into(), anyhow::Error::msg))
+        .with_context(|| format!("configuration {}", path.display()))
 }
 
 impl ReadingArgs {
@@ -503,6 +506,33 @@ mod tests {
         assert_eq!(error, "evaluation option `warm_up_s` is -1, it must lie in 0 to 86400");
         let error = parse(&["--fov=-60,60,-16,16,3,400"]).unwrap_err().to_string();
         assert!(error.contains("grids go to 256 m"), "{error}");
+    }
+
+    #[test]
+    fn a_units_file_is_told_from_one_for_replay() {
+        let told = |text: &str| {
+            let folder = std::env::temp_dir().join(format!("viewshed-config-{}", std::process::id()));
+            std::fs::create_dir_all(&folder).unwrap();
+            let path = folder.join("a.toml");
+            std::fs::write(&path, text).unwrap();
+            let read = read_config(&path).map_err(|error| format!("{error:#}"));
+            std::fs::remove_dir_all(&folder).unwrap();
+            read.err()
+        };
+        let lanes = "[[lanes]]\npoints = [[0.0, 0.0], [60.0, 0.0]]\n";
+        assert!(told(lanes).unwrap().contains("write it with `viewshed lanes --table estimators.lanes`"));
+        assert_eq!(told(&lanes.replace("lanes", "estimators.lanes")), None);
+        for unit in [
+            include_str!("../../../../boards/linux/viewshed.toml"),
+            include_str!("../../../../boards/unit.toml"),
+            &format!("[unit]\nlearn_lanes = true\n{lanes}"),
+        ] {
+            assert!(told(unit).unwrap().contains("a.toml: it is a unit's file"), "{:?}", told(unit));
+        }
+        let tuned = told("[obstacles]\nheadway_s = 0.4\n").unwrap();
+        assert!(tuned.contains("for --config it is [estimators.radar_3d.obstacles]"), "{tuned}");
+        assert_eq!(told("[estimators.radar_3d.obstacles]\nheadway_s = 0.4\n"), None);
+        assert!(told("[evaluaton]\n").unwrap().contains("unknown field `evaluaton`"));
     }
 
     #[test]

@@ -22,9 +22,16 @@ use crate::evaluation::probability::table_file;
 /// A file that explains every key, with their defaults.
 pub const EXAMPLE: &str = include_str!("../../../../boards/unit.toml");
 
+/// Cells of the grid that tables are fitted on.
+#[allow(clippy::cast_possible_truncation)] // 200, 128
+pub const FITTED_ON: [u8; 2] = [reference::State::RANGES as u8, reference::State::AZIMUTHS as u8];
+
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Tables {
+    // at the top of a daemon's file, where a controller's has it in [unit]
+    #[serde(default, skip_serializing)]
+    learn_lanes: Option<bool>,
     #[serde(default)]
     unit: UnitConfig,
     mount: Mount,
@@ -86,6 +93,8 @@ pub struct UnitFile {
     pub settings: Settings,
     /// What a unit keeps beside them.
     pub blocks: Blocks,
+    /// The configuration its table of probabilities was fitted with.
+    pub fitted_with: Option<u32>,
     /// Keys of the daemon's that no block has.
     pub left_out: Vec<&'static str>,
 }
@@ -103,20 +112,20 @@ pub fn read(path: &Path) -> Result<UnitFile> {
     let Settings { ground, lanes, .. } = file.settings;
     let heights = (!ground.is_empty()).then(|| kept::of_heights(ground)).transpose().with_context(in_file)?;
     let lanes = (!lanes.is_empty()).then(|| kept::of_lanes(lanes)).transpose().with_context(in_file)?;
-    file.blocks = [heights, lanes, given.map(|given| table(&given)).transpose().with_context(in_file)?];
+    let (table, fitted_with) = given.map(|given| table(&given)).transpose().with_context(in_file)?.unzip();
+    file.blocks = [heights, lanes, table];
+    file.fitted_with = fitted_with;
     Ok(file)
 }
 
-/// The table as a block. Tables are fitted on the reference grid.
-#[allow(clippy::cast_possible_truncation)] // 200, 128
-fn table(given: &Given) -> Result<Vec<u8>> {
+/// The table as a block, and the configuration it was fitted with. Tables are fitted on the reference grid.
+fn table(given: &Given) -> Result<(Vec<u8>, u32)> {
     let share = given.risk.is_none_or(|risk| risk > 0.0 && risk < 1.0);
     ensure!(share, "probability.risk is not between 0 and 1: 0.1 is 10 %");
-    let read = || -> Result<Vec<u8>> {
+    let read = || -> Result<(Vec<u8>, u32)> {
         let (table, counted) = table_file::parse(&std::fs::read_to_string(&given.file)?)?;
         let threshold = given.risk.map(|risk| Threshold::keeping(risk, &counted));
-        let grid = [reference::State::RANGES as u8, reference::State::AZIMUTHS as u8];
-        Ok(table_block(grid, &table, threshold).to_vec())
+        Ok((table_block(FITTED_ON, &table, threshold).to_vec(), table.fingerprint()))
     };
     read().with_context(|| format!("probability.file: {}", given.file.display()))
 }
@@ -125,9 +134,21 @@ fn table(given: &Given) -> Result<Vec<u8>> {
 fn parse(text: &str) -> Result<(UnitFile, Option<Given>), (usize, String)> {
     let tables: Tables = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start.min(text.len()));
-        (1 + text[..at].matches('\n').count(), error.message().to_owned())
+        (1 + text[..at].matches('\n').count(), with_advice(error.message()))
     })?;
-    let Tables { unit, mount, field_of_view, noise, gate, visibility, health, radar_bus, broadcast_bus, .. } = tables;
+    let Tables {
+        learn_lanes,
+        unit,
+        mount,
+        field_of_view,
+        noise,
+        gate,
+        visibility,
+        health,
+        radar_bus,
+        broadcast_bus,
+        ..
+    } = tables;
     let sensor = Sensor { mount, field_of_view, noise };
     let keys = [
         ("state_dir", tables.state_dir.is_some()),
@@ -142,9 +163,51 @@ fn parse(text: &str) -> Result<(UnitFile, Option<Given>), (usize, String)> {
     // once a run
     let lanes = tables.lanes.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak();
     let ground = tables.ground.map_or(&[][..], |ground| ground.points.leak());
+    let unit = UnitConfig { learn_lanes: learn_lanes.unwrap_or(unit.learn_lanes), ..unit };
     let own = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
-    let file = UnitFile { settings: Settings { lanes, ground, ..own }, blocks: [None, None, None], left_out };
+    let settings = Settings { lanes, ground, ..own };
+    let file = UnitFile { settings, blocks: [None, None, None], fitted_with: None, left_out };
     Ok((file, tables.probability))
+}
+
+/// What is wrong, and where a table of another kind of file belongs.
+fn with_advice(wrong: &str) -> String {
+    if !["estimators", "evaluation"].iter().any(|table| wrong.starts_with(&format!("unknown field `{table}`"))) {
+        return wrong.to_owned();
+    }
+    let what = wrong.split(',').next().unwrap_or_default();
+    format!(
+        "{what}: [estimators] and [evaluation] are tables of files for --config of `viewshed replay`; lanes of a unit's file are [[lanes]], as `viewshed lanes` writes them without --table"
+    )
+}
+
+/// What to do with a unit's file, or a part of one, that was given as `--config`.
+pub fn for_config(text: &str) -> Option<String> {
+    let tables: toml::Table = text.parse().ok()?;
+    let has = |keys: &[&str]| keys.iter().any(|key| tables.contains_key(*key));
+    if has(&["mount", "field_of_view", "input", "output", "unit"]) {
+        return Some(
+            "it is a unit's file, for the daemon or `viewshed configure`; --config takes the tables [evaluation] and [estimators], with the keys that --json writes under \"options\". Mount and field of view are the recording's, or --mount and --fov; [noise] is [estimators.noise], [gate], [visibility] and [health] are [estimators.radar_3d.gate] and so on, [[lanes]] and [ground] [[estimators.lanes]] and [estimators.ground]"
+                .into(),
+        );
+    }
+    if has(&["lanes"]) {
+        return Some(
+            "[[lanes]] is a table of a unit's file; for --config write it with `viewshed lanes --table estimators.lanes`"
+                .into(),
+        );
+    }
+    let known = [
+        ("ground", "estimators.ground"),
+        ("noise", "estimators.noise"),
+        ("gate", "estimators.radar_3d.gate"),
+        ("visibility", "estimators.radar_3d.visibility"),
+        ("health", "estimators.radar_3d.health"),
+        ("obstacles", "estimators.radar_3d.obstacles"),
+        ("evidence", "estimators.radar_3d.evidence"),
+    ];
+    let (table, here) = known.into_iter().find(|(table, _)| has(&[table]))?;
+    Some(format!("[{table}] is a table of a unit's file; for --config it is [{here}]"))
 }
 
 /// Settings as a file.
@@ -195,6 +258,7 @@ fn tables(settings: &Settings) -> Tables {
     let (state_dir, grid, input, output) = (None, None, None, None);
     let (lanes, ground, obstacles, evidence, fixtures, probability) = (Vec::new(), None, None, None, None, None);
     Tables {
+        learn_lanes: None,
         unit,
         mount,
         field_of_view,
@@ -254,6 +318,32 @@ mod tests {
         let (file, _) = parse(include_str!("../../../../boards/linux/viewshed.toml")).unwrap();
         assert_eq!(file.left_out, ["[input]", "[output]"]);
         assert_eq!(file.settings.sensor.mount.height_m, 6.0);
+        assert!(!file.settings.unit.learn_lanes);
+    }
+
+    #[test]
+    fn the_daemons_file_may_ask_for_learnt_lanes_where_it_has_the_key() {
+        let daemon = include_str!("../../../../boards/linux/viewshed.toml");
+        assert!(daemon.contains("\n#learn_lanes = false\n"));
+        let (file, _) = parse(&daemon.replace("\n#learn_lanes = false\n", "\nlearn_lanes = true\n")).unwrap();
+        assert!(file.settings.unit.learn_lanes);
+        assert_eq!(file.left_out, ["[input]", "[output]"], "it is part of a unit's configuration");
+        let (own, _) = parse(&EXAMPLE.replace("#[unit]", "[unit]\nlearn_lanes = true")).unwrap();
+        assert!(own.settings.unit.learn_lanes);
+    }
+
+    #[test]
+    fn tables_of_files_for_replay_are_told_where_they_belong() {
+        let lanes = "\n[[estimators.lanes]]\npoints = [[0.0, 0.0], [60.0, 0.0]]\n";
+        for (table, key) in [(lanes, "estimators"), ("\n[evaluation]\nmin_speed_mps = 2.0\n", "evaluation")] {
+            let (line, said) = parse(&format!("{EXAMPLE}{table}")).unwrap_err();
+            assert!(line > EXAMPLE.lines().count(), "{line}");
+            assert!(said.starts_with(&format!("unknown field `{key}`: ")), "{said}");
+            assert!(
+                said.contains("--config") && said.contains("`viewshed lanes` writes them without --table"),
+                "{said}"
+            );
+        }
     }
 
     #[test]

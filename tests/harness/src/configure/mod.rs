@@ -11,6 +11,7 @@
 
 pub mod can;
 pub mod file;
+pub mod grids;
 pub mod kept;
 pub mod link;
 pub mod serial;
@@ -22,12 +23,13 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use viewshed::unit::can_service::INCOMPLETE;
 use viewshed::unit::identity::Identified;
-use viewshed::unit::profile::{reference, small};
 use viewshed::unit::said::{Refusal, Said};
 use viewshed::unit::service::PART_LEN;
-use viewshed::unit::settings::{BlockError, Kind, Settings, SettingsCheck, Which};
+use viewshed::unit::settings::{BlockError, Kind, Settings, Which};
 use viewshed::unit::timing::Took;
 
+use file::UnitFile;
+use grids::Grid;
 use link::{Ask, Link};
 
 /// Time after which a question is put again.
@@ -338,29 +340,18 @@ impl Found<'_> {
         took.with_context(|| format!("{place}: {} does not time its frames", self.unit.board()))
     }
 
-    /// What it refuses before it is asked: settings that its grid cannot run with.
+    /// What it refuses before it is asked: settings that its grid cannot run with, a table of another unit.
     ///
     /// # Errors
-    /// Names the parameter.
-    pub fn check(&self, settings: &Settings) -> Result<()> {
-        let check = check_of(self.unit.grid);
-        if let Some(Err(error)) = check.map(|check| check.settings(settings)) {
+    /// Names the parameter, or says what the table is of.
+    pub fn check(&self, file: &UnitFile) -> Result<()> {
+        let Some(grid) = Grid::of(self.unit.grid) else { return Ok(()) };
+        let settings = grid.check.settings(&file.settings).err().map(|error| error.to_string());
+        if let Some(error) = settings.or_else(|| grids::table_refused(file, self.unit.grid)) {
             let [ranges, azimuths] = self.unit.grid;
             bail!("{error} (on a grid of {ranges} x {azimuths}); nothing was sent");
         }
         Ok(())
-    }
-}
-
-/// Whether units of this grid can run with settings.
-fn check_of(grid: [u8; 2]) -> Option<SettingsCheck> {
-    let is = |ranges: usize, azimuths: usize| grid.map(usize::from) == [ranges, azimuths];
-    if is(reference::State::RANGES, reference::State::AZIMUTHS) {
-        Some(reference::CHECK)
-    } else if is(small::State::RANGES, small::State::AZIMUTHS) {
-        Some(small::CHECK)
-    } else {
-        None
     }
 }
 

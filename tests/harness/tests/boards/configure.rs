@@ -155,8 +155,18 @@ fn lanes_heights_and_a_table_are_written_compared_read_and_taken_away_with_the_f
     let (_, text, _) = ask(&["unit.toml"]);
     assert!(text.contains("written as block 2") && !text.contains("[[lanes]]"), "{text}");
 
-    // another profile of the road: the table is not of that one, and the unit says so
+    // another profile of the road: the table is not of that one
     let steeper = std::fs::read_to_string(folder.join("unit.toml")).unwrap().replace("105.7", "107.7");
+    std::fs::write(folder.join("steeper.toml"), &steeper).unwrap();
+    let (code, _, error) = ask(&["steeper.toml", "--check"]);
+    assert!(
+        code == 2 && error.contains("[probability]: the probability table was fitted with configuration"),
+        "{error}"
+    );
+    let (code, text, error) = said(&folder, &["steeper.toml", "--check"]);
+    assert!(code == 2 && text.contains("reference grid: [probability]: the probability table was fitted"), "{text}");
+    assert!(error.contains("no unit can run with this"), "{error}");
+    let steeper = steeper.replace("[probability]\nfile = \"t.toml\"\n", "");
     std::fs::write(folder.join("steeper.toml"), steeper).unwrap();
     let (code, text, _) = ask(&["steeper.toml", "--check"]);
     assert_eq!((code, text.lines().nth(1)), (1, Some("[ground]: another in the unit, one in the file")), "{text}");
@@ -200,7 +210,7 @@ fn what_a_unit_cannot_keep_is_said_before_anything_is_written() {
     std::fs::write(folder.join("t.toml"), table.text().unwrap()).unwrap();
     std::fs::write(folder.join("unit.toml"), example.clone() + "[probability]\nfile = \"t.toml\"\n").unwrap();
     let (code, _, error) = said(&folder, &["unit.toml", "--port", &port]);
-    assert!(code == 2 && error.contains("the table was fitted on a grid of 200 x 128"), "{error}");
+    assert!(code == 2 && error.contains("table was fitted on a grid of 200 x 128"), "{error}");
 }
 
 #[test]
@@ -247,6 +257,15 @@ fn what_cannot_be_used_is_named_before_anything_is_sent() {
     let (code, text, _) = said(&folder, &["unit.toml", "--check"]);
     assert_eq!(code, 0);
     assert_eq!(text, "reference grid: can be used\nsmall grid: can be used\n");
+    file(&folder, "learns.toml", &[("#[unit]", "[unit]\nlearn_lanes = true")]);
+    let (code, text, _) = said(&folder, &["learns.toml", "--check"]);
+    let small = "small grid: learn_lanes: no controller has room for it with this grid, the daemon alone\n";
+    assert_eq!((code, text), (0, format!("reference grid: can be used\n{small}")));
+    let lanes = std::fs::read_to_string(folder.join("unit.toml")).unwrap() + PLACE;
+    std::fs::write(folder.join("lanes.toml"), lanes).unwrap();
+    let (code, text, _) = said(&folder, &["lanes.toml", "--check", "--json", "lanes.json"]);
+    let without = "small grid: can be used\n  not on nucleo-g474re: no room for [[lanes]]\n";
+    assert!(code == 0 && text.starts_with(&format!("reference grid: can be used\n{without}")), "{text}");
     file(&folder, "low.toml", &[("range_max_m = 200.0", "range_max_m = 4.0")]);
     let (code, text, error) = said(&folder, &["low.toml", "--check"]);
     assert!(
