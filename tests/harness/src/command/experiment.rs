@@ -103,13 +103,13 @@ pub struct Args {
     /// Write each unit's table, NAME.probability.toml, and reliability diagram, NAME.png, into this folder
     #[arg(long, value_name = "DIR", requires = "calibration", help_heading = "Results")]
     tables: Option<PathBuf>,
-    /// Run the training scenes in place of those that are reported (crossing, queue)
+    /// Run the training scenes in place of those that are reported (crossing, queue, grade)
     #[arg(long)]
     train: bool,
     /// Judge every Nth frame only, which is faster; estimators are given all frames (all but motorway)
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1000))]
     every: u16,
-    /// Leave out the runs without elevation, which is faster (crossing, queue)
+    /// Leave out the runs without elevation, which is faster (crossing, queue, grade)
     #[arg(long)]
     only_elevation: bool,
     /// Give lanes learnt from 90 s of another day, not those of the traffic's net (crossing)
@@ -149,6 +149,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     };
     let mut outputs = args.outputs.beside(args.beside.iter().flat_map(|path| recording::files(path)));
     outputs.reads(args.judging.files().chain([path.clone()]));
+    if !args.calibration {
+        fit_together(args)?;
+    }
     match args.scene {
         _ if args.calibration => calibration(args, &path, &settings, &mut outputs)?,
         World::Motorway => motorway(args, &path, &settings, &mut outputs)?,
@@ -160,9 +163,33 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Refuses options that are of other worlds.
+fn fit_together(args: &Args) -> Result<()> {
+    use World::{Crossing, GantryCamera, Grade, Motorway, Queue, RadarCamera, TwoRadars};
+    const SCENES: &[World] = &[Crossing, Queue, Grade];
+    // of the plans that are shipped crossings alone name other days
+    let learning = if args.plan.is_some() { SCENES } else { &[Crossing][..] };
+    let options: [(&str, bool, &[World]); 6] = [
+        ("--train", args.train, SCENES),
+        ("--only-elevation", args.only_elevation, SCENES),
+        ("--learn-lanes", args.learn_lanes, learning),
+        ("--every", args.every > 1, &[Crossing, Queue, Grade, GantryCamera, TwoRadars, RadarCamera]),
+        ("--keep", args.keep.is_some(), &[Motorway, Crossing, Queue, Grade, TwoRadars, RadarCamera]),
+        ("--beside", !args.beside.is_empty(), &[Motorway, Crossing, Queue, Grade]),
+    ];
+    for (option, is_asked, worlds) in options {
+        let names = || worlds.iter().map(|world| world.name()).collect::<Vec<_>>().join(", ");
+        ensure!(
+            !is_asked || worlds.contains(&args.scene),
+            "{option} does not go with --scene {}; it goes with {}",
+            args.scene.name(),
+            names()
+        );
+    }
+    Ok(())
+}
+
 fn motorway(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.every > 1 || args.only_elevation || args.learn_lanes;
-    ensure!(!asked, "--train, --every, --only-elevation and --learn-lanes go with --scene crossing or --scene queue");
     let plan = Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
@@ -230,11 +257,6 @@ fn several_scenes(args: &Args, path: &Path, settings: &Settings, outputs: &mut O
 }
 
 fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.only_elevation || args.learn_lanes || args.keep.is_some() || !args.beside.is_empty();
-    ensure!(
-        !asked,
-        "--train, --only-elevation, --learn-lanes, --keep and --beside do not go with --scene gantry-camera"
-    );
     let plan = gantry_camera::Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;
@@ -250,12 +272,6 @@ fn gantry_camera(args: &Args, path: &Path, settings: &Settings, outputs: &mut Ou
 }
 
 fn several_sensors(args: &Args, path: &Path, settings: &Settings, outputs: &mut Outputs) -> Result<()> {
-    let asked = args.train || args.only_elevation || args.learn_lanes || !args.beside.is_empty();
-    ensure!(
-        !asked,
-        "--train, --only-elevation, --learn-lanes and --beside do not go with --scene {}",
-        args.scene.name()
-    );
     let plan = several_sensors::Plan::read(path)?;
     outputs.reads(plan.files()?);
     let json_file = outputs.file("--json", args.json.as_deref())?;

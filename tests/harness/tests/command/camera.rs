@@ -152,5 +152,5 @@ fn the_experiment_of_a_camera_tells_why_what_was_not_found_is_called_visible() {
     assert_eq!(detectors[0]["fvr_causes"]["missed"], 0, "the ideal detector misses nothing that shows");
     assert!(undetected[0] < undetected[1] && undetected[2] < undetected[3], "{undetected:?}");
     let output = viewshed(&folder, "experiment --scene gantry-camera --train");
-    assert!(output.status.code() == Some(2) && stderr(&output).contains("do not go with --scene gantry-camera"));
+    assert!(output.status.code() == Some(2) && stderr(&output).contains("does not go with --scene gantry-camera"));
 }

@@ -50,7 +50,11 @@ fn lanes_are_learnt_only_where_another_day_is_named() {
     let none = experiment(&folder, "plan.toml --scene crossing --learn-lanes");
     assert!(stderr(&none).contains("name no other_days"), "{}", stderr(&none));
     let motorway = experiment(&folder, "--scene motorway --learn-lanes");
-    assert!(stderr(&motorway).contains("--learn-lanes go with --scene crossing"), "{}", stderr(&motorway));
+    assert!(
+        stderr(&motorway).contains("--learn-lanes does not go with --scene motorway; it goes with crossing\n"),
+        "{}",
+        stderr(&motorway)
+    );
     let plan = std::fs::read_to_string(folder.join("plan.toml")).unwrap();
     let day = shipped().join("wide-day-1.fcd.xml.gz");
     std::fs::write(folder.join("plan.toml"), format!("{plan}other_days = [\"{}\"]\n", day.display())).unwrap();
@@ -161,7 +165,13 @@ fn a_plan_of_scenes_that_cannot_be_run_says_why() {
         ("none.toml --scene queue", "[training] has no scenes"),
         ("gone.toml --scene crossing", "gone-2.toml"),
         ("typing.toml --scene crossing", "unknown field `scnes`"),
-        ("--train", "go with --scene crossing or --scene queue"),
+        ("--train", "--train does not go with --scene motorway; it goes with crossing, queue, grade"),
+        ("--scene queue --learn-lanes", "--learn-lanes does not go with --scene queue; it goes with crossing"),
+        ("--scene two-radars --beside a.mcap", "--beside does not go with --scene two-radars; it goes with motorway, "),
+        (
+            "--every 2",
+            "--every does not go with --scene motorway; it goes with crossing, queue, grade, gantry-camera, ",
+        ),
         ("--scene roundabout", "possible values: motorway, crossing, queue, grade, gantry-camera"),
         ("plan.toml --scene crossing --every 0", "0 is not in 1..=1000"),
     ] {

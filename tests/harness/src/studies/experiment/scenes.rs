@@ -122,7 +122,10 @@ impl Plan {
     /// # Errors
     /// The set names none.
     pub fn other_days(&self, set: &Set) -> Result<Vec<PathBuf>> {
-        ensure!(!set.other_days.is_empty(), "these scenes name no other_days that lanes could be learnt from");
+        ensure!(
+            !set.other_days.is_empty(),
+            "these scenes name no other_days that lanes could be learnt from, as those of --scene crossing do"
+        );
         Ok(set.other_days.iter().map(|day| self.folder.join(day)).collect())
     }
 }
