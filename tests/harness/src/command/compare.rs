@@ -104,8 +104,21 @@ fn read(path: &Path) -> Result<Vec<Set>> {
     let value: Value = serde_json::from_str(&text).with_context(place)?;
     let mut sets = Vec::new();
     collect(&value, "", &mut sets).with_context(place)?;
-    ensure!(!sets.is_empty(), "{}: no run of labelled samples; write one with `viewshed replay --json`", place());
+    ensure!(!sets.is_empty(), "{}: {}", place(), nothing_in(&value));
     Ok(sets)
+}
+
+/// Why a file has nothing to compare.
+fn nothing_in(value: &Value) -> &'static str {
+    fn has_run(value: &Value) -> bool {
+        let all = value.as_array().map_or(std::slice::from_ref(value), Vec::as_slice);
+        all.iter().any(|one| one.get("units").is_some() && one.get("estimators").is_some())
+    }
+    if has_run(value) {
+        "a run of a recording without labels, and rates are of labelled objects: put NAME.labels.csv beside the recording (`viewshed label` makes one), and replay it again"
+    } else {
+        "no run of labelled samples; write one with `viewshed replay --json`"
+    }
 }
 
 /// Every object of the file that has units and estimators; `within` names what it lies in.
@@ -219,6 +232,15 @@ mod tests {
         let counted = &found[0].estimators[0].1;
         assert_eq!(counted.by_unit[1], Counts { tv: 5, fv: 6, ti: 7, fi: 8 });
         assert_eq!(counted.by_block[0].blocked_visible, 1);
+    }
+
+    #[test]
+    fn runs_without_labels_are_told_from_files_of_something_else() {
+        let of = |value: Value| (sets(&value).unwrap().len(), nothing_in(&value));
+        assert_eq!(of(json!({ "findings": [] })).0, 0);
+        assert!(of(json!({ "findings": [] })).1.contains("write one with `viewshed replay --json`"));
+        let (found, said) = of(run_of("a", &[], &[]));
+        assert!(found == 0 && said.contains("a recording without labels"), "{said}");
     }
 
     #[test]

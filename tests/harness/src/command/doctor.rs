@@ -34,7 +34,7 @@ const WRONG: u8 = 1;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The log; - reads standard input
-    #[arg(value_name = "LOG", required_unless_present = "can")]
+    #[arg(value_name = "LOG")]
     log: Option<PathBuf>,
     /// Listen to this SocketCAN interface in place of a log
     #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["log", "detections", "interface"])]
@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let report = match (&args.can, &args.log) {
         (Some(interface), _) => listen(interface, args.seconds.unwrap_or(USUAL_S), &options)?,
         (None, Some(log)) => examine(log, &options)?,
-        (None, None) => bail!("neither a log nor an interface"),
+        (None, None) => bail!("say what to examine: LOG, - for standard input, or a bus to listen to: --can INTERFACE"),
     };
     print(&report.text())?;
     if let Some(file) = json {

@@ -47,7 +47,7 @@ use crate::recording::{self, Recording, file};
 #[command(verbatim_doc_comment)]
 pub struct Args {
     /// A recording that viewshed replay takes, or a log of a broadcast that viewshed listen takes
-    #[arg(value_name = "FILE", required_unless_present_any = ["can", "port"])]
+    #[arg(value_name = "FILE")]
     file: Option<PathBuf>,
     /// Listen to a unit behind this serial port
     #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "can"], help_heading = "Live")]
@@ -102,7 +102,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         (Some(path), ..) => from_file(path, args, addresses, key.as_ref(), settings)?,
         (_, Some(port), _) => from_port(port, args.baud, addresses, key.as_ref())?,
         (_, _, Some(interface)) => from_can(interface, addresses, key.as_ref())?,
-        _ => bail!("neither a file nor a port nor an interface"),
+        _ => bail!(
+            "say what to look at: FILE, a recording or the log of a broadcast; or what is live, --port PATH or --can INTERFACE"
+        ),
     };
     let server = Server::bind(args.bind, args.page_port)?;
     print(&format!("{says}\n{}\nCtrl-C ends the server.\n", server.url()))?;

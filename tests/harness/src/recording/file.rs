@@ -20,6 +20,9 @@ const GZIP: [u8; 2] = [0x1F, 0x8B];
 /// A file that cannot be read or unpacked; a terminal as standard input.
 pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     let place = || format!("cannot read {}", shown(path));
+    if path.is_dir() {
+        bail!("{}: it is a folder; name a recording in it, of a ROS 2 bag the .mcap", place());
+    }
     let bytes =
         if path == Path::new(STANDARD_INPUT) { standard_input()? } else { std::fs::read(path).with_context(place)? };
     if !bytes.starts_with(&GZIP) {
@@ -91,6 +94,12 @@ mod tests {
         std::fs::write(&path, &whole[..10]).unwrap();
         assert!(bytes(&path).unwrap_err().to_string().contains("a.log.gz"));
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_is_no_recording() {
+        let error = bytes(&std::env::temp_dir()).unwrap_err().to_string();
+        assert!(error.starts_with("cannot read ") && error.contains("name a recording in it"), "{error}");
     }
 
     #[test]

@@ -57,6 +57,9 @@ pub fn read_rows<Row: DeserializeOwned>(path: &Path) -> Result<Vec<(u64, Row)>> 
     let mut csv =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).with_context(place)?;
     let headers = csv.headers().with_context(place)?.clone();
+    if let Some(wrong) = other_separator(&headers, path) {
+        bail!("{}: {wrong}", place());
+    }
     let mut rows = Vec::new();
     for record in csv.records() {
         // the error of a record that is none has its line in it
@@ -65,6 +68,23 @@ pub fn read_rows<Row: DeserializeOwned>(path: &Path) -> Result<Vec<(u64, Row)>> 
         rows.push((line, record.deserialize(Some(&headers)).with_context(|| at_line(path, line))?));
     }
     Ok(rows)
+}
+
+/// What a spreadsheet of another language writes between columns, if that stands in a file's one column; and in numbers.
+fn other_separator(headers: &csv::StringRecord, path: &Path) -> Option<String> {
+    let (1, Some(all)) = (headers.len(), headers.get(0)) else { return None };
+    let (separator, name) = [(';', "semicolons"), ('\t', "tabs"), ('|', "bars")]
+        .into_iter()
+        .find(|(separator, _)| all.contains(*separator))?;
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let is_decimal = |value: &str| {
+        let halves = value.trim().split_once(',');
+        let digits = |half: &str| !half.is_empty() && half.chars().all(|c| c.is_ascii_digit());
+        halves.is_some_and(|(whole, rest)| digits(whole.trim_start_matches('-')) && digits(rest))
+    };
+    let has_decimal_commas = text.lines().any(|line| line.split(separator).any(is_decimal));
+    let and = if has_decimal_commas { ", and its numbers have decimal commas, where points are read" } else { "" };
+    Some(format!("its columns are separated by {name}, not by commas{and}; export it with commas and points"))
 }
 
 /// A line of a file, for errors.
@@ -194,4 +214,33 @@ pub fn read_occlusion(path: &Path) -> Result<BTreeMap<String, u8>> {
         grades.insert(row.object_id, row.occlusion_0_to_2);
     }
     Ok(grades)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_of_other_languages_are_named() {
+        let folder = std::env::temp_dir().join(format!("viewshed-separators-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("a.labels.csv");
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            read_rows::<LabelRow>(&path).map(|rows| rows.len()).map_err(|error| format!("{error:#}"))
+        };
+        let head = "time_s,object_id,class,x_m,y_m";
+        assert_eq!(read(&format!("{head}\n0.5,1,car,20.5,-1.75\n")), Ok(1));
+        for (separator, name) in [(";", "semicolons"), ("\t", "tabs")] {
+            let head = head.replace(',', separator);
+            let points = ["0.5", "1", "car", "20.5", "-1.75"].join(separator);
+            let said = read(&format!("# of a place\n{head}\n{points}\n")).unwrap_err();
+            assert!(said.contains(&format!("a.labels.csv: its columns are separated by {name}")), "{said}");
+            assert!(!said.contains("decimal commas"), "{said}");
+            let commas = points.replace('.', ",");
+            assert!(read(&format!("{head}\n{commas}\n")).unwrap_err().contains("its numbers have decimal commas"));
+        }
+        assert!(read("object_id\n1\n").unwrap_err().contains("missing field `time_s`"));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -247,7 +247,11 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
         let (messages, broken) = native::unstuff(&bytes);
         native::read(name, &messages, broken, options)?
     } else {
-        mcap::parse(&bytes, name, options)?
+        bail!(
+            "{}: not an MCAP file, nor another that is read: a log of {}, a capture of a TI mmWave radar's data port or of the native format, a camera's boxes in NAME.boxes.csv; each may be gzipped",
+            file::shown(path),
+            can_log::FORMATS
+        );
     };
     beside::complete(recording, path, options)
 }

@@ -333,8 +333,8 @@ fn bad() -> Vec<Bad> {
         // no recording at all
         ("no file", "absent.mcap", vec![], "", "cannot read absent.mcap"),
         ("an empty file", "a.mcap", vec![], "", "not an MCAP file"),
-        ("a folder", ".", vec![], "", "cannot read ."),
-        ("a text", "a.txt", b"hello\n".to_vec(), "", "not an MCAP file"),
+        ("a folder", ".", vec![], "", "cannot read .: it is a folder; name a recording in it"),
+        ("a text", "a.txt", b"hello\n".to_vec(), "", "not an MCAP file, nor another that is read: a log of `candump`"),
         ("JSON", "a.json", b"{\"a\": 1}".to_vec(), "", "it is JSON; export it as MCAP"),
         (
             "a bag of ROS 1",

@@ -246,7 +246,9 @@ fn what_is_no_source_is_refused_with_what_to_do() {
         (&["view", "text.log"][..], "text.log: not an MCAP file"),
         (&["view", "missing.mcap"], "missing.mcap"),
         (&["view", "--port", "/dev/no-such-port"], "no such port"),
-        (&["view"], "required"),
+        (&["view"], "say what to look at: FILE"),
+        (&["doctor"], "say what to examine: LOG"),
+        (&["configure"], "--port PATH or --can INTERFACE: --read"),
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
         let output = command.current_dir(&folder).args(arguments).output().unwrap();
