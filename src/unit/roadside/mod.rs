@@ -347,7 +347,7 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
         if let Some(maps) = &mut self.maps {
             maps.unit.broadcast().count_dropped(late);
         }
-        if !self.outbox.flush(now, &mut self.broadcast_bus, port) {
+        if !self.outbox.flush(&mut self.broadcast_bus, port) {
             return;
         }
         let safe = self.safe_status();

@@ -22,24 +22,22 @@ impl Outbox {
         Self { deadlines: [Time::from_micros(0); MAILBOXES], held: None }
     }
 
-    /// Takes the mailboxes' frames back if the oldest is late; how many they were.
+    /// Takes the mailboxes' frames back if the oldest is late, and the one that waits if that is; how many they were.
     pub fn take_back(&mut self, now: Time, port: &mut impl CanPort) -> u16 {
+        let held = u16::from(self.held.take_if(|(_, deadline)| now > *deadline).is_some());
         let waiting = port.waiting().min(MAILBOXES);
         let oldest = MAILBOXES.checked_sub(waiting).and_then(|k| self.deadlines.get(k));
         if oldest.is_none_or(|deadline| now <= *deadline) {
-            return 0;
+            return held;
         }
         port.abort();
-        u16::try_from(waiting).unwrap_or(u16::MAX)
+        u16::try_from(waiting).unwrap_or(u16::MAX).saturating_add(held)
     }
 
-    /// Sends the frame that waits; whether there is none left.
-    pub fn flush(&mut self, now: Time, bus: &mut BusKeeper, port: &mut impl CanPort) -> bool {
-        match self.held.take() {
-            Some((frame, deadline)) if now <= deadline => self.hand_over(frame, deadline, bus, port),
-            // none, or too late
-            _ => true,
-        }
+    /// Sends the frame that waits; whether there is none left. What is late was [taken back](Self::take_back).
+    pub fn flush(&mut self, bus: &mut BusKeeper, port: &mut impl CanPort) -> bool {
+        let Some((frame, deadline)) = self.held.take() else { return true };
+        self.hand_over(frame, deadline, bus, port)
     }
 
     /// Sends a frame, or keeps it until there is room. `map` is the deadline of the map it may belong to.
@@ -121,13 +119,13 @@ mod tests {
         let mut port = Port::default();
         let (mut bus, mut outbox) = (bus(&mut port), Outbox::new());
         for id in 1..=4 {
-            assert!(outbox.flush(at(0), &mut bus, &mut port));
+            assert!(outbox.flush(&mut bus, &mut port));
             outbox.send(frame(id), Some(at(80)), at(0), &mut bus, &mut port);
         }
         assert_eq!(port.mailboxes, [1, 2, 3]);
-        assert!(!outbox.flush(at(1), &mut bus, &mut port), "no other one until it is gone");
+        assert!(!outbox.flush(&mut bus, &mut port), "no other one until it is gone");
         port.mailboxes.pop_front();
-        assert!(outbox.flush(at(2), &mut bus, &mut port));
+        assert!(outbox.flush(&mut bus, &mut port));
         assert_eq!(port.mailboxes, [2, 3, 4]);
     }
 
@@ -148,12 +146,14 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_waited_too_long_is_dropped() {
+    fn a_frame_that_waited_too_long_is_dropped_and_counted() {
         let mut port = Port::default();
         let (mut bus, mut outbox) = (bus(&mut port), Outbox::new());
         (1..=4).for_each(|id| outbox.send(frame(id), Some(at(80)), at(0), &mut bus, &mut port));
+        assert_eq!(outbox.take_back(at(80), &mut port), 0);
         port.abort();
-        assert!(outbox.flush(at(81), &mut bus, &mut port));
+        assert_eq!(outbox.take_back(at(81), &mut port), 1);
+        assert!(outbox.flush(&mut bus, &mut port));
         assert_eq!(port.waiting(), 0);
     }
 }
