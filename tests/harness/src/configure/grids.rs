@@ -131,7 +131,7 @@ mod tests {
         GRIDS.map(|grid| grid.not_on(file))
     }
 
-    const LANES: &str = "[[lanes]]\npoints = [[0.0, -1.75], [60.0, -1.75]]\n\n[mount]";
+    const LANES: &str = "\n[[lanes]]\npoints = [[0.0, -1.75], [60.0, -1.75]]\n\n[mount]\n";
 
     #[test]
     fn the_example_is_for_every_board() {
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn boards_without_room_are_named() {
-        let of_lanes = boards(&example("[mount]", LANES, Some(0)));
+        let of_lanes = boards(&example("\n[mount]\n", LANES, Some(0)));
         let expected = [
             vec![("zcu102-r5", "[probability]".to_owned())],
             vec![("zcu102-r5", "[probability]".to_owned()), ("nucleo-g474re", "[[lanes]], [probability]".to_owned())],

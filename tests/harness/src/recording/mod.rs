@@ -248,8 +248,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
         native::read(name, &messages, broken, options)?
     } else {
         bail!(
-            "{}: not an MCAP file, nor another that is read: a log of {}, a capture of a TI mmWave radar's data port or of the native format, a camera's boxes in NAME.boxes.csv; each may be gzipped",
-            file::shown(path),
+            "not an MCAP file, nor another that is read: a log of {}, a capture of a TI mmWave radar's data port or of the native format, a camera's boxes in NAME.boxes.csv; each may be gzipped",
             can_log::FORMATS
         );
     };
