@@ -6,8 +6,9 @@
 //! pairs agree on.
 //!
 //! - *Sign*: over one frame, pairs with the velocity as it stands against pairs with its opposite.
-//! - *Yaw*: over [`PAUSE_S`], the direction in the road frame from one to the other. Traffic runs along the road's axis,
-//!   or across it, so the direction most pairs have is a multiple of 90 degrees.
+//! - *Yaw*: over [`PAUSE_S`], the direction in the road frame from one to the other. Most pairs have that of the road's
+//!   axis. A few degrees off it the yaw is wrong by as much. Farther off it may as well be another road's, or one's square
+//!   to it: then no angle is advised. Nothing is said of a direction in which labelled vehicles drive, too.
 //! - *Height and pitch*: the median height above the road of what moves, over its distance. By a height that is wrong
 //!   it is off everywhere, by a pitch that is wrong the more the farther.
 
@@ -32,7 +33,7 @@ const YAW_DEG: f64 = 1.5;
 const PITCH_DEG: f64 = 0.8;
 const HEIGHT_M: f64 = 0.6;
 
-/// A direction farther off is another road.
+/// Farther off it may be another road.
 const MOST_YAW_DEG: f64 = 6.0;
 
 const TOPIC: &str = "mount";
@@ -41,6 +42,8 @@ const TOPIC: &str = "mount";
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MountError {
     pub yaw_deg: Option<f64>,
+    /// Direction of most traffic from the road's axis where that is too far off to be the yaw's error for sure, -90 to 90.
+    pub off_axis_deg: Option<f64>,
     /// Pitch in degrees and height in metres.
     pub pitch_and_height: Option<(f64, f64)>,
 }
@@ -61,7 +64,7 @@ pub fn check(recording: &mut Recording) {
         return;
     }
     let error = mount_error(&recording.frames, &recording.pose);
-    if let Some(yaw) = error.yaw_deg.filter(|yaw| yaw.abs() >= YAW_DEG) {
+    if let Some(yaw) = error.yaw_deg.filter(|yaw| yaw.abs() >= YAW_DEG && !is_a_road(*yaw, recording)) {
         add(
             &mut recording.problems,
             told(
@@ -72,6 +75,15 @@ pub fn check(recording: &mut Recording) {
                 "traffic does not run along the road's axis",
             ),
         );
+    }
+    if let Some(off) = error.off_axis_deg.filter(|off| off_any(*off) >= YAW_DEG && !is_a_road(*off, recording)) {
+        let what = format!(
+            "traffic runs {:.1} degrees off the road's axis and {:.1} off what is square to it: yaw {:.1} degrees is wrong, or the axis is of another road; look at the picture",
+            off.abs(),
+            90.0 - off.abs(),
+            recording.pose.yaw_rad().to_degrees()
+        );
+        add(&mut recording.problems, what);
     }
     // on a road that is known not to be flat both follow the road
     let flat = recording.truth.as_ref().is_none_or(|truth| truth.ground.is_level());
@@ -96,6 +108,11 @@ pub fn check(recording: &mut Recording) {
             );
         }
     }
+}
+
+/// How far a direction is from the road's axis and from what is square to it, whichever is nearer; degrees.
+fn off_any(direction: f64) -> f64 {
+    direction.abs().min(90.0 - direction.abs())
 }
 
 fn told(what: &str, error: f64, unit: &str, given: f64, why: &str) -> String {
@@ -133,10 +150,17 @@ pub fn signs(frames: &[Frame]) -> (usize, usize) {
 
 /// By how much the mount is off.
 pub fn mount_error(frames: &[Frame], pose: &SensorPose) -> MountError {
-    MountError { yaw_deg: yaw_error(frames, pose), pitch_and_height: pitch_and_height(frames, pose) }
+    let off = commonest(&directions(frames, pose));
+    let is_error = |off: &f64| off.abs() <= MOST_YAW_DEG;
+    MountError {
+        yaw_deg: off.filter(is_error),
+        off_axis_deg: off.filter(|off| !is_error(off)),
+        pitch_and_height: pitch_and_height(frames, pose),
+    }
 }
 
-fn yaw_error(frames: &[Frame], pose: &SensorPose) -> Option<f64> {
+/// Directions of pairs in the road frame, degrees, -90 to 90.
+fn directions(frames: &[Frame], pose: &SensorPose) -> Vec<f64> {
     let mut directions = Vec::new();
     for (k, before) in spread(frames.iter().enumerate()) {
         let Some(after) = frames[k..].iter().find(|after| seconds(before, after) >= PAUSE_S) else { break };
@@ -158,23 +182,54 @@ fn yaw_error(frames: &[Frame], pose: &SensorPose) -> Option<f64> {
                 let (x, y) = (to[0] - from[0], to[1] - from[1]);
                 // across the line of sight everything fits
                 if y.hypot(x) < 2.0 * passed * f64::from(d.radial_velocity_mps.abs()) {
-                    directions.push((y.atan2(x).to_degrees() + 45.0).rem_euclid(90.0) - 45.0);
+                    directions.push(axis_deg([x, y]));
                 }
             }
         }
     }
-    directions.sort_by(f64::total_cmp);
+    directions
+}
+
+/// The direction that most have, where one stands out from those beside it and from chance; degrees, -90 to 90.
+fn commonest(directions: &[f64]) -> Option<f64> {
+    // an axis has no front: what is near one end is near the other
+    let again = directions.iter().map(|d| if *d < 0.0 { d + 180.0 } else { d - 180.0 });
+    let mut sorted: Vec<f64> = directions.iter().copied().chain(again).collect();
+    sorted.sort_by(f64::total_cmp);
     let within = |middle: f64, half: f64| {
-        let start = directions.partition_point(|d| *d < middle - half);
-        &directions[start..directions.partition_point(|d| *d <= middle + half)]
+        let start = sorted.partition_point(|d| *d < middle - half);
+        &sorted[start..sorted.partition_point(|d| *d <= middle + half)]
     };
-    let steps = (0..=180).map(|step| -45.0 + 0.5 * f64::from(step));
+    let steps = (0..360).map(|step| -90.0 + 0.5 * f64::from(step));
     let most = steps.max_by_key(|middle| within(*middle, 1.5).len())?;
     let near = within(most, 2.5);
-    // where roads bend or cross at any angle no direction stands out from those beside it, nor from chance
+    // where roads bend no direction stands out
     let stands_out = 100 * within(most, 1.5).len() >= 42 * within(most, 4.0).len();
     let agreed = near.len() >= 300 && 3 * near.len() >= within(most, 15.0).len();
-    (stands_out && agreed && most.abs() <= MOST_YAW_DEG).then(|| near.iter().sum::<f64>() / near.len() as f64)
+    (stands_out && agreed).then(|| near.iter().sum::<f64>() / near.len() as f64)
+}
+
+/// The direction of a step along a road, whichever way: degrees, -90 to 90.
+fn axis_deg([x, y]: [f64; 2]) -> f64 {
+    (y.atan2(x).to_degrees() + 90.0).rem_euclid(180.0) - 90.0
+}
+
+/// Whether many labelled vehicles drive in this direction: then a road runs there, whatever the axis is of.
+fn is_a_road(direction: f64, recording: &Recording) -> bool {
+    let Some(truth) = &recording.truth else { return false };
+    let driven: Vec<f64> = spread(recording.frames.iter())
+        .flat_map(|frame| truth.at(frame.time_ns))
+        .filter(|object| object.speed().is_some_and(|speed| speed >= f64::from(LEAST_SPEED_MPS)))
+        .filter_map(|object| object.velocity.map(axis_deg))
+        .collect();
+    let near = |middle: f64| driven.iter().filter(|d| axis_apart(**d, middle).abs() <= 1.5).count();
+    let most = (0..180).map(|k| near(f64::from(k) - 90.0)).max().unwrap_or(0);
+    most > 0 && 3 * near(direction) >= most
+}
+
+/// From one direction to another, degrees, -90 to 90.
+fn axis_apart(from: f64, to: f64) -> f64 {
+    (from - to + 90.0).rem_euclid(180.0) - 90.0
 }
 
 fn pitch_and_height(frames: &[Frame], pose: &SensorPose) -> Option<(f64, f64)> {
@@ -219,4 +274,88 @@ fn spread<I: ExactSizeIterator>(all: I) -> impl Iterator<Item = I::Item> {
 
 fn seconds(before: &Frame, after: &Frame) -> f64 {
     after.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::samples::by_hand;
+    use crate::geometry::pose::Spherical;
+    use crate::geometry::solid::Solid;
+    use crate::recording::truth::{Label, Truth};
+
+    /// Traffic on a road in this direction, seen by a radar of yaw 0 that is said to have `yaw_deg`.
+    fn traffic(direction_deg: f64, yaw_deg: f64, labelled: bool) -> Recording {
+        let mut recording = by_hand::recording(300, 0);
+        let (s, c) = direction_deg.to_radians().sin_cos();
+        let mut labels = Vec::new();
+        for (k, frame) in recording.frames.iter_mut().enumerate() {
+            frame.time_ns = k as i64 * 100_000_000;
+            for vehicle in 0..12 {
+                let (lane, speed) = if vehicle % 2 == 0 { (-8.0, 15.0) } else { (-4.5, -17.0) };
+                let along = (37.0 * f64::from(vehicle) + speed * 0.1 * k as f64).rem_euclid(444.0) - 222.0;
+                let place = [c * along - s * lane, s * along + c * lane, USUAL_HEIGHT_M];
+                let Spherical { range_m, azimuth_rad, elevation_rad } = recording.pose.to_spherical(place);
+                if range_m > 200.0 || azimuth_rad.abs() > 1.0 {
+                    continue;
+                }
+                let radial = (place[0] * c + place[1] * s) * speed / range_m;
+                frame.detections.push(RadarDetection {
+                    range_m: range_m as f32,
+                    azimuth_rad: azimuth_rad as f32,
+                    elevation_rad: Some(elevation_rad as f32),
+                    radial_velocity_mps: radial as f32,
+                    rcs_dbsm: None,
+                    snr_db: None,
+                });
+                let solid = Solid { center: place, yaw_rad: 0.0, size: [4.6, 1.8, 1.5] };
+                // a vehicle that begins anew is another
+                let lap = (37.0 * f64::from(vehicle) + speed * 0.1 * k as f64).div_euclid(444.0);
+                let id = format!("{vehicle} {lap}");
+                labels.push(Label { time_ns: frame.time_ns, id, class: "car".into(), solid });
+            }
+        }
+        recording.truth = labelled.then(|| Truth::new(labels));
+        recording.pose = SensorPose::new(recording.pose.position, yaw_deg.to_radians(), 0.0, 0.0);
+        recording
+    }
+
+    fn said(mut recording: Recording) -> String {
+        check(&mut recording);
+        recording.problems.iter().map(|p| p.what).collect::<Vec<_>>().join("\n")
+    }
+
+    #[test]
+    fn a_yaw_that_is_little_wrong_is_told_by_how_much() {
+        for yaw in [-5.0, -3.0, 3.0, 5.0_f64] {
+            let said = said(traffic(0.0, yaw, false));
+            let word = if yaw > 0.0 { "large" } else { "small" };
+            assert!(said.contains(&format!("yaw {yaw:.1} degrees seems {:.1} too {word}", yaw.abs())), "{said}");
+        }
+        assert_eq!(said(traffic(0.0, 0.0, false)), "");
+    }
+
+    #[test]
+    fn a_yaw_that_is_badly_wrong_is_named_and_no_angle_advised() {
+        for yaw in [-84.0, -60.0, -28.0, -14.0, -8.0, 8.0, 10.0, 15.0, 30.0, 45.0, 84.0_f64] {
+            for labelled in [false, true] {
+                let mut recording = traffic(0.0, yaw, false);
+                // labels are in the frame of the road, whatever the mount is said to be
+                recording.truth = traffic(0.0, 0.0, labelled).truth;
+                let said = said(recording);
+                let off = format!("runs {:.1} degrees off the road's axis and {:.1} off", yaw.abs(), 90.0 - yaw.abs());
+                assert!(said.contains(&off) && said.contains("look at the picture"), "{yaw}: {said}");
+                assert!(!said.contains("too large") && !said.contains("too small"), "{yaw}: {said}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_road_that_is_not_the_axis_s_is_no_error_where_labelled_vehicles_drive_along_it() {
+        for direction in [-38.0, -10.0, 4.0, 30.0] {
+            assert_eq!(said(traffic(direction, 0.0, true)), "", "{direction}");
+            assert!(said(traffic(direction, 0.0, false)).contains("the road's axis"), "{direction}");
+        }
+        assert_eq!(said(traffic(90.0, 0.0, false)), "", "square to the axis");
+    }
 }
