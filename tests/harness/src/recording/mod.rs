@@ -9,6 +9,7 @@ pub mod capture;
 pub mod clock;
 pub mod file;
 pub mod foreign;
+mod ignored;
 pub mod labels;
 pub mod mcap;
 pub mod native;
@@ -30,6 +31,7 @@ use anyhow::{Result, bail};
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
 use camera::RecordedCamera;
+use ignored::Kind;
 use problems::Problems;
 
 /// One low-level radar measurement, as recorded.
@@ -204,7 +206,10 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
     let (mut found, mut said, mut all) = (Vec::new(), String::new(), true);
     for topic in &topics {
         let of_one = ReadOptions { radar_topic: Some(topic.clone()), one_of_several: true, ..options.clone() };
-        let outcome = mcap::parse(&bytes, name.clone(), &of_one).and_then(|r| beside::complete(r, path, &of_one));
+        let outcome = mcap::parse(&bytes, name.clone(), &of_one).and_then(|mut r| {
+            ignored::note(&mut r, options, Kind::Other);
+            beside::complete(r, path, &of_one)
+        });
         match outcome {
             Ok(recording) => {
                 said += &format!("\n  {topic}: can be read");
@@ -233,24 +238,25 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     let (bytes, name) = (file::bytes(path)?, file::stem(path));
-    let recording = if boxes::is_boxes(path) {
-        boxes::read(path, &bytes, options)?
+    let (mut recording, kind) = if boxes::is_boxes(path) {
+        (boxes::read(path, &bytes, options)?, Kind::Other)
     } else if bytes.starts_with(::mcap::MAGIC) {
-        mcap::parse(&bytes, name, options)?
+        (mcap::parse(&bytes, name, options)?, Kind::Other)
     } else if let Some(format) = can_log::Format::of(&bytes) {
-        ars408::read(name, &bytes, format, options)?
+        (ars408::read(name, &bytes, format, options)?, Kind::CanLog)
     } else if let Some(foreign) = foreign::named(&bytes) {
         bail!("{} cannot be read: {foreign}", file::shown(path));
     } else if ti::is_capture(&bytes) {
-        ti::read(name, &bytes, options)?
+        (ti::read(name, &bytes, options)?, Kind::TiCapture)
     } else if native::is_capture(&bytes) {
         let (messages, broken) = native::unstuff(&bytes);
-        native::read(name, &messages, broken, options)?
+        (native::read(name, &messages, broken, options)?, Kind::NativeCapture)
     } else {
         bail!(
             "not an MCAP file, nor another that is read: a log of {}, a capture of a TI mmWave radar's data port or of the native format, a camera's boxes in NAME.boxes.csv; each may be gzipped",
             can_log::FORMATS
         );
     };
+    ignored::note(&mut recording, options, kind);
     beside::complete(recording, path, options)
 }

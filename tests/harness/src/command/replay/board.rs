@@ -22,7 +22,7 @@ use crate::results::files::{Folder, Target};
 use crate::{estimators, recording};
 
 #[derive(Debug, clap::Args)]
-#[command(next_help_heading = "Processor in the loop")]
+#[command(next_help_heading = "Processor in the loop", group = clap::ArgGroup::new("processor").args(["board", "port"]))]
 pub struct BoardArgs {
     /// Run radar-3d on this emulated controller too and compare every frame; fails if one differs
     ///
@@ -31,8 +31,8 @@ pub struct BoardArgs {
     /// in all and by stage, and the stack used. No rates are reported then.
     #[arg(long, value_name = "BOARD", value_enum)]
     pub board: Option<Board>,
-    /// Grid of the board; both if not given
-    #[arg(long, value_name = "PROFILE", value_enum)]
+    /// Grid of the board; both if not given (of maps here: --grid-size)
+    #[arg(long, value_name = "PROFILE", value_enum, requires = "processor")]
     profile: Option<Profile>,
     /// Run the board's live program: scans over its serial line or clusters over its CAN bus, maps back
     ///
