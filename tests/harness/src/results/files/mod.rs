@@ -6,6 +6,7 @@
 pub mod one_file;
 mod unfinished;
 
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -34,19 +35,20 @@ impl OutputArgs {
     }
 }
 
-/// A file by its path, or a folder with the number of its files.
-type Place = (PathBuf, Option<usize>);
+/// A file by its path, or a folder with its files.
+type Place = (PathBuf, Option<BTreeSet<PathBuf>>);
 
 /// What was written, in the order it was finished.
 #[derive(Debug, Clone, Default)]
 struct Written(Arc<Mutex<Vec<Place>>>);
 
 impl Written {
-    fn add(&self, path: &Path, in_folder: bool) {
+    fn add(&self, path: &Path, folder: Option<&Path>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match all.iter_mut().find(|(known, _)| known == path) {
-            Some((_, files)) => *files = files.map(|n| n + 1),
-            None => all.push((path.to_owned(), in_folder.then_some(1))),
+        let place = folder.unwrap_or(path);
+        match all.iter_mut().find(|(known, _)| known == place) {
+            Some((_, files)) => drop(files.as_mut().map(|files| files.insert(path.to_owned()))),
+            None => all.push((place.to_owned(), folder.map(|_| BTreeSet::from([path.to_owned()])))),
         }
     }
 }
@@ -126,17 +128,36 @@ impl Outputs {
         Ok(Folder { option, path, root, inputs: self.inputs.clone(), written: self.written.clone() })
     }
 
-    /// A line for each file and folder that was written.
+    /// A line for each file and folder that was written, and one for pictures there that were not.
     pub fn told(&self) -> String {
         let all = self.written.0.lock().unwrap_or_else(PoisonError::into_inner);
         let line = |(path, files): &Place| match files {
             None => format!("wrote {}\n", path.display()),
-            Some(1) => format!("wrote 1 file into {}\n", path.display()),
-            Some(files) => format!("wrote {files} files into {}\n", path.display()),
+            Some(files) => {
+                let (n, s) = (files.len(), if files.len() == 1 { "" } else { "s" });
+                format!("wrote {n} file{s} into {}\n{}", path.display(), told_of_others(path, files))
+            }
         };
         all.iter().map(line).collect()
     }
 }
+
+/// Which pictures beside those of this run are in its folders, where there are any.
+fn told_of_others(root: &Path, written: &BTreeSet<PathBuf>) -> String {
+    let folders: BTreeSet<&Path> = written.iter().filter_map(|path| path.parent()).collect();
+    let entries = folders.iter().flat_map(std::fs::read_dir).flatten().flatten().map(|entry| entry.path());
+    let is_picture = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "png");
+    let others: BTreeSet<PathBuf> = entries.filter(is_picture).filter(|path| !written.contains(path)).collect();
+    let shown = |path: &PathBuf| path.strip_prefix(root).unwrap_or(path).display().to_string();
+    let mut names: Vec<String> = others.iter().take(OTHERS_SHOWN).map(shown).collect();
+    if others.len() > OTHERS_SHOWN {
+        names.push(format!("{} more", others.len() - OTHERS_SHOWN));
+    }
+    if names.is_empty() { String::new() } else { format!("not of this run, but there before: {}\n", names.join(", ")) }
+}
+
+/// How many of them are named.
+const OTHERS_SHOWN: usize = 8;
 
 /// Finds out before anything is computed whether files can be made in a folder.
 fn can_be_written(option: &str, folder: &Path) -> Result<()> {
@@ -198,10 +219,7 @@ impl Target {
     /// It cannot be written.
     pub fn create(&self) -> Result<Unfinished> {
         let (written, folder, path) = (self.written.clone(), self.folder.clone(), self.path.clone());
-        Unfinished::create(&self.path, move || match &folder {
-            Some(folder) => written.add(folder, true),
-            None => written.add(&path, false),
-        })
+        Unfinished::create(&self.path, move || written.add(&path, folder.as_deref()))
     }
 
     /// Writes the whole file.
@@ -300,6 +318,23 @@ mod tests {
         outputs(&[], true).file("--json", Some(&file)).unwrap().unwrap().write("now").unwrap();
         assert_eq!((fs::read(&file).unwrap(), fs::read(&empty).unwrap()), (b"now".to_vec(), b"now".to_vec()));
         assert_eq!(names(&folder), ["empty", "r.json"]);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn pictures_of_an_earlier_run_are_named() {
+        let folder = folder("earlier");
+        let draw = |names: &[&str]| {
+            let outputs = outputs(&[], false);
+            let into = outputs.folder("--out", &folder).unwrap();
+            names.iter().for_each(|name| into.folder("camera").file(name).unwrap().write("drawn").unwrap());
+            outputs.told()
+        };
+        assert!(!draw(&["a.png", "b.png", "table.txt"]).contains("before"));
+        let told = draw(&["b.png"]);
+        let camera = Path::new("camera").join("a.png");
+        assert!(told.contains("wrote 1 file into"), "{told}");
+        assert!(told.ends_with(&format!("not of this run, but there before: {}\n", camera.display())), "{told}");
         fs::remove_dir_all(folder).unwrap();
     }
 
