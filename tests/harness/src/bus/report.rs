@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::entropy::Entropy;
 use super::load::Load;
 use super::loss::Arrived;
+use super::traffic::A;
 use crate::results::report::table::table;
 
 /// What one recording's maps cost.
@@ -12,16 +13,25 @@ use crate::results::report::table::table;
 pub struct Report {
     /// File stem.
     pub recording: String,
+    /// The row of `replay`'s table whose maps were sent.
+    pub estimator: String,
     pub scans: usize,
     pub scans_per_second: f64,
     pub buses: Vec<Load>,
     /// What a receiver has, by bus and share of frames lost.
     pub received: Vec<Arrived>,
     pub entropy_bytes_per_scan: Entropy,
-    /// Azimuths of scans that were dropped, most of all buses.
-    pub dropped: u16,
+    /// Buses on which azimuths of scans were dropped.
+    pub dropped: Vec<Dropped>,
     /// Unknown cells between known ones, which travel as not visible.
     pub holes: u64,
+}
+
+/// What was not sent in time.
+#[derive(Debug, Clone, Serialize)]
+pub struct Dropped {
+    pub bus: &'static str,
+    pub azimuths: u16,
 }
 
 /// `fd-500k-2M-authenticated` in two lines.
@@ -52,9 +62,10 @@ impl Report {
             ["bus", "lost %", "visible cells\nthere %", "worst 5 %\nof scans", "scans\nequal %", "wrongly\nvisible"];
         let Entropy { neighbours, previous_scan } = self.entropy_bytes_per_scan;
         let mut text = format!(
-            "{}: {} scans of radar-3d, {:.1} a second\n{}\n",
+            "{}: {} scans of {}, {:.1} a second\n{}\n",
             self.recording,
             self.scans,
+            self.estimator,
             self.scans_per_second,
             table(&headings, loads)
         );
@@ -63,8 +74,12 @@ impl Report {
             "Entropy of the maps: {neighbours:.0} bytes a scan given the neighbours, {previous_scan:.0} given the previous scan too.\n"
         );
         text += &format!("{}\n", table(&arrived, received));
-        if self.dropped > 0 {
-            text += &format!("{} azimuths were not sent in time.\n", self.dropped);
+        for Dropped { bus, azimuths } in &self.dropped {
+            text += &format!("On {bus} {azimuths} of {} azimuths were not sent in time.\n", self.scans * A);
+        }
+        if !self.dropped.is_empty() {
+            text += "What is late is left out, and a receiver says unknown there. On CAN FD there is room; on classic CAN with a \
+                     smaller gap between frames, where the bus has it to spare: gap_us of [output] in a daemon's file, 1000 here.\n";
         }
         if self.holes > 0 {
             text += &format!("{} unknown cells between known ones were sent as not visible.\n", self.holes);

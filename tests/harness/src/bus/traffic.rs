@@ -54,6 +54,8 @@ pub struct Scan {
 
 /// The maps of a recording, and what they are of.
 pub struct Maps {
+    /// The row of `replay`'s table that they are.
+    pub estimator: String,
     pub header: Header,
     pub scans: Vec<Scan>,
     /// Unknown cells between known ones; on the wire they are not visible.
@@ -103,7 +105,7 @@ impl Maps {
         )
         .map_err(|error| anyhow!("the maps of {} cannot be sent: {error:?}", recording.name))?;
         let header = Header { probability: quantiser.map(Quantiser::levels), ..header };
-        Ok(Self { header, scans, holes })
+        Ok(Self { estimator: estimators::unit_name(recording, options)?, header, scans, holes })
     }
 }
 

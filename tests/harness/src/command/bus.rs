@@ -19,15 +19,17 @@ use crate::bus::ears::Key;
 use crate::bus::entropy::Entropy;
 use crate::bus::load::Load;
 use crate::bus::loss::{Arrived, LOSSES};
-use crate::bus::report::Report;
+use crate::bus::report::{Dropped, Report};
 use crate::bus::symbols::{self, Symbols};
 use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
 use crate::command::options::SettingsArgs;
+use crate::estimators::at_risk;
 use crate::evaluation::probability::file::Fitted;
 use crate::recording;
 use crate::recording::can_log::{Content, Line};
 use crate::recording::serial_log::Chunk;
 use crate::results::files::{OutputArgs, Target};
+use crate::results::report::notes;
 
 /// Send a recording's maps over CAN, CAN FD and a serial line and report what they cost
 ///
@@ -112,7 +114,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             continue;
         }
         let report = send(&recording.name, &maps, args, key.as_ref(), log.as_ref())?;
-        print(&report.text())?;
+        print(&(report.text() + &notes::problems(&recording).join("\n") + "\n"))?;
         reports.push(report);
     }
     if args.count_symbols {
@@ -129,7 +131,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Target>) -> Result<Report> {
-    let (mut buses, mut received, mut dropped) = (Vec::new(), Vec::new(), 0);
+    let (mut buses, mut received, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
     let logged = if key.is_some() { format!("{}-authenticated", args.bus) } else { args.bus.clone() };
     let authenticated = AUTHENTICATED.into_iter().filter_map(|bus| key.map(|key| (bus, Some(key))));
     for (bus, key) in BUSES.into_iter().map(|bus| (bus, None)).chain(authenticated) {
@@ -139,7 +141,9 @@ fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Ta
         if bus.name != "classic-1M" {
             received.extend(LOSSES.map(|loss| Arrived::new(maps, &traffic, loss, args.sensor, key)));
         }
-        dropped = dropped.max(traffic.dropped);
+        if traffic.dropped > 0 {
+            dropped.push(Dropped { bus: bus.name, azimuths: traffic.dropped });
+        }
         if let Some(log) = log.filter(|_| bus.name == logged) {
             write_log(log, &traffic)?;
         }
@@ -148,6 +152,7 @@ fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Ta
     let span = first.zip(last).and_then(|(first, last)| last.measured.since(first.measured)).unwrap_or(0);
     Ok(Report {
         recording: name.to_owned(),
+        estimator: if args.risk.is_some() { at_risk::NAME.to_owned() } else { maps.estimator.clone() },
         scans: maps.scans.len(),
         scans_per_second: (maps.scans.len() - 1) as f64 / (span.max(1) as f64 / 1e6),
         buses,

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, ensure};
 use viewshed::obstacles::lanes::{MOST_LANES, MOST_SEGMENTS};
 
 use super::options::ReadingArgs;
-use super::print;
 use super::progress::bar;
+use super::{print, told_problems};
 use crate::estimators::Lane;
 use crate::labels::lanes::{self, segments};
 use crate::recording::{self, Recording};
@@ -61,6 +61,9 @@ struct NetArgs {
     range: Option<f64>,
 }
 
+/// A lane and, of one that was learnt, how many vehicles drove there.
+type Counted = (Lane, Option<usize>);
+
 fn pair(text: &str) -> Result<[f64; 2], String> {
     let numbers: Vec<f64> =
         text.split(',').filter_map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
@@ -89,17 +92,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             of_recordings(all, &args.reading)?
         }
     };
-    let mut text = format!("# {} lanes with {} segments {told}\n", lanes.len(), segments(&lanes));
-    for lane in &lanes {
+    let mut text =
+        format!("# {} lanes with {} segments {told}\n", lanes.len(), segments(lanes.iter().map(|(lane, _)| lane)));
+    for (number, (lane, followed)) in (1..).zip(&lanes) {
+        let driven = followed.map(|n| format!(": {n} vehicles drove there")).unwrap_or_default();
         let points: Vec<String> = lane.points.iter().map(|[x, y]| format!("[{x:?}, {y:?}]")).collect();
-        text += &format!("[[{}]]\npoints = [{}]\n", args.table, points.join(", "));
+        text += &format!("\n# lane {number}{driven}\n[[{}]]\npoints = [{}]\n", args.table, points.join(", "));
     }
     print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Lanes and where they are from.
-fn of_net(net: &Path, args: &NetArgs) -> Result<(Vec<Lane>, String)> {
+/// Lanes, each with how many vehicles were followed there, and where they are from.
+fn of_net(net: &Path, args: &NetArgs) -> Result<(Vec<Counted>, String)> {
     let (range_m, heading) = (args.range.unwrap_or(200.0), args.heading.unwrap_or(0.0));
     ensure!(range_m > 0.0 && range_m <= 300.0, "--range {range_m} is outside 0 to 300 m");
     ensure!(heading.abs() <= 360.0, "--heading {heading} is outside -360 to 360 degrees");
@@ -115,10 +120,11 @@ fn of_net(net: &Path, args: &NetArgs) -> Result<(Vec<Lane>, String)> {
         segments(&lanes)
     );
     let [x, y] = reach.from;
+    let lanes = lanes.into_iter().map(|lane| (lane, None)).collect();
     Ok((lanes, format!("of {}, within {} m of ({x}, {y})", name(net), reach.reach_m)))
 }
 
-fn of_recordings(paths: &[PathBuf], reading: &ReadingArgs) -> Result<(Vec<Lane>, String)> {
+fn of_recordings(paths: &[PathBuf], reading: &ReadingArgs) -> Result<(Vec<Counted>, String)> {
     let reading = reading.options();
     let read = |path: &PathBuf| recording::read(path, &reading).with_context(|| path.display().to_string());
     let all: Vec<Recording> = paths.iter().map(read).collect::<Result<_>>()?;
@@ -130,8 +136,11 @@ fn of_recordings(paths: &[PathBuf], reading: &ReadingArgs) -> Result<(Vec<Lane>,
             paths[0].display()
         );
     }
+    for recording in &all {
+        told_problems(recording);
+    }
     let learning = bar("learning lanes", 100);
-    let lanes = lanes::learnt(&all, &|share| learning.reach(share));
+    let lanes = lanes::counted(&all, &|share| learning.reach(share));
     drop(learning);
     ensure!(
         !lanes.is_empty(),
@@ -139,6 +148,7 @@ fn of_recordings(paths: &[PathBuf], reading: &ReadingArgs) -> Result<(Vec<Lane>,
         paths[0].display()
     );
     let names: Vec<String> = paths.iter().map(|path| name(path)).collect();
+    let lanes = lanes.into_iter().map(|(lane, n)| (lane, Some(n))).collect();
     Ok((lanes, format!("learnt from {}", names.join(", "))))
 }
 

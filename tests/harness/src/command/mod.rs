@@ -28,6 +28,9 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 
+use crate::recording::Recording;
+use crate::results::report::notes;
+
 /// Exit code for input or options that cannot be used.
 pub const BAD_INPUT: u8 = 2;
 
@@ -94,6 +97,13 @@ impl Cli {
 /// One error with its causes on stderr.
 pub fn complain(error: &anyhow::Error) {
     eprintln!("error: {error:#}");
+}
+
+/// Prints to stderr what is wrong with a recording, where there is something: stdout may be another program's input.
+pub fn told_problems(recording: &Recording) {
+    if !recording.problems.is_empty() {
+        eprintln!("{}: {}", recording.name, notes::problems(recording).join("\n"));
+    }
 }
 
 /// Prints to stdout; a reader that has seen enough (`| head`) is no error.

@@ -336,6 +336,17 @@ pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3d
     Ok((sensor, config))
 }
 
+/// The row of tables that has the map of the [`unit`].
+///
+/// # Errors
+/// Those of [`unit`].
+pub fn unit_name(recording: &Recording, options: &Options) -> Result<String> {
+    let (_, told) = unit(recording, options)?;
+    let usual = Radar3dConfig { visibility: options.radar_3d.visibility, ground: &[], lanes: &[], ..told };
+    let name = own_name(options);
+    Ok(site(&usual, &told).last().map_or_else(|| name.to_owned(), |(what, _)| format!("{name}-{what}")))
+}
+
 /// Name of the estimator of [`own`], of a radar.
 fn own_name(options: &Options) -> &'static str {
     if options.grid.is_reference() { "radar-3d" } else { "radar-3d-small" }

@@ -45,21 +45,27 @@ const WIDER: f64 = 1.25;
 /// Lanes of one site, at most as many as a unit has room for; those that most drove on first. Empty where nothing
 /// drives. `progress` is told the share that is done.
 pub fn learnt(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<Lane> {
+    counted(recordings, progress).into_iter().map(|(lane, _)| lane).collect()
+}
+
+/// The same, each with how many vehicles were followed there.
+pub fn counted(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<(Lane, usize)> {
     let Some(sensor) = recordings.first() else { return Vec::new() };
     let [x, y, _] = sensor.pose.position;
     let reach_m =
         recordings.iter().map(|r| r.sensor.field_of_view.range_m[1]).fold(0.0, f64::max) + Lane::BEYOND_RANGE_M;
-    let mut smooth: Vec<Vec<[f64; 2]>> = proposals::lanes(recordings, progress)
+    let mut smooth: Vec<(Vec<[f64; 2]>, usize)> = proposals::lanes(recordings, progress)
         .iter()
-        .map(|points| within(&smoothed(points, STEP_M, SMOOTH_M), [x, y], reach_m))
-        .filter(|points| points.len() > 1)
+        .map(|(points, n)| (within(&smoothed(points, STEP_M, SMOOTH_M), [x, y], reach_m), *n))
+        .filter(|(points, _)| points.len() > 1)
         .collect();
     smooth.truncate(MOST_LANES);
     let mut straight_m = STRAIGHT_M;
     loop {
-        let lanes = smooth.iter().filter_map(|points| Lane::of(uncrossed(&straightened(points, straight_m))));
-        let lanes: Vec<Lane> = lanes.collect();
-        if segments(&lanes) <= MOST_SEGMENTS {
+        let lane = |points: &[[f64; 2]]| Lane::of(uncrossed(&straightened(points, straight_m)));
+        let lanes: Vec<(Lane, usize)> =
+            smooth.iter().filter_map(|(points, n)| lane(points).map(|lane| (lane, *n))).collect();
+        if segments(lanes.iter().map(|(lane, _)| lane)) <= MOST_SEGMENTS {
             return lanes;
         }
         straight_m *= WIDER;
@@ -67,6 +73,6 @@ pub fn learnt(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<
 }
 
 /// Segments of lanes.
-pub fn segments(lanes: &[Lane]) -> usize {
-    lanes.iter().map(|lane| lane.points.len() - 1).sum()
+pub fn segments<'a>(lanes: impl IntoIterator<Item = &'a Lane>) -> usize {
+    lanes.into_iter().map(|lane| lane.points.len() - 1).sum()
 }

@@ -229,7 +229,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             if let Some(folder) = folder {
                 let origin = if one.of_simulated_labels() { format!("\n{ORIGIN}\n") } else { String::new() };
                 let own = if several { folder.folder(&one.replay.recording.name) } else { folder.clone() };
-                out::write(&own, &(text + &origin), &one.replay, &one.examples, one.shown_frame, &settings)?;
+                out::write(&own, &(text + &origin), &one, &args.risk, &settings)?;
             }
             if let Some(target) = &page {
                 report::write(target, &one, &settings)?;
@@ -263,6 +263,23 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     print(&outputs.told())?;
     Ok(if failed { ExitCode::from(BAD_INPUT) } else { ExitCode::SUCCESS })
+}
+
+impl Args {
+    /// What was asked for and needs labels, said of a recording that has none.
+    fn without_labels(&self) -> String {
+        let asked = [
+            ("--mount-error", self.mount_error.is_some()),
+            ("--breakdown", self.breakdown),
+            ("--csv", self.csv.is_some()),
+        ];
+        let asked: Vec<&str> = asked.iter().filter(|(_, asked)| *asked).map(|(option, _)| *option).collect();
+        match &asked[..] {
+            [] => String::new(),
+            [one] => format!("{one} needs labels, and there are none.\n"),
+            several => format!("{} need labels, and there are none.\n", several.join(", ")),
+        }
+    }
 }
 
 /// One recording replayed, with what was asked for beside its rates.
@@ -464,6 +481,9 @@ impl Replayed {
         }
         if args.causes && self.causes.is_empty() {
             text += NO_CAUSES;
+        }
+        if self.replay.recording.truth.is_none() {
+            text += &args.without_labels();
         }
         text
     }

@@ -6,10 +6,11 @@ use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
-use super::{SHOWN, SHOWN_OF_CAMERA, pictures};
+use super::risk::RiskArgs;
+use super::{Replayed, SHOWN, SHOWN_OF_CAMERA, pictures};
+use crate::estimators;
 use crate::evaluation::Settings;
-use crate::evaluation::examples::{self, Example};
-use crate::evaluation::replay::Replay;
+use crate::evaluation::examples;
 use crate::results::files::Folder;
 
 /// The folder of each recording: the one named for a single recording, one inside it for each of several.
@@ -27,17 +28,13 @@ pub fn folders(dir: &Folder, recordings: &[PathBuf]) -> Result<Vec<Folder>> {
 }
 
 /// Fills one recording's folder.
-pub fn write(
-    folder: &Folder,
-    text: &str,
-    replay: &Replay,
-    examples: &[Example],
-    shown_frame: Option<usize>,
-    settings: &Settings,
-) -> Result<()> {
+pub fn write(folder: &Folder, text: &str, one: &Replayed, risk: &RiskArgs, settings: &Settings) -> Result<()> {
+    let Replayed { replay, examples, shown_frame, .. } = one;
     folder.file("table.txt")?.write(text)?;
     let shown = if replay.recording.of_camera().is_some() { SHOWN_OF_CAMERA } else { SHOWN };
-    pictures::write(folder, replay, shown, examples, shown_frame, settings)?;
+    let mut drawn = estimators::all(&replay.recording, &settings.estimators)?;
+    risk.add(&mut drawn, &replay.recording, settings)?;
+    pictures::write(folder, replay, drawn, shown, examples, *shown_frame, settings)?;
     if let Some(camera) = &replay.camera {
         let score = camera.score(SHOWN_OF_CAMERA);
         // its frames are at times of their own
@@ -45,7 +42,8 @@ pub fn write(
         let apart = |time_ns: i64| move |k: &usize| camera.recording.frames[*k].time_ns.abs_diff(time_ns);
         let of_camera = time_ns.and_then(|t| (0..camera.recording.frames.len()).min_by_key(apart(t)));
         let examples = score.map(|s| examples::find(&camera.recording, &camera.samples, s)).unwrap_or_default();
-        pictures::write(&folder.folder("camera"), camera, SHOWN_OF_CAMERA, &examples, of_camera, settings)?;
+        let drawn = estimators::all(&camera.recording, &settings.estimators)?;
+        pictures::write(&folder.folder("camera"), camera, drawn, SHOWN_OF_CAMERA, &examples, of_camera, settings)?;
     }
     Ok(())
 }

@@ -4,8 +4,7 @@ use anyhow::Result;
 use viewshed::sensor::road::RoadPoint;
 
 use crate::command::progress::bar;
-use crate::estimators;
-use crate::estimators::{Estimator, camera_3d};
+use crate::estimators::{Estimator, at_risk, camera_3d};
 use crate::evaluation::counts::Outcome;
 use crate::evaluation::curve::CurvePoint;
 use crate::evaluation::examples::Example;
@@ -24,13 +23,17 @@ use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
 use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKind, Span, TradeOff};
 use crate::results::pictures::{canvas::Canvas, palette};
 
-/// Estimators that are drawn from above at the chosen frame, beside the one examples are of.
-const ALSO_DRAWN: [&str; 5] = ["radar-2d", "radar-3d-lanes", "radar-3d-learning", "reference", "camera-reference"];
+/// Whether an estimator is drawn from above at the chosen frame, beside the one examples are of: `radar-3d` with
+/// whatever it was told, and what it is compared with.
+fn also_drawn(name: &str) -> bool {
+    name.starts_with("radar-3d-") || ["radar-2d", "reference", "camera-reference"].contains(&name)
+}
 
-/// Draws everything into a folder.
+/// Draws everything into a folder; `all` are the estimators of the table.
 pub fn write(
     folder: &Folder,
     replay: &Replay,
+    mut all: Vec<Box<dyn Estimator>>,
     shown: &str,
     examples: &[Example],
     asked: Option<usize>,
@@ -38,7 +41,6 @@ pub fn write(
 ) -> Result<()> {
     let drawing = bar("drawing pictures", 1);
     let chosen = asked.unwrap_or_else(|| chosen_frame(replay, examples));
-    let mut all = estimators::all(&replay.recording, &settings.estimators)?;
     for estimator in &mut all {
         let name = estimator.name().to_owned();
         if name == shown {
@@ -51,7 +53,7 @@ pub fn write(
                 }
             });
             outcome?;
-        } else if ALSO_DRAWN.contains(&name.as_str()) {
+        } else if also_drawn(&name) {
             let mut canvas = None;
             visit(&replay.recording, estimator.as_mut(), &[chosen], |frame, estimator| {
                 canvas = Some(from_above(replay, estimator, frame, None, settings));
@@ -189,7 +191,7 @@ fn scene<'a>(
     highlight: Option<Highlight>,
     settings: &'a Settings,
 ) -> Scene<'a> {
-    let told = WITH_LANES.contains(&estimator.name());
+    let told = has_given_lanes(estimator.name());
     let recording = &replay.recording;
     Scene {
         map: estimator.map(),
@@ -201,14 +203,17 @@ fn scene<'a>(
         boxes: boxes(replay, estimator.name(), frame),
         road: &[],
         lanes: if told { settings.estimators.lanes.as_slice().into() } else { estimator.learnt_lanes().into() },
+        lanes_numbered: told,
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),
         highlight,
     }
 }
 
-/// Estimators that are given the lanes.
-const WITH_LANES: [&str; 2] = ["radar-3d-lanes", "radar-3d-site"];
+/// Whether an estimator is given the lanes.
+fn has_given_lanes(name: &str) -> bool {
+    name.ends_with("-lanes") || name.ends_with("-site") || name == at_risk::NAME
+}
 
 /// Said where a box called visible stands on cells of which most are not.
 const ANY_CELL: &str =
@@ -406,6 +411,17 @@ mod tests {
         }
         let road = seen((0..500).map(|k| detection(20.0 + 0.3 * k as f32)).collect());
         assert!(road.x_m[1] < 190.0 && road.y_m[1] <= 10.0, "{road:?}");
+    }
+
+    #[test]
+    fn all_that_is_said_of_a_site_has_a_picture() {
+        for name in ["radar-2d", "radar-3d-narrow", "radar-3d-site", "radar-3d-small", "radar-3d-ground", at_risk::NAME]
+        {
+            assert!(also_drawn(name), "{name}");
+        }
+        // both readings of the flat grid are one map
+        assert!(!also_drawn("radar-2d-first"));
+        assert!(has_given_lanes("radar-3d-small-lanes") && !has_given_lanes("radar-3d-learning"));
     }
 
     #[test]

@@ -197,9 +197,14 @@ pub fn driven(paths: &[Path], instants: &[Instant]) -> Vec<Driven> {
 }
 
 /// The lanes that are driven on, those that most speak for first.
-pub fn learn(mut left: Vec<Driven>) -> Vec<Lane> {
+pub fn learn(left: Vec<Driven>) -> Vec<Lane> {
+    counted(left).into_iter().map(|(lane, _)| lane).collect()
+}
+
+/// The same, each with how many paths speak for it.
+pub fn counted(mut left: Vec<Driven>) -> Vec<(Lane, usize)> {
     left.sort_by(|a, b| b.length_m().total_cmp(&a.length_m()));
-    let mut lanes: Vec<Lane> = Vec::new();
+    let (mut lanes, mut paths): (Vec<Lane>, Vec<usize>) = (Vec::new(), Vec::new());
     while let Some((first, _)) = left
         .par_iter()
         .enumerate()
@@ -231,12 +236,13 @@ pub fn learn(mut left: Vec<Driven>) -> Vec<Lane> {
         });
         if supported {
             lanes.push(lane);
+            paths.push(own.len());
         } else if before == left.len() {
             break;
         }
     }
     parallel(&mut lanes);
-    lanes
+    lanes.into_iter().zip(paths).collect()
 }
 
 /// Straight lanes of one road have one direction: places of one lane are wrong alike, those to the sensor's left and

@@ -151,11 +151,11 @@ pub fn propose(recording: &Recording, progress: &(dyn Fn(f64) + Sync)) -> Vec<Pr
 }
 
 /// Lanes that were driven on in these recordings of one site, as places along their middles in the direction of travel;
-/// those that most speak for first. `progress` is told the share that is done.
-pub fn lanes(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<Vec<[f64; 2]>> {
+/// those that most speak for first, each with how many were followed there. `progress` is told the share that is done.
+pub fn lanes(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<(Vec<[f64; 2]>, usize)> {
     let mut all: Vec<Vec<reflections::Instant>> =
         recordings.iter().filter(|r| !r.sensor.frames_independent).map(reflections::instants).collect();
-    let mut known: Vec<Lane> = Vec::new();
+    let (mut known, mut followed): (Vec<Lane>, Vec<usize>) = (Vec::new(), Vec::new());
     // as for proposals: the second time nobody is mixed up with the vehicle beside
     for pass in 0..2 {
         let shared: Vec<Arc<Lane>> = known.iter().cloned().map(Arc::new).collect();
@@ -172,10 +172,10 @@ pub fn lanes(recordings: &[Recording], progress: &(dyn Fn(f64) + Sync)) -> Vec<V
             }
             driven.extend(lanes::driven(&paths, instants));
         }
-        known = lanes::learn(driven);
+        (known, followed) = lanes::counted(driven).into_iter().unzip();
     }
     progress(1.0);
-    known.into_iter().map(|lane| lane.points).collect()
+    known.into_iter().map(|lane| lane.points).zip(followed).collect()
 }
 
 /// What moves, followed in both directions of time.

@@ -108,6 +108,9 @@ fn panel(canvas: &mut Canvas, scene: &Scene, plot: &Plot, enlarged: bool) {
         let [x, y, _] = pose.position;
         let (left, ahead) = pose.yaw_rad().sin_cos();
         overlay::sensor(canvas, sensor, plot.at([x + ahead, y + left]));
+        if scene.lanes_numbered {
+            overlay::number_lanes(canvas, plot, &scene.lanes);
+        }
         if enlarged {
             closeup::name_boxes(canvas, scene, plot);
         }
@@ -170,6 +173,7 @@ mod tests {
             boxes: Vec::new(),
             road: &[],
             lanes: [].as_slice().into(),
+            lanes_numbered: false,
             title: "title".into(),
             caption: None,
             highlight: None,

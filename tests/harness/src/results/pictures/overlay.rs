@@ -2,7 +2,9 @@
 
 use super::axes::Plot;
 use super::canvas::{Canvas, Colour, Pen, Pixel};
+use super::labels::Labels;
 use super::palette::{DETECTION, INK, Outcome, outline};
+use super::text::Style;
 use crate::estimators::Lane;
 use crate::evaluation::samples::Cell;
 use crate::geometry::pose::{SensorPose, Spherical};
@@ -19,8 +21,11 @@ const SENSOR_PX: f32 = 11.0;
 const FIELD_OF_VIEW: Pen = Pen::new(Colour::hex(0x3C434C), 1.3).dashed(&[7.0, 5.0]);
 const ROAD: Pen = Pen::new(Colour::hex(0xFFFFFF), 1.4);
 const LANE: Pen = Pen::new(Colour::hex(0x6A3D9A), 1.6);
-/// Length of the arrow head at the end of a lane, pixels; of a short one its half.
+/// Length of the arrow heads of a lane, pixels; of a short one its half.
 const ARROW_PX: f32 = 9.0;
+/// One head every so many metres, the first so many metres inside the picture.
+const ARROWS_M: f64 = 25.0;
+const FIRST_ARROW_M: f64 = 12.0;
 
 /// A ground-truth box: outline by outcome, a tick from its centre to its front.
 pub fn truth_box(canvas: &mut Canvas, plot: &Plot, solid: &Solid, outcome: Option<Outcome>) {
@@ -97,21 +102,63 @@ pub fn road(canvas: &mut Canvas, plot: &Plot, cells: &[Cell]) {
     }
 }
 
-/// A lane of traffic, with an arrow head where it ends.
+/// A lane of traffic, with an arrow head where it ends and more on its way: it may end outside the picture.
 pub fn lane(canvas: &mut Canvas, plot: &Plot, lane: &Lane) {
     let points: Vec<Pixel> = lane.points.iter().map(|p| plot.at(p.map(f64::from))).collect();
     arrow(canvas, &points);
+    let (mut inside_m, mut next_m) = (0.0, FIRST_ARROW_M);
+    for [from, to] in metres_inside(plot, lane) {
+        inside_m += (to[0] - from[0]).hypot(to[1] - from[1]);
+        if inside_m >= next_m {
+            next_m += ARROWS_M;
+            head(canvas, plot.at(from), plot.at(to), ARROW_PX);
+        }
+    }
+}
+
+/// The number of every lane, from 1, beside where it comes into the picture.
+pub fn number_lanes(canvas: &mut Canvas, plot: &Plot, lanes: &[Lane]) {
+    let style = Style::new(14.0, LANE.colour).bold().halo();
+    let mut labels = Labels::new(plot.area);
+    for (number, lane) in (1..).zip(lanes) {
+        // a little inside, where the frame leaves room
+        let Some([_, at]) = metres_inside(plot, lane).take(NUMBER_M).last() else { continue };
+        let (at, number) = (plot.at(at), format!("{number}"));
+        if !labels.place(canvas, at, &number, style, 40.0) {
+            canvas.text_middle(at, &number, style);
+        }
+    }
+}
+
+/// How far inside the picture the number of a lane is, metres.
+const NUMBER_M: usize = 4;
+
+/// The parts of a lane that are shown, in pieces of about a metre.
+fn metres_inside<'a>(plot: &'a Plot, lane: &'a Lane) -> impl Iterator<Item = [[f64; 2]; 2]> + 'a {
+    let pairs = lane.points.windows(2).filter_map(|pair| <[[f32; 2]; 2]>::try_from(pair).ok());
+    let pieces = pairs.flat_map(|pair| {
+        let [[ax, ay], [bx, by]] = pair.map(|p| p.map(f64::from));
+        let pieces = (bx - ax).hypot(by - ay).ceil().clamp(1.0, 2000.0);
+        let place = move |k: f64| [ax + (bx - ax) * k / pieces, ay + (by - ay) * k / pieces];
+        (0..pieces as u32).map(f64::from).map(move |k| [place(k), place(k + 1.0)])
+    });
+    pieces.filter(|[from, to]| plot.shows(*from) && plot.shows(*to))
 }
 
 fn arrow(canvas: &mut Canvas, points: &[Pixel]) {
     canvas.polyline(points, false, LANE);
     let [.., from, to] = points else { return };
+    let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+    head(canvas, *from, *to, ARROW_PX.min(length / 2.0));
+}
+
+/// A head of this length whose tip is at the second of two places, in their direction.
+fn head(canvas: &mut Canvas, from: Pixel, to: Pixel, head: f32) {
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
     let length = dx.hypot(dy).max(1e-6);
-    let head = ARROW_PX.min(length / 2.0);
     let (c, s) = (dx / length * head, dy / length * head);
     let barb = |right: f32| [to[0] - c - right * s, to[1] - s + right * c];
-    canvas.polyline(&[barb(0.5), *to, barb(-0.5)], false, LANE);
+    canvas.polyline(&[barb(0.5), to, barb(-0.5)], false, LANE);
 }
 
 /// Samples of the pens, for the legend.
@@ -215,6 +262,25 @@ mod tests {
         let back: Vec<[f32; 2]> = along.iter().rev().copied().collect();
         assert!(dark(along.clone(), [78.8, end[1]]) && !dark(along, [21.2, begin[1]]));
         assert!(dark(back.clone(), [21.2, begin[1]]) && !dark(back, [78.8, end[1]]));
+    }
+
+    #[test]
+    fn a_lane_that_ends_outside_the_picture_shows_its_direction_and_number_inside() {
+        let window = crate::results::pictures::scene::Window { x_m: [0.0, 100.0], y_m: [-10.0, 10.0] };
+        let plot = window.filling(500);
+        let through = Lane { points: vec![[-80.0, 0.0], [180.0, 0.0]] };
+        let mut canvas = Canvas::new(plot.area.width, plot.area.height);
+        lane(&mut canvas, &plot, &through);
+        // barbs are up to 4 pixels beside the line, behind the tip
+        let barbs = |columns: std::ops::Range<i32>| columns.filter(|&x| canvas.pixel(x, 53) != Colour::WHITE).count();
+        let heads = (0..4).filter(|k| barbs(k * 125..(k + 1) * 125) > 0).count();
+        assert_eq!((heads, barbs(70..170)), (4, 0), "at 12, 37, 62 and 87 m");
+        let mut numbered = Canvas::new(plot.area.width, plot.area.height);
+        number_lanes(&mut numbered, &plot, &[through]);
+        let ink = |columns: std::ops::Range<i32>| {
+            columns.flat_map(|x| (0..100).map(move |y| (x, y))).filter(|&(x, y)| numbered.pixel(x, y).red < 130).count()
+        };
+        assert!(ink(0..60) > 10 && ink(60..500) == 0, "where it comes in");
     }
 
     fn dark(canvas: &Canvas, columns: std::ops::Range<i32>, row: i32) -> usize {

@@ -77,6 +77,8 @@ pub struct Scene<'a> {
     pub road: &'a [Cell],
     /// Lanes of traffic that the map was made with, given or learnt; may be empty.
     pub lanes: Cow<'a, [Lane]>,
+    /// Whether they are numbered from 1, in their order.
+    pub lanes_numbered: bool,
     /// Recording, estimator, time.
     pub title: String,
     /// What has to be said of the data.

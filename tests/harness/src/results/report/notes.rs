@@ -66,15 +66,19 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines.extend(noise_learnt(&summary.rows));
     lines.extend(lanes_learnt(&summary.rows));
     lines.extend(left_out(recording, &summary.rows));
-    if recording.problems.is_empty() {
-        lines.push("Problems of the input: none.".into());
-    } else {
-        lines.push("Problems of the input:".into());
-        let start = recording.frames.first().map_or(0, |f| f.time_ns);
-        lines.extend(recording.problems.iter().map(|p| format!("  {}", p.since(start))));
-    }
+    lines.extend(problems(recording));
     lines.extend(recording.sensor.licence.as_ref().map(|l| format!("Licence of the recording: {l}.")));
     lines
+}
+
+/// What is wrong with the input, or that nothing is.
+pub fn problems(recording: &Recording) -> Vec<String> {
+    if recording.problems.is_empty() {
+        return vec!["Problems of the input: none.".into()];
+    }
+    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+    let each = recording.problems.iter().map(|p| format!("  {}", p.since(start)));
+    ["Problems of the input:".to_owned()].into_iter().chain(each).collect()
 }
 
 /// What stands in place of a table without a number.
