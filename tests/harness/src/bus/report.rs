@@ -78,12 +78,37 @@ impl Report {
             text += &format!("On {bus} {azimuths} of {} azimuths were not sent in time.\n", self.scans * A);
         }
         if !self.dropped.is_empty() {
-            text += "What is late is left out, and a receiver says unknown there. On CAN FD there is room; on classic CAN with a \
+            text += "What is late is left out: a receiver has what came before, or unknown. On CAN FD there is room; on classic CAN with a \
                      smaller gap between frames, where the bus has it to spare: gap_us of [output] in a daemon's file, 1000 here.\n";
         }
         if self.holes > 0 {
             text += &format!("{} unknown cells between known ones were sent as not visible.\n", self.holes);
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_that_is_too_slow_is_named_with_what_to_do() {
+        let late = Report {
+            recording: "busy".into(),
+            estimator: "radar-3d-narrow".into(),
+            scans: 10,
+            scans_per_second: 15.0,
+            buses: Vec::new(),
+            received: Vec::new(),
+            entropy_bytes_per_scan: Entropy { neighbours: 1.0, previous_scan: 1.0 },
+            dropped: vec![Dropped { bus: "classic-500k", azimuths: 12 }],
+            holes: 0,
+        };
+        let text = late.text();
+        assert!(text.starts_with("busy: 10 scans of radar-3d-narrow, "), "{text}");
+        assert!(text.contains("On classic-500k 12 of 1280 azimuths were not sent in time."), "{text}");
+        assert!(text.contains("CAN FD") && text.contains("gap_us"), "{text}");
+        assert!(!Report { dropped: Vec::new(), ..late }.text().contains("gap_us"));
     }
 }

@@ -4,6 +4,7 @@ use anyhow::{Result, anyhow, ensure};
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
 use viewshed::probability::Quantiser;
+use viewshed::radar_3d::Radar3dConfig;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
@@ -105,8 +106,15 @@ impl Maps {
         )
         .map_err(|error| anyhow!("the maps of {} cannot be sent: {error:?}", recording.name))?;
         let header = Header { probability: quantiser.map(Quantiser::levels), ..header };
-        Ok(Self { estimator: estimators::unit_name(recording, options)?, header, scans, holes })
+        Ok(Self { estimator: row(&config, options), header, scans, holes })
     }
+}
+
+/// The row of `replay`'s table that a unit of this configuration is.
+fn row(told: &Radar3dConfig, options: &estimators::Options) -> String {
+    let usual = Radar3dConfig { visibility: options.radar_3d.visibility, ground: &[], lanes: &[], ..*told };
+    let (own, said) = (estimators::own_name(options), estimators::site(&usual, told));
+    said.last().map_or_else(|| own.to_owned(), |(what, _)| format!("{own}-{what}"))
 }
 
 fn holes_of(map: &PolarMap<{ radar_3d::RANGES }, A>, rays: &[Ray<W>]) -> u64 {
@@ -226,12 +234,16 @@ mod tests {
 
     #[test]
     fn what_is_sent_is_the_map_of_a_unit_that_is_told_of_its_site() {
-        let of = |options: &Options| Maps::new(&recording(3, 1), options, None, &|| ()).map(|maps| maps.header);
-        let usual = of(&Options::default()).unwrap();
-        let told = of(&Options { far_road: Some(FarRoad::Degrees(-12)), ..Options::default() }).unwrap();
+        let of = |options: &Options| {
+            Maps::new(&recording(3, 1), options, None, &|| ()).map(|maps| (maps.header, maps.estimator))
+        };
+        let (usual, row) = of(&Options::default()).unwrap();
+        assert_eq!(row, "radar-3d");
+        let (told, row) = of(&Options { far_road: Some(FarRoad::Degrees(-12)), ..Options::default() }).unwrap();
+        assert_eq!(row, "radar-3d-narrow");
         assert_ne!(usual.narrow, told.narrow);
         assert_ne!(usual.fingerprint, told.fingerprint);
-        let error = of(&Options { grid: Grid::Small, ..Options::default() }).unwrap_err().to_string();
+        let error = of(&Options { grid: Grid::Small, ..Options::default() }).err().unwrap().to_string();
         assert!(error.contains("leave out --grid-size"), "{error}");
     }
 }

@@ -299,7 +299,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
 }
 
 /// What is said of the site, each alone, and where there is more than one, all of it.
-fn site<'a>(usual: &Radar3dConfig, told: &Radar3dConfig) -> Vec<(&'a str, Radar3dConfig)> {
+pub fn site<'a>(usual: &Radar3dConfig, told: &Radar3dConfig) -> Vec<(&'a str, Radar3dConfig)> {
     let each = [
         ("narrow", Radar3dConfig { visibility: told.visibility, ..*usual }),
         ("ground", Radar3dConfig { ground: told.ground, ..*usual }),
@@ -336,19 +336,8 @@ pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3d
     Ok((sensor, config))
 }
 
-/// The row of tables that has the map of the [`unit`].
-///
-/// # Errors
-/// Those of [`unit`].
-pub fn unit_name(recording: &Recording, options: &Options) -> Result<String> {
-    let (_, told) = unit(recording, options)?;
-    let usual = Radar3dConfig { visibility: options.radar_3d.visibility, ground: &[], lanes: &[], ..told };
-    let name = own_name(options);
-    Ok(site(&usual, &told).last().map_or_else(|| name.to_owned(), |(what, _)| format!("{name}-{what}")))
-}
-
 /// Name of the estimator of [`own`], of a radar.
-fn own_name(options: &Options) -> &'static str {
+pub fn own_name(options: &Options) -> &'static str {
     if options.grid.is_reference() { "radar-3d" } else { "radar-3d-small" }
 }
 

@@ -176,3 +176,25 @@ fn block(recording: &recording::Recording, settings: &Settings) -> Result<Block>
     );
     Ok(block)
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        processor: BoardArgs,
+    }
+
+    #[test]
+    fn a_profile_is_of_a_board_or_a_port() {
+        let parse = |line: &[&str]| Line::try_parse_from([&["viewshed"], line].concat()).map(|line| line.processor);
+        let error = parse(&["--profile", "small"]).err().unwrap().to_string();
+        assert!(error.contains("--board") && error.contains("--port"), "{error}");
+        assert!(parse(&["--profile", "small", "--board", "mps2-an386"]).unwrap().profile.is_some());
+        assert!(parse(&["--profile", "small", "--port", "/dev/ttyUSB0"]).unwrap().profile.is_some());
+    }
+}
