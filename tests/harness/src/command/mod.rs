@@ -56,7 +56,7 @@ enum Command {
     Detect(detect::Args),
     Detections(Box<detections::Args>),
     Configure(Box<configure::Args>),
-    Lanes(lanes::Args),
+    Lanes(Box<lanes::Args>),
     Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
