@@ -162,7 +162,7 @@ impl Default for ObstacleConfig {
             heading_sigmas: 4.0,
             standing_speed_mps: 0.7,
             standing_visible_loss_per_s: 5.0,
-            standing_hidden_loss_per_s: 0.1,
+            standing_hidden_loss_per_s: 0.06,
             weak_rcs_dbsm: -3.0,
             low_rcs_dbsm: 5.0,
             lorry_rcs_dbsm: 11.0,
