@@ -132,7 +132,7 @@ pub fn maps(like: &Maps, random: &mut Random) -> Maps {
         }
         scans.push(Scan { measured: scan.measured, rays: rays.clone(), probable: Vec::new() });
     }
-    Maps { header: like.header, scans, holes: 0 }
+    Maps { estimator: like.estimator.clone(), header: like.header, scans, holes: 0 }
 }
 
 /// The same maps with a plane of probability, whose bits are those of a map some scans later.
@@ -143,7 +143,8 @@ pub fn with_probabilities(like: &Maps) -> Maps {
         Scan { probable: probable.collect(), ..scan.clone() }
     };
     let header = Header { probability: Levels::from_bytes([61, 178, 242, 0xAB, 0xCD]), ..like.header };
-    Maps { header, scans: like.scans.iter().zip(later).map(scan).collect(), holes: 0 }
+    let scans = like.scans.iter().zip(later).map(scan).collect();
+    Maps { estimator: like.estimator.clone(), header, scans, holes: 0 }
 }
 
 /// The same maps as of azimuths of which the middle third is narrow.
