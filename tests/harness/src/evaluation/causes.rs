@@ -2,7 +2,7 @@
 //!
 //! # Rule
 //! A blocked cell called visible lies in the shadow of one vehicle or several, which share it. Where a box of the estimator
-//! would hide it, too, the map's own cells lost it. Otherwise its vehicle has no box yet, or none any more; or the box
+//! would hide it, too, the map's own cells lost it; a box hides its own place here, which the map shows. Otherwise its vehicle has no box yet, or none any more; or the box
 //! would hide the cell if it were as high as the vehicle; or it is elsewhere, shorter, narrower or turned.
 //!
 //! A clear cell called invisible lies in the shadow of boxes, which share it: of one with no vehicle there, of one that
