@@ -4,7 +4,6 @@ use anyhow::{Result, anyhow, ensure};
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
 use viewshed::probability::Quantiser;
-use viewshed::radar_3d::Radar3dConfig;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
@@ -106,15 +105,8 @@ impl Maps {
         )
         .map_err(|error| anyhow!("the maps of {} cannot be sent: {error:?}", recording.name))?;
         let header = Header { probability: quantiser.map(Quantiser::levels), ..header };
-        Ok(Self { estimator: row(&config, options), header, scans, holes })
+        Ok(Self { estimator: estimators::unit_row(&config, options), header, scans, holes })
     }
-}
-
-/// The row of `replay`'s table that a unit of this configuration is.
-fn row(told: &Radar3dConfig, options: &estimators::Options) -> String {
-    let usual = Radar3dConfig { visibility: options.radar_3d.visibility, ground: &[], lanes: &[], ..*told };
-    let (own, said) = (estimators::own_name(options), estimators::site(&usual, told));
-    said.last().map_or_else(|| own.to_owned(), |(what, _)| format!("{own}-{what}"))
 }
 
 fn holes_of(map: &PolarMap<{ radar_3d::RANGES }, A>, rays: &[Ray<W>]) -> u64 {

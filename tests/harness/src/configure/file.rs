@@ -136,19 +136,8 @@ fn parse(text: &str) -> Result<(UnitFile, Option<Given>), (usize, String)> {
         let at = error.span().map_or(0, |span| span.start.min(text.len()));
         (1 + text[..at].matches('\n').count(), with_advice(error.message()))
     })?;
-    let Tables {
-        learn_lanes,
-        unit,
-        mount,
-        field_of_view,
-        noise,
-        gate,
-        visibility,
-        health,
-        radar_bus,
-        broadcast_bus,
-        ..
-    } = tables;
+    let unit = UnitConfig { learn_lanes: tables.learn_lanes.unwrap_or(tables.unit.learn_lanes), ..tables.unit };
+    let Tables { mount, field_of_view, noise, gate, visibility, health, radar_bus, broadcast_bus, .. } = tables;
     let sensor = Sensor { mount, field_of_view, noise };
     let keys = [
         ("state_dir", tables.state_dir.is_some()),
@@ -163,7 +152,6 @@ fn parse(text: &str) -> Result<(UnitFile, Option<Given>), (usize, String)> {
     // once a run
     let lanes = tables.lanes.into_iter().map(|lane| &*lane.points.leak()).collect::<Vec<_>>().leak();
     let ground = tables.ground.map_or(&[][..], |ground| ground.points.leak());
-    let unit = UnitConfig { learn_lanes: learn_lanes.unwrap_or(unit.learn_lanes), ..unit };
     let own = Settings { gate, visibility, health, radar_bus, broadcast_bus, unit, ..Settings::of(sensor) };
     let settings = Settings { lanes, ground, ..own };
     let file = UnitFile { settings, blocks: [None, None, None], fitted_with: None, left_out };

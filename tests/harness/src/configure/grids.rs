@@ -24,11 +24,11 @@ struct Board {
 }
 
 /// All of them.
-#[allow(clippy::cast_possible_truncation)] // 200 x 128, 100 x 96
+#[allow(clippy::cast_possible_truncation)] // 100 x 96
 pub const GRIDS: [Grid; 2] = [
     Grid {
         name: "reference",
-        cells: [reference::State::RANGES as u8, reference::State::AZIMUTHS as u8],
+        cells: FITTED_ON,
         check: reference::CHECK,
         boards: &[
             Board { name: "mps2-an386", lanes: true, table: true, learns: true },

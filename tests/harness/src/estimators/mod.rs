@@ -7,6 +7,7 @@ pub mod fused;
 mod radar_2d;
 pub mod radar_3d;
 mod reference;
+mod site;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
@@ -261,6 +262,7 @@ pub const MOST_DETECTIONS: usize = 4096;
 pub use before::Before;
 pub use radar_2d::MOST_RANGE_M;
 pub use radar_3d::Grid;
+pub use site::{site_rows, unit_row};
 
 /// Every estimator for a recording, in the order of the table. `reference` needs ground truth.
 ///
@@ -273,7 +275,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     let (sensor, told) = unit(recording, options)?;
     let mut radar_2d = options.radar_2d;
     radar_2d.gate.max_detections = told.gate.max_detections;
-    let radar_3d = Radar3dConfig { visibility: options.radar_3d.visibility, ground: &[], lanes: &[], ..told };
+    let radar_3d = site::untold(&told, options);
     let mut estimators = vec![
         radar_2d::new("radar-2d", Radar2dReading::Last, &sensor, &radar_2d)?,
         radar_2d::new("radar-2d-first", Radar2dReading::First, &sensor, &radar_2d)?,
@@ -283,7 +285,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
     if !options.grid.is_reference() {
         estimators.push(radar_3d::new(options.grid, name, &sensor, &radar_3d)?);
     }
-    for (what, config) in site(&radar_3d, &told) {
+    for (what, config) in site::said(&radar_3d, &told) {
         estimators.push(radar_3d::new(options.grid, &format!("{name}-{what}"), &sensor, &config)?);
     }
     if let Some(frames) = options.before.frames() {
@@ -296,25 +298,6 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
         estimators.push(reference::new(recording, truth, &sensor, &ground(recording, options)?, options)?);
     }
     Ok(estimators)
-}
-
-/// What is said of the site, each alone, and where there is more than one, all of it.
-pub fn site<'a>(usual: &Radar3dConfig, told: &Radar3dConfig) -> Vec<(&'a str, Radar3dConfig)> {
-    let each = [
-        ("narrow", Radar3dConfig { visibility: told.visibility, ..*usual }),
-        ("ground", Radar3dConfig { ground: told.ground, ..*usual }),
-        ("lanes", Radar3dConfig { lanes: told.lanes, ..*usual }),
-    ];
-    let mut said: Vec<_> = each.into_iter().filter(|(_, config)| config != usual).collect();
-    if said.len() > 1 {
-        said.push(("site", *told));
-    }
-    said
-}
-
-/// How many rows of tables [`site`] makes, of so many things that are said of a site.
-pub const fn site_rows(said: u64) -> u64 {
-    if said > 1 { said + 1 } else { said }
 }
 
 /// What a unit in a recording's place is given: its sensor, and all that is said of it and of the site.
@@ -337,7 +320,7 @@ pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3d
 }
 
 /// Name of the estimator of [`own`], of a radar.
-pub fn own_name(options: &Options) -> &'static str {
+fn own_name(options: &Options) -> &'static str {
     if options.grid.is_reference() { "radar-3d" } else { "radar-3d-small" }
 }
 

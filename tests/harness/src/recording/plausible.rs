@@ -211,7 +211,12 @@ fn commonest(directions: &[f64]) -> Option<f64> {
 
 /// The direction of a step along a road, whichever way: degrees, -90 to 90.
 fn axis_deg([x, y]: [f64; 2]) -> f64 {
-    (y.atan2(x).to_degrees() + 90.0).rem_euclid(180.0) - 90.0
+    folded(y.atan2(x).to_degrees())
+}
+
+/// The same axis within -90 to 90 degrees.
+fn folded(degrees: f64) -> f64 {
+    (degrees + 90.0).rem_euclid(180.0) - 90.0
 }
 
 /// Whether many labelled vehicles drive in this direction: then a road runs there, whatever the axis is of.
@@ -222,14 +227,9 @@ fn is_a_road(direction: f64, recording: &Recording) -> bool {
         .filter(|object| object.speed().is_some_and(|speed| speed >= f64::from(LEAST_SPEED_MPS)))
         .filter_map(|object| object.velocity.map(axis_deg))
         .collect();
-    let near = |middle: f64| driven.iter().filter(|d| axis_apart(**d, middle).abs() <= 1.5).count();
+    let near = |middle: f64| driven.iter().filter(|d| folded(**d - middle).abs() <= 1.5).count();
     let most = (0..180).map(|k| near(f64::from(k) - 90.0)).max().unwrap_or(0);
     most > 0 && 3 * near(direction) >= most
-}
-
-/// From one direction to another, degrees, -90 to 90.
-fn axis_apart(from: f64, to: f64) -> f64 {
-    (from - to + 90.0).rem_euclid(180.0) - 90.0
 }
 
 fn pitch_and_height(frames: &[Frame], pose: &SensorPose) -> Option<(f64, f64)> {

@@ -328,8 +328,7 @@ fn replay(
     settings: &Settings,
 ) -> Result<Replayed> {
     let shown_frame = args.time.map(|time_s| frame_at(&recording, time_s)).transpose()?;
-    let mut running = estimators::all(&recording, &settings.estimators)?;
-    args.risk.add(&mut running, &recording, settings)?;
+    let mut running = args.risk.estimators(&recording, settings)?;
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
     let replaying = bar(&format!("replaying {name}"), passes + camera_steps(&recording));
     let replay = if recording.of_camera().is_some() {

@@ -32,8 +32,7 @@ pub fn write(folder: &Folder, text: &str, one: &Replayed, risk: &RiskArgs, setti
     let Replayed { replay, examples, shown_frame, .. } = one;
     folder.file("table.txt")?.write(text)?;
     let shown = if replay.recording.of_camera().is_some() { SHOWN_OF_CAMERA } else { SHOWN };
-    let mut drawn = estimators::all(&replay.recording, &settings.estimators)?;
-    risk.add(&mut drawn, &replay.recording, settings)?;
+    let drawn = risk.estimators(&replay.recording, settings)?;
     pictures::write(folder, replay, drawn, shown, examples, *shown_frame, settings)?;
     if let Some(camera) = &replay.camera {
         let score = camera.score(SHOWN_OF_CAMERA);

@@ -67,18 +67,19 @@ impl RiskArgs {
         self.probability.as_ref().zip(self.risk).map(read).transpose()
     }
 
-    /// Adds the row behind that of `radar-3d`.
+    /// The estimators of the table: this row is behind that of `radar-3d`.
     ///
     /// # Errors
     /// A table that cannot be read, or of another mount or configuration; a recording of no radar.
-    pub fn add(&self, running: &mut Vec<Box<dyn Estimator>>, recording: &Recording, settings: &Settings) -> Result<()> {
-        let Some((risk, fitted)) = self.asked()? else { return Ok(()) };
+    pub fn estimators(&self, recording: &Recording, settings: &Settings) -> Result<Vec<Box<dyn Estimator>>> {
+        let mut running = estimators::all(recording, &settings.estimators)?;
+        let Some((risk, fitted)) = self.asked()? else { return Ok(running) };
         ensure!(recording.of_camera().is_none(), "--risk: {} is of a camera; tables are of radars", recording.name);
         let (quantiser, grid) = quantiser(fitted, Some(risk), recording, settings)?;
         let inner = estimators::own(recording, &settings.estimators)?;
         let place = running.iter().position(|e| e.name() == inner.name()).map_or(running.len(), |k| k + 1);
         running.insert(place, Box::new(AtRisk::new(inner, quantiser, grid)));
-        Ok(())
+        Ok(running)
     }
 
     /// What was asked, and what it came to on this recording.
