@@ -1,5 +1,6 @@
 //! What the detections of one frame add up to, for one obstacle.
 
+use super::doppler_slope::DopplerSlope;
 use crate::fixed::math::hypot_gate;
 use crate::fixed::trig::Direction;
 use crate::frame::reflection::Reflection;
@@ -25,6 +26,8 @@ pub(super) struct Gathered {
     pub squares: i32,
     /// Sum of the radial speed errors, 2^-4 cm/s.
     pub radial: i32,
+    /// How that error changes over the vehicle.
+    pub slope: DopplerSlope,
     /// Line of sight to the last detection.
     pub sight: Direction,
     /// Its standard deviation across that, cm.
@@ -41,6 +44,7 @@ impl Gathered {
         offset: (0, 0),
         squares: 0,
         radial: 0,
+        slope: DopplerSlope::NONE,
         sight: Direction::AHEAD,
         across_cm: 0,
         rcs_half_dbsm: None,
@@ -51,6 +55,7 @@ impl Gathered {
     pub fn add(&mut self, r: &Reflection, heading: Direction, (along, left): (i32, i32), error: i32, noise: &Noise) {
         let projection = heading.cosine(r.sight);
         let w = weight(sigma_across(heading, r, noise));
+        self.slope.add(self.count == 0, r.sight, error);
         self.count += 1;
         self.speed.0 = self.speed.0.saturating_add((projection * error) >> 8);
         self.speed.1 += (projection * projection) >> 14;

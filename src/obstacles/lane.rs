@@ -28,6 +28,9 @@ const TEACHING_SPEED: i32 = 300 << FRACTION;
 /// See [`TEACHING_HITS`].
 const TEACHING_SIGMAS: i32 = 10 << 4;
 
+/// Least distance of a vehicle that teaches, in lengths of its outline.
+const TEACHING_LENGTHS: i32 = 3;
+
 /// Outline from which a vehicle's heading is known by its length, centimetres.
 const SETTLED_CM: i32 = 800;
 /// Least cosine between the road's axis and a motion that is measured, where they agree, 2^-14: 8 degrees.
@@ -200,6 +203,11 @@ impl Obstacle {
         if t.lane_vehicles == 0 || !drives || !known || self.travelled_cm < self.teaches_from_cm {
             return;
         }
+        // of what fills a wide angle the reflections move along the side that it shows, and its motion seems another
+        let (x, y) = self.middle();
+        if hypot_gate(x, y) < TEACHING_LENGTHS * self.extent.length_cm() {
+            return;
+        }
         let (vx, vy) = self.free.velocity;
         let measured = Direction::of(vx, vy);
         let follows_axis = self.lane == NO_LANE && !self.free_heading;
@@ -370,6 +378,23 @@ mod tests {
                 first(cars, &t, velocity)
             );
         }
+    }
+
+    #[test]
+    fn what_drives_by_nearer_than_three_lengths_teaches_nothing() {
+        let t = learning();
+        let nearest = |x| {
+            let mut list = Obstacles::<16>::new();
+            for _ in 0..4 {
+                follow(&mut list, &mut car([x, -35.0], [0.0, 1.0], 9.0), 120, &t);
+                list.clear();
+            }
+            let distances = list.learnt_lanes(&t).map(|((x, y), _)| f64::from(x).hypot(f64::from(y)) / 100.0);
+            distances.fold(f64::INFINITY, f64::min)
+        };
+        // the car is 4.5 m long
+        assert!((12.5..20.0).contains(&nearest(6.0)), "{} m", nearest(6.0));
+        assert!((14.0..18.0).contains(&nearest(15.0)), "{} m", nearest(15.0));
     }
 
     #[test]

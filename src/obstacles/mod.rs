@@ -146,6 +146,7 @@ mod body;
 #[cfg(test)]
 mod by_hand;
 pub mod config;
+mod doppler_slope;
 mod gathered;
 mod hidden_end;
 mod joining;

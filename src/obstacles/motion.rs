@@ -3,9 +3,10 @@
 //!
 //! # Model
 //! The sensor measures the component of the velocity along the line of sight to centimetres a second
-//! in every frame, and nothing of the one across. That one follows from place: a Kalman filter of two
-//! states, place and speed across the line of sight, whose measurement is the centre of a frame's
-//! detections. It is right wherever a thing goes, and slow: 2 m/s after half a second.
+//! in every frame. The one across follows from place: a Kalman filter of two states, place and speed
+//! across the line of sight, whose measurement is the centre of a frame's detections. It is right wherever
+//! a thing goes, and slow: 2 m/s after half a second. Where detections of one frame span an angle, how
+//! [Doppler changes over it](super::doppler_slope) tells that speed sooner.
 
 use crate::fixed::math::{mul_shift, ratio};
 use crate::fixed::time::Step;
@@ -44,6 +45,17 @@ pub struct Seen {
     pub sight: Direction,
     /// Measured radial velocity, 2^-8 cm/s.
     pub radial: i32,
+}
+
+/// A speed across the line of sight.
+#[derive(Debug, Clone, Copy)]
+pub struct Across {
+    /// Line of sight.
+    pub sight: Direction,
+    /// To its left, cm/s.
+    pub speed: i32,
+    /// (cm/s)^2.
+    pub variance: i32,
 }
 
 impl FreeMotion {
@@ -101,6 +113,25 @@ impl FreeMotion {
             (place - mul_shift(place, to_place, 12)).max(1),
             both - mul_shift(both, to_place, 12),
             (speed - mul_shift(both, to_speed, 12)).max(1),
+        ];
+    }
+
+    /// Takes a speed across the line of sight that was measured.
+    pub fn take_across(&mut self, seen: &Across) {
+        let sight = seen.sight;
+        let [place, both, speed] = self.variance;
+        let total = (speed + seen.variance).max(1);
+        // gains in 2^-12, the first one in seconds
+        let (to_place, to_speed) = (ratio::<12>(both, total), ratio::<12>(speed, total));
+        let off = (seen.speed << 8) - sight.across(self.velocity.0, self.velocity.1);
+        self.push(sight, 0, mul_shift(off, to_speed, 12));
+        let (dx, dy) = turned(sight, 0, mul_shift(off, to_place, 12));
+        self.place.0 += dx;
+        self.place.1 += dy;
+        self.variance = [
+            (place - mul_shift(both, to_place, 12)).max(1),
+            both - mul_shift(both, to_speed, 12),
+            (speed - mul_shift(speed, to_speed, 12)).max(1),
         ];
     }
 
@@ -162,6 +193,25 @@ mod tests {
     fn the_speed_along_the_line_of_sight_is_right_at_once() {
         let found = followed([20.0, 0.0], (0, 0), 4);
         assert!((found[0] - 20.0).abs() < 1.0, "{found:?}");
+    }
+
+    #[test]
+    fn a_speed_across_that_is_measured_counts_as_much_as_it_is_sure() {
+        let after = |variance| {
+            let mut motion = FreeMotion::new((4000 << 8, 0), 150 * 150, (500 << 8, 0), 1000 * 1000);
+            motion.take_across(&Across { sight: Direction::AHEAD, speed: -900, variance });
+            (motion.velocity.0 >> 8, motion.velocity.1 >> 8, motion.speed_variance())
+        };
+        let (ahead, across, variance) = after(10 * 10);
+        assert!(ahead == 500 && (-905..=-895).contains(&across) && variance < 300, "{across} {variance}");
+        let (ahead, across, variance) = after(1000 * 1000);
+        assert!(ahead == 500 && (-455..=-445).contains(&across), "{across}");
+        assert!((490_000..=510_000).contains(&variance), "{variance}");
+        // what has moved on since it was sure of its place lies as much farther to that side
+        let mut motion = FreeMotion::new((4000 << 8, 0), 150 * 150, (0, 0), 1000 * 1000);
+        motion.predict(Step::from_micros(500_000), 0);
+        motion.take_across(&Across { sight: Direction::AHEAD, speed: 800, variance: 10 });
+        assert!((390..=410).contains(&(motion.place.1 >> 8)), "{:?}", motion.place);
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
 //! side, the obstacle leaves the road's axis and goes on with the motion that was seen.
 
+use super::doppler_slope::Target;
 use super::lanes::{LEARNT, NO_LANE};
-use super::motion::Seen;
+use super::motion::{Across, Seen};
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tracking::Tracking;
@@ -42,6 +43,12 @@ impl Obstacle {
             sight: g.sight,
             radial: own + ((g.radial / g.count.max(1)) << 4),
         });
+        let (x, y) = self.middle();
+        let target = Target { range_cm: length(x, y), speed_cm_s: self.speed() >> FRACTION, sight: g.sight };
+        if let Some(off) = g.slope.across(g.count, g.radial, &target, &t.noise) {
+            let along_heading = off.sight.across(self.velocity.0, self.velocity.1) >> FRACTION;
+            self.free.take_across(&Across { speed: along_heading + off.speed, ..off });
+        }
         if self.free_heading {
             let (dx, dy) = (self.free.place.0 - self.position.0, self.free.place.1 - self.position.1);
             let ahead = self.heading.along(dx, dy) - (self.extent.middle_cm() << FRACTION);

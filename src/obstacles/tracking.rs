@@ -2,6 +2,7 @@
 
 use super::lanes::Lanes;
 use super::size::Sizes;
+use crate::fixed::math::length;
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
 use crate::frame::reflection::Reflection;
@@ -142,8 +143,12 @@ impl Tracking {
         // nearly broadside Doppler says nothing about motion along the road
         let speed = if along.abs() < LEAST_PROJECTION { i32::MAX } else { (radial << 14).checked_div(along)? };
         if speed.abs() > FASTEST_ALONG_CM_S {
-            let heading = if radial > 0 { r.sight } else { r.sight.reversed() };
-            return (LEAST_RADIAL_CM_S..=FASTEST_CM_S).contains(&radial.abs()).then_some((heading, radial.abs()));
+            // along the ground: a line of sight that points down has a part there shorter than one
+            let (x, y) = (i32::from(r.sight.x), i32::from(r.sight.y));
+            let sight = Direction::of(x, y);
+            let speed = (radial.abs() << 14) / length(x, y).max(1);
+            let heading = if radial > 0 { sight } else { sight.reversed() };
+            return (radial.abs() >= LEAST_RADIAL_CM_S && speed <= FASTEST_CM_S).then_some((heading, speed));
         }
         let heading = if speed > 0 { self.road } else { self.road.reversed() };
         (speed.abs() >= self.min_speed_cm_s).then_some((heading, speed.abs()))
@@ -173,7 +178,7 @@ const LEAST_RADIAL_CM_S: i32 = 300;
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::rules;
+    use super::super::by_hand::{rules, seen_at};
     use super::*;
 
     #[test]
@@ -207,6 +212,11 @@ mod tests {
                 "towards the sensor, or away from it"
             );
         }
+        // from a mast: 45 degrees down, and the line of sight along the ground is a heading as long as any other
+        let down = Reflection { sight: Direction { x: 0, y: 11_585 }, ..seen_at(0, 800, 500) };
+        let (heading, speed) = t.course(&down).unwrap();
+        assert!(length(i32::from(heading.x), i32::from(heading.y)).abs_diff(1 << 14) < 4, "{heading:?}");
+        assert!((706..=708).contains(&speed), "{speed}");
         assert_eq!(at(1000, 5000, -800), Some((t.road.reversed(), 4079)), "nearly as fast as anything drives");
         assert_eq!(at(5000, 0, 55), None, "within the noise of what stands");
         assert_eq!(at(5000, 0, 120), None, "slower than what starts an obstacle");

@@ -60,6 +60,8 @@ pub struct Gathered {
     /// Offsets ahead and to the left, squared ones to the left, radial speed errors.
     pub offset: [f64; 2],
     squares: f64,
+    /// Angles from the first line of sight, their squares, and angle x radial speed error.
+    pub slope: ([f64; 2], [f64; 3]),
     pub radial: f64,
     /// Of the last.
     pub sight: Ground,
@@ -212,6 +214,11 @@ impl Obstacle {
         let error = self.speed_error(d);
         let weight = (ON_VEHICLE_SIGMA.powi(2) + sigma_across.powi(2)).recip();
         let g = &mut self.gathered;
+        if g.count == 0.0 {
+            g.slope.0 = d.sight.map(|c| c / d.sight[0].hypot(d.sight[1]));
+        }
+        let angle = across(g.slope.0, d.sight);
+        g.slope.1 = [g.slope.1[0] + angle, g.slope.1[1] + angle * angle, g.slope.1[2] + angle * error];
         g.count += 1.0;
         g.speed.0 += projection * error;
         g.speed.1 += projection * projection;

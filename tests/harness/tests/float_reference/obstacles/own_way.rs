@@ -12,6 +12,11 @@ const ON_VEHICLE_SIGMA: f64 = 0.5;
 const LEAST_SIGMA: f64 = 0.2;
 /// Greatest standard deviation of a place and of a speed.
 const MOST_VARIANCE: f64 = 400.0;
+/// Speed of turning that is taken for noise, rad/s, how much higher or lower than assumed a reflection may lie, metres, and
+/// the share of the spread of angles that noise may be.
+const TURNING: f64 = 0.05;
+const HEIGHT: f64 = 2.0;
+const MOST_NOISE: f64 = 0.25;
 /// Frames in a row in which motion along the heading must fail.
 const OWN_WAY_FRAMES: u32 = 2;
 
@@ -38,6 +43,16 @@ impl FreeMotion {
         let [place, both, speed] = self.variance;
         self.variance = [place + dt * (2.0 * both + dt * speed), both + dt * speed, speed + dt * turning_noise.powi(2)]
             .map(|v| v.min(MOST_VARIANCE));
+    }
+
+    /// Takes a speed across a line of sight, with its variance.
+    fn take_across(&mut self, sight: Ground, speed: f64, variance: f64) {
+        let [place, both, known] = self.variance;
+        let (to_place, to_speed) = (both / (known + variance), known / (known + variance));
+        let off = speed - across(sight, self.velocity);
+        self.velocity = moved(self.velocity, left(sight), off * to_speed);
+        self.place = moved(self.place, left(sight), off * to_place);
+        self.variance = [place - both * to_place, both * (1.0 - to_speed), known * (1.0 - to_speed)];
     }
 
     /// Takes a centre of `count` detections with its variance, and the radial velocity.
@@ -75,10 +90,34 @@ impl Obstacle {
         let variance = (shown.powi(2) / 12.0 + ON_VEHICLE_SIGMA.powi(2) + g.sigma_across.powi(2)) / g.count;
         let radial = along(g.sight, self.velocity) + g.radial / g.count;
         self.free.update(g.count, centre, variance.max(LEAST_SIGMA.powi(2)), g.sight, radial);
+        self.take_slope(rules);
         if self.free_heading {
             let off = along(self.heading, difference(self.free.place, self.anchor)) - self.extent.middle();
             self.anchor = moved(self.anchor, self.heading, off * rules.own_way_follow);
         }
+    }
+
+    /// Takes what the change of Doppler over the vehicle says of its speed across the line of sight.
+    fn take_slope(&mut self, rules: &Rules) {
+        let g = self.gathered;
+        let (first, [angles, squares, products]) = g.slope;
+        let spread = squares - angles * angles / g.count;
+        let own = spread - (g.count - 1.0) * rules.azimuth_sigma.powi(2);
+        if own <= 0.0 || own < (1.0 - MOST_NOISE) * spread {
+            return;
+        }
+        let slope = (products - angles * g.radial / g.count) / own;
+        let distance = length(self.ahead(self.extent.middle()));
+        let down = (1.0 - length(g.sight).powi(2)).max(0.0).sqrt();
+        let error_of_height = length(self.velocity) * down * HEIGHT / distance;
+        let doppler = rules.speed_sigma.powi(2) + error_of_height.powi(2);
+        let variance = doppler * spread / own.powi(2) + (TURNING * distance).powi(2);
+        if variance > MOST_VARIANCE {
+            return;
+        }
+        let towards = moved(first, left(first), angles / g.count);
+        let sight = towards.map(|c| c / length(towards));
+        self.free.take_across(sight, across(sight, self.velocity) + slope.clamp(-40.0, 40.0), variance);
     }
 
     /// Leaves the heading it has where motion along that does not explain what is seen.

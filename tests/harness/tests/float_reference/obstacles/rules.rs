@@ -45,6 +45,8 @@ pub struct Rules {
     pub sizes: SizeConfig,
     pub range_sigma: f64,
     pub speed_sigma: f64,
+    /// Radians.
+    pub azimuth_sigma: f64,
     /// The road's axis in the levelled frame.
     pub road: Ground,
     /// How far obstacles are followed.
@@ -112,6 +114,7 @@ impl Rules {
             sizes: c.sizes,
             range_sigma: real(noise.range_m),
             speed_sigma: real(noise.radial_velocity_mps),
+            azimuth_sigma: real(noise.azimuth_deg).to_radians(),
             road,
             limit,
             merge_lateral: real(c.merge_lateral_m),
