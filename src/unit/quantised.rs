@@ -47,6 +47,16 @@ impl<const A: usize, const W: usize> QuantisedSender<A, W> {
         self.broadcast.status_mut()
     }
 
+    /// The epoch; it goes on by itself where the clock steps back.
+    pub fn epoch(&self) -> Epoch {
+        self.broadcast.epoch()
+    }
+
+    /// Begins a new epoch on another clock.
+    pub fn start_over(&mut self, now: Time) {
+        self.broadcast.start_over(now);
+    }
+
     /// Whether everything of the last map is handed out or dropped.
     pub fn idle(&self) -> bool {
         self.broadcast.idle()

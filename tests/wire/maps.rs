@@ -401,6 +401,19 @@ fn a_clock_that_steps_back_while_the_sender_is_quiet_begins_a_new_epoch() {
 }
 
 #[test]
+fn on_another_clock_a_sender_is_quiet_again_and_its_uptime_begins_anew() {
+    let mut sender =
+        Broadcaster::<A, W>::new(BroadcastConfig::new(SENSOR, MEDIA[0]), header(1), Epoch::new(3), ms(0)).unwrap();
+    let map = Shadows::new(2).next();
+    assert_eq!(sender.scan(ms(3000), &map), Ok(()));
+    sender.start_over(ms(100_000));
+    assert_eq!((sender.epoch(), sender.scan(ms(100_399), &map)), (Epoch::new(4), Err(NotSent::Quiet)));
+    assert_eq!((sender.scan(ms(100_400), &map), sender.epoch()), (Ok(()), Epoch::new(4)));
+    (100_400..102_400).for_each(|now| drop(sender.next_frame(ms(now))));
+    assert!(sender.status_mut().uptime_s <= 2, "{}", sender.status_mut().uptime_s);
+}
+
+#[test]
 fn an_unknown_version_and_a_larger_map_are_reported_and_unknown() {
     let mut line = Line::<1>::new(MEDIA[2], BroadcastConfig::new(SENSOR, MEDIA[2]));
     let mut small = Receiver::<1, 20, W>::new([SENSOR], Addresses::STANDARD, ReceiverLimits::DEFAULT);

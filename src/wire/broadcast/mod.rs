@@ -20,7 +20,7 @@
 //! measurement is dropped too. Azimuths dropped are counted in the status. Nothing is sent late: a
 //! caller aborts what its mailboxes still hold after [`Broadcaster::deadline`].
 //!
-//! *Quiet.* After the start, after [`Broadcaster::restart`] and after a clock that stepped back by more than the greatest
+//! *Quiet.* After the start, after [`Broadcaster::restart`], [`Broadcaster::start_over`] and after a clock that stepped back by more than the greatest
 //! delay the epoch is a new one, and no map is sent for the greatest age and delay together: by then nothing of the old
 //! epoch is under way.
 //!
@@ -190,6 +190,12 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.begin(header, now)
     }
 
+    /// Begins a new epoch on another clock: from here on uptime is counted as well.
+    pub fn start_over(&mut self, now: Time) {
+        (self.epoch, self.started) = (self.epoch.next(), now);
+        self.quiet(now);
+    }
+
     /// Whether maps of this header are sent by a sender of this size.
     ///
     /// # Errors
@@ -258,7 +264,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         self.synchronised = synchronised;
     }
 
-    /// The epoch.
+    /// The epoch; it goes on by itself where the clock steps back.
     pub fn epoch(&self) -> Epoch {
         self.epoch
     }
