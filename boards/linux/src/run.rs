@@ -15,7 +15,7 @@ use super::size::{QuantisedSender as Sender, State as Radar3d};
 use crate::config::{ClockSource, Config};
 use crate::output::{Output, version};
 use crate::probability::say_refused;
-use crate::state::{FileSlots, next_epoch};
+use crate::state::{FileSlots, KeptEpoch};
 use crate::systemd::Systemd;
 
 /// The daemon's unit: radar-3d on the grid of this module.
@@ -50,10 +50,9 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     let mut map: Box<Map> = Box::new(PolarMap::NOWHERE);
     let mut clock = Clock::new(config, input.begins());
     let mut systemd = Systemd::new();
-    let mut last_epoch = None;
+    let mut kept = KeptEpoch::new(folder);
     loop {
-        let epoch = next_epoch(folder, last_epoch);
-        last_epoch = Some(epoch);
+        let epoch = kept.next();
         output.keep_up(clock.now(), &mut slots);
         let stored = StoredSettings::read(&slots, CHECK);
         input.start(epoch, stored, &mut output);
@@ -106,6 +105,9 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             }
             let (began, offered) = (Instant::now(), unit.as_ref().and_then(Unit::offered));
             let step = input.step(now, &mut Work { unit: &mut unit, slots: &mut slots, output: &mut output });
+            if let Some(unit) = &mut unit {
+                kept.follow(unit.broadcast().epoch());
+            }
             let Step::Now(now) = step else { break step };
             if let Some(unit) = &mut unit {
                 if unit.offered() != offered && config.input.clock == ClockSource::System {

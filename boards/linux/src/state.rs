@@ -15,20 +15,40 @@ pub const FILES: [&str; 2] = [EPOCH, SLOTS];
 const EPOCH: &str = "epoch";
 const SLOTS: &str = "slots";
 
-/// The epoch after `last`, or after that of the last start, a number kept in the folder. Where nothing can be
-/// kept, the first one is by chance: one start in 16 then has the epoch of the one before.
-pub fn next_epoch(folder: Option<&Path>, last: Option<Epoch>) -> Epoch {
-    let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
-    let path = folder.map(|folder| folder.join(EPOCH));
-    let kept = || fs::read_to_string(path.as_ref()?).ok()?.trim().parse().ok().map(Epoch::new);
-    let next = last.or_else(kept).map_or(Epoch::new(chance), Epoch::next);
-    match path.as_ref().map(|path| replace(path, next.number().to_string().as_bytes())) {
-        Some(Ok(())) => {}
-        Some(Err(e)) => warn!("{}: {e}: the epoch is not kept", folder.unwrap_or(Path::new("")).display()),
-        None if last.is_none() => warn!("no state folder: the epoch is by chance, and blocks are not kept"),
-        None => {}
+/// The epoch of the maps, kept in the folder so that no start takes the one before.
+pub struct KeptEpoch {
+    path: Option<PathBuf>,
+    last: Option<Epoch>,
+}
+
+impl KeptEpoch {
+    pub fn new(folder: Option<&Path>) -> Self {
+        Self { path: folder.map(|folder| folder.join(EPOCH)), last: None }
     }
-    next
+
+    /// That of a start: after the last one, or after that of the last start of the daemon. Where nothing can be kept, the
+    /// first one is by chance: one start in 16 then has the epoch of the one before.
+    pub fn next(&mut self) -> Epoch {
+        let chance = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| (d.as_micros() & 0xFF) as u8);
+        let kept = || fs::read_to_string(self.path.as_ref()?).ok()?.trim().parse().ok().map(Epoch::new);
+        let next = self.last.or_else(kept).map_or(Epoch::new(chance), Epoch::next);
+        if self.path.is_none() && self.last.is_none() {
+            warn!("no state folder: the epoch is by chance, and blocks are not kept");
+        }
+        self.follow(next);
+        next
+    }
+
+    /// That of the sender now, which goes on by itself where the radar's clock steps back.
+    pub fn follow(&mut self, epoch: Epoch) {
+        if self.last.replace(epoch) == Some(epoch) {
+            return;
+        }
+        let Some(path) = &self.path else { return };
+        if let Err(e) = replace(path, epoch.number().to_string().as_bytes()) {
+            warn!("{}: {e}: the epoch is not kept", path.display());
+        }
+    }
 }
 
 /// Writes a file whole or not at all.
@@ -147,16 +167,24 @@ mod tests {
     #[test]
     fn epochs_go_on_from_start_to_start() {
         let folder = folder("epochs");
-        let first = next_epoch(Some(&folder), None);
-        assert_eq!(next_epoch(Some(&folder), None), first.next());
+        let start = || KeptEpoch::new(Some(&folder)).next();
+        let first = start();
+        assert_eq!(start(), first.next());
         fs::write(folder.join("epoch"), "15").unwrap();
-        assert_eq!(next_epoch(Some(&folder), None).number(), 0);
+        assert_eq!(start().number(), 0);
         fs::write(folder.join("epoch"), "rubbish").unwrap();
-        next_epoch(Some(&folder), None);
+        start();
         assert!(fs::read_to_string(folder.join("epoch")).unwrap().parse::<u8>().is_ok());
+        // those that a sender went on to by itself are gone as well
+        let mut epoch = KeptEpoch::new(Some(&folder));
+        let own = epoch.next().next().next();
+        epoch.follow(own);
+        assert_eq!((start(), epoch.next()), (own.next(), own.next()));
         fs::remove_dir_all(folder).unwrap();
         // also where nothing can be kept, a restart is a new epoch
-        assert_eq!(next_epoch(None, Some(first)), first.next());
+        let mut epoch = KeptEpoch::new(None);
+        let first = epoch.next();
+        assert_eq!(epoch.next(), first.next());
     }
 
     #[test]
