@@ -1,7 +1,7 @@
 //! What outlasts the daemon: the epoch of its maps and the configuration blocks, in the state folder.
 
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -57,7 +57,18 @@ fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = fs::File::create(&new)?;
     file.write_all(bytes)?;
     file.sync_all()?;
-    fs::rename(new, path)
+    fs::rename(new, path)?;
+    sync_folder(path)
+}
+
+/// Names outlast a loss of power only once their folder is written.
+fn sync_folder(path: &Path) -> std::io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match fs::File::open(folder)?.sync_all() {
+        // some file systems have no such thing
+        Err(e) if e.kind() == ErrorKind::InvalidInput => Ok(()),
+        done => done,
+    }
 }
 
 /// Bytes of a block of layout 1, of which an older file has two.
