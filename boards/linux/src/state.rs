@@ -110,7 +110,12 @@ impl FileSlots {
             return Ok(());
         };
         if self.is_empty() {
-            return fs::remove_file(path);
+            return match fs::remove_file(path) {
+                // no block was written
+                Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
+                Err(e) => Err(e),
+                Ok(()) => sync_folder(path),
+            };
         }
         let file = fs::OpenOptions::new().create(true).truncate(false).write(true).open(path)?;
         // new, or with blocks of the layout before
@@ -118,7 +123,8 @@ impl FileSlots {
             file.write_all_at(self.slots.as_flattened(), 0)?;
         }
         file.write_all_at(&self.slots[slot], (slot * BLOCK_LEN) as u64)?;
-        file.sync_all()
+        file.sync_all()?;
+        sync_folder(path)
     }
 }
 

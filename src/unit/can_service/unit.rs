@@ -177,6 +177,11 @@ impl CanService {
         Flow::Continue
     }
 
+    /// Whether slots were written and that is still to be answered.
+    pub fn has_written(&self) -> bool {
+        self.outgoing.cleared || self.outgoing.written.is_some()
+    }
+
     /// The next answer, if one is due.
     pub fn next_frame(&mut self, now: Time, slots: &impl SettingsSlots) -> Option<CanFrame> {
         let gap_us = u64::from(self.config.gap_us);

@@ -27,7 +27,8 @@
 //!
 //! # Limits
 //! 64 frames of each bus and 64 bytes of the serial line a step. Three mailboxes. While a block is written
-//! the loop stands still, on parts with large sectors for seconds: the map ends and comes back.
+//! the loop stands still, on parts with large sectors for seconds: the map ends and comes back. No more frames of the
+//! broadcast bus are taken in that step.
 
 mod outbox;
 mod reset;
@@ -207,6 +208,10 @@ impl<'u, E: InUnit, S: MapSender<E::Map>, F: Feed<Piece = CanFrame, Input = E::I
             let Some(frame) = self.broadcast_bus.receive(&mut ports.broadcast) else { break };
             if self.can_service.take(&frame, &mut ports.slots) == Some(Flow::Restart) {
                 flow = Flow::Restart;
+            }
+            // the watchdog does not wait for more than one request to be written
+            if self.can_service.has_written() {
+                break;
             }
         }
         let frame_done = self.receive(now, &mut ports.radar);

@@ -317,10 +317,14 @@ impl StoredSettings {
         Ok(Some(Quantiser::new(table, threshold, visible_from)))
     }
 
-    /// Empties both slots of a kind: from the next start on the unit is as it was before its first block of it.
+    /// Empties both slots of a kind: from the next start on the unit is as it was before its first block of it. A slot that
+    /// is empty already is left alone: erasing takes a controller long, and a request may come again.
     pub fn clear(kind: Kind, slots: &mut impl SettingsSlots) {
         const ERASED: [u8; MOST_BLOCK_LEN] = [0xFF; MOST_BLOCK_LEN];
         for slot in kind.slots() {
+            if slots.slot(slot).iter().all(|byte| *byte == 0xFF) {
+                continue;
+            }
             slots.write(slot, ERASED.get(..kind.most_len()).unwrap_or(&ERASED));
         }
     }

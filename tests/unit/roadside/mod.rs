@@ -2,6 +2,7 @@
 
 mod blocks;
 mod own_figures;
+mod requests;
 
 use std::collections::VecDeque;
 
@@ -116,13 +117,15 @@ impl serial_service::SerialLine for Line {
     }
 }
 
-struct InRam([[u8; BLOCK_LEN]; 2]);
+/// Slots, and how often one was erased.
+struct InRam([[u8; BLOCK_LEN]; 2], usize);
 
 impl SettingsSlots for InRam {
     fn slot(&self, slot: usize) -> &[u8] {
         self.0.get(slot).map_or(&[], |slot| slot)
     }
     fn write(&mut self, slot: usize, block: &[u8]) {
+        self.1 += 1;
         self.0[slot][..block.len()].copy_from_slice(block);
     }
 }
@@ -175,7 +178,7 @@ impl World {
             radar: Bus::default(),
             broadcast: Bus::default(),
             serial: Line::default(),
-            slots: InRam(blocks),
+            slots: InRam(blocks, 0),
         };
         let stored =
             StoredSettings::read(&ports.slots, SettingsCheck::of::<SmallState, SmallSender>().on_can(CAN_CLOCK_HZ));
