@@ -74,6 +74,14 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
 /// Bytes of a block of layout 1, of which an older file has two.
 const LAYOUT_1_LEN: usize = 148;
 
+/// What holds no block and is not empty: the head of one, and no check sum that fits.
+const UNREADABLE: [u8; BLOCK_LEN] = {
+    let mut block = [0; BLOCK_LEN];
+    let [low, high] = (BLOCK_LEN as u16).to_le_bytes();
+    [block[0], block[1], block[2], block[3], block[4], block[6], block[7]] = [b'V', b'S', b'C', b'B', 2, low, high];
+    block
+};
+
 /// The two slots of configuration blocks: in a file once one was written, before that, and once both were emptied, the
 /// settings of the configuration file.
 pub struct FileSlots {
@@ -84,16 +92,24 @@ pub struct FileSlots {
 }
 
 impl FileSlots {
-    /// Reads the slots. Where none was written, the first holds these settings.
+    /// Reads the slots. Where none was written, the first holds these settings; where that cannot be told, neither holds
+    /// any.
     pub fn open(folder: Option<&Path>, settings: Option<&Settings>) -> Self {
         let path = folder.map(|folder| folder.join(SLOTS));
         let mut slots = [[0xFF; BLOCK_LEN]; 2];
-        let kept = path.as_ref().and_then(|path| fs::read(path).ok()).unwrap_or_default();
+        let of_file = settings.map_or([0xFF; BLOCK_LEN], |settings| settings.to_block(1));
+        let kept = match path.as_ref().map(|path| (path, fs::read(path))) {
+            Some((_, Ok(kept))) => kept,
+            Some((path, Err(e))) if e.kind() != ErrorKind::NotFound => {
+                error!("{}: {e}: which configuration blocks were written is not known", path.display());
+                return Self { path: Some(path.clone()), slots: [UNREADABLE; 2], of_file };
+            }
+            _ => Vec::new(),
+        };
         let length = if kept.len() == 2 * LAYOUT_1_LEN { LAYOUT_1_LEN } else { BLOCK_LEN };
         for (slot, bytes) in slots.iter_mut().zip(kept.chunks(length)) {
             slot[..bytes.len()].copy_from_slice(bytes);
         }
-        let of_file = settings.map_or([0xFF; BLOCK_LEN], |settings| settings.to_block(1));
         if kept.is_empty() {
             slots[0] = of_file;
         }
@@ -152,6 +168,7 @@ impl SettingsSlots for FileSlots {
 mod tests {
     use super::*;
     use viewshed::board::{BlockError, StoredSettings};
+    use viewshed::unit::settings::Kind;
     use viewshed::{ConfigError, FieldOfView, Mount, NoiseConfig, Sensor, reference::CHECK};
 
     fn settings(height_m: f32) -> Settings {
@@ -234,6 +251,32 @@ mod tests {
         assert_eq!(height(&slots), Ok(6.0));
         assert!(!folder.join("slots").exists());
         assert_eq!(height(&FileSlots::open(Some(&folder), Some(&settings(8.0)))), Ok(8.0));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn slots_that_are_emptied_before_a_block_was_written_stay_the_files() {
+        let folder = folder("emptied-first");
+        let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
+        for _ in 0..2 {
+            StoredSettings::clear(Kind::Settings, &mut slots);
+            assert_eq!((height(&slots), folder.join("slots").exists()), (Ok(6.0), false));
+        }
+        assert_eq!(height(&FileSlots::open(Some(&folder), Some(&settings(8.0)))), Ok(8.0));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn slots_that_cannot_be_read_are_not_taken_for_slots_that_were_never_written() {
+        let folder = folder("unreadable");
+        fs::create_dir(folder.join("slots")).unwrap();
+        let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
+        assert_eq!(height(&slots), Err(BlockError::CheckSum), "never silently the file's");
+        // what cannot be kept is not answered as written, either
+        assert!(StoredSettings::read(&slots, CHECK).write(&settings(7.0).to_block(0), &mut slots).is_err());
+        fs::remove_dir(folder.join("slots")).unwrap();
+        assert!(StoredSettings::read(&slots, CHECK).write(&settings(7.0).to_block(0), &mut slots).is_ok());
+        assert_eq!(height(&FileSlots::open(Some(&folder), Some(&settings(6.0)))), Ok(7.0));
         fs::remove_dir_all(folder).unwrap();
     }
 
