@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use log::{info, warn};
 use socketcan::dump::{ParseError, Reader};
 use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, Identity, RadarClock, SerialSession, StoredSettings};
-use viewshed::{BusConfig, CanFrame, Epoch, Reason, Ti, Time};
+use viewshed::{BusConfig, CanFrame, Epoch, Feed, NativeConfig, NativeReceiver, Reason, Ti, Time, Unstuffer};
 
 use super::run::Unit;
 use super::size::{Radar as Decoder, State as Radar3d};
@@ -99,6 +99,7 @@ pub fn open(config: &Config) -> Result<Box<dyn Input>> {
                 hearing: hearing("scans"),
                 session: None,
                 clock: RadarClock::NEW,
+                first: (!bench).then(|| FirstStamp::of(input.sensor_id)),
                 rest: Vec::new(),
             })
         }
@@ -296,6 +297,37 @@ impl Input for TiPort {
     }
 }
 
+/// Looks for a radar's first stamp, so that it is known before the unit works on the scan it comes with.
+struct FirstStamp {
+    unstuffer: Unstuffer,
+    scans: NativeReceiver<{ Radar3d::DETECTIONS }>,
+}
+
+impl FirstStamp {
+    fn of(sensor: u8) -> Self {
+        Self { unstuffer: Unstuffer::new(), scans: NativeReceiver::new(NativeConfig::sensor(sensor)) }
+    }
+
+    fn take(&mut self, byte: u8, now: Time) -> Option<Time> {
+        let (_, message) = self.unstuffer.push(&[byte]);
+        let mut stamp = None;
+        self.scans.take(message?, now, &mut |frame| stamp = Some(frame.measured));
+        stamp
+    }
+
+    fn wait(&mut self, now: Time) -> Option<Time> {
+        let mut stamp = None;
+        self.scans.wait(now, &mut |frame| stamp = Some(frame.measured));
+        stamp
+    }
+
+    /// On a clock that was not known until now, sender and unit begin anew: quiet time and uptime were those of another.
+    fn begin(stamp: Time, unit: &mut Unit<'_>) {
+        unit.reset();
+        unit.broadcast().start_over(stamp);
+    }
+}
+
 /// Native scans and service messages on a serial port.
 struct NativePort {
     port: Serial,
@@ -306,6 +338,8 @@ struct NativePort {
     hearing: Hearing,
     session: Option<SerialSession<{ Radar3d::DETECTIONS }>>,
     clock: RadarClock,
+    /// Until the radar's clock is known.
+    first: Option<FirstStamp>,
     /// What came after a restart.
     rest: Vec<u8>,
 }
@@ -315,6 +349,8 @@ impl Input for NativePort {
         self.port.keep_open();
         let mut lines = Lines { output, own: Some(&mut self.port) };
         self.session = Some(SerialSession::start(self.sensor, self.identity, epoch, stored, &mut lines));
+        // it hears what the session hears
+        self.first = self.first.take().map(|_| FirstStamp::of(self.sensor));
     }
 
     fn fd(&self) -> Option<BorrowedFd<'_>> {
@@ -338,6 +374,12 @@ impl Input for NativePort {
             // byte by byte: what stands after a restart belongs to the next session
             for (k, byte) in bytes.iter().enumerate() {
                 let before = session.now();
+                let stamp = self.first.as_mut().and_then(|first| first.take(*byte, before));
+                if let Some((stamp, unit)) = stamp.zip(work.unit.as_mut()) {
+                    self.first = None;
+                    self.clock.stamp(stamp, now);
+                    FirstStamp::begin(stamp, unit);
+                }
                 let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
                 if session.take(&[*byte], work.unit, work.slots, &mut lines, &mut |_, _| {}) == Flow::Restart {
                     self.rest.extend_from_slice(bytes.get(k + 1..).unwrap_or(&[]));
@@ -352,6 +394,12 @@ impl Input for NativePort {
             say(self.hearing.look(now, unit.frames()));
         }
         if !self.bench {
+            let stamp = self.first.as_mut().and_then(|first| first.wait(now));
+            if let Some((stamp, unit)) = stamp.zip(work.unit.as_mut()) {
+                self.first = None;
+                self.clock.stamp(stamp, now);
+                FirstStamp::begin(stamp, unit);
+            }
             let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
             session.idle(self.clock.now(now), work.unit, &mut lines);
         }
