@@ -29,7 +29,7 @@ pub enum Grid {
 
 impl Grid {
     /// Whether a unit of this size can run with settings.
-    fn check(self) -> SettingsCheck {
+    pub fn check(self) -> SettingsCheck {
         match self {
             Self::Reference => reference::supervised::CHECK,
             Self::Small => small::supervised::CHECK,
@@ -60,14 +60,10 @@ pub struct Config {
     pub output: Output,
     pub mount: Option<Mount>,
     pub field_of_view: Option<FieldOfView>,
-    #[serde(default)]
-    pub noise: NoiseConfig,
-    #[serde(default)]
-    pub gate: GateConfig,
-    #[serde(default)]
-    pub visibility: VisibilityConfig,
-    #[serde(default)]
-    pub health: HealthConfig,
+    pub noise: Option<NoiseConfig>,
+    pub gate: Option<GateConfig>,
+    pub visibility: Option<VisibilityConfig>,
+    pub health: Option<HealthConfig>,
     /// Tuned for the place. Kept as long as the daemon runs, like the lanes.
     #[serde(default, deserialize_with = "kept")]
     pub obstacles: Option<&'static ObstacleConfig>,
@@ -267,7 +263,7 @@ impl Config {
     }
 
     /// Reads and checks a text; problems come with their lines.
-    fn parse(text: &str) -> Result<Self, Vec<(Option<usize>, String)>> {
+    pub fn parse(text: &str) -> Result<Self, Vec<(Option<usize>, String)>> {
         let config: Self = toml::from_str(text).map_err(|e| {
             let at = e.span().map(|span| span.start);
             let key = at.and_then(|at| locate::key_at(text, at)).map_or(String::new(), |key| format!("{key}: "));
@@ -357,7 +353,9 @@ impl Config {
         match self.settings() {
             Some(settings) => problems.extend(self.grid.check().settings(&settings).err().map(|e| of_library(&e))),
             // the integrator's messages can bring them
-            None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {}
+            None if self.has_service() && missing.iter().all(|(_, missing)| *missing) => {
+                problems.extend(self.place_problem().map(|e| of_library(&e)));
+            }
             None => {
                 let missing = missing.iter().filter(|(_, missing)| *missing);
                 problems.extend(missing.map(|(key, _)| ((*key).to_owned(), format!("the table [{key}] is missing"))));
@@ -373,8 +371,10 @@ impl Config {
 
     /// What the integrator set; `None` if that is left to a configuration block.
     pub fn settings(&self) -> Option<Settings> {
-        let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise: self.noise };
-        let Self { gate, visibility, health, .. } = *self;
+        let noise = self.noise.unwrap_or_default();
+        let sensor = Sensor { mount: self.mount?, field_of_view: self.field_of_view?, noise };
+        let gate = self.gate.unwrap_or_default();
+        let (visibility, health) = (self.visibility.unwrap_or_default(), self.health.unwrap_or_default());
         Some(self.of_place(Settings { gate, visibility, health, ..Settings::of(sensor) }))
     }
 
@@ -438,6 +438,7 @@ impl Config {
             )),
             _ => lines.push("mount: from a configuration block; the safe state until there is one".to_owned()),
         }
+        lines.extend(self.unused());
         lines.extend(self.table().and_then(Result::ok).map(|table| format!("p:     {}", table.said())));
         lines.extend(self.absent().iter().map(|device| format!("not there now, would be waited for: {device}")));
         lines.join("\n")
@@ -547,7 +548,7 @@ fn family(bytes: u32) -> Option<TiFamily> {
 fn of_library(e: &ConfigError) -> Problem {
     let key = e.parameter.replace("broadcast.", "output.");
     let text = e.to_string();
-    let what = text.strip_prefix(e.parameter).unwrap_or(&text).trim().to_owned();
+    let what = text.strip_prefix(e.parameter).unwrap_or(&text).trim_start_matches([':', ' ']).to_owned();
     (key, what)
 }
 

@@ -8,6 +8,7 @@ mod locate;
 #[path = "../../../tests/harness/src/results/files/one_file.rs"]
 mod one_file;
 mod output;
+mod place;
 mod probability;
 mod reference;
 mod serial;

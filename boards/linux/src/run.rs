@@ -44,6 +44,9 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
     if config.has_service() && settings.is_some() && of_line(&stored).is_some_and(|s| Some(s) != settings) {
         warn!("a configuration block written over the line goes before the file's mount, field of view and figures");
     }
+    if let Some(unused) = config.unused() {
+        warn!("{unused}");
+    }
     let mut input = input::open(config)?;
     let mut output = Output::new(config)?;
     let mut state = Box::new(State::new(Radar3d::new()));
@@ -58,7 +61,10 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
         input.start(epoch, stored, &mut output);
         // where blocks are taken the newest that can run, else what the file says
         let settings = if config.has_service() { of_line(&stored) } else { config.settings() };
-        let refused = stored.position().err().map(|refused| refused.error).filter(|_| settings.is_none());
+        let none = stored.position().err().map(|refused| refused.error).filter(|_| settings.is_none());
+        // a block that could run by itself, and not with what the file alone says of the place
+        let misfit = settings.as_ref().and_then(|s| CHECK.settings(s).err()).map(BlockError::Parameter);
+        let (settings, refused) = (settings.filter(|_| misfit.is_none()), none.or(misfit));
         if let Some(reason) = &refused {
             warn!("{reason}: safe state until a block is written");
         }
