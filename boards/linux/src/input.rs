@@ -115,6 +115,8 @@ struct Bus {
     hearing: Hearing,
     holds: bool,
     last: Time,
+    /// Maps go out on the same bus, whose bus-offs are counted there.
+    is_shared: bool,
 }
 
 impl Bus {
@@ -126,7 +128,8 @@ impl Bus {
         let keeper = BusKeeper::start(&BusConfig::default(), &mut interface);
         let decoder = Decoder::new(input.ars408());
         let hearing = Hearing::new(Line::Ars408 { interface: name.to_owned(), id: input.sensor_id });
-        Self { interface, keeper, decoder, upkeep, hearing, holds: false, last: Time::from_micros(0) }
+        let is_shared = config.output.interface.as_deref() == Some(name);
+        Self { interface, keeper, decoder, upkeep, hearing, holds: false, last: Time::from_micros(0), is_shared }
     }
 
     /// Sends the radar its configuration, and that it stands.
@@ -152,6 +155,7 @@ impl Input for Bus {
 
     fn step(&mut self, now: Time, work: &mut Work<'_, '_>) -> Step {
         self.keeper.poll(now, &mut self.interface);
+        work.output.radar_bus_offs = if self.is_shared { 0 } else { self.interface.bus_offs };
         let Some(unit) = work.unit else {
             while self.keeper.receive(&mut self.interface).is_some() {}
             return Step::Now(now);

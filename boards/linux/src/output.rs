@@ -28,6 +28,9 @@ pub struct Output {
     held: Option<(CanFrame, Time)>,
     /// The integrator's messages, if they are listened to.
     service: Option<CanService>,
+    /// Bus-offs of the radar's bus, if it is another one, and of both as they were reported.
+    pub radar_bus_offs: u16,
+    reported: u16,
     /// Messages that went out, and those that did not.
     pub sent: u64,
     pub refused: u64,
@@ -63,7 +66,7 @@ impl Output {
             let own = output.port.as_ref().filter(|port| config.input.port.as_ref() != Some(*port));
             Sink::Serial(own.map(|port| Serial::new(port, output.baud(), patient)))
         };
-        Ok(Self { sink, held: None, service: None, sent: 0, refused: 0 })
+        Ok(Self { sink, held: None, service: None, radar_bus_offs: 0, reported: 0, sent: 0, refused: 0 })
     }
 
     /// A start: from here on the integrator's messages are answered, where that is wanted.
@@ -107,8 +110,8 @@ impl Output {
 
     /// Answers the integrator; in the safe state, says that it is one.
     pub fn answer(&mut self, now: Time, safe: bool, slots: &FileSlots) {
+        let base = Status { firmware: version(), bus_off: self.bus_offs(), ..Status::starting(0) };
         let Some(service) = &mut self.service else { return };
-        let base = Status { firmware: version(), ..Status::starting(0) };
         let status = if safe { service.next_status(now, base) } else { None };
         let answer = service.next_frame(now, slots);
         for frame in status.iter().chain(&answer) {
@@ -129,6 +132,7 @@ impl Output {
         unit: &mut Unit<'_, E, S>,
         own: Option<&mut Serial>,
     ) {
+        self.report_bus_offs(now, unit);
         if matches!(self.sink, Sink::Serial(_)) {
             let mut line = [0; MOST_STUFFED];
             let mut lines = Lines { output: self, own };
@@ -157,11 +161,20 @@ impl Output {
             }
             self.sent += 1;
         }
-        if let Sink::Can(interface, _) = &self.sink {
-            let status = unit.broadcast().status_mut();
-            if std::mem::replace(&mut status.bus_off, interface.bus_offs) != interface.bus_offs {
-                unit.degrade(now, Reason::BusOff);
-            }
+    }
+
+    /// Of both buses.
+    fn bus_offs(&self) -> u16 {
+        let own = if let Sink::Can(interface, _) = &self.sink { interface.bus_offs } else { 0 };
+        own.saturating_add(self.radar_bus_offs)
+    }
+
+    /// Into the status.
+    fn report_bus_offs<E: Estimator, S: MapSender<E::Map>>(&mut self, now: Time, unit: &mut Unit<'_, E, S>) {
+        let bus_offs = self.bus_offs();
+        unit.broadcast().status_mut().bus_off = bus_offs;
+        if std::mem::replace(&mut self.reported, bus_offs) != bus_offs {
+            unit.degrade(now, Reason::BusOff);
         }
     }
 
