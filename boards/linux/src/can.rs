@@ -60,10 +60,14 @@ impl Interface {
 
     fn failed(&mut self, why: &str) {
         self.off = true;
-        // once, not at every attempt
-        if why != self.last_error {
-            warn!("{}: {why}; trying again until it works", self.name);
-            why.clone_into(&mut self.last_error);
+        self.say(&format!("{why}; trying again until it works"));
+    }
+
+    /// Once, not at every attempt.
+    fn say(&mut self, what: &str) {
+        if what != self.last_error {
+            warn!("{}: {what}", self.name);
+            what.clone_into(&mut self.last_error);
         }
     }
 }
@@ -88,6 +92,7 @@ impl CanPort for Interface {
                 return None;
             }
             if let Some(frame) = from_socketcan(&frame) {
+                self.last_error.clear();
                 let age = stamps.socket.and_then(|at| SystemTime::now().duration_since(at).ok());
                 self.age = age.unwrap_or_default().min(Duration::from_secs(1));
                 return Some(frame);
@@ -98,8 +103,16 @@ impl CanPort for Interface {
     fn send(&mut self, frame: &CanFrame) -> bool {
         let (Some(socket), Some(frame)) = (&self.socket, to_socketcan(frame)) else { return false };
         match socket.write_frame(&frame) {
-            Ok(()) => true,
-            Err(e) if e.should_retry() || e.raw_os_error() == Some(Errno::NOBUFS.raw_os_error()) => false,
+            Ok(()) => {
+                self.last_error.clear();
+                true
+            }
+            // opened again it would be the same; a frame that it takes is sent as soon as it is set up so
+            Err(e) if matches!(frame, CanAnyFrame::Fd(_)) && is(&e, Errno::INVAL) => {
+                self.say(&no_fd(&self.name));
+                false
+            }
+            Err(e) if e.should_retry() || is(&e, Errno::NOBUFS) => false,
             Err(e) => {
                 self.failed(&e.to_string());
                 false
@@ -123,9 +136,20 @@ impl CanPort for Interface {
             Ok(socket) => {
                 info!("{}: open", self.name);
                 (self.socket, self.off) = (Some(socket), false);
-                self.last_error.clear();
             }
             Err(e) => self.failed(&e.to_string()),
         }
     }
+}
+
+fn is(e: &std::io::Error, errno: Errno) -> bool {
+    e.raw_os_error() == Some(errno.raw_os_error())
+}
+
+/// Why an interface refuses frames of CAN FD.
+fn no_fd(name: &str) -> String {
+    format!(
+        "takes no CAN FD frames; set it up for them: `ip link set {name} type can bitrate 500000 dbitrate 2000000 fd on`, or \
+         medium = \"can\""
+    )
 }

@@ -8,7 +8,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use socketcan::dump::Reader;
-use socketcan::{CanAnyFrame, CanDataFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId};
+use socketcan::{
+    CanAnyFrame, CanDataFrame, CanErrorFrame, CanFdFrame, CanFdSocket, EmbeddedFrame, Id, Socket, StandardId,
+};
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
@@ -415,4 +417,48 @@ fn frames_come_and_go_over_the_kernels_buses() {
         let gone = Some((UnitState::Starting, Reason::None));
         assert!(bench.until(|bench| bench.state() == gone && bench.visible() == 0), "{medium}: {:?}", bench.state());
     }
+}
+
+#[test]
+fn an_interface_that_takes_no_can_fd_is_said_once_with_what_sets_it_up() {
+    let _buses = match Buses::make() {
+        Ok(buses) => buses,
+        Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
+    };
+    let mtu = |mtu| {
+        ip(&format!("link set {MAPS} down")).unwrap();
+        ip(&format!("link set {MAPS} mtu {mtu}")).unwrap();
+        ip(&format!("link set {MAPS} up")).unwrap();
+    };
+    mtu(16);
+    let mut daemon = Daemon::start("can-fd");
+    daemon.wait_for("warning: vsmaps: takes no CAN FD frames; set it up for them: `ip link set vsmaps type can ", 1);
+    std::thread::sleep(Duration::from_secs(3));
+    // once, and there is nothing to open again
+    assert_eq!(daemon.log().matches(MAPS).count(), 3, "{}", daemon.log());
+    mtu(72);
+    daemon.wait_for("vsmaps: open", 2);
+    let mut bench = Bench::new("can-fd");
+    assert!(bench.until(|bench| bench.state().is_some()), "{}", daemon.log());
+    assert_eq!(daemon.terminate().code(), Some(0));
+}
+
+#[test]
+fn a_bus_off_of_the_radars_bus_is_in_the_status() {
+    let _buses = match Buses::make() {
+        Ok(buses) => buses,
+        Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
+    };
+    let mut bench = Bench::new("can");
+    let mut daemon = Daemon::start("can");
+    daemon.wait_for("started", 1);
+    assert!(bench.play_until(|bench| bench.is_ok()), "{:?}", bench.state());
+    // as the kernel says it of a controller
+    bench.radar.write_frame(&CanErrorFrame::new_error(0x40, &[0; 8]).unwrap()).unwrap();
+    daemon.wait_for("warning: vsradar: bus-off", 1);
+    let degraded = Some((UnitState::Degraded, Reason::BusOff));
+    assert!(bench.play_until(|bench| bench.state() == degraded), "{:?}", bench.state());
+    let bus_off = bench.receiver.sensor(0).and_then(|sensor| sensor.status()).map(|status| status.bus_off);
+    assert_eq!(bus_off, Some(1));
+    assert_eq!(daemon.terminate().code(), Some(0));
 }
