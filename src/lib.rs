@@ -308,7 +308,9 @@ pub mod board {
     // the loop
     pub use crate::unit::Flow;
     pub use crate::unit::radar_clock::RadarClock;
-    pub use crate::unit::roadside::{ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SerialPort};
+    pub use crate::unit::roadside::{
+        FaultySlots, ResetFlags, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SerialPort,
+    };
     pub use crate::unit::status_output::StatusOutput;
     pub use crate::unit::timing::CycleCounter;
 }

@@ -104,7 +104,8 @@ async fn main(_spawner: Spawner) {
     let flags = reset_flags(last.crashed);
     defmt::info!("reset: {}", flags);
 
-    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SLOTS, |slot| last.readable(slot));
+    let faulty = last.faulty(flags);
+    let slots = FlashSlots::new(flash::Flash::new_blocking(p.FLASH), SLOTS, |slot| crash::readable(faulty, slot));
     crash::read_done();
     let stored = StoredSettings::read(&slots, CHECK.on_can(CAN_CLOCK_HZ));
     let [radar_timing, broadcast_timing] = stored.buses().map(|bus| bus.timing(CAN_CLOCK_HZ));

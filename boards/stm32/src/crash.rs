@@ -1,7 +1,7 @@
 //! A panic or a fault ends in a reset that the status then reports.
 //!
 //! Flash memory that lost its power while it was written faults when it is read. So that the start does not
-//! end there for ever, what is being read is remembered over the reset.
+//! end there for ever, what is being read is remembered over the resets.
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
@@ -9,15 +9,14 @@ use core::ptr::{read_volatile, write_volatile};
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
+use viewshed::board::{FaultySlots, ResetFlags};
 
-/// Whether it crashed, and the slot that was being read. Not cleared at the start; a board places it where no
+/// Whether it crashed, and which slots were being read. Not cleared at the start; a board places it where no
 /// cache holds it back.
 #[unsafe(link_section = ".crash")]
 static mut MARKS: MaybeUninit<[u32; 2]> = MaybeUninit::uninit();
 
 const CRASHED: u32 = 0xC4A5_4EED;
-/// A slot's number is added.
-const READING: u32 = 0x5107_0000;
 
 fn read(mark: usize) -> u32 {
     // SAFETY: one of two words that this file alone touches; any value is one
@@ -34,29 +33,33 @@ fn write(mark: usize, value: u32) {
 pub struct Last {
     /// In a panic or a fault.
     pub crashed: bool,
-    reading: u32,
+    read: u32,
 }
 
 /// Asked once, at the start.
 pub fn last() -> Last {
-    let last = Last { crashed: read(0) == CRASHED, reading: read(1) };
+    let last = Last { crashed: read(0) == CRASHED, read: read(1) };
     write(0, 0);
-    write(1, 0);
+    read_done();
     last
 }
 
 impl Last {
-    /// Whether a slot can be read: not if the last run crashed in it. To be followed by [`read_done`].
-    pub fn readable(&self, slot: usize) -> bool {
-        let reading = READING + slot as u32;
-        write(1, reading);
-        !(self.crashed && self.reading == reading)
+    /// The slots in which it and the runs before crashed.
+    pub fn faulty(&self, flags: ResetFlags) -> FaultySlots {
+        FaultySlots::found(self.read, flags.into())
     }
+}
+
+/// Whether a slot can be read, which is remembered. To be followed by [`read_done`].
+pub fn readable(faulty: FaultySlots, slot: usize) -> bool {
+    write(1, faulty.reading(slot));
+    faulty.is_readable(slot)
 }
 
 /// The slots are read.
 pub fn read_done() {
-    write(1, 0);
+    write(1, FaultySlots::NOT_READING);
 }
 
 fn reset() -> ! {

@@ -30,6 +30,7 @@
 //! the loop stands still, on parts with large sectors for seconds: the map ends and comes back. No more frames of the
 //! broadcast bus are taken in that step.
 
+mod faulty;
 mod outbox;
 mod reset;
 
@@ -50,6 +51,7 @@ use crate::wire::message::{Addresses, Epoch};
 use crate::wire::serial::{MOST_STUFFED, Unstuffer};
 use crate::wire::status::{Reason, ResetCause, Status, UnitState};
 
+pub use faulty::FaultySlots;
 use outbox::Outbox;
 pub use reset::ResetFlags;
 

@@ -6,7 +6,8 @@
 //! # Limits
 //! A slot begins where a page begins and takes as many pages as a block needs, which is one on every
 //! part so far. Some parts raise an exception at a read where power failed while writing, as the check
-//! bits do not hold: their boards remember which slot they were reading, and do not read it again.
+//! bits do not hold: their boards remember which slots they were reading then, and do not read them again
+//! ([`FaultySlots`](crate::unit::roadside::FaultySlots)).
 
 use embedded_storage::nor_flash::NorFlash;
 
