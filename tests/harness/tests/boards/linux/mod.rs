@@ -5,6 +5,7 @@ mod lines;
 mod logs;
 mod probability;
 mod service;
+mod starts;
 mod terminal;
 #[allow(dead_code)] // of every kind of frame, few are sent here
 #[path = "../../../../inputs/ti/frames.rs"]
