@@ -409,7 +409,7 @@ fn on_another_clock_a_sender_is_quiet_again_and_its_uptime_begins_anew() {
     sender.start_over(ms(100_000));
     assert_eq!((sender.epoch(), sender.scan(ms(100_399), &map)), (Epoch::new(4), Err(NotSent::Quiet)));
     assert_eq!((sender.scan(ms(100_400), &map), sender.epoch()), (Ok(()), Epoch::new(4)));
-    (100_400..102_400).for_each(|now| drop(sender.next_frame(ms(now))));
+    (100_400..102_400).for_each(|now| _ = sender.next_frame(ms(now)));
     assert!(sender.status_mut().uptime_s <= 2, "{}", sender.status_mut().uptime_s);
 }
 
