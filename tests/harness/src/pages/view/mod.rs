@@ -232,7 +232,7 @@ fn told(this: &Viewing, (number, map, azimuth, range): (usize, usize, usize, usi
         "x_m": place[0],
         "y_m": place[1],
         "range_m": (range as f64 + 0.5) * shown.cells.cell_m,
-        "azimuth_deg": ((place[1] - y).atan2(place[0] - x) - shown.cells.mount[3]).to_degrees(),
+        "azimuth_deg": azimuth_deg(shown.cells.mount, place),
         "grade": grade,
         "state": state,
         "probability": shown.probability(azimuth, range),
@@ -244,6 +244,12 @@ fn told(this: &Viewing, (number, map, azimuth, range): (usize, usize, usize, usi
         "hidden_by": casting(&now.boxes, sensor, place, this.about.slice_height_m),
         "stands_on": on(&now, place),
     }))
+}
+
+/// Where a place lies from where a sensor looks, degrees, + to its left, -180 to 180.
+fn azimuth_deg([x, y, _, yaw_rad]: [f64; 4], place: [f64; 2]) -> f64 {
+    let azimuth = ((place[1] - y).atan2(place[0] - x) - yaw_rad).to_degrees();
+    (azimuth + 180.0).rem_euclid(360.0) - 180.0
 }
 
 /// Numbers of the boxes whose shadow reaches a place, the nearest to the sensor first.
@@ -276,5 +282,22 @@ mod tests {
             casting(&boxes, sensor, [60.0, -8.0], 1.0).is_empty()
                 && casting(&boxes, sensor, [20.0, 0.0], 1.0).is_empty()
         );
+    }
+
+    #[test]
+    fn an_azimuth_is_told_from_where_the_sensor_looks_and_never_a_turn_off() {
+        let told = |yaw_deg: f64, to_deg: f64| {
+            let (sin, cos) = to_deg.to_radians().sin_cos();
+            azimuth_deg([10.0, 5.0, 6.0, yaw_deg.to_radians()], [10.0 + 40.0 * cos, 5.0 + 40.0 * sin])
+        };
+        for (yaw_deg, to_deg, expected) in [
+            (0.0, 20.0, 20.0),
+            (170.0, 200.0, 30.0),
+            (170.0, 160.0, -10.0),
+            (-170.0, 150.0, -40.0),
+            (200.0, 190.0, -10.0),
+        ] {
+            assert!((told(yaw_deg, to_deg) - expected).abs() < 1e-9, "{yaw_deg} {to_deg}: {}", told(yaw_deg, to_deg));
+        }
     }
 }
