@@ -70,6 +70,24 @@ fn it_plays_steps_and_jumps_to_what_is_wrong() {
 }
 
 #[test]
+fn samples_that_were_skipped_are_asked_for_and_the_nearest_is_one_that_is_known() {
+    let Some(browser) = Browser::start("skipped") else { return };
+    let server = start();
+    let page = ready(&browser, &server);
+    let found = page.ask(
+        "(async () => { const { source } = viewshed; const { samples } = source;
+           const middle = samples.length >> 1; const { time_s: time } = samples[middle];
+           for (const k of [0, 1, 2]) delete samples[middle + k];
+           const without = source.nearest(time);
+           await source.update();
+           return [middle, without, source.nearest(time), samples.findIndex((sample) => !sample)]; })()",
+    );
+    let [middle, without, again, hole] = [0, 1, 2, 3].map(|k| found[k].as_i64().unwrap());
+    assert_eq!((without, again, hole), (middle - 1, middle, -1));
+    assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
 fn a_cell_says_what_it_is_since_when_and_in_whose_shadow() {
     let Some(browser) = Browser::start("cells") else { return };
     let server = start();

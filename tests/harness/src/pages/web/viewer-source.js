@@ -26,12 +26,18 @@ export class Source {
     else this.fill();
   }
 
-  // Samples that have come since the last time.
+  // Number of the first sample that is not known.
+  get unknown() {
+    const hole = this.samples.findIndex((sample) => sample === undefined);
+    return hole < 0 ? this.samples.length : hole;
+  }
+
+  // Samples that have come since the last time, and those between that were skipped.
   async update() {
-    const from = this.samples.length;
+    const from = this.unknown;
     const found = await fetched(`overview/${from}`).then((answer) => answer.json());
     // samples of a source without an end are dropped at last; their numbers stay
-    while (this.samples.length < found.from) this.samples.push(null);
+    for (let k = from; k < found.from; k++) this.samples[k] ??= null;
     found.samples.forEach((sample, k) => (this.samples[found.from + k] = sample));
     const { events, count, done, says, kept_from: keptFrom } = found;
     Object.assign(this, { events, count, done, says, keptFrom });
@@ -72,12 +78,13 @@ export class Source {
         const instant = unpacked(found);
         after = instant.number + 1;
         this.keep(instant);
+        const skipped = instant.number > this.samples.length;
         this.samples[instant.number] = instant.sample;
         this.count = Math.max(this.count, after);
         this.on.instant(instant);
         const now = instant.senders.map((sender) => `${sender.condition} ${sender.epoch}`).join();
         // what happened, and what was missed meanwhile
-        if (now !== events) await this.update();
+        if (skipped || now !== events) await this.update();
         events = now;
       }
     }
@@ -106,16 +113,19 @@ export class Source {
     }
   }
 
-  // Number of the instant nearest to a time.
+  // Number of the instant nearest to a time, of those that are known; -1 where none is.
   nearest(time) {
-    let [low, high] = [this.samples.findIndex((sample) => sample), this.samples.length - 1];
+    const known = [];
+    this.samples.forEach((sample, number) => sample && known.push(number));
+    const timeOf = (k) => this.samples[known[k]].time_s;
+    let [low, high] = [0, known.length - 1];
     while (low < high) {
       const middle = (low + high) >> 1;
-      if (this.samples[middle].time_s < time) low = middle + 1;
+      if (timeOf(middle) < time) low = middle + 1;
       else high = middle;
     }
-    const before = this.samples[low - 1];
-    return before && time - before.time_s < this.samples[low].time_s - time ? low - 1 : low;
+    if (low > 0 && time - timeOf(low - 1) < timeOf(low) - time) low -= 1;
+    return known[low] ?? -1;
   }
 }
 
