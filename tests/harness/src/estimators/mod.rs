@@ -479,7 +479,7 @@ impl Intake {
             }
         }
         let micros = u64::try_from(frame.time_ns / 1000).unwrap_or(0);
-        (Time::from_micros(micros), &self.detections, FrameStatus { fault: false, refused })
+        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused })
     }
 
     fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {

@@ -102,7 +102,12 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
             }
         }
         for (_, second) in part.seconds.iter().enumerate().filter(|(k, _)| *k as f64 >= from_s) {
-            frames.push(Frame { time_ns: frames.len() as i64 * BLOCK_NS, detections: Vec::new(), refused: 0 });
+            frames.push(Frame {
+                time_ns: frames.len() as i64 * BLOCK_NS,
+                detections: Vec::new(),
+                refused: 0,
+                fault: false,
+            });
             counted += second.frames;
             let mut sample = second.samples.clone();
             sample.objects.iter_mut().for_each(|s| s.track += known);

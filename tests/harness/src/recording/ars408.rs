@@ -46,7 +46,12 @@ pub fn read(name: String, bytes: &[u8], format: Format, options: &ReadOptions) -
             problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
         }
         let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame { time_ns: nanoseconds(scan.time), detections, refused: scan.refused.into() });
+        frames.push(Frame {
+            time_ns: nanoseconds(scan.time),
+            detections,
+            refused: scan.refused.into(),
+            fault: scan.fault,
+        });
     });
     if frames.is_empty() {
         bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");
@@ -136,5 +141,40 @@ fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counte
     ];
     for (what, n) in counted {
         problems.add_many(interface, what, start, u64::from(n));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use viewshed::sensor::road::RoadPoint;
+
+    use super::*;
+    use crate::estimators::{self, Options};
+
+    const LOG: &str = include_str!("../../../recordings/ars408-made-up.log");
+
+    /// Whether any estimator's map ever has a visible cell, and how many scans carry a fault.
+    fn seen(log: &str) -> (bool, usize) {
+        let mount = Some([0.0, 0.0, 5.0, 0.0, 0.03, 0.0]);
+        let options = ReadOptions { sensor_id: Some(0), mount, ..ReadOptions::default() };
+        let recording = read("log".into(), log.as_bytes(), Format::Candump, &options).unwrap();
+        let mut seen = false;
+        for estimator in &mut estimators::all(&recording, &Options::default()).unwrap() {
+            for frame in &recording.frames {
+                estimator.step(frame);
+                let cells = (5..60).flat_map(|x| (-5..5).map(move |y| (x as f32 + 0.5, y as f32 + 0.5)));
+                seen |=
+                    cells.into_iter().any(|(x, y)| estimator.map().at(RoadPoint::from_metres(x, y).unwrap()).visible());
+            }
+        }
+        (seen, recording.frames.iter().filter(|frame| frame.fault).count())
+    }
+
+    #[test]
+    fn a_radar_that_reports_a_fault_sees_nothing() {
+        assert_eq!(seen(LOG), (true, 0));
+        // a persistent error in every message of its state
+        let faulty = LOG.replace("201#401F40", "201#401F60");
+        assert_eq!(seen(&faulty), (false, 28));
     }
 }

@@ -66,6 +66,8 @@ pub struct Frame {
     pub detections: Vec<RadarDetection>,
     /// Points dropped when it was read: not finite, or at no distance.
     pub refused: u64,
+    /// The radar says that something is wrong with it.
+    pub fault: bool,
 }
 
 /// Static field of view, in the sensor frame.

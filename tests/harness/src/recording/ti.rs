@@ -50,7 +50,12 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
     let mut clock = Clock::new(period_s);
     scans(&mut radar, bytes, |scan| {
         let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame { time_ns: clock.time_ns(scan.number), detections, refused: scan.refused.into() });
+        frames.push(Frame {
+            time_ns: clock.time_ns(scan.number),
+            detections,
+            refused: scan.refused.into(),
+            fault: scan.fault,
+        });
     });
     let c = *radar.counters();
     let first = frames.first().map(|f| f.time_ns).with_context(|| {
