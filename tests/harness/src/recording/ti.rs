@@ -21,6 +21,9 @@ const WITHIN: usize = 1 << 17;
 /// Time between frames of TI's own demonstrations.
 const PERIOD_S: f64 = 0.1;
 
+/// Time of the first frame.
+const START_NS: i64 = 1_000_000_000;
+
 /// Whether a file looks like such a capture.
 pub fn is_capture(bytes: &[u8]) -> bool {
     bytes[..bytes.len().min(WITHIN)].windows(MAGIC.len()).any(|w| w == MAGIC)
@@ -133,7 +136,15 @@ pub fn flaw(flaw: Flaw) -> &'static str {
 /// Times from frame numbers.
 struct Clock {
     period_ns: i64,
-    last: Option<(u32, i64)>,
+    last: Option<Stamp>,
+}
+
+#[derive(Clone, Copy)]
+struct Stamp {
+    number: u32,
+    /// Of the first sub-frame of the number, from which the next number counts.
+    first_ns: i64,
+    time_ns: i64,
 }
 
 impl Clock {
@@ -141,17 +152,45 @@ impl Clock {
         Self { period_ns: (period_s * 1e9) as i64, last: None }
     }
 
-    /// Later than the time before, whatever the number: sub-frames share one, restarts begin anew.
+    /// Later than the time before, whatever the number: sub-frames share one, restarts begin anew. A radar has at most four
+    /// sub-frames; how many is not known from the first, so they are a quarter of a period apart.
     fn time_ns(&mut self, number: u32) -> i64 {
-        let time = match self.last {
-            None => 1_000_000_000,
-            Some((last, time)) => match number.checked_sub(last) {
-                Some(0) => time + self.period_ns / 4,
-                Some(advance) if advance < 10_000 => time + i64::from(advance) * self.period_ns,
-                _ => time + self.period_ns,
-            },
+        let stamp = match self.last {
+            None => Stamp { number, first_ns: START_NS, time_ns: START_NS },
+            Some(last) => {
+                let later_ns = last.time_ns + self.period_ns / 4;
+                match number.checked_sub(last.number) {
+                    Some(0) => Stamp { time_ns: later_ns, ..last },
+                    advance => {
+                        let periods = advance.filter(|advance| *advance < 10_000).unwrap_or(1);
+                        let next_ns = last.first_ns + i64::from(periods) * self.period_ns;
+                        // a number that stood still for more sub-frames than there are has come too far
+                        let time_ns = if next_ns > last.time_ns { next_ns } else { later_ns };
+                        Stamp { number, first_ns: time_ns, time_ns }
+                    }
+                }
+            }
         };
-        self.last = Some((number, time));
-        time
+        self.last = Some(stamp);
+        stamp.time_ns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sub_frames_do_not_slow_time_down() {
+        let times = |numbers: &[u32]| {
+            let mut clock = Clock::new(0.1);
+            numbers.iter().map(|n| (clock.time_ns(*n) - START_NS) / 1_000_000).collect::<Vec<_>>()
+        };
+        assert_eq!(times(&[1, 1, 2, 2]), [0, 25, 100, 125]);
+        assert_eq!(times(&[7, 7, 7, 7, 8, 8, 8, 8, 9]), [0, 25, 50, 75, 100, 125, 150, 175, 200]);
+        assert_eq!(times(&[1, 2, 5, 6]), [0, 100, 400, 500], "frames that never came");
+        // restarts, and more of one number than a radar has
+        assert_eq!(times(&[90, 90, 0, 0, 1]), [0, 25, 100, 125, 200]);
+        assert_eq!(times(&[3, 3, 3, 3, 3, 3, 4, 5]), [0, 25, 50, 75, 100, 125, 150, 250]);
     }
 }
