@@ -24,21 +24,30 @@ pub fn is_log(start: &str) -> bool {
 pub fn read(text: &str) -> Vec<Result<Line, String>> {
     let base = text.lines().find(|line| line.starts_with("base ")).unwrap_or_default();
     let radix = if base.starts_with("base dec") { 10 } else { 16 };
-    let mut lines: Vec<_> = text.lines().filter_map(|line| event(line, radix)).collect();
+    let mut events: Vec<_> = text.lines().filter_map(|line| event(line, radix)).collect();
     if base.contains("timestamps relative") {
-        add_up(&mut lines);
+        add_up(events.iter_mut().map(|(time_ns, _)| time_ns));
     }
-    lines
+    let line = |(time_ns, event): (i64, Event<'_>)| {
+        let line = |(channel, content): (&str, Content)| Line { time_ns, interface: channel.to_owned(), content };
+        event.map(|read| read.map(line))
+    };
+    events.into_iter().filter_map(line).collect()
 }
 
+/// A frame and its channel, or why a line is none; nothing of what is neither a frame nor a flaw.
+type Event<'a> = Option<Result<(&'a str, Content), String>>;
+
 /// What a line with a time says of a bus.
-fn event(line: &str, radix: u32) -> Option<Result<Line, String>> {
+fn event(line: &str, radix: u32) -> Option<(i64, Event<'_>)> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let (time, rest) = words.split_first()?;
     let time_ns = seconds(time)?;
     let read = match rest {
-        // of the whole measurement, once
-        ["Start", "of", "measurement", ..] => return None,
+        // of the whole measurement, once, and of each channel, every second
+        ["Start", "of", "measurement", ..] | ["Statistic:", ..] | [_, "Statistic:", ..] => {
+            return Some((time_ns, None));
+        }
         ["CANFD", channel, _, "ErrorFrame", ..] | [channel, "ErrorFrame", ..] => Ok((*channel, Content::Error(0))),
         ["CANFD", channel, _, id, rest @ ..] => flexible(id, rest, radix).map(|content| (*channel, content)),
         [channel, id, _, "d", length, bytes @ ..] if is_channel(channel) => {
@@ -49,7 +58,7 @@ fn event(line: &str, radix: u32) -> Option<Result<Line, String>> {
         }
         _ => Err("an event that is no frame".into()),
     };
-    Some(read.map(|(channel, content)| Line { time_ns, interface: channel.to_owned(), content }))
+    Some((time_ns, Some(read)))
 }
 
 fn is_channel(word: &str) -> bool {
@@ -135,12 +144,27 @@ mod tests {
     }
 
     #[test]
+    fn times_since_the_line_before_count_what_is_no_frame() {
+        let events = "0.1 1 60A Rx d 1 01\n1.0 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 0.01%\n0.2 1 60A Rx d 2 02\n\
+                      0.3 CAN 1 Status:chip status error active\n0.4 1 60A Rx d 1 03\n";
+        let since_start = [0.1, 1.1, 1.3, 1.6, 2.0];
+        let lines = events.lines().zip(since_start);
+        let absolute: String =
+            lines.map(|(line, time)| format!("{time:.1} {}\n", line.split_once(' ').unwrap().1)).collect();
+        let relative = read(&format!("base hex  timestamps relative\n0.0 Start of measurement\n{events}"));
+        assert_eq!(relative, read(&format!("base hex  timestamps absolute\n0.0 Start of measurement\n{absolute}")));
+        let times: Vec<_> = relative.iter().flatten().map(|line| line.time_ns / 1_000_000).collect();
+        // the statistics are no flaw, the frame cut short and the status are
+        assert_eq!((&times[..], relative.len()), (&[100, 2000][..], 4));
+    }
+
+    #[test]
     fn what_is_no_frame_is_counted() {
         let why = |line: &str| match &read(&format!("base hex timestamps absolute\n{line}\n"))[..] {
             [one] => one.clone().unwrap_err(),
             other => panic!("{other:?}"),
         };
-        assert_eq!(why("1.0 1  Statistic: D 0 R 0 XD 0"), "an event that is no frame");
+        assert_eq!(why("1.0 1  Trigger event"), "an event that is no frame");
         assert_eq!(why("1.0 1  60A Rx d 4 01 C2 49"), "not the 4 bytes it announces");
         assert_eq!(why("1.0 1  8FF Rx d 1 01"), "`8FF` is no identifier");
         let long = format!("1.0 CANFD 1 Rx 400 1 0 f 65 {}", "00 ".repeat(65));

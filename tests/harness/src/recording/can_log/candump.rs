@@ -55,14 +55,32 @@ fn screen_line(line: &str) -> Result<Line, String> {
     Ok(Line { time_ns, interface, content })
 }
 
-/// Reads what `candump -t a`, `-t z` or `-t d` prints. Times that ever go back are differences (`-t d`), and added up.
+/// Reads what `candump -t a`, `-t z` or `-t d` prints. Times that are [differences](are_differences) are added up.
 pub fn screen(text: &str) -> Vec<Result<Line, String>> {
-    let mut lines: Vec<_> = text.lines().filter(|line| !line.trim().is_empty()).map(screen_line).collect();
-    let times = || lines.iter().flatten().map(|line| line.time_ns);
-    if times().zip(times().skip(1)).any(|(before, after)| after < before) && times().next() == Some(0) {
-        add_up(&mut lines);
+    let lines = text.lines().filter(|line| !line.trim().is_empty());
+    // a line whose frame cannot be read passes time, too
+    let time = |line: &str| line.split_whitespace().next().and_then(|word| nanoseconds(word).ok());
+    let mut lines: Vec<_> = lines.map(|line| (time(line), screen_line(line))).collect();
+    if are_differences(&lines.iter().filter_map(|(time, _)| *time).collect::<Vec<_>>()) {
+        add_up(lines.iter_mut().filter_map(|(time, _)| time.as_mut()));
     }
-    lines
+    let line = |(time, line): (Option<i64>, Result<Line, String>)| {
+        line.map(|line| Line { time_ns: time.unwrap_or(line.time_ns), ..line })
+    };
+    lines.into_iter().map(line).collect()
+}
+
+/// Whether times are since the line before (`-t d`). Then they go back again and again, by about as much as forward; the
+/// first is 0, unless it was cut off.
+fn are_differences(times: &[i64]) -> bool {
+    let steps = || times.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
+    let back = || steps().filter(|step| *step < 0);
+    let sum = |all: &mut dyn Iterator<Item = i64>| all.fold(0_i64, i64::saturating_add);
+    let [forward, backward] = [sum(&mut steps().filter(|step| *step > 0)), -sum(&mut back())];
+    match times.first() {
+        Some(0) => backward > 0,
+        _ => back().count() >= 2 && backward > forward / 2,
+    }
 }
 
 /// Whether a line is one of the screen.
@@ -226,6 +244,12 @@ mod tests {
         let times = |text: &str| on_screen(text).iter().map(|(time_ns, _)| time_ns / 1_000_000).collect::<Vec<_>>();
         assert_eq!(times(&of(&["000.000000", "000.070000", "000.001000", "000.069000"])), [0, 70, 71, 140]);
         assert_eq!(times(&of(&["000.000000", "000.070000", "000.071000", "000.140000"])), [0, 70, 71, 140]);
+        // the first line was cut off; and one was garbled
+        let cut = of(&["000.070000", "000.001000", "000.069000", "000.002000", "000.068000"]);
+        assert_eq!(times(&cut), [70, 71, 140, 142, 210]);
+        let garbled = screen(&cut.replacen("60A", "60", 2));
+        let read: Vec<_> = garbled.iter().flatten().map(|line| line.time_ns / 1_000_000).collect();
+        assert_eq!(read, [140, 142, 210]);
         // a clock that stepped back
         assert_eq!(times(&of(&["1500.000000", "1500.070000", "1499.000000"])), [1_500_000, 1_500_070, 1_499_000]);
     }

@@ -160,12 +160,13 @@ fn seconds(text: &str) -> Option<i64> {
     seconds.checked_mul(1_000_000_000)?.checked_add(fraction)
 }
 
-/// Times that count from the line before, counted from the first.
-fn add_up(lines: &mut [Result<Line, String>]) {
+/// Times that count from the line before, counted from the first. Lines without one are left out, those whose frame
+/// cannot be read are not.
+fn add_up<'a>(times: impl Iterator<Item = &'a mut i64>) {
     let mut now = 0_i64;
-    for line in lines.iter_mut().flatten() {
-        now = now.saturating_add(line.time_ns);
-        line.time_ns = now;
+    for time in times {
+        now = now.saturating_add(*time);
+        *time = now;
     }
 }
 
