@@ -5,7 +5,7 @@
 //! base hex  timestamps absolute
 //!    0.004301 1  60A             Rx   d 4 01 C2 49 10
 //!    0.004501 1  18DAF110x       Rx   r
-//!    0.016305 CANFD   1 Rx        400  Map        1 0 9 12 00 01 02 03 04 05 06 07 08 09 0A 0B
+//!    0.016305 CANFD   1 Rx        400  Map        1 0 9 12 00 01 02 03 04 05 06 07 08 09 0A 0B  130000  130  303000
 //! ```
 //!
 //! Times are seconds since the start of the log or, after `timestamps relative`, since the line before. After a frame's
@@ -86,6 +86,9 @@ fn classic(id: &str, length: &str, words: &[&str], radix: u32) -> Result<Content
     frame.map(Content::Data).ok_or_else(|| format!("{count} bytes are too many"))
 }
 
+/// In the flags of a CANFD line: the frame is one of CAN FD. Channels of CAN FD log classic frames so, too, without it.
+const EXTENDED_LENGTH: u32 = 0x1000;
+
 /// After the identifier: a name if there is one, bit rate switch, error state, length code, length, bytes.
 fn flexible(id: &str, rest: &[&str], radix: u32) -> Result<Content, String> {
     let flag = |word: &str| word == "0" || word == "1";
@@ -99,7 +102,12 @@ fn flexible(id: &str, rest: &[&str], radix: u32) -> Result<Content, String> {
     }
     let count: usize = length.parse().map_err(|_| format!("`{length}` is no length"))?;
     let bytes = bytes(words, count, radix)?;
-    let frame = CanFrame::fd(identifier(id, radix)?, &bytes);
+    let id = identifier(id, radix)?;
+    // duration and length in bits, then flags; older tools end before them
+    let flags = words.get(count + 2).and_then(|word| u32::from_str_radix(word, 16).ok());
+    let is_classic =
+        flags.is_some_and(|flags| flags & EXTENDED_LENGTH == 0) && *brs == "0" && *esi == "0" && count <= 8;
+    let frame = if is_classic { CanFrame::classic(id, &bytes) } else { CanFrame::fd(id, &bytes) };
     frame.map(Content::Data).ok_or_else(|| format!("{count} bytes are no length of CAN FD"))
 }
 
@@ -133,6 +141,24 @@ mod tests {
                 "(2.5) 1 20000000#",
             ],
         );
+    }
+
+    #[test]
+    fn a_channel_of_can_fd_has_classic_frames_too() {
+        let line = |brs: u8, rest: &str| format!("base hex timestamps absolute\n1.5 CANFD 1 Rx 60A {brs} 0 {rest}\n");
+        let tail = "46500250 4b140250 20011736 2001040d";
+        for (brs, flags, as_candump) in [
+            (0, "200000", "(1.5) 1 60A#01C24910"),
+            (0, "0", "(1.5) 1 60A#01C24910"),
+            (0, "1000", "(1.5) 1 60A##001C24910"),
+            (1, "303000", "(1.5) 1 60A##101C24910"),
+            // only CAN FD switches its bit rate, whatever a tool puts there
+            (1, "200040", "(1.5) 1 60A##101C24910"),
+        ] {
+            same(&line(brs, &format!("4 4 01 C2 49 10 130000 130 {flags} e0006659 {tail}")), &[as_candump]);
+        }
+        same(&line(0, "4 4 01 C2 49 10"), &["(1.5) 1 60A##001C24910"]);
+        same(&line(0, "9 12 00 01 02 03 04 05 06 07 08 09 0A 0B 1 2 0"), &["(1.5) 1 60A##0000102030405060708090A0B"]);
     }
 
     #[test]
