@@ -332,8 +332,7 @@ fn given(ground: &Ground, error: GroundError) -> Result<Ground> {
 
 /// The road's heights: those of the options, or else the recording's own.
 fn ground(recording: &Recording, options: &Options) -> Result<Ground> {
-    let recorded = recording.truth.as_ref().map(|truth| truth.ground.clone()).unwrap_or_default();
-    if options.ground.is_empty() { Ok(recorded) } else { Ground::new(options.ground.points.clone()) }
+    if options.ground.is_empty() { Ok(recording.ground.clone()) } else { Ground::new(options.ground.points.clone()) }
 }
 
 /// The estimator whose map a sensor sends: `radar-3d` with all that is said of the [site](unit), or `camera-3d` of a
@@ -389,7 +388,7 @@ pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
     let degrees = |v: f64| v.to_degrees() as f32;
     let mut mount = mount(&recording.pose);
     // above the road below it
-    mount.height_m -= recording.truth.as_ref().map_or(0.0, |t| t.ground.height(recording.pose.position[0])) as f32;
+    mount.height_m -= recording.ground.height(recording.pose.position[0]) as f32;
     Sensor {
         mount,
         field_of_view: FieldOfView {

@@ -32,6 +32,8 @@ const WINDOW: f64 = 0.5;
 struct Reference {
     truth: Truth,
     pose: SensorPose,
+    /// Height of the road below the sensor.
+    foot_m: f64,
     parameters: Box<Radar3dParameters<RANGES, AZIMUTHS, ELEVATIONS>>,
     grid: Box<SphericalGrid<RANGES, AZIMUTHS, ELEVATIONS>>,
     map: Box<PolarMap<RANGES, AZIMUTHS>>,
@@ -57,6 +59,7 @@ pub fn new(
     Ok(Box::new(Reference {
         truth: truth.clone(),
         pose: recording.pose,
+        foot_m: recording.ground.height(recording.pose.position[0]),
         parameters,
         grid: Box::default(),
         map,
@@ -75,13 +78,7 @@ impl Estimator for Reference {
         self.grid.clear();
         let axes = self.parameters.axes();
         for object in self.truth.at(frame.time_ns) {
-            fill(
-                &object.solid,
-                (&self.pose, self.truth.ground.height(self.pose.position[0])),
-                axes,
-                self.scale,
-                &mut self.grid,
-            );
+            fill(&object.solid, (&self.pose, self.foot_m), axes, self.scale, &mut self.grid);
         }
         raycast::cast(&self.grid, axes, &mut self.map);
     }

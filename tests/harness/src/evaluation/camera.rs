@@ -29,7 +29,8 @@ pub fn recording(of: &Recording, range_max_m: f64) -> Option<Recording> {
     let (first, last) = (of.frames.first()?.time_ns, of.frames.last()?.time_ns);
     let mut camera = camera.clone();
     camera.frames.retain(|f| (first..=last).contains(&f.time_ns));
-    Some(camera.alone(format!("{}, camera", of.name), of.sensor.clone(), of.truth.clone(), range_max_m))
+    let alone = camera.alone(format!("{}, camera", of.name), of.sensor.clone(), of.truth.clone(), range_max_m);
+    Some(Recording { ground: of.ground.clone(), ..alone })
 }
 
 /// Samples of every `every`-th frame of a camera's own recording.

@@ -142,7 +142,7 @@ pub fn causes(
     slice_height_m: f64,
     progress: &dyn Fn(),
 ) -> Option<Causes> {
-    let truth = recording.truth.as_ref().filter(|truth| truth.ground.is_level())?;
+    let truth = recording.truth.as_ref().filter(|_| recording.ground.is_level())?;
     let mut causes = Causes { estimator: estimator.name().to_owned(), ..Causes::default() };
     let mut had_box = vec![false; truth.tracks.len()];
     let moves: Vec<bool> = truth.tracks.iter().map(Track::moves).collect();
@@ -292,6 +292,7 @@ mod tests {
 
     use super::super::samples::by_hand::recording;
     use super::*;
+    use crate::geometry::ground::Ground;
     use crate::recording::Frame;
     use crate::recording::truth::{Label, Truth};
 
@@ -480,11 +481,9 @@ mod tests {
         };
         assert!(found(&recording, &samples).is_some());
         assert_eq!(found(&recording, &none), None);
-        if let Some(truth) = &mut recording.truth {
-            truth.ground = crate::geometry::ground::Ground::new(vec![[0.0, 0.0], [100.0, 4.0]]).unwrap();
-        }
+        let flat = std::mem::replace(&mut recording.ground, Ground::new(vec![[0.0, 0.0], [100.0, 4.0]]).unwrap());
         assert_eq!(found(&recording, &samples), None);
-        recording.truth = None;
+        (recording.ground, recording.truth) = (flat, None);
         assert_eq!(found(&recording, &samples), None);
     }
 }

@@ -219,7 +219,7 @@ pub fn cell_in_view(recording: &Recording, (i, j): Cell, height_m: f64) -> bool 
 
 /// The road's heights, where it is known not to be flat.
 fn ground(recording: &Recording) -> Option<&Ground> {
-    recording.truth.as_ref().map(|truth| &truth.ground).filter(|ground| !ground.is_level())
+    Some(&recording.ground).filter(|ground| !ground.is_level())
 }
 
 /// A place so high above the road.
@@ -370,6 +370,7 @@ pub mod by_hand {
             frames: (0..frames)
                 .map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new(), refused: 0, fault: false })
                 .collect(),
+            ground: Ground::default(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),
             occlusion: Default::default(),
             camera: None,

@@ -68,6 +68,11 @@ impl Ground {
         Some((from, next.map_or(0.0, |next| (next[1] - from[1]) / (next[0] - from[0]))))
     }
 
+    /// Puts what stands on level ground on this one.
+    pub fn lift(&self, solid: &mut Solid) {
+        solid.center[2] += self.height(solid.center[0]);
+    }
+
     /// A place above the ground.
     pub fn above(&self, [x, y]: Point, height_m: f64) -> [f64; 3] {
         [x, y, self.height(x) + height_m]

@@ -192,7 +192,9 @@ impl Judged {
     ) -> Result<[Vec<Row>; 3]> {
         let site = Site::of(recording);
         let perfect = Truth::new(recording.frames.iter().flat_map(|f| self.perfect(recording, f.time_ns)).collect());
-        let made = Truth::new(self.tracks.iter().flat_map(|t| labels(t, &site)).collect());
+        let mut made: Vec<Label> = self.tracks.iter().flat_map(|t| labels(t, &site)).collect();
+        made.iter_mut().for_each(|label| recording.ground.lift(&mut label.solid));
+        let made = Truth::new(made);
         let rows = |truth: Option<Truth>| -> Result<Vec<Row>> {
             let recording = Recording { truth, ..recording.clone() };
             let mut radar = estimators::all(&recording, estimators)?;

@@ -24,12 +24,13 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if labels_csv.exists() {
         let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
         let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
-        let (labels, sized_by_class) = labels::read_labels(&labels_csv, start_ns, end_ns)?;
+        let (mut labels, sized_by_class) = labels::read_labels(&labels_csv, start_ns, end_ns)?;
         labels::check_places(&labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
+        // they say nothing of heights
+        labels.iter_mut().for_each(|label| recording.ground.lift(&mut label.solid));
         let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let beside = Some(LabelsBeside { file, sized_by_class });
-        let ground = recording.truth.take().map(|truth| truth.ground).unwrap_or_default();
-        recording.truth = Some(Truth { beside, ground, ..Truth::new(labels) });
+        recording.truth = Some(Truth { beside, ..Truth::new(labels) });
     }
     if occlusion_csv.exists() {
         recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
@@ -55,4 +56,90 @@ fn restrict(recording: &mut Recording, options: &ReadOptions) {
     recording
         .frames
         .retain(|f| options.from_s.is_none_or(|t| since(f) >= t) && options.to_s.is_none_or(|t| since(f) <= t));
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+    use crate::evaluation::samples::{by_hand, collect};
+    use crate::geometry::ground::Ground;
+    use crate::geometry::solid::Solid;
+    use crate::recording::truth::Label;
+    use crate::recording::write::RecordingWriter;
+
+    /// A fresh folder for one test.
+    fn folder(test: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("viewshed-beside-{test}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        path
+    }
+
+    /// Two trucks that drive over a crest, one behind the other.
+    fn labels(recording: &Recording, ground: &Ground) -> Vec<Label> {
+        let label = |time_ns: i64, id: &str, x: f64, y: f64| {
+            let mut solid = Solid { center: [x, y, 2.0], yaw_rad: 0.0, size: [16.5, 2.55, 4.0] };
+            ground.lift(&mut solid);
+            Label { time_ns, id: id.into(), class: "truck".into(), solid }
+        };
+        let at = |f: &Frame| {
+            let moved = 10.0 * f.time_ns as f64 * 1e-9;
+            [label(f.time_ns, "a", 30.0 + moved, 0.0), label(f.time_ns, "b", 75.0 + moved, 0.0)]
+        };
+        recording.frames.iter().flat_map(at).collect()
+    }
+
+    fn rows(labels: &[Label]) -> String {
+        let row = |l: &Label| {
+            let [x, y, _] = l.solid.center;
+            format!("{:.9},{},truck,{x},{y},0\n", l.time_ns as f64 * 1e-9, l.id)
+        };
+        labels.iter().map(row).fold("time_s,object_id,class,x_m,y_m,heading_rad\n".to_owned(), |all, row| all + &row)
+    }
+
+    #[test]
+    fn labels_beside_a_recording_stand_on_its_ground_as_those_inside() {
+        let folder = folder("ground");
+        let ground = Ground::new(vec![[0.0, -2.0], [60.0, 1.0], [150.0, -5.0]]).unwrap();
+        let blank = by_hand::recording(30, 0);
+        let labels = labels(&blank, &ground);
+        let write = |name: &str, inside: bool| {
+            let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &blank.sensor, &blank.pose, 0).unwrap();
+            writer.ground(&ground).unwrap();
+            for frame in &blank.frames {
+                writer.frame(frame).unwrap();
+                if inside {
+                    writer.objects(frame.time_ns, labels.iter().filter(|l| l.time_ns == frame.time_ns)).unwrap();
+                }
+            }
+            let path = folder.join(name);
+            std::fs::write(&path, writer.finish().unwrap().into_inner()).unwrap();
+            path
+        };
+        let read = |path: &Path| crate::recording::read(path, &ReadOptions::default()).unwrap();
+        let inside = read(&write("inside.mcap", true));
+        let path = write("beside.mcap", false);
+        let unlabelled = read(&path);
+        assert!(unlabelled.truth.is_none());
+        assert_eq!(unlabelled.ground, ground, "an unlabelled recording has its road, too");
+        std::fs::write(files(&path)[0].clone(), rows(&labels)).unwrap();
+        let beside = read(&path);
+        assert_eq!((&beside.ground, &inside.ground), (&ground, &ground));
+        let slice = |recording: &Recording| -> Vec<_> {
+            let frames = collect(recording, &Default::default(), &|| ());
+            let objects = frames.iter().flat_map(|f| &f.objects);
+            let seen: Vec<_> = objects.map(|o| (o.track, o.slice_in_sight, o.box_in_sight, o.solid.center)).collect();
+            seen
+        };
+        let (a, b) = (slice(&inside), slice(&beside));
+        assert!(a.len() > 20 && a.iter().any(|o| o.1) && a.iter().any(|o| !o.1), "{a:?}");
+        for (a, b) in a.iter().zip(&b) {
+            assert_eq!((a.0, a.1, a.2), (b.0, b.1, b.2));
+            assert!((a.3[2] - b.3[2]).abs() < 1e-6, "{a:?} {b:?}");
+        }
+        assert_eq!(a.len(), b.len());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

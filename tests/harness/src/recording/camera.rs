@@ -10,6 +10,7 @@ use super::ros::{
 use super::transforms::Transforms;
 use super::truth::Truth;
 use super::{FieldOfView, Frame, Recording, Sensor};
+use crate::geometry::ground::Ground;
 use crate::geometry::polygon::Convex;
 use crate::geometry::pose::SensorPose;
 
@@ -141,6 +142,7 @@ impl RecordedCamera {
             },
             pose: self.pose,
             frames: self.frames.iter().map(|f| frame(f.time_ns)).collect(),
+            ground: Ground::default(),
             truth,
             occlusion: Default::default(),
             camera: Some(self),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::problems::Problems;
 use super::{FieldOfView, Frame, RadarDetection, ReadOptions, Recording, Sensor};
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use viewshed::frame::detection::Detection;
 
@@ -57,7 +58,17 @@ pub fn recording(
         synthetic: false,
         licence: None,
     };
-    Recording { name, sensor, pose, frames, truth: None, occlusion: BTreeMap::new(), camera: None, problems }
+    Recording {
+        name,
+        sensor,
+        pose,
+        frames,
+        ground: Ground::default(),
+        truth: None,
+        occlusion: BTreeMap::new(),
+        camera: None,
+        problems,
+    }
 }
 
 /// The library's detection as recordings have it.

@@ -317,9 +317,11 @@ impl Reader {
                 _ => None,
             };
             if let Some(camera) = camera {
+                let ground = self.ground(&name)?;
                 let truth = self.labelled.then(|| Truth::new(self.labels));
                 let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
                 return Ok(Recording {
+                    ground,
                     problems: self.problems,
                     ..camera.alone(name, Sensor::CAMERA, truth, range_max_m)
                 });
@@ -364,25 +366,28 @@ impl Reader {
             );
         }
         let sensor = self.sensor(&name, options)?;
-        let ground = match &self.ground {
-            Some(text) => serde_json::from_str(text)
-                .map_err(anyhow::Error::from)
-                .and_then(Ground::new)
-                .with_context(|| format!("{name}: metadata `{GROUND_METADATA}`: `points_m` is `{text}`"))?,
-            None => Ground::default(),
-        };
-        let truth = self.labelled.then(|| Truth { ground, ..Truth::new(self.labels) });
+        let ground = self.ground(&name)?;
+        let truth = self.labelled.then(|| Truth::new(self.labels));
         let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);
         Ok(Recording {
             name,
             sensor,
             pose,
             frames: self.frames,
+            ground,
             truth,
             occlusion: BTreeMap::new(),
             camera,
             problems: self.problems,
         })
+    }
+
+    fn ground(&self, recording: &str) -> Result<Ground> {
+        let Some(text) = &self.ground else { return Ok(Ground::default()) };
+        let points = serde_json::from_str(text).map_err(anyhow::Error::from);
+        points
+            .and_then(Ground::new)
+            .with_context(|| format!("{recording}: metadata `{GROUND_METADATA}`: `points_m` is `{text}`"))
     }
 
     fn sensor(&self, recording: &str, options: &ReadOptions) -> Result<Sensor> {

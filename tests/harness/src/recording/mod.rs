@@ -28,6 +28,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
+use crate::geometry::ground::Ground;
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
 use camera::RecordedCamera;
@@ -122,6 +123,8 @@ pub struct Recording {
     pub sensor: Sensor,
     pub pose: SensorPose,
     pub frames: Vec<Frame>,
+    /// Heights of the road, where it is not flat.
+    pub ground: Ground,
     /// Objects over time, if labelled.
     pub truth: Option<Truth>,
     /// Human occlusion grade (0 = free, 2 = mostly hidden) by object id.

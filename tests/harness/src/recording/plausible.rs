@@ -86,8 +86,7 @@ pub fn check(recording: &mut Recording) {
         add(&mut recording.problems, what);
     }
     // on a road that is known not to be flat both follow the road
-    let flat = recording.truth.as_ref().is_none_or(|truth| truth.ground.is_level());
-    if let Some((pitch, height)) = error.pitch_and_height.filter(|_| flat) {
+    if let Some((pitch, height)) = error.pitch_and_height.filter(|_| recording.ground.is_level()) {
         if pitch.abs() >= PITCH_DEG {
             add(
                 &mut recording.problems,

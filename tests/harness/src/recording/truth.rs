@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::ground::Ground;
 use crate::geometry::solid::Solid;
 
 /// One labelled box at one instant.
@@ -47,8 +46,6 @@ pub struct Truth {
     pub tracks: Vec<Track>,
     /// Where the labels lie beside the recording, if they do.
     pub beside: Option<LabelsBeside>,
-    /// Heights of the road, where it is not flat.
-    pub ground: Ground,
 }
 
 /// Labels from a file beside a recording: somebody's, so they lack what nobody labelled.
@@ -80,7 +77,7 @@ impl Truth {
         for t in &mut tracks {
             t.velocities = t.differences();
         }
-        Self { tracks, beside: None, ground: Ground::default() }
+        Self { tracks, beside: None }
     }
 
     /// Every object at an instant, each only between its first and last label.

@@ -355,12 +355,13 @@ impl Simulation {
                 further.iter_mut().zip(step.further).for_each(|(all, one)| all.push(one));
             }
         }
-        let truth = Some(Truth { ground: self.ground.clone(), ..Truth::new(labels) });
+        let truth = Some(Truth::new(labels));
         let recording = |((sensor, pose), frames): ((Sensor, SensorPose), Vec<Frame>)| Recording {
             name: sensor.name.clone(),
             sensor,
             pose,
             frames,
+            ground: self.ground.clone(),
             truth: truth.clone(),
             occlusion: Default::default(),
             camera: None,
@@ -371,7 +372,8 @@ impl Simulation {
             let camera = section.camera();
             let frames = in_parallel(0..self.camera_frames(), |n| self.camera_step(&camera, section.rate_hz, n))?;
             let recorded = RecordedCamera { pose: camera.pose, intrinsics: camera.intrinsics, frames, alone: true };
-            recordings.push(recorded.alone(section.name.clone(), self.sensor(), truth, camera_range_m));
+            let alone = recorded.alone(section.name.clone(), self.sensor(), truth, camera_range_m);
+            recordings.push(Recording { ground: self.ground.clone(), ..alone });
         }
         Ok(recordings)
     }

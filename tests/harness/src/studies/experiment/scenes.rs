@@ -499,7 +499,7 @@ mod tests {
     fn a_recording_on_a_grade_says_so_and_all_stands_on_it() {
         for (name, raised_m) in [("up", 0.0), ("down", 0.0), ("crest", 300.0)] {
             let (simulation, recording) = on_grade(name, raised_m);
-            let ground = recording.truth.as_ref().map(|truth| truth.ground.clone()).unwrap();
+            let ground = &recording.ground;
             assert_eq!(ground.points(), simulation.scene.ground);
             let truth = recording.truth.as_ref().unwrap();
             for solid in truth.solids() {

@@ -23,6 +23,7 @@ use serde::Serialize;
 use crate::evaluation::Options;
 use crate::evaluation::counts::rate;
 use crate::evaluation::samples::{Cell, associate};
+use crate::geometry::ground::Ground;
 use crate::geometry::polygon::Convex;
 use crate::geometry::sight::shadow;
 use crate::geometry::solid::Solid;
@@ -298,6 +299,7 @@ fn blank(simulation: &Simulation, mount: &Mount) -> Recording {
         sensor: simulation.sensor(),
         pose: mount.pose(),
         frames: Vec::new(),
+        ground: Ground::default(),
         truth: None,
         occlusion: BTreeMap::new(),
         camera: None,
