@@ -2,6 +2,7 @@
 
 pub mod azimuths;
 pub mod ground;
+pub mod heading;
 pub mod polygon;
 pub mod polyline;
 pub mod pose;

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use super::Site;
-use super::near_face::{self, BoxStep, HEADING_BASE_M, boxes, headings};
+use super::near_face::{self, BoxStep, boxes};
 use super::tracks::{LabelPoint, LabelTrack, check_all};
 use crate::recording::beside;
-use crate::recording::labels::{LabelRow, at_line, label, read_rows};
+use crate::recording::labels::{LabelRow, at_line, clock, label, read_rows, turn_along_paths};
 use crate::results::files::Target;
 
 const HEADER: &str = "time_s,object_id,class,x_m,y_m,heading_rad,length_m,width_m,height_m,near_x_m,near_y_m\n";
@@ -55,7 +55,7 @@ pub fn text(tracks: &[LabelTrack], site: &Site) -> Result<String> {
             let [x, y] = step.center;
             let near = points.get(&micros(step.time_s));
             let near = near.map_or(",".to_owned(), |p| format!("{:.3},{:.3}", p.x_m, p.y_m));
-            let time = clock(site.start_ns, step.time_s);
+            let time = on_clock(site.start_ns, step.time_s);
             // to a String, which cannot fail
             let _ = writeln!(text, "{time},{named},{x:.3},{y:.3},{:.4},{size},{near}", step.heading_rad);
         }
@@ -82,9 +82,10 @@ pub fn read(path: &Path, site: &Site) -> Result<Vec<LabelTrack>> {
         label(LabelRow { object_id: String::new(), class: row.class.clone(), ..*row })
             .with_context(|| at_line(path, *line))?;
     }
-    let on_clock = rows.iter().any(|(_, row)| (site.start_ns..=site.end_ns).contains(&nanos(row.time_s)));
+    turn_along_paths(&mut rows);
+    let add_ns = clock(&rows, site.start_ns, site.end_ns).add_ns(site.start_ns);
     for (_, row) in &mut rows {
-        let since_ns = nanos(row.time_s).saturating_sub(if on_clock { site.start_ns } else { 0 });
+        let since_ns = nanos(row.time_s).saturating_add(add_ns).saturating_sub(site.start_ns);
         row.time_s = micros(since_ns as f64 * 1e-9) as f64 / 1e6;
     }
     let mut order = Vec::new();
@@ -143,16 +144,14 @@ fn track(path: &Path, rows: &[&(u64, LabelRow)], site: &Site) -> Result<LabelTra
     Ok(track)
 }
 
-/// Boxes of rows; a heading nobody gave is that of the path.
+/// Boxes of rows.
 fn steps(rows: &[&(u64, LabelRow)]) -> Vec<BoxStep> {
-    let path: Vec<[f64; 2]> = rows.iter().map(|(_, row)| [row.x_m, row.y_m]).collect();
-    let all = rows.iter().zip(headings(&path, HEADING_BASE_M));
-    all.map(|((_, row), heading)| BoxStep {
+    let step = |row: &LabelRow| BoxStep {
         time_s: row.time_s,
         center: [row.x_m, row.y_m],
-        heading_rad: row.heading_rad.unwrap_or(heading),
-    })
-    .collect()
+        heading_rad: row.heading_rad.unwrap_or_default(),
+    };
+    rows.iter().map(|(_, row)| step(row)).collect()
 }
 
 /// A field of a CSV file.
@@ -169,7 +168,7 @@ fn nanos(time_s: f64) -> i64 {
 }
 
 /// Seconds on the recording's clock, to the nanosecond: an f64 of today's date has steps of 240 ns.
-fn clock(start_ns: i64, since_s: f64) -> String {
+fn on_clock(start_ns: i64, since_s: f64) -> String {
     let ns = start_ns.saturating_add(micros(since_s).saturating_mul(1000));
     let (sign, ns) = (if ns < 0 { "-" } else { "" }, ns.unsigned_abs());
     format!("{sign}{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
@@ -226,7 +225,7 @@ mod tests {
         let folder = folder("boxes");
         let path = folder.join("a.labels.csv");
         std::fs::write(&path, text(&tracks(), &SITE).unwrap()).unwrap();
-        let truth = Truth::new(read_labels(&path, SITE.start_ns, SITE.end_ns).unwrap().0);
+        let truth = Truth::new(read_labels(&path, SITE.start_ns, SITE.end_ns).unwrap().labels);
         let truck = truth.at(SITE.start_ns + 500_000_000)[0];
         assert_eq!(truth.tracks[truck.track].class, "truck");
         assert_eq!(truck.solid.size, [16.5, 2.55, 4.0]);

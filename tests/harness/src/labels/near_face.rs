@@ -24,20 +24,18 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::tracks::{LabelPoint, LabelTrack};
+use crate::geometry::heading::{BASE_M, STANDS_M, carried, headings, moves};
 use crate::geometry::polyline::kept;
 use crate::geometry::solid::Solid;
 
 /// Time between two boxes of a track, seconds.
 pub const STEP_S: f64 = 0.1;
-/// The heading is taken between the places this far behind and ahead, metres, of a long vehicle this share of its length, its ends:
+/// Of a long vehicle the heading is taken between the places this share of its length behind and ahead, its ends:
 /// its centre turns about the near face with its heading, and over a shorter way that would turn it more and more.
-pub const HEADING_BASE_M: f64 = 4.0;
 const HEADING_LENGTHS: f64 = 0.5;
 /// How often the near face is computed anew, and how often halved: to a tenth of a millimetre.
 const ROUNDS: usize = 40;
 const HALVINGS: usize = 20;
-/// A track that nowhere gets this far from its start stands, metres.
-pub const STANDS_M: f64 = 0.5;
 /// How far the drawn line may be from the near face between two points, metres.
 const LINE_M: f64 = 2.0;
 /// A step aside: between two points so near in time, seconds, so far, metres, and so much across the way that it came or
@@ -139,7 +137,7 @@ pub fn boxes(track: &LabelTrack, sensor: [f64; 2]) -> Vec<BoxStep> {
     let nears: Vec<[f64; 2]> = track.points.iter().map(|p| [p.x_m, p.y_m]).collect();
     let size = track.size();
     let mut centers = between(&nears, &times, &at);
-    let base_m = HEADING_BASE_M.max(HEADING_LENGTHS * size[0]);
+    let base_m = BASE_M.max(HEADING_LENGTHS * size[0]);
     let pieces = pieces(&track.points, &at, centers.len());
     let mut headings = headings_of(&centers, &pieces, base_m);
     // the heading is that of the centres, which depend on it
@@ -185,22 +183,6 @@ fn headings_of(path: &[[f64; 2]], pieces: &[Range<usize>], base_m: f64) -> Vec<f
         }
     }
     carried(all)
-}
-
-/// Headings that nobody knows: as before, or as after.
-fn carried(all: Vec<Option<f64>>) -> Vec<f64> {
-    let first = all.iter().flatten().next().copied().unwrap_or(0.0);
-    all.into_iter()
-        .scan(first, |last, heading| {
-            *last = heading.unwrap_or(*last);
-            Some(*last)
-        })
-        .collect()
-}
-
-/// Whether a path gets away from its start.
-fn moves(path: &[[f64; 2]]) -> bool {
-    path.first().is_some_and(|first| path.iter().any(|p| (p[0] - first[0]).hypot(p[1] - first[1]) >= STANDS_M))
 }
 
 /// Places at all times, from those at the times with these numbers.
@@ -254,27 +236,6 @@ fn times(points: &[LabelPoint]) -> (Vec<f64>, Vec<usize>) {
         }
     }
     (times, at)
-}
-
-/// Heading at each place of a path: from the place behind to the place ahead, each the nearest in time that is far
-/// enough away. So standing changes nothing.
-pub fn headings(path: &[[f64; 2]], base_m: f64) -> Vec<f64> {
-    let distance = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]).hypot(b[1] - a[1]);
-    if !moves(path) {
-        return vec![0.0; path.len()];
-    }
-    // both pointers only go forward; where nothing is far enough, the end of the path is taken
-    let mut all = Vec::with_capacity(path.len());
-    for (k, here) in path.iter().enumerate() {
-        let behind = path[..k].iter().rev().find(|p| distance(**p, *here) >= base_m).or(path.first());
-        let ahead = path[k..].iter().find(|p| distance(**p, *here) >= base_m).or(path.last());
-        let (Some(a), Some(b)) = (behind, ahead) else { continue };
-        let heading = (b[1] - a[1]).atan2(b[0] - a[0]);
-        let clear = distance(*a, *b) >= STANDS_M;
-        all.push(clear.then_some(heading));
-    }
-    // too short a way to tell
-    carried(all)
 }
 
 /// Distance of `p` from where the line from `a` to `b` is at its time.

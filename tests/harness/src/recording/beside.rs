@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 
-use super::{Frame, ReadOptions, Recording, clock, labels, plausible};
+use super::labels::{self, LabelClock, LabelsRead};
+use super::{Frame, ReadOptions, Recording, clock, plausible};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -24,12 +25,20 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if labels_csv.exists() {
         let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
         let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
-        let (mut labels, sized_by_class) = labels::read_labels(&labels_csv, start_ns, end_ns)?;
+        let LabelsRead { mut labels, sized_by_class, turned_by_path, clock: labels_clock } =
+            labels::read_labels(&labels_csv, start_ns, end_ns)?;
         labels::check_places(&labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
         // they say nothing of heights
         labels.iter_mut().for_each(|label| recording.ground.lift(&mut label.solid));
         let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let beside = Some(LabelsBeside { file, sized_by_class });
+        if labels_clock == LabelClock::Either {
+            let start_s = start_ns as f64 * 1e-9;
+            let what = format!(
+                "times fit the recording's own clock and as counted from its first frame, which are {start_s:.3} s apart; the first is taken: if they count from the first frame, add {start_s:.3} s to each"
+            );
+            recording.problems.add(&file, what, start_ns);
+        }
+        let beside = Some(LabelsBeside { file, sized_by_class, turned_by_path });
         recording.truth = Some(Truth { beside, ..Truth::new(labels) });
     }
     if occlusion_csv.exists() {

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use crate::geometry::heading::{BASE_M, headings};
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
 use crate::recording::truth::Label;
@@ -92,27 +93,98 @@ pub fn at_line(path: &Path, line: u64) -> String {
     format!("{}, line {line}", path.display())
 }
 
-/// Reads labels in the road frame. Times are seconds on the recording's clock or, where none of
-/// them falls between `start_ns` and `end_ns`, seconds since its start. Beside them, how many objects have
-/// the size of their class.
+/// What the times of labels count from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LabelClock {
+    /// The recording's own clock.
+    Own,
+    /// Its first frame.
+    FirstFrame,
+    /// Either may be meant; taken as its own clock.
+    Either,
+}
+
+impl LabelClock {
+    /// What makes times of the recording's own clock of those of the labels, nanoseconds.
+    pub fn add_ns(self, start_ns: i64) -> i64 {
+        if self == Self::FirstFrame { start_ns } else { 0 }
+    }
+}
+
+/// Which clock the times of these rows are of, for a recording from `start_ns` to `end_ns`: the one by which more of them
+/// lie in it. Times since its first frame were made of this very recording, so most of them do; those of its own clock may
+/// be of a whole day. Rows with a drawn point are of `viewshed label`, which writes the recording's own clock.
+pub fn clock(rows: &[(u64, LabelRow)], start_ns: i64, end_ns: i64) -> LabelClock {
+    let duration_ns = end_ns.saturating_sub(start_ns);
+    let times = || rows.iter().map(|(_, row)| nanoseconds(row.time_s));
+    let within = |from: i64, to: i64| times().filter(|time| (from..=to).contains(time)).count();
+    let (own, since) = (within(start_ns, end_ns), within(0, duration_ns));
+    let drawn = rows.iter().any(|(_, row)| row.near_x_m.is_some());
+    let most = since * 2 >= rows.len();
+    match (own, since) {
+        (0, 0) if times().any(|time| time < start_ns) && times().any(|time| time > end_ns) => LabelClock::Own,
+        (0, _) => LabelClock::FirstFrame,
+        _ if drawn || !most => LabelClock::Own,
+        _ if since > own => LabelClock::FirstFrame,
+        _ if since == own && start_ns != 0 => LabelClock::Either,
+        _ => LabelClock::Own,
+    }
+}
+
+fn nanoseconds(time_s: f64) -> i64 {
+    (time_s * 1e9).round() as i64
+}
+
+/// Gives rows without a heading that of their object's path; how many objects have such rows.
+pub fn turn_along_paths(rows: &mut [(u64, LabelRow)]) -> usize {
+    let mut by_id: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    for (k, (_, row)) in rows.iter().enumerate() {
+        by_id.entry(row.object_id.as_str()).or_default().push(k);
+    }
+    let without = |of_one: &Vec<usize>| of_one.iter().any(|&k| rows[k].1.heading_rad.is_none());
+    let mut turned: Vec<Vec<usize>> = by_id.into_values().filter(without).collect();
+    for of_one in &mut turned {
+        of_one.sort_by(|&a, &b| rows[a].1.time_s.total_cmp(&rows[b].1.time_s));
+        let path: Vec<[f64; 2]> = of_one.iter().map(|&k| [rows[k].1.x_m, rows[k].1.y_m]).collect();
+        for (&k, heading) in of_one.iter().zip(headings(&path, BASE_M)) {
+            rows[k].1.heading_rad.get_or_insert(heading);
+        }
+    }
+    turned.len()
+}
+
+/// Labels of a file, and what of them the file does not say.
+#[derive(Debug)]
+pub struct LabelsRead {
+    /// In the road frame, standing on level ground, on the recording's own clock.
+    pub labels: Vec<Label>,
+    /// Objects that have the size of their class.
+    pub sized_by_class: usize,
+    /// Objects that look along their path, at one time at least.
+    pub turned_by_path: usize,
+    pub clock: LabelClock,
+}
+
+/// Reads labels beside a recording from `start_ns` to `end_ns`.
 ///
 /// # Errors
 /// Names file and line of the first row that is malformed or whose class has no known size; labels of another time.
-pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<(Vec<Label>, usize)> {
+pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<LabelsRead> {
+    let mut rows = read_rows::<LabelRow>(path)?;
+    let turned_by_path = turn_along_paths(&mut rows);
+    let clock = clock(&rows, start_ns, end_ns);
     let (mut labels, mut sized_by_class) = (Vec::new(), BTreeSet::new());
-    for (line, row) in read_rows::<LabelRow>(path)? {
+    for (line, row) in rows {
         if [row.length_m, row.width_m, row.height_m].contains(&None) {
             sized_by_class.insert(row.object_id.clone());
         }
         labels.push(label(row).with_context(|| at_line(path, line))?);
     }
     check_times(path, &labels, start_ns, end_ns)?;
-    if !labels.iter().any(|l| (start_ns..=end_ns).contains(&l.time_ns)) {
-        for l in &mut labels {
-            l.time_ns = l.time_ns.saturating_add(start_ns);
-        }
+    for l in &mut labels {
+        l.time_ns = l.time_ns.saturating_add(clock.add_ns(start_ns));
     }
-    Ok((labels, sized_by_class.len()))
+    Ok(LabelsRead { labels, sized_by_class: sized_by_class.len(), turned_by_path, clock })
 }
 
 /// Refuses labels of which none is of the recording's time, and times that are milliseconds.
@@ -188,7 +260,7 @@ pub fn label(row: LabelRow) -> Result<Label> {
         bail!("a value is not finite, or a size not positive");
     }
     Ok(Label {
-        time_ns: (row.time_s * 1e9).round() as i64,
+        time_ns: nanoseconds(row.time_s),
         id: row.object_id,
         class: row.class,
         solid: Solid { center: [row.x_m, row.y_m, h / 2.0], yaw_rad, size: [l, w, h] },
@@ -242,5 +314,59 @@ mod tests {
         }
         assert!(read("object_id\n1\n").unwrap_err().contains("missing field `time_s`"));
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    /// A fresh file with these rows after the usual heading.
+    fn file(test: &str, rows: impl IntoIterator<Item = String>) -> std::path::PathBuf {
+        let path = std::env::temp_dir().join(format!("viewshed-{test}-{}.labels.csv", std::process::id()));
+        let rows: String = rows.into_iter().map(|row| row + "\n").collect();
+        std::fs::write(&path, format!("time_s,object_id,class,x_m,y_m,heading_rad,near_x_m,near_y_m\n{rows}")).unwrap();
+        path
+    }
+
+    #[test]
+    fn times_are_of_the_clock_by_which_more_labels_lie_in_the_recording() {
+        use LabelClock::{Either, FirstFrame, Own};
+        let first = |from_ds: u32, to_ds: u32, start_ns: i64, end_ns: i64, near: &str| {
+            let row = |k: u32| format!("{:.1},a,car,{k},0,,{near}", f64::from(k) / 10.0);
+            let path = file("clock", (from_ds..=to_ds).map(row));
+            let read = read_labels(&path, start_ns, end_ns).unwrap();
+            std::fs::remove_file(path).unwrap();
+            (read.clock, read.labels[0].time_ns / 1_000_000)
+        };
+        let (start, end) = (1_000_000_000, 4_900_000_000);
+        assert_eq!(first(0, 39, start, end, ","), (FirstFrame, 1000));
+        assert_eq!(first(10, 49, start, end, ","), (Own, 1000));
+        // as many by either, unless the clock begins at 0
+        assert_eq!(first(15, 35, start, end, ","), (Either, 1500));
+        assert_eq!(first(15, 35, 0, end - start, ","), (Own, 1500));
+        // what `viewshed label` wrote, with a line from before the first frame on
+        assert_eq!(first(5, 35, start, end, "1,2"), (Own, 500));
+        assert_eq!(first(5, 35, start, end, ","), (FirstFrame, 1500));
+        // labels of a longer drive, from which the recording was cut: none of them counts from its first frame
+        assert_eq!(first(0, 2000, 100_050_000_000, 160_050_000_000, ","), (Own, 0));
+        assert_eq!(first(0, 39, start + 1_700_000_000_000_000_000, end + 1_700_000_000_000_000_000, ",").0, FirstFrame);
+        let path = file("clock", ["50,a,car,0,0,,,".into(), "150,a,car,100,0,,,".into()]);
+        assert_eq!(read_labels(&path, 100_000_000_000, 103_000_000_000).unwrap().clock, Own, "it lies between them");
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn a_heading_that_is_not_given_is_that_of_the_path() {
+        let rows = |heading: &str| {
+            let row = |k: u32| format!("{:.1},a,truck,50,{}{heading}", f64::from(k) / 10.0, 1.5 * f64::from(k));
+            (0..20).map(row).chain(["0,b,car,20,5,0.3,,".into()]).collect::<Vec<_>>()
+        };
+        let read = |heading: &str| {
+            let path = file("heading", rows(heading));
+            let read = read_labels(&path, 0, 2_000_000_000).unwrap();
+            std::fs::remove_file(path).unwrap();
+            read
+        };
+        let (given, left_out) = (read(",1.5708,,"), read(",,,"));
+        assert_eq!((given.turned_by_path, left_out.turned_by_path), (0, 1));
+        for (a, b) in given.labels.iter().zip(&left_out.labels) {
+            assert!((a.solid.yaw_rad - b.solid.yaw_rad).abs() < 1e-4, "{a:?} {b:?}");
+        }
     }
 }

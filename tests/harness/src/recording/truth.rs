@@ -54,6 +54,8 @@ pub struct LabelsBeside {
     pub file: String,
     /// Objects that have the size of their class, since the file gives none.
     pub sized_by_class: usize,
+    /// Objects that look along their path where the file gives no heading.
+    pub turned_by_path: usize,
 }
 
 impl Truth {

@@ -116,10 +116,9 @@ fn the_columns_of_labels_are_in_the_help_in_the_page_and_in_an_example() {
     // the page shows rows as they can be
     let shown = YOUR_DATA.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
     assert_eq!(shown.lines().next(), example("labels").lines().nth(1));
-    let (labels, by_class) =
-        read_labels(Path::new(&format!("{RECORDINGS}/example.labels.csv")), 0, 2_000_000_000).unwrap();
-    assert_eq!((labels.len(), by_class), (5, 2));
-    assert_eq!(labels[2].solid.size, [16.5, 2.55, 4.0]);
+    let read = read_labels(Path::new(&format!("{RECORDINGS}/example.labels.csv")), 0, 2_000_000_000).unwrap();
+    assert_eq!((read.labels.len(), read.sized_by_class), (5, 2));
+    assert_eq!(read.labels[2].solid.size, [16.5, 2.55, 4.0]);
     let grades = read_occlusion(Path::new(&format!("{RECORDINGS}/example.occlusion.csv"))).unwrap();
     assert_eq!(grades.into_iter().collect::<Vec<_>>(), [("17".to_owned(), 0), ("18".to_owned(), 2)]);
 }

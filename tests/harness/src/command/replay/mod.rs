@@ -129,8 +129,8 @@ Labels beside the recording, in the road frame (x along the road, y to the left)
   NAME.labels.csv      time_s,object_id,class,x_m,y_m[,heading_rad,length_m,width_m,height_m]
                        a row is an object at an instant; between two rows of one object_id its place is
                        interpolated. time_s counts from the first frame, or is the recording's own clock.
-                       x_m, y_m: middle of the box; heading_rad anticlockwise from +x; a size that is missing
-                       is the class's: car, van, truck, bus, motorcycle, bicycle, pedestrian
+                       x_m, y_m: middle of the box; heading_rad anticlockwise from +x; a heading that is missing
+                       is the path's, a size the class's: car, van, truck, bus, motorcycle, bicycle, pedestrian
   NAME.occlusion.csv   object_id,occlusion_0_to_2
                        how much of it a person saw hidden: 0 nothing, 1 some, 2 most
 

@@ -7,7 +7,7 @@ use super::lane::Lane;
 use super::motion::{Motion, smooth};
 use super::reflections::{Instant, Reflection};
 use super::tracker::{across_m, keep_to, measure};
-use crate::labels::near_face::{HEADING_BASE_M, headings};
+use crate::geometry::heading::{BASE_M, headings};
 
 /// A gap in which it moved less than this although it lasted longer than that: it stood.
 const STOOD_M: f64 = 4.0;
@@ -164,7 +164,7 @@ impl Path {
 
     fn headings(&self) -> Vec<f64> {
         let places: Vec<[f64; 2]> = self.motions.iter().map(|(_, m)| m.place()).collect();
-        let by_place = headings(&places, HEADING_BASE_M);
+        let by_place = headings(&places, BASE_M);
         let all = (self.first..).zip(self.motions.iter().zip(by_place)).map(|(frame, ((_, m), by_place))| {
             if let Some(b) = self.lane_at(frame).and_then(|lane| lane.beside(m.place())) {
                 return b.heading[1].atan2(b.heading[0]);

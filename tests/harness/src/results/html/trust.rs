@@ -32,10 +32,11 @@ pub fn lines(replay: &Replay) -> Vec<String> {
             if let Some(beside) = &truth.beside {
                 lines.push(format!(
                     "<strong>Labels are somebody's</strong> ({}): what nobody labelled does not exist for these figures, and {} of \
-                     {} objects have the size of their class.",
+                     {} objects have the size of their class, {} the heading of their path.",
                     escaped(&beside.file),
                     beside.sized_by_class,
-                    truth.tracks.len()
+                    truth.tracks.len(),
+                    beside.turned_by_path
                 ));
             }
         }

@@ -53,11 +53,13 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
             options.bootstrap, summary.drawn_units, summary.drawn, options.seed
         ));
     }
-    if let Some(LabelsBeside { file, sized_by_class }) = recording.truth.as_ref().and_then(|t| t.beside.as_ref()) {
+    if let Some(LabelsBeside { file, sized_by_class, turned_by_path }) =
+        recording.truth.as_ref().and_then(|t| t.beside.as_ref())
+    {
         let objects = recording.truth.as_ref().map_or(0, |t| t.tracks.len());
         lines.push(format!(
             "Labels of {file}: only what was labelled counts, usually what moves and was seen at least once; \
-             {sized_by_class} of {objects} objects have the size of their class."
+             {sized_by_class} of {objects} objects have the size of their class, {turned_by_path} the heading of their path."
         ));
     }
     let cartesian = summary.rows.iter().filter(|r| !r.curve.is_empty() && r.grid != options.grid);

@@ -19,8 +19,9 @@ use rayon::prelude::*;
 
 use super::motion::{Motion, smooth};
 use super::reflections::{self, Instant};
+use crate::geometry::heading::{BASE_M, STANDS_M, headings};
 use crate::labels::Site;
-use crate::labels::near_face::{BoxStep, HEADING_BASE_M, STANDS_M, drawn, headings};
+use crate::labels::near_face::{BoxStep, drawn};
 use crate::labels::tracks::{FARTHEST, LabelPoint, LabelTrack};
 use crate::recording::Recording;
 use around::{Around, Standing};
@@ -142,7 +143,7 @@ fn smoothed(around: &Around, [after, before]: &[Way; 2], click: usize, begin: St
     }
     let smoothed = smooth(&filtered);
     let places: Vec<[f64; 2]> = smoothed.iter().map(|(_, m)| m.place()).collect();
-    let by_place = headings(&places, HEADING_BASE_M);
+    let by_place = headings(&places, BASE_M);
     let still = places.iter().all(|p| (p[0] - places[0][0]).hypot(p[1] - places[0][1]) < STANDS_M);
     let all = smoothed.iter().zip(by_place).zip(&steps);
     all.map(|(((time_s, m), by_place), step)| {
