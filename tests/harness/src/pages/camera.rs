@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::recording::file;
 use crate::recording::ros::{self, Header};
 
 /// Schema of the messages that hold pictures.
@@ -29,8 +30,8 @@ const NEAR_NS: i64 = 500_000_000;
 
 impl Images {
     /// Those of a recording; none of one that has no camera, or is no MCAP.
-    pub fn of(file: &Path) -> Self {
-        Self(std::fs::read(file).map(|bytes| sorted(read(&bytes))).unwrap_or_default())
+    pub fn of(path: &Path) -> Self {
+        Self(file::bytes(path).map(|bytes| sorted(read(&bytes))).unwrap_or_default())
     }
 
     /// No pictures at all.
@@ -78,7 +79,10 @@ fn picture(data: &[u8]) -> Option<Image> {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::io::Cursor;
+    use std::io::{Cursor, Write};
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
 
     use super::*;
     use crate::recording::ros::Stamp;
@@ -104,7 +108,13 @@ mod tests {
             writer.write_to_known_channel(&header, &ros::encode(&image).unwrap()).unwrap();
         }
         writer.finish().unwrap();
-        let images = Images(sorted(read(&writer.into_inner().into_inner())));
+        // a packed recording has its pictures, too
+        let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(&writer.into_inner().into_inner()).unwrap();
+        let path = std::env::temp_dir().join(format!("viewshed-pictures-{}.mcap.gz", std::process::id()));
+        std::fs::write(&path, packed.finish().unwrap()).unwrap();
+        let images = Images::of(&path);
+        std::fs::remove_file(path).unwrap();
         let at = |time_s: f64| images.at((time_s * 1e9) as i64).map(|(kind, bytes)| (kind, bytes.len()));
         assert_eq!(
             (at(1.1), at(2.0), at(2.4)),

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 
 use super::labels::{self, LabelClock, LabelsRead};
-use super::{Frame, ReadOptions, Recording, clock, plausible};
+use super::{Frame, ReadOptions, Recording, clock, file, plausible};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
 pub fn files(path: &Path) -> [PathBuf; 2] {
-    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = file::unpacked_name(path);
+    let name = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
     // those of NAME.boxes.csv are called after NAME too
     let name = name.strip_suffix(".boxes").unwrap_or(&name);
     ["labels", "occlusion"].map(|suffix| path.with_file_name(format!("{name}.{suffix}.csv")))
@@ -69,7 +70,10 @@ fn restrict(recording: &mut Recording, options: &ReadOptions) {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Cursor;
+    use std::io::{Cursor, Write};
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
 
     use super::*;
     use crate::evaluation::samples::{by_hand, collect};
@@ -149,6 +153,13 @@ mod tests {
             assert!((a.3[2] - b.3[2]).abs() < 1e-6, "{a:?} {b:?}");
         }
         assert_eq!(a.len(), b.len());
+        // packed it has the same labels beside it
+        let packed = folder.join("beside.mcap.gz");
+        let mut gz = GzEncoder::new(Vec::new(), Compression::fast());
+        gz.write_all(&std::fs::read(&path).unwrap()).unwrap();
+        std::fs::write(&packed, gz.finish().unwrap()).unwrap();
+        std::fs::remove_file(path).unwrap();
+        assert_eq!(slice(&read(&packed)), b);
         std::fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -23,7 +23,7 @@ use viewshed::camera::calibration::Calibration;
 
 use super::camera::{Box2d, CameraFrame, Intrinsics, RecordedCamera};
 use super::problems::Problems;
-use super::{ReadOptions, Recording, Sensor};
+use super::{ReadOptions, Recording, Sensor, file};
 use crate::geometry::pose::SensorPose;
 
 const SUFFIX: &str = ".boxes.csv";
@@ -31,7 +31,7 @@ const PROBLEMS: &str = "boxes";
 
 /// Name before the suffix.
 fn stem(path: &Path) -> Option<String> {
-    path.file_name()?.to_str()?.strip_suffix(SUFFIX).map(str::to_owned)
+    file::unpacked_name(path).strip_suffix(SUFFIX).map(str::to_owned)
 }
 
 /// Whether a file is one of boxes, by its name.
@@ -171,6 +171,17 @@ mod tests {
         );
         assert_eq!((frames[0].boxes[1].class.as_str(), frames[0].boxes[1].edges), ("truck", [5.0, 6.0, 7.0, 8.25]));
         assert!(problems.is_empty());
+    }
+
+    #[test]
+    fn packed_boxes_are_known_by_their_name_too() {
+        for name in ["day/a.boxes.csv", "day/a.boxes.csv.gz"] {
+            let path = Path::new(name);
+            assert!(is_boxes(path), "{name}");
+            assert_eq!(camera_file(path), Some("day/a.camera.toml".into()));
+            assert_eq!(super::super::beside::files(path)[0], Path::new("day/a.labels.csv"));
+        }
+        assert!(!is_boxes(Path::new("a.csv.gz")) && !is_boxes(Path::new("a.boxes.gz")));
     }
 
     #[test]

@@ -60,9 +60,13 @@ pub fn stem(path: &Path) -> String {
     if path == Path::new(STANDARD_INPUT) {
         return "stdin".into();
     }
+    Path::new(&unpacked_name(path)).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The name of the file that is packed in this one, if one is.
+pub fn unpacked_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let name = name.strip_suffix(".gz").unwrap_or(&name);
-    Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    name.strip_suffix(".gz").unwrap_or(&name).to_owned()
 }
 
 #[cfg(test)]
