@@ -5,9 +5,10 @@ use std::path::Path;
 use anyhow::{Result, bail};
 
 use crate::recording::can_log::{self, FORMATS, Format, Line};
+use crate::recording::file::{self, Content};
+use crate::recording::foreign;
 use crate::recording::problems::Problems;
 use crate::recording::serial_log::Chunk;
-use crate::recording::{file, foreign};
 
 /// A line of a log.
 pub enum Logged {
@@ -15,16 +16,33 @@ pub enum Logged {
     Chunk(Chunk),
 }
 
-/// The lines of a log, and how many are none.
+/// What a log holds.
+pub struct Log {
+    pub lines: Vec<Logged>,
+    /// Lines that are none.
+    pub unread: u64,
+    /// What is wrong with it, in words.
+    pub problems: Vec<String>,
+}
+
+impl Log {
+    fn new(lines: Vec<Logged>, unread: u64, damage: Option<String>) -> Self {
+        let skipped = (unread > 0).then(|| format!("{unread} lines are no frames"));
+        Self { lines, unread, problems: skipped.into_iter().chain(damage).collect() }
+    }
+}
+
+/// The lines of a log.
 ///
 /// # Errors
 /// A file that cannot be read, and one that is no log; says what it is.
-pub fn read(path: &Path, interface: Option<&str>) -> Result<(Vec<Logged>, u64)> {
-    let bytes = file::bytes(path)?;
+pub fn read(path: &Path, interface: Option<&str>) -> Result<Log> {
+    let Content { bytes, damage } = file::read(path)?;
     if let Some(format) = Format::of(&bytes) {
         let mut problems = Problems::default();
         let lines = can_log::read(&bytes, format, interface, &mut problems)?;
-        return Ok((lines.into_iter().map(Logged::Frame).collect(), problems.count("line skipped")));
+        let lines = lines.into_iter().map(Logged::Frame).collect();
+        return Ok(Log::new(lines, problems.count("line skipped"), damage));
     }
     let text = String::from_utf8_lossy(&bytes);
     let lines = text.lines().filter(|line| !line.trim().is_empty());
@@ -39,7 +57,7 @@ pub fn read(path: &Path, interface: Option<&str>) -> Result<(Vec<Logged>, u64)> 
         let why = foreign::named(&bytes).unwrap_or_else(|| format!("it is no log of {FORMATS}, nor of a serial line"));
         bail!("{} cannot be read: {why}", file::shown(path));
     }
-    Ok((chunks, unread))
+    Ok(Log::new(chunks, unread, damage))
 }
 
 impl Logged {

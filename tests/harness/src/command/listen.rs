@@ -14,7 +14,7 @@ use super::key::KeyArgs;
 use super::options::seconds;
 use super::print;
 use crate::bus::listening::{Counted, Heard, Listening, Moment, SENSORS, shown};
-use crate::bus::logged::{self, Logged};
+use crate::bus::logged::{self, Log, Logged};
 #[cfg(target_os = "linux")]
 use crate::geometry::azimuths;
 use crate::recording::can_log;
@@ -83,21 +83,21 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         next_ns: 0,
         told: false,
     };
-    let (log, unread) = match (&args.can, &args.log) {
+    let (log, unread, problems) = match (&args.can, &args.log) {
         (Some(interface), _) => {
             session.told = true;
             live(interface, args.seconds, &mut session)?;
-            (Cow::Borrowed(interface.as_str()), 0)
+            (Cow::Borrowed(interface.as_str()), 0, Vec::new())
         }
         (None, Some(log)) => {
-            let (logged, unread) = logged::read(log, args.interface.as_deref())?;
-            for logged in &logged {
+            let Log { lines, unread, problems } = logged::read(log, args.interface.as_deref())?;
+            for logged in &lines {
                 match logged {
                     Logged::Frame(line) => session.at(line.time_ns)?.take(line),
                     Logged::Chunk(chunk) => session.at(chunk.time_ns)?.take_bytes(chunk),
                 }
             }
-            (file::shown(log), unread)
+            (file::shown(log), unread, problems)
         }
         (None, None) => bail!("neither a log nor an interface"),
     };
@@ -123,7 +123,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             }
         }
     }
-    print(&report(&sensors, &listening, unread))?;
+    print(&report(&sensors, &listening, &problems))?;
     if let Some(file) = json {
         let report = serde_json::json!({
             "frames": listening.frames(),
@@ -266,7 +266,7 @@ fn used(c: &Counted) -> String {
     text + &format!("; {} never came, by their counters", c.lost)
 }
 
-fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
+fn report(sensors: &[Heard], listening: &Listening, problems: &[String]) -> String {
     let mut text = String::new();
     for heard in sensors {
         let _ = writeln!(text, "sensor {}: {}", heard.sensor, heard.condition);
@@ -332,8 +332,8 @@ fn report(sensors: &[Heard], listening: &Listening, unread: u64) -> String {
         }
     }
     let _ = writeln!(text, "{} frames in all, {} of others", listening.frames(), listening.foreign());
-    if unread > 0 {
-        let _ = writeln!(text, "{unread} lines are no frames");
+    for problem in problems {
+        let _ = writeln!(text, "{problem}");
     }
     text
 }

@@ -18,7 +18,7 @@ use super::print;
 use super::replay::risk::{quantiser, share};
 use crate::bus::ears::Key;
 use crate::bus::listening::Listening;
-use crate::bus::logged::{self, Logged};
+use crate::bus::logged::{self, Log, Logged};
 use crate::evaluation::Settings;
 use crate::evaluation::probability::file::Fitted;
 use crate::pages::server::{LOOPBACK, Server};
@@ -125,16 +125,16 @@ fn from_file(
     settings: Settings,
 ) -> Result<(Arc<Viewing>, String)> {
     let fitted = args.probability.as_ref().map(|path| Fitted::read(path)).transpose()?;
-    if let Ok((lines, unread)) = logged::read(path, None) {
+    if let Ok(log) = logged::read(path, None) {
         let mut trial = Listening::new(addresses, key);
-        lines.iter().for_each(|line| trial.take_logged(line));
+        log.lines.iter().for_each(|line| trial.take_logged(line));
         if !trial.sensors().is_empty() {
             ensure!(
                 fitted.is_none(),
                 "--probability: {} is the log of a broadcast, which says itself what its sender's table is",
                 file::shown(path)
             );
-            return Ok(from_log(path, lines, unread, Listening::new(addresses, key), args.every));
+            return Ok(from_log(path, log, Listening::new(addresses, key), args.every));
         }
         ensure!(
             trial.not_authentic() == 0,
@@ -166,13 +166,11 @@ fn from_file(
 
 fn from_log(
     path: &Path,
-    lines: Vec<Logged>,
-    unread: u64,
+    Log { lines, problems, .. }: Log,
     listening: Listening,
     every_s: f64,
 ) -> (Arc<Viewing>, String) {
     let name = file::shown(path).into_owned();
-    let problems = if unread > 0 { vec![format!("{unread} lines are no frames")] } else { Vec::new() };
     let says = format!("{name}: {} lines of a broadcast", lines.len());
     let viewing = Viewing::broadcast(About::broadcast(name, "log", problems));
     let filling = viewing.clone();

@@ -65,6 +65,12 @@ pub fn judge(report: &Report, lines: &[Line]) -> Vec<Finding> {
     found.0
 }
 
+/// Adds one to those found, in its place.
+pub fn add(found: &mut Vec<Finding>, severity: Severity, what: String, remedy: &str) {
+    found.push(Finding { severity, what, remedy: remedy.into() });
+    found.sort_by_key(|f| f.severity);
+}
+
 /// What is said of a bus on which nothing came.
 pub fn silence(seconds: f64) -> Finding {
     Finding {

@@ -14,13 +14,13 @@ use serde::Serialize;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 
 use crate::recording::can_log::{self, FORMATS, Format, Line};
-use crate::recording::file;
+use crate::recording::file::{self, Content};
 use crate::recording::foreign;
 use crate::recording::problems::{Problem, Problems};
 use crate::recording::ti::is_capture;
 use crate::recording::{self, ReadOptions};
 use can::Identifier;
-use findings::Finding;
+use findings::{Finding, Severity};
 use sensor::Sensor;
 
 /// Everything that is said of one log.
@@ -56,6 +56,14 @@ impl Examined {
         }
     }
 
+    fn findings_mut(&mut self) -> &mut Vec<Finding> {
+        match self {
+            Self::Can(report) => &mut report.findings,
+            Self::Ti(report) => &mut report.findings,
+            Self::Native(report) => &mut report.findings,
+        }
+    }
+
     /// The report to be read.
     pub fn text(&self) -> String {
         match self {
@@ -71,23 +79,31 @@ impl Examined {
 /// # Errors
 /// A file that cannot be read or is no such log.
 pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
-    let bytes = file::bytes(path)?;
+    let Content { bytes, damage } = file::read(path)?;
+    let mut examined = examine_bytes(path, &bytes, known)?;
+    if let Some(damage) = damage {
+        findings::add(examined.findings_mut(), Severity::Warning, damage, file::DAMAGE_REMEDY);
+    }
+    Ok(examined)
+}
+
+fn examine_bytes(path: &Path, bytes: &[u8], known: &ReadOptions) -> Result<Examined> {
     let log = match file::shown(path) {
         name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
         _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    if let Some(format) = Format::of(&bytes) {
-        return can(log, &bytes, format, known);
+    if let Some(format) = Format::of(bytes) {
+        return can(log, bytes, format, known);
     }
-    if let Some(foreign) = foreign::named(&bytes) {
+    if let Some(foreign) = foreign::named(bytes) {
         bail!("{log} cannot be read: {foreign}");
     }
     if !bytes.starts_with(mcap::MAGIC) {
-        if is_capture(&bytes) {
-            return Ok(Examined::Ti(ti::examine(log, &bytes, known)));
+        if is_capture(bytes) {
+            return Ok(Examined::Ti(ti::examine(log, bytes, known)));
         }
-        if recording::native::is_capture(&bytes) {
-            let (messages, broken) = recording::native::unstuff(&bytes);
+        if recording::native::is_capture(bytes) {
+            let (messages, broken) = recording::native::unstuff(bytes);
             return Ok(Examined::Native(native::examine(log, &messages, broken)));
         }
     }
@@ -141,4 +157,38 @@ fn judged(
     };
     report.findings = findings::judge(&report, lines);
     Examined::Can(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    #[test]
+    fn a_packed_log_that_is_damaged_is_named_whoever_reads_it() {
+        let log = include_bytes!("../../../recordings/ars408-made-up.log");
+        let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(log).unwrap();
+        let mut packed = packed.finish().unwrap();
+        let path = std::env::temp_dir().join(format!("viewshed-damaged-{}.log.gz", std::process::id()));
+        let known = ReadOptions { sensor_id: Some(0), ..ReadOptions::default() };
+        let told = |packed: &[u8]| {
+            std::fs::write(&path, packed).unwrap();
+            let (examined, recording) = (examine(&path, &known).unwrap(), recording::read(&path, &known).unwrap());
+            let of_file =
+                |f: &&Finding| f.what.contains("is damaged or cut off") && f.what.contains("viewshed-damaged");
+            let findings = examined.findings().iter().filter(of_file).map(|f| f.severity).collect::<Vec<_>>();
+            (findings, recording.problems.count("log.gz is damaged or cut off"))
+        };
+        assert_eq!(told(&packed), (vec![], 0));
+        // the sum at the end
+        let sum = packed.len() - 8;
+        packed[sum] ^= 1;
+        assert_eq!(told(&packed), (vec![Severity::Warning], 1));
+        std::fs::remove_file(path).unwrap();
+    }
 }

@@ -14,11 +14,31 @@ pub const STANDARD_INPUT: &str = "-";
 /// What a gzip file begins with.
 const GZIP: [u8; 2] = [0x1F, 0x8B];
 
+/// What a file holds.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Content {
+    /// Unpacked.
+    pub bytes: Vec<u8>,
+    /// That not all could be unpacked as it was packed, with the file's name.
+    pub damage: Option<String>,
+}
+
+/// What to do about that.
+pub const DAMAGE_REMEDY: &str = "record again, or pack the original again";
+
+/// All bytes, unpacked, for those who need not say whether they are whole.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+    read(path).map(|content| content.bytes)
+}
+
 /// All bytes, unpacked. Standard input is read once and kept.
 ///
 /// # Errors
 /// A file that cannot be read or unpacked; a terminal as standard input.
-pub fn bytes(path: &Path) -> Result<Vec<u8>> {
+pub fn read(path: &Path) -> Result<Content> {
     let place = || format!("cannot read {}", shown(path));
     if path.is_dir() {
         bail!("{}: it is a folder; name a recording in it, of a ROS 2 bag the .mcap", place());
@@ -26,13 +46,17 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     let bytes =
         if path == Path::new(STANDARD_INPUT) { standard_input()? } else { std::fs::read(path).with_context(place)? };
     if !bytes.starts_with(&GZIP) {
-        return Ok(bytes);
+        return Ok(Content { bytes, damage: None });
     }
     let mut unpacked = Vec::new();
     match MultiGzDecoder::new(&bytes[..]).read_to_end(&mut unpacked) {
-        Ok(_) => Ok(unpacked),
+        Ok(_) => Ok(Content { bytes: unpacked, damage: None }),
         // what comes before the break is read, as of other files
-        Err(_) if !unpacked.is_empty() => Ok(unpacked),
+        Err(error) if !unpacked.is_empty() => {
+            let damage =
+                format!("the packed file {} is damaged or cut off, read as far as it goes: {error}", shown(path));
+            Ok(Content { bytes: unpacked, damage: Some(damage) })
+        }
         Err(error) => Err(error).with_context(place),
     }
 }
@@ -93,8 +117,16 @@ mod tests {
         std::fs::write(&path, [packed("first\n"), packed(&text)].concat()).unwrap();
         assert_eq!(bytes(&path).unwrap(), format!("first\n{text}").into_bytes());
         let whole = packed(&text);
-        std::fs::write(&path, &whole[..whole.len() - 12]).unwrap();
-        assert!(text.as_bytes().starts_with(&bytes(&path).unwrap()));
+        assert_eq!(read(&path).unwrap().damage, None);
+        // the sum of a member, and the end
+        let mut flipped = whole.clone();
+        flipped[whole.len() - 8] ^= 1;
+        for damaged in [&flipped[..], &whole[..whole.len() - 12]] {
+            std::fs::write(&path, damaged).unwrap();
+            let Content { bytes, damage } = read(&path).unwrap();
+            assert!(text.as_bytes().starts_with(&bytes));
+            assert!(damage.unwrap().contains("a.log.gz is damaged or cut off"));
+        }
         std::fs::write(&path, &whole[..10]).unwrap();
         assert!(bytes(&path).unwrap_err().to_string().contains("a.log.gz"));
         std::fs::remove_dir_all(&folder).unwrap();

@@ -32,6 +32,7 @@ use crate::geometry::ground::Ground;
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
 use camera::RecordedCamera;
+use file::Content;
 use ignored::Kind;
 use problems::Problems;
 
@@ -193,7 +194,7 @@ pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
 /// Those of [`read`]; several radars, some of them without a mount or a field of view: all are listed.
 pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, ReadOptions)>> {
     let asked = options.radar_topic.is_some() || path.as_os_str() == file::STANDARD_INPUT || boxes::is_boxes(path);
-    let bytes = if asked { Vec::new() } else { file::bytes(path)? };
+    let Content { bytes, damage } = if asked { Content { bytes: Vec::new(), damage: None } } else { file::read(path)? };
     let topics = if bytes.starts_with(::mcap::MAGIC) { mcap::radar_topics(&bytes) } else { Vec::new() };
     if topics.len() < 2 {
         // whoever reads the file again finds the same topic
@@ -213,6 +214,7 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
         let of_one = ReadOptions { radar_topic: Some(topic.clone()), one_of_several: true, ..options.clone() };
         let outcome = mcap::parse(&bytes, name.clone(), &of_one).and_then(|mut r| {
             ignored::note(&mut r, options, Kind::Other);
+            note_damage(&mut r, damage.as_deref());
             beside::complete(r, path, &of_one)
         });
         match outcome {
@@ -242,7 +244,7 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
-    let (bytes, name) = (file::bytes(path)?, file::stem(path));
+    let (Content { bytes, damage }, name) = (file::read(path)?, file::stem(path));
     let (mut recording, kind) = if boxes::is_boxes(path) {
         (boxes::read(path, &bytes, options)?, Kind::Other)
     } else if bytes.starts_with(::mcap::MAGIC) {
@@ -263,5 +265,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
         );
     };
     ignored::note(&mut recording, options, kind);
+    note_damage(&mut recording, damage.as_deref());
     beside::complete(recording, path, options)
+}
+
+/// Adds what is wrong with how the file was packed.
+fn note_damage(recording: &mut Recording, damage: Option<&str>) {
+    let Some(damage) = damage else { return };
+    let last = recording.frames.last().map_or(0, |frame| frame.time_ns);
+    recording.problems.add("file", format!("{damage}; {}", file::DAMAGE_REMEDY), last);
 }

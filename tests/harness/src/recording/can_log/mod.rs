@@ -140,9 +140,10 @@ pub fn of_file(path: &Path, interface: Option<&str>) -> Result<Option<Vec<Line>>
     Format::of(&bytes).map(|format| read(&bytes, format, interface, &mut Problems::default())).transpose()
 }
 
-/// A reason without the text it names, so that many of a kind are one problem.
+/// A reason without the text it names, so that many of a kind are one problem; what a line should be stays.
 fn kind_of(why: &str) -> String {
     match why.split('`').collect::<Vec<_>>()[..] {
+        ["not ", ..] => why.to_owned(),
         [before, _, after] => format!("{before}something{after}").trim().to_owned(),
         _ => why.to_owned(),
     }
@@ -200,6 +201,20 @@ mod tests {
         ] {
             assert_eq!(Format::of(text.as_bytes()), format, "{text}");
         }
+    }
+
+    #[test]
+    fn a_skipped_line_says_what_it_should_be() {
+        let mut problems = Problems::default();
+        read(
+            b"(2.0) can0 60A#01\n(3.0) can0\n(4.0) can0 60A#0\n(5.0) can0 60A#1\n",
+            Format::Candump,
+            None,
+            &mut problems,
+        )
+        .unwrap();
+        assert_eq!(problems.count("line skipped: not `(seconds) interface identifier#data`"), 1);
+        assert_eq!(problems.count("line skipped: something is not whole bytes"), 2, "one problem whatever the bytes");
     }
 
     #[test]
