@@ -3,7 +3,7 @@
 
 Written from two pages: "The wire format, version 1" (the rules, whose numbers and names are used here) and "Does a receiver
 conform?" (what comes in on standard input and what goes out on standard output). Plane 0, visibility, and plane 1 for
-probabilities; without authentication.
+probabilities; without authentication. With --without-probability plane 0 alone is held, and no cell has a probability.
 
     gzip -dc logs/can-lossless.in.gz | python3 receiver.py
 """
@@ -19,7 +19,7 @@ P = 5_120_000            # scan numbers come again
 M = 2**40 * 1000         # the sender's clock comes again
 TICK = 20_000
 BASE = 0x400             # of the identifiers
-PLANES = 2               # planes that are held, from 0 on
+PLANES = 1 if "--without-probability" in sys.argv else 2     # planes that are held, from 0 on
 WIRE_VERSION = 1
 ROOM_OF_WORDS = 36
 
@@ -590,7 +590,7 @@ class Sensor:
             self.header_message(t, own, long)
         elif dated and self.in_time(t, own[0]):
             self.map_message(t, number, own, long)
-        # The status and the visible range change no map.
+        # The status changes no map.
 
     def in_session(self, t, epoch, scan):
         """True if the frame is one of the session. `scan` of a dated message, or None."""
@@ -760,6 +760,8 @@ class Sensor:
 
     def map_message(self, t, number, own, long):
         self.drop_old(t, own[0])
+        if number < 6:
+            return                      # the visible range is dated, but no map
         place, kind = divmod(number - 6, 6)
         if self.header is None or place >= PLANES:
             return
@@ -814,7 +816,7 @@ class Sensor:
 
     def probabilities(self, t):
         """How many cells have one, and the least of every cell, azimuth by azimuth; 0 for none."""
-        planes = self.shown(t) if self.levels else None
+        planes = self.shown(t) if self.levels and PLANES == 2 else None
         known, all_cells = 0, bytearray()
         for (near, end, visible), (n, e, clear) in zip(*planes) if planes else ():
             clear &= visible & cells_between(n, e)

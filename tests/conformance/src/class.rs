@@ -6,7 +6,7 @@ use crate::input::Bus;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     Lossless,
-    /// Frames are lost: 1, 5, 20 %.
+    /// Frames are lost: 1, 5, 20 %; of a sender of visible ranges, too.
     Loss1,
     Loss5,
     Loss20,
@@ -52,7 +52,7 @@ pub enum Class {
     HeaderFaults,
     /// Made-up maps: noise, limits that change, azimuths without known cells.
     MadeUpMaps,
-    /// A sender with a table of probabilities; 5 % of its frames are lost.
+    /// A sender with a table of probabilities, and visible ranges; 5 % of its frames are lost.
     Probabilities,
     /// The same, and some of its azimuths are narrow.
     NarrowAzimuths,

@@ -42,7 +42,17 @@ pub fn python_there() -> bool {
 
 /// The Python receiver; `None` without python3.
 pub fn python() -> Option<Program> {
+    python_with(&[])
+}
+
+/// The Python receiver that holds the plane of visibility alone; `None` without python3.
+pub fn python_of_one_plane() -> Option<Program> {
+    python_with(&["--without-probability"])
+}
+
+fn python_with(arguments: &[&str]) -> Option<Program> {
     let found = Command::new("python3").args(["-c", "import zlib"]).output();
     let there = found.is_ok_and(|output| output.status.success());
-    there.then(|| Program::of([PathBuf::from("python3"), script()]))
+    let words = [PathBuf::from("python3"), script()].into_iter().chain(arguments.iter().map(PathBuf::from));
+    there.then(|| Program::of(words))
 }

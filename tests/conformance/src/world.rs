@@ -199,7 +199,11 @@ fn plans(class: Class, random: &mut Random, end: u64) -> Vec<Plan> {
         ahead: random.below(100 * S),
         first_map: random.below(400) as usize,
         mailboxes,
-        visible_range: class == Class::Others,
+        // where words are lost, too: one that is taken for a word that is missing shows
+        visible_range: matches!(
+            class,
+            Class::Others | Class::Loss1 | Class::Loss5 | Class::Loss20 | Class::Probabilities | Class::NarrowAzimuths
+        ),
     };
     let mut all = Vec::new();
     if class == Class::SenderRestarts {
