@@ -320,7 +320,7 @@ def read_block(plane, delta, scan, first, numbers):
         if told_by == AS_EXPECTED:
             ray = expected
         elif told_by == EDGES:
-            ray = read_edges(numbers, delta, expected, edges, expected[0], expected[1])
+            ray = read_edges(numbers, delta, expected, edges, *expected[:2]) if expected[0] < expected[1] else NO_CELLS
         elif delta:
             raise Malformed
         else:

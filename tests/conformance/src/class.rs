@@ -50,7 +50,7 @@ pub enum Class {
     Others,
     /// Headers that contradict, do not check, or are of another wire version.
     HeaderFaults,
-    /// Made-up maps: noise, limits that change, azimuths without known cells.
+    /// Made-up maps: noise, limits that change, azimuths without known cells; blocks that say edges of such.
     MadeUpMaps,
     /// A sender with a table of probabilities, and visible ranges; 5 % of its frames are lost.
     Probabilities,

@@ -79,6 +79,25 @@ impl Maker {
         }
     }
 
+    /// A refresh of the last three azimuths that no sender writes and every receiver reads: without known cells, edges where
+    /// none is known, known cells of which none is visible.
+    pub fn edges_of_nothing(&self, at: u64, random: &mut Random) -> Vec<Sent> {
+        let scan = ScanNumber::at(Time::from_micros(at + self.sender.ahead)).byte();
+        let first = self.header.azimuths.saturating_sub(3);
+        let messages: Vec<(u8, Vec<u8>)> = if self.bus == Bus::Can {
+            let own = |word: u64| [&[scan, first << 1 | (word >> 32) as u8], &(word as u32).to_be_bytes()[..]].concat();
+            [(6, EDGES_OF_NOTHING_CLASSIC[0]), (8, EDGES_OF_NOTHING_CLASSIC[1]), (9, EDGES_OF_NOTHING_CLASSIC[2])]
+                .map(|(number, word)| (number, own(word)))
+                .to_vec()
+        } else {
+            vec![(6, [&[scan, first], &EDGES_OF_NOTHING_LONG.map(u32::to_be_bytes).concat()[..]].concat())]
+        };
+        let sent = messages
+            .into_iter()
+            .filter_map(|(number, own)| self.message(at, SENSOR, number, self.sender.epoch, &own, random));
+        sent.collect()
+    }
+
     /// A header of the sender's epoch with something wrong.
     pub fn header(&self, at: u64, random: &mut Random) -> Option<Sent> {
         let clock = Clock { time_ms: (at + self.sender.ahead) / 1000, synchronised: false };
@@ -108,6 +127,11 @@ impl Maker {
         self.message(at, SENSOR, 1, self.sender.epoch, &own, random)
     }
 }
+
+/// The words of that block: `known` with near 1 and end 0 in plain bits; `edges`; `known` with near 10 and end 30 in plain
+/// bits, first otherwise, no edge. A receiver that reads edges of the second azimuth reads something else of the third.
+const EDGES_OF_NOTHING_CLASSIC: [u64; 3] = [0x1_EAF8_1921, 0x1_50A8_9D09, 0x0_5360_0000];
+const EDGES_OF_NOTHING_LONG: [u32; 3] = [0xF57C_0C90, 0x542A_2741, 0x8A6C_0000];
 
 fn bytes(count: usize, random: &mut Random) -> Vec<u8> {
     (0..count).map(|_| random.below(256) as u8).collect()

@@ -229,12 +229,10 @@ fn plans(class: Class, random: &mut Random, end: u64) -> Vec<Plan> {
 impl Faults {
     fn apply(&mut self, class: Class, sent: Vec<Sent>) -> Vec<Sent> {
         match class {
-            Class::Lossless
-            | Class::SenderRestarts
-            | Class::TwoSenders
-            | Class::Mailboxes
-            | Class::MailboxesFull
-            | Class::MadeUpMaps => sent,
+            Class::Lossless | Class::SenderRestarts | Class::TwoSenders | Class::Mailboxes | Class::MailboxesFull => {
+                sent
+            }
+            Class::MadeUpMaps => self.add(sent, S, 3 * S, Maker::edges_of_nothing),
             Class::Loss1 => self.lose(sent, 10),
             Class::Loss5 | Class::Probabilities | Class::NarrowAzimuths => self.lose(sent, 50),
             Class::Loss20 => self.lose(sent, 200),
@@ -368,12 +366,12 @@ impl Faults {
     }
 
     /// Messages that are made up, one after another with these times between them.
-    fn add(
+    fn add<Made: IntoIterator<Item = Sent>>(
         &mut self,
         mut sent: Vec<Sent>,
         least_us: u64,
         most_us: u64,
-        make: fn(&Maker, u64, &mut Random) -> Option<Sent>,
+        make: fn(&Maker, u64, &mut Random) -> Made,
     ) -> Vec<Sent> {
         let maker = Maker { bus: self.bus, sender: self.sender, header: self.header };
         let mut at = START + self.random.below(2 * S);
