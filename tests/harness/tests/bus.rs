@@ -103,6 +103,31 @@ fn listens(log: &Path, scans: u64) {
     assert_eq!(drawn, maps.len());
 }
 
+/// What the counters of the protection say decides nothing: it is no reason why a frame was not used.
+#[test]
+fn a_frame_that_comes_twice_came_twice() {
+    let (_, log) = sent("bus-doubled", &[]);
+    let text = std::fs::read_to_string(&log).expect("written");
+    let lines: Vec<&str> = text.lines().collect();
+    // one of a map, in the middle
+    let doubled =
+        lines.len() / 2 + lines[lines.len() / 2..].iter().position(|line| line.contains(" 406#")).expect("a map");
+    let (before, after) = lines.split_at(doubled + 1);
+    let log = scratch("doubled.log");
+    std::fs::write(&log, [before, &[lines[doubled]], after].concat().join("\n") + "\n").expect("written");
+    let output = viewshed(&["listen", log.to_str().expect("UTF-8")]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let frames = said.lines().find_map(|line| line.strip_prefix("  frames: ")).expect("frames");
+    let numbers: Vec<usize> = frames.split([' ', ';', ',']).filter_map(|word| word.parse().ok()).collect();
+    assert_eq!(numbers[0], lines.len() + 1, "{frames}");
+    // the first frame of an epoch is not used
+    assert_eq!(numbers[1..3], [lines.len(), 1], "{frames}");
+    assert!(
+        frames.contains("1 first of an epoch, or of another; by their counters 0 never came, 1 came again"),
+        "{frames}"
+    );
+}
+
 #[test]
 fn what_is_no_broadcast_is_told() {
     let log = scratch("other.log");

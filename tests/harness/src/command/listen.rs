@@ -244,26 +244,27 @@ fn draw(listening: &Listening, sensor: u8, time_s: f64, target: &Target) -> Resu
     polar::draw(&grid).save(target)
 }
 
-/// What happened to a sensor's frames: those that were not used by reason, with their total.
+/// What happened to a sensor's frames: those that were not used by reason, with their total; and what their counters
+/// say, which decides nothing: a frame that came again was used or refused like any other.
 fn used(c: &Counted) -> String {
     let reasons = [
         (c.protection, "failed the protection"),
         (c.not_authentic, "not authentic"),
-        (c.repeated, "repeated"),
-        (c.out_of_sequence, "out of sequence"),
         (c.late, "late"),
-        (c.epoch, "of another epoch"),
+        (c.epoch, "first of an epoch, or of another"),
         (c.early, "before their header or refresh"),
         (c.malformed, "malformed"),
     ];
+    let said = |counts: &[(u32, &str)]| -> String {
+        counts.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!(", {n} {why}")).collect()
+    };
     let unused: u64 = reasons.iter().map(|(n, _)| u64::from(*n)).sum();
-    let arrived = u64::from(c.accepted) + unused;
-    let said: Vec<String> = reasons.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{n} {why}")).collect();
-    let mut text = format!("frames: {arrived} came, {} used", c.accepted);
+    let mut text = format!("frames: {} came, {} used", u64::from(c.accepted) + unused, c.accepted);
     if unused > 0 {
-        text += &format!(", {unused} not: {}", said.join(", "));
+        text += &format!(", {unused} not: {}", said(&reasons).trim_start_matches(", "));
     }
-    text + &format!("; {} never came, by their counters", c.lost)
+    let odd = said(&[(c.repeated, "came again"), (c.out_of_sequence, "came out of sequence")]);
+    text + &format!("; by their counters {} never came{odd}", c.lost)
 }
 
 fn report(sensors: &[Heard], listening: &Listening, problems: &[String]) -> String {

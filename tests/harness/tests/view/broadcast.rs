@@ -98,6 +98,7 @@ fn a_log_is_played_and_its_sender_described() {
     let sender = page.ask("document.querySelector('.sender')?.textContent");
     let sender = sender.as_str().unwrap();
     assert!(sender.contains("its map is shown") && sender.contains("fingerprint") && sender.contains("ms"), "{sender}");
+    assert!(sender.contains(" used, 0 lost") && sender.contains("1 first of an epoch, or of another"), "{sender}");
     page.focus("plan");
     page.key("Enter");
     page.until("viewshed.told !== null");

@@ -10,6 +10,15 @@ const CONDITIONS = {
   unusable: 'another version, or a map too large: all of it is unknown',
   conflict: 'two senders use this number: all of it is unknown',
 };
+// Why messages are not used.
+const UNUSED = {
+  protection: 'failed the protection',
+  not_authentic: 'not authentic',
+  late: 'late',
+  epoch: 'first of an epoch, or of another',
+  early: 'before their header or refresh',
+  malformed: 'malformed',
+};
 
 // Fills a list of terms.
 function define(list, rows) {
@@ -62,12 +71,14 @@ export function showSenders(instant) {
     title.textContent = `Sensor ${sender.sensor}: ${CONDITIONS[sender.condition] ?? sender.condition}`;
     const rows = document.createElement('dl');
     const { counters: c, status, header } = sender;
-    const unused = ['protection', 'not_authentic', 'repeated', 'out_of_sequence', 'late', 'epoch', 'early', 'malformed'].filter((name) => c[name] > 0);
+    const counted = (names) => Object.entries(names).filter(([name]) => c[name] > 0).map(([name, what]) => `${c[name]} ${what}`);
+    // one that came again or out of sequence is used or refused like any other
+    const byCounters = counted({ repeated: 'came again', out_of_sequence: 'came out of sequence' });
     define(rows, [
       ['epoch', sender.epoch],
       ['sectors’ ages', ages(sender.sensor)],
-      ['messages', `${c.accepted} used, ${c.lost} lost`],
-      ['not used', unused.map((name) => `${c[name]} ${name.replaceAll('_', ' ')}`).join(', ')],
+      ['messages', [`${c.accepted} used`, `${c.lost} lost`, ...byCounters].join(', ')],
+      ['not used', counted(UNUSED).join(', ')],
       ['unit', status && `${status.state} (${status.reason}), up ${status.uptime_s} s`],
       ['wire version', status?.wire_version],
       ['fingerprint', header && header.fingerprint.toString(16).toUpperCase().padStart(8, '0')],
