@@ -129,6 +129,18 @@ fn a_frame_that_comes_twice_came_twice() {
 }
 
 #[test]
+fn looks_are_taken_at_times_that_can_be() {
+    let log = scratch("steps.log");
+    std::fs::write(&log, "(1.0) can0 701#0011223344556677\n").expect("written");
+    for every in ["1e-10", "0", "-1", "1e12", "inf", "nan"] {
+        let output = viewshed(&["listen", log.to_str().expect("UTF-8"), "--every", every]);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{every}: {error}");
+        assert!(error.contains("--every") && !error.contains("panicked"), "{every}: {error}");
+    }
+}
+
+#[test]
 fn what_is_no_broadcast_is_told() {
     let log = scratch("other.log");
     std::fs::write(&log, "(1.0) can0 701#0011223344556677\n").expect("written");

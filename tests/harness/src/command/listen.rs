@@ -50,7 +50,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Time between two looks at the maps, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true, value_parser = seconds)]
     every: f64,
     /// Sensors on 29-bit identifiers from 0x4000000 on, instead of 0x400 to 0x4FF
     #[arg(long)]
@@ -66,9 +66,6 @@ pub struct Args {
 /// # Errors
 /// A log that cannot be read, an interface that cannot be listened to, and one that has no broadcast.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    if args.every.is_nan() || args.every <= 0.0 {
-        bail!("--every {} is not above 0", args.every);
-    }
     let mut outputs = args.outputs.beside(args.log.clone().into_iter().chain(args.key.file()));
     let json = outputs.file("--json", args.json.as_deref())?;
     let pictures = args.out.as_deref().map(|path| outputs.folder("--out", path)).transpose()?;
