@@ -140,6 +140,16 @@ fn looks_are_taken_at_times_that_can_be() {
     }
 }
 
+/// A load is of a second: of less there is none, and no receiver has settled.
+#[test]
+fn too_short_a_recording_has_no_figures() {
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
+    let output = viewshed(&["bus", recording, "--to", "0.9"]);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{error}");
+    assert!(error.contains("0.87 s of maps are too few") && error.contains("1.8 s are needed"), "{error}");
+}
+
 #[test]
 fn what_is_no_broadcast_is_told() {
     let log = scratch("other.log");

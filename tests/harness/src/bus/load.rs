@@ -41,17 +41,19 @@ impl Load {
     }
 }
 
+const WINDOW_US: u64 = 1_000_000;
+
 /// Between the beginnings of two windows, microseconds.
 const STEP_US: u64 = 1000;
 
 /// The load of windows of a second, one every millisecond up to the last frame: windows that begin with
-/// frames would count dense seconds more often.
+/// frames would count dense seconds more often. None of less than a second: a part of a window is no load.
 fn windows(sent: &[(u64, f64)]) -> Vec<f64> {
     let (Some((first, _)), Some((last, _))) = (sent.first(), sent.last()) else { return Vec::new() };
     let (mut from, mut to, mut busy) = (0, 0, 0.0);
     let mut windows = Vec::new();
-    for begin in (*first..=(*last).saturating_sub(1_000_000).max(*first)).step_by(STEP_US as usize) {
-        while let Some((_, more)) = sent.get(to).filter(|(at, _)| *at < begin + 1_000_000) {
+    for begin in (*first..=(*last).saturating_sub(WINDOW_US)).step_by(STEP_US as usize) {
+        while let Some((_, more)) = sent.get(to).filter(|(at, _)| *at < begin + WINDOW_US) {
             busy += more;
             to += 1;
         }
@@ -78,6 +80,13 @@ mod tests {
         assert!((windows[0] - 0.1).abs() < 1e-9);
         let worst = windows.iter().copied().fold(0.0, f64::max);
         assert!((worst - 0.3).abs() < 1e-9, "{worst}");
+    }
+
+    #[test]
+    fn less_than_a_second_has_no_load() {
+        let sent = |last: u64| windows(&[(5_000_000, 0.01), (last, 0.01)]);
+        assert_eq!(sent(5_999_999), Vec::<f64>::new());
+        assert_eq!(sent(6_000_000).len(), 1);
     }
 
     #[test]

@@ -26,11 +26,12 @@ pub struct Arrived {
     pub loss: f64,
     /// Scans compared, each when the next one was measured.
     pub scans: usize,
-    /// Share of the sender's visible cells reported visible: median and lowest twentieth of the scans.
-    pub visible_median: f64,
-    pub visible_p05: f64,
-    /// Share of scans in which every cell is the same.
-    pub equal: f64,
+    /// Share of the sender's visible cells reported visible: median and lowest twentieth of the scans that have any;
+    /// none where no scan has.
+    pub visible_median: Option<f64>,
+    pub visible_p05: Option<f64>,
+    /// Share of scans in which every cell is the same; none where none was compared.
+    pub equal: Option<f64>,
     /// Cells reported visible that no scan of the last A + D had visible, in all.
     pub wrongly_visible: u64,
 }
@@ -45,7 +46,7 @@ impl Arrived {
         let mut ears = Ears::<1, A, W, 1>::new([sensor], addresses, ReceiverLimits::DEFAULT, key);
         let mut unstuffer = Unstuffer::new();
         let mut random = Pcg64::seed_from_u64(1);
-        let (mut shares, mut equal, mut wrongly_visible) = (Vec::new(), 0, 0);
+        let (mut shares, mut scans, mut equal, mut wrongly_visible) = (Vec::new(), 0, 0_usize, 0);
         let settled = maps.scans.first().map_or(0, |scan| scan.measured.micros()) + SETTLING_US;
         let mut sent = traffic.sent.iter().peekable();
         for (k, scan) in maps.scans.iter().enumerate() {
@@ -80,22 +81,54 @@ impl Arrived {
                 let words = received.bits().words().iter().zip(ever);
                 wrongly_visible += words.map(|(r, e)| u64::from((r & !e).count_ones())).sum::<u64>();
             }
+            scans += 1;
             equal += usize::from(same);
             if visible > 0 {
                 shares.push(f64::from(arrived) / f64::from(visible));
             }
         }
         shares.sort_by(f64::total_cmp);
-        let scans = shares.len();
-        let at = |share: f64| shares.get((scans as f64 * share) as usize).copied().unwrap_or(f64::NAN);
+        let at = |share: f64| shares.get((shares.len() as f64 * share) as usize).copied();
         Self {
             name: traffic.bus.name,
             loss,
             scans,
             visible_median: at(0.5),
             visible_p05: at(0.05),
-            equal: equal as f64 / scans.max(1) as f64,
+            equal: (scans > 0).then(|| equal as f64 / scans as f64),
             wrongly_visible,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use viewshed::fixed::bits::Bits;
+    use viewshed::wire::code::ray::{Known, Ray};
+
+    use super::super::traffic::{BUSES, Scan};
+    use super::*;
+    use crate::estimators::Options;
+    use crate::evaluation::samples::by_hand::recording;
+
+    #[test]
+    fn maps_without_a_visible_cell_have_no_share_of_them_and_are_compared_all_the_same() {
+        let like = Maps::new(&recording(3, 1), &Options::default(), None, &|| ()).unwrap();
+        let scan = |k: u64| Scan {
+            measured: Time::from_micros(500_000 + k * 66_667),
+            rays: vec![Ray::new(Known::new(3, 100), Bits::NONE); A],
+            probable: Vec::new(),
+        };
+        let arrived = |count: u64| {
+            let scans = (0..count).map(scan).collect();
+            let maps = Maps { estimator: String::new(), header: like.header, scans, holes: 0 };
+            let traffic = Traffic::new(&maps, BUSES[0], None, 0, None).unwrap();
+            Arrived::new(&maps, &traffic, 0.0, 0, None)
+        };
+        let all = arrived(60);
+        assert_eq!((all.visible_median, all.visible_p05, all.equal), (None, None, Some(1.0)));
+        // those from 1.5 s on that have a next one
+        assert_eq!(all.scans, 60 - 23 - 1);
+        assert_eq!(arrived(20).equal, None);
     }
 }

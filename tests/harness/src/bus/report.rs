@@ -54,7 +54,8 @@ impl Report {
         });
         let headings = ["bus", "load %", "worst\nsecond %", "frames\na scan", "bytes\na scan"];
         let received = self.received.iter().map(|r| {
-            let shares = [percent(r.visible_median), percent(r.visible_p05), percent(r.equal)];
+            let shares = [r.visible_median, r.visible_p05, r.equal];
+            let shares = shares.map(|share| share.map_or_else(|| "n/a".to_owned(), percent));
             let begin = [name(r.name), percent(r.loss)];
             begin.into_iter().chain(shares).chain([r.wrongly_visible.to_string()]).collect()
         });

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::builder::PossibleValuesParser;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::code::block::Kind;
@@ -81,6 +81,11 @@ pub struct Args {
     settings: SettingsArgs,
 }
 
+/// Least time from the first map to the last, seconds: scans come after a receiver has settled, and between the first
+/// frame after the quiet of the start and the last one lies a second, the window of a load, also where there is but the
+/// status four times a second.
+const LEAST_S: f64 = 1.8;
+
 /// Sends one recording after the other.
 ///
 /// # Errors
@@ -131,6 +136,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Target>) -> Result<Report> {
+    let (first, last) = (maps.scans.first(), maps.scans.last());
+    let span = first.zip(last).and_then(|(first, last)| last.measured.since(first.measured)).unwrap_or(0);
+    let span_s = span as f64 / 1e6;
+    ensure!(
+        span_s >= LEAST_S,
+        "{name}: {span_s:.2} s of maps are too few to say what they cost: a load is of a whole second, and a receiver takes one and a half to settle; {LEAST_S} s are needed"
+    );
     let (mut buses, mut received, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
     let logged = if key.is_some() { format!("{}-authenticated", args.bus) } else { args.bus.clone() };
     let authenticated = AUTHENTICATED.into_iter().filter_map(|bus| key.map(|key| (bus, Some(key))));
@@ -148,13 +160,11 @@ fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Ta
             write_log(log, &traffic)?;
         }
     }
-    let (first, last) = (maps.scans.first(), maps.scans.last());
-    let span = first.zip(last).and_then(|(first, last)| last.measured.since(first.measured)).unwrap_or(0);
     Ok(Report {
         recording: name.to_owned(),
         estimator: if args.risk.is_some() { at_risk::NAME.to_owned() } else { maps.estimator.clone() },
         scans: maps.scans.len(),
-        scans_per_second: (maps.scans.len() - 1) as f64 / (span.max(1) as f64 / 1e6),
+        scans_per_second: (maps.scans.len() - 1) as f64 / span_s,
         buses,
         received,
         entropy_bytes_per_scan: Entropy::new(maps),
