@@ -9,7 +9,8 @@
 //!
 //! *Refresh.* A map is refreshed whole when the last refresh is 180 ms old, the scans between are encoded
 //! against it. The whole header is sent at once at an epoch's start; its groups and the pages of the status go
-//! round all the time, so who joins late has everything within a second.
+//! round all the time. So who joins late on classic CAN has the header within half a second and all pages of the status
+//! within one and a half; in long form each message has everything.
 //!
 //! *Probability.* With levels in the header the second plane is that of probability. It goes out by halves, right and left in
 //! turn, each with a scan that is 60 ms younger than the last one that brought a half.
@@ -335,8 +336,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
 
     fn drop_scan(&mut self) {
         let Some(scan) = self.scan.take() else { return };
-        let pending: u32 = self.planes.iter().map(OutgoingPlane::pending).sum();
-        self.count_dropped(u16::try_from(pending).unwrap_or(u16::MAX));
+        self.count_dropped(u16::try_from(self.pending()).unwrap_or(u16::MAX));
         if let Some(running) = scan.running {
             self.from = match running.next {
                 Next::Block { start, .. } => start,
@@ -344,6 +344,11 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
             };
         }
         self.planes.iter_mut().for_each(OutgoingPlane::give_up);
+    }
+
+    /// How many azimuths of the last map are neither handed out nor dropped, those of all planes together.
+    pub fn pending(&self) -> u32 {
+        self.planes.iter().map(OutgoingPlane::pending).sum()
     }
 
     /// Whether everything of the last map is handed out or dropped.

@@ -5,7 +5,6 @@ use serde::Serialize;
 use super::entropy::Entropy;
 use super::load::Load;
 use super::loss::Arrived;
-use super::traffic::A;
 use crate::results::report::table::table;
 
 /// What one recording's maps cost.
@@ -32,6 +31,8 @@ pub struct Report {
 pub struct Dropped {
     pub bus: &'static str,
     pub azimuths: u16,
+    /// Of so many that were to be sent, those of all planes.
+    pub of: u64,
 }
 
 /// `fd-500k-2M-authenticated` in two lines.
@@ -75,8 +76,11 @@ impl Report {
             "Entropy of the maps: {neighbours:.0} bytes a scan given the neighbours, {previous_scan:.0} given the previous scan too.\n"
         );
         text += &format!("{}\n", table(&arrived, received));
-        for Dropped { bus, azimuths } in &self.dropped {
-            text += &format!("On {bus} {azimuths} of {} azimuths were not sent in time.\n", self.scans * A);
+        if self.received.iter().any(|r| r.visible_median.is_none()) {
+            text += "n/a: no scan after the first 1.5 s has a visible cell that could arrive.\n";
+        }
+        for Dropped { bus, azimuths, of } in &self.dropped {
+            text += &format!("On {bus} {azimuths} of {of} azimuths were not sent in time.\n");
         }
         if !self.dropped.is_empty() {
             text += "What is late is left out: a receiver has what came before, or unknown. On CAN FD there is room; on classic CAN with a \
@@ -103,12 +107,12 @@ mod tests {
             buses: Vec::new(),
             received: Vec::new(),
             entropy_bytes_per_scan: Entropy { neighbours: 1.0, previous_scan: 1.0 },
-            dropped: vec![Dropped { bus: "classic-500k", azimuths: 12 }],
+            dropped: vec![Dropped { bus: "classic-500k", azimuths: 12, of: 1920 }],
             holes: 0,
         };
         let text = late.text();
         assert!(text.starts_with("busy: 10 scans of radar-3d-narrow, "), "{text}");
-        assert!(text.contains("On classic-500k 12 of 1280 azimuths were not sent in time."), "{text}");
+        assert!(text.contains("On classic-500k 12 of 1920 azimuths were not sent in time."), "{text}");
         assert!(text.contains("CAN FD") && text.contains("gap_us"), "{text}");
         assert!(!Report { dropped: Vec::new(), ..late }.text().contains("gap_us"));
     }

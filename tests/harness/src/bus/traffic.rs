@@ -140,7 +140,9 @@ pub struct Traffic {
     pub sent: Vec<Sent>,
     /// Scans that were sent, without those of the quiet first moments.
     pub scans: usize,
-    /// Azimuths of scans that were dropped.
+    /// Azimuths of scans that were to be sent, those of all planes: of a plane of probability a scan has a half.
+    pub offered: u64,
+    /// Those that were dropped.
     pub dropped: u16,
 }
 
@@ -173,11 +175,14 @@ impl Traffic {
         sender.status_mut().state = viewshed::wire::status::UnitState::Ok;
         // a clock in microseconds runs ahead of any number of messages
         let mut sealer = key.map(|key| Sealer::new(*key, begin.micros()));
-        let (mut sent, mut scans) = (Vec::new(), 0);
+        let (mut sent, mut scans, mut offered) = (Vec::new(), 0, 0);
         // the bus is busy up to here
         let mut free = begin;
         for (k, scan) in maps.scans.iter().enumerate() {
-            scans += usize::from(sender.scan(scan.measured, scan).is_ok());
+            if sender.scan(scan.measured, scan).is_ok() {
+                scans += 1;
+                offered += u64::from(sender.pending());
+            }
             let end = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_667, |next| next.measured.micros());
             let mut now = scan.measured.max(free);
             while now.micros() < end {
@@ -188,7 +193,7 @@ impl Traffic {
                 now = Time::from_micros(now.micros() + POLL_US).max(free);
             }
         }
-        Ok(Self { bus, sent, scans, dropped: sender.status_mut().dropped })
+        Ok(Self { bus, sent, scans, offered, dropped: sender.status_mut().dropped })
     }
 }
 
@@ -220,9 +225,31 @@ impl Sent {
 
 #[cfg(test)]
 mod tests {
+    use viewshed::probability::Levels;
+
     use super::*;
     use crate::estimators::{FarRoad, Grid, Options};
     use crate::evaluation::samples::by_hand::recording;
+
+    #[test]
+    fn a_scan_offers_an_azimuth_and_half_a_probability_for_each() {
+        let offered = |header: Header| {
+            let scan = |k: u64| Scan {
+                measured: Time::from_micros(500_000 + k * 66_667),
+                rays: vec![Ray::clear(Known::new(3, 100)); A],
+                probable: vec![Ray::UNKNOWN; A],
+            };
+            let maps = Maps { estimator: String::new(), header, scans: (0..30).map(scan).collect(), holes: 0 };
+            let traffic = Traffic::new(&maps, BUSES[0], None, 0, None).unwrap();
+            (traffic.scans as u64, traffic.offered)
+        };
+        let plain = Maps::new(&recording(3, 1), &Options::default(), None, &|| ()).unwrap().header;
+        let (scans, azimuths) = offered(plain);
+        assert!((20..30).contains(&scans), "without those of the quiet begin: {scans}");
+        assert_eq!(azimuths, scans * A as u64);
+        let (scans, azimuths) = offered(Header { probability: Levels::from_bytes([61, 178, 242, 0, 1]), ..plain });
+        assert_eq!(azimuths, scans * (A + A / 2) as u64);
+    }
 
     #[test]
     fn what_is_sent_is_the_map_of_a_unit_that_is_told_of_its_site() {

@@ -154,7 +154,7 @@ fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Ta
             received.extend(LOSSES.map(|loss| Arrived::new(maps, &traffic, loss, args.sensor, key)));
         }
         if traffic.dropped > 0 {
-            dropped.push(Dropped { bus: bus.name, azimuths: traffic.dropped });
+            dropped.push(Dropped { bus: bus.name, azimuths: traffic.dropped, of: traffic.offered });
         }
         if let Some(log) = log.filter(|_| bus.name == logged) {
             write_log(log, &traffic)?;
