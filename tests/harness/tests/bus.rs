@@ -150,6 +150,34 @@ fn too_short_a_recording_has_no_figures() {
     assert!(error.contains("0.87 s of maps are too few") && error.contains("1.8 s are needed"), "{error}");
 }
 
+/// No option does nothing without a word.
+#[test]
+fn options_that_would_do_nothing_are_refused() {
+    for arguments in [
+        &["bus", "a.mcap", "--bus", "fd-500k-2M"][..],
+        &["bus", "a.mcap", "--count-symbols", "--json", "x"],
+        &["bus", "a.mcap", "--count-symbols", "--log", "y"],
+        &["bus", "a.mcap", "--min-speed", "2"],
+        &["bus", "a.mcap", "--warm-up", "2"],
+        &["bus", "a.mcap", "--growth", "2"],
+        &["bus", "a.mcap", "--grid", "polar"],
+        &["bus", "a.mcap", "--bootstrap", "20"],
+        &["bus", "a.mcap", "--seed", "20"],
+        &["bus", "a.mcap", "--reference-share", "0.4"],
+        &["listen", "a.log", "--for", "3"],
+        &["doctor", "a.log", "--for", "3"],
+        &["view", "a.mcap", "--baud", "9600"],
+        &["view", "--can", "can0", "--baud", "9600"],
+        &["replay", "a.mcap", "--mcap-estimator", "foo"],
+    ] {
+        let output = viewshed(arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        // by the command line, before any file is looked for
+        assert!(error.contains("Usage: "), "{arguments:?}: {error}");
+    }
+}
+
 #[test]
 fn what_is_no_broadcast_is_told() {
     let log = scratch("other.log");

@@ -22,7 +22,7 @@ use crate::bus::loss::{Arrived, LOSSES};
 use crate::bus::report::{Dropped, Report};
 use crate::bus::symbols::{self, Symbols};
 use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
-use crate::command::options::SettingsArgs;
+use crate::command::options::MapArgs;
 use crate::estimators::at_risk;
 use crate::evaluation::probability::file::Fitted;
 use crate::recording;
@@ -54,6 +54,7 @@ pub struct Args {
         long,
         value_name = "NAME",
         default_value = "classic-500k",
+        requires = "log",
         value_parser = PossibleValuesParser::new(BUSES.map(|bus| bus.name)),
         help_heading = "Results"
     )]
@@ -71,14 +72,14 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..8), help_heading = "Sender")]
     sensor: u8,
     /// Print the code's frequency tables as counted on these recordings, instead
-    #[arg(long, help_heading = "Results")]
+    #[arg(long, conflicts_with_all = ["json", "log"], help_heading = "Results")]
     count_symbols: bool,
     #[command(flatten)]
     key: KeyArgs,
     #[command(flatten)]
     outputs: OutputArgs,
     #[command(flatten)]
-    settings: SettingsArgs,
+    maps: MapArgs,
 }
 
 /// Least time from the first map to the last, seconds: scans come after a receiver has settled, and between the first
@@ -91,13 +92,13 @@ const LEAST_S: f64 = 1.8;
 /// # Errors
 /// A recording that cannot be read, a file that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let settings = args.settings.settings()?;
+    let settings = args.maps.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
     if args.log.is_some() && paths.len() > 1 {
         bail!("--log writes one recording and {} are to be sent; name one", paths.len());
     }
     let mut outputs = args.outputs.beside(paths.iter().flat_map(|path| recording::files(path)));
-    outputs.reads(args.settings.files().chain(args.key.file()).chain(args.probability.clone()));
+    outputs.reads(args.maps.files().chain(args.key.file()).chain(args.probability.clone()));
     let json = outputs.file("--json", args.json.as_deref())?;
     let log = outputs.file("--log", args.log.as_deref())?;
     let key = args.key.key()?;

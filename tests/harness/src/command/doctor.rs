@@ -40,7 +40,7 @@ pub struct Args {
     #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["log", "detections", "interface"])]
     can: Option<String>,
     /// How long to listen to it, in seconds [default: 10]
-    #[arg(long = "for", value_name = "SECONDS", requires = "can", value_parser = period)]
+    #[arg(long = "for", value_name = "SECONDS", requires = "can", conflicts_with = "log", value_parser = period)]
     seconds: Option<f64>,
     /// Write everything that was found as JSON
     #[arg(long, value_name = "FILE")]

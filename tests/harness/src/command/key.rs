@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
+use super::options::given;
 use crate::bus::ears::Key;
 
 /// Where the key comes from.
@@ -24,6 +25,11 @@ impl KeyArgs {
     /// The file the key is read from.
     pub fn file(&self) -> Option<PathBuf> {
         self.key_file.clone()
+    }
+
+    /// The options that are given.
+    pub fn given(&self) -> Vec<&'static str> {
+        given([("--key", self.key.is_some()), ("--key-file", self.key_file.is_some())])
     }
 
     /// The key, if one is given.

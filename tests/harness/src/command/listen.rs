@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "INTERFACE", conflicts_with_all = ["log", "interface"])]
     can: Option<String>,
     /// Listen to it for this time only, in seconds
-    #[arg(long = "for", value_name = "SECONDS", requires = "can", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", requires = "can", conflicts_with = "log", value_parser = seconds)]
     seconds: Option<f64>,
     /// Only this bus of a CAN log: can0, or the channel of an ASC log [default: all]
     #[arg(long, value_name = "NAME")]

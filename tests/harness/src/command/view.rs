@@ -13,7 +13,7 @@ use viewshed::wire::message::Addresses;
 
 use super::key::KeyArgs;
 use super::label::open;
-use super::options::SettingsArgs;
+use super::options::{SettingsArgs, given};
 use super::print;
 use super::replay::risk::{quantiser, share};
 use crate::bus::ears::Key;
@@ -28,7 +28,7 @@ use crate::pages::view::{About, Viewing, recorded};
 use crate::recording::can_log;
 #[cfg(unix)]
 use crate::recording::serial_log::Chunk;
-use crate::recording::{self, Recording, file};
+use crate::recording::{self, Recording, file, ignored};
 
 /// Look at the maps of a recording, of a broadcast's log, or of a unit that is running, in a browser on this machine
 ///
@@ -53,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "PATH", conflicts_with_all = ["file", "can"], help_heading = "Live")]
     port: Option<String>,
     /// Bit rate of the port
-    #[arg(long, value_name = "BAUD", default_value_t = UnitConfig::SERVICE_BAUD, requires = "port", help_heading = "Live")]
+    #[arg(long, value_name = "BAUD", default_value_t = UnitConfig::SERVICE_BAUD, requires = "port", conflicts_with_all = ["file", "can"], help_heading = "Live")]
     baud: u32,
     /// Listen to this SocketCAN interface
     #[arg(long, value_name = "INTERFACE", conflicts_with = "file", help_heading = "Live")]
@@ -61,9 +61,9 @@ pub struct Args {
     /// Sensors on 29-bit identifiers from 0x4000000 on, instead of 0x400 to 0x4FF
     #[arg(long, help_heading = "Broadcast")]
     extended: bool,
-    /// Time between two instants of a log, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = super::options::seconds, help_heading = "Broadcast")]
-    every: f64,
+    /// Time between two instants of a log, in seconds [default: 0.1]
+    #[arg(long, value_name = "SECONDS", value_parser = super::options::seconds, help_heading = "Broadcast")]
+    every: Option<f64>,
     /// Print the address and open no browser
     #[arg(long, help_heading = "Page")]
     no_open: bool,
@@ -100,8 +100,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let (viewing, says) = match (&args.file, &args.port, &args.can) {
         (Some(path), ..) => from_file(path, args, addresses, key.as_ref(), settings)?,
-        (_, Some(port), _) => from_port(port, args.baud, addresses, key.as_ref())?,
-        (_, _, Some(interface)) => from_can(interface, addresses, key.as_ref())?,
+        (_, Some(port), _) => from_port(port, args, addresses, key.as_ref())?,
+        (_, _, Some(interface)) => from_can(interface, args, addresses, key.as_ref())?,
         _ => bail!(
             "say what to look at: FILE, a recording or the log of a broadcast; or what is live, --port PATH or --can INTERFACE"
         ),
@@ -114,6 +114,40 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let routes = viewing.routes(&server);
     server.serve(routes).context("the server")?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    Recording,
+    Log,
+    Port,
+    Can,
+}
+
+impl Args {
+    /// The options that are given and ignored, each with what it is for.
+    fn ignored(&self, source: Source) -> Vec<String> {
+        let of_recordings = if source == Source::Recording { Vec::new() } else { self.settings.given() };
+        let of_logs = given([("--every", source != Source::Log && self.every.is_some())]);
+        let addressed = matches!(source, Source::Log | Source::Can);
+        let of_buses = given([("--extended", !addressed && self.extended)]);
+        let of_broadcasts = if source == Source::Recording { self.key.given() } else { Vec::new() };
+        [
+            (of_recordings, "recordings"),
+            (of_logs, "logs of a broadcast"),
+            (of_buses, "broadcasts on CAN"),
+            (of_broadcasts, "broadcasts"),
+        ]
+        .into_iter()
+        .flat_map(|(options, of)| options.into_iter().map(move |option| ignored::said(option, of)))
+        .collect()
+    }
+}
+
+/// What was found, and what was passed over.
+fn told(says: String, ignored: &[String]) -> String {
+    [&[says], ignored].concat().join("\n")
 }
 
 /// A log of a broadcast if it holds one, else a recording.
@@ -134,7 +168,8 @@ fn from_file(
                 "--probability: {} is the log of a broadcast, which says itself what its sender's table is",
                 file::shown(path)
             );
-            return Ok(from_log(path, log, Listening::new(addresses, key), args.every));
+            let ignored = args.ignored(Source::Log);
+            return Ok(from_log(path, log, Listening::new(addresses, key), args.every, &ignored));
         }
         ensure!(
             trial.not_authentic() == 0,
@@ -143,7 +178,12 @@ fn from_file(
         );
     }
     let radars = recording::read_each(path, &settings.reading).with_context(|| path.display().to_string())?;
-    let radars: Vec<Recording> = radars.into_iter().map(|(radar, _)| radar).collect();
+    let mut radars: Vec<Recording> = radars.into_iter().map(|(radar, _)| radar).collect();
+    let ignored = args.ignored(Source::Recording);
+    if let Some(first) = radars.first_mut() {
+        let start = first.frames.first().map_or(0, |frame| frame.time_ns);
+        ignored.iter().for_each(|said| first.problems.add(ignored::TOPIC, said, start));
+    }
     let recording = radars.first().context("no radar")?;
     ensure!(
         recording.of_camera().is_none(),
@@ -153,7 +193,7 @@ fn from_file(
     let table = fitted.map(|fitted| quantiser(fitted, args.risk, recording, &settings)).transpose()?;
     let viewing = Viewing::recording(&radars, path, settings.evaluation.slice_height_m);
     let frames: Vec<String> = radars.iter().map(|radar| radar.frames.len().to_string()).collect();
-    let says = format!("{}: {} radar frames", file::stem(path), frames.join(" and "));
+    let says = told(format!("{}: {} radar frames", file::stem(path), frames.join(" and ")), &ignored);
     let filling = viewing.clone();
     std::thread::spawn(move || {
         if let Err(error) = recorded::fill(&filling.instants, &radars, &settings, table.as_ref()) {
@@ -168,15 +208,17 @@ fn from_log(
     path: &Path,
     Log { lines, problems, .. }: Log,
     listening: Listening,
-    every_s: f64,
+    every_s: Option<f64>,
+    ignored: &[String],
 ) -> (Arc<Viewing>, String) {
     let name = file::shown(path).into_owned();
-    let says = format!("{name}: {} lines of a broadcast", lines.len());
+    let problems = [ignored, &problems].concat();
+    let says = told(format!("{name}: {} lines of a broadcast", lines.len()), ignored);
     let viewing = Viewing::broadcast(About::broadcast(name, "log", problems));
     let filling = viewing.clone();
     std::thread::spawn(move || {
         let count = lines.len();
-        let outcome = listened(&filling, lines, listening, every_s);
+        let outcome = listened(&filling, lines, listening, every_s.unwrap_or(EVERY_S));
         filling.instants.end(match outcome {
             Ok(()) => format!("{count} lines"),
             Err(error) => format!("failed: {error:#}"),
@@ -184,6 +226,9 @@ fn from_log(
     });
     (viewing, says)
 }
+
+/// Time between two instants of a log, unless it is said.
+const EVERY_S: f64 = 0.1;
 
 fn listened(viewing: &Viewing, lines: Vec<Logged>, listening: Listening, every_s: f64) -> Result<()> {
     let mut receiving = Receiving::new(listening);
@@ -252,11 +297,12 @@ fn ended(viewing: &Viewing, error: &anyhow::Error) {
 }
 
 #[cfg(unix)]
-fn from_port(path: &str, baud: u32, addresses: Addresses, key: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
+fn from_port(path: &str, args: &Args, addresses: Addresses, key: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
     use std::io::{ErrorKind, Read};
 
-    let mut port = crate::configure::serial::open_port(path, baud)?;
-    let viewing = Viewing::broadcast(About::broadcast(path.to_owned(), "live", Vec::new()));
+    let mut port = crate::configure::serial::open_port(path, args.baud)?;
+    let ignored = args.ignored(Source::Port);
+    let viewing = Viewing::broadcast(About::broadcast(path.to_owned(), "live", ignored.clone()));
     let mut live = Live::new(viewing.clone(), Listening::new(addresses, key));
     let device = path.to_owned();
     std::thread::spawn(move || {
@@ -288,18 +334,19 @@ fn from_port(path: &str, baud: u32, addresses: Addresses, key: Option<&Key>) -> 
             ended(&live.viewing, &error);
         }
     });
-    Ok((viewing, format!("listening to {path}")))
+    Ok((viewing, told(format!("listening to {path}"), &ignored)))
 }
 
 #[cfg(not(unix))]
-fn from_port(_: &str, _: u32, _: Addresses, _: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
+fn from_port(_: &str, _: &Args, _: Addresses, _: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
     bail!("--port is for Unix; record the line with viewshed bus --log and name the log")
 }
 
 #[cfg(target_os = "linux")]
-fn from_can(interface: &str, addresses: Addresses, key: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
+fn from_can(interface: &str, args: &Args, addresses: Addresses, key: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
     let bus = can_log::live::Bus::open(interface)?;
-    let viewing = Viewing::broadcast(About::broadcast(interface.to_owned(), "live", Vec::new()));
+    let ignored = args.ignored(Source::Can);
+    let viewing = Viewing::broadcast(About::broadcast(interface.to_owned(), "live", ignored.clone()));
     let mut live = Live::new(viewing.clone(), Listening::new(addresses, key));
     std::thread::spawn(move || {
         let never = std::sync::atomic::AtomicBool::new(false);
@@ -317,10 +364,10 @@ fn from_can(interface: &str, addresses: Addresses, key: Option<&Key>) -> Result<
             ended(&live.viewing, &error);
         }
     });
-    Ok((viewing, format!("listening to {interface}")))
+    Ok((viewing, told(format!("listening to {interface}"), &ignored)))
 }
 
 #[cfg(not(target_os = "linux"))]
-fn from_can(_: &str, _: Addresses, _: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
+fn from_can(_: &str, _: &Args, _: Addresses, _: Option<&Key>) -> Result<(Arc<Viewing>, String)> {
     bail!("--can listens to SocketCAN, which Linux has; record the bus and name the log")
 }

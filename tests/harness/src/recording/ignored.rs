@@ -12,7 +12,8 @@ pub enum Kind {
     Other,
 }
 
-const TOPIC: &str = "options";
+/// The topic of what is said of them.
+pub const TOPIC: &str = "options";
 
 /// Adds the options that say nothing of this file to the recording's problems.
 pub fn note(recording: &mut Recording, options: &ReadOptions, kind: Kind) {
@@ -29,9 +30,14 @@ pub fn note(recording: &mut Recording, options: &ReadOptions, kind: Kind) {
         ("--frame-period", options.frame_period_s.is_some(), of_ti, ti),
     ] {
         if given && !applies {
-            recording.problems.add(TOPIC, format!("{option} is for {of}, and ignored"), start);
+            recording.problems.add(TOPIC, said(option, of), start);
         }
     }
+}
+
+/// Says of an option what it is for.
+pub fn said(option: &str, of: &str) -> String {
+    format!("{option} is for {of}, and ignored")
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ pub mod capture;
 pub mod clock;
 pub mod file;
 pub mod foreign;
-mod ignored;
+pub mod ignored;
 pub mod labels;
 pub mod mcap;
 pub mod native;

@@ -1,7 +1,8 @@
 //! The page over the log of a broadcast: what a receiver shows, also where the log is cut, or speaks another version.
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
@@ -104,6 +105,38 @@ fn a_log_is_played_and_its_sender_described() {
     page.until("viewshed.told !== null");
     page.picture(&folder.join("log.png"));
     assert_eq!(page.console(), Vec::<String>::new());
+}
+
+/// What is printed up to the address.
+fn told(arguments: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+    let mut child = command.arg("view").args(arguments).arg("--no-open").stdout(Stdio::piped()).spawn().unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+    let told: Vec<String> = lines.take_while(|line| !line.starts_with("http://")).collect();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    told.join("\n")
+}
+
+#[test]
+fn options_of_another_kind_of_file_are_named() {
+    let folder = folder("ignored");
+    let log = log(&folder);
+    let said = told(&[log.to_str().unwrap(), "--from", "3", "--far-road", "--every", "1"]);
+    for option in ["--from", "--far-road"] {
+        assert!(said.contains(&format!("{option} is for recordings, and ignored")), "{said}");
+    }
+    assert!(!said.contains("--every"), "{said}");
+    let key = folder.join("key");
+    std::fs::write(&key, "000102030405060708090a0b0c0d0e0f").unwrap();
+    let more = ["--to", "3", "--every", "3", "--extended", "--key-file", key.to_str().unwrap()];
+    let said = told(&[&[SHIPPED], &more[..]].concat());
+    for what in
+        ["--every is for logs of a broadcast", "--extended is for broadcasts on CAN", "--key-file is for broadcasts"]
+    {
+        assert!(said.contains(&format!("{what}, and ignored")), "{said}");
+    }
+    assert!(!said.contains("--to"), "{said}");
 }
 
 #[test]

@@ -69,7 +69,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     mcap: Option<PathBuf>,
     /// Estimator whose map goes into --mcap
-    #[arg(long, value_name = "NAME", default_value = SHOWN, help_heading = "Results")]
+    #[arg(long, value_name = "NAME", default_value = SHOWN, requires = "mcap", help_heading = "Results")]
     mcap_estimator: String,
     /// Write a report to send around: one HTML file with tables, curves, pictures and the worst moments, which opens offline
     #[arg(long, value_name = "FILE", help_heading = "Results")]

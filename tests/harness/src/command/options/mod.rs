@@ -2,6 +2,9 @@
 //!
 //! Defaults are overridden by `--config FILE`, that by single options.
 
+mod given;
+mod values;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -9,10 +12,13 @@ use clap::Args;
 use serde::Deserialize;
 use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
-use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
+use viewshed::inputs::ti::{TiDialect, TiFamily};
 
+pub(super) use self::given::given;
+use self::values::{far_road, field_of_view, ground_error, mount, noise, period, profile, ti_dialect, ti_header};
+pub(super) use self::values::{finite, seconds};
 use crate::configure::file as unit_file;
-use crate::estimators::{self, FarRoad, GroundError, MOST_RANGE_M};
+use crate::estimators::{self, FarRoad, GroundError};
 use crate::evaluation::{self, Grid, Settings};
 use crate::recording::{FieldOfView, ReadOptions};
 
@@ -33,6 +39,19 @@ pub struct SettingsArgs {
     judging: JudgingArgs,
 }
 
+/// Those of a command that makes maps and judges none.
+#[derive(Debug, Clone, Default, Args)]
+pub struct MapArgs {
+    #[command(flatten)]
+    reading: ReadingArgs,
+    #[command(flatten)]
+    height: HeightArgs,
+    #[command(flatten)]
+    unit: UnitArgs,
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
 /// How estimators run and how they are judged, whatever they are given.
 #[derive(Debug, Clone, Default, Args)]
 pub struct JudgingArgs {
@@ -40,6 +59,12 @@ pub struct JudgingArgs {
     evaluation: EvaluationArgs,
     #[command(flatten)]
     estimators: EstimatorArgs,
+    #[command(flatten)]
+    config: ConfigArgs,
+}
+
+#[derive(Debug, Clone, Default, Args)]
+struct ConfigArgs {
     /// TOML file with the tables [evaluation] and [estimators]
     ///
     /// Its keys are those that --json writes under "options", for example
@@ -136,9 +161,8 @@ struct EvaluationArgs {
     /// Objects slower than this are not counted, in m/s; they still hide others [default: 1, from 0 to 100]
     #[arg(long, allow_negative_numbers = true, value_name = "M/S")]
     min_speed: Option<f64>,
-    /// Height above the road at which visibility is judged, in metres [default: 1, from 0 to 20]
-    #[arg(long, allow_negative_numbers = true, value_name = "METRES")]
-    slice_height: Option<f64>,
+    #[command(flatten)]
+    height: HeightArgs,
     /// Start of each recording that is not counted, in seconds [default: 1, from 0 to 86400; 0 for independent frames]
     #[arg(long, allow_negative_numbers = true, value_name = "SECONDS")]
     warm_up: Option<f64>,
@@ -170,16 +194,32 @@ struct EvaluationArgs {
     seed: Option<u64>,
 }
 
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Evaluation")]
+struct HeightArgs {
+    /// Height above the road at which visibility is judged, in metres [default: 1, from 0 to 20]
+    #[arg(long, allow_negative_numbers = true, value_name = "METRES")]
+    slice_height: Option<f64>,
+}
+
 /// What the estimators are given.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Estimators")]
 struct EstimatorArgs {
-    /// Detections a frame that estimators take, after the gate; the weakest beyond are dropped and counted [default: 256, from 1 to 4096]
-    #[arg(long, allow_negative_numbers = true, value_name = "N")]
-    max_detections: Option<usize>,
+    #[command(flatten)]
+    unit: UnitArgs,
     /// Share of a cell that boxes must fill for `reference` to call it occupied [default: 0.5, above 0 to 1]
     #[arg(long, allow_negative_numbers = true, value_name = "SHARE")]
     reference_share: Option<f64>,
+}
+
+/// What radar-3d, as units run it, is given.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Estimators")]
+struct UnitArgs {
+    /// Detections a frame that estimators take, after the gate; the weakest beyond are dropped and counted [default: 256, from 1 to 4096]
+    #[arg(long, allow_negative_numbers = true, value_name = "N")]
+    max_detections: Option<usize>,
     /// Grid of radar-3d: on the small one, radar-3d-small runs beside radar-3d in tables, and is what is tuned, watched and
     /// fused [default: reference]
     #[arg(long, value_name = "SIZE")]
@@ -222,10 +262,47 @@ impl SettingsArgs {
     }
 }
 
+impl MapArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.config.files()
+    }
+
+    /// Defaults, then the file, then the command line.
+    ///
+    /// # Errors
+    /// Those of [`JudgingArgs::settings`].
+    pub fn settings(&self) -> Result<Settings> {
+        let mut settings = Settings { reading: self.reading.options(), ..self.config.settings()? };
+        self.height.apply(&mut settings.evaluation);
+        self.unit.apply(&mut settings.estimators);
+        checked(settings)
+    }
+}
+
+impl ConfigArgs {
+    fn files(&self) -> impl Iterator<Item = PathBuf> {
+        self.config.clone().into_iter()
+    }
+
+    /// Defaults, then the file.
+    fn settings(&self) -> Result<Settings> {
+        let config = self.config.as_deref().map(read_config).transpose()?.unwrap_or_default();
+        Ok(Settings { reading: ReadOptions::default(), evaluation: config.evaluation, estimators: config.estimators })
+    }
+}
+
+/// With values that can be, and one height for truth and estimators.
+fn checked(mut settings: Settings) -> Result<Settings> {
+    settings.evaluation.check()?;
+    settings.estimators.judge_at(settings.evaluation.slice_height_m);
+    Ok(settings)
+}
+
 impl JudgingArgs {
     /// Files these options name.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        self.config.clone().into_iter()
+        self.config.files()
     }
 
     /// Defaults, then the file, then the command line; recordings are read as they are.
@@ -233,14 +310,10 @@ impl JudgingArgs {
     /// # Errors
     /// A file that cannot be read, a key it should not have (with its line), a value out of range.
     pub fn settings(&self) -> Result<Settings> {
-        let config = self.config.as_deref().map(read_config).transpose()?.unwrap_or_default();
-        let mut settings =
-            Settings { reading: ReadOptions::default(), evaluation: config.evaluation, estimators: config.estimators };
+        let mut settings = self.config.settings()?;
         self.evaluation.apply(&mut settings.evaluation);
         self.estimators.apply(&mut settings.estimators);
-        settings.evaluation.check()?;
-        settings.estimators.judge_at(settings.evaluation.slice_height_m);
-        Ok(settings)
+        checked(settings)
     }
 }
 
@@ -283,7 +356,7 @@ fn set<T: Copy>(option: Option<T>, place: &mut T) {
 impl EvaluationArgs {
     fn apply(&self, options: &mut evaluation::Options) {
         set(self.min_speed, &mut options.min_speed_mps);
-        set(self.slice_height, &mut options.slice_height_m);
+        self.height.apply(options);
         set(self.warm_up, &mut options.warm_up_s);
         set(self.growth, &mut options.growth_m);
         set(self.growth_azimuth, &mut options.growth_azimuth_deg);
@@ -295,10 +368,22 @@ impl EvaluationArgs {
     }
 }
 
+impl HeightArgs {
+    fn apply(&self, options: &mut evaluation::Options) {
+        set(self.slice_height, &mut options.slice_height_m);
+    }
+}
+
 impl EstimatorArgs {
     fn apply(&self, options: &mut estimators::Options) {
-        set(self.max_detections, &mut options.max_detections);
+        self.unit.apply(options);
         set(self.reference_share, &mut options.reference_share);
+    }
+}
+
+impl UnitArgs {
+    fn apply(&self, options: &mut estimators::Options) {
+        set(self.max_detections, &mut options.max_detections);
         set(self.grid_size, &mut options.grid);
         set(self.ground_error, &mut options.ground_error);
         options.far_road = self.far_road.or(options.far_road);
@@ -310,116 +395,10 @@ impl EstimatorArgs {
     }
 }
 
-fn far_road(text: &str) -> Result<FarRoad, String> {
-    match text {
-        "along-road" => Ok(FarRoad::AlongRoad),
-        _ => text
-            .parse()
-            .map(FarRoad::Degrees)
-            .map_err(|_| format!("`{text}` is not a whole number of degrees, -128 to 127")),
-    }
-}
-
-pub(super) fn finite(text: &str) -> Result<f64, String> {
-    let value: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
-    if value.is_finite() { Ok(value) } else { Err(format!("`{text}` is not finite")) }
-}
-
-/// `N` numbers between commas.
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let values = text.split(',').map(finite).collect::<Result<Vec<_>, _>>()?;
-    let found = values.len();
-    values.try_into().map_err(|_| format!("{found} values, {N} are needed"))
-}
-
-fn profile(text: &str) -> Result<&'static Ars408Profile, String> {
-    let names = || Ars408Profile::ALL.map(|p| p.name).join(", ");
-    Ars408Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
-}
-
-fn ti_header(text: &str) -> Result<TiFamily, String> {
-    let bytes = text.trim().parse().unwrap_or(0);
-    TiFamily::ALL
-        .into_iter()
-        .find(|f| f.header() == bytes)
-        .ok_or_else(|| format!("`{text}` is not 36, 40, 44, 48 or 52"))
-}
-
-fn ti_dialect(text: &str) -> Result<TiDialect, String> {
-    text.split(',').map(str::trim).try_fold(TiDialect::USUAL, |mut dialect, word| {
-        match (word, word.strip_prefix("doppler=").map(finite)) {
-            ("degrees", _) => dialect.angles = TiAngleUnit::Degrees,
-            ("raised", _) => dialect.polar_points = PolarPoints::Raised,
-            ("no-elevation", _) => dialect.has_elevation = false,
-            ("targets", _) => dialect.entries = Entries::Targets,
-            (_, Some(Ok(step))) if step > 0.0 => dialect.doppler_step_mps = Some(step as f32),
-            (_, Some(_)) => return Err(format!("`{word}`: a Doppler step is a number of m/s above 0")),
-            _ => return Err(format!("no `{word}`; there are degrees, raised, no-elevation, targets, doppler=M/S")),
-        }
-        Ok(dialect)
-    })
-}
-
-/// How long something is to last.
-pub(super) fn seconds(text: &str) -> Result<f64, String> {
-    let seconds = finite(text)?;
-    if (0.1..=86_400.0).contains(&seconds) {
-        Ok(seconds)
-    } else {
-        Err(format!("{seconds} s is not within 0.1 to 86400"))
-    }
-}
-
-fn period(text: &str) -> Result<f64, String> {
-    let seconds = finite(text)?;
-    if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
-}
-
-fn noise(text: &str) -> Result<NoiseConfig, String> {
-    let [range_m, azimuth_deg, elevation_deg, radial_velocity_mps] = numbers(text)?.map(|v| v as f32);
-    let config = NoiseConfig { range_m, azimuth_deg, elevation_deg, radial_velocity_mps, ..NoiseConfig::default() };
-    config.noise().map(|_| config).map_err(|e| e.to_string())
-}
-
-fn ground_error(text: &str) -> Result<GroundError, String> {
-    let [times, ahead_m] = numbers(text)?;
-    if (0.0..=3.0).contains(&times) && (-200.0..=200.0).contains(&ahead_m) {
-        Ok(GroundError { times, ahead_m })
-    } else {
-        Err(format!("{times} times is not within 0 to 3, or {ahead_m} m not within -200 to 200"))
-    }
-}
-
-fn mount(text: &str) -> Result<[f64; 6], String> {
-    let [x, y, z, yaw, pitch, roll] = numbers(text)?;
-    if z <= 0.0 {
-        return Err(format!("the mount's height z = {z} m is not above the road"));
-    }
-    Ok([x, y, z, yaw.to_radians(), pitch.to_radians(), roll.to_radians()])
-}
-
-fn field_of_view(text: &str) -> Result<FieldOfView, String> {
-    let [az0, az1, el0, el1, r0, r1] = numbers(text)?;
-    for (what, lo, hi) in [("azimuth", az0, az1), ("elevation", el0, el1), ("range", r0, r1)] {
-        if lo >= hi {
-            return Err(format!("{what} from {lo} to {hi} is no interval: the lower limit comes first"));
-        }
-    }
-    if r1 > MOST_RANGE_M {
-        return Err(format!(
-            "range to {r1} m: grids go to {MOST_RANGE_M} m; give that, and what is farther is left out"
-        ));
-    }
-    Ok(FieldOfView {
-        azimuth_rad: [az0.to_radians(), az1.to_radians()],
-        elevation_rad: [el0.to_radians(), el1.to_radians()],
-        range_m: [r0, r1],
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit};
 
     use super::*;
 
@@ -523,8 +502,8 @@ mod tests {
         assert!(told(lanes).unwrap().contains("write it with `viewshed lanes --table estimators.lanes`"));
         assert_eq!(told(&lanes.replace("lanes", "estimators.lanes")), None);
         for unit in [
-            include_str!("../../../../boards/linux/viewshed.toml"),
-            include_str!("../../../../boards/unit.toml"),
+            include_str!("../../../../../boards/linux/viewshed.toml"),
+            include_str!("../../../../../boards/unit.toml"),
             &format!("[unit]\nlearn_lanes = true\n{lanes}"),
         ] {
             assert!(told(unit).unwrap().contains("a.toml: it is a unit's file"), "{:?}", told(unit));
