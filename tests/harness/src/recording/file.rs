@@ -1,9 +1,10 @@
 //! The bytes of a recording: of a file, plain or gzip, or of standard input.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::io::{IsTerminal, Read};
-use std::path::Path;
-use std::sync::OnceLock;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use anyhow::{Context, Result, anyhow, bail};
 use flate2::read::MultiGzDecoder;
@@ -34,7 +35,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     read(path).map(|content| content.bytes)
 }
 
-/// All bytes, unpacked. Standard input is read once and kept.
+/// All bytes, unpacked. Standard input and pipes are read once and kept.
 ///
 /// # Errors
 /// A file that cannot be read or unpacked; a terminal as standard input.
@@ -43,8 +44,13 @@ pub fn read(path: &Path) -> Result<Content> {
     if path.is_dir() {
         bail!("{}: it is a folder; name a recording in it, of a ROS 2 bag the .mcap", place());
     }
-    let bytes =
-        if path == Path::new(STANDARD_INPUT) { standard_input()? } else { std::fs::read(path).with_context(place)? };
+    let bytes = if path == Path::new(STANDARD_INPUT) {
+        standard_input()?
+    } else if is_pipe(path) {
+        pipe(path).with_context(place)?
+    } else {
+        std::fs::read(path).with_context(place)?
+    };
     if !bytes.starts_with(&GZIP) {
         return Ok(Content { bytes, damage: None });
     }
@@ -72,6 +78,34 @@ fn standard_input() -> Result<Vec<u8>> {
         input.read_to_end(&mut bytes).map(|_| bytes).map_err(|error| error.to_string())
     });
     read.clone().map_err(|error| anyhow!("cannot read standard input: {error}"))
+}
+
+/// Whether what is read from a path is gone afterwards: a named pipe, or `<(command)` of a shell.
+fn is_pipe(path: &Path) -> bool {
+    path.metadata().is_ok_and(|about| !about.is_file())
+}
+
+/// The bytes of a pipe, which come once: who asks again is given the same.
+fn pipe(path: &Path) -> std::io::Result<Vec<u8>> {
+    static READ: Mutex<BTreeMap<PathBuf, Vec<u8>>> = Mutex::new(BTreeMap::new());
+    let mut read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(bytes) = read.get(path) {
+        return Ok(bytes.clone());
+    }
+    let bytes = std::fs::read(path)?;
+    read.insert(path.to_owned(), bytes.clone());
+    Ok(bytes)
+}
+
+/// Whether there is something of this name; what is read for minutes need not begin if the next is a typing error.
+///
+/// # Errors
+/// There is nothing, or it cannot be seen.
+pub fn there(path: &Path) -> Result<()> {
+    if path != Path::new(STANDARD_INPUT) {
+        path.metadata().with_context(|| format!("cannot read {}", shown(path)))?;
+    }
+    Ok(())
 }
 
 /// The path to be shown.

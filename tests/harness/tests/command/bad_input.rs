@@ -220,6 +220,37 @@ fn one_bad_recording_does_not_keep_the_others() {
     assert_eq!(report[0]["recording"], "good");
 }
 
+/// What is read from a pipe comes once, and is looked at more than once.
+#[cfg(unix)]
+#[test]
+fn a_recording_comes_from_a_pipe() {
+    let folder = folder("pipe");
+    let pipe = folder.join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    let bytes = Scene::default().bytes();
+    let feeding = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::write(pipe, bytes).unwrap()
+    });
+    let replaying = std::thread::spawn({
+        let folder = folder.clone();
+        move || outcome(&folder, &["pipe"])
+    });
+    let begin = std::time::Instant::now();
+    while !replaying.is_finished() && begin.elapsed() < std::time::Duration::from_secs(60) {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    if !replaying.is_finished() {
+        // it waits for somebody who writes again
+        std::fs::write(&pipe, "").unwrap();
+        panic!("read twice");
+    }
+    feeding.join().unwrap();
+    let (code, text, report) = replaying.join().unwrap();
+    assert_eq!((code, &report["input"]["frames"]), (0, &FRAMES.into()), "{text}");
+}
+
 #[test]
 fn a_piece_outside_the_recording_is_an_error() {
     let folder = folder("outside");
