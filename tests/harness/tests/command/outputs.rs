@@ -167,6 +167,27 @@ fn a_place_for_results_that_is_none_is_found_before_anything_is_read() {
     assert_eq!(names(&folder), all);
 }
 
+/// `-` is standard input elsewhere; a file of that name is what nobody wants.
+#[test]
+fn a_dash_is_no_file_to_write() {
+    let folder = prepared("dash");
+    let all = names(&folder);
+    for (arguments, says) in [
+        ("replay a.mcap --bootstrap 0 --json -", "--json /dev/stdout"),
+        ("replay a.mcap --bootstrap 0 --out -", "--out ./-"),
+        ("bus a.mcap --json -", "--json /dev/stdout"),
+        ("bus a.mcap --log -", "--log ./-"),
+        ("simulate s.toml --out -", "--out /dev/stdout"),
+        ("detections a.mcap --out -", "--out ./-"),
+    ] {
+        let output = viewshed(&folder, arguments);
+        assert!(output.status.code() == Some(2) && stderr(&output).contains(says), "{arguments}: {}", stderr(&output));
+    }
+    assert_eq!(names(&folder), all);
+    assert!(viewshed(&folder, "bus a.mcap --log ./-").status.success());
+    assert!(folder.join("-").is_file());
+}
+
 #[test]
 fn the_main_job_runs_twice() {
     let folder = folder("twice");

@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail, ensure};
 
+use crate::recording::file::STANDARD_INPUT;
 use one_file::is_one_file;
 pub use unfinished::{Unfinished, until_ctrl_c};
 
@@ -72,9 +73,13 @@ impl Outputs {
     ///
     /// # Errors
     /// It is an input or another output, also through links; a folder, or in one that does not exist; a file
-    /// that exists, without `--force`.
+    /// that exists, without `--force`; `-`, which elsewhere is standard input.
     pub fn file(&mut self, option: &str, path: Option<&Path>) -> Result<Option<Target>> {
         let Some(path) = path else { return Ok(None) };
+        ensure!(
+            path != Path::new(STANDARD_INPUT),
+            "{option} - is no name of a file; write to standard output with `{option} /dev/stdout`, to a file of that name with `{option} ./-`"
+        );
         not_read(option, path, &self.inputs)?;
         if !is_stream(path) {
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -118,8 +123,12 @@ impl Outputs {
     /// The folder an option names. Its files may be replaced.
     ///
     /// # Errors
-    /// It is a file, or cannot be made or written to.
+    /// It is a file, or cannot be made or written to; `-`, which elsewhere is standard input.
     pub fn folder(&self, option: &str, path: &Path) -> Result<Folder> {
+        ensure!(
+            path != Path::new(STANDARD_INPUT),
+            "{option} - is no name of a folder; make one of that name with `{option} ./-`"
+        );
         ensure!(!path.exists() || path.is_dir(), "{option} {} is a file, and a folder is needed", path.display());
         let there = path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
         ensure!(there.is_dir(), "{option} {}: {} is a file, and a folder is needed", path.display(), there.display());
