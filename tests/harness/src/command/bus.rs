@@ -25,9 +25,9 @@ use crate::bus::traffic::{AUTHENTICATED, BUSES, Maps, Traffic};
 use crate::command::options::MapArgs;
 use crate::estimators::at_risk;
 use crate::evaluation::probability::file::Fitted;
-use crate::recording;
 use crate::recording::can_log::{Content, Line};
 use crate::recording::serial_log::Chunk;
+use crate::recording::{self, file};
 use crate::results::files::{OutputArgs, Target};
 use crate::results::report::notes;
 
@@ -107,6 +107,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         bail!("--log: classic CAN has no room for an authenticator; name --bus fd-500k-2M or serial-230400");
     }
     let (mut reports, mut symbols) = (Vec::new(), Symbols::new());
+    paths.iter().try_for_each(|path| file::there(path))?;
     for path in &paths {
         let recording = recording::read(path, &settings.reading)?;
         let progress = bar(&format!("replaying {}", recording.name), recording.frames.len() as u64);

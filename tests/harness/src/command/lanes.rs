@@ -35,7 +35,7 @@ pub struct Args {
     #[arg(value_name = "RECORDING|NET", required = true)]
     sources: Vec<PathBuf>,
     /// Name of the tables
-    #[arg(long, value_name = "NAME", default_value = "lanes")]
+    #[arg(long, value_name = "NAME", default_value = "lanes", value_parser = table_name)]
     table: String,
     #[command(flatten)]
     net: NetArgs,
@@ -68,6 +68,18 @@ fn pair(text: &str) -> Result<[f64; 2], String> {
     let numbers: Vec<f64> =
         text.split(',').filter_map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     <[f64; 2]>::try_from(numbers).map_err(|_| "not two numbers X,Y".into())
+}
+
+/// A name of a TOML table that needs no quotes: words between points.
+fn table_name(text: &str) -> Result<String, String> {
+    let is_word = |word: &str| {
+        !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-'))
+    };
+    if text.split('.').all(is_word) {
+        Ok(text.to_owned())
+    } else {
+        Err("a table's name is of letters, digits, _ and -, with points between its parts: estimators.lanes".into())
+    }
 }
 
 /// Reads, learns and prints.

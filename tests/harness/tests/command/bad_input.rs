@@ -7,7 +7,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use viewshed_harness::recording::ros::{Header, PointCloud2, PointField, Stamp, encode};
 
-use crate::scene::{FRAMES, PERIOD_NS, Scene, folder, json, replay, stderr};
+use crate::scene::{FRAMES, PERIOD_NS, Scene, folder, json, replay, stderr, stdout, viewshed};
 
 /// Replays one file; exit code, standard error and report.
 fn outcome(folder: &Path, arguments: &[&str]) -> (i32, String, Value) {
@@ -218,6 +218,21 @@ fn one_bad_recording_does_not_keep_the_others() {
     assert!(text.contains("absent.mcap"), "{text}");
     assert_eq!(report.as_array().unwrap().len(), 1);
     assert_eq!(report[0]["recording"], "good");
+}
+
+/// Files that are missing are named before any other is replayed, which takes minutes.
+#[test]
+fn a_missing_file_is_named_first() {
+    let folder = folder("missing");
+    Scene::default().save(&folder, "good");
+    std::fs::write(folder.join("bad.mcap"), "time,x,y\n1,2,3\n").unwrap();
+    let (code, text, _) = outcome(&folder, &["good.mcap", "bad.mcap", "absent.mcap"]);
+    assert_eq!(code, 2);
+    let said: Vec<&str> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert!(said.len() == 2 && said[0].contains("cannot read absent.mcap") && said[1].contains("bad.mcap"), "{text}");
+    let output = viewshed(&folder, "bus good.mcap absent.mcap");
+    assert!(output.status.code() == Some(2) && stdout(&output).is_empty(), "{}", stdout(&output));
+    assert!(stderr(&output).contains("cannot read absent.mcap"), "{}", stderr(&output));
 }
 
 /// What is read from a pipe comes once, and is looked at more than once.

@@ -14,6 +14,18 @@ fn viewshed(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 #[test]
+fn a_name_that_is_no_table_is_refused() {
+    let folder = folder("lanes-table");
+    for name in ["a b", "", "a..b", "lanes]", "\u{e4}"] {
+        let output = viewshed(&folder, &["lanes", "absent.mcap", "--table", name]);
+        let error = stderr(&output);
+        assert!(output.status.code() == Some(2) && error.contains("a table's name is of letters"), "{name}: {error}");
+    }
+    let error = stderr(&viewshed(&folder, &["lanes", "absent.mcap", "--table", "estimators.my-lanes_2"]));
+    assert!(error.contains("absent.mcap"), "{error}");
+}
+
+#[test]
 fn lanes_of_a_recording_are_a_configuration_that_replay_takes() {
     let folder = folder("lanes-learnt");
     let motorway = shipped().join("motorway.mcap");

@@ -13,6 +13,16 @@ fn row<'a>(report: &'a Value, name: &str) -> &'a Value {
 }
 
 #[test]
+fn without_labels_nothing_is_broken_down() {
+    let folder = folder("no_breakdown");
+    Scene { labelled: false, ..Scene::default() }.save(&folder, "a");
+    let output = replay(&folder, &["a.mcap", "--bootstrap", "0", "--breakdown"]);
+    let text = stdout(&output);
+    assert!(output.status.success() && text.contains("--breakdown needs labels, and there are none."), "{text}");
+    assert!(!text.contains("FVR / FIR in % by "), "{text}");
+}
+
+#[test]
 fn what_is_written_is_what_is_read() {
     let folder = folder("round_trip");
     let scene = Scene::default();

@@ -247,7 +247,7 @@ fn a_file_that_cannot_be_written_is_named() {
     let output = simulate(&folder, "2", "no/such/folder/r.mcap", &[]);
     assert!(stderr(&output).contains("cannot write no/such/folder/r.mcap"), "{}", stderr(&output));
     let output = simulate(&folder, "2", "r.mcap", &["--duration", "0"]);
-    assert!(stderr(&output).contains("duration_s is 0"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("duration_s is 0, it must be above 0 and at most 86400"), "{}", stderr(&output));
 }
 
 #[test]

@@ -180,7 +180,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut reports = Vec::new();
     let (mut failed, mut synthetic) = (false, false);
     let mut of_all: Vec<Causes> = Vec::new();
+    // a typing error is said at once, not after the minutes that the others take
+    let missing = missing(&paths);
     for (k, path) in paths.iter().enumerate() {
+        if missing.contains(&path) {
+            failed = true;
+            continue;
+        }
         let radars = match radars(path, &settings, one_only) {
             Ok(radars) => radars,
             Err(error) => {
@@ -290,6 +296,12 @@ struct Replayed {
     causes: Vec<Causes>,
     /// The frame of --time.
     shown_frame: Option<usize>,
+}
+
+/// Complains of the files that are not there.
+fn missing(paths: &[PathBuf]) -> Vec<&PathBuf> {
+    let complained = |path: &&PathBuf| file::there(path).inspect_err(complain).is_err();
+    paths.iter().filter(complained).collect()
 }
 
 /// What each radar of a file recorded, and how it is read.
@@ -468,7 +480,8 @@ impl Replayed {
     fn text(&self, args: &Args, settings: &Settings) -> String {
         let extent = table::Extent::of(args.wide);
         let mut text = table::text(&self.replay, &settings.evaluation, extent);
-        if args.breakdown {
+        // without labels there is nothing to break down, and `without_labels` says so
+        if args.breakdown && self.replay.recording.truth.is_some() {
             text += &table::breakdown(&self.replay.summary, extent);
             text += &self.replay.camera.as_ref().map(|c| table::breakdown(&c.summary, extent)).unwrap_or_default();
         }

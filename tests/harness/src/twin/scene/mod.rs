@@ -348,7 +348,7 @@ impl Scene {
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.duration_s > 0.0 && self.duration_s <= 86_400.0,
-            "duration_s is {}, it must lie in 0 to 86400",
+            "duration_s is {}, it must be above 0 and at most 86400",
             self.duration_s
         );
         self.radar.check().with_context(|| format!("radar `{}`", self.radar.name))?;
