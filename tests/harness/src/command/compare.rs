@@ -17,8 +17,12 @@ use crate::results::report::table;
 /// Compare two runs over the same recordings: is one better, or is the difference chance?
 ///
 /// Both files were written by `viewshed replay --json` or `viewshed experiment --json`, before and after a change of the
-/// library, of its configuration or of the options. Tracks are drawn again with replacement, the same ones of both runs,
-/// so that what they have in common drops out. A rate is better or worse where the interval of its difference excludes 0.
+/// library, of its configuration or of the options. Tracks are drawn again with replacement, and for cells runs of ten
+/// seconds, the same ones of both runs, so that what they have in common drops out. A rate is better or worse where the
+/// interval of its difference excludes 0, and n/a where the recording is too short for an interval: cells take 80 s.
+///
+/// At crossings the tracker amplifies the smallest difference: a change that alters nothing in truth moves a single
+/// scene by up to 10 points of FVR and 3 of cell FVR. Judge such changes by several scenes or seeds together.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The run before the change

@@ -114,7 +114,7 @@ pub fn compare(
                 fvr,
                 fvr_against,
                 difference_points: 100.0 * (fvr - fvr_against),
-                difference_interval: Interval::of(differences),
+                difference_interval: draws.interval(differences),
             })
         })
         .collect()

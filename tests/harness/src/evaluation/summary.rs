@@ -12,7 +12,7 @@ use super::counts::Counts;
 use super::curve::{CurvePoint, Grades, trade_off};
 use super::samples::FrameSamples;
 use super::score::Score;
-use super::units::Units;
+use super::units::{RUN_BLOCKS, Units};
 use super::{Grid, Options};
 use crate::recording::Recording;
 
@@ -90,7 +90,7 @@ pub struct Summary {
     pub drawn_units: usize,
     /// What each of them is called.
     pub unit_names: Vec<String>,
-    /// Blocks of about one second drawn again for cell rates.
+    /// Blocks of about one second, of which runs are drawn again for cell rates.
     pub blocks: usize,
     /// Estimators as delivered, then `geometry-slice` and `geometry-box`.
     pub rows: Vec<Row>,
@@ -110,7 +110,8 @@ impl Summary {
     pub fn new(recording: &Recording, samples: &[FrameSamples], scores: &[Score], options: &Options) -> Self {
         let units = Units::new(recording, samples);
         let object_draws = Draws::new(units.object_units, options.bootstrap, options.seed);
-        let block_draws = Draws::new(units.block_units, options.bootstrap, options.seed.wrapping_add(BLOCK_SEED));
+        let block_seed = options.seed.wrapping_add(BLOCK_SEED);
+        let block_draws = Draws::in_runs(units.block_units, RUN_BLOCKS, options.bootstrap, block_seed);
         let (slice, boxes) = (bounds::slice(samples), bounds::boxes(samples));
         let drawn = |score: &Score| {
             let by_unit = units.by_object(|counts: &mut Counts, frame, object| {
@@ -135,7 +136,7 @@ impl Summary {
                 grid: score.grid,
                 counts,
                 cells: (!score.cells.is_empty()).then(|| score.cell_counts()),
-                intervals: Intervals::new(drawn),
+                intervals: Intervals::new(drawn, &block_draws),
                 to_slice: distance(&slice, &slice_draws),
                 to_box: distance(&boxes, &box_draws),
                 breakdown: Breakdown::new(recording, samples, score),
@@ -178,9 +179,9 @@ impl Summary {
 }
 
 impl Intervals {
-    fn new(drawn: &Drawn) -> Self {
+    fn new(drawn: &Drawn, blocks: &Draws) -> Self {
         let objects = |rate: fn(&Counts) -> Option<f64>| Interval::of(drawn.objects.iter().map(rate));
-        let cells = |rate: fn(&CellCounts) -> Option<f64>| Interval::of(drawn.cells.iter().map(rate));
+        let cells = |rate: fn(&CellCounts) -> Option<f64>| blocks.interval(drawn.cells.iter().map(rate));
         Self {
             tvr: objects(Counts::tvr),
             fvr: objects(Counts::fvr),

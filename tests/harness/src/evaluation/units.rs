@@ -2,7 +2,8 @@
 //!
 //! Samples of one track are correlated, so intervals come from drawing whole tracks; where frames
 //! are independent, whole frames. Cells of successive frames are correlated too (the same truck
-//! throws the same shadow), so cell rates draw blocks of about one second.
+//! throws the same shadow, the same queue stands for a red light), for 5 to 15 s: so cells are summed
+//! up by blocks of one second, and runs of [`RUN_BLOCKS`] of them are drawn.
 
 use std::collections::BTreeMap;
 
@@ -11,6 +12,8 @@ use crate::recording::Recording;
 
 /// Length of a block of frames, nanoseconds.
 pub const BLOCK_NS: i64 = 1_000_000_000;
+/// Blocks that are drawn together, one after another.
+pub const RUN_BLOCKS: usize = 10;
 
 /// The units of one recording.
 #[derive(Debug, Clone, PartialEq)]

@@ -86,12 +86,11 @@ fn two_runs_are_compared_track_by_track_and_refused_where_they_are_of_other_samp
     done(&folder, "replay a.mcap --to 6 --bootstrap 0 --json b.json --config c.toml");
     done(&folder, "replay a.mcap --to 5 --bootstrap 0 --json short.json");
     let text = done(&folder, "compare a.json b.json --estimator radar-3d --json d.json");
-    assert!(
-        text.contains("cell FIR") && text.contains("worse"),
-        "less is visible, so more is falsely invisible: {text}"
-    );
     let differences = &json(&folder.join("d.json"))[0]["differences"];
     assert!(differences[1]["points"].as_f64().unwrap() > 0.0 && differences[0]["points"].as_f64().unwrap() <= 0.0);
+    assert!(differences[3]["points"].as_f64().unwrap() > 0.0, "less is visible, so more is falsely invisible: {text}");
+    let too_short = "blocks of 1 s are too short for an interval, which takes 80";
+    assert!(differences[3]["interval"].is_null() && text.contains(too_short), "{text}");
     let same = done(&folder, "compare a.json a.json");
     assert!(!same.contains("worse") && !same.contains("better\n"), "{same}");
     let other = refused(&folder, "compare a.json short.json");

@@ -19,6 +19,7 @@ use crate::evaluation::examples::Example;
 use crate::evaluation::mount_error::Sensitivity;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::{Distance, Intervals, Row, Summary};
+use crate::evaluation::units::RUN_BLOCKS;
 use crate::evaluation::{self, Grid};
 use crate::geometry::pose::SensorPose;
 use crate::recording::problems::Problem;
@@ -97,7 +98,7 @@ pub struct Estimator {
     learnt_lanes: Option<usize>,
     /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
     by_unit: Vec<String>,
-    /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s.
+    /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s, in the order of time.
     by_block: Vec<String>,
 }
 
@@ -120,7 +121,9 @@ pub(super) struct Resampling {
     objects_over: &'static str,
     object_units: usize,
     cells_over: &'static str,
+    /// Blocks, and how many of them are drawn together.
     cell_units: usize,
+    cell_units_in_a_run: usize,
 }
 
 /// What was read.
@@ -264,8 +267,9 @@ pub(super) fn resampling(summary: &Summary) -> Resampling {
     Resampling {
         objects_over: summary.drawn,
         object_units: summary.drawn_units,
-        cells_over: "blocks of 1 s",
+        cells_over: "runs of blocks of 1 s",
         cell_units: summary.blocks,
+        cell_units_in_a_run: RUN_BLOCKS,
     }
 }
 

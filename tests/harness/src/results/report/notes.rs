@@ -7,10 +7,11 @@ use super::percent;
 use crate::estimators::camera_3d::NO_VEHICLE;
 use crate::estimators::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE};
 use crate::evaluation::Options;
-use crate::evaluation::bootstrap::Interval;
+use crate::evaluation::bootstrap::{Interval, LEAST_RUNS};
 use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
+use crate::evaluation::units::RUN_BLOCKS;
 use crate::recording::Recording;
 use crate::recording::truth::LabelsBeside;
 
@@ -46,7 +47,7 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
         let cells = if recording.sensor.frames_independent {
             String::new()
         } else {
-            format!(" (cells: of {} blocks of 1 s)", summary.blocks)
+            format!(" (cells: {})", blocks(summary.blocks))
         };
         lines.push(format!(
             "95 % intervals by {} draws of {} {}{cells}, the same for every row; seed {}.",
@@ -71,6 +72,16 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines.extend(problems(recording));
     lines.extend(recording.sensor.licence.as_ref().map(|l| format!("Licence of the recording: {l}.")));
     lines
+}
+
+/// What intervals of cells are drawn of.
+pub fn blocks(blocks: usize) -> String {
+    let least = LEAST_RUNS * RUN_BLOCKS;
+    if blocks < least {
+        format!("n/a, {blocks} blocks of 1 s are too short for an interval, which takes {least}")
+    } else {
+        format!("of {blocks} blocks of 1 s in runs of {RUN_BLOCKS}")
+    }
 }
 
 /// What is wrong with the input, or that nothing is.

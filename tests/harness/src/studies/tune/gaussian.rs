@@ -13,6 +13,8 @@
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
+use crate::evaluation::bootstrap::normal;
+
 /// Draws of lengths and noise.
 const FITS: usize = 120;
 /// Random points looked at, and as many steps from the best.
@@ -181,15 +183,6 @@ fn backward(lower: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     solved
 }
 
-/// Share of the standard normal distribution below z (Abramowitz and Stegun 26.2.17, error below 1e-7).
-fn normal(z: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.231_641_9 * z.abs());
-    let polynomial =
-        t * (0.319_381_530 + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
-    let tail = (-z * z / 2.0).exp() / std::f64::consts::TAU.sqrt() * polynomial;
-    if z > 0.0 { 1.0 - tail } else { tail }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,12 +232,5 @@ mod tests {
         };
         assert_eq!(next(1), next(1));
         assert_ne!(next(1), next(2));
-    }
-
-    #[test]
-    fn the_normal_distribution_is_that_of_tables() {
-        for (z, share) in [(0.0, 0.5), (1.0, 0.841_344_7), (-1.96, 0.024_997_9), (3.0, 0.998_650_1)] {
-            assert!((normal(z) - share).abs() < 2e-7, "{z}");
-        }
     }
 }
