@@ -251,22 +251,25 @@ pub fn run(
     progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<SceneResult>> {
     let one = |k: usize, scene: &Scene| -> Result<SceneResult> {
-        let mut settings = settings.clone();
-        let other = lanes.other_day(k, scene, &settings, progress)?;
-        settings.estimators.lanes = lanes.of(scene, other.as_ref(), &settings)?;
-        settings.estimators.before = Before::of(other);
-        let recording = record(scene, &settings, keep, progress)?;
+        // what a radar is told of its site, it has seen itself
+        let told = |scene: &Scene| -> Result<Settings> {
+            let other = lanes.other_day(k, scene, settings, progress)?;
+            let mut told = settings.clone();
+            told.estimators.lanes = lanes.of(scene, other.as_ref(), settings)?;
+            told.estimators.before = Before::of(other);
+            Ok(told)
+        };
+        let recording = record(scene, settings, keep, progress)?;
         let mut samples = samples::collect_every(&recording, &settings.evaluation, extent.every, progress);
-        let with_elevation = seconds(recording, &samples, &settings, progress)?;
+        let with_elevation = seconds(recording, &samples, &told(scene)?, progress)?;
         let without_elevation = extent
             .without_elevation
             .then(|| {
                 let mut flat = scene.clone();
                 flat.radar.has_elevation = false;
-                settings.estimators.before = Before::of(lanes.other_day(k, &flat, &settings, progress)?);
-                let recording = record(&flat, &settings, &|_, _| Ok(()), progress)?;
+                let recording = record(&flat, settings, &|_, _| Ok(()), progress)?;
                 samples::detect_again(&recording, &mut samples, &settings.evaluation);
-                seconds(recording, &samples, &settings, progress)
+                seconds(recording, &samples, &told(&flat)?, progress)
             })
             .transpose()?;
         Ok(SceneResult { scene: scene.clone(), with_elevation, without_elevation })
@@ -455,6 +458,23 @@ mod tests {
         assert!(matches!(LanesFrom::nets(&[scene.clone()]), LanesFrom::Nets));
         scene.traffic.as_mut().unwrap().net = None;
         assert!(matches!(LanesFrom::nets(&[scene]), LanesFrom::Settings));
+    }
+
+    #[test]
+    fn a_radar_without_elevation_learns_lanes_from_what_it_saw_itself() {
+        static SEEN: std::sync::Mutex<Vec<bool>> = std::sync::Mutex::new(Vec::new());
+        let learn = |recordings: &[Recording]| {
+            let mut detections = recordings.iter().flat_map(|r| &r.frames).flat_map(|f| &f.detections);
+            SEEN.lock().unwrap().push(detections.any(|d| d.elevation_rad.is_some()));
+            vec![Lane { points: vec![[0.0, 0.0], [50.0, 0.0]] }]
+        };
+        let plan = shipped("crossing");
+        let mut scene = plan.scenes(&plan.reporting).unwrap().remove(0);
+        scene.duration_s = 1.0;
+        let lanes = LanesFrom::OtherDays(plan.other_days(&plan.reporting).unwrap(), learn);
+        let extent = Extent { every: 15, without_elevation: true };
+        run(&[scene], &Settings::default(), extent, &lanes, &|_, _| Ok(()), &|| ()).unwrap();
+        assert_eq!(*SEEN.lock().unwrap(), [true, false]);
     }
 
     #[test]
