@@ -64,22 +64,21 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let (before, after) = (read(&args.before)?, read(&args.after)?);
     let names = || args.before.display().to_string() + " and " + &args.after.display().to_string();
     let mut all = Vec::new();
-    for a in &before {
-        let Some(b) = after.iter().find(|b| b.name == a.name) else { continue };
-        same_samples(a, b).with_context(names)?;
+    let (pairs, left_out) = paired(&before, &after);
+    for Pair { called, a, b } in pairs {
+        same_samples(&called, a, b).with_context(names)?;
         for (name, counted) in &a.estimators {
             let wanted = args.estimator.as_ref().is_none_or(|wanted| wanted == name);
             let Some((_, other)) = b.estimators.iter().find(|(other, _)| wanted && other == name) else { continue };
             ensure!(
                 counted.by_block.len() == other.by_block.len(),
-                "{}: {name} of `{}` was judged in {} seconds in one and {} in the other",
+                "{}: {name} of `{called}` was judged in {} seconds in one and {} in the other",
                 names(),
-                a.name,
                 counted.by_block.len(),
                 other.by_block.len()
             );
             all.push(Compared {
-                of: a.name.clone(),
+                of: called.clone(),
                 estimator: name.clone(),
                 units: a.units.len(),
                 blocks: counted.by_block.len(),
@@ -95,11 +94,46 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     }
     print(&report::text(&all, table::Extent::Terminal))?;
+    for (path, of_file) in [&args.before, &args.after].into_iter().zip(&left_out) {
+        if !of_file.is_empty() {
+            print(&format!("Not compared, in {} alone: {}.\n", path.display(), of_file.join("; ")))?;
+        }
+    }
     if let Some(file) = json_file {
         file.write(report::json(&all)?)?;
     }
     print(&outputs.told())?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Two sets that are compared, and what they are called together.
+struct Pair<'a> {
+    called: String,
+    a: &'a Set,
+    b: &'a Set,
+}
+
+/// The first set of a name in one file is that of the other, the second the second; and what each file has beyond.
+fn paired<'a>(before: &'a [Set], after: &'a [Set]) -> (Vec<Pair<'a>>, [Vec<String>; 2]) {
+    let numbered = |sets: &'a [Set]| -> Vec<(&'a Set, usize)> {
+        let of_name = |k: usize| sets[..k].iter().filter(|other| other.name == sets[k].name).count();
+        sets.iter().enumerate().map(|(k, set)| (set, of_name(k))).collect()
+    };
+    let called = |(set, number): &(&Set, usize)| match number {
+        0 => set.name.clone(),
+        n => format!("{} ({})", set.name, n + 1),
+    };
+    let same = |(a, n): &(&Set, usize), (b, m): &(&Set, usize)| a.name == b.name && n == m;
+    let [of_before, of_after] = [numbered(before), numbered(after)];
+    let pair = |one: &(&'a Set, usize)| {
+        let (b, _) = of_after.iter().find(|other| same(one, other))?;
+        Some(Pair { called: called(one), a: one.0, b })
+    };
+    let alone = |sets: &[(&Set, usize)], others: &[(&Set, usize)]| {
+        sets.iter().filter(|one| !others.iter().any(|other| same(one, other))).map(called).collect()
+    };
+    let left_out = [alone(&of_before, &of_after), alone(&of_after, &of_before)];
+    (of_before.iter().filter_map(pair).collect(), left_out)
 }
 
 fn read(path: &Path) -> Result<Vec<Set>> {
@@ -181,8 +215,7 @@ fn numbers(row: &Value) -> Option<[u64; 4]> {
 }
 
 /// Refuses two runs that did not judge the same objects.
-fn same_samples(a: &Set, b: &Set) -> Result<()> {
-    let name = &a.name;
+fn same_samples(name: &str, a: &Set, b: &Set) -> Result<()> {
     ensure!(
         a.units.len() == b.units.len(),
         "`{name}` has {} tracks in one and {} in the other: give both the same recording, labels and options of the evaluation",
@@ -250,7 +283,7 @@ mod tests {
     #[test]
     fn runs_of_other_samples_are_refused_by_the_first_that_differs() {
         let set = |units: &[&str], by_unit: &[&str]| sets(&run_of("a", units, by_unit)).unwrap().remove(0);
-        let refused = |a: &Set, b: &Set| same_samples(a, b).unwrap_err().to_string();
+        let refused = |a: &Set, b: &Set| same_samples("a", a, b).unwrap_err().to_string();
         let a = set(&["1", "2"], &["1 2 3 4", "5 6 7 8"]);
         assert!(refused(&a, &set(&["1"], &["1 2 3 4"])).contains("2 tracks in one and 1 in the other"));
         assert!(
@@ -259,7 +292,23 @@ mod tests {
         let other = set(&["1", "2"], &["1 2 3 4", "6 6 7 8"]);
         assert!(refused(&a, &other).contains("track 2 was detected in other frames"));
         // another map of the same objects
-        assert!(same_samples(&a, &set(&["1", "2"], &["2 1 4 3", "5 6 7 8"])).is_ok());
+        assert!(same_samples("a", &a, &set(&["1", "2"], &["2 1 4 3", "5 6 7 8"])).is_ok());
+    }
+
+    #[test]
+    fn recordings_of_one_name_are_compared_in_their_order_and_what_is_left_over_is_named() {
+        let (one, other) = (run_of("a", &["1"], &["1 2 3 4"]), run_of("a", &["5", "6"], &["1 2 3 4", "5 6 7 8"]));
+        let all = sets(&json!([one, other, run_of("b", &["1"], &["1 2 3 4"])])).unwrap();
+        let (pairs, left_out) = paired(&all, &all);
+        let called: Vec<&str> = pairs.iter().map(|p| p.called.as_str()).collect();
+        assert_eq!((called, left_out), (vec!["a", "a (2)", "b"], [vec![], vec![]]));
+        assert!(
+            pairs.iter().all(|p| same_samples(&p.called, p.a, p.b).is_ok()),
+            "a file is of the same samples as itself"
+        );
+        let few = sets(&json!([one, run_of("c", &["1"], &["1 2 3 4"])])).unwrap();
+        let (pairs, left_out) = paired(&all, &few);
+        assert_eq!((pairs.len(), left_out), (1, [vec!["a (2)".into(), "b".into()], vec!["c".into()]]));
     }
 
     #[test]

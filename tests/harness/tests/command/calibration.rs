@@ -92,7 +92,10 @@ fn two_runs_are_compared_track_by_track_and_refused_where_they_are_of_other_samp
     let too_short = "blocks of 1 s are too short for an interval, which takes 80";
     assert!(differences[3]["interval"].is_null() && text.contains(too_short), "{text}");
     let same = done(&folder, "compare a.json a.json");
-    assert!(!same.contains("worse") && !same.contains("better\n"), "{same}");
+    assert!(!same.contains("worse") && !same.contains("better\n") && !same.contains("Not compared"), "{same}");
+    done(&folder, "replay a.mcap b.mcap --to 6 --bootstrap 0 --json both.json");
+    let partly = done(&folder, "compare both.json a.json");
+    assert!(partly.contains("Not compared, in both.json alone: b."), "{partly}");
     let other = refused(&folder, "compare a.json short.json");
     assert!(other.contains("a.json and short.json: `a`"), "{other}");
     assert!(refused(&folder, "compare a.json c.toml").contains("c.toml"));
