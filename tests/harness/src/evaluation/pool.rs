@@ -4,6 +4,7 @@
 //! what rates and intervals are made of stays, the maps' cells frame by frame go.
 
 use super::Options;
+use super::bounds;
 use super::cells::CellTally;
 use super::replay::Replay;
 use super::samples::FrameSamples;
@@ -19,7 +20,8 @@ use crate::recording::{Frame, Recording};
 pub struct Seconds {
     recording: Recording,
     seconds: Vec<Second>,
-    /// Scores without verdicts and cells, which are in `seconds`.
+    /// Scores without verdicts and cells, which are in `seconds`; the last is `geometry-slice`, whose cells cannot be
+    /// told from the samples of a second.
     scores: Vec<Score>,
 }
 
@@ -36,6 +38,7 @@ struct Second {
 impl Seconds {
     /// Sums up what was scored; `samples` lie in the recording's order.
     pub fn new(mut recording: Recording, samples: &[FrameSamples], mut scores: Vec<Score>) -> Self {
+        scores.push(bounds::slice(samples));
         let frames = std::mem::take(&mut recording.frames);
         let start = frames.first().map_or(0, |f| f.time_ns);
         let mut seconds: Vec<Second> = Vec::new();
@@ -130,7 +133,8 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
         camera: None,
         problems: Problems::default(),
     };
-    let mut summary = Summary::new(&recording, &samples, &scores, options);
+    let slice = scores.pop()?;
+    let mut summary = Summary::beside(&recording, &samples, &scores, &slice, options);
     summary.frames = counted;
     Some(Replay { recording, samples, scores, summary, camera: None })
 }
@@ -146,11 +150,12 @@ mod tests {
     /// 3 s at 10 Hz of two tracks; the second is hidden and found in the last second only.
     fn part() -> (Recording, Vec<FrameSamples>, Score) {
         let objects = |k: usize| vec![sample(0, 40.0, true, true), sample(1, 60.0, k >= 20, false)];
-        let samples = frames((0..30).map(objects));
+        let mut samples = frames((0..30).map(objects));
         let mut score = score("radar-3d", &samples, |s| Some(if s.distance_m < 50.0 { 255 } else { 0 }));
-        for tally in &mut score.cells {
+        for (tally, frame) in score.cells.iter_mut().zip(&mut samples) {
             tally.add(true, true, Some(200));
             tally.add(false, true, Some(180));
+            frame.cells = vec![((30, 0), true), ((70, 0), false)];
         }
         score.counters = vec![("snr".into(), 2)];
         (recording(30, 2), samples, score)
@@ -170,7 +175,9 @@ mod tests {
         for name in ["radar-3d", SLICE] {
             let [a, b] = [&whole, &pooled].map(|s| s.row(name).unwrap());
             assert_eq!((a.counts, &a.to_slice), (b.counts, &b.to_slice), "{name}");
+            assert_eq!((a.cells, &a.intervals, &a.by_block), (b.cells, &b.intervals, &b.by_block), "{name}");
         }
+        assert_eq!(pooled.row(SLICE).map(|r| (r.cell_fvr(), r.cell_fir())), Some((Some(0.0), Some(0.0))));
         let [a, b] = [&whole.rows[0], &pooled.rows[0]];
         assert_eq!((a.cells, &a.intervals, &a.cell_curve), (b.cells, &b.intervals, &b.cell_curve));
     }

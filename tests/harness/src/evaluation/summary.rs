@@ -108,11 +108,22 @@ struct Drawn {
 impl Summary {
     /// `scores` are the estimators' own; the bounds are added here.
     pub fn new(recording: &Recording, samples: &[FrameSamples], scores: &[Score], options: &Options) -> Self {
+        Self::beside(recording, samples, scores, &bounds::slice(samples), options)
+    }
+
+    /// The same where `geometry-slice` is known already.
+    pub fn beside(
+        recording: &Recording,
+        samples: &[FrameSamples],
+        scores: &[Score],
+        slice: &Score,
+        options: &Options,
+    ) -> Self {
         let units = Units::new(recording, samples);
         let object_draws = Draws::new(units.object_units, options.bootstrap, options.seed);
         let block_seed = options.seed.wrapping_add(BLOCK_SEED);
         let block_draws = Draws::in_runs(units.block_units, RUN_BLOCKS, options.bootstrap, block_seed);
-        let (slice, boxes) = (bounds::slice(samples), bounds::boxes(samples));
+        let boxes = bounds::boxes(samples);
         let drawn = |score: &Score| {
             let by_unit = units.by_object(|counts: &mut Counts, frame, object| {
                 let detected = samples[frame].objects[object].detected;
@@ -125,7 +136,7 @@ impl Summary {
             });
             Drawn { objects: object_draws.totals(&by_unit), cells: block_draws.totals(&by_block), by_unit, by_block }
         };
-        let (slice_draws, box_draws) = (drawn(&slice), drawn(&boxes));
+        let (slice_draws, box_draws) = (drawn(slice), drawn(&boxes));
         let row = |score: &Score, drawn: &Drawn| {
             let counts = score.objects(samples);
             let distance = |bound: &Score, theirs: &Drawn| {
@@ -137,7 +148,7 @@ impl Summary {
                 counts,
                 cells: (!score.cells.is_empty()).then(|| score.cell_counts()),
                 intervals: Intervals::new(drawn, &block_draws),
-                to_slice: distance(&slice, &slice_draws),
+                to_slice: distance(slice, &slice_draws),
                 to_box: distance(&boxes, &box_draws),
                 breakdown: Breakdown::new(recording, samples, score),
                 curve: if score.graded { trade_off(&object_grades(score, samples)) } else { Vec::new() },
@@ -151,7 +162,7 @@ impl Summary {
             }
         };
         let mut rows: Vec<Row> = scores.par_iter().map(|score| row(score, &drawn(score))).collect();
-        rows.extend([row(&slice, &slice_draws), row(&boxes, &box_draws)]);
+        rows.extend([row(slice, &slice_draws), row(&boxes, &box_draws)]);
         Self {
             frames: samples.iter().filter(|s| s.counted).count(),
             objects: distinct_tracks(samples),
