@@ -80,7 +80,8 @@ impl World {
 /// Motorway: 60 s of 3 + 3 lanes with dense traffic and many trucks, a radar on a gantry at 6 m looking along the
 /// direction of travel. Counts are pooled over the reporting days, and beside every rate stands its least and
 /// greatest day. Crossing and queue: scenes of 150 s with a mount each (corner, side, far; 4 to 8 m), the first 60 s
-/// not counted, pooled with intervals by tracks; beside it without elevation and without warm-up, and every scene.
+/// not counted, pooled with intervals; beside it means, least and most of the scenes, radar-3d without elevation and
+/// without warm-up, and every scene.
 /// Gantry-camera: a camera in the radar's place, its detector's misses step by step, and why vehicles that were not
 /// found were called visible. Two-radars and radar-camera: what each sensor and both together show of the road.
 ///
@@ -121,7 +122,7 @@ pub struct Args {
     /// Print tables as wide as they are: all intervals, and distances to the bound geometry-slice, too
     #[arg(long, help_heading = "Results")]
     wide: bool,
-    /// Write everything as JSON: pooled, and by day (`seeds`) or by scene (`variants`)
+    /// Write everything as JSON: pooled with its `spread`, and by day (`seeds`) or by scene (`variants`)
     #[arg(long, value_name = "FILE", help_heading = "Results")]
     json: Option<PathBuf>,
     /// Keep the simulated recordings in this folder, DAY.mcap or SCENE.mcap each

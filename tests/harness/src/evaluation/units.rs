@@ -3,7 +3,8 @@
 //! Samples of one track are correlated, so intervals come from drawing whole tracks; where frames
 //! are independent, whole frames. Cells of successive frames are correlated too (the same truck
 //! throws the same shadow, the same queue stands for a red light), for 5 to 15 s: so cells are summed
-//! up by blocks of one second, and runs of [`RUN_BLOCKS`] of them are drawn.
+//! up by blocks of one second, and runs of [`RUN_BLOCKS`] of them are drawn. Tracks are taken for independent, which
+//! vehicles in one shadow are not: where queues stand, intervals of vehicles are too narrow.
 
 use std::collections::BTreeMap;
 

@@ -11,7 +11,7 @@ use super::{ORIGIN, notes};
 use crate::evaluation::summary::Row;
 use crate::studies::experiment::{DayResult, Experiment, PAPER, PAPER_COVERAGE, PAPER_TRAJECTORIES, Pooled, hidden};
 
-/// Least, mean, greatest and standard deviation of a rate over the reporting days.
+/// Least, mean, greatest and standard deviation of a rate over the reporting days, or over scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     pub min: f64,
@@ -36,7 +36,7 @@ impl Spread {
         })
     }
 
-    fn text(spread: Option<Self>) -> String {
+    pub(super) fn text(spread: Option<Self>) -> String {
         spread.map_or_else(String::new, |s| format!("\n{:.1}–{:.1}", 100.0 * s.min, 100.0 * s.max))
     }
 }
@@ -187,6 +187,12 @@ struct OfDay {
     report: Report,
 }
 
+/// How far each rate goes from one to another of what is pooled: days, or scenes.
+pub(super) fn spread(rows: &[&Row]) -> Value {
+    let of = |(name, of_row, _): Rate| (name.to_owned(), json!(Spread::of(rows.iter().map(|r| of_row(r)))));
+    Value::Object(RATES.into_iter().map(of).collect())
+}
+
 /// The file of `--json`; `beside` are recordings that were replayed too.
 pub fn json(experiment: &Experiment, beside: &[Report], plan: &Value, options: Options) -> Result<String> {
     let day = |result: &DayResult| OfDay {
@@ -203,9 +209,7 @@ pub fn json(experiment: &Experiment, beside: &[Report], plan: &Value, options: O
             map.insert("cell_fvr".into(), json!(p.cells.and_then(|c| c.fvr())));
             map.insert("cell_fir".into(), json!(p.cells.and_then(|c| c.fir())));
             map.insert("cells".into(), json!(p.cells));
-            let spread =
-                RATES.map(|(name, of_row, _)| (name.to_owned(), json!(Spread::of(rows.iter().map(|r| of_row(r))))));
-            map.insert("spread".into(), Value::Object(spread.into_iter().collect()));
+            map.insert("spread".into(), spread(&rows));
         }
         value
     };

@@ -3,9 +3,10 @@
 use anyhow::Result;
 use serde_json::{Value, json};
 
+use super::experiment::{Spread, spread};
 use super::json::{self, Options, Report};
 use super::percent;
-use super::table::{Extent, rates, signed, tables};
+use super::table::{Extent, rates, signed, table, tables};
 use super::{ORIGIN, notes};
 use crate::evaluation::Options as EvaluationOptions;
 use crate::evaluation::replay::Replay;
@@ -60,6 +61,10 @@ pub fn text(title: &Title, plan: &Plan, counted: &[Counted], options: &Evaluatio
     if !beside.is_empty() {
         text += &format!("\n{OURS} beside it:\n{}\n", variants(counted, title.extent));
     }
+    text += &format!(
+        "\nMeans over the scenes, each as much as the others (below: least and most of a scene):\n{}\n",
+        means(main)
+    );
     format!("{text}\n{OURS} by scene:\n{}\n\n{ORIGIN}\n", by_scene(counted, title.extent))
 }
 
@@ -130,6 +135,29 @@ fn variants(counted: &[Counted], extent: Extent) -> String {
     tables(&heading, &counted.iter().map(row).collect::<Vec<_>>(), 1, extent)
 }
 
+/// A rate of a row.
+type Rate = fn(&Row) -> Option<f64>;
+
+/// What pooling hides: a scene with many cells hidden counts for more there than one with few.
+fn means(main: &Counted) -> String {
+    const RATES: [Rate; 4] = [|r| r.counts.fvr(), |r| r.counts.fir(), Row::cell_fvr, Row::cell_fir];
+    let heading = ["estimator", "FVR %", "FIR %", "cell\nFVR %", "cell\nFIR %"];
+    let row = |pooled: &Row| {
+        let scenes = rows(main, &pooled.name);
+        let rates = RATES.map(|rate| {
+            let spread = Spread::of(scenes.iter().map(|r| rate(r)));
+            percent(spread.map(|s| s.mean)) + &Spread::text(spread)
+        });
+        std::iter::once(pooled.name.clone()).chain(rates).collect()
+    };
+    table(&heading, main.pooled.summary.rows.iter().map(row)).to_string()
+}
+
+/// One estimator's rows, by scene.
+fn rows<'a>(counted: &'a Counted, name: &str) -> Vec<&'a Row> {
+    counted.scenes.iter().filter_map(|scene| scene.summary.row(name)).collect()
+}
+
 fn by_scene(counted: &[Counted], extent: Extent) -> String {
     let Some((main, beside)) = counted.split_first() else { return String::new() };
     let fixed = [
@@ -192,10 +220,19 @@ pub fn json(
             "units": summary.unit_names,
         })
     };
+    // what is pooled, and how far scenes lie apart
+    let pooled = |c: &Counted| {
+        let mut value = of(&c.pooled);
+        let estimators = value["estimators"].as_array_mut().into_iter().flatten();
+        for (estimator, row) in estimators.zip(&c.pooled.summary.rows) {
+            estimator["spread"] = spread(&rows(c, &row.name));
+        }
+        value
+    };
     let variant = |c: &Counted| {
         json!({
             "counted": c.variant,
-            "pooled": of(&c.pooled),
+            "pooled": pooled(c),
             "scenes": c.scenes.iter().map(of).collect::<Vec<_>>(),
         })
     };
@@ -218,10 +255,62 @@ pub fn json(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::Settings;
     use crate::evaluation::pool::{Seconds, pool};
     use crate::evaluation::samples::by_hand::{frames, recording, sample};
     use crate::evaluation::score::by_hand::score;
     use crate::recording::Recording;
+    use crate::studies::experiment::scenes::Variant;
+
+    /// Two scenes of which all is called visible: of 4 and of 16 cells 1 is hidden.
+    fn two_scenes() -> Counted {
+        let options = EvaluationOptions::default();
+        let of = |clear: u32| {
+            let samples = frames((0..10).map(|k| vec![sample(0, 40.0, true, true), sample(1, 60.0, k > 4, false)]));
+            let mut scored = score(OURS, &samples, |_| Some(255));
+            scored.cells[0].add(false, true, Some(255));
+            scored.cells[0].add(false, false, Some(0));
+            // of those in sight one is called invisible
+            scored.cells[0].add(true, false, Some(0));
+            (1..clear).for_each(|_| scored.cells[0].add(true, true, Some(255)));
+            Seconds::new(recording(10, 2), &samples, vec![scored])
+        };
+        let parts = [of(4), of(16)];
+        let scenes = parts.iter().map(|part| pool("scene", &[part], 0.0, &options).unwrap()).collect();
+        let pooled = pool("pooled", &[&parts[0], &parts[1]], 0.0, &options).unwrap();
+        Counted { variant: Variant::Main, pooled, scenes }
+    }
+
+    #[test]
+    fn beside_what_is_pooled_stand_the_mean_and_the_ends_of_its_scenes() {
+        let counted = [two_scenes()];
+        let title = Title {
+            name: "queue",
+            set: "reporting",
+            warm_up_s: 0.0,
+            every: 1,
+            lanes_learnt: false,
+            extent: Extent::Terminal,
+        };
+        let settings = Settings::default();
+        let options =
+            Options { reading: &settings.reading, evaluation: &settings.evaluation, estimators: &settings.estimators };
+        let file: Value =
+            serde_json::from_str(&json(&title, &Value::Null, &[], &counted, &[], options).unwrap()).unwrap();
+        let pooled = &file["variants"][0]["pooled"]["estimators"][0];
+        // 1 of 4 and 1 of 16: 2 of 20 together
+        assert_eq!((&pooled["name"], &pooled["cell_fir"]), (&json!(OURS), &json!(0.1)));
+        let of = |key: &str| ["min", "mean", "max"].map(|end| pooled["spread"][key][end].as_f64().unwrap());
+        assert_eq!((of("cell_fir"), of("cell_fvr")), ([0.0625, 0.15625, 0.25], [0.5; 3]));
+        assert_eq!((of("fvr"), of("fir")), ([1.0; 3], [0.0; 3]));
+        assert!(file["variants"][0]["scenes"][0]["estimators"][0]["spread"].is_null());
+        let table = means(&counted[0]);
+        let row = table.lines().position(|line| line.contains(OURS)).unwrap();
+        let cells = |line: usize| -> Vec<String> {
+            table.lines().nth(line).unwrap().split(['│', '┆']).map(|cell| cell.trim().to_owned()).collect()
+        };
+        assert_eq!((&*cells(row)[5], &*cells(row + 1)[5]), ("15.6", "6.2–25.0"), "{table}");
+    }
 
     #[test]
     fn a_goal_is_reached_where_both_rates_are() {
