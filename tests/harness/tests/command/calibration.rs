@@ -95,7 +95,7 @@ fn two_runs_are_compared_track_by_track_and_refused_where_they_are_of_other_samp
     assert!(!same.contains("worse") && !same.contains("better\n") && !same.contains("Not compared"), "{same}");
     done(&folder, "replay a.mcap b.mcap --to 6 --bootstrap 0 --json both.json");
     let partly = done(&folder, "compare both.json a.json");
-    assert!(partly.contains("Not compared, in both.json alone: b."), "{partly}");
+    assert!(partly.contains("Not compared, in both.json alone: b; b, camera."), "{partly}");
     let other = refused(&folder, "compare a.json short.json");
     assert!(other.contains("a.json and short.json: `a`"), "{other}");
     assert!(refused(&folder, "compare a.json c.toml").contains("c.toml"));
