@@ -38,7 +38,7 @@ pub fn text(all: &[Compared], extent: Extent) -> String {
         begun += same;
     }
     text + "Below 0 the second file is better. Intervals of 95 % from the same tracks, and for cells the same runs of seconds, of both.\n\
-            At crossings any change, even one that alters nothing, moves a single scene by up to 10 points of FVR and 3 of cell FVR:\n\
+            At crossings any change, even one that alters nothing, can move a single scene by 10 points of FVR and 3 of cell FVR:\n\
             judge it by several scenes or seeds together.\n"
 }
 
