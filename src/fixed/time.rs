@@ -162,7 +162,7 @@ mod tests {
                     sum += part;
                     phase = phase.after(step);
                 }
-                let exact = i64::from(rate) * i64::from(step.raw()) * 10 * frames as i64 >> 16;
+                let exact = (i64::from(rate) * i64::from(step.raw()) * 10 * frames as i64) >> 16;
                 assert!((i64::from(sum) - exact).abs() <= 1, "{frames} frames and {rate} a second: {sum}, {exact}");
             }
         }
