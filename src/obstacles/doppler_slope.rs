@@ -12,7 +12,7 @@
 //! more than a quarter of the spread, as of one reflection, and of a rear end far ahead, nothing is said.
 //!
 //! # Cost
-//! Four multiplications for each detection, and of 64 bits five divisions for each obstacle that is seen.
+//! Four multiplications for each detection, and of 64 bits six divisions for each obstacle that spans an angle.
 //!
 //! # What was tried
 //! On the recordings of `tests/recordings/tuning.toml`, a crossing of another generator, and two motorways of it and the
@@ -98,11 +98,16 @@ impl DopplerSlope {
     #[allow(clippy::cast_possible_truncation)] // a mean of sines, and what was limited
     pub fn across(&self, count: i32, errors: i32, target: &Target, noise: &Noise) -> Option<Across> {
         let [angles, squares, products] = self.sums.map(i64::from);
-        let n = i64::from(count.max(1));
+        let n = i64::from(count);
         let sigma = i64::from(noise.azimuth >> (16 - ANGLE)).max(1);
+        let of_noise = (n - 1) * sigma * sigma;
+        // of most it is told without a division: they spread no more than around the first of them
+        if of_noise <= 0 || squares < MOST_NOISE * of_noise {
+            return None;
+        }
         let spread = squares - angles * angles / n;
-        let own = spread - (n - 1) * sigma * sigma;
-        if own <= 0 || own * MOST_NOISE < spread * (MOST_NOISE - 1) {
+        let own = spread - of_noise;
+        if own <= 0 || spread < MOST_NOISE * of_noise {
             return None;
         }
         let slope = ((products - angles * i64::from(errors) / n) << (ANGLE - ERROR)) / own;

@@ -10,19 +10,19 @@ use viewshed::unit::profile::{reference, small};
 use viewshed::wire::receive::SensorReceiver;
 
 #[test]
-fn the_reference_grid_fits_365_kb() {
+fn the_reference_grid_fits_366_kb() {
     let state = size_of::<reference::State>();
     let parameters = size_of::<reference::Parameters>();
     println!("radar-3d 200 x 128 x 12: state {state} B, parameters {parameters} B");
-    assert!(state + parameters <= 365_000, "{state} + {parameters}");
+    assert!(state + parameters <= 366_000, "{state} + {parameters}");
 }
 
 #[test]
-fn the_small_profile_fits_62_kb_in_all() {
+fn the_small_profile_fits_63_kb_in_all() {
     let state = size_of::<small::State>();
     let parameters = size_of::<small::Parameters>();
     println!("radar-3d 100 x 96 x 4: state {state} B, parameters {parameters} B");
-    assert!(state + parameters <= 62_000, "{state} + {parameters}");
+    assert!(state + parameters <= 63_000, "{state} + {parameters}");
 }
 
 #[test]
