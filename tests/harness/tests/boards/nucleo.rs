@@ -29,7 +29,7 @@ const H743: Board = Board {
     ram: 0x2400_0000..0x2407_F000,
     dma: 0x2407_F000..0x2408_0000,
     coupled: Some([0x20..0x1_0000, 0x2000_0000..0x2002_0000]),
-    most_flash: 178_000,
+    most_flash: 180_000,
     most_ram: 495_000,
     least_stack: 64_000,
 };
