@@ -102,7 +102,7 @@ impl DopplerSlope {
         let sigma = i64::from(noise.azimuth >> (16 - ANGLE)).max(1);
         let of_noise = (n - 1) * sigma * sigma;
         // of most it is told without a division: they spread no more than around the first of them
-        if of_noise <= 0 || squares < MOST_NOISE * of_noise {
+        if n < 2 || squares < MOST_NOISE * of_noise {
             return None;
         }
         let spread = squares - angles * angles / n;
