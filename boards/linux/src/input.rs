@@ -326,9 +326,13 @@ impl FirstStamp {
     }
 
     /// On a clock that was not known until now, sender and unit begin anew: quiet time and uptime were those of another.
-    fn begin(stamp: Time, unit: &mut Unit<'_>) {
+    /// Whether they did.
+    fn begin(stamp: Option<Time>, now: Time, clock: &mut RadarClock, unit: &mut Option<Unit<'_>>) -> bool {
+        let Some((stamp, unit)) = stamp.zip(unit.as_mut()) else { return false };
+        clock.stamp(stamp, now);
         unit.reset();
         unit.broadcast().start_over(stamp);
+        true
     }
 }
 
@@ -379,10 +383,8 @@ impl Input for NativePort {
             for (k, byte) in bytes.iter().enumerate() {
                 let before = session.now();
                 let stamp = self.first.as_mut().and_then(|first| first.take(*byte, before));
-                if let Some((stamp, unit)) = stamp.zip(work.unit.as_mut()) {
+                if FirstStamp::begin(stamp, now, &mut self.clock, work.unit) {
                     self.first = None;
-                    self.clock.stamp(stamp, now);
-                    FirstStamp::begin(stamp, unit);
                 }
                 let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
                 if session.take(&[*byte], work.unit, work.slots, &mut lines, &mut |_, _| {}) == Flow::Restart {
@@ -399,10 +401,8 @@ impl Input for NativePort {
         }
         if !self.bench {
             let stamp = self.first.as_mut().and_then(|first| first.wait(now));
-            if let Some((stamp, unit)) = stamp.zip(work.unit.as_mut()) {
+            if FirstStamp::begin(stamp, now, &mut self.clock, work.unit) {
                 self.first = None;
-                self.clock.stamp(stamp, now);
-                FirstStamp::begin(stamp, unit);
             }
             let mut lines = Lines { output: work.output, own: Some(&mut self.port) };
             session.idle(self.clock.now(now), work.unit, &mut lines);

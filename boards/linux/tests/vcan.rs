@@ -309,7 +309,10 @@ fn the_command_examines_and_shows_a_live_bus() {
     assert!(looks.len() >= 6 && most > 60.0, "{text}");
     assert!(text.contains("no broadcast among 0 frames"), "before: {text}");
     assert!(looks.last().is_some_and(|line| line.contains("all of its map is unknown")), "after: {text}");
-    assert!(text.contains(&format!("frames: {played} came, ")) && text.contains("by their counters 0 never came"), "{text}");
+    assert!(
+        text.contains(&format!("frames: {played} came, ")) && text.contains("by their counters 0 never came"),
+        "{text}"
+    );
 
     // the same in a page: shown, and then said to have stopped
     let mut view = start("view --can vslive --no-open");

@@ -10,8 +10,7 @@ use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
 pub fn files(path: &Path) -> [PathBuf; 2] {
-    let name = file::unpacked_name(path);
-    let name = Path::new(&name).file_stem().unwrap_or_default().to_string_lossy();
+    let name = file::unpacked_stem(path);
     // those of NAME.boxes.csv are called after NAME too
     let name = name.strip_suffix(".boxes").unwrap_or(&name);
     ["labels", "occlusion"].map(|suffix| path.with_file_name(format!("{name}.{suffix}.csv")))

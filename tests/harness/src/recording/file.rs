@@ -118,6 +118,11 @@ pub fn stem(path: &Path) -> String {
     if path == Path::new(STANDARD_INPUT) {
         return "stdin".into();
     }
+    unpacked_stem(path)
+}
+
+/// The name of the file that is packed in this one, if one is, without what comes after the last point.
+pub fn unpacked_stem(path: &Path) -> String {
     Path::new(&unpacked_name(path)).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
