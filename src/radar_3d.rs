@@ -289,7 +289,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     pub fn reset(&mut self) {
         self.repeatability = Repeatability::new();
         self.obstacles.clear();
-        self.obstacles.forget_lanes();
+        self.obstacles.forget_what_was_learnt();
         self.grid.clear();
         self.health = Health::NEW;
     }

@@ -112,6 +112,9 @@ pub struct ObstacleConfig {
     pub low_rcs_dbsm: f32,
     /// Radar cross section half way between a car's and a lorry's, dBsm.
     pub lorry_rcs_dbsm: f32,
+    /// Seconds that something unmoving must have been seen at its place until its detections are kept from obstacles
+    /// (`fixtures.rs`); 0: never.
+    pub fixture_after_s: f32,
     /// Vehicles that must have driven on a place before the way they went is learnt (`learnt_lanes.rs`) as
     /// a lane; 0: none is learnt.
     pub lane_vehicles: f32,
@@ -166,6 +169,7 @@ impl Default for ObstacleConfig {
             weak_rcs_dbsm: -3.0,
             low_rcs_dbsm: 5.0,
             lorry_rcs_dbsm: 11.0,
+            fixture_after_s: 30.0,
             lane_vehicles: 0.0,
             sizes: SizeConfig::default(),
         }
@@ -185,7 +189,8 @@ impl ObstacleConfig {
             outline_sigmas, turning_noise_mps, own_way_sigmas, own_way_mps, own_way_share,
             own_way_follow, own_way_margin_m, length_growth_s, length_memory_s, slow_mps,
             heading_sigmas, standing_speed_mps, standing_visible_loss_per_s, standing_hidden_loss_per_s,
-            weak_rcs_dbsm, low_rcs_dbsm, lorry_rcs_dbsm, lane_vehicles;
+            weak_rcs_dbsm, low_rcs_dbsm, lorry_rcs_dbsm, fixture_after_s,
+            lane_vehicles;
             but sizes
         );
         let SizeConfig { points, min_length_m } = self.sizes;
@@ -203,6 +208,7 @@ impl ObstacleConfig {
     ///
     /// # Errors
     /// Names the parameter outside its limits.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // limits are checked
     pub fn tracking(&self, noise: Noise, road: Direction, limit_cm: i32) -> Result<Tracking, ConfigError> {
         let cm = |name, v, min, max| within(name, v, min, max).map(|m| math::round_i32(m * 100.0));
         let seconds = |name, v| within(name, v, 0.05, 60.0).map(|s| math::round_i32(s * 65536.0));
@@ -278,6 +284,9 @@ impl ObstacleConfig {
             road,
             limit_cm,
             lanes: Lanes::default(),
+            fixture_after: math::round_i32(
+                within("obstacles.fixture_after_s", self.fixture_after_s, 0.0, 200.0)? * 256.0,
+            ) as u16,
             lane_vehicles: math::round_i32(within("obstacles.lane_vehicles", self.lane_vehicles, 0.0, most)?),
         })
     }

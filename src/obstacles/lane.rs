@@ -401,7 +401,7 @@ mod tests {
     fn learnt_lanes_outlast_the_vehicles_until_they_are_forgotten() {
         let t = learning();
         let mut list = after_cars(4, &t);
-        list.forget_lanes();
+        list.forget_what_was_learnt();
         follow(&mut list, &mut car([40.0, -13.0], [0.0, 1.0], 9.0), 1, &t);
         assert!((degrees(&list).abs() - 180.0).abs() < 1.0, "{}", degrees(&list));
     }

@@ -146,6 +146,7 @@ mod body;
 mod by_hand;
 pub mod config;
 mod doppler_slope;
+mod fixtures;
 mod gathered;
 mod hidden_end;
 mod joining;
@@ -153,6 +154,7 @@ mod lane;
 pub mod lanes;
 pub mod learnt_lanes;
 pub mod motion;
+mod newborn;
 pub mod obstacle;
 mod own_way;
 pub mod profile;
@@ -172,6 +174,7 @@ use crate::fixed::time::{Phase, Step};
 use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 use crate::obstacles::solid::Solid;
+use fixtures::Fixtures;
 use learnt_lanes::LearntLanes;
 use obstacle::Obstacle;
 use tracking::Tracking;
@@ -184,6 +187,7 @@ const BEHIND_CM: i32 = -2000;
 pub struct Obstacles<const N: usize> {
     list: Vec<Obstacle, N, u16>,
     lanes: LearntLanes<N>,
+    fixtures: Fixtures<N>,
     dropped: u32,
     phase: Phase,
 }
@@ -216,18 +220,19 @@ impl<const N: usize> Default for Obstacles<N> {
 impl<const N: usize> Obstacles<N> {
     /// No obstacles.
     pub const fn new() -> Self {
-        Self { list: Vec::new(), lanes: LearntLanes::new(), dropped: 0, phase: Phase::START }
+        Self { list: Vec::new(), lanes: LearntLanes::new(), fixtures: Fixtures::new(), dropped: 0, phase: Phase::START }
     }
 
-    /// Forgets all but the lanes they drove on.
+    /// Forgets all but the lanes they drove on and the fixtures beside them.
     pub fn clear(&mut self) {
         self.list.clear();
         self.phase = Phase::START;
     }
 
-    /// Forgets the lanes that were [learnt](learnt_lanes).
-    pub fn forget_lanes(&mut self) {
+    /// Forgets the [lanes](learnt_lanes) and fixtures that were learnt.
+    pub fn forget_what_was_learnt(&mut self) {
         self.lanes.clear();
+        self.fixtures.clear();
     }
 
     /// All, confirmed or not.
@@ -265,12 +270,14 @@ impl<const N: usize> Obstacles<N> {
             o.predict(step, kept.lateral, t);
             o.keep_to_learnt(&self.lanes, t);
         }
-        let mut claimed = self.associate(reflections, by_range, kept.outline, t);
+        let of_fixtures = self.of_fixtures(reflections, by_range, t);
+        let mut claimed = self.associate(reflections, by_range, &of_fixtures, kept.outline, t);
         for o in &mut self.list {
             o.settle(step, t);
             o.look_for_learnt(&self.lanes, t);
         }
-        self.found(reflections, by_range, &mut claimed, t);
+        self.found(reflections, by_range, &of_fixtures, &mut claimed, t);
+        self.learn_fixtures(reflections, by_range, &claimed, step, t, &in_view);
         self.join_parts(t);
         self.look_for_room(t);
         self.list.iter_mut().for_each(|o| o.look_for_end(t, &in_view));
@@ -280,12 +287,13 @@ impl<const N: usize> Obstacles<N> {
     }
 
     /// Gives each detection to the obstacle it fits best, or else to the one whose wheel it may be; of
-    /// equals, to the elder in the list.
+    /// equals, to the elder in the list. What is of fixtures belongs to none.
     #[allow(clippy::cast_possible_truncation)] // the list is bounded
     fn associate<const D: usize>(
         &mut self,
         reflections: &[Reflection],
         by_range: &ByRange<D>,
+        of_fixtures: &Claimed<D>,
         outline_kept: i32,
         t: &Tracking,
     ) -> Claimed<D> {
@@ -305,6 +313,9 @@ impl<const N: usize> Obstacles<N> {
                     continue;
                 }
                 let i = usize::from(place.index);
+                if of_fixtures.contains(i) {
+                    continue;
+                }
                 let (Some(r), Some((body, wheel))) = (reflections.get(i), best.get_mut(i)) else { continue };
                 let Some(offset) = search.offset(r, t) else { continue };
                 let error = search.speed_error(r);
@@ -343,66 +354,6 @@ impl<const N: usize> Obstacles<N> {
             claimed.insert(i);
         }
         claimed
-    }
-
-    /// Starts obstacles from detections that move along the road and belong to nobody. At most half
-    /// as many in a frame as there is room for in all; the rest waits for the next.
-    fn found<const D: usize>(
-        &mut self,
-        reflections: &[Reflection],
-        by_range: &ByRange<D>,
-        claimed: &mut Claimed<D>,
-        t: &Tracking,
-    ) {
-        let mut room = N / 2;
-        for (i, seed) in reflections.iter().enumerate() {
-            if claimed.contains(i) {
-                continue;
-            }
-            let Some((heading, speed)) = t.course(seed) else { continue };
-            if room == 0 {
-                return;
-            }
-            if self.list.is_full() && self.list.iter().all(|o| o.existence >= t.confirmed) {
-                // there will be none in this frame
-                self.dropped = self.dropped.saturating_add(1);
-                return;
-            }
-            room -= 1;
-            let mut newborn = Obstacle::new(seed, heading, speed);
-            newborn.find_any_lane(&self.lanes, t);
-            newborn.absorb(seed, t);
-            claimed.insert(i);
-            let mut search = newborn.search(t);
-            let (from, to) = search.distances_cm();
-            for place in by_range.between(from - t.max_length_cm, to + t.max_length_cm) {
-                if !search.reaches(place.x_cm, place.y_cm) {
-                    continue;
-                }
-                let j = usize::from(place.index);
-                let Some(r) = reflections.get(j).filter(|_| !claimed.contains(j)) else { continue };
-                let error = search.speed_error(r);
-                if error <= t.doppler_gate
-                    && search.offset(r, t).and_then(|offset| search.misfit(r, offset, error, t)).is_some()
-                {
-                    newborn.absorb(r, t);
-                    newborn.reach(r);
-                    claimed.insert(j);
-                    search = newborn.search(t);
-                }
-            }
-            newborn.settle(Step::from_micros(0), t);
-            self.admit(newborn, t);
-        }
-    }
-
-    fn admit(&mut self, newborn: Obstacle, t: &Tracking) {
-        let Err(newborn) = self.list.push(newborn) else { return };
-        let weakest = self.list.iter_mut().min_by_key(|o| o.existence);
-        match weakest {
-            Some(o) if o.existence < t.confirmed && o.existence < newborn.existence => *o = newborn,
-            _ => self.dropped = self.dropped.saturating_add(1),
-        }
     }
 
     /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
@@ -462,7 +413,12 @@ impl<const N: usize> Obstacles<N> {
         self.phase = self.phase.after(step);
         self.list.retain(|o| {
             let (x, y) = o.anchor();
-            o.existence > 0 && !o.is_fixture(t) && x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
+            o.existence > 0
+                && !o.is_fixture(t)
+                && !o.is_a_mast(t)
+                && x > BEHIND_CM
+                && x < t.limit_cm
+                && y.abs() < t.limit_cm
         });
     }
 }

@@ -100,6 +100,8 @@ pub struct Tracking {
     pub lanes: Lanes,
     /// Vehicles that make a lane; 0: none is learnt.
     pub lane_vehicles: i32,
+    /// 2^-8 s
+    pub fixture_after: u16,
 }
 
 /// Frames an obstacle is young: its motion follows its detections quickly.

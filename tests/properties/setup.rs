@@ -132,6 +132,7 @@ pub const OF_RADAR_3D: &[Parameter] = parameters! {
     "obstacles.weak_rcs_dbsm" -60.0 60.0 radar_3d.obstacles.weak_rcs_dbsm;
     "obstacles.low_rcs_dbsm" -60.0 60.0 radar_3d.obstacles.low_rcs_dbsm;
     "obstacles.lorry_rcs_dbsm" -60.0 60.0 radar_3d.obstacles.lorry_rcs_dbsm;
+    "obstacles.fixture_after_s" 0.0 200.0 radar_3d.obstacles.fixture_after_s;
     "obstacles.lane_vehicles" 0.0 80.0 radar_3d.obstacles.lane_vehicles;
     "sizes.min_length_m" 0.3 20.0 radar_3d.obstacles.sizes.min_length_m;
     "evidence.gain" 0.0 1.0 radar_3d.evidence.gain;

@@ -141,7 +141,7 @@ impl Estimator for Pipeline {
 
     fn reset(&mut self) {
         self.repeatability = Repeatability::default();
-        self.obstacles.list.clear();
+        self.obstacles = Obstacles::new(OBSTACLES);
         self.grid.clear();
         self.health = Health::NEW;
         self.map.forget();

@@ -1,5 +1,6 @@
 //! Moving obstacles: detections that move together, followed from frame to frame.
 
+mod fixtures;
 mod obstacle;
 mod outline;
 mod own_way;
@@ -20,13 +21,20 @@ const STRETCHES: f64 = 64.0;
 #[derive(Debug, Clone, Default)]
 pub struct Obstacles {
     pub list: Vec<Obstacle>,
+    fixtures: Vec<fixtures::Fixture>,
+    turn: usize,
     /// Most obstacles followed.
     pub capacity: usize,
 }
 
 impl Obstacles {
     pub fn new(capacity: usize) -> Self {
-        Self { list: Vec::new(), capacity }
+        Self { capacity, ..Self::default() }
+    }
+
+    /// Forgets all but the fixtures beside the road.
+    pub fn clear(&mut self) {
+        self.list.clear();
     }
 
     /// Boxes of those that are confirmed, at least two frames old, and have moved.
@@ -39,9 +47,11 @@ impl Obstacles {
     /// whether a place is in plain view.
     pub fn step(&mut self, placed: &[Placed], dt: f64, rules: &Rules, in_view: impl Fn(Ground) -> bool) -> Vec<bool> {
         self.list.iter_mut().for_each(|o| o.predict(dt, rules));
-        let mut claimed = self.associate(placed, dt, rules);
+        let of_fixtures = self.of_fixtures(placed, rules);
+        let mut claimed = self.associate(placed, &of_fixtures, dt, rules);
         self.list.iter_mut().for_each(|o| o.settle(dt, rules));
-        self.found(placed, &mut claimed, rules);
+        self.found(placed, &of_fixtures, &mut claimed, rules);
+        self.learn_fixtures(placed, &claimed, dt, rules, &in_view);
         self.join_parts(rules);
         let farther: Vec<bool> = self.list.iter().map(|o| o.is_farther_end(&self.list, rules)).collect();
         self.list.iter_mut().zip(farther).for_each(|(o, farther)| o.farther_end = farther);
@@ -51,12 +61,13 @@ impl Obstacles {
     }
 
     /// Gives each detection to the obstacle it fits best; of equals, to the elder in the list.
-    fn associate(&mut self, placed: &[Placed], dt: f64, rules: &Rules) -> Vec<bool> {
+    fn associate(&mut self, placed: &[Placed], of_fixtures: &[bool], dt: f64, rules: &Rules) -> Vec<bool> {
         let best = |d: &Placed| {
             let fits = self.list.iter().enumerate().filter_map(|(k, o)| o.misfit(d, rules).map(|m| (k, m)));
             fits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
         };
-        let owners: Vec<Option<usize>> = placed.iter().map(best).collect();
+        let owners: Vec<Option<usize>> =
+            placed.iter().zip(of_fixtures).map(|(d, of_fixture)| if *of_fixture { None } else { best(d) }).collect();
         for (d, owner) in placed.iter().zip(&owners) {
             let Some(o) = owner.map(|k| &mut self.list[k]) else { continue };
             if !o.seen() {
@@ -84,7 +95,7 @@ impl Obstacles {
 
     /// Starts obstacles from detections that move along the road and belong to nobody; at most half as
     /// many in a frame as are followed at all.
-    fn found(&mut self, placed: &[Placed], claimed: &mut [bool], rules: &Rules) {
+    fn found(&mut self, placed: &[Placed], of_fixtures: &[bool], claimed: &mut [bool], rules: &Rules) {
         let stretch = |i: &usize| (placed[*i].ground() / (rules.limit / STRETCHES)) as usize;
         let mut nearest_first: Vec<usize> = (0..placed.len()).collect();
         nearest_first.sort_by_key(stretch);
@@ -100,7 +111,7 @@ impl Obstacles {
             claimed[i] = true;
             for &j in &nearest_first {
                 let d = &placed[j];
-                if !claimed[j] && newborn.misfit(d, rules).is_some() {
+                if !claimed[j] && !of_fixtures[j] && newborn.misfit(d, rules).is_some() {
                     newborn.absorb(d, rules);
                     newborn.reach(d);
                     claimed[j] = true;
@@ -171,7 +182,12 @@ impl Obstacles {
         }
         self.list.retain(|o| {
             let [x, y] = o.anchor;
-            o.existence > 0.0 && !o.is_fixture(rules) && x > BEHIND && x < rules.limit && y.abs() < rules.limit
+            o.existence > 0.0
+                && !o.is_fixture(rules)
+                && !o.is_a_mast(rules)
+                && x > BEHIND
+                && x < rules.limit
+                && y.abs() < rules.limit
         });
     }
 }

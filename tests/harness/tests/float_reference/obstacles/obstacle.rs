@@ -143,6 +143,14 @@ impl Obstacle {
         self.is_mover(rules) && length(self.velocity) < rules.standing_speed
     }
 
+    /// Whether it stands, shows one point alone, and that is as high as only wide or long vehicles are.
+    pub fn is_a_mast(&self, rules: &Rules) -> bool {
+        let point = self.extent.length() < 1.5 && self.spread < 0.35;
+        let stands = self.seen() && length(self.velocity) < 2.0 * rules.standing_speed;
+        let rcs = self.reflectivity.known();
+        point && stands && self.is_tall() && !rcs.is_some_and(|rcs| rcs > rules.lorry_rcs)
+    }
+
     /// Measured radial velocity less the one this motion explains.
     fn speed_error(&self, d: &Placed) -> f64 {
         d.radial_velocity - along(d.sight, self.velocity)

@@ -75,6 +75,7 @@ pub struct Rules {
     pub weak_rcs: f64,
     pub low_rcs: f64,
     pub lorry_rcs: f64,
+    pub fixture_after: f64,
     /// Frames.
     pub young: u32,
     pub young_inertia: f64,
@@ -139,6 +140,7 @@ impl Rules {
             weak_rcs: real(c.weak_rcs_dbsm),
             low_rcs: real(c.low_rcs_dbsm),
             lorry_rcs: real(c.lorry_rcs_dbsm),
+            fixture_after: real(c.fixture_after_s),
             young: u32::from(YOUNG_FRAMES),
             young_inertia: f64::from(YOUNG_INERTIA) / 16384.0,
             inertia: f64::from(INERTIA) / 16384.0,
