@@ -20,7 +20,7 @@
 //! | ended where nobody drove | 14.6 / 12.4 | +0.4 / +9.6 |
 //! | driven on by three, not two | 16.6 / 11.5 | +4.5 / +7.8 |
 //!
-//! On the six crossings that are reported 19.3 / 11.4 became 18.3 / 10.5, and 15.6 / 10.3 with the net; on the crossing of
+//! On the six crossings that are reported 18.9 / 10.9 became 18.0 / 10.7, and 15.6 / 9.7 with the net; on the crossing of
 //! another generator, from its 50th second on and with lanes learnt before the 45th, 23.4 / 15.0 became 20.0 / 14.9 where
 //! a unit is started then, and 13.9 / 16.5 became 10.2 / 16.5 where it has run since the start.
 //!
