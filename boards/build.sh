@@ -16,7 +16,10 @@ target=$(sed -n 's/^target = "\(.*\)"/\1/p' .cargo/config.toml)
 for setting in $(env | sed -n 's/^\(CARGO_PROFILE_RELEASE_[A-Z_]*\)=.*/\1/p'); do unset "$setting"; done
 settings=$("$here/toolchain.sh" "$target")
 eval "$settings"
-# features share a file name, so each set has a folder
-folder=${CARGO_TARGET_DIR:-$here/../target}/boards/$board/$(echo "plain $*" | tr -c 'a-z0-9\n' '-')
+# features share a file name, so each set has a folder; what boards and sets have in common, macros most of all, is built
+# once (cargo 1.91; older ones do not know of that and build it for each)
+all=${CARGO_TARGET_DIR:-$here/../target}/boards
+folder=$all/$board/$(echo "plain $*" | tr -c 'a-z0-9\n' '-')
+export CARGO_BUILD_BUILD_DIR="$all/common"
 cargo build --quiet --release --target-dir "$folder" --bin "$program" "$@" >&2
 echo "$folder/$target/release/$program"
