@@ -1,14 +1,15 @@
 #!/bin/sh
-# Builds one program of a board as a release image and prints the image's path on stdout.
+# Builds one program of a board, or several, as release images and prints each image's path on stdout.
 #
 #   boards/build.sh BOARD PROGRAM [cargo options]
 #   boards/build.sh mps2-an386 batch --features small
+#   boards/build.sh mps2-an386 "batch live"
 set -eu
 
 [ $# -ge 2 ] || { echo "usage: build.sh BOARD PROGRAM [cargo options]" >&2; exit 2; }
 here=$(cd "$(dirname "$0")" && pwd)
 board=$1
-program=$2
+programs=$2
 shift 2
 cd "$here/$board"
 target=$(sed -n 's/^target = "\(.*\)"/\1/p' .cargo/config.toml)
@@ -21,5 +22,6 @@ eval "$settings"
 all=${CARGO_TARGET_DIR:-$here/../target}/boards
 folder=$all/$board/$(echo "plain $*" | tr -c 'a-z0-9\n' '-')
 export CARGO_BUILD_BUILD_DIR="$all/common"
-cargo build --quiet --release --target-dir "$folder" --bin "$program" "$@" >&2
-echo "$folder/$target/release/$program"
+for program in $programs; do set -- --bin "$program" "$@"; done
+cargo build --quiet --release --target-dir "$folder" "$@" >&2
+for program in $programs; do echo "$folder/$target/release/$program"; done

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Builds the boards' firmware and runs it on emulated controllers.
 #
-#   tests/firmware.sh              with --install what it needs is only made ready
+#   tests/firmware.sh              with --install what it needs is only made ready, with --build only the images are
 #
 # Installs what it needs where it may (root on Debian or Ubuntu), and says in one line what it skipped
 # and why. The last line is `firmware: N passed, M skipped`; the exit code is 0 unless something failed.
@@ -39,6 +39,25 @@ cargo_tests() {
     fi
     rm -f "$log"
 }
+
+# images BOARD PROGRAMS [cargo options]: those that the tests ask for, together, as one is linked on one core. With other
+# options than in tests/harness/src/boards/firmware.rs they are not those, and the tests build their own.
+images() {
+    boards/build.sh "$@" >/dev/null || echo "$1 is not built ahead"
+}
+
+if [ "${1:-}" = --build ]; then
+    small="--features small --config profile.release.opt-level=2"
+    images mps2-an386 "batch live camera" --features learning
+    # shellcheck disable=SC2086
+    images mps2-an386 "batch live" $small
+    images zcu102-r5 "batch live camera" --features learning
+    # shellcheck disable=SC2086
+    images zcu102-r5 batch $small
+    images nucleo-h743zi live
+    images nucleo-g474re live
+    exit 0
+fi
 
 command -v qemu-system-arm >/dev/null || install qemu-system-arm
 if [ "${1:-}" = --install ]; then

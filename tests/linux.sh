@@ -2,7 +2,7 @@
 # Builds the daemon of boards/linux and runs it: on logs of CAN buses, on pseudo-terminals, as a service, and
 # on a virtual CAN bus where the kernel has one.
 #
-#   tests/linux.sh
+#   tests/linux.sh                 with --build it is only built, and its tests
 #
 # Needs Rust and a C compiler, which it installs where it may. The runners' own summary lines come last; what
 # was skipped is said in one line.
@@ -25,9 +25,18 @@ run() {
 }
 
 target=${CARGO_TARGET_DIR:-$PWD/target}
+daemon() {
+    command=$1
+    shift
+    cargo "$command" --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target/boards/linux" "$@"
+}
+if [ "${1:-}" = --build ]; then
+    daemon test --no-run && daemon build
+    exit
+fi
 echo "== the daemon's own tests"
-run cargo test --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target/boards/linux" -- --nocapture
-cargo build --quiet --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target/boards/linux" || exit 1
+run daemon test -- --nocapture
+daemon build || exit 1
 VIEWSHEDD=$target/boards/linux/release/viewshedd
 export VIEWSHEDD
 "$VIEWSHEDD" --version
