@@ -21,8 +21,8 @@
 //! | driven on by three, not two | 16.6 / 11.5 | +4.5 / +7.8 |
 //!
 //! On the six crossings that are reported 18.9 / 10.9 became 18.0 / 10.7, and 15.6 / 9.7 with the net; on the crossing of
-//! another generator, from its 50th second on and with lanes learnt before the 45th, 23.4 / 15.0 became 20.0 / 14.9 where
-//! a unit is started then, and 13.9 / 16.5 became 10.2 / 16.5 where it has run since the start.
+//! another generator, from its 50th second on and with lanes learnt before the 45th, 23.6 / 14.1 became 20.1 / 13.8 where
+//! a unit is started then, and 16.7 / 14.2 became 10.3 / 14.5 where it has run since the start.
 //!
 //! # Limits
 //! Lanes that were not driven on by two vehicles at least are missing, and so are those the radar does not see. Their

@@ -186,7 +186,7 @@ struct EvaluationArgs {
     /// Draws behind each 95 % interval; 0 for no intervals [default: 1000, from 0 to 100000]
     ///
     /// Tracks are drawn with replacement (independent frames where the recording has them; for cells
-    /// blocks of one second), since samples of one track are correlated. All estimators share the draws.
+    /// runs of ten seconds), since samples of one track are correlated. All estimators share the draws.
     #[arg(long, allow_negative_numbers = true, value_name = "N")]
     bootstrap: Option<u32>,
     /// Seed of the draws [default: 1]
