@@ -118,6 +118,24 @@ fn a_jam_the_unit_started_in_is_followed_once_it_moves() {
 }
 
 #[test]
+fn a_jam_that_stood_for_minutes_before_it_moved_is_followed_when_each_stops_where_another_stood() {
+    let mut list = Obstacles::<64>::new();
+    let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
+    follow(&mut list, &mut cars, 120.0, true);
+    assert!(boxes(&list).is_empty());
+    change_speed(&mut list, &mut cars, 3.0);
+    // 2.25 m in speeding up and as much in stopping
+    follow(&mut list, &mut cars, 3.5 / 3.0, true);
+    change_speed(&mut list, &mut cars, 0.0);
+    for _ in 0..6 {
+        follow(&mut list, &mut cars, 10.0, true);
+        let found = boxes(&list);
+        assert_eq!(found.len(), 6, "{found:?}");
+        assert!(found.iter().all(|b| b.half_length_cm > 180), "{found:?}");
+    }
+}
+
+#[test]
 fn a_slow_lorry_half_hidden_for_seconds_stays_a_lorry() {
     let mut list = Obstacles::<16>::new();
     let mut lorry = [car([20.0, 5.0], [1.0, 0.0], 3.0)];
