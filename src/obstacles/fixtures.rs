@@ -6,13 +6,13 @@
 //!
 //! # Model
 //! A detection that does not move and belongs to no obstacle is a candidate. One that is seen again and again at its place, and
-//! never stays away for 3 s in plain view, is a fixture after half a minute; time beside or behind what may be a part of a vehicle,
-//! within 2 m of its centre line and 10 m of its outline, does not count. From then on detections that do not move and
-//! lie there belong to no obstacle, but to the grid. A fixture that stays away for 3 s in plain view is forgotten; hidden, it
-//! stays for three minutes.
+//! never stays away for 3 s, is a fixture after half a minute. Time in which it may be a part of a vehicle does not count: within
+//! 2 m of a vehicle's centre line and 10 m of its outline. From then on detections that do not move and lie there belong to no
+//! obstacle, but to the grid. A fixture that stays away for 3 s in plain view is forgotten; hidden, it stays for three minutes.
 //!
 //! What is learnt late needs another rule: an obstacle that stands, reflects at one point alone and reflects high is a mast. Something as tall
-//! as a van is 2 m wide or 6 m long, and shows it.
+//! as a van is 2 m wide or 6 m long, and shows it. A lorry of which one point alone is ever seen is taken for a mast, too, unless it
+//! reflects like a lorry; the grid then hides what is behind that point, and no more.
 //!
 //! # Limits
 //! As many as obstacles, candidates among them; where there is no room, what comes later is not learnt. Gaps and steps of the
@@ -84,6 +84,8 @@ const POINT: (i32, i32) = (150, 3500);
 struct Fixture {
     /// Centimetres times [`FOLLOWS`], in the levelled frame.
     place: (i32, i32),
+    /// How far away that is, centimetres.
+    distance_cm: i32,
     /// How long it has been known, 2^-8 s, no longer than it takes; `None` for a fixture.
     known_for: Option<u16>,
     /// How long it has not been seen, 2^-8 s, and what of hidden time is left over.
@@ -106,7 +108,7 @@ fn stands(r: &Reflection) -> bool {
 impl Fixture {
     fn new(r: &Reflection) -> Self {
         let place = (r.x_cm * FOLLOWS, r.y_cm * FOLLOWS);
-        Self { place, known_for: Some(0), away: 0, hidden: 0 }
+        Self { place, distance_cm: length(r.x_cm, r.y_cm), known_for: Some(0), away: 0, hidden: 0 }
     }
 
     fn place_cm(&self) -> (i32, i32) {
@@ -120,13 +122,16 @@ impl Fixture {
         by_range: &'a ByRange<D>,
         t: &Tracking,
     ) -> impl Iterator<Item = (usize, &'a Reflection, bool)> + 'a {
-        let ((x, y), sigmas) = (self.place_cm(), t.sigmas);
-        let distance = length(x, y);
+        let ((x, y), distance, sigmas) = (self.place_cm(), self.distance_cm, t.sigmas);
         let around = by_range.between(distance - 2 * ALONG_CM, distance + 2 * ALONG_CM).iter().take(MOST_AROUND);
         around.filter_map(move |place| {
             let (dx, dy, i) = (place.x_cm - x, place.y_cm - y, usize::from(place.index));
             let r = reflections.get(i).filter(|r| stands(r))?;
-            let (along, across) = (r.sight.along(dx, dy).abs(), r.sight.across(dx, dy).abs());
+            let along = r.sight.along(dx, dy).abs();
+            if along > 2 * ALONG_CM {
+                return None;
+            }
+            let across = r.sight.across(dx, dy).abs();
             let reach = ACROSS_CM + ((sigmas * i32::from(r.across_cm)) >> 4);
             let within = |times: i32| along <= times * ALONG_CM && across <= times * reach;
             within(2).then(|| (i, r, within(1)))
@@ -139,6 +144,8 @@ impl Fixture {
         if let Some(r) = r {
             (self.away, self.hidden) = (0, 0);
             self.place = (self.place.0 + r.x_cm - x, self.place.1 + r.y_cm - y);
+            let (x, y) = self.place_cm();
+            self.distance_cm = length(x, y);
         } else if self.known_for.is_some() || in_view(x, y) {
             self.away = self.away.saturating_add(passed);
         } else {
