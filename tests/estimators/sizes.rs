@@ -10,11 +10,11 @@ use viewshed::unit::profile::{reference, small};
 use viewshed::wire::receive::SensorReceiver;
 
 #[test]
-fn the_reference_grid_fits_367_kb() {
+fn the_reference_grid_fits_368_kb() {
     let state = size_of::<reference::State>();
     let parameters = size_of::<reference::Parameters>();
     println!("radar-3d 200 x 128 x 12: state {state} B, parameters {parameters} B");
-    assert!(state + parameters <= 367_000, "{state} + {parameters}");
+    assert!(state + parameters <= 368_000, "{state} + {parameters}");
 }
 
 #[test]
