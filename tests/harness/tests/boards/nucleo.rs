@@ -41,7 +41,7 @@ const G474: Board = Board {
     dma: 0x2000_0000..0x2000_0800,
     coupled: None,
     most_flash: 201_500,
-    most_ram: 106_000,
+    most_ram: 106_500,
     least_stack: 22_000,
 };
 
