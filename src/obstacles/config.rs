@@ -1,5 +1,6 @@
 //! What can be set of obstacle tracking, in SI units.
 
+use super::fixtures;
 use super::lanes::Lanes;
 use super::learnt_lanes;
 use super::profile::HIT;
@@ -285,7 +286,7 @@ impl ObstacleConfig {
             limit_cm,
             lanes: Lanes::default(),
             fixture_after: math::round_i32(
-                within("obstacles.fixture_after_s", self.fixture_after_s, 0.0, 200.0)? * 256.0,
+                within("obstacles.fixture_after_s", self.fixture_after_s, 0.0, 200.0)? * f32::from(fixtures::SECOND),
             ) as u16,
             lane_vehicles: math::round_i32(within("obstacles.lane_vehicles", self.lane_vehicles, 0.0, most)?),
         })

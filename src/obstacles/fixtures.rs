@@ -51,7 +51,7 @@ use super::tracking::Tracking;
 use super::{Claimed, Obstacles};
 use crate::fixed::math::length;
 use crate::fixed::time::{Phase, Step};
-use crate::frame::by_range::ByRange;
+use crate::frame::by_range::{ByRange, MOST_AROUND};
 use crate::frame::reflection::Reflection;
 
 /// Fastest radial velocity of what does not move, cm/s.
@@ -60,8 +60,8 @@ const STANDS_CM_S: u16 = 50;
 const ALONG_CM: i32 = 60;
 /// How far across it, beside what noise allows for, centimetres.
 const ACROSS_CM: i32 = 15;
-/// Seconds are counted in 2^-8.
-const SECOND: u16 = 256;
+/// A second, in the unit of time here: 2^-8 s.
+pub(super) const SECOND: u16 = 256;
 /// How long it stays away before it is forgotten.
 const AWAY: u16 = 3 * SECOND;
 /// Time that it is hidden counts as so much less.
@@ -72,8 +72,6 @@ const PART_CM: [i32; 2] = [200, 1000];
 const TURNS: u16 = 8;
 /// New candidates in a frame.
 const MOST_NEW: usize = 4;
-/// Most detections around a place that are looked at.
-const MOST_AROUND: usize = 32;
 /// Share of the way to where it is seen by which its place follows: a 16th.
 const FOLLOWS: i32 = 16;
 /// Outline of what shows one point, centimetres, and how far that spreads to its sides, cm^2.

@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use super::Obstacles;
-use super::by_hand::{car, change_speed, follow, reflection, rules};
+use super::by_hand::{Vehicle, car, change_speed, follow, reflection, rules};
 use super::solid::Solid;
 use crate::fixed::time::Step;
 use crate::frame::by_range::ByRange;
@@ -106,12 +106,18 @@ fn a_crowd_of_standing_detections_makes_no_obstacle() {
     assert_eq!((list.iter().count(), list.dropped()), (0, 0));
 }
 
+/// A jam that has stood since the unit started, so many seconds, and has no boxes.
+fn jam<const N: usize>(seconds: f64) -> (Obstacles<N>, Vec<Vehicle>) {
+    let mut list = Obstacles::new();
+    let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
+    follow(&mut list, &mut cars, seconds, true);
+    assert!(boxes(&list).is_empty());
+    (list, cars)
+}
+
 #[test]
 fn a_jam_the_unit_started_in_is_followed_once_it_moves() {
-    let mut list = Obstacles::<16>::new();
-    let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
-    follow(&mut list, &mut cars, 5.0, true);
-    assert!(boxes(&list).is_empty());
+    let (mut list, mut cars) = jam::<16>(5.0);
     change_speed(&mut list, &mut cars, 2.0);
     follow(&mut list, &mut cars, 3.0, true);
     assert_eq!(boxes(&list).len(), 6);
@@ -119,10 +125,7 @@ fn a_jam_the_unit_started_in_is_followed_once_it_moves() {
 
 #[test]
 fn a_jam_that_stood_for_minutes_before_it_moved_is_followed_when_each_stops_where_another_stood() {
-    let mut list = Obstacles::<64>::new();
-    let mut cars: Vec<_> = (0..6).map(|k| car([30.0 + 8.0 * f64::from(k), 3.0], [1.0, 0.0], 0.0)).collect();
-    follow(&mut list, &mut cars, 120.0, true);
-    assert!(boxes(&list).is_empty());
+    let (mut list, mut cars) = jam::<64>(120.0);
     change_speed(&mut list, &mut cars, 3.0);
     // 2.25 m in speeding up and as much in stopping
     follow(&mut list, &mut cars, 3.5 / 3.0, true);

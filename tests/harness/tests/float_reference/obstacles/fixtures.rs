@@ -68,7 +68,7 @@ impl Obstacles {
                 let counts = fixture.known_for.is_some() || in_view(fixture.place);
                 fixture.away += if counts { dt } else { dt / HIDDEN };
             }
-            let its_turn = (self.turn + k + 1) % TURNS == 0;
+            let its_turn = (self.turn + k + 1).is_multiple_of(TURNS);
             let Some(known_for) = fixture.known_for.filter(|_| its_turn) else { continue };
             if !self.list.iter().any(|o| o.may_have_a_part_at(fixture.place, rules)) {
                 let known_for = known_for + TURNS as f64 * dt;

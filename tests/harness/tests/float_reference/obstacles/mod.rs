@@ -32,11 +32,6 @@ impl Obstacles {
         Self { capacity, ..Self::default() }
     }
 
-    /// Forgets all but the fixtures beside the road.
-    pub fn clear(&mut self) {
-        self.list.clear();
-    }
-
     /// Boxes of those that are confirmed, at least two frames old, and have moved.
     pub fn solids<'a>(&'a self, rules: &'a Rules) -> impl Iterator<Item = Solid> + 'a {
         let stands = |o: &&Obstacle| o.existence >= rules.confirm_hits && o.age >= 2 && o.is_mover(rules);
