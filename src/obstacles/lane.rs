@@ -160,6 +160,7 @@ impl Obstacle {
         } else {
             self.lane = NO_LANE;
             self.free_heading = !self.goes_along_the_road(t);
+            self.heading_variance = u16::MAX;
         }
     }
 

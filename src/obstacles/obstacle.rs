@@ -59,6 +59,8 @@ pub struct Obstacle {
     pub(super) farther_end: bool,
     /// Whether it goes its own way, with speed and heading from `free`.
     pub(super) free_heading: bool,
+    /// Variance of that heading, 2^-16 rad^2, saturating.
+    pub(super) heading_variance: u16,
     /// Segment of the lane it follows, [`LEARNT`](super::lanes::LEARNT), or [`NO_LANE`].
     pub(super) lane: u8,
     /// Way after which [lanes are learnt](super::learnt_lanes) from it again, centimetres.
@@ -95,6 +97,7 @@ impl Obstacle {
             hidden_end: 0,
             farther_end: false,
             free_heading: false,
+            heading_variance: u16::MAX,
             lane: NO_LANE,
             teaches_from_cm: 0,
             heading,
@@ -235,7 +238,7 @@ impl Obstacle {
         let offset = ratio::<FRACTION>(g.lateral.0, weight);
         if self.free_heading && self.knows_its_way(t) {
             self.velocity = self.free.velocity;
-            self.heading = Direction::of(self.velocity.0, self.velocity.1);
+            self.turn_with_motion(step);
             self.move_left(offset);
         } else {
             if self.free_heading {

@@ -10,11 +10,19 @@ use super::motion::{Across, Seen};
 use super::obstacle::{FRACTION, Obstacle};
 use super::profile::{BIN_CM, Extent, Profile};
 use super::tracking::Tracking;
-use crate::fixed::math::{length, mul_shift};
+use crate::fixed::math::{length, mul_shift, ratio};
+use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
 
 /// Frames in a row in which motion along the heading must fail.
 const OWN_WAY_FRAMES: u8 = 2;
+/// Variance that a turn adds to a heading, 2^-16 rad^2 for a centimetre of way: a radian, the tightest turn, in 6 m at one
+/// standard deviation, or 13 degrees in a metre.
+const TURN: i32 = 33;
+/// Time over which the free motion is a mean, 2^-16 s: what frames say of a heading within it is nearly the same.
+const SHARED: i32 = (1 << 16) / 3;
+/// Greatest variance of a heading that is told from others, 2^-16 rad^2.
+const ANY: i32 = u16::MAX as i32;
 /// Least variance of where a frame's detections have their centre, cm^2.
 const LEAST_VARIANCE: i32 = 20 * 20;
 
@@ -51,11 +59,34 @@ impl Obstacle {
         }
         if self.free_heading {
             let (dx, dy) = (self.free.place.0 - self.position.0, self.free.place.1 - self.position.1);
-            let ahead = self.heading.along(dx, dy) - (self.extent.middle_cm() << FRACTION);
+            // not the middle of the outline: of a lorry the nearer end shows more of itself
+            let centre = self.profile.mean_cm().unwrap_or(self.extent.middle_cm());
+            let ahead = self.heading.along(dx, dy) - (centre << FRACTION);
             let by = mul_shift(ahead, t.own_way_follow, 16);
             self.position.0 += mul_shift(by, hx, 14);
             self.position.1 += mul_shift(by, hy, 14);
         }
+    }
+
+    /// Turns into the free motion's direction, as far as that is known better than the heading it has. A vehicle turns by the
+    /// way it makes, so one that brakes keeps its heading, while its motion tells less and less.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
+    pub(super) fn turn_with_motion(&mut self, step: Step) {
+        let motion = Direction::of(self.velocity.0, self.velocity.1);
+        let speed = self.speed() >> FRACTION;
+        let way_cm = step.times(self.speed()) >> FRACTION;
+        let variance = (i32::from(self.heading_variance) + way_cm.min(ANY / TURN) * TURN).min(ANY);
+        // the variance across, over the square of the speed; 2^-16
+        let seen = ratio::<8>(self.free.speed_variance() << 4, (speed * speed) >> 4).min(ANY);
+        let seen = (seen * SHARED / step.raw().max(1)).clamp(seen, 1 << 20);
+        if self.heading.cosine(motion) < 0 {
+            (self.heading, self.heading_variance) = (motion, seen.min(ANY) as u16);
+            return;
+        }
+        let gain = ratio::<12>(variance, variance + seen);
+        let turned = |from: i16, to: i16| (i32::from(from) << 12) + (i32::from(to) - i32::from(from)) * gain;
+        self.heading = Direction::of(turned(self.heading.x, motion.x), turned(self.heading.y, motion.y));
+        self.heading_variance = (variance - mul_shift(variance, gain, 12)).clamp(0, ANY) as u16;
     }
 
     /// Goes on along the heading it has, as fast along it as the free motion is: across the line of sight, Doppler
@@ -93,7 +124,7 @@ impl Obstacle {
 
     /// Goes on from the free motion, with a new outline.
     fn go_own_way(&mut self) {
-        self.free_heading = true;
+        (self.free_heading, self.heading_variance) = (true, u16::MAX);
         self.position = self.free.place;
         self.velocity = self.free.velocity;
         self.heading = Direction::of(self.velocity.0, self.velocity.1);
@@ -106,7 +137,13 @@ impl Obstacle {
 #[cfg(test)]
 mod tests {
     use super::super::Obstacles;
-    use super::super::by_hand::{car, follow, rules};
+    use super::super::by_hand::{PERIOD_S, car, follow, reflection, rules, seen_at};
+    use super::super::motion::FreeMotion;
+    use super::super::obstacle::{FRACTION, Obstacle};
+    use crate::fixed::time::Step;
+    use crate::fixed::trig::Direction;
+    use crate::frame::by_range::ByRange;
+    use crate::frame::reflection::Reflection;
     use std::vec::Vec;
 
     /// Headings of the boxes after a time, degrees from the road's axis, and their places, metres.
@@ -142,6 +179,65 @@ mod tests {
             assert!((degrees + 13.5 * side).abs() < 3.0, "{boxes:?}");
             assert!((y - at[1]).abs() < 0.8, "{boxes:?}, it is at {at:?}");
         }
+    }
+
+    /// Middle along x of the box of a lorry 12 m long that crosses at 40 m with this velocity along y, how far that is ahead
+    /// of the lorry's own; its `shown` end, 1 for its front, reflects four times as often as the rest.
+    fn ahead_of_the_lorry(velocity: f64, shown: f64) -> f64 {
+        let (mut list, t) = (Obstacles::<16>::new(), rules());
+        let heading = velocity.signum();
+        let mut y = -18.0 * heading;
+        for _ in 0..50 {
+            let places = [6.0, 5.5, 5.0, 4.5, 1.0, -2.5, -6.0].map(|a| [40.0, y + a * shown * heading]);
+            let seen: Vec<Reflection> = places.iter().map(|p| reflection(*p, [0.0, velocity])).collect();
+            let step = Step::from_micros((PERIOD_S * 1e6) as u64);
+            list.step(&seen, &ByRange::<64>::sort(&seen, t.limit_cm), step, &t, |_, _| true);
+            y += velocity * PERIOD_S;
+        }
+        let solids: Vec<_> = list.solids(&t).collect();
+        assert_eq!(solids.len(), 1, "{solids:?}");
+        (f64::from(solids[0].y_cm) / 100.0 - (y - velocity * PERIOD_S)) * heading
+    }
+
+    #[test]
+    fn a_lorry_that_shows_one_end_more_than_the_other_is_not_drawn_nearer_to_that_end() {
+        for velocity in [8.0, -8.0] {
+            for shown in [1.0, -1.0] {
+                let ahead = ahead_of_the_lorry(velocity, shown);
+                assert!(ahead.abs() < 0.5, "{ahead} m ahead at {velocity} m/s, end {shown}");
+            }
+        }
+    }
+
+    /// How far one that goes along x at so many m/s turns to the left in a step, degrees, when its free motion, known to
+    /// a standard deviation in cm/s, points `degrees` to the left.
+    fn turned(mps: f64, seconds: f64, sigma: i32, degrees: f64) -> f64 {
+        let speed = mps * 25_600.0;
+        let velocity = [degrees.to_radians().cos(), degrees.to_radians().sin()].map(|c| (c * speed) as i32);
+        let mut o = Obstacle::new(&seen_at(4000, 0, 0), Direction::AHEAD, 0);
+        o.velocity = (velocity[0], velocity[1]);
+        o.free = FreeMotion::new((4000 << FRACTION, 0), 100, o.velocity, sigma * sigma);
+        (o.free_heading, o.heading_variance) = (true, 16);
+        o.turn_with_motion(Step::from_micros((seconds * 1e6) as u64));
+        f64::from(o.heading.y).atan2(f64::from(o.heading.x)).to_degrees()
+    }
+
+    #[test]
+    fn a_vehicle_turns_by_the_way_it_makes_towards_where_it_is_seen_to_go() {
+        for side in [1.0, -1.0] {
+            let turned = |mps, seconds, sigma| turned(mps, seconds, sigma, 20.0 * side) * side;
+            let (fast, slow) = (turned(12.0, PERIOD_S, 50), turned(2.5, PERIOD_S, 50));
+            assert!(fast > 12.0 && slow < 4.0 && slow > 0.5, "{fast} and {slow} degrees of 20");
+            assert!(turned(12.0, PERIOD_S, 200) < fast / 2.0, "its motion is known worse");
+            let (once, often) = (turned(8.0, 0.2, 100), turned(8.0, 0.05, 100));
+            assert!(often < once / 3.0, "{often} and {once} degrees: four frames in the time of one tell no more");
+        }
+    }
+
+    #[test]
+    fn what_is_seen_to_go_the_other_way_goes_the_other_way() {
+        let turned = turned(5.0, PERIOD_S, 100, 170.0);
+        assert!((turned - 170.0).abs() < 1.0, "{turned} degrees");
     }
 
     #[test]

@@ -74,6 +74,16 @@ impl Profile {
         }
     }
 
+    /// Where the hits have their centre, centimetres; `None` without any.
+    pub fn mean_cm(&self) -> Option<i32> {
+        let (mut total, mut moment) = (0, 0);
+        for (hits, bin) in self.bins.iter().zip(-(BINS as i32) / 2..) {
+            total += i32::from(*hits);
+            moment += i32::from(*hits) * bin;
+        }
+        Some((moment * BIN_CM).checked_div(total)? + BIN_CM / 2)
+    }
+
     /// Fades every bin by a factor in 2^-16.
     pub fn fade(&mut self, factor: i32) {
         let factor = factor.clamp(0, 1 << 16).unsigned_abs();
@@ -192,6 +202,16 @@ mod tests {
         assert_eq!(e.beyond_cm(e.front_cm + 70), 70);
         assert_eq!(e.beyond_cm(e.rear_cm - 30), 30);
         assert_eq!(e.beyond_cm(0), 0);
+    }
+
+    #[test]
+    fn its_centre_is_where_most_of_it_reflects() {
+        assert_eq!(Profile::EMPTY.mean_cm(), None);
+        let mean = |hits: &[(i32, usize)]| profile(hits).mean_cm().unwrap();
+        assert!((mean(&[(-600, 30), (600, 10)]) + 300).abs() <= 25, "three of four at the rear");
+        assert!((mean(&[(-600, 10), (600, 30)]) - 300).abs() <= 25, "at the front");
+        let full: Vec<(i32, usize)> = (0..24).map(|k| (1175 - k * 50, 511)).collect();
+        assert!((mean(&full) - 600).abs() <= 25, "as many as there is room for");
     }
 
     fn row(places: &[i32]) -> bool {

@@ -46,6 +46,8 @@ pub struct Obstacle {
     pub free: FreeMotion,
     pub unexplained: u32,
     pub free_heading: bool,
+    /// rad^2.
+    pub heading_variance: f64,
     pub gathered: Gathered,
 }
 
@@ -103,6 +105,7 @@ impl Obstacle {
             free: FreeMotion::newborn(seed.at, heading.map(|c| c * speed)),
             unexplained: 0,
             free_heading: false,
+            heading_variance: 1.0,
             gathered: Gathered::default(),
         }
     }
@@ -275,7 +278,7 @@ impl Obstacle {
         let offset = g.lateral.0 / self.lateral_weight;
         if self.free_heading && self.knows_its_way(rules) {
             self.velocity = self.free.velocity;
-            self.heading = self.velocity.map(|v| v / length(self.velocity));
+            self.turn_with_motion(dt);
             self.anchor = moved(self.anchor, left(self.heading), offset);
         } else {
             self.go_along_heading(offset, dt, rules);

@@ -60,6 +60,13 @@ impl Profile {
         }
     }
 
+    /// Where the hits have their centre.
+    pub fn mean(&self) -> Option<f64> {
+        let total: f64 = self.0.iter().sum();
+        let moment: f64 = self.0.iter().enumerate().map(|(i, hits)| hits * (Self::rear_of(i) + BIN_M / 2.0)).sum();
+        (total > 0.0).then(|| moment / total)
+    }
+
     pub fn fade(&mut self, factor: f64) {
         self.0.iter_mut().for_each(|b| *b *= factor);
     }

@@ -17,6 +17,9 @@ const MOST_VARIANCE: f64 = 400.0;
 const TURNING: f64 = 0.05;
 const HEIGHT: f64 = 2.0;
 const MOST_NOISE: f64 = 0.25;
+/// Variance that a turn adds to a heading, rad^2 for a metre of way, and the time over which the free motion is a mean.
+const TURN: f64 = 0.05;
+const SHARED: f64 = 1.0 / 3.0;
 /// Frames in a row in which motion along the heading must fail.
 const OWN_WAY_FRAMES: u32 = 2;
 
@@ -36,6 +39,10 @@ impl FreeMotion {
 
     pub fn is_sure_of(&self, speed: f64, sigmas: f64) -> bool {
         speed.powi(2) > sigmas.powi(2) * self.variance[2]
+    }
+
+    fn speed_variance(&self) -> f64 {
+        self.variance[2]
     }
 
     pub fn predict(&mut self, dt: f64, turning_noise: f64) {
@@ -92,9 +99,26 @@ impl Obstacle {
         self.free.update(g.count, centre, variance.max(LEAST_SIGMA.powi(2)), g.sight, radial);
         self.take_slope(rules);
         if self.free_heading {
-            let off = along(self.heading, difference(self.free.place, self.anchor)) - self.extent.middle();
+            let centre = self.profile.mean().unwrap_or(self.extent.middle());
+            let off = along(self.heading, difference(self.free.place, self.anchor)) - centre;
             self.anchor = moved(self.anchor, self.heading, off * rules.own_way_follow);
         }
+    }
+
+    /// Turns into the free motion's direction as far as that is known better than the heading it has.
+    pub fn turn_with_motion(&mut self, dt: f64) {
+        let speed = length(self.velocity);
+        let motion = self.velocity.map(|v| v / speed);
+        let variance = (self.heading_variance + speed * dt * TURN).min(1.0);
+        let seen = (self.free.speed_variance() / speed.powi(2)).min(1.0) * (SHARED / dt).max(1.0);
+        if along(self.heading, motion) < 0.0 {
+            (self.heading, self.heading_variance) = (motion, seen.min(1.0));
+            return;
+        }
+        let gain = variance / (variance + seen);
+        let turned = [0, 1].map(|k| self.heading[k] + (motion[k] - self.heading[k]) * gain);
+        self.heading = turned.map(|c| c / length(turned));
+        self.heading_variance = variance * (1.0 - gain);
     }
 
     /// Takes what the change of Doppler over the vehicle says of its speed across the line of sight.
@@ -131,7 +155,7 @@ impl Obstacle {
             && self.free.is_sure_of(length(off), rules.own_way_sigmas);
         self.unexplained = if certain { self.unexplained + 1 } else { 0 };
         if self.unexplained >= OWN_WAY_FRAMES {
-            self.free_heading = true;
+            (self.free_heading, self.heading_variance) = (true, 1.0);
             self.anchor = self.free.place;
             self.velocity = self.free.velocity;
             self.heading = self.velocity.map(|v| v / length(self.velocity));
