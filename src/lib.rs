@@ -74,7 +74,7 @@
 //! | `board` | who builds a unit, on a controller or as a service | module `board`: the loop `Roadside` with a board's `CanPort`, `SerialPort` and `SettingsSlots`; sessions and services on a line or bus; settings that outlast a restart |
 //! | `defmt` | who reads a controller's log | `Format` on public types, and events |
 //! | `serde` | who reads the configuration from files | `Serialize` and `Deserialize` on it |
-//! | `lanes` | units at crossings that have 6 kB to spare | room for lanes of traffic; without it there is room for none |
+//! | `lanes` | units at crossings that have 6 kB to spare, 1.5 kB of it memory | room for lanes of traffic; without it there is room for none |
 //! | `learning` | the same with 19 kB more, 8 kB on the small grid | room for lanes that the unit learns by itself, and that for others |
 //! | `tuned` | units whose parameters were tuned for their place, with 2 kB to spare | [`Settings`] with parameters of obstacles and evidence |
 //! | `monitoring` | who watches sensors for being blind, turned or dirty | [`fusion`]'s `Fixtures`, `Supervised` and `Alignment`; [`Settings`] with fixtures, 2 kB |
@@ -94,7 +94,7 @@
 //! | `fixed` | integers with their scale: angles, time, directions, rows of bits |
 //! | `sensor` | a sensor as it is installed, in SI units, checked once: mount, field of view, noise |
 //! | `frame` | one radar frame: detections in, gated and counted, placed on the road; how well fixtures repeat; what a silent or blind sensor means |
-//! | `obstacles` | what moves is followed: place, length, width, height; solid boxes out |
+//! | `obstacles` | what moves is followed: place, length, width, height; fixtures beside it are learnt, and lanes given or learnt; solid boxes out |
 //! | `map` | what a map answers: the interface, the polar map, queries, the 1 m grid, the bitmap |
 //! | `fusion` | maps of several sensors in, one map of the road out: who sees what, and who contradicts whom |
 //! | `grid` | range x azimuth x slope: evidence and boxes in, lines of sight, shadows and a polar map out |
@@ -116,6 +116,7 @@
 //! | reflection | a detection placed on the road, in the levelled frame under the sensor |
 //! | obstacle | what is followed over many frames because its reflections move together: a vehicle |
 //! | solid | the upright box that an obstacle becomes; it casts its shadow on the map |
+//! | fixture | what stands and was never seen moving: a mast, a post, a rail, a parked car. `frame` learns the noise of azimuths from them, `obstacles` keeps their detections from vehicles, `fusion` tells by them that a radar is blind or turned; each finds its own |
 //! | evidence | occupancy of the grid's cells from reflections that no obstacle explains; fades by the second |
 //! | slope | height over ground range; a row of the grid is a range of slopes, so a line of sight is a row |
 //! | slice | the surface, 1 m above the road, on which visibility is judged: a plane where the road is flat |
@@ -159,8 +160,8 @@
 //! - **A thing never hides itself.** Along a row only cells behind the *end* of an occupied run are
 //!   hidden by it, and a box shades only what lies behind it.
 //! - **Elevation says how high, within what length allows.** A reflection well above a level proves it; many
-//!   together distinguish a car from a van or a lorry where none alone does; and what is as long as a lorry is never
-//!   called low. Seeing reflections *past* an obstacle was tried as a ceiling on its height and left out: road
+//!   together distinguish a car from a van or a lorry where none alone does; and what is as long as a lorry is not
+//!   called low, unless it hardly reflects or is several cars in a row. Seeing reflections *past* an obstacle was tried as a ceiling on its height and left out: road
 //!   bounce under trucks makes it lie, and each lie is a false "visible".
 //! - **An azimuth's noise is learnt**: two measurements of a post differ by noise alone, so posts, signs and walls show it
 //!   within a minute. How far from a vehicle its detections are looked for, and how far behind them its middle lies,

@@ -8,8 +8,9 @@ use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 
 impl<const N: usize> Obstacles<N> {
-    /// Starts obstacles from detections that move along the road and belong to nobody. At most half
-    /// as many in a frame as there is room for in all; the rest waits for the next.
+    /// Starts obstacles from detections that move and belong to nobody: along the road, or along the line of sight where
+    /// nothing drives so fast along the road (`Tracking::course`). At most half as many in a frame as there is room for in
+    /// all; the rest waits for the next.
     pub(super) fn found<const D: usize>(
         &mut self,
         reflections: &[Reflection],

@@ -9,7 +9,7 @@
 //! With reflections of a car spread by 0.35 m and the standard deviation `s` of elevation beside that, a
 //! height `h` is `1 - w + w exp((h - 1.65 m) 1.9 m / (s^2 + (0.35 m)^2))` times as likely of something tall
 //! (`w` = 0.08). The logarithms are added up, with what the [radar cross section](super::reflectivity) says. Some lorries
-//! show nothing high for long, so what is as long as one is never called low, unless it hardly reflects.
+//! show nothing high for long, so what is as long as one is not called low, unless it hardly reflects or is several cars in a row (`body.rs`).
 
 /// Heights that are distinguished, centimetres.
 const LEVELS_CM: [i32; 5] = [180, 220, 260, 310, 360];
