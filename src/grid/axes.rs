@@ -14,7 +14,7 @@
 
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
-use crate::fixed::trig::Direction;
+use crate::fixed::trig::{self, Direction};
 use crate::map::azimuths::{Columns, Narrow};
 use crate::map::polar::PolarGeometry;
 use crate::sensor::config::{ConfigError, Problem, within};
@@ -65,6 +65,8 @@ pub struct Axes<const R: usize, const A: usize, const E: usize> {
     slice_rows: [SliceRow; E],
     /// For every column: the first and the last range cell in view on the slice plane.
     view: [(u8, u8); A],
+    /// Directions of the columns' centres, which every box asks for in every frame.
+    directions: [Direction; A],
     /// Heights of the road; where it is flat, `slice_share` and `slice_rows` hold.
     ground: Ground,
 }
@@ -76,6 +78,12 @@ pub struct SliceRow {
     pub lower: u8,
     /// First range cell behind the stretch; stretches follow one another from the first cell on.
     pub end: u16,
+}
+
+/// Place of a column's centre on the column axis, 2^-8 columns.
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // below 2^8 columns
+const fn centre(column: usize) -> i32 {
+    column as i32 * 256 + 128
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_possible_wrap)] // indices below 2^8
@@ -119,6 +127,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             slice_share: [0; R],
             slice_rows: [SliceRow { lower: 0, end: 0 }; E],
             view: [NOTHING; A],
+            directions: [Direction::AHEAD; A],
             ground,
         };
         // a limit itself is in view, whatever a float makes of it
@@ -145,6 +154,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             let far_road = Angle::from_degrees(within("visibility.far_road_deg", f32::from(far_road), least, most)?);
             axes.narrow = Narrow::towards(far_road - axes.azimuth_origin, axes.azimuth_span, A);
         }
+        axes.directions = core::array::from_fn(|a| trig::direction(axes.azimuth_of(centre(a))));
         axes.find_view(&in_view);
         if axes.ground.is_level() {
             axes.lay_rows(drop);
@@ -172,7 +182,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// it again, and what lies between must stay unknown.
     fn find_view(&mut self, in_view: &impl Fn(f32, f32) -> bool) {
         for a in 0..A {
-            let bearing = self.azimuth_of((a as i32 * 256) + 128).radians();
+            let bearing = self.azimuth_of(centre(a)).radians();
             let mut stretch = 0..0;
             let mut longest = 0..0;
             for r in 0..R {
@@ -405,9 +415,16 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
         Columns { span: self.azimuth_span, number: A, narrow: self.narrow }
     }
 
-    /// Direction of a column's centre.
+    /// Direction of a place on the column axis.
+    pub fn direction_of(&self, place: i32) -> Direction {
+        let column = (place >> 8) as usize;
+        let central = self.directions.get(column).filter(|_| place == centre(column));
+        central.map_or_else(|| trig::direction(self.azimuth_of(place)), |d| *d)
+    }
+
+    /// Direction of a column's centre; ahead where there is none of this number.
     pub fn column_direction(&self, column: usize) -> Direction {
-        crate::fixed::trig::direction(self.azimuth_of(column as i32 * 256 + 128))
+        self.directions.get(column).copied().unwrap_or(Direction::AHEAD)
     }
 
     /// Range cell of a ground distance.

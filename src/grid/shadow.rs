@@ -102,7 +102,7 @@ fn columns<const R: usize, const A: usize, const E: usize>(
         if from >= to {
             return None;
         }
-        let (enter, leave) = solid.crossing(origin, trig::direction(axes.azimuth_of((from + to) / 2)))?;
+        let (enter, leave) = solid.crossing(origin, axes.direction_of((from + to) / 2))?;
         let (enter_cm, leave_cm) = (enter.min(farthest), leave.min(farthest));
         let nearest = (enter_cm / cell_cm) as usize;
         let end = (((leave_cm + cell_cm / 2) / cell_cm) as usize).max(nearest + 1).min(R);

@@ -136,12 +136,12 @@ impl Tracking {
     /// sight where nothing drives so fast along the road that it would show that. `None` where it may be standing, or
     /// is slow and nearly crosses the line of sight.
     pub fn course(&self, r: &Reflection) -> Option<(Direction, i32)> {
-        let along = self.road.along(i32::from(r.sight.x), i32::from(r.sight.y));
         let radial = i32::from(r.radial_velocity_cm_s);
         // what stands still shows no more than the noise of its Doppler
         if radial.abs() < 4 * self.noise.radial_velocity_cm_s {
             return None;
         }
+        let along = self.road.along(i32::from(r.sight.x), i32::from(r.sight.y));
         // nearly broadside Doppler says nothing about motion along the road
         let speed = if along.abs() < LEAST_PROJECTION { i32::MAX } else { (radial << 14).checked_div(along)? };
         if speed.abs() > FASTEST_ALONG_CM_S {

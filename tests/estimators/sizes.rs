@@ -18,11 +18,11 @@ fn the_reference_grid_fits_368_kb() {
 }
 
 #[test]
-fn the_small_profile_fits_63_kb_in_all() {
+fn the_small_profile_fits_63_5_kb_in_all() {
     let state = size_of::<small::State>();
     let parameters = size_of::<small::Parameters>();
     println!("radar-3d 100 x 96 x 4: state {state} B, parameters {parameters} B");
-    assert!(state + parameters <= 63_000, "{state} + {parameters}");
+    assert!(state + parameters <= 63_500, "{state} + {parameters}");
 }
 
 #[test]

@@ -420,10 +420,13 @@ fn what_is_taken_back_is_counted_also_where_its_room_is_not_free_at_once() {
         world.run(700);
         world.status()[0].dropped
     };
+    let mut most = 0;
     for from in (0..SCAN_MS).step_by(7) {
         let (fast, slow) = (dropped(from, false), dropped(from, true));
-        assert!(slow >= fast && fast >= 3, "{slow} after {fast}, from {from} ms on");
+        assert!(slow >= fast && fast >= 1, "{slow} after {fast}, from {from} ms on");
+        most = most.max(fast);
     }
+    assert!(most >= 3, "{most}: a whole controller full");
 }
 
 #[test]
