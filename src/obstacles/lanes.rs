@@ -43,6 +43,10 @@ const SHORTEST_CM: i32 = 50;
 /// Length of a unit of a stored place: two centimetres, so that 400 m fit 16 bits.
 const UNIT_SHIFT: u32 = 1;
 
+/// Segments this near to each other lie on one line, and what they share of it is more than rounding if it is longer, centimetres:
+/// points are rounded to two, and a direction to five in 800 m.
+const ON_LINE_CM: i32 = 10;
+
 /// Lanes in the levelled frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Lanes {
@@ -108,7 +112,7 @@ impl Lanes {
     ///
     /// # Errors
     /// Too many lanes or segments; a lane of one point, with a point that is repeated or too far from the sensor, or
-    /// that crosses itself: by the number of the lane, from 0.
+    /// that crosses itself or goes back along itself: by the number of the lane, from 0.
     pub fn new(levelling: &Levelling, lanes: LaneList<'_>) -> Result<Self, ConfigError> {
         let mut all = Self::default();
         all.set(levelling, lanes).map(|()| all)
@@ -244,20 +248,37 @@ impl Segment {
 
     /// A place along it and to its left, centimetres.
     fn local(&self, (x, y): (i32, i32)) -> (i32, i32) {
-        let (dx, dy) = (x - (i32::from(self.start.0) << UNIT_SHIFT), y - (i32::from(self.start.1) << UNIT_SHIFT));
+        let start = self.start_cm();
+        let (dx, dy) = (x - start.0, y - start.1);
         (self.heading.along(dx, dy), self.heading.across(dx, dy))
     }
 
-    /// Whether two segments cross, ends not counted.
+    fn start_cm(&self) -> (i32, i32) {
+        (i32::from(self.start.0) << UNIT_SHIFT, i32::from(self.start.1) << UNIT_SHIFT)
+    }
+
+    fn end_cm(&self) -> (i32, i32) {
+        let ((x, y), heading) = (self.start_cm(), self.heading);
+        let ahead = |part: i16| (self.length_cm() * i32::from(part)) >> 14;
+        (x + ahead(heading.x), y + ahead(heading.y))
+    }
+
+    /// Whether two segments cross or lie on each other, ends not counted.
     fn crosses(&self, other: &Self) -> bool {
         let parts = |a: &Self, b: &Self| {
-            let start = (i32::from(b.start.0) << UNIT_SHIFT, i32::from(b.start.1) << UNIT_SHIFT);
-            let (x, y) = (i32::from(b.heading.x), i32::from(b.heading.y));
-            let end = (start.0 + ((b.length_cm() * x) >> 14), start.1 + ((b.length_cm() * y) >> 14));
-            let (from, to) = (a.local(start).1, a.local(end).1);
+            let (from, to) = (a.local(b.start_cm()).1, a.local(b.end_cm()).1);
             (from > 2 && to < -2) || (from < -2 && to > 2)
         };
-        parts(self, other) && parts(other, self)
+        (parts(self, other) && parts(other, self)) || self.lies_on(other)
+    }
+
+    /// Whether two segments share a stretch of one line.
+    fn lies_on(&self, other: &Self) -> bool {
+        // the direction of the longer is known better
+        let (long, short) = if self.length < other.length { (other, self) } else { (self, other) };
+        let ((a, left_a), (b, left_b)) = (long.local(short.start_cm()), long.local(short.end_cm()));
+        let shared = a.max(b).min(long.length_cm()) - a.min(b).max(0);
+        left_a.abs().max(left_b.abs()) <= ON_LINE_CM && shared > ON_LINE_CM
     }
 }
 
@@ -321,14 +342,40 @@ mod tests {
             (&[[1.0, 2.0], [1.1, 2.0]], Problem::PointTwice),
             (&[[10.0, 2.0], [500.0, 2.0]], Problem::TooFar),
             (&[[0.0, 0.0], [50.0, 0.0], [50.0, 20.0], [20.0, -20.0]], Problem::CrossesItself),
+            // back along itself: at once, to its beginning and beyond, and after a turn
+            (&[[0.0, 0.0], [50.0, 0.0], [20.0, 0.0]], Problem::CrossesItself),
+            (&[[10.0, 3.0], [50.0, 13.0], [10.0, 3.0]], Problem::CrossesItself),
+            (&[[20.0, 0.0], [50.0, 0.0], [0.0, 0.0]], Problem::CrossesItself),
+            (&[[0.0, 0.0], [0.5, 0.0], [0.0, 0.0]], Problem::CrossesItself),
+            (&[[0.0, 0.0], [50.0, 0.0], [70.0, 20.0], [70.0, 0.0], [20.0, 0.0]], Problem::CrossesItself),
+            (&[[-399.0, -399.0], [399.0, 301.0], [0.0, -49.0]], Problem::CrossesItself),
         ] {
             let e = refused(lane);
             assert_eq!((e.parameter, e.value, e.problem), ("lanes", 1.0, problem), "{e}");
         }
         let e = refused(&[[0.0, 0.0], [f32::NAN, 0.0]]);
         assert_eq!((e.parameter, e.problem), ("lanes.points", Problem::NotFinite));
-        // a bend that comes back beside itself does not cross
-        lanes(&[&[[0.0, 0.0], [50.0, 0.0], [50.0, 20.0], [0.0, 20.0]]]);
+    }
+
+    #[test]
+    fn a_lane_that_bends_touches_itself_or_closes_does_not_cross_itself() {
+        for lane in [
+            // back beside itself, as near as lanes may be
+            &[[0.0, 0.0], [50.0, 0.0], [50.0, 20.0], [0.0, 20.0]][..],
+            &[[0.0, 0.0], [50.0, 0.0], [0.0, 0.5]],
+            &[[0.0, 0.0], [50.0, 0.0], [50.0, 0.6], [0.0, 0.6]],
+            // on along one line, in short pieces and long ones
+            &[[0.0, 0.0], [0.5, 0.1], [1.0, 0.2], [100.0, 20.0], [399.0, 79.8]],
+            // a loop that ends where it began, at a corner and on a straight
+            &[[10.0, 0.0], [50.0, 0.0], [50.0, 40.0], [10.0, 0.0]],
+            &[[30.0, 0.0], [50.0, 0.0], [50.0, 40.0], [10.0, 40.0], [10.0, 0.0], [30.0, 0.0]],
+            // it ends on itself
+            &[[0.0, 0.0], [50.0, 0.0], [50.0, 20.0], [25.0, 0.0]],
+        ] {
+            assert!(Lanes::new(&level(), LaneList::Metres(&[lane])).is_ok(), "{lane:?}");
+        }
+        // another lane may lie on it
+        lanes(&[&[[0.0, 0.0], [50.0, 0.0]], &[[50.0, 0.0], [20.0, 0.0]]]);
     }
 
     #[test]
