@@ -297,6 +297,7 @@ fn unit(r: &mut Reader) -> Option<Result<(UnitConfig, Option<i8>), ConfigError>>
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::fusion::FixturesConfig;
 
     /// A block as firmware before layout 2 wrote it.
     pub fn layout_1(settings: &Settings, sequence: u32) -> [u8; LAYOUT_1_LEN] {
@@ -426,5 +427,29 @@ pub(super) mod tests {
         // and they are what the estimator runs with
         assert_eq!(obstacles(|c| c.gap_m = 2.5).radar_3d().obstacles.gap_m, 2.5);
         assert_eq!(Settings { evidence: Some(&GAIN), ..a }.radar_3d().evidence.clearing, 0.3);
+    }
+
+    #[test]
+    fn the_fingerprint_is_of_each_number_that_fixtures_are_watched_with() {
+        let a = settings();
+        let fixtures = |change: fn(&mut FixturesConfig)| {
+            let mut config = FixturesConfig::default();
+            change(&mut config);
+            Settings { fixtures: Some(std::boxed::Box::leak(std::boxed::Box::new(config))), ..a }.fingerprint()
+        };
+        assert_eq!(a.fingerprint(), fixtures(|_| ()), "supervised by the usual numbers");
+        let all = [
+            fixtures(|_| ()),
+            fixtures(|c| c.window_ms += 1),
+            fixtures(|c| c.learned_windows += 1),
+            fixtures(|c| c.least_share += 0.1),
+            fixtures(|c| c.blind_windows += 1),
+            fixtures(|c| c.weaker_db += 0.5),
+            fixtures(|c| c.fewer_share += 0.1),
+            fixtures(|c| c.turned_deg += 0.1),
+            // two of them the other way round
+            fixtures(|c| (c.least_share, c.fewer_share) = (c.fewer_share, c.least_share)),
+        ];
+        assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:x?}");
     }
 }
