@@ -85,16 +85,17 @@ impl Vehicle {
     }
 
     /// Reflection points along both sides, every 3 m and at the ends, bumper high.
+    pub fn points(&self) -> impl Iterator<Item = [f64; 3]> {
+        let Self { x, y, length, width, .. } = *self;
+        let steps = (length / 3.0).ceil() as i32;
+        (0..=steps).flat_map(move |k| {
+            [-0.5, 0.5].map(|side| [x + length * (f64::from(k) / f64::from(steps) - 0.5), y + side * width, 0.8])
+        })
+    }
+
+    /// What the radar measures of these points.
     pub fn detections(&self, sensor: &Sensor, elevation: bool) -> Vec<Detection> {
-        let steps = (self.length / 3.0).ceil() as i32;
-        let mut all = Vec::new();
-        for k in 0..=steps {
-            for side in [-0.5, 0.5] {
-                let x = self.x + self.length * (f64::from(k) / f64::from(steps) - 0.5);
-                all.extend(detection(sensor, [x, self.y + side * self.width, 0.8], [self.speed, 0.0], elevation));
-            }
-        }
-        all
+        self.points().filter_map(|point| detection(sensor, point, [self.speed, 0.0], elevation)).collect()
     }
 }
 
@@ -120,6 +121,7 @@ pub fn detection(sensor: &Sensor, point: [f64; 3], velocity: [f64; 2], elevation
 }
 
 /// An estimator with its map, fed frame by frame.
+#[derive(Clone)]
 pub struct Rig {
     pub sensor: Sensor,
     pub parameters: Box<Parameters>,

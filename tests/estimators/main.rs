@@ -10,4 +10,5 @@ mod obstacles;
 mod radar_2d;
 mod radar_3d;
 mod sizes;
+mod standing;
 mod text_pictures;
