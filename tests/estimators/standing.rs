@@ -212,7 +212,7 @@ fn in_a_crowd_that_stood_for_a_minute_a_lorry_has_its_box_and_its_shadow_and_the
     }
     assert!(boxes(&rig).is_empty() && lane_is_seen(&rig), "{}", rig.draw(5..190, -15..15));
     // all leave at once
-    let speed = |i: usize| (300 + 97 * (i % 13) as i16) * if i % 2 == 0 { 1 } else { -1 };
+    let speed = |i: usize| (300 + 97 * (i % 13) as i16) * [1, -1][i % 2];
     let leaving: Vec<Detection> =
         crowd.iter().enumerate().map(|(i, d)| Detection { radial_velocity_cm_s: speed(i), ..*d }).collect();
     let report = (0..10).map(|_| frame(&mut rig, &leaving)).last().unwrap();
