@@ -1,7 +1,7 @@
 //! Instructions a frame, counted by callgrind: `cargo bench -p viewshed-harness`.
 //!
 //! Counts everything from the gate to the map, for the shipped recording, for a crossing and a queue of the twin, and for
-//! three adversarial scans of 256 detections; and sending and receiving the maps, from map to packets and back. Names
+//! four adversarial scans of 256 detections; and sending and receiving the maps, from map to packets and back. Names
 //! behind `--` measure only those, `--recording PATH` takes another recording. Counts repeat exactly and do not
 //! depend on the machine's speed.
 
@@ -41,7 +41,13 @@ use viewshed_harness::twin::simulate::Simulation;
 /// `radar-3d-narrow` has azimuths that are narrower along the road; `radar-3d-blurred` has the largest range noise that may
 /// be set: evidence spreads widest.
 const ESTIMATORS: [&str; 5] = ["radar-3d", "radar-3d-narrow", "radar-3d-small", "radar-3d-blurred", "radar-2d"];
-const SCENES: [&str; 6] = ["recording", CROSSING, QUEUE, "one-ray", "all-rays", "everywhere"];
+const SCENES: [&str; 7] = ["recording", CROSSING, QUEUE, "one-ray", "all-rays", "everywhere", "crowd"];
+
+/// Instructions that a frame of radar-3d may take on the reference grid: in the mean of what is driven, and in the worst frame of all.
+const RADAR_3D_BUDGET: u64 = 1_500_000;
+const RADAR_3D_WORST: u64 = 2_600_000;
+/// Those of the small grid, in the mean of what is driven.
+const SMALL_BUDGET: u64 = 720_000;
 
 /// Training scenes of the twin, the first of each plan.
 const CROSSING: &str = "crossing";
@@ -115,6 +121,7 @@ fn main() -> ExitCode {
     let scenes = asked.is_empty() || asked.iter().any(|a| a.starts_with("radar"));
     let simulated = if scenes { [CROSSING, QUEUE].map(|scene| (scene, simulated(scene))).to_vec() } else { vec![] };
     let several = [FUSION, MONITOR].into_iter().chain(WIRE).map(|estimator| (estimator, SCENES[0]));
+    let mut code = ExitCode::SUCCESS;
     for (estimator, scene) in estimators.chain(CAMERA).chain(several) {
         if !asked.is_empty() && !asked.iter().any(|a| *a == estimator) {
             continue;
@@ -128,18 +135,28 @@ fn main() -> ExitCode {
         let mean = counts.iter().sum::<u64>() / counts.len() as u64;
         let median = counts[counts.len() / 2];
         println!("{estimator:<16} {scene:<12} {:>9} {mean:>12} {median:>12} {worst:>12}", counts.len());
-        if estimator == FUSION && median > FUSION_BUDGET {
-            eprintln!("fusing two maps takes {median} instructions, more than {FUSION_BUDGET}");
-            return ExitCode::FAILURE;
-        }
-        let budget = if estimator.ends_with("narrow") { NARROW_WIRE_BUDGET } else { WIRE_BUDGET };
-        if WIRE.contains(&estimator) && median > budget {
-            eprintln!("{estimator} takes {median} instructions a scan, more than {budget}");
-            return ExitCode::FAILURE;
+        if let Some(excess) = excess(estimator, scene, [mean, median, *worst]) {
+            eprintln!("{excess}");
+            code = ExitCode::FAILURE;
         }
     }
     simulated.iter().for_each(|(_, file)| _ = std::fs::remove_file(file));
-    ExitCode::SUCCESS
+    code
+}
+
+/// What is more than it may be.
+fn excess(estimator: &str, scene: &str, [mean, median, worst]: [u64; 3]) -> Option<String> {
+    let wire = if estimator.ends_with("narrow") { NARROW_WIRE_BUDGET } else { WIRE_BUDGET };
+    let is_driven = [SCENES[0], CROSSING, QUEUE].contains(&scene);
+    let (what, takes, most) = match estimator {
+        "radar-3d" if worst > RADAR_3D_WORST => ("in the worst frame", worst, RADAR_3D_WORST),
+        "radar-3d" if is_driven => ("in the mean", mean, RADAR_3D_BUDGET),
+        "radar-3d-small" if is_driven => ("in the mean", mean, SMALL_BUDGET),
+        FUSION => ("for two maps", median, FUSION_BUDGET),
+        _ if WIRE.contains(&estimator) => ("a scan", median, wire),
+        _ => return None,
+    };
+    (takes > most).then(|| format!("{estimator} takes {takes} instructions {what} of {scene}, more than {most}"))
 }
 
 /// The recording of a training scene, in a file of its own.

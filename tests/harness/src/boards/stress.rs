@@ -10,14 +10,23 @@ use super::scans::Scan;
 const FRAMES: u64 = 45;
 const FRAME_US: u64 = 66_667;
 
-/// A scene of 256 detections a frame that fit the field of view, with speeds of their own, so that
-/// few join: along one ray, one a ray, or new ones everywhere in every frame.
-pub const SCENES: [&str; 3] = ["one-ray", "all-rays", "everywhere"];
+/// Frames before those in which a crowd stands until it is learnt as fixtures (half a minute, and time to find all of it), as far
+/// apart as frames of one scene may be.
+const LEARNING: u64 = 70;
+const LEARNING_US: u64 = 900_000;
+
+/// A scene of 256 detections a frame that fit the field of view. With speeds of their own, so that few join: along one ray,
+/// one a ray, or new ones everywhere in every frame; and those of a crowd of which every second one stands and is learnt.
+pub const SCENES: [&str; 4] = ["one-ray", "all-rays", "everywhere", CROWD];
+
+const CROWD: &str = "crowd";
 
 /// All frames of a scene.
 pub fn scans(scene: &str) -> Vec<Scan> {
-    let scan = |k| Scan { time: Time::from_micros(k * FRAME_US), reset: false, detections: detections(scene, k) };
-    (0..FRAMES).map(scan).collect()
+    let learning = if scene == CROWD { LEARNING } else { 0 };
+    let time = |k: u64| Time::from_micros(k.min(learning) * LEARNING_US + k.saturating_sub(learning) * FRAME_US);
+    let scan = |k| Scan { time: time(k), reset: false, detections: detections(scene, k) };
+    (0..learning + FRAMES).map(scan).collect()
 }
 
 fn detections(scene: &str, frame: u64) -> Vec<Detection> {
@@ -31,13 +40,17 @@ fn detections(scene: &str, frame: u64) -> Vec<Detection> {
             let (range_cm, azimuth) = match scene {
                 "one-ray" => (2000 + 69 * i, 500),
                 "all-rays" => (6000, -10_000 + 78 * i),
+                // too far from each other to be one fixture
+                CROWD => (5000 + 200 * (i / 2 % 4), -10_000 + 78 * i),
                 _ => (random(1500..19_900), random(-10_500..10_500)),
             };
+            let elevation = Some(Angle::from_raw(random(-1500..200) as i16));
+            let speed = random(-3000..3000) as i16;
             Detection {
                 range_cm: range_cm as u16,
                 azimuth: Angle::from_raw(azimuth as i16),
-                elevation: Some(Angle::from_raw(random(-1500..200) as i16)),
-                radial_velocity_cm_s: random(-3000..3000) as i16,
+                elevation,
+                radial_velocity_cm_s: if scene == CROWD && i % 2 == 0 { 0 } else { speed },
                 rcs_half_dbsm: Some(20),
                 snr_half_db: Some(60),
             }
