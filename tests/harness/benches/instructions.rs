@@ -47,7 +47,7 @@ const SCENES: [&str; 7] = ["recording", CROSSING, QUEUE, "one-ray", "all-rays", 
 const RADAR_3D_BUDGET: u64 = 1_500_000;
 const RADAR_3D_WORST: u64 = 2_600_000;
 /// Those of the small grid, in the mean of what is driven.
-const SMALL_BUDGET: u64 = 720_000;
+const SMALL_BUDGET: u64 = 700_000;
 
 /// Training scenes of the twin, the first of each plan.
 const CROSSING: &str = "crossing";
