@@ -153,7 +153,8 @@
 //! | everywhere: motorways' cells 15.8 / 8.8, not 15.5 / 8.9 | 19.9 / 10.3 | +13.6 / +4.5 | 12.4 / 8.2 | +1.4 / +13.8 | no |
 //! | what is lower than 3 m only | 20.4 / 9.8 | +13.3 / +5.6 | 12.5 / 8.6 | +0.8 / +15.5 | no |
 //!
-//! What farther ends (`room.rs`), [radar cross sections](reflectivity), Doppler's slope (`doppler_slope.rs`) and fixtures (`fixtures.rs`) gave stands there.
+//! What farther ends (`room.rs`), [radar cross sections](reflectivity), Doppler's slope (`doppler_slope.rs`), fixtures (`fixtures.rs`) and headings
+//! that turn by the way that is made (`own_way.rs`) gave stands there.
 
 mod body;
 #[cfg(test)]
