@@ -388,7 +388,7 @@ mod tests {
                 }
             };
             let vehicle = detection(25.0, 6.7, -8.0);
-            let all = vec![vehicle, vehicle, vehicle, detection(12.0, 3.2, 0.0), detection(18.0, 3.0, 0.0)];
+            let all = vec![vehicle, vehicle, vehicle, detection(12.0, 1.2, 0.0), detection(18.0, 1.0, 0.0)];
             recording.frames.iter_mut().for_each(|f| f.detections.clone_from(&all));
             // what is weaker yet is detected, too
             recording.frames[0].detections[0].snr_db = Some(5.0);
