@@ -7,7 +7,7 @@ use crate::shipped;
 
 /// Bytes for everything, of each size: variables and stack, which a controller has; image, of which controllers with as
 /// much memory have several times that, so that growth is seen.
-const LIMITS: [(Profile, u64, u64); 2] = [(Profile::Reference, 516_096, 88_000), (Profile::Small, 112_000, 94_000)];
+const LIMITS: [(Profile, u64, u64); 2] = [(Profile::Reference, 516_096, 89_000), (Profile::Small, 114_000, 96_000)];
 
 fn image(profile: Profile) -> Image {
     Image::read(&firmware::build(Board::Mps2An386, profile, "batch").unwrap()).unwrap()
