@@ -31,7 +31,7 @@
 //! on cells of 1 m is cut off at 1.6. Work grows with it: with such noise a whole scan of the reference profile
 //! took at most 4.8 million instructions on x86-64 (256 detections spread over the field of view; 2.7 million in
 //! the worst frame of the shipped recording; counted on an earlier grid of 120 azimuths), with the default noise it takes
-//! 2.4 million: `cargo bench -p viewshed-harness --bench instructions -- radar-3d radar-3d-blurred`.
+//! 2.6 million: `cargo bench -p viewshed-harness --bench instructions -- radar-3d radar-3d-blurred`.
 //!
 //! # References
 //! Slutsky and Dobkin, "Dual inverse sensor model for radar occupancy grids", IV 2019.
