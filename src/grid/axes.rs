@@ -82,7 +82,7 @@ pub struct SliceRow {
 
 /// Place of a column's centre on the column axis, 2^-8 columns.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // below 2^8 columns
-const fn centre(column: usize) -> i32 {
+pub(super) const fn column_centre(column: usize) -> i32 {
     column as i32 * 256 + 128
 }
 
@@ -154,7 +154,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
             let far_road = Angle::from_degrees(within("visibility.far_road_deg", f32::from(far_road), least, most)?);
             axes.narrow = Narrow::towards(far_road - axes.azimuth_origin, axes.azimuth_span, A);
         }
-        axes.directions = core::array::from_fn(|a| trig::direction(axes.azimuth_of(centre(a))));
+        axes.directions = core::array::from_fn(|a| trig::direction(axes.azimuth_of(column_centre(a))));
         axes.find_view(&in_view);
         if axes.ground.is_level() {
             axes.lay_rows(drop);
@@ -182,7 +182,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// it again, and what lies between must stay unknown.
     fn find_view(&mut self, in_view: &impl Fn(f32, f32) -> bool) {
         for a in 0..A {
-            let bearing = self.azimuth_of(centre(a)).radians();
+            let bearing = self.azimuth_of(column_centre(a)).radians();
             let mut stretch = 0..0;
             let mut longest = 0..0;
             for r in 0..R {
@@ -418,7 +418,7 @@ impl<const R: usize, const A: usize, const E: usize> Axes<R, A, E> {
     /// Direction of a place on the column axis.
     pub fn direction_of(&self, place: i32) -> Direction {
         let column = (place >> 8) as usize;
-        let central = self.directions.get(column).filter(|_| place == centre(column));
+        let central = self.directions.get(column).filter(|_| place == column_centre(column));
         central.map_or_else(|| trig::direction(self.azimuth_of(place)), |d| *d)
     }
 

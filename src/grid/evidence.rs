@@ -40,7 +40,7 @@
 use crate::fixed::math;
 use crate::fixed::time::Step;
 use crate::frame::reflection::Reflection;
-use crate::grid::axes::Axes;
+use crate::grid::axes::{Axes, column_centre};
 use crate::grid::raycast::BLOCKED;
 use crate::grid::spherical::{Column, SphericalGrid};
 use crate::map::polar::PolarMap;
@@ -316,7 +316,7 @@ impl InverseSensor {
         let middle = ground_cm / axes.cell_cm.max(1);
         for a in first..=last {
             let Some(column) = grid.column_mut(a as usize) else { continue };
-            let by_azimuth = self.bell(axes.narrow.unit(a * 256 + 128) - place, self.azimuth_sigma);
+            let by_azimuth = self.bell(axes.narrow.unit(column_centre(a as usize)) - place, self.azimuth_sigma);
             for cell in (middle - self.range_reach).max(0)..=(middle + self.range_reach).min(R as i32 - 1) {
                 let offset = cell * axes.cell_cm + axes.cell_cm / 2 - ground_cm;
                 let weight = (gain * by_azimuth * self.bell(offset, self.range_sigma)) >> 16;

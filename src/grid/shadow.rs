@@ -31,7 +31,7 @@
 use core::ops::Range;
 
 use crate::fixed::trig;
-use crate::grid::axes::Axes;
+use crate::grid::axes::{Axes, column_centre};
 use crate::grid::raycast::shade;
 use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
@@ -97,7 +97,7 @@ fn columns<const R: usize, const A: usize, const E: usize>(
     (first..=last).filter_map(move |a| {
         // here, where the divisions below show that they cannot be by nothing
         let cell_cm = axes.cell_cm.max(1);
-        let centre = a * 256 + 128;
+        let centre = column_centre(a as usize);
         let (from, to) = (low.max(centre - WINDOW), high.min(centre + WINDOW));
         if from >= to {
             return None;

@@ -85,7 +85,8 @@ impl Obstacle {
             self.heading.along(self.velocity.0, self.velocity.1)
         };
         self.lane = lane;
-        self.free_heading = false;
+        // should it go its own way again, its motion tells the heading at once
+        (self.free_heading, self.heading_variance) = (false, u16::MAX);
         self.unexplained = 0;
         self.head(heading, speed);
         if self.age == 0 {
@@ -160,7 +161,6 @@ impl Obstacle {
         } else {
             self.lane = NO_LANE;
             self.free_heading = !self.goes_along_the_road(t);
-            self.heading_variance = u16::MAX;
         }
     }
 

@@ -59,7 +59,7 @@ pub struct Obstacle {
     pub(super) farther_end: bool,
     /// Whether it goes its own way, with speed and heading from `free`.
     pub(super) free_heading: bool,
-    /// Variance of that heading, 2^-16 rad^2, saturating.
+    /// Variance of that heading, 2^-16 rad^2, saturating, and the greatest there is while it does not.
     pub(super) heading_variance: u16,
     /// Segment of the lane it follows, [`LEARNT`](super::lanes::LEARNT), or [`NO_LANE`].
     pub(super) lane: u8,

@@ -100,8 +100,8 @@ impl Obstacle {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
     pub(super) fn turn_with_motion(&mut self, step: Step) {
         let motion = Direction::of(self.velocity.0, self.velocity.1);
-        let speed = self.speed() >> FRACTION;
-        let way_cm = step.times(self.speed()) >> FRACTION;
+        let fine = self.speed();
+        let (speed, way_cm) = (fine >> FRACTION, step.times(fine) >> FRACTION);
         let variance = (i32::from(self.heading_variance) + way_cm.min(ANY / TURN) * TURN).min(ANY);
         // the variance across, over the square of the speed; 2^-16
         let seen = ratio::<8>(self.free.speed_variance() << 4, (speed * speed) >> 4).min(ANY);
@@ -151,7 +151,7 @@ impl Obstacle {
 
     /// Goes on from the free motion, with a new outline.
     fn go_own_way(&mut self) {
-        (self.free_heading, self.heading_variance) = (true, u16::MAX);
+        self.free_heading = true;
         self.position = self.free.place;
         self.velocity = self.free.velocity;
         self.heading = Direction::of(self.velocity.0, self.velocity.1);

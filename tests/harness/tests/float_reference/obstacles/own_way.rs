@@ -155,7 +155,7 @@ impl Obstacle {
             && self.free.is_sure_of(length(off), rules.own_way_sigmas);
         self.unexplained = if certain { self.unexplained + 1 } else { 0 };
         if self.unexplained >= OWN_WAY_FRAMES {
-            (self.free_heading, self.heading_variance) = (true, 1.0);
+            self.free_heading = true;
             self.anchor = self.free.place;
             self.velocity = self.free.velocity;
             self.heading = self.velocity.map(|v| v / length(self.velocity));
