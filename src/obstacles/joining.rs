@@ -12,10 +12,16 @@ use crate::fixed::trig::Direction;
 
 /// Least distance between the faces of two cars in a row: a short car's length and a gap, centimetres.
 const SPACING_CM: i32 = 480;
-/// Longest outline of one end of a car, and of a car that shows both its ends, with what noise adds, centimetres.
-const END_CM: i32 = 150;
+/// Longest outline of one end of a car, to its nearest axle, and of a car that shows both its ends, with what noise adds,
+/// centimetres.
+const END_CM: i32 = 200;
 /// See [`END_CM`].
 const CAR_CM: RangeInclusive<i32> = 400..=520;
+/// Outline of a car that has shown all of itself, with what echoes of others add, centimetres. A lorry's trailer
+/// shows longer low parts.
+const WHOLE_CAR_CM: RangeInclusive<i32> = 400..=600;
+/// Farthest that two outlines of one whole car lie apart, centimetres.
+const TWICE_CM: i32 = 100;
 /// The same of a delivery van, which is tall: its end, to behind the cab, and all of it.
 const VAN_END_CM: i32 = 250;
 /// See [`VAN_END_CM`].
@@ -65,7 +71,27 @@ impl Obstacle {
         // nothing low is as long as a lorry
         let low = self.tallness.is_low() && other.tallness.is_low();
         let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
-        (gap <= widest && length <= longest) || (apart <= ENDS_SPEED && self.has_other_end(other, along, length, t))
+        let offset = (along - self.extent.middle_cm()).abs().max(left.abs());
+        !self.is_another_car_than(other, offset, t)
+            && ((gap <= widest && length <= longest)
+                || (apart <= ENDS_SPEED && self.has_other_end(other, along, length, t)))
+    }
+
+    /// Whether one of both is a whole car, and the other something tall, or another whole car whose middle lies so far away: a
+    /// car behind a lorry, or beside another where the place of one was guessed.
+    fn is_another_car_than(&self, other: &Self, offset_cm: i32, t: &Tracking) -> bool {
+        match (self.is_whole_car(t), other.is_whole_car(t)) {
+            (true, true) => offset_cm > TWICE_CM,
+            (true, false) => other.tallness.is_tall(),
+            (false, true) => self.tallness.is_tall(),
+            (false, false) => false,
+        }
+    }
+
+    /// Whether it is low for certain and has shown all of a car.
+    fn is_whole_car(&self, t: &Tracking) -> bool {
+        let shown = self.extent.length_cm().max(self.remembered_length_cm(t));
+        self.existence >= t.confirmed && self.tallness.is_low() && WHOLE_CAR_CM.contains(&shown)
     }
 
     /// Whether another obstacle that points elsewhere is a part of the same lorry: both stand, are tall, and touch along
@@ -258,6 +284,39 @@ mod tests {
         assert!(a.is_one_with(&b, &t), "8.5 m");
     }
 
+    #[test]
+    fn a_whole_car_is_no_part_of_a_lorry_nor_of_another_car() {
+        let t = rules();
+        let one = |apart, change: &dyn Fn(&mut Obstacle, &mut Obstacle)| {
+            let (mut car, mut other) = two(apart, 0, 2000);
+            (car.tallness, other.tallness) = (low(), tall());
+            car.existence = t.confirmed;
+            change(&mut car, &mut other);
+            let (forward, back) = (car.is_one_with(&other, &t), other.is_one_with(&car, &t));
+            assert_eq!(forward, back, "{apart} cm");
+            forward
+        };
+        assert!(!one(200, &|_, _| ()), "a lorry close ahead");
+        assert!(one(200, &|car, _| car.existence -= 1), "perhaps no car");
+        assert!(one(200, &|car, _| car.tallness = Tallness::default()), "perhaps not low");
+        assert!(one(200, &|_, other| other.tallness = Tallness::default()), "perhaps not tall");
+        assert!(one(200, &|car, _| car.extent = Extent { rear_cm: -10, front_cm: 380 }), "a part of something");
+        assert!(one(200, &|car, _| car.extent.rear_cm = -410), "as a trailer's low part");
+        // a creeping one whose rear is hidden for now
+        let hidden = |car: &mut Obstacle, other: &mut Obstacle, shown_cm: i32| {
+            (car.velocity.0, other.velocity.0) = (200 << FRACTION, 200 << FRACTION);
+            car.extent.rear_cm = 0;
+            car.shown_length = shown_cm << 4;
+        };
+        assert!(!one(200, &|car, other| hidden(car, other, 450)) && one(200, &|car, other| hidden(car, other, 200)));
+        let two_cars = |car: &mut Obstacle, other: &mut Obstacle| {
+            (other.tallness, other.existence) = (low(), t.confirmed);
+            assert!(car.tallness.is_low());
+        };
+        assert!(!one(-290, &two_cars), "1.1 m apart within one another: the place of one was guessed");
+        assert!(one(-310, &two_cars), "0.9 m: one car, found twice");
+    }
+
     /// Evidence left of a car that stands within a lorry that drives.
     fn left_of_a_car_within_a_lorry(change: impl Fn(&mut Obstacle, &mut Obstacle)) -> i32 {
         let t = rules();
@@ -303,13 +362,13 @@ mod tests {
     fn what_begins_behind_a_face_by_less_than_a_car_and_a_gap_is_that_cars_other_end() {
         let t = rules();
         // neither is short; ahead of the sensor the face is the rear, behind it the front
-        let [near, far] = ends([170, 40], 460, 3000);
+        let [near, far] = ends([206, 10], 460, 3000);
         assert!(near.is_one_with(&far, &t) && !far.is_one_with(&near, &t));
-        let [far, near] = ends([40, 170], 460, -3500);
+        let [far, near] = ends([10, 206], 460, -3500);
         assert!(near.is_one_with(&far, &t) && !far.is_one_with(&near, &t));
-        let [near, far] = ends([170, 40], 500, 3000);
+        let [near, far] = ends([210, 40], 500, 3000);
         assert!(!near.is_one_with(&far, &t), "the next car's face");
-        let [near, mut far] = ends([170, 40], 460, 3000);
+        let [near, mut far] = ends([206, 10], 460, 3000);
         far.velocity.0 += 130 << FRACTION;
         assert!(!near.is_one_with(&far, &t), "it comes nearer");
     }
@@ -326,7 +385,8 @@ mod tests {
         assert_eq!(one([95, 95], 540, 3000), (false, false), "ends of two cars");
         assert!(!one([40, 40], 390, -3500).0, "too short for a car; its face is the other one");
         assert_eq!(one([490, 95], 900, 3000), (false, false), "one that has both its ends");
-        assert_eq!(one([160, 95], 500, 3000), (false, false), "more than an end");
+        assert_eq!(one([200, 40], 500, 3000), (true, true), "to its axle");
+        assert_eq!(one([210, 40], 500, 3000), (false, false), "more than an end");
         let van = |lengths: [i32; 2], over_all: i32, ends_tall: usize| {
             let mut pair = ends(lengths, over_all, 3000);
             pair.iter_mut().take(ends_tall).for_each(|o| o.tallness = tall());

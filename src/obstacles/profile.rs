@@ -113,28 +113,27 @@ impl Profile {
     }
 
     /// Whether an outline falls into parts that are all as long as a car, with gaps between them that are as wide as
-    /// cars leave. Bins with less than a tenth of the mean are empty.
+    /// cars leave. A car may show its ends alone, so a gap within one tells nothing; the first place that is too far behind a
+    /// car's front to be its rear is the next car's. Bins with less than a tenth of the mean are empty.
     pub fn is_a_row_of_cars(&self, extent: &Extent) -> bool {
         let bin = |along: i32| usize::try_from(along.div_euclid(BIN_CM) + BINS as i32 / 2).unwrap_or(0);
         let held = self.bins.get(bin(extent.rear_cm)..=bin(extent.front_cm).min(BINS - 1)).unwrap_or(&[]);
-        let total = held.iter().map(|b| i32::from(*b)).sum::<i32>();
-        let is_car = |part: i32| (CAR_BINS[0]..=CAR_BINS[1]).contains(&part);
-        let (mut cars, mut others, mut part, mut gap) = (0, 0, 0, 0);
-        for b in held {
-            if i32::from(*b) * 10 * (held.len() as i32) >= total {
-                part += if gap < GAP_BINS[0] { gap + 1 } else { 1 };
-                gap = 0;
-                continue;
-            }
-            gap += 1;
-            if gap == GAP_BINS[0] {
+        let (total, count) = (held.iter().map(|b| i32::from(*b)).sum::<i32>(), held.len() as i32);
+        let mut filled = (0..).zip(held).filter(|(_, b)| i32::from(**b) * 10 * count >= total).map(|(i, _)| i);
+        let Some(mut begin) = filled.next() else { return false };
+        let (mut end, mut cars) = (begin, 0);
+        let is_car = |begin: i32, end: i32| end + 1 - begin >= CAR_BINS[0];
+        for i in filled {
+            if i - begin >= CAR_BINS[1] {
+                if !is_car(begin, end) || !(GAP_BINS[0]..=GAP_BINS[1]).contains(&(i - end - 1)) {
+                    return false;
+                }
                 cars += 1;
-                others += i32::from(!is_car(part));
-                part = 0;
+                begin = i;
             }
-            others += i32::from(gap > GAP_BINS[1]);
+            end = i;
         }
-        cars > 0 && others == 0 && is_car(part)
+        cars > 0 && is_car(begin, end)
     }
 
     /// Centre of gravity of the bins `i` and `i + 1`, centimetres from the anchor.
@@ -228,6 +227,8 @@ mod tests {
         assert!(row(&two_cars), "3.2 m apart");
         let three = [-1010, -900, -790, -660, -260, -150, -30, 90, 200, 520, 640, 750, 860];
         assert!(row(&three));
+        assert!(row(&[-710, -690, -240, -210, 240, 260, 690, 710]), "four ends, as far apart as a car's: two cars");
+        assert!(!row(&[-710, -690, -240, -210, 240, 260]), "two ends and one");
         assert!(!row(&[-610, -500, -390, -260, -160, -30, 90, 160, 260, 390, 500, 610]), "it reflects all along");
         assert!(!row(&[-610, -560, 560, 610]), "a lorry that shows only its ends");
         assert!(!row(&[-810, -700, -590, -460, 360, 460, 590, 700]), "8 m apart");
