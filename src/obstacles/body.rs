@@ -27,7 +27,8 @@ impl Obstacle {
     pub fn solid(&self, t: &Tracking) -> Solid {
         let size = self.size(t);
         let (along, aside) = self.middle_of_box(&size);
-        let lid = if self.may_be_low(&size, t) { self.tallness.ceiling_cm() } else { i32::MAX };
+        let low = self.tallness.is_low() && self.may_be_low(&size, t);
+        let lid = if low { self.tallness.ceiling_cm() } else { i32::MAX };
         let margin = self.margin_cm(t);
         let aside = aside + self.towards_lane(self.global(along, aside), t);
         let (x, y) = self.global(along, aside);

@@ -71,10 +71,9 @@ impl Obstacle {
         // nothing low is as long as a lorry
         let low = self.tallness.is_low() && other.tallness.is_low();
         let longest = if low { LONGEST_LOW_CM } else { t.max_length_cm };
-        let offset = (along - self.extent.middle_cm()).abs().max(left.abs());
-        !self.is_another_car_than(other, offset, t)
-            && ((gap <= widest && length <= longest)
-                || (apart <= ENDS_SPEED && self.has_other_end(other, along, length, t)))
+        let one = (gap <= widest && length <= longest)
+            || (apart <= ENDS_SPEED && self.has_other_end(other, along, length, t));
+        one && !self.is_another_car_than(other, (along - self.extent.middle_cm()).abs().max(left.abs()), t)
     }
 
     /// Whether one of both is a whole car, and the other something tall, or another whole car whose middle lies so far away: a

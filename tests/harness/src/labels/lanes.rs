@@ -20,9 +20,9 @@
 //! | ended where nobody drove | 14.6 / 12.4 | +0.4 / +9.6 |
 //! | driven on by three, not two | 16.6 / 11.5 | +4.5 / +7.8 |
 //!
-//! On the six crossings that are reported 18.2 / 10.9 became 17.5 / 10.7, and 15.8 / 9.7 with the net; on the crossing of
-//! another generator, from its 50th second on and with lanes learnt before the 45th, 21.3 / 13.0 became 20.1 / 13.9 where
-//! a unit is started then, and 10.5 / 13.1 became 10.2 / 14.8 where it has run since the start.
+//! On the six crossings that are reported 18.0 / 11.1 become 17.2 / 10.8, and 15.5 / 10.0 with the net; on the crossing of
+//! another generator, from its 50th second on and with lanes learnt before the 45th, 20.9 / 10.5 became 21.8 / 12.1 where
+//! a unit is started then, and 10.6 / 13.3 became 9.9 / 15.1 where it has run since the start.
 //!
 //! # Limits
 //! Lanes that were not driven on by two vehicles at least are missing, and so are those the radar does not see. Their
