@@ -359,7 +359,7 @@ impl Obstacle {
         // the ends of a car that is creeping, or of a van
         let behind_its_face = (ahead > self.extent.middle()) == (along(self.heading, self.anchor) > 0.0);
         let confirmed = self.existence.min(other.existence) >= rules.confirm_hits;
-        let (end, over_all) = if self.is_tall() && other.is_tall() { (2.5, 6.6) } else { (1.5, 5.2) };
+        let (end, over_all) = if self.is_tall() && other.is_tall() { (2.5, 6.6) } else { (2.0, 5.2) };
         let ends = self.extent.length().max(other.extent.length()) <= end;
         let both_ends = confirmed && ends && (4.0..=over_all).contains(&whole);
         let other_end = apart <= 1.0 && ((behind_its_face && whole < 4.8) || both_ends);
@@ -367,6 +367,19 @@ impl Obstacle {
             && along(self.heading, other.heading) >= rules.merge_parallel
             && left.abs() <= abreast.max(rules.merge_lateral + uncertain)
             && (near || other_end)
+            && !self.is_another_car_than(other, (ahead - self.extent.middle()).abs().max(left.abs()), rules)
+    }
+
+    /// Whether a whole car and something tall, or two whole cars so far apart.
+    fn is_another_car_than(&self, other: &Self, offset: f64, rules: &Rules) -> bool {
+        let whole = |o: &Self| {
+            let shown = o.extent.length().max(o.remembered_length(rules));
+            o.existence >= rules.confirm_hits && o.is_low() && (4.0..=6.0).contains(&shown)
+        };
+        match (whole(self), whole(other)) {
+            (true, true) => offset > 1.0,
+            (one, two) => one && other.is_tall() || two && self.is_tall(),
+        }
     }
 
     /// Whether another obstacle lies within this one, where nothing else can be.

@@ -90,21 +90,22 @@ impl Profile {
     }
 
     /// Whether an outline falls into parts that are all as long as a car, with gaps between them as cars leave; bins
-    /// with less than a tenth of the mean are empty.
+    /// with less than a tenth of the mean are empty, and a part ends before what is too far from its begin.
     pub fn is_a_row_of_cars(&self, extent: &Extent) -> bool {
         let bin = |along: f64| ((along / BIN_M).floor() + BINS as f64 / 2.0).clamp(0.0, BINS as f64 - 1.0) as usize;
         let held = &self.0[bin(extent.rear)..=bin(extent.front)];
         let mean = held.iter().sum::<f64>() / held.len() as f64;
-        let filled: Vec<usize> = (0..held.len()).filter(|&i| held[i] >= mean / 10.0).collect();
+        let mut parts: Vec<(usize, usize)> = Vec::new();
+        for i in (0..held.len()).filter(|&i| held[i] >= mean / 10.0) {
+            match parts.last_mut() {
+                Some((begin, end)) if ((i - *begin) as f64) < CAR[1] / BIN_M => *end = i,
+                _ => parts.push((i, i)),
+            }
+        }
         let gap = |a: usize, b: usize| (b - a - 1) as f64 * BIN_M;
-        let parts: Vec<&[usize]> = filled.chunk_by(|a, b| gap(*a, *b) < GAP[0]).collect();
-        let is_car = |p: &&[usize]| {
-            let length = (p[p.len() - 1] - p[0] + 1) as f64 * BIN_M;
-            (CAR[0]..=CAR[1]).contains(&length)
-        };
         parts.len() > 1
-            && parts.iter().all(is_car)
-            && parts.windows(2).all(|p| gap(p[0][p[0].len() - 1], p[1][0]) <= GAP[1])
+            && parts.iter().all(|(begin, end)| (end - begin + 1) as f64 * BIN_M >= CAR[0])
+            && parts.windows(2).all(|p| (GAP[0]..=GAP[1]).contains(&gap(p[0].1, p[1].0)))
     }
 
     /// Moves the anchor forward by whole bins.
