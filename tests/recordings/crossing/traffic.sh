@@ -41,6 +41,18 @@ traffic skewed-2 skewed crossing 2004 90 0.9 150
 traffic tee-1 tee tee 2005 70 1.1 150
 traffic tee-2 tee tee 2006 90 1.2 150
 
+# the scenes of unseen.toml, and the day before each of them
+unseen() {
+    traffic "$1" "$2" "$3" "$4" "$5" "$6" 150
+    traffic "$1-before" "$2" "$3" $(($4 + 100)) "$5" "$6" 90
+}
+unseen wide-3 wide crossing 7001 90 1.1
+unseen skewed-3 skewed crossing 7002 100 0.9
+unseen tee-3 tee tee 7003 80 1.1
+unseen broad-1 broad crossing 7004 100 1.3
+unseen broad-2 broad crossing 7005 90 1.2
+unseen narrow-1 narrow crossing 7006 70 0.6
+
 # days of the unit of wide-1, for calibration.toml
 for day in $(seq 1 14); do
     traffic "wide-day-$day" wide crossing $((5000 + day)) 80 1.0 90

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the traffic of every day, day-0.fcd.xml.gz to day-13.fcd.xml.gz, anew, and that of days with few heavy
+# Makes the traffic of every day, day-0.fcd.xml.gz to day-23.fcd.xml.gz, anew, and that of days with few heavy
 # vehicles, light-1.fcd.xml.gz to light-5.fcd.xml.gz, and ten minutes each, long-1.fcd.xml.gz to long-5.fcd.xml.gz.
 #
 #   pip install eclipse-sumo==1.28.0        # or Debian's package sumo; another version may give other traffic
@@ -24,7 +24,7 @@ traffic() {
     sed -e '/^<!--/,/^-->/d' "$work/fcd.xml" | gzip -9 --no-name >"$1.fcd.xml.gz"
     echo "$1.fcd.xml.gz"
 }
-for day in $(seq 0 13); do
+for day in $(seq 0 23); do
     traffic "day-$day" motorway.rou.xml $((100 + day)) 262 0.5
 done
 for day in 1 2 3 4 5; do

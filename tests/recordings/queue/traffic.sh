@@ -42,3 +42,9 @@ traffic waves-2 waves 4004 0.9 150
 for day in $(seq 1 14); do
     traffic "exit-day-$day" exit $((6000 + day)) 1.0 90
 done
+
+# the scenes of unseen.toml
+traffic exit-3 exit 7101 0.9 150
+traffic exit-4 exit 7102 1.0 150
+traffic waves-3 waves 7103 1.1 150
+traffic waves-4 waves 7104 1.0 150
