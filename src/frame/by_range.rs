@@ -101,7 +101,6 @@ mod tests {
             across_cm: 1,
             height_cm: None,
             rcs_half_dbsm: None,
-            strength: 0,
         };
         // the fourth is as far away as the others, in another direction
         let all = [at(3000, 4000), at(3290, 4000), at(3000, 3710), at(4000, 3000), at(3000, 4310)];
@@ -127,7 +126,6 @@ mod tests {
                 across_cm: 1,
                 height_cm: None,
                 rcs_half_dbsm: None,
-                strength: 0,
             })
             .collect();
         let sorted = ByRange::<8>::sort(&reflections, 22_500);

@@ -102,9 +102,9 @@ impl Detection {
         })
     }
 
-    /// What decides which detections stay when a list is full: SNR, else RCS, half dB.
-    pub fn strength(&self) -> i16 {
-        self.snr_half_db.or(self.rcs_half_dbsm).unwrap_or(i16::MIN)
+    /// SNR, else RCS, half dB: what counts first when a list is too full.
+    pub fn strength(&self) -> Option<i16> {
+        self.snr_half_db.or(self.rcs_half_dbsm)
     }
 }
 
@@ -130,7 +130,7 @@ mod tests {
         assert_eq!(d.radial_velocity_cm_s, -2500);
         assert_eq!(d.rcs_half_dbsm, Some(21));
         assert_eq!(d.snr_half_db, None);
-        assert_eq!(d.strength(), 21);
+        assert_eq!(d.strength(), Some(21));
     }
 
     #[test]

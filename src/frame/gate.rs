@@ -25,7 +25,7 @@ pub struct GateConfig {
     /// Noise allowed for beyond the field of view's elevation limits. An angle, never metres: a
     /// third of true detections at 150 m compute below the road.
     pub elevation_margin_deg: f32,
-    /// Detections of a frame that are used at most, the strongest; the storage may hold fewer.
+    /// Detections of a frame that are used at most (which: `frame/thinning.rs`); the storage may hold fewer.
     pub max_detections: u16,
 }
 
@@ -58,7 +58,7 @@ pub enum Rejection {
     Rcs,
     /// Radial velocity implausible, or too slow where only movers are wanted.
     Velocity,
-    /// The list was full of stronger detections.
+    /// The list was full of others that count more.
     Overflow,
     /// No detection at all: not finite, at no distance, or absurd. Dropped by whoever decoded it.
     Refused,

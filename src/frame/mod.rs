@@ -7,3 +7,4 @@ pub mod health;
 pub mod reflection;
 pub mod repeatability;
 pub mod scan;
+pub mod thinning;

@@ -31,8 +31,6 @@ pub struct Reflection {
     pub height_cm: Option<(i16, u16)>,
     /// Radar cross section, half dBsm, where the radar measures it.
     pub rcs_half_dbsm: Option<i16>,
-    /// What decides who stays when a list is full, half dB.
-    pub strength: i16,
 }
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // unit vectors within 2^14, lengths clamped
@@ -81,7 +79,6 @@ impl Noise {
             across_cm: math::mul_shift(range, self.azimuth, 16).clamp(1, 65_535) as u16,
             height_cm: None,
             rcs_half_dbsm: d.rcs_half_dbsm,
-            strength: d.strength(),
         }
     }
 

@@ -221,7 +221,6 @@ mod tests {
             across_cm: 1,
             height_cm: None,
             rcs_half_dbsm: None,
-            strength: 0,
         }
     }
 

@@ -6,13 +6,14 @@ use crate::frame::detection::Detection;
 use crate::frame::gate::{Gate, Rejection, Rejections};
 use crate::frame::health::Points;
 use crate::frame::reflection::Reflection;
+use crate::frame::thinning::Thinning;
 
-/// Up to `D` reflections, the strongest of the frame, in order of arrival.
+/// Up to `D` reflections of the frame, in order of arrival.
 ///
 /// # Limits
-/// When more pass the gate, the strongest stay, of equals the first to arrive; the others are counted as
-/// [`Rejection::Overflow`]. Strengths below -48 dB and above 79.5 dB count as these. The cost is two looks at
-/// every detection at most, however many there are and in whatever order they come.
+/// When more pass the gate, those of the greatest [rank](Thinning::rank) stay, of equals the first to arrive; the others
+/// are counted as [`Rejection::Overflow`]. The cost is three looks at every detection at most, however many there are and in
+/// whatever order they come.
 #[derive(Debug, Clone)]
 pub struct Scan<const D: usize> {
     reflections: Vec<Reflection, D, u16>,
@@ -45,7 +46,6 @@ impl<const D: usize> Scan<D> {
         self.rejections.add_many(Rejection::Refused, refused.into());
         let room = D.min(gate.max_detections);
         let mut kept: Vec<&Detection, D, u16> = Vec::new();
-        let mut strengths = Strengths([0; STEPS]);
         let (mut reported, mut passed) = (0_u32, 0);
         let mut arriving = detections;
         let mut late = None;
@@ -56,7 +56,6 @@ impl<const D: usize> Scan<D> {
                 continue;
             }
             passed += 1;
-            strengths.count(d);
             if passed > room {
                 self.rejections.add(Rejection::Overflow);
                 continue;
@@ -67,10 +66,15 @@ impl<const D: usize> Scan<D> {
             }
         }
         if let Some(late) = late.filter(|_| passed > room) {
-            let mut strongest = strengths.strongest(room);
-            kept.retain(|d| strongest.takes(d));
-            for d in late.filter(|d| gate.judge(d).is_ok()) {
-                if strongest.takes(d) {
+            let late = late.filter(|d| gate.judge(d).is_ok());
+            let (mut thinning, mut ranks) = (Thinning::NEW, Ranks([0; RANKS]));
+            for d in kept.iter().copied().chain(late.clone()) {
+                ranks.count(thinning.rank(d));
+            }
+            let (mut thinning, mut greatest) = (Thinning::NEW, ranks.greatest(room));
+            kept.retain(|d| greatest.takes(thinning.rank(d)));
+            for d in late {
+                if greatest.takes(thinning.rank(d)) {
                     let _ = kept.push(d);
                 }
             }
@@ -104,52 +108,44 @@ impl<const D: usize> Scan<D> {
     }
 }
 
-/// Steps of strength that are distinguished, of half a decibel.
-const STEPS: usize = 256;
+/// Ranks there are.
+const RANKS: usize = 1 << u8::BITS;
 
-/// The first step's strength, half dB.
-const LEAST_HALF_DB: i16 = -96;
+/// How many detections have which rank.
+struct Ranks([u16; RANKS]);
 
-fn step_of(d: &Detection) -> u8 {
-    u8::try_from(d.strength().saturating_sub(LEAST_HALF_DB).max(0)).unwrap_or(u8::MAX)
-}
-
-/// How many detections are how strong.
-struct Strengths([u16; STEPS]);
-
-impl Strengths {
-    fn count(&mut self, d: &Detection) {
-        if let Some(n) = self.0.get_mut(usize::from(step_of(d))) {
+impl Ranks {
+    fn count(&mut self, rank: u8) {
+        if let Some(n) = self.0.get_mut(usize::from(rank)) {
             *n = n.saturating_add(1);
         }
     }
 
-    /// What it takes to be among the `room` strongest.
-    fn strongest(&self, room: usize) -> Strongest {
+    /// What it takes to be among the `room` greatest.
+    fn greatest(&self, room: usize) -> Greatest {
         let mut left = room;
         let mut least = u8::MAX;
         for n in self.0.iter().rev() {
             match left.checked_sub(usize::from(*n)) {
                 Some(rest) => left = rest,
-                None => return Strongest { least, of_least: left },
+                None => return Greatest { least, of_least: left },
             }
             least = least.saturating_sub(1);
         }
-        Strongest { least: 0, of_least: left }
+        Greatest { least: 0, of_least: left }
     }
 }
 
-/// All that are stronger than a step, and the first so many of that step.
-struct Strongest {
+/// All above a rank, and the first so many of that rank.
+struct Greatest {
     least: u8,
     of_least: usize,
 }
 
-impl Strongest {
-    fn takes(&mut self, d: &Detection) -> bool {
-        let step = step_of(d);
-        if step != self.least || self.of_least == 0 {
-            return step > self.least;
+impl Greatest {
+    fn takes(&mut self, rank: u8) -> bool {
+        if rank != self.least || self.of_least == 0 {
+            return rank > self.least;
         }
         self.of_least -= 1;
         true
@@ -166,7 +162,24 @@ mod tests {
     use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec as StdVec;
 
+    fn detection(range_cm: u16, strength: i16) -> Detection {
+        Detection {
+            range_cm,
+            azimuth: Angle::ZERO,
+            elevation: None,
+            radial_velocity_cm_s: 0,
+            rcs_half_dbsm: None,
+            snr_half_db: Some(strength),
+        }
+    }
+
+    /// Detections of these strengths, each from a place of its own.
     fn scan<const D: usize>(strengths: &[i16]) -> Scan<D> {
+        let of = |(i, s): (usize, &i16)| detection(1000 + i as u16 * 300, *s);
+        gathered(&strengths.iter().enumerate().map(of).collect::<StdVec<_>>())
+    }
+
+    fn gathered<const D: usize>(detections: &[Detection]) -> Scan<D> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
         let view = FieldOfView {
             azimuth_min_deg: -60.0,
@@ -177,59 +190,54 @@ mod tests {
             range_max_m: 200.0,
         };
         let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
-        let detections: StdVec<Detection> = strengths
-            .iter()
-            .enumerate()
-            .map(|(i, &s)| Detection {
-                range_cm: 1000 + i as u16 * 100,
-                azimuth: Angle::ZERO,
-                elevation: None,
-                radial_velocity_cm_s: 0,
-                rcs_half_dbsm: None,
-                snr_half_db: Some(s),
-            })
-            .collect();
         let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
         let mut scan = Scan::new();
         let points = scan.gather(detections.iter(), 7, &gate, |d| noise.place(d, &levelling));
-        assert_eq!(points, Points { inside: strengths.len() as u32, outside: 0, refused: 7 });
+        assert_eq!(points, Points { inside: detections.len() as u32, outside: 0, refused: 7 });
         assert_eq!(scan.rejections().count(Rejection::Refused), 7);
         scan
+    }
+
+    /// Which of the detections stayed.
+    fn kept<const D: usize>(s: &Scan<D>) -> StdVec<usize> {
+        s.reflections().iter().map(|r| usize::from(r.ground_cm - 800) / 300).collect()
     }
 
     #[test]
     fn the_strongest_stay_and_the_rest_is_counted() {
         let s: Scan<3> = scan(&[20, 50, 30, 40, 10, 60]);
-        let kept: StdVec<i16> = s.reflections().iter().map(|r| r.strength).collect();
-        assert_eq!(kept, [50, 40, 60], "in order of arrival");
+        assert_eq!(kept(&s), [1, 3, 5], "in order of arrival");
         assert_eq!(s.rejections().count(Rejection::Overflow), 3);
     }
 
     #[test]
     fn of_equals_the_first_stay() {
-        let s: Scan<2> = scan(&[20, 20, 20]);
-        let kept: StdVec<u16> = s.reflections().iter().map(|r| r.ground_cm / 100).collect();
-        assert_eq!(kept, [8, 9]);
+        assert_eq!(kept::<2>(&scan(&[20, 20, 20])), [0, 1]);
     }
 
     #[test]
     fn of_the_weakest_that_stay_the_first_do() {
         let s: Scan<4> = scan(&[20, 50, 20, 20, 50, 20]);
-        let kept: StdVec<(i16, u16)> = s.reflections().iter().map(|r| (r.strength, r.ground_cm / 100)).collect();
-        assert_eq!(kept, [(20, 8), (50, 9), (20, 10), (50, 12)]);
+        assert_eq!(kept(&s), [0, 1, 2, 4]);
         assert_eq!(s.rejections().count(Rejection::Overflow), 2);
     }
 
     #[test]
     fn strengths_beyond_the_scale_count_as_its_end() {
-        let s: Scan<2> = scan(&[159, 160, 400, 12, 10_000]);
-        let kept: StdVec<i16> = s.reflections().iter().map(|r| r.strength).collect();
-        assert_eq!(kept, [159, 160]);
+        assert_eq!(kept::<2>(&scan(&[159, 160, 400, 12, 10_000])), [0, 1]);
     }
 
     #[test]
     fn gated_detections_do_not_count_against_the_cap() {
         let s: Scan<3> = scan(&[5, 5, 5, 30]);
         assert_eq!((s.reflections().len(), s.rejections().count(Rejection::Quality)), (1, 3));
+    }
+
+    #[test]
+    fn a_weak_detection_of_a_place_of_its_own_stays_before_the_third_of_a_strong_one() {
+        let strong = detection(1000, 80);
+        let far = detection(9000, 20);
+        let s: Scan<3> = gathered(&[strong, strong, strong, strong, far]);
+        assert_eq!(s.reflections().iter().map(|r| r.ground_cm > 8000).collect::<StdVec<_>>(), [false, false, true]);
     }
 }

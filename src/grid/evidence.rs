@@ -424,7 +424,6 @@ mod tests {
             across_cm: 20,
             height_cm: None,
             rcs_half_dbsm: None,
-            strength: 0,
         }
     }
 

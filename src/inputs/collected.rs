@@ -4,32 +4,50 @@ use heapless::Vec;
 
 use crate::camera::boxes::ImageBox;
 use crate::frame::detection::Detection;
+use crate::frame::thinning::Thinning;
 
 /// What is collected.
 pub trait Entry: Copy {
-    /// The weakest are dropped from a full list.
-    fn strength(&self) -> i32;
+    /// What those that came before say of the next.
+    type Before: Copy + core::fmt::Debug;
+    /// Before the first.
+    const NONE_BEFORE: Self::Before;
+    /// How much one counts in a full list, more is better.
+    type Rank: Ord + Copy + core::fmt::Debug;
+
+    /// How much it counts, as the next to arrive.
+    fn rank(&self, before: &mut Self::Before) -> Self::Rank;
 }
 
 impl Entry for Detection {
-    fn strength(&self) -> i32 {
-        i32::from(Detection::strength(self))
+    type Before = Thinning;
+    const NONE_BEFORE: Thinning = Thinning::NEW;
+    type Rank = u8;
+
+    fn rank(&self, before: &mut Thinning) -> u8 {
+        before.rank(self)
     }
 }
 
 /// Of a picture too full the smallest go: what is small hides little.
 impl Entry for ImageBox {
-    fn strength(&self) -> i32 {
+    type Before = ();
+    const NONE_BEFORE: () = ();
+    type Rank = i32;
+
+    fn rank(&self, (): &mut ()) -> i32 {
         self.area()
     }
 }
 
-/// Up to `N` detections or boxes, the strongest of those offered.
+/// Up to `N` detections or boxes, those of the greatest [rank](Entry::rank), in order of arrival.
 #[derive(Debug, Clone)]
-pub(crate) struct Collected<const N: usize, T = Detection> {
+pub(crate) struct Collected<const N: usize, T: Entry = Detection> {
     detections: Vec<T, N, u16>,
     /// The radar's numbers in the same order; `None` of what is not to be kept.
     numbers: Vec<Option<u16>, N, u16>,
+    ranks: Vec<T::Rank, N, u16>,
+    before: T::Before,
 }
 
 /// What became of a detection offered.
@@ -37,34 +55,38 @@ pub(crate) struct Collected<const N: usize, T = Detection> {
 pub(crate) enum Added {
     /// There was room.
     Kept,
-    /// There was none: the weakest of all was dropped.
+    /// There was none: the one of the least rank was dropped, of equals the last.
     Full,
 }
 
 impl<const N: usize, T: Entry> Collected<N, T> {
     pub(crate) const fn new() -> Self {
-        Self { detections: Vec::new(), numbers: Vec::new() }
+        Self { detections: Vec::new(), numbers: Vec::new(), ranks: Vec::new(), before: T::NONE_BEFORE }
     }
 
     pub(crate) fn clear(&mut self) {
         self.detections.clear();
         self.numbers.clear();
+        self.ranks.clear();
+        self.before = T::NONE_BEFORE;
     }
 
-    /// Takes a detection; in a full list it replaces the weakest if it is stronger.
+    /// Takes a detection; in a full list it takes the room of the last of those that count least, if it counts more.
     pub(crate) fn add(&mut self, number: u16, detection: T) -> Added {
-        if self.detections.push(detection).is_ok() {
-            let _ = self.numbers.push(Some(number));
-            return Added::Kept;
+        let rank = detection.rank(&mut self.before);
+        let is_full = self.detections.is_full();
+        if is_full {
+            let least = self.ranks.iter().enumerate().rev().min_by_key(|(_, rank)| **rank);
+            let Some((place, _)) = least.filter(|(_, least)| **least < rank) else { return Added::Full };
+            // unlike `remove`, cannot panic
+            self.detections.retain(all_but(place));
+            self.numbers.retain(all_but(place));
+            self.ranks.retain(all_but(place));
         }
-        let weakest = self.detections.iter().enumerate().min_by_key(|(_, d)| Entry::strength(*d));
-        if let Some((place, weakest)) = weakest
-            && Entry::strength(weakest) < Entry::strength(&detection)
-            && let (Some(d), Some(n)) = (self.detections.get_mut(place), self.numbers.get_mut(place))
-        {
-            (*d, *n) = (detection, Some(number));
-        }
-        Added::Full
+        let _ = self.detections.push(detection);
+        let _ = self.numbers.push(Some(number));
+        let _ = self.ranks.push(rank);
+        if is_full { Added::Full } else { Added::Kept }
     }
 
     /// Where the detection of a number lies. Radars repeat their order, so the search begins at `from`.
@@ -86,6 +108,8 @@ impl<const N: usize, T: Entry> Collected<N, T> {
     pub(crate) fn finish(&mut self) {
         let mut numbers = self.numbers.iter();
         self.detections.retain(|_| numbers.next().is_some_and(Option::is_some));
+        let mut numbers = self.numbers.iter();
+        self.ranks.retain(|_| numbers.next().is_some_and(Option::is_some));
         self.numbers.retain(Option::is_some);
     }
 
@@ -98,15 +122,22 @@ impl<const N: usize, T: Entry> Collected<N, T> {
     }
 }
 
+/// What keeps all elements of a list but one.
+fn all_but<E>(place: usize) -> impl FnMut(&E) -> bool {
+    let mut places = 0..;
+    move |_| places.next() != Some(place)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixed::angle::Angle;
     use std::vec::Vec as StdVec;
 
+    /// Of this strength, from a place of its own.
     fn detection(snr: i16) -> Detection {
         Detection {
-            range_cm: 1000,
+            range_cm: 1000 + 300 * snr.unsigned_abs(),
             azimuth: Angle::ZERO,
             elevation: None,
             radial_velocity_cm_s: 0,
@@ -116,17 +147,65 @@ mod tests {
     }
 
     fn strengths<const N: usize>(c: &Collected<N>) -> StdVec<i16> {
-        c.detections().iter().map(Detection::strength).collect()
+        c.detections().iter().filter_map(Detection::strength).collect()
     }
 
     #[test]
-    fn the_strongest_stay_under_their_numbers() {
+    fn the_strongest_stay_under_their_numbers_in_the_order_they_arrived_in() {
         let mut c = Collected::<3>::new();
         let added: StdVec<Added> =
             [(7, 20), (8, 50), (9, 30), (10, 10), (11, 60)].map(|(n, s)| c.add(n, detection(s))).into();
         assert_eq!(added, [Added::Kept, Added::Kept, Added::Kept, Added::Full, Added::Full]);
-        assert_eq!(strengths(&c), [60, 50, 30]);
-        assert_eq!((c.place(11, 0), c.place(9, 0), c.place(7, 0)), (Some(0), Some(2), None));
+        assert_eq!(strengths(&c), [50, 30, 60]);
+        assert_eq!((c.place(11, 0), c.place(9, 0), c.place(7, 0)), (Some(2), Some(1), None));
+    }
+
+    /// What a list that fills while detections arrive keeps is what one that sees them all at once does.
+    #[test]
+    fn a_list_that_fills_keeps_what_a_scan_of_all_keeps() {
+        use crate::frame::gate::GateConfig;
+        use crate::frame::scan::Scan;
+        use crate::sensor::field_of_view::FieldOfView;
+        use crate::sensor::mount::Mount;
+        use crate::sensor::noise::NoiseConfig;
+
+        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+        let view = FieldOfView {
+            azimuth_min_deg: -60.0,
+            azimuth_max_deg: 60.0,
+            elevation_min_deg: -16.0,
+            elevation_max_deg: 16.0,
+            range_min_m: 3.0,
+            range_max_m: 200.0,
+        };
+        let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
+        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
+        let mut state = 1_u32;
+        let mut draw = |below: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % below
+        };
+        for frame in 0..50 {
+            let mut all: StdVec<Detection> = (0..20 + 5 * frame)
+                .map(|_| Detection {
+                    // few places, and few strengths
+                    range_cm: 1000 + 250 * draw(12) as u16,
+                    azimuth: Angle::from_degrees(draw(5) as f32),
+                    snr_half_db: Some(20 + 10 * draw(5) as i16),
+                    ..detection(0)
+                })
+                .collect();
+            let mut collected = Collected::<32>::new();
+            all.iter().for_each(|d| _ = collected.add(0, *d));
+            let scan = |from: &[Detection]| {
+                let mut scan = Scan::<32>::new();
+                scan.gather(from.iter(), 0, &gate, |d| noise.place(d, &levelling));
+                StdVec::from(scan.reflections())
+            };
+            assert_eq!(scan(collected.detections()), scan(&all), "frame {frame}");
+            all.reverse();
+            assert_eq!(collected.detections().len(), all.len().min(32));
+        }
     }
 
     #[test]

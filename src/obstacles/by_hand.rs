@@ -37,7 +37,6 @@ pub fn seen_at(x_cm: i32, y_cm: i32, radial_velocity_cm_s: i16) -> Reflection {
         across_cm: 40,
         height_cm: None,
         rcs_half_dbsm: None,
-        strength: 0,
     }
 }
 
@@ -54,7 +53,6 @@ pub fn reflection([x, y]: [f64; 2], [vx, vy]: [f64; 2]) -> Reflection {
         across_cm: (distance * 0.87).round().max(1.0) as u16,
         height_cm: None,
         rcs_half_dbsm: None,
-        strength: 0,
     }
 }
 

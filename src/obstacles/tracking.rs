@@ -197,7 +197,6 @@ mod tests {
                 across_cm: 40,
                 height_cm: None,
                 rcs_half_dbsm: None,
-                strength: 0,
             })
         };
         assert_eq!(at(5000, 0, 2000), Some((t.road, 2000)));

@@ -28,7 +28,7 @@ const MOST_MESSAGES: usize = 400;
 
 /// What lies between the lines and the unit. `D` detections a scan, or boxes of a camera, [`ImageBox`](crate::ImageBox).
 #[derive(Debug)]
-pub struct SerialSession<const D: usize, T = Detection> {
+pub struct SerialSession<const D: usize, T: NativeEntry = Detection> {
     unstuffer: Unstuffer,
     service: SerialService,
     radar: NativeReceiver<D, T>,

@@ -19,7 +19,6 @@ fn what_was_not_seen_of_a_vehicle_lies_behind_the_face_that_was() {
         across_cm: 40,
         height_cm: None,
         rcs_half_dbsm: None,
-        strength: 0,
     };
     for heading in [Direction::AHEAD, Direction::AHEAD.reversed()] {
         let solid = Obstacle::new(&seed, heading, 2_500).solid(&tracking);

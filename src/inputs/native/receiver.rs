@@ -99,18 +99,18 @@ pub struct NativeCounters {
     pub late: u32,
     /// Messages that came before the scan before was fetched.
     pub not_polled: u32,
-    /// Detections dropped because the list was full, the weakest first.
+    /// Detections dropped because the list was full, the weakest of crowded places first.
     pub overflow: u32,
 }
 
 /// Collects the scans of one sensor from whole messages.
 ///
 /// # Limits
-/// `N` detections or boxes a scan, the strongest of those sent, or the largest. After [`push`](Self::push), call
+/// `N` detections a scan, thinned where more are sent, or the largest boxes. After [`push`](Self::push), call
 /// [`poll`](Self::poll) until it returns `None`: a message can end one scan and begin another.
 /// After a restart of the sender up to 8 scans are refused as late.
 #[derive(Debug, Clone)]
-pub struct NativeReceiver<const N: usize, T = Detection> {
+pub struct NativeReceiver<const N: usize, T: NativeEntry = Detection> {
     config: NativeConfig,
     collected: Collected<N, T>,
     /// The last scan has been given out and its detections may go.
@@ -339,7 +339,7 @@ impl<const N: usize, T: NativeEntry> NativeReceiver<N, T> {
 
 /// Collects the scans of one sensor from a serial line.
 #[derive(Debug, Clone)]
-pub struct NativeSerialReceiver<const N: usize, T = Detection> {
+pub struct NativeSerialReceiver<const N: usize, T: NativeEntry = Detection> {
     unstuffer: Unstuffer,
     receiver: NativeReceiver<N, T>,
 }

@@ -75,7 +75,7 @@ pub struct TiCounters {
     pub other_items: u32,
     /// Points with values that are none.
     pub no_point: u32,
-    /// Points dropped because the list was full.
+    /// Points dropped because the list was full, of crowded places first.
     pub overflow: u32,
 }
 

@@ -212,6 +212,6 @@ fn a_full_list_keeps_the_strongest_and_the_scan_is_complete_all_the_same() {
         last = got(radar.push(&frame(f), at(0)));
     }
     // the first, of 0 dBsm, made room for the third
-    assert_eq!(last, Some(whole(1, &[4000, 3000])));
+    assert_eq!(last, Some(whole(1, &[3000, 4000])));
     assert_eq!(radar.counters().overflow, 1);
 }

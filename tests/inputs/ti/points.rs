@@ -263,10 +263,12 @@ fn a_full_list_keeps_the_first_or_the_strongest() {
     assert_eq!(d.iter().map(|d| (d.range_cm, d.snr_half_db)).collect::<Vec<_>>(), [(1000, Some(2)), (2000, Some(4))]);
     assert_eq!(radar.counters().overflow, 2);
     let units = floats(&[[0.01, 0.01, 0.1, 0.05, 1.0]]);
-    let points: Vec<u8> =
-        [10, 1000, 100].iter().flat_map(|ratio| [vec![0, 0], shorts(&[0, 400, *ratio])].concat()).collect();
+    let points: Vec<u8> = [[400, 10], [800, 1000], [1200, 100]]
+        .iter()
+        .flat_map(|p| [vec![0, 0], shorts(&[0, p[0], p[1]])].concat())
+        .collect();
     let frame = Frame::new(TiFamily::Bytes40, 2).item(1020, 3, [units, points].concat());
     let got = feed(&mut radar, &frame.bytes(), 1000);
     let [Got::Scan(_, d, 0)] = &got[..] else { panic!("{got:?}") };
-    assert_eq!(d.iter().map(|d| d.snr_half_db.unwrap()).collect::<Vec<_>>(), [40, 60]);
+    assert_eq!(d.iter().map(|d| d.snr_half_db.unwrap()).collect::<Vec<_>>(), [60, 40]);
 }

@@ -1,4 +1,6 @@
-//! Which measurements are used: the limits on single ones, and the strongest of the rest.
+//! Which measurements are used: the limits on single ones, and which of too many.
+
+use std::collections::BTreeMap;
 
 use viewshed::frame::detection::{MAX_RANGE_M, Measurement};
 use viewshed::frame::gate::{GateConfig, Rejection};
@@ -11,11 +13,6 @@ use crate::geometry::{Levelled, Placed, place};
 /// Half dB, the step quality and size are judged in.
 pub fn half_db(value: Option<f32>) -> Option<f64> {
     value.filter(|v| v.is_finite()).map(|v| (f64::from(v) * 2.0).round())
-}
-
-/// What decides who stays when the list is full: SNR, else RCS, half dB.
-pub fn strength(m: &Measurement) -> f64 {
-    half_db(m.snr_db).or(half_db(m.rcs_dbsm)).unwrap_or(f64::NEG_INFINITY)
 }
 
 /// Whether a measurement is a detection at all.
@@ -52,6 +49,15 @@ pub fn refusal(m: &Measurement, gate: &GateConfig, view: &FieldOfView) -> Option
     }
 }
 
+/// The place a measurement came from, 2.56 m deep and an arc of 2^21 centimetres times 2^-16 turns wide, as one of 1024 values.
+fn place_of(m: &Measurement) -> u64 {
+    let range_cm = (f64::from(m.range_m) * 100.0).round();
+    let azimuth = (f64::from(m.azimuth_rad) / std::f64::consts::TAU * 65_536.0).round();
+    let (depth, width) = ((range_cm / 256.0).floor(), (range_cm * azimuth / 2_097_152.0).floor());
+    let key = depth as u32 * 65_536 + width.rem_euclid(65_536.0) as u32;
+    u64::from(key.wrapping_mul(2_654_435_769)) * 1024 >> 32
+}
+
 /// One frame's measurements after the gate.
 #[derive(Debug, Default)]
 pub struct Scan {
@@ -62,7 +68,8 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// The strongest of a frame, as many as the gate allows, in order of arrival; of equals the first stay.
+    /// As many of a frame as the gate allows, in order of arrival: the strongest, each for 32 dB less for every one that came
+    /// from its place before it; of equals the first stay.
     pub fn new(
         measurements: &[Measurement],
         gate: &GateConfig,
@@ -71,6 +78,7 @@ impl Scan {
         levelled: &Levelled,
     ) -> Self {
         let mut scan = Self::default();
+        let (mut places, mut ranks) = (BTreeMap::new(), Vec::new());
         for m in measurements {
             if !is_detection(m) {
                 scan.points.refused += 1;
@@ -86,9 +94,13 @@ impl Scan {
                 continue;
             }
             scan.placed.push(place(m, noise, levelled));
+            let before = places.entry(place_of(m)).or_insert(0_u8);
+            let strength = half_db(m.snr_db).or(half_db(m.rcs_dbsm)).unwrap_or(32.0);
+            ranks.push((strength.clamp(-96.0, 159.0) - 64.0 * f64::from(*before)).max(-96.0));
+            *before += u8::from(*before < u8::MAX);
         }
         let mut order: Vec<usize> = (0..scan.placed.len()).collect();
-        order.sort_by(|&a, &b| scan.placed[b].strength.total_cmp(&scan.placed[a].strength));
+        order.sort_by(|&a, &b| ranks[b].total_cmp(&ranks[a]));
         let late = order.split_off(order.len().min(usize::from(gate.max_detections)));
         scan.refused.extend(late.iter().map(|_| Rejection::Overflow));
         order.sort_unstable();
@@ -141,7 +153,6 @@ mod tests {
             assert_eq!(points, exact.points);
             assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
             for (got, exact) in scan.reflections().iter().zip(&exact.placed) {
-                assert_eq!(f64::from(got.strength), exact.strength);
                 assert!((f64::from(got.ground_cm) / 100.0 - exact.ground()).abs() < 0.07);
             }
             for reason in Rejection::ALL {

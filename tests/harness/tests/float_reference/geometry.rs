@@ -81,8 +81,6 @@ pub struct Placed {
     pub height: Option<(f64, f64)>,
     /// Radar cross section, dBsm.
     pub rcs: Option<f64>,
-    /// SNR, else RCS, half dB.
-    pub strength: f64,
 }
 
 impl Placed {
@@ -112,7 +110,6 @@ pub fn place(m: &Measurement, noise: &NoiseConfig, levelled: &Levelled) -> Place
         sigma_across: sigma(noise.azimuth_deg),
         height,
         rcs: super::gate::half_db(m.rcs_dbsm).map(|half| half / 2.0),
-        strength: super::gate::strength(m),
     }
 }
 

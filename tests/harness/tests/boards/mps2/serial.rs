@@ -6,6 +6,7 @@ use viewshed::bench::record::{RECORD_LEN, Record};
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
+use viewshed::frame::thinning::Thinning;
 use viewshed::map::Visibility;
 use viewshed::unit::profile::reference::{Map, State};
 use viewshed::unit::said::Said;
@@ -291,15 +292,15 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     assert_eq!((blocks[0].0, blocks[1].0), (1, 2), "sequences");
 }
 
-/// What a unit's list holds of a scan with more detections: a stronger one takes the place of the weakest.
+/// What a unit's list holds of a scan with more detections.
 fn collected(mut scan: Scan) -> Scan {
-    let rest = scan.detections.split_off(scan.detections.len().min(State::DETECTIONS));
-    for d in rest {
-        let Some(weakest) = scan.detections.iter_mut().min_by_key(|d| d.strength()) else { continue };
-        if d.strength() > weakest.strength() {
-            *weakest = d;
-        }
-    }
+    let mut thinning = Thinning::NEW;
+    let mut ranked: Vec<_> = scan.detections.iter().map(|d| std::cmp::Reverse(thinning.rank(d))).zip(0..).collect();
+    ranked.sort_unstable();
+    ranked.truncate(State::DETECTIONS);
+    let mut kept: Vec<usize> = ranked.into_iter().map(|(_, place)| place).collect();
+    kept.sort_unstable();
+    scan.detections = kept.into_iter().map(|place| scan.detections[place]).collect();
     scan
 }
 
