@@ -41,17 +41,22 @@ traffic skewed-2 skewed crossing 2004 90 0.9 150
 traffic tee-1 tee tee 2005 70 1.1 150
 traffic tee-2 tee tee 2006 90 1.2 150
 
-# the scenes of unseen.toml, and the day before each of them
-unseen() {
-    traffic "$1" "$2" "$3" "$4" "$5" "$6" 150
-    traffic "$1-before" "$2" "$3" $(($4 + 100)) "$5" "$6" 90
-}
-unseen wide-3 wide crossing 7001 90 1.1
-unseen skewed-3 skewed crossing 7002 100 0.9
-unseen tee-3 tee tee 7003 80 1.1
-unseen broad-1 broad crossing 7004 100 1.3
-unseen broad-2 broad crossing 7005 90 1.2
-unseen narrow-1 narrow crossing 7006 70 0.6
+# the scenes of unseen.toml
+traffic wide-3 wide crossing 7001 90 1.1 150
+traffic skewed-3 skewed crossing 7002 100 0.9 150
+traffic tee-3 tee tee 7003 80 1.1 150
+traffic broad-1 broad crossing 7004 100 1.3 150
+traffic broad-2 broad crossing 7005 90 1.2 150
+traffic narrow-1 narrow crossing 7006 70 0.6 150
+
+# other traffic past each of these, which lanes are learnt from
+before() { traffic "$1-before" "$2" "$3" "$4" "$5" "$6" 90; }
+before wide-3 wide crossing 7101 90 1.1
+before skewed-3 skewed crossing 7102 100 0.9
+before tee-3 tee tee 7103 80 1.1
+before broad-1 broad crossing 7104 100 1.3
+before broad-2 broad crossing 7105 90 1.2
+before narrow-1 narrow crossing 7106 70 0.6
 
 # days of the unit of wide-1, for calibration.toml
 for day in $(seq 1 14); do

@@ -339,6 +339,23 @@ mod tests {
     }
 
     #[test]
+    fn scenes_that_nothing_was_chosen_on_share_no_seed_and_no_traffic_with_the_others() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings");
+        for (name, scenes) in [("crossing", 6), ("queue", 4)] {
+            let plan = Plan::read(&folder.join(name).join("unseen.toml")).unwrap();
+            let unseen = plan.scenes(&plan.reporting).unwrap();
+            assert_eq!(unseen.len(), scenes);
+            let fixed = shipped(name);
+            let mut others = fixed.scenes(&fixed.training).unwrap();
+            others.extend(fixed.scenes(&fixed.reporting).unwrap());
+            for (ours, other) in unseen.iter().flat_map(|ours| others.iter().map(move |other| (ours, other))) {
+                assert!(ours.seed != other.seed && ours.radar.mount != other.radar.mount, "{}", ours.name);
+                assert_ne!(ours.files(None).unwrap(), other.files(None).unwrap(), "{}", ours.name);
+            }
+        }
+    }
+
+    #[test]
     fn the_shipped_scenes_are_those_that_were_fixed() {
         let fixed = |name: &str| -> Vec<(String, u64, f64, f64)> {
             let plan = shipped(name);
@@ -399,7 +416,8 @@ mod tests {
                     (words[0].to_owned(), words[words.len() - 1].parse().unwrap())
                 })
                 .collect();
-            let sets = [&plan.training, &plan.reporting];
+            let unseen = Plan::read(&plan.folder.join("unseen.toml")).unwrap();
+            let sets = [&plan.training, &plan.reporting, &unseen.reporting];
             let scenes: Vec<Scene> = sets.iter().flat_map(|set| plan.scenes(set).unwrap()).collect();
             let mut used: Vec<(String, f64)> = scenes.iter().map(|s| (s.name.clone(), s.duration_s)).collect();
             for scene in &scenes {

@@ -71,8 +71,8 @@ fn messages(bytes: &[u8]) -> Vec<Vec<u8>> {
 const AZIMUTHS: usize = State::AZIMUTHS;
 /// See [`AZIMUTHS`].
 const RANGES: usize = State::RANGES;
-/// All of its cells but one in 120.
-const NEARLY_ALL: usize = AZIMUTHS * RANGES * 119 / 120;
+/// All of its cells but one in 100.
+const NEARLY_ALL: usize = AZIMUTHS * RANGES * 99 / 100;
 /// Scans within which every ray is sent again.
 const SCANS_OF_A_RAY: usize = 6;
 
