@@ -102,7 +102,7 @@ impl Detection {
         })
     }
 
-    /// SNR, else RCS, half dB: what counts first when a list is too full.
+    /// SNR, else RCS, half dB: what a list that is too full is thinned by, beside where detections came from.
     pub fn strength(&self) -> Option<i16> {
         self.snr_half_db.or(self.rcs_half_dbsm)
     }

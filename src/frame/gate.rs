@@ -58,7 +58,7 @@ pub enum Rejection {
     Rcs,
     /// Radial velocity implausible, or too slow where only movers are wanted.
     Velocity,
-    /// The list was full of others that count more.
+    /// The list was full of others of a greater priority, or of the same and earlier.
     Overflow,
     /// No detection at all: not finite, at no distance, or absurd. Dropped by whoever decoded it.
     Refused,

@@ -11,7 +11,7 @@ use crate::frame::thinning::Thinning;
 /// Up to `D` reflections of the frame, in order of arrival.
 ///
 /// # Limits
-/// When more pass the gate, those of the greatest [rank](Thinning::rank) stay, of equals the first to arrive; the others
+/// When more pass the gate, those of the greatest [priority](Thinning::priority) stay, of equals the first to arrive; the others
 /// are counted as [`Rejection::Overflow`]. The cost is three looks at every detection at most, however many there are and in
 /// whatever order they come.
 #[derive(Debug, Clone)]
@@ -67,14 +67,15 @@ impl<const D: usize> Scan<D> {
         }
         if let Some(late) = late.filter(|_| passed > room) {
             let late = late.filter(|d| gate.judge(d).is_ok());
-            let (mut thinning, mut ranks) = (Thinning::NEW, Ranks([0; RANKS]));
+            let (mut thinning, mut priorities) = (Thinning::NEW, Priorities([0; PRIORITIES]));
             for d in kept.iter().copied().chain(late.clone()) {
-                ranks.count(thinning.rank(d));
+                priorities.count(thinning.priority(d));
             }
-            let (mut thinning, mut greatest) = (Thinning::NEW, ranks.greatest(room));
-            kept.retain(|d| greatest.takes(thinning.rank(d)));
+            let mut greatest = priorities.greatest(room);
+            thinning = Thinning::NEW;
+            kept.retain(|d| greatest.takes(thinning.priority(d)));
             for d in late {
-                if greatest.takes(thinning.rank(d)) {
+                if greatest.takes(thinning.priority(d)) {
                     let _ = kept.push(d);
                 }
             }
@@ -108,15 +109,15 @@ impl<const D: usize> Scan<D> {
     }
 }
 
-/// Ranks there are.
-const RANKS: usize = 1 << u8::BITS;
+/// Priorities there are.
+const PRIORITIES: usize = 1 << u8::BITS;
 
-/// How many detections have which rank.
-struct Ranks([u16; RANKS]);
+/// How many detections have which priority.
+struct Priorities([u16; PRIORITIES]);
 
-impl Ranks {
-    fn count(&mut self, rank: u8) {
-        if let Some(n) = self.0.get_mut(usize::from(rank)) {
+impl Priorities {
+    fn count(&mut self, priority: u8) {
+        if let Some(n) = self.0.get_mut(usize::from(priority)) {
             *n = n.saturating_add(1);
         }
     }
@@ -136,16 +137,16 @@ impl Ranks {
     }
 }
 
-/// All above a rank, and the first so many of that rank.
+/// All above a priority, and the first so many of that priority.
 struct Greatest {
     least: u8,
     of_least: usize,
 }
 
 impl Greatest {
-    fn takes(&mut self, rank: u8) -> bool {
-        if rank != self.least || self.of_least == 0 {
-            return rank > self.least;
+    fn takes(&mut self, priority: u8) -> bool {
+        if priority != self.least || self.of_least == 0 {
+            return priority > self.least;
         }
         self.of_least -= 1;
         true
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_strongest_stay_and_the_rest_is_counted() {
+    fn the_strongest_of_places_of_their_own_stay_and_the_rest_is_counted() {
         let s: Scan<3> = scan(&[20, 50, 30, 40, 10, 60]);
         assert_eq!(kept(&s), [1, 3, 5], "in order of arrival");
         assert_eq!(s.rejections().count(Rejection::Overflow), 3);

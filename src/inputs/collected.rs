@@ -8,46 +8,46 @@ use crate::frame::thinning::Thinning;
 
 /// What is collected.
 pub trait Entry: Copy {
-    /// What those that came before say of the next.
-    type Before: Copy + core::fmt::Debug;
+    /// What is counted of those that came before in the scan.
+    type Counts: Clone + core::fmt::Debug;
     /// Before the first.
-    const NONE_BEFORE: Self::Before;
-    /// How much one counts in a full list, more is better.
-    type Rank: Ord + Copy + core::fmt::Debug;
+    const NO_COUNTS: Self::Counts;
+    /// What decides who stays in a full list: the greatest.
+    type Priority: Ord + Copy + core::fmt::Debug;
 
-    /// How much it counts, as the next to arrive.
-    fn rank(&self, before: &mut Self::Before) -> Self::Rank;
+    /// Its priority, as the next to arrive.
+    fn priority(&self, counts: &mut Self::Counts) -> Self::Priority;
 }
 
 impl Entry for Detection {
-    type Before = Thinning;
-    const NONE_BEFORE: Thinning = Thinning::NEW;
-    type Rank = u8;
+    type Counts = Thinning;
+    const NO_COUNTS: Thinning = Thinning::NEW;
+    type Priority = u8;
 
-    fn rank(&self, before: &mut Thinning) -> u8 {
-        before.rank(self)
+    fn priority(&self, counts: &mut Thinning) -> u8 {
+        counts.priority(self)
     }
 }
 
 /// Of a picture too full the smallest go: what is small hides little.
 impl Entry for ImageBox {
-    type Before = ();
-    const NONE_BEFORE: () = ();
-    type Rank = i32;
+    type Counts = ();
+    const NO_COUNTS: () = ();
+    type Priority = i32;
 
-    fn rank(&self, (): &mut ()) -> i32 {
+    fn priority(&self, (): &mut ()) -> i32 {
         self.area()
     }
 }
 
-/// Up to `N` detections or boxes, those of the greatest [rank](Entry::rank), in order of arrival.
+/// Up to `N` detections or boxes, those of the greatest [priority](Entry::priority), in order of arrival.
 #[derive(Debug, Clone)]
 pub(crate) struct Collected<const N: usize, T: Entry = Detection> {
     detections: Vec<T, N, u16>,
     /// The radar's numbers in the same order; `None` of what is not to be kept.
     numbers: Vec<Option<u16>, N, u16>,
-    ranks: Vec<T::Rank, N, u16>,
-    before: T::Before,
+    priorities: Vec<T::Priority, N, u16>,
+    counts: T::Counts,
 }
 
 /// What became of a detection offered.
@@ -55,38 +55,38 @@ pub(crate) struct Collected<const N: usize, T: Entry = Detection> {
 pub(crate) enum Added {
     /// There was room.
     Kept,
-    /// There was none: the one of the least rank was dropped, of equals the last.
+    /// There was none: the one of the least priority was dropped, of equals the last.
     Full,
 }
 
 impl<const N: usize, T: Entry> Collected<N, T> {
     pub(crate) const fn new() -> Self {
-        Self { detections: Vec::new(), numbers: Vec::new(), ranks: Vec::new(), before: T::NONE_BEFORE }
+        Self { detections: Vec::new(), numbers: Vec::new(), priorities: Vec::new(), counts: T::NO_COUNTS }
     }
 
     pub(crate) fn clear(&mut self) {
         self.detections.clear();
         self.numbers.clear();
-        self.ranks.clear();
-        self.before = T::NONE_BEFORE;
+        self.priorities.clear();
+        self.counts = T::NO_COUNTS;
     }
 
-    /// Takes a detection; in a full list it takes the room of the last of those that count least, if it counts more.
+    /// Takes a detection; in a full list it takes the room of the last of those of the least priority, if its own is greater.
     pub(crate) fn add(&mut self, number: u16, detection: T) -> Added {
-        let rank = detection.rank(&mut self.before);
-        let is_full = self.detections.is_full();
-        if is_full {
-            let least = self.ranks.iter().enumerate().rev().min_by_key(|(_, rank)| **rank);
-            let Some((place, _)) = least.filter(|(_, least)| **least < rank) else { return Added::Full };
-            // unlike `remove`, cannot panic
-            self.detections.retain(all_but(place));
-            self.numbers.retain(all_but(place));
-            self.ranks.retain(all_but(place));
+        let priority = detection.priority(&mut self.counts);
+        if !self.detections.is_full() {
+            let _ = self.detections.push(detection);
+            let _ = self.numbers.push(Some(number));
+            let _ = self.priorities.push(priority);
+            return Added::Kept;
         }
-        let _ = self.detections.push(detection);
-        let _ = self.numbers.push(Some(number));
-        let _ = self.ranks.push(rank);
-        if is_full { Added::Full } else { Added::Kept }
+        let least = self.priorities.iter().enumerate().rev().min_by_key(|(_, priority)| **priority);
+        if let Some((place, _)) = least.filter(|(_, least)| **least < priority) {
+            replace(&mut self.detections, place, detection);
+            replace(&mut self.numbers, place, Some(number));
+            replace(&mut self.priorities, place, priority);
+        }
+        Added::Full
     }
 
     /// Where the detection of a number lies. Radars repeat their order, so the search begins at `from`.
@@ -109,7 +109,7 @@ impl<const N: usize, T: Entry> Collected<N, T> {
         let mut numbers = self.numbers.iter();
         self.detections.retain(|_| numbers.next().is_some_and(Option::is_some));
         let mut numbers = self.numbers.iter();
-        self.ranks.retain(|_| numbers.next().is_some_and(Option::is_some));
+        self.priorities.retain(|_| numbers.next().is_some_and(Option::is_some));
         self.numbers.retain(Option::is_some);
     }
 
@@ -122,10 +122,12 @@ impl<const N: usize, T: Entry> Collected<N, T> {
     }
 }
 
-/// What keeps all elements of a list but one.
-fn all_but<E>(place: usize) -> impl FnMut(&E) -> bool {
-    let mut places = 0..;
-    move |_| places.next() != Some(place)
+/// Takes an element out; those behind it move up, and `last` comes behind them. Unlike `remove` and `push`, cannot panic.
+fn replace<E>(list: &mut [E], place: usize, last: E) {
+    let mut moved = last;
+    for element in list.iter_mut().skip(place).rev() {
+        moved = core::mem::replace(element, moved);
+    }
 }
 
 #[cfg(test)]
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_strongest_stay_under_their_numbers_in_the_order_they_arrived_in() {
+    fn the_strongest_of_places_of_their_own_stay_under_their_numbers_in_the_order_they_arrived_in() {
         let mut c = Collected::<3>::new();
         let added: StdVec<Added> =
             [(7, 20), (8, 50), (9, 30), (10, 10), (11, 60)].map(|(n, s)| c.add(n, detection(s))).into();
@@ -160,7 +162,7 @@ mod tests {
         assert_eq!((c.place(11, 0), c.place(9, 0), c.place(7, 0)), (Some(2), Some(1), None));
     }
 
-    /// What a list that fills while detections arrive keeps is what one that sees them all at once does.
+    /// What a list that fills while detections arrive keeps is what one that sees them all at once does, where all pass the gate.
     #[test]
     fn a_list_that_fills_keeps_what_a_scan_of_all_keeps() {
         use crate::frame::gate::GateConfig;
@@ -186,7 +188,7 @@ mod tests {
             (state >> 8) % below
         };
         for frame in 0..50 {
-            let mut all: StdVec<Detection> = (0..20 + 5 * frame)
+            let all: StdVec<Detection> = (0..20 + 5 * frame)
                 .map(|_| Detection {
                     // few places, and few strengths
                     range_cm: 1000 + 250 * draw(12) as u16,
@@ -203,8 +205,17 @@ mod tests {
                 StdVec::from(scan.reflections())
             };
             assert_eq!(scan(collected.detections()), scan(&all), "frame {frame}");
-            all.reverse();
             assert_eq!(collected.detections().len(), all.len().min(32));
+        }
+    }
+
+    #[test]
+    fn the_next_scan_begins_with_empty_places() {
+        let mut c = Collected::<2>::new();
+        for _ in 0..2 {
+            c.clear();
+            [20, 20, 20, 30].iter().for_each(|s| _ = c.add(0, detection(*s)));
+            assert_eq!((strengths(&c), &c.priorities[..]), (std::vec![20, 30], &[116, 126][..]));
         }
     }
 

@@ -58,7 +58,7 @@ size!(
 );
 size!(
     /// 100 x 96 x 4 cells: parts with 128 kB.
-    small, 100, 96, 4, 28, 176
+    small, 100, 96, 4, 28, 160
 );
 
 /// A camera's unit, 200 m ahead and 30 m to each side.

@@ -339,7 +339,7 @@ fn what_was_learnt_of_lanes_outlasts_gaps_and_steps_of_the_clock_and_is_lost_by_
 }
 
 #[test]
-fn ten_thousand_detections_are_taken_by_strength_and_counted() {
+fn of_ten_thousand_detections_256_are_taken_and_the_rest_is_counted() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
     let many: Vec<Detection> = (0..10_000_i32)
         .map(|i| Detection {

@@ -174,7 +174,7 @@ fn a_lorry_parked_before_the_unit_started_hides_little_and_traffic_beside_it_has
 #[test]
 fn in_a_crowd_that_stood_for_a_minute_a_lorry_has_its_box_and_its_shadow_and_the_lane_is_seen() {
     let mut rig = Rig::new(gantry(6.0, 0.0));
-    // to both sides of a lane; of too many detections those that reflect best are kept
+    // to both sides of a lane; of too many detections those of crowded places go first
     let places = (0..256).map(|i| {
         let aside = 2.5 + f64::from(i / 16 % 8);
         [20.0 + 8.0 * f64::from(i % 16), if i < 128 { aside } else { -aside }, 0.8]

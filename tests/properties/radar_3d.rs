@@ -95,7 +95,7 @@ proptest! {
 
     #[test]
     fn the_small_profile_holds(world in worlds(12)) {
-        run::<100, 96, 4, 4, 28, 176>(&world.0, &world.1)?;
+        run::<100, 96, 4, 4, 28, 160>(&world.0, &world.1)?;
     }
 
     #[test]

@@ -134,14 +134,14 @@ pub struct Ars408Counters {
     pub no_range: u32,
     /// Entries left out by the sensor's own marks.
     pub unwanted: u32,
-    /// Entries dropped because the list was full, the weakest of crowded places first.
+    /// Entries dropped because the list was full, of crowded places first.
     pub overflow: u32,
 }
 
 /// Collects the scans of one sensor; several on a bus have one each and are all given every frame.
 ///
 /// # Limits
-/// `N` entries a scan; of more, the weakest by RCS of crowded places go. Where a status message is lost and scans follow each
+/// `N` entries a scan; of more, crowded places give way first, then the least RCS. Where a status message is lost and scans follow each
 /// other without a pause, entries can fill the gaps of the scan before. Whether quality messages follow is learnt: before the
 /// first of them, or the first state message, scans are given out without waiting for them.
 #[derive(Debug, Clone)]

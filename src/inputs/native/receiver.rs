@@ -99,7 +99,7 @@ pub struct NativeCounters {
     pub late: u32,
     /// Messages that came before the scan before was fetched.
     pub not_polled: u32,
-    /// Detections dropped because the list was full, the weakest of crowded places first.
+    /// Detections dropped because the list was full, of crowded places first.
     pub overflow: u32,
 }
 

@@ -100,7 +100,7 @@ pub struct PolarCells<'a> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
-    /// Detections of a frame an estimator may use, of those that pass its gate; of more, the weakest of crowded places go.
+    /// Detections of a frame an estimator may use, of those that pass its gate; of more, those of crowded places go first.
     pub max_detections: usize,
     /// Share of a cell that boxes must fill for `reference` to call it occupied.
     pub reference_share: f64,

@@ -35,7 +35,7 @@ pub enum Grid {
     /// 200 x 128 x 12 cells, for parts with 512 kB
     #[default]
     Reference,
-    /// 100 x 96 x 4 cells, 28 vehicles and 176 detections a frame, for parts with 128 kB
+    /// 100 x 96 x 4 cells, 28 vehicles and 160 detections a frame, for parts with 128 kB
     Small,
 }
 

@@ -20,7 +20,7 @@
 //! | ended where nobody drove | 14.6 / 12.4 | +0.4 / +9.6 |
 //! | driven on by three, not two | 16.6 / 11.5 | +4.5 / +7.8 |
 //!
-//! On the six crossings that are reported 18.0 / 11.1 become 17.2 / 10.8, and 15.5 / 10.0 with the net; on the crossing of
+//! On the six crossings that are reported 17.2 / 11.4 become 16.8 / 10.7, and 15.0 / 10.3 with the net; on the crossing of
 //! another generator, from its 50th second on and with lanes learnt before the 45th, 20.9 / 10.5 became 21.8 / 12.1 where
 //! a unit is started then, and 10.6 / 13.3 became 9.9 / 15.1 where it has run since the start.
 //!

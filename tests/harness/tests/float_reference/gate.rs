@@ -68,8 +68,8 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// As many of a frame as the gate allows, in order of arrival: the strongest, each for 32 dB less for every one that came
-    /// from its place before it; of equals the first stay.
+    /// As many of a frame as the gate allows, in order of arrival: those of the greatest strength, less 32 dB for each that came
+    /// from the same place before; of equals the first.
     pub fn new(
         measurements: &[Measurement],
         gate: &GateConfig,
@@ -154,6 +154,7 @@ mod tests {
             assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
             for (got, exact) in scan.reflections().iter().zip(&exact.placed) {
                 assert!((f64::from(got.ground_cm) / 100.0 - exact.ground()).abs() < 0.07);
+                assert_eq!(got.rcs_half_dbsm.map(|half| f64::from(half) / 2.0), exact.rcs);
             }
             for reason in Rejection::ALL {
                 let exact = exact.refused.iter().filter(|r| **r == reason).count();

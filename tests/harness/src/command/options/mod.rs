@@ -217,7 +217,7 @@ struct EstimatorArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Estimators")]
 struct UnitArgs {
-    /// Detections a frame that estimators take, after the gate; of more, the weakest of crowded places are dropped and counted [default: 256, from 1 to 4096]
+    /// Detections a frame that estimators take, after the gate; of more, those of crowded places are dropped first, and all counted [default: 256, from 1 to 4096]
     #[arg(long, allow_negative_numbers = true, value_name = "N")]
     max_detections: Option<usize>,
     /// Grid of radar-3d: on the small one, radar-3d-small runs beside radar-3d in tables, and is what is tuned, watched and

@@ -131,7 +131,7 @@ fn in_words(reason: &str) -> Option<&str> {
         _ if reason == Rejection::Quality.name() => "with too low an SNR",
         _ if reason == Rejection::Rcs.name() => "with too low an RCS",
         _ if reason == Rejection::Velocity.name() => "with a velocity no vehicle has",
-        _ if reason == Rejection::Overflow.name() => "too many for --max-detections, the weakest of crowded places",
+        _ if reason == Rejection::Overflow.name() => "too many for --max-detections, of crowded places first",
         DROPPED => "not finite or without a range when read",
         NOT_FINITE => "not finite",
         NO_RANGE => "at no measurable range",

@@ -338,21 +338,33 @@ mod tests {
         Plan::read(&folder.join(name).join("scenes.toml")).unwrap()
     }
 
+    /// Scenes that nothing was chosen on have seeds, mounts and traffic of their own.
     #[test]
-    fn scenes_that_nothing_was_chosen_on_share_no_seed_and_no_traffic_with_the_others() {
+    fn unseen_scenes_share_nothing_with_those_of_training_and_reporting() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings");
         for (name, scenes) in [("crossing", 6), ("queue", 4)] {
             let plan = Plan::read(&folder.join(name).join("unseen.toml")).unwrap();
             let unseen = plan.scenes(&plan.reporting).unwrap();
             assert_eq!(unseen.len(), scenes);
+            if name == "crossing" {
+                assert!(plan.other_days(&plan.reporting).unwrap().iter().all(|day| day.exists()));
+            }
             let fixed = shipped(name);
             let mut others = fixed.scenes(&fixed.training).unwrap();
             others.extend(fixed.scenes(&fixed.reporting).unwrap());
             for (ours, other) in unseen.iter().flat_map(|ours| others.iter().map(move |other| (ours, other))) {
                 assert!(ours.seed != other.seed && ours.radar.mount != other.radar.mount, "{}", ours.name);
-                assert_ne!(ours.files(None).unwrap(), other.files(None).unwrap(), "{}", ours.name);
+                let traffic = |scene: &Scene| std::fs::read(scene.source(None).unwrap().path).unwrap();
+                assert!(traffic(ours) != traffic(other), "{} and {}", ours.name, other.name);
             }
         }
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+        let days =
+            |text: &str| text.lines().filter_map(|l| l.strip_prefix("fcd = ")).map(str::to_owned).collect::<Vec<_>>();
+        let unseen = days(&read("unseen.toml"));
+        assert_eq!(unseen.len(), 11, "ten to report, and the one that is trained on");
+        let others = ["experiment.toml", "gantry-camera.toml", "calibration.toml", "tuning.toml"].map(read).join("\n");
+        assert!(unseen[1..].iter().all(|day| !others.contains(day.as_str())), "{unseen:?}");
     }
 
     #[test]

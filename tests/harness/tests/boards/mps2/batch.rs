@@ -13,7 +13,7 @@ use crate::shipped;
 
 /// Instructions a frame may take, of the recording, which has more detections than either grid keeps, and of
 /// scans nobody should send.
-const BUDGET: [(Profile, u32); 2] = [(Profile::Reference, 2_850_000), (Profile::Small, 930_000)];
+const BUDGET: [(Profile, u32); 2] = [(Profile::Reference, 2_850_000), (Profile::Small, 900_000)];
 
 fn run(board: Board, profile: Profile, name: &str, settings: &Settings, scans: &[Scan]) -> Checked {
     let checked = Run { board, profile, name, settings, scans }.check().unwrap();

@@ -49,7 +49,7 @@ fn same(profile: Profile, script: &Script) -> Running {
     let mut board = start(profile);
     let expected = answer(profile, &script.bytes);
     board.line.send(&script.bytes).unwrap();
-    board.line.wait_for(expected.bytes.len(), Duration::from_secs(10)).unwrap();
+    board.line.wait_for(expected.bytes.len(), Duration::from_secs(60)).unwrap();
     let got = &board.line.answer;
     let first = got.iter().zip(&expected.bytes).position(|(a, b)| a != b);
     assert_eq!((first, got.len()), (None, expected.bytes.len()), "first byte that differs, and how many came");
@@ -292,13 +292,13 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     assert_eq!((blocks[0].0, blocks[1].0), (1, 2), "sequences");
 }
 
-/// What a unit's list holds of a scan with more detections.
+/// What a unit's list holds of a scan with more detections: it comes before the gate.
 fn collected(mut scan: Scan) -> Scan {
     let mut thinning = Thinning::NEW;
-    let mut ranked: Vec<_> = scan.detections.iter().map(|d| std::cmp::Reverse(thinning.rank(d))).zip(0..).collect();
-    ranked.sort_unstable();
-    ranked.truncate(State::DETECTIONS);
-    let mut kept: Vec<usize> = ranked.into_iter().map(|(_, place)| place).collect();
+    let mut sorted: Vec<_> = scan.detections.iter().map(|d| std::cmp::Reverse(thinning.priority(d))).zip(0..).collect();
+    sorted.sort_unstable();
+    sorted.truncate(State::DETECTIONS);
+    let mut kept: Vec<usize> = sorted.into_iter().map(|(_, place)| place).collect();
     kept.sort_unstable();
     scan.detections = kept.into_iter().map(|place| scan.detections[place]).collect();
     scan
