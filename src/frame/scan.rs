@@ -154,7 +154,7 @@ impl Greatest {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::fixed::angle::Angle;
     use crate::frame::gate::GateConfig;
@@ -180,7 +180,8 @@ mod tests {
         gathered(&strengths.iter().enumerate().map(of).collect::<StdVec<_>>())
     }
 
-    fn gathered<const D: usize>(detections: &[Detection]) -> Scan<D> {
+    /// A frame of detections that all pass the gate.
+    pub(crate) fn gathered<const D: usize>(detections: &[Detection]) -> Scan<D> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
         let view = FieldOfView {
             azimuth_min_deg: -60.0,

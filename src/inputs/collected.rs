@@ -134,6 +134,7 @@ fn replace<E>(list: &mut [E], place: usize, last: E) {
 mod tests {
     use super::*;
     use crate::fixed::angle::Angle;
+    use crate::frame::scan::tests::gathered;
     use std::vec::Vec as StdVec;
 
     /// Of this strength, from a place of its own.
@@ -165,23 +166,6 @@ mod tests {
     /// What a list that fills while detections arrive keeps is what one that sees them all at once does, where all pass the gate.
     #[test]
     fn a_list_that_fills_keeps_what_a_scan_of_all_keeps() {
-        use crate::frame::gate::GateConfig;
-        use crate::frame::scan::Scan;
-        use crate::sensor::field_of_view::FieldOfView;
-        use crate::sensor::mount::Mount;
-        use crate::sensor::noise::NoiseConfig;
-
-        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
-        let view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
-        let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
-        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
         let mut state = 1_u32;
         let mut draw = |below: u32| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -199,11 +183,7 @@ mod tests {
                 .collect();
             let mut collected = Collected::<32>::new();
             all.iter().for_each(|d| _ = collected.add(0, *d));
-            let scan = |from: &[Detection]| {
-                let mut scan = Scan::<32>::new();
-                scan.gather(from.iter(), 0, &gate, |d| noise.place(d, &levelling));
-                StdVec::from(scan.reflections())
-            };
+            let scan = |from: &[Detection]| StdVec::from(gathered::<32>(from).reflections());
             assert_eq!(scan(collected.detections()), scan(&all), "frame {frame}");
             assert_eq!(collected.detections().len(), all.len().min(32));
         }
