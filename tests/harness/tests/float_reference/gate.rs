@@ -49,13 +49,13 @@ pub fn refusal(m: &Measurement, gate: &GateConfig, view: &FieldOfView) -> Option
     }
 }
 
-/// The place a measurement came from, 2.56 m deep and an arc of 2^21 centimetres times 2^-16 turns wide, as one of 1024 values.
-fn place_of(m: &Measurement) -> u64 {
+/// The bin a measurement falls into, 2.56 m deep and an arc of 2^21 centimetres times 2^-16 turns wide, as one of 1024 values.
+fn bin_of(m: &Measurement) -> u64 {
     let range_cm = (f64::from(m.range_m) * 100.0).round();
     let azimuth = (f64::from(m.azimuth_rad) / std::f64::consts::TAU * 65_536.0).round();
     let (depth, width) = ((range_cm / 256.0).floor(), (range_cm * azimuth / 2_097_152.0).floor());
     let key = depth as u32 * 65_536 + width.rem_euclid(65_536.0) as u32;
-    u64::from(key.wrapping_mul(2_654_435_769)) * 1024 >> 32
+    (u64::from(key.wrapping_mul(2_654_435_769)) * 1024) >> 32
 }
 
 /// One frame's measurements after the gate.
@@ -94,7 +94,7 @@ impl Scan {
                 continue;
             }
             scan.placed.push(place(m, noise, levelled));
-            let before = places.entry(place_of(m)).or_insert(0_u8);
+            let before = places.entry(bin_of(m)).or_insert(0_u8);
             let strength = half_db(m.snr_db).or(half_db(m.rcs_dbsm)).unwrap_or(32.0);
             ranks.push((strength.clamp(-96.0, 159.0) - 64.0 * f64::from(*before)).max(-96.0));
             *before += u8::from(*before < u8::MAX);
