@@ -180,7 +180,7 @@ pub(crate) mod tests {
         gathered(&strengths.iter().enumerate().map(of).collect::<StdVec<_>>())
     }
 
-    /// A frame of detections that all pass the gate.
+    /// A frame of detections that all lie in the field of view.
     pub(crate) fn gathered<const D: usize>(detections: &[Detection]) -> Scan<D> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
         let view = FieldOfView {
