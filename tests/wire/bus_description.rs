@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 
 use crate::dbc::{Signals, decode};
 use crate::shadows::{A, Map, Shadows, USUAL, W, header};
+use crate::skipped::skipped;
 use can_dbc::Dbc;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
@@ -285,8 +286,7 @@ fn cantools_reads_the_same() {
     let python = std::env::var("PYTHON").unwrap_or_else(|_| installed.into());
     if !Command::new(&python).args(["-c", "import cantools"]).stderr(Stdio::null()).status().is_ok_and(|s| s.success())
     {
-        println!("skipped: {python} cannot import cantools (tests/cantools.sh installs it)");
-        return;
+        return skipped("cantools", "the bus description (tests/cantools.sh installs it)");
     }
     for medium in [CLASSIC, FD] {
         with_cantools(&python, medium);

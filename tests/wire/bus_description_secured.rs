@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use crate::dbc::decode;
 use crate::shadows::{A, Shadows, W, header};
+use crate::skipped::skipped;
 use can_dbc::Dbc;
 use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
@@ -101,8 +102,7 @@ fn cantools_loads_it_strictly_and_reads_the_same() {
     let python = std::env::var("PYTHON").unwrap_or_else(|_| installed.into());
     let mut check = Command::new(&python);
     if !check.args(["-c", "import cantools"]).stderr(Stdio::null()).status().is_ok_and(|s| s.success()) {
-        println!("skipped: {python} cannot import cantools (tests/cantools.sh installs it)");
-        return;
+        return skipped("cantools", "the bus description of secured messages (tests/cantools.sh installs it)");
     }
     let dbc = described();
     let message = |frame: &CanFrame| Received::from_frame(frame, &Addresses::STANDARD).unwrap().message;

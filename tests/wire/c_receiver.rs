@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::shadows::{A, Map, Random, Shadows, W, header};
+use crate::skipped::skipped;
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
@@ -236,7 +237,7 @@ fn built(name: &str) -> Option<PathBuf> {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/receiver/receiver.c");
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("receiver-{name}"));
     if Command::new("cc").arg("--version").output().is_err() {
-        println!("skipped: no C compiler `cc` (on Debian and Ubuntu: apt-get install gcc libc6-dev)");
+        skipped("cc", &format!("the receiver in C, {name}: no C compiler (apt-get install gcc libc6-dev)"));
         return None;
     }
     let output = Command::new("cc")

@@ -6,6 +6,8 @@
 mod dbc;
 #[path = "../shadows/mod.rs"]
 mod shadows;
+#[path = "../common/skipped.rs"]
+mod skipped;
 
 mod bus_description;
 #[cfg(feature = "secoc")]

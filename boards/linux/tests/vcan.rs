@@ -24,6 +24,10 @@ use viewshed::wire::message::Addresses;
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::status::{Reason, UnitState};
 
+#[path = "../../../tests/common/skipped.rs"]
+mod skipped;
+use skipped::skipped;
+
 const RADAR: &str = "vsradar";
 const MAPS: &str = "vsmaps";
 
@@ -36,15 +40,29 @@ fn ip(arguments: &str) -> Result<(), String> {
 struct Buses;
 
 impl Buses {
-    fn make() -> Result<Self, String> {
+    /// `None` where a test is skipped, which is said.
+    fn make(test: &str) -> Option<Self> {
         for name in [RADAR, MAPS] {
-            ip(&format!("link add dev {name} type vcan"))?;
+            if !added(name, test) {
+                return None;
+            }
             // room for CAN FD frames
-            ip(&format!("link set {name} mtu 72"))?;
-            ip(&format!("link set {name} up"))?;
+            ip(&format!("link set {name} mtu 72")).unwrap();
+            ip(&format!("link set {name} up")).unwrap();
         }
-        Ok(Self)
+        Some(Self)
     }
+}
+
+/// Adds a virtual bus; false where the kernel has none, or not for this user, which is said.
+fn added(name: &str, test: &str) -> bool {
+    if Command::new("ip").arg("-V").output().is_err() {
+        skipped("iproute2", &format!("{test}: no command `ip` (apt-get install iproute2)"));
+        return false;
+    }
+    ip(&format!("link add dev {name} type vcan"))
+        .inspect_err(|why| skipped("vcan", &format!("{test}: ip link add type vcan: {why}")))
+        .is_ok()
 }
 
 impl Drop for Buses {
@@ -251,12 +269,13 @@ fn play(log: &[u8], socket: &CanFdSocket, seconds: u64) -> usize {
 #[test]
 fn the_command_examines_and_shows_a_live_bus() {
     const LIVE: &str = "vslive";
-    let (Ok(viewshed), Ok(broadcast)) = (std::env::var("VIEWSHED"), std::env::var("BROADCAST")) else {
-        return println!("skipped: `viewshed` on live buses: no VIEWSHED and BROADCAST are named");
-    };
-    if let Err(why) = ip(&format!("link add dev {LIVE} type vcan")) {
-        return println!("skipped: `viewshed` on live buses: ip link add type vcan: {why}");
+    if !added(LIVE, "`viewshed` on live buses") {
+        return;
     }
+    let (Ok(viewshed), Ok(broadcast)) = (std::env::var("VIEWSHED"), std::env::var("BROADCAST")) else {
+        ip(&format!("link del {LIVE}")).unwrap();
+        return skipped("viewshed", "`viewshed` on live buses: no VIEWSHED and BROADCAST are named (tests/linux.sh)");
+    };
     let start = |arguments: &str| {
         let mut command = Command::new(&viewshed);
         let command = command.args(arguments.split(' ')).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -349,10 +368,7 @@ fn the_command_examines_and_shows_a_live_bus() {
 
 #[test]
 fn frames_come_and_go_over_the_kernels_buses() {
-    let _buses = match Buses::make() {
-        Ok(buses) => buses,
-        Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
-    };
+    let Some(_buses) = Buses::make("frames come and go") else { return };
     for medium in ["can", "can-fd"] {
         let mut bench = Bench::new(medium);
         let mut daemon = Daemon::start(medium);
@@ -424,10 +440,7 @@ fn frames_come_and_go_over_the_kernels_buses() {
 
 #[test]
 fn an_interface_that_takes_no_can_fd_is_said_once_with_what_sets_it_up() {
-    let _buses = match Buses::make() {
-        Ok(buses) => buses,
-        Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
-    };
+    let Some(_buses) = Buses::make("an interface without CAN FD") else { return };
     let mtu = |mtu| {
         ip(&format!("link set {MAPS} down")).unwrap();
         ip(&format!("link set {MAPS} mtu {mtu}")).unwrap();
@@ -448,10 +461,7 @@ fn an_interface_that_takes_no_can_fd_is_said_once_with_what_sets_it_up() {
 
 #[test]
 fn a_bus_off_of_the_radars_bus_is_in_the_status() {
-    let _buses = match Buses::make() {
-        Ok(buses) => buses,
-        Err(why) => return println!("skipped: virtual CAN buses: ip link add type vcan: {why}"),
-    };
+    let Some(_buses) = Buses::make("a bus-off in the status") else { return };
     let mut bench = Bench::new("can");
     let mut daemon = Daemon::start("can");
     daemon.wait_for("started", 1);

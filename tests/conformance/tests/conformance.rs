@@ -14,6 +14,10 @@ use viewshed_conformance::program::Program;
 use viewshed_conformance::world::{Looks, World};
 use viewshed_conformance::{library, maps, receivers};
 
+#[path = "../../common/skipped.rs"]
+mod skipped;
+use skipped::skipped;
+
 const SECOND: u64 = 1_000_000;
 
 /// The receivers beside the library's, by their language. What is missing is said past the test's own capture.
@@ -27,7 +31,7 @@ fn others() -> Vec<(&'static str, Program)> {
     }
     let found = all.into_iter().filter_map(|(language, needs, program)| {
         if program.is_none() {
-            let _ = writeln!(std::io::stderr(), "skipped: the receiver in {language}: no {needs} (apt-get install it)");
+            skipped(needs, &format!("the receiver in {language} (apt-get install it)"));
         }
         Some((language, program?))
     });
@@ -63,7 +67,7 @@ fn every_receiver_answers_the_logs_as_expected() {
 #[test]
 fn a_receiver_of_one_plane_shows_the_same_maps() {
     let Some(python) = receivers::python_of_one_plane() else {
-        return drop(writeln!(std::io::stderr(), "skipped: the receiver in Python: no python3 (apt-get install it)"));
+        return skipped("python3", "the receiver in Python of one plane (apt-get install it)");
     };
     let without = |text: &str, asked: &str| -> String {
         text.lines().filter(|line| !line.contains(asked)).map(|line| format!("{line}\n")).collect()

@@ -13,6 +13,10 @@ use tract_onnx::pb::{
 use viewshed_harness::recording::camera::Box2d;
 use viewshed_harness::recording::{self, ReadOptions};
 
+#[path = "../../../common/skipped.rs"]
+mod skipped;
+use skipped::skipped;
+
 const FLOAT: i32 = 1;
 
 fn tensor(name: &str, dims: &[i64], values: &[f32]) -> TensorProto {
@@ -226,8 +230,7 @@ fn a_real_network_finds_a_bus() {
     let Some(fetched) =
         std::env::var_os("VIEWSHED_DETECTOR").map(PathBuf::from).filter(|f| f.join("centernet.onnx").exists())
     else {
-        println!("skipped: the detector on a real network; tests/detector.sh fetches one");
-        return;
+        return skipped("network", "the detector on a real network (tests/detector.sh fetches one)");
     };
     let folder = folder("real");
     let (model, picture) = (fetched.join("centernet.onnx"), fetched.join("bus.jpg"));

@@ -17,4 +17,6 @@ mod replay;
 mod scene;
 mod scenes;
 mod simulate;
+#[path = "../../../common/skipped.rs"]
+mod skipped;
 mod ti_capture;

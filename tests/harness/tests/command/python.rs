@@ -1,10 +1,11 @@
 //! Recordings as another implementation reads them: Python's `mcap-ros2-support`, which knows nothing of ours.
 
-use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
+
+use crate::skipped::skipped;
 
 /// A Python that has the package; `VIEWSHED_PYTHON` names one that is not on the path.
 fn python() -> Option<String> {
@@ -16,10 +17,7 @@ fn python() -> Option<String> {
 #[test]
 fn python_reads_the_shipped_recording() {
     let Some(python) = python() else {
-        // past the test's own capture, so that it is seen
-        let why = "skipped: reading a recording by Python: no python3 with mcap-ros2-support (pip install it)";
-        let _ = writeln!(std::io::stderr(), "{why}");
-        return;
+        return skipped("mcap-ros2-support", "a recording read by Python (tests/mcap_ros2.sh installs it)");
     };
     let recording = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
     let output = Command::new(python).args(["-c", include_str!("read.py")]).arg(recording).output().unwrap();

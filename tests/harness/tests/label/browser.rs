@@ -16,7 +16,7 @@ use headless_chrome::types::PrintToPdfOptions;
 use headless_chrome::{LaunchOptions, Tab};
 use serde_json::Value;
 
-use crate::server::skipped;
+use crate::skipped::skipped;
 
 pub const ALT: u32 = 1;
 pub const CTRL: u32 = 2;
@@ -45,7 +45,7 @@ impl Browser {
     /// Starts one; without any on this machine, says so once a test.
     pub fn start(test: &str) -> Option<Self> {
         let Some(program) = program() else {
-            skipped(&format!("{test}: no Chromium (apt-get install chromium-headless-shell)"));
+            skipped("browser", &format!("the page, {test}: no Chromium (apt-get install chromium-headless-shell)"));
             return None;
         };
         let flags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"];

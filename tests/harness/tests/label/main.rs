@@ -13,3 +13,5 @@ mod person;
 mod plots;
 mod requests;
 mod server;
+#[path = "../../../common/skipped.rs"]
+mod skipped;

@@ -9,7 +9,8 @@ use std::time::Duration;
 use viewshed_harness::recording::write::RecordingWriter;
 use viewshed_harness::recording::{self, ReadOptions};
 
-use crate::server::{SHIPPED, Server, folder, recording, skipped};
+use crate::server::{SHIPPED, Server, folder, recording};
+use crate::skipped::skipped;
 
 /// Two tracks as the page sends them.
 const TWO: &str = r#"[{"id":"1","class":"car","points":[[1,80,3],[4,20,3]]},
@@ -264,7 +265,7 @@ fn a_full_disk_is_said_and_what_was_saved_stays() {
     let mount = |arguments: &[&str]| Command::new(arguments[0]).args(&arguments[1..]).arg(&folder).status();
     // it holds the recording and little more
     if !mount(&["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs"]).is_ok_and(|status| status.success()) {
-        skipped("labels on a full disk: no small file system can be mounted here");
+        skipped("mount", "labels on a full disk: no small file system can be mounted here");
         return;
     }
     let recording = folder.join("site.mcap");

@@ -24,11 +24,6 @@ pub fn recording(test: &str) -> PathBuf {
     path
 }
 
-/// Says why a test was skipped, past the capture of the test runner: one line that scripts can find.
-pub fn skipped(what: &str) {
-    let _ = writeln!(std::io::stderr(), "skipped: viewshed label, {what}");
-}
-
 pub struct Server {
     child: Child,
     pub url: String,

@@ -18,3 +18,5 @@ mod report;
 #[allow(dead_code, reason = "of the tests of another page")]
 #[path = "../label/server.rs"]
 mod server;
+#[path = "../../../common/skipped.rs"]
+mod skipped;
