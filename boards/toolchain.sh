@@ -6,7 +6,8 @@
 # First choice: the installed compiler already has the target's core library, or rustup can add it.
 # Nothing is printed then. Second choice: Debian's compiler and library sources (rustc-web, cargo-web,
 # rust-web-src) build it once, without the network, into a directory of their own; the settings that
-# make cargo use it are printed. VIEWSHED_TOOLCHAIN=debian goes straight to the second choice.
+# make cargo use it are printed. Once it is built, rustup is not asked any more. VIEWSHED_TOOLCHAIN=debian
+# goes straight to the second choice.
 # Exit code 1 and one line on stderr if neither works.
 set -eu
 
@@ -23,28 +24,38 @@ missing() {
 
 targets=$*
 compiler=${RUSTC:-rustc}
+debian=/usr/bin/rustc
+library=/usr/lib/rustlib/src/rust/library
+root=
+if [ -x "$debian" ] && [ -x /usr/bin/cargo ] && [ -d "$library/core" ] && [ -d "$library/vendor" ]; then
+    version=$("$debian" -vV | sed -n 's/^commit-hash: //p')
+    # a directory a compiler version: libraries of another one do not fit
+    root=${VIEWSHED_SYSROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/viewshed-sysroot}/$version
+fi
+
+# whether the second choice was taken before, for every target
+built() {
+    [ -n "$root" ] || return 1
+    for target in $targets; do [ -e "$root/lib/rustlib/$target/complete" ] || return 1; done
+}
+
 if [ "${VIEWSHED_TOOLCHAIN:-any}" != debian ] && command -v "$compiler" >/dev/null; then
     absent=$(missing)
-    if [ -n "$absent" ] && command -v rustup >/dev/null; then
+    if [ -n "$absent" ] && ! built && command -v rustup >/dev/null; then
         for target in $absent; do timeout 120 rustup target add "$target" >/dev/null 2>&1 || true; done
         absent=$(missing)
     fi
     [ -n "$absent" ] || exit 0
 fi
 
-debian=/usr/bin/rustc
-library=/usr/lib/rustlib/src/rust/library
-if ! [ -x "$debian" ] || ! [ -x /usr/bin/cargo ] || ! [ -d "$library/core" ] || ! [ -d "$library/vendor" ]; then
+if [ -z "$root" ]; then
     echo "no core library for $targets: \`rustup target add $targets\`, or on Debian" \
         "\`apt-get install rustc-web cargo-web rust-web-src lld\`" >&2
     exit 1
 fi
-version=$("$debian" -vV | sed -n 's/^commit-hash: //p')
 host=$("$debian" -vV | sed -n 's/^host: //p')
-# a directory a compiler version: libraries of another one do not fit
-root=${VIEWSHED_SYSROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/viewshed-sysroot}/$version
 mkdir -p "$root/bin" "$root/lib/rustlib"
-[ -e "$root/lib/rustlib/$host" ] || ln -s "/usr/lib/rustlib/$host" "$root/lib/rustlib/$host"
+[ -e "$root/lib/rustlib/$host" ] || ln -sfn "/usr/lib/rustlib/$host" "$root/lib/rustlib/$host"
 # in one move: another build may be running it
 wrapper=$(mktemp "$root/bin/new.XXXXXX")
 printf '#!/bin/sh\nexec %s --sysroot "%s" "$@"\n' "$debian" "$root" >"$wrapper"
@@ -82,9 +93,15 @@ END
     touch "$root/lib/rustlib/$1/complete"
 }
 
-for target in $targets; do
-    [ -e "$root/lib/rustlib/$target/complete" ] || build_core "$target"
-done
+# one at a time: tests that run side by side ask for the same target
+if ! built; then
+    exec 9>"$root/lock"
+    flock 9
+    for target in $targets; do
+        [ -e "$root/lib/rustlib/$target/complete" ] || build_core "$target"
+    done
+    exec 9>&-
+fi
 
 echo "export RUSTC='$root/bin/rustc' PATH=\"/usr/bin:\$PATH\""
 # bare-metal targets ask for rust-lld, which Debian's compiler does not bring

@@ -2,15 +2,32 @@
 
 say() { printf '%s\n' "$*" >&2; }
 
-# install PACKAGE...: true where they could be installed
-install() {
+# may_install: whether packages can be installed here at all, by $root
+may_install() {
     command -v apt-get >/dev/null || return 1
     if [ "$(id -u)" = 0 ]; then root=; elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then root=sudo; else return 1; fi
+}
+
+# apt_get ARGUMENTS: what it says is in $apt_said. Waits while another one is at work: the option waits for dpkg's lock only,
+# not for that of the lists of packages.
+apt_get() {
+    for pause in 15 15 15 15 15 15 15 15 0; do
+        # shellcheck disable=SC2086
+        apt_said=$($root env LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=600 -o Acquire::Retries=3 "$@" 2>&1) && return
+        case $apt_said in *"Could not get lock"* | *"Unable to lock"*) sleep $pause ;; *) return 1 ;; esac
+    done
+    return 1
+}
+
+# install PACKAGE...: true where they could be installed; else what apt-get said against it
+install() {
+    may_install || return 1
     say "installing $*"
-    # shellcheck disable=SC2086
-    DEBIAN_FRONTEND=noninteractive $root apt-get install -y --no-install-recommends "$@" >/dev/null 2>&1 ||
-        { $root apt-get update >/dev/null 2>&1 &&
-            DEBIAN_FRONTEND=noninteractive $root apt-get install -y --no-install-recommends "$@" >/dev/null 2>&1; }
+    apt_get install -y --no-install-recommends "$@" && return
+    # lists of packages are absent on a bare machine, and old on others
+    apt_get update && apt_get install -y --no-install-recommends "$@" && return
+    say "cannot install $*: $(printf '%s\n' "$apt_said" | grep -m 1 '^E:' || printf '%s\n' "$apt_said" | tail -n 1)"
+    return 1
 }
 
 # Rust and a C compiler: nothing can be built without them
@@ -20,9 +37,9 @@ need_compilers() {
     command -v cc >/dev/null || install gcc libc6-dev || { say "a C compiler is missing: apt-get install gcc libc6-dev, and run this again"; exit 1; }
 }
 
-# A Chromium for the tests of pages; without one they say that they skipped
+# A Chromium for the tests of pages: true where there is one
 need_browser() {
     [ -n "${VIEWSHED_BROWSER:-}" ] || [ -x /usr/lib/chromium/chromium-headless-shell ] ||
         command -v chromium-headless-shell chromium google-chrome chromium-browser >/dev/null ||
-        install chromium-headless-shell || install chromium || true
+        install chromium-headless-shell || install chromium
 }
