@@ -12,6 +12,7 @@ mod linux;
 mod live;
 mod mps2;
 mod nucleo;
+mod regions;
 mod zcu102;
 
 use std::path::Path;

@@ -15,7 +15,7 @@ struct Board {
     dma: Range<u64>,
     /// Memories the core reaches without waiting, if there are any: for code, and for the map and the stack behind it.
     coupled: Option<[Range<u64>; 2]>,
-    /// Bytes the image takes at most.
+    /// Bytes the image takes at most: 4 % more than it does, as compilers differ by 1 %.
     most_flash: u64,
     /// Bytes of variables at most.
     most_ram: u64,
@@ -29,7 +29,7 @@ const H743: Board = Board {
     ram: 0x2400_0000..0x2407_F000,
     dma: 0x2407_F000..0x2408_0000,
     coupled: Some([0x20..0x1_0000, 0x2000_0000..0x2002_0000]),
-    most_flash: 182_500,
+    most_flash: 190_000,
     most_ram: 496_500,
     least_stack: 64_000,
 };
@@ -40,7 +40,7 @@ const G474: Board = Board {
     ram: 0x2000_0800..0x2002_0000,
     dma: 0x2000_0000..0x2000_0800,
     coupled: None,
-    most_flash: 207_500,
+    most_flash: 216_000,
     most_ram: 107_000,
     least_stack: 22_000,
 };

@@ -6,6 +6,7 @@ mod can;
 use viewshed_harness::boards::image::Image;
 use viewshed_harness::boards::{Board, Profile, Run, check, firmware, stress};
 
+use crate::regions::Regions;
 use crate::shipped;
 
 #[test]
@@ -28,16 +29,21 @@ fn every_frame_of_the_shipped_recording_is_the_same() {
 #[test]
 #[ignore = "needs a compiler for the target"]
 fn each_region_holds_what_belongs_there() {
-    for (profile, ram_bytes) in [(Profile::Reference, 512_000), (Profile::Small, 98_000)] {
-        let image = Image::read(&firmware::build(Board::Zcu102R5, profile, "batch").unwrap()).unwrap();
-        let regions = [0x10_0000..0x10_0000 + 128 * 1024, 0x20_0000..0x20_0000 + ram_bytes, 0x30_0000..0x40_0000];
-        for section in &image.sections {
-            let place = regions.iter().find(|r| r.contains(&section.address));
-            assert!(place.is_some_and(|r| section.address + section.bytes <= r.end), "{section:?}");
+    let images = [
+        (Profile::Reference, "batch", "reference.x"),
+        (Profile::Reference, "live", "reference.x"),
+        (Profile::Small, "batch", "small.x"),
+    ];
+    for (profile, program, script) in images {
+        let regions = Regions::of("zcu102-r5", script);
+        let image = Image::read(&firmware::build(Board::Zcu102R5, profile, program).unwrap()).unwrap();
+        println!("{program}, {}", profile.name());
+        regions.hold(&image);
+        let address = |part: &str| image.symbol(&[program, part]).unwrap().address;
+        assert!(regions.get("RAM").contains(&address("STATE")));
+        if program == "batch" {
+            assert!(regions.get("RAM").contains(&address("MAP")) && regions.get("BENCH").contains(&address("SCAN")));
         }
-        let address = |part: &str| image.symbol(&["batch", part]).unwrap().address;
-        assert!(regions[1].contains(&address("STATE")) && regions[1].contains(&address("MAP")));
-        assert!(regions[2].contains(&address("SCAN")));
         assert!(!image.symbols.iter().any(|s| s.name.contains("panicking") || s.name.starts_with("__aeabi_d")));
     }
 }
