@@ -1,30 +1,43 @@
 #!/bin/sh
 # Looks for inputs that break a decoder or a receiver: tests/fuzz.sh [SECONDS [TARGET...]]
 #
-# Every target of tests/fuzz (or those named), 30 s each, two at a time, where cargo-fuzz is there and a compiler it
-# works with; else one line says what was skipped. An input that breaks something is printed and kept.
+# Every target of tests/fuzz (or those named), 30 s each, two at a time. cargo-fuzz is installed where it can be, into the
+# target folder; else one line says what was skipped. An input that breaks something is printed and kept.
+# With --install what it needs is only made ready, and a skip is exit code 1; with --build the targets are only built.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 . tests/tools.sh
 need_compilers
+only=
+case ${1:-} in --install | --build) only=$1; shift ;; esac
+target=${CARGO_TARGET_DIR:-$PWD/target}
+# cargo looks for its commands there
+PATH=$target/fuzz-tools/bin:$PATH
 
 skip() {
     echo "skipped: fuzzing: $1; the kept inputs are replayed by cargo test"
-    exit 0
+    [ "$only" != --install ]
+    exit
 }
 
-command -v cargo-fuzz >/dev/null || skip "no cargo-fuzz (cargo install cargo-fuzz)"
+command -v cargo-fuzz >/dev/null || {
+    say "installing cargo-fuzz"
+    said=$(CARGO_TARGET_DIR=$target/fuzz-tools/build cargo install --quiet --locked cargo-fuzz@0.13.1 --root "$target/fuzz-tools" 2>&1) ||
+        skip "cargo-fuzz cannot be installed: $(printf '%s\n' "$said" | grep -m 1 '^error' || echo 'cargo install cargo-fuzz')"
+    rm -rf "$target/fuzz-tools/build"
+}
 command -v c++ >/dev/null || install g++ || skip "no C++ compiler for libFuzzer (apt-get install g++)"
-# instrumentation wants a nightly compiler; a stable one does without the address sanitizer
-options=
-if cargo +nightly --version >/dev/null 2>&1; then
-    fuzz() { command=$1; shift; cargo +nightly fuzz "$command" --fuzz-dir tests/fuzz $options "$@"; }
-elif rustc --version | grep -q nightly; then
-    fuzz() { command=$1; shift; cargo fuzz "$command" --fuzz-dir tests/fuzz $options "$@"; }
-else
-    options="--sanitizer none"
-    fuzz() { command=$1; shift; RUSTC_BOOTSTRAP=1 cargo fuzz "$command" --fuzz-dir tests/fuzz $options "$@"; }
-fi
+said=$(cargo fetch --quiet --manifest-path tests/fuzz/Cargo.toml 2>&1) ||
+    skip "libfuzzer-sys cannot be fetched: $(printf '%s\n' "$said" | grep -m 1 '^error' || echo 'cargo fetch')"
+[ "$only" != --install ] || exit 0
+
+# the stable compiler, which lets libFuzzer's instrumentation pass when it is told that it is a nightly one; without the
+# address sanitizer, which it has not, and which looks for errors of unsafe code: the library has none
+fuzz() {
+    command=$1
+    shift
+    RUSTC_BOOTSTRAP=1 cargo fuzz "$command" --fuzz-dir tests/fuzz --target-dir "$target/fuzz" --sanitizer none "$@"
+}
 
 seconds=${1:-30}
 [ $# = 0 ] || shift
@@ -32,9 +45,11 @@ seconds=${1:-30}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 if ! fuzz build >"$work/build" 2>&1; then
-    tail -n 5 "$work/build"
-    skip "its targets cannot be built here, see above"
+    cat "$work/build"
+    echo "fuzzing: the targets do not build"
+    exit 1
 fi
+[ "$only" != --build ] || exit 0
 
 # one TARGET: new inputs go to a folder of its own, so that the kept ones stay few
 one() {
