@@ -1,6 +1,6 @@
 #!/bin/sh
 # An ARS408's log decoded by viewshed and by cantools: tests/cantools.sh [LOG [SENSOR_ID]]. Without a log, the
-# shipped one, both of its sensors. With --install only cantools is made ready.
+# shipped one, both of its sensors. With --install only cantools is made ready; then a skip is exit code 1.
 set -eu
 cd "$(dirname "$0")/.."
 . tests/tools.sh
@@ -10,7 +10,11 @@ python=$venv/bin/python
 if ! "$python" -c 'import cantools' 2>/dev/null; then
     { python3 -m venv "$venv" || { install python3-venv && python3 -m venv "$venv"; }; } >/dev/null 2>&1 &&
         "$venv/bin/pip" install -q 'cantools>=41' >/dev/null 2>&1 ||
-        { [ "${1:-}" = --install ] || echo "skipped: comparison with cantools, as neither it nor python3-venv can be installed here"; exit 0; }
+        {
+            echo "skipped: cantools: an ARS408's log, as neither it nor python3-venv can be installed here"
+            [ "${1:-}" != --install ]
+            exit
+        }
 fi
 [ "${1:-}" != --install ] || exit 0
 # VIEWSHED: one that is built already

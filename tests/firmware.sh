@@ -1,7 +1,8 @@
 #!/bin/sh
 # Builds the boards' firmware and runs it on emulated controllers.
 #
-#   tests/firmware.sh              with --install what it needs is only made ready, with --build only the images are
+#   tests/firmware.sh              with --install what it needs is only made ready, and exit code 1 says that something is
+#                                  lacking; with --build only the images are built
 #
 # Installs what it needs where it may (root on Debian or Ubuntu), and says in one line what it skipped
 # and why. The last line is `firmware: N passed, M skipped`; the exit code is 0 unless something failed.
@@ -19,25 +20,18 @@ skip() {
     skipped=$((skipped + 1))
 }
 
-# compiler TARGET: whether there will be one
+# compiler TARGET: whether there will be one; else why not is in $lacking
 compiler() {
     boards/toolchain.sh "$1" >/dev/null 2>&1 && return
-    install rustc-web cargo-web rust-web-src lld gcc && boards/toolchain.sh "$1" >/dev/null
+    install rustc-web cargo-web rust-web-src lld gcc
+    lacking=$(boards/toolchain.sh "$1" 2>&1 >/dev/null) && return
+    lacking=$(printf '%s\n' "$lacking" | tail -n 1)
+    return 1
 }
 
-# cargo_tests FILTER WHAT: the ignored tests of that name
-cargo_tests() {
-    echo "== $2"
-    log=$(mktemp)
-    if cargo test --quiet --release --locked --workspace --exclude viewshed --test boards --test view -- --ignored "$1" >"$log" 2>&1; then
-        # the line ends with the times that differ from run to run
-        passed=$((passed + $(awk '/^test result: ok/ { n += $4 } END { print n + 0 }' "$log")))
-        sed -n 's/^test result: \(.*\); finished.*/\1/p' "$log"
-    else
-        cat "$log"
-        failed=$((failed + 1))
-    fi
-    rm -f "$log"
+emulator() {
+    lacking="no $1 (apt-get install qemu-system-arm)"
+    command -v "$1" >/dev/null || { install qemu-system-arm && command -v "$1" >/dev/null; }
 }
 
 # images BOARD PROGRAMS [cargo options]: those that the tests ask for, together, as one is linked on one core. With other
@@ -59,33 +53,38 @@ if [ "${1:-}" = --build ]; then
     exit 0
 fi
 
-command -v qemu-system-arm >/dev/null || install qemu-system-arm
 if [ "${1:-}" = --install ]; then
-    for target in thumbv7em-none-eabihf armv7r-none-eabihf; do compiler "$target"; done
-    exit 0
+    status=0
+    for program in qemu-system-arm qemu-system-aarch64; do emulator $program || { status=1; say "$lacking"; }; done
+    for target in thumbv7em-none-eabihf armv7r-none-eabihf; do compiler $target || { status=1; say "$lacking"; }; done
+    exit $status
 fi
 
-if ! command -v qemu-system-arm >/dev/null; then
-    skip "emulated boards" "no qemu-system-arm (apt-get install qemu-system-arm)"
-elif ! compiler thumbv7em-none-eabihf; then
-    skip "mps2-an386" "no compiler for thumbv7em-none-eabihf (rustup target add thumbv7em-none-eabihf)"
-else
-    cargo_tests mps2 "mps2-an386: every map the same, budgets, contents of the image, seen live"
-fi
+# board NAME EMULATOR TARGET FILTER WHAT: the ignored tests whose names contain FILTER
+board() {
+    if { [ "$2" != none ] && ! emulator "$2"; } || ! compiler "$3"; then
+        skip "$1" "$lacking"
+        return
+    fi
+    echo "== $1: $5"
+    log=$(mktemp)
+    if cargo test --release --locked --workspace --exclude viewshed --test boards --test view -- --ignored "$4" >"$log" 2>&1; then
+        ran=$(awk '/^test result: ok/ { n += $4 } END { print n + 0 }' "$log")
+        [ "$ran" -gt 0 ] || { echo "no test is named $4"; failed=$((failed + 1)); }
+        passed=$((passed + ran))
+        # what a test skipped is one of this summary's as well
+        skipped=$((skipped + $(grep -c '^skipped:' "$log")))
+        grep -E '^(test result:|skipped:)' "$log"
+    else
+        cat "$log"
+        failed=$((failed + 1))
+    fi
+    rm -f "$log"
+}
 
-if ! command -v qemu-system-aarch64 >/dev/null && ! install qemu-system-arm; then
-    skip "zcu102-r5" "no qemu-system-aarch64 (apt-get install qemu-system-arm)"
-elif ! compiler armv7r-none-eabihf; then
-    skip "zcu102-r5" "no compiler for armv7r-none-eabihf (rustup target add armv7r-none-eabihf)"
-else
-    cargo_tests zcu102 "zcu102-r5: every map the same, contents of the image"
-fi
-
-if ! compiler thumbv7em-none-eabihf; then
-    skip "nucleo-h743zi, nucleo-g474re" "no compiler for thumbv7em-none-eabihf (rustup target add thumbv7em-none-eabihf)"
-else
-    cargo_tests nucleo "nucleo-h743zi, nucleo-g474re: built and looked at, not run"
-fi
+board mps2-an386 qemu-system-arm thumbv7em-none-eabihf mps2 "every map the same, budgets, contents of the image, seen live"
+board zcu102-r5 qemu-system-aarch64 armv7r-none-eabihf zcu102 "every map the same, contents of the image"
+board nucleo none thumbv7em-none-eabihf nucleo "h743zi and g474re built and looked at, not run"
 
 echo "firmware: $passed passed, $skipped skipped"
 [ "$failed" = 0 ]

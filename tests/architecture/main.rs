@@ -5,3 +5,4 @@
 mod circles;
 mod extending;
 mod public_names;
+mod skips;

@@ -19,7 +19,7 @@ fn shipped() -> (Settings, Vec<Scan<ImageBox>>) {
 
 #[test]
 #[ignore = "needs QEMU"]
-fn every_picture_of_the_shipped_recording_is_the_same_on_a_cortex_m4f_within_its_budget() {
+fn mps2_gives_every_picture_of_the_shipped_recording_the_same_map_within_its_budget() {
     let (settings, scans) = shipped();
     assert!(scans.len() >= 300 && scans.iter().all(|s| !s.detections.is_empty()));
     let checked = check_camera(Board::Mps2An386, &settings, &scans).unwrap();
@@ -46,7 +46,7 @@ fn every_picture_of_the_shipped_recording_is_the_same_on_a_cortex_m4f_within_its
 
 #[test]
 #[ignore = "needs QEMU"]
-fn and_on_a_cortex_r5f() {
+fn zcu102_gives_every_picture_the_same_map() {
     let (settings, scans) = shipped();
     let checked = check_camera(Board::Zcu102R5, &settings, &scans).unwrap();
     assert_eq!((checked.frames, checked.equal), (scans.len(), scans.len()));
