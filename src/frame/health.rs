@@ -1,7 +1,7 @@
 //! Whether the sensor's silence means a free road, a blind sensor or no sensor at all.
 //!
-//! A healthy frame within its hold time is evidence for the whole field of view, so an empty road
-//! is visible. A run of empty frames after traffic is a sensor that went blind, and no frames at all
+//! A healthy frame within its hold time is evidence along every line of sight, so an empty road is visible once it has
+//! [settled](crate::grid::settling). A run of empty frames after traffic is a sensor that went blind, and no frames at all
 //! make everything unknown. Rejected is not empty: where points keep coming of which none can be
 //! right (not finite, in another unit, all outside the field of view), the sensor or its mount is not
 //! what it is taken for, and everything is unknown from the first such run on.
@@ -22,15 +22,18 @@ pub struct HealthConfig {
     /// How long frames may be empty after traffic before the sensor counts as blind; and how long, also
     /// from the first frame on, their points may be none that can be used.
     pub blind_after_s: f32,
-    /// A longer gap between frames resets the grids.
+    /// A longer gap between frames is a new start. Over a shorter one what is known is moved on.
     pub reset_gap_s: f32,
 }
 
 impl Default for HealthConfig {
     fn default() -> Self {
-        Self { hold_s: 0.5, blind_after_s: 1.0, reset_gap_s: 1.0 }
+        Self { hold_s: 0.5, blind_after_s: 1.0, reset_gap_s: 60.0 }
     }
 }
+
+/// A run of frames has no longer gap, microseconds.
+const BREAK_US: u64 = 1_000_000;
 
 /// [`HealthConfig`] in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +67,8 @@ pub enum Condition {
     Starting,
     /// The last frame is evidence.
     Healthy,
+    /// It is, but lines of sight were not yet looked along for long enough since a start or gap: what is behind is unknown.
+    Settling,
     /// Frames come, but they have been empty since there was traffic, or the sensor says so.
     Blind,
     /// No frame within the hold time.
@@ -81,7 +86,7 @@ pub enum Condition {
 impl Condition {
     /// Whether there is a map.
     pub const fn has_map(self) -> bool {
-        matches!(self, Self::Healthy | Self::SectorBlind | Self::Misaligned | Self::Weaker)
+        matches!(self, Self::Healthy | Self::Settling | Self::SectorBlind | Self::Misaligned | Self::Weaker)
     }
 }
 
@@ -181,7 +186,11 @@ impl Health {
                 Some(gap) => Continuity::Follows(gap),
             },
         };
-        if continuity.resets() {
+        let broken = match continuity {
+            Continuity::Follows(gap) => gap > BREAK_US,
+            _ => true,
+        };
+        if broken {
             // a run of frames has to be seen without a break; a blind sensor stays blind
             (self.empty_since, self.unusable) = (None, None);
         }
@@ -282,8 +291,9 @@ mod tests {
         assert_eq!(h.frame(at(5000), &inside(1), false, &l), Continuity::First);
         assert_eq!(h.frame(at(5066), &inside(1), false, &l), Continuity::Follows(66_000));
         assert_eq!(h.frame(at(6066), &inside(1), false, &l), Continuity::Follows(1_000_000));
-        assert_eq!(h.frame(at(7067), &inside(1), false, &l), Continuity::Gap);
-        assert_eq!(h.frame(at(7067), &inside(1), false, &l), Continuity::ClockStepped);
+        assert_eq!(h.frame(at(66_066), &inside(1), false, &l), Continuity::Follows(60_000_000));
+        assert_eq!(h.frame(at(126_067), &inside(1), false, &l), Continuity::Gap);
+        assert_eq!(h.frame(at(126_067), &inside(1), false, &l), Continuity::ClockStepped);
         assert_eq!(h.frame(at(3000), &inside(0), false, &l), Continuity::ClockStepped);
         assert!(Continuity::Gap.resets() && !Continuity::First.resets());
         // a step back never makes a later moment look fresh

@@ -105,6 +105,14 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
         }
     }
 
+    /// Makes an azimuth unknown from a range cell on.
+    pub(crate) fn forget_from(&mut self, azimuth: usize, range: usize) {
+        if let Some((grades, occupancy)) = self.rows_mut(azimuth) {
+            grades.iter_mut().skip(range).for_each(|grade| *grade = UNKNOWN);
+            occupancy.iter_mut().skip(range).for_each(|occupied| *occupied = 0);
+        }
+    }
+
     /// Where the cells lie.
     pub fn geometry(&self) -> &PolarGeometry {
         &self.geometry

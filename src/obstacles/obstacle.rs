@@ -1,5 +1,6 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
+use super::BEHIND_CM;
 use super::gathered::Gathered;
 use super::lanes::NO_LANE;
 use super::motion::FreeMotion;
@@ -174,6 +175,12 @@ impl Obstacle {
     /// Whether it stands still without ever having moved.
     pub fn is_fixture(&self, t: &Tracking) -> bool {
         !self.is_mover(t) && self.age >= 2 && self.speed() < t.fixture_speed
+    }
+
+    /// Whether it is where obstacles are followed.
+    pub(super) fn is_within_reach(&self, t: &Tracking) -> bool {
+        let (x, y) = self.anchor();
+        x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
     }
 
     /// Whether it has come to a stop.

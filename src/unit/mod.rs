@@ -223,7 +223,10 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             (Condition::SectorBlind, _) => (UnitState::Degraded, Reason::SectorBlind),
             (Condition::Misaligned, _) => (UnitState::Degraded, Reason::Misaligned),
             (Condition::Weaker, None) => (UnitState::Degraded, Reason::Weaker),
-            (Condition::Healthy | Condition::Weaker, Some(reason)) => (UnitState::Degraded, reason),
+            (Condition::Settling, None) => (UnitState::Degraded, Reason::Settling),
+            (Condition::Healthy | Condition::Settling | Condition::Weaker, Some(reason)) => {
+                (UnitState::Degraded, reason)
+            }
             (Condition::Healthy, None) => {
                 self.lacking.map_or((UnitState::Ok, Reason::None), |reason| (UnitState::Degraded, reason))
             }

@@ -18,6 +18,7 @@ pub mod progress;
 pub mod replay;
 pub mod simulate;
 pub mod site;
+pub mod starts;
 pub mod tune;
 #[cfg(feature = "pages")]
 pub mod view;
@@ -51,6 +52,7 @@ enum Command {
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
+    Starts(Box<starts::Args>),
     Compare(compare::Args),
     Tune(Box<tune::Args>),
     Detect(detect::Args),
@@ -75,6 +77,7 @@ impl Cli {
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
+            Command::Starts(args) => starts::run(args),
             Command::Tune(args) => tune::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Detect(args) => detect::run(args),

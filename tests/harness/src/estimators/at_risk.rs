@@ -41,6 +41,10 @@ impl Estimator for AtRisk {
         self.inner.reset();
     }
 
+    fn is_settled(&self) -> bool {
+        self.inner.is_settled()
+    }
+
     fn step(&mut self, frame: &Frame) {
         self.inner.step(frame);
     }

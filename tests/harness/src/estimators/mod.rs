@@ -16,6 +16,7 @@ use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, Measurement, NotADetection};
 use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
+use viewshed::grid::settling::SettlingConfig;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::obstacles::lanes;
@@ -74,6 +75,12 @@ pub trait Estimator: Send {
     /// What was rejected or dropped since construction, by reason.
     fn counters(&self) -> Vec<(&'static str, u64)> {
         Vec::new()
+    }
+
+    /// Whether its map has [settled](viewshed::grid::settling): nothing of it is unknown because the unit has just started, or
+    /// frames were missing.
+    fn is_settled(&self) -> bool {
+        true
     }
 
     /// Azimuth's noise that it now works with, degrees, where that is learnt and not the configured one.
@@ -316,6 +323,9 @@ pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3d
         config.ground = given(&ground, options.ground_error)?.kept();
     }
     config.lanes = kept(&options.lanes);
+    if recording.sensor.frames_independent {
+        config.settling = SettlingConfig::AT_ONCE;
+    }
     Ok((sensor, config))
 }
 

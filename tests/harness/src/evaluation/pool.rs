@@ -91,7 +91,13 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
     let mut scores: Vec<Score> = first
         .scores
         .iter()
-        .map(|s| Score { counters: Vec::new(), azimuth_noise_deg: None, learnt_lanes: None, ..s.clone() })
+        .map(|s| Score {
+            counters: Vec::new(),
+            azimuth_noise_deg: None,
+            learnt_lanes: None,
+            settled: Vec::new(),
+            ..s.clone()
+        })
         .collect();
     for part in parts {
         let known = tracks.len();

@@ -11,7 +11,7 @@ use super::comparison::{Comparison, compare};
 use super::counts::Counts;
 use super::curve::{CurvePoint, Grades, trade_off};
 use super::samples::FrameSamples;
-use super::score::Score;
+use super::score::{Score, Settled};
 use super::units::{RUN_BLOCKS, Units};
 use super::{Grid, Options};
 use crate::recording::Recording;
@@ -41,6 +41,8 @@ pub struct Row {
     pub azimuth_noise_deg: Option<f64>,
     /// Places at which it has learnt a lane; `None` of several recordings together.
     pub learnt_lanes: Option<usize>,
+    /// Without the frames whose map had not settled, where there are any.
+    pub settled: Option<Settled>,
     /// Counts of each object unit, and of each block: what is drawn again.
     pub by_unit: Vec<Counts>,
     pub by_block: Vec<CellCounts>,
@@ -157,6 +159,7 @@ impl Summary {
                 counters: score.counters.clone(),
                 azimuth_noise_deg: score.azimuth_noise_deg,
                 learnt_lanes: score.learnt_lanes,
+                settled: score.settled(samples),
                 by_unit: drawn.by_unit.clone(),
                 by_block: drawn.by_block.clone(),
             }

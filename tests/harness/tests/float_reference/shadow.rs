@@ -32,19 +32,23 @@ pub fn cast(solid: &Solid, axes: &Axes, grid: &mut Grid, map: &mut Map) {
                 *occupancy = occupancy.max(share);
             }
         }
-        let (from, to) = hidden(axes, solid.top(), enter, leave);
-        for r in cells.end..axes.ranges {
-            let (near, far) = (r as f64 * axes.cell_m, (r + 1) as f64 * axes.cell_m);
-            // the cell a shadow begins in is all of it in shadow
-            let part = if from < far { ((to.min(far) - near) / axes.cell_m).clamp(0.0, 1.0) } else { 0.0 };
-            let (grade, _) = map.cell_mut(column, r);
-            *grade = grade.map(|g| g.min(1.0 - share * part));
-        }
+        shade(map, axes, column, cells.end, hidden(axes, solid.top(), enter, leave), share);
+    }
+}
+
+/// Lowers the grades of a column from a cell on, between two distances.
+pub fn shade(map: &mut Map, axes: &Axes, column: usize, first: usize, (from, to): (f64, f64), share: f64) {
+    for r in first..axes.ranges {
+        let (near, far) = (r as f64 * axes.cell_m, (r + 1) as f64 * axes.cell_m);
+        // the cell a shadow begins in is all of it in shadow
+        let part = if from < far { ((to.min(far) - near) / axes.cell_m).clamp(0.0, 1.0) } else { 0.0 };
+        let (grade, _) = map.cell_mut(column, r);
+        *grade = grade.map(|g| g.min(1.0 - share * part));
     }
 }
 
 /// Between which distances the slice plane is hidden behind a box of this height.
-fn hidden(axes: &Axes, top: f64, enter: f64, leave: f64) -> (f64, f64) {
+pub fn hidden(axes: &Axes, top: f64, enter: f64, leave: f64) -> (f64, f64) {
     let nothing = (f64::INFINITY, 0.0);
     let (sensor, slice) = (axes.height_m, axes.slice_m);
     match (sensor > slice, top) {

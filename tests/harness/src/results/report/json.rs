@@ -96,6 +96,9 @@ pub struct Estimator {
     /// Places at which it has learnt a lane.
     #[serde(skip_serializing_if = "Option::is_none")]
     learnt_lanes: Option<usize>,
+    /// Frames whose map had settled since the start and since gaps, of how many, and the rates over these alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    settled: Option<Value>,
     /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
     by_unit: Vec<String>,
     /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s, in the order of time.
@@ -234,6 +237,16 @@ pub(super) fn estimator(row: &Row) -> Estimator {
         counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
         azimuth_noise_deg: row.azimuth_noise_deg,
         learnt_lanes: row.learnt_lanes.filter(|places| *places > 0),
+        settled: row.settled.map(|s| {
+            json!({
+                "frames": s.frames,
+                "of": s.of,
+                "rates": rates(&s.counts),
+                "cells": s.cells,
+                "cell_fvr": s.cells.fvr(),
+                "cell_fir": s.cells.fir(),
+            })
+        }),
         by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
         by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }

@@ -66,6 +66,7 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     let cartesian = summary.rows.iter().filter(|r| !r.curve.is_empty() && r.grid != options.grid);
     lines.extend(cartesian.map(|r| format!("{} was judged on the {} grid: its map has no other.", r.name, r.grid)));
     lines.extend(summary.comparisons.iter().map(comparison));
+    lines.extend(settled(&summary.rows));
     lines.extend(noise_learnt(&summary.rows));
     lines.extend(lanes_learnt(&summary.rows));
     lines.extend(left_out(recording, &summary.rows));
@@ -176,6 +177,22 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
         }
     };
     said.iter().map(line).collect()
+}
+
+/// How much of the frames had a map that had settled, and the rates over these alone.
+fn settled(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
+    rows.iter().filter_map(|row| {
+        let settled = row.settled?;
+        let pair = |fvr, fir| format!("{} / {}", percent(fvr), percent(fir));
+        let share = 100.0 * settled.frames as f64 / settled.of.max(1) as f64;
+        Some(format!(
+            "{}: {share:.0} % of the frames had settled since the start and since gaps (before that what is behind things that \
+             stand is unknown); over these alone FVR / FIR {} %, cells {} %.",
+            row.name,
+            pair(settled.counts.fvr(), settled.counts.fir()),
+            pair(settled.cells.fvr(), settled.cells.fir())
+        ))
+    })
 }
 
 /// What fixtures taught estimators of the azimuth's noise.
