@@ -272,7 +272,7 @@ pub use wire::{
 };
 
 // Radars.
-pub use inputs::ars408::{Ars408, Ars408Config};
+pub use inputs::ars408::{Ars408, Ars408Config, quality::Ars408Wanted};
 pub use inputs::native::{NativeConfig, NativeMedium, NativeReceiver, NativeSender};
 pub use inputs::ti::{Ti, TiAngleUnit, TiConfig, TiDialect, TiFamily};
 pub use inputs::{Feed, Frame};

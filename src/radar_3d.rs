@@ -127,6 +127,9 @@ const LONGEST_STEP_US: u64 = 1_000_000;
 /// How far behind the field of view's range obstacles are followed, centimetres.
 const BEYOND_CM: i32 = 2500;
 
+/// Stages of a frame.
+const STAGES: usize = 7;
+
 impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> {
     /// Checks a configuration.
     ///
@@ -307,8 +310,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         self.settling = Settling::NEW;
     }
 
-    /// Takes a radar frame and brings the map up to its time. `status` is the sensor's own fault flag, and
-    /// where there can be any with it the number of points that are no detections.
+    /// Takes a radar frame and brings the map up to its time. `status` is the sensor's own fault flag, and where there can be any
+    /// with it the numbers of points that are no detections, and of those left out by the sensor's own marks.
     pub fn process<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
@@ -321,7 +324,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     /// [`process`](Self::process) that calls `ended` as each of its seven stages ends.
-    #[allow(clippy::cast_possible_truncation)] // bounded lists
     pub fn process_traced<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
@@ -331,12 +333,19 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         map: &mut PolarMap<R, A>,
         ended: &mut impl FnMut(),
     ) -> FrameReport {
-        let FrameStatus { fault, refused } = status.into();
+        let status = status.into();
         let noise = self.repeatability.noise(&p.noise);
         let place = |d: &Detection| noise.place_on(d, &p.levelling, p.axes.ground());
-        let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
+        let points = self.scan.gather(detections.into_iter(), status, &p.gate, place);
         let points = self.scan.within_reach(points, |r| p.reaches(r));
-        let continuity = self.health.frame(now, &points, fault, &p.health);
+        let continuity = self.health.frame(now, &points, status.fault, &p.health);
+        if continuity == Continuity::Unjudged {
+            for _ in 0..STAGES {
+                ended();
+            }
+            let condition = self.expire(p, now, map);
+            return self.report(continuity, condition);
+        }
         if continuity.resets() {
             self.obstacles.clear();
             self.grid.clear();
@@ -372,6 +381,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let looked = if gap > Step::NONE { Step::NONE } else { step };
         let condition = self.settle(p, condition, looked, map);
         ended();
+        self.report(continuity, condition)
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // bounded lists
+    fn report(&mut self, continuity: Continuity, condition: Condition) -> FrameReport {
         self.rejections.add_all(self.scan.rejections());
         let report = FrameReport {
             continuity,

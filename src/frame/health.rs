@@ -4,7 +4,8 @@
 //! [settled](crate::grid::settling). A run of empty frames after traffic is a sensor that went blind, and no frames at all
 //! make everything unknown. Rejected is not empty: where points keep coming of which none can be
 //! right (not finite, in another unit, all outside the field of view), the sensor or its mount is not
-//! what it is taken for, and everything is unknown from the first such run on.
+//! what it is taken for, and everything is unknown from the first such run on. A frame of which all that lies in view was left out
+//! by the sensor's own marks is neither empty nor evidence: it is as if it had not come.
 
 use crate::fixed::time::Time;
 use crate::sensor::config::{ConfigError, within};
@@ -99,12 +100,15 @@ pub struct FrameStatus {
     /// Points that are no detections, see [`NotADetection`](crate::frame::detection::NotADetection): whoever
     /// decodes a frame drops them and counts them here.
     pub refused: u16,
+    /// Points that whoever decoded the frame left out by the sensor's own marks, see
+    /// [`Ars408Wanted`](crate::inputs::ars408::quality::Ars408Wanted).
+    pub unwanted: u16,
 }
 
 impl From<bool> for FrameStatus {
     /// Of a frame every point of which was a detection.
     fn from(fault: bool) -> Self {
-        Self { fault, refused: 0 }
+        Self { fault, refused: 0, unwanted: 0 }
     }
 }
 
@@ -118,9 +122,16 @@ pub struct Points {
     pub outside: u32,
     /// Nowhere: no detections.
     pub refused: u32,
+    /// Left out by the sensor's own marks, wherever they were.
+    pub unwanted: u32,
 }
 
 impl Points {
+    /// Whether nothing is known of what was measured in view: it was left out.
+    fn unjudged(&self) -> bool {
+        self.unwanted > 0 && self.inside == 0
+    }
+
     /// Whether there are points and nothing can be said from them. A field of view narrower than the
     /// radar's leaves most of its points outside; but no radar has most of them refused, and of angles
     /// in degrees a few always look like radians near the axis.
@@ -142,6 +153,8 @@ pub enum Continuity {
     Gap,
     /// The clock stepped back or stood still.
     ClockStepped,
+    /// Nothing of the frame could be judged: it is no evidence, and the next one follows the one before it.
+    Unjudged,
 }
 
 impl Continuity {
@@ -178,6 +191,10 @@ impl Health {
 
     /// Takes note of a frame and of what the radar reported in it, gated or not; `fault` is its own flag.
     pub fn frame(&mut self, now: Time, points: &Points, fault: bool, limits: &HealthLimits) -> Continuity {
+        if points.unjudged() {
+            self.blind |= fault;
+            return Continuity::Unjudged;
+        }
         let continuity = match self.last_frame {
             None => Continuity::First,
             Some(last) => match now.since(last) {
@@ -312,12 +329,12 @@ mod tests {
             .collect()
     }
 
-    const NOT_FINITE: Points = Points { inside: 0, outside: 0, refused: 80 };
-    const OUTSIDE: Points = Points { inside: 0, outside: 3, refused: 0 };
+    const NOT_FINITE: Points = Points { inside: 0, outside: 0, refused: 80, unwanted: 0 };
+    const OUTSIDE: Points = Points { inside: 0, outside: 3, refused: 0, unwanted: 0 };
 
     #[test]
     fn rejected_is_not_empty_from_the_first_frame_on() {
-        let mostly = Points { inside: 5, outside: 4, refused: 10 };
+        let mostly = Points { inside: 5, outside: 4, refused: 10, unwanted: 3 };
         for points in [NOT_FINITE, OUTSIDE, mostly] {
             let mut h = Health::NEW;
             let conditions = run(&mut h, 0, 20, points);
@@ -330,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_view_narrower_than_the_radars_and_weak_clutter_are_healthy() {
-        for points in [Points { inside: 1, outside: 90, refused: 1 }, inside(1)] {
+        for points in [Points { inside: 1, outside: 90, refused: 1, unwanted: 5 }, inside(1)] {
             assert!(run(&mut Health::default(), 0, 60, points).iter().all(|c| *c == Condition::Healthy), "{points:?}");
         }
         // a car beyond the view's edge, now and then one within
@@ -340,6 +357,27 @@ mod tests {
                 assert_eq!(run(&mut h, i * 990 + at, 1, points), [Condition::Healthy]);
             }
         }
+    }
+
+    #[test]
+    fn a_frame_that_was_left_out_is_neither_empty_nor_evidence() {
+        let (mut h, l) = (Health::NEW, limits());
+        let left_out = Points { unwanted: 12, ..Points::default() };
+        assert!(run(&mut h, 0, 30, left_out).iter().all(|c| *c == Condition::Starting));
+        run(&mut h, 2000, 1, inside(5));
+        let conditions = run(&mut h, 2066, 30, left_out);
+        assert!(conditions[..7].iter().all(|c| *c == Condition::Healthy), "until the hold time is over");
+        assert!(conditions[7..].iter().all(|c| *c == Condition::Stale), "{conditions:?}");
+        // what comes next follows the last that was judged
+        let mut h = Health::NEW;
+        run(&mut h, 0, 1, inside(5));
+        assert_eq!(h.frame(at(66), &left_out, false, &l), Continuity::Unjudged);
+        assert_eq!(h.frame(at(132), &inside(0), false, &l), Continuity::Follows(132_000));
+        // with a detection in view it is one like others, and a fault is one anyway
+        let some = Points { inside: 1, ..left_out };
+        assert_eq!(run(&mut h, 198, 1, some), [Condition::Healthy]);
+        h.frame(at(264), &left_out, true, &l);
+        assert_eq!(h.condition(at(264), &l), Condition::Blind);
     }
 
     #[test]

@@ -13,7 +13,7 @@
 use crate::estimator::{Estimator, Progress};
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
-use crate::frame::health::{Condition, FrameStatus};
+use crate::frame::health::{Condition, Continuity, FrameStatus};
 use crate::map::VisibilityMap;
 use crate::map::polar::PolarMap;
 use crate::sensor::config::ConfigError;
@@ -119,7 +119,7 @@ where
             self.standing.begin(limits);
             self.is_watched = true;
         }
-        if self.is_watched {
+        if self.is_watched && progress.continuity != Continuity::Unjudged {
             let standing = &mut self.standing;
             input.iter().for_each(|detection| standing.observe(detection));
             // a radar that is blind or silent as a whole says nothing of what stands

@@ -148,8 +148,8 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         self.known = false;
     }
 
-    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the
-    /// number of points that are no detections.
+    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the numbers of
+    /// points that are no detections, and of those left out by the sensor's own marks.
     pub fn process<'a>(
         &mut self,
         p: &Radar2dParameters,
@@ -157,15 +157,16 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
         status: impl Into<FrameStatus>,
     ) -> Condition {
-        let FrameStatus { fault, refused } = status.into();
+        let status = status.into();
         let place = |d: &Detection| p.noise.place_flat(d, &p.levelling);
-        let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
+        let points = self.scan.gather(detections.into_iter(), status, &p.gate, place);
         self.rejections.add_all(self.scan.rejections());
         let points = self.scan.within_reach(points, |r| p.reaches(r));
-        match self.health.frame(now, &points, fault, &p.health) {
+        match self.health.frame(now, &points, status.fault, &p.health) {
             Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros), &p.cartesian),
             Continuity::First => {}
             Continuity::Gap | Continuity::ClockStepped => self.grid.clear(),
+            Continuity::Unjudged => return self.expire(p, now),
         }
         for r in self.scan.reflections() {
             self.grid.add(r, &p.noise, &p.levelling, &p.cartesian);

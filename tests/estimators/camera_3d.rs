@@ -187,7 +187,7 @@ fn every_box_is_used_or_counted_with_its_reason() {
     ];
     boxes.resize(MOST_BOXES + 1, car(50.0, 3.0));
     let mut bench = Bench::new(&Camera3dConfig::default());
-    let status = viewshed::frame::health::FrameStatus { fault: false, refused: 2 };
+    let status = viewshed::frame::health::FrameStatus { refused: 2, ..Default::default() };
     let report = bench.camera.process(&bench.parameters, Time::from_micros(0), &boxes, status, &mut bench.map);
     let counts = BoxRejection::ALL.map(|reason| report.rejections.count(reason));
     // inverted, outside, above the horizon, off the grid, too many, refused

@@ -264,11 +264,26 @@ fn rejected_is_not_empty() {
     ];
     for (what, sensor, refused, detections) in cases {
         let mut rig = Rig::new(sensor);
-        let (seen, known) = conditions(&mut rig, FrameStatus { fault: false, refused }, &detections);
+        let (seen, known) = conditions(&mut rig, FrameStatus { refused, ..FrameStatus::default() }, &detections);
         assert_eq!(seen.first(), Some(&Condition::Healthy), "{what}");
         assert_eq!(seen.last(), Some(&Condition::Unusable), "{what}: unknown within 1.5 s");
         assert!(!known, "{what}");
     }
+}
+
+#[test]
+fn what_was_left_out_is_neither_empty_nor_evidence() {
+    let left_out = FrameStatus { unwanted: 40, ..FrameStatus::default() };
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let (seen, known) = conditions(&mut rig, left_out, &[]);
+    assert!(!known && seen.iter().all(|c| *c == Condition::Starting), "{seen:?}");
+    assert_eq!(rig.state.rejections().count(Rejection::Unwanted), 23 * 40);
+    rig.drive(&[Vehicle::truck(110.0, 0.0, -20.0)], 30, true);
+    let obstacles = rig.state.obstacles().iter().count();
+    let (seen, known) = conditions(&mut rig, left_out, &[]);
+    assert_eq!((seen[6], seen[7]), (Condition::Healthy, Condition::Stale), "half a second after the last frame");
+    assert!(!known && !seen.contains(&Condition::Blind), "{seen:?}");
+    assert_eq!(rig.state.obstacles().iter().count(), obstacles, "nobody saw that they are gone");
 }
 
 #[test]

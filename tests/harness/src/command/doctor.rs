@@ -68,10 +68,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = args.outputs.beside(args.log.iter().flat_map(|log| recording::files(log)));
     let json = outputs.file("--json", args.json.as_deref())?;
     let detections = outputs.file("--detections", args.detections.as_deref())?;
-    let KindArgs { radar: profile, ti_header, ti_dialect } = args.kind;
+    let KindArgs { radar: profile, cluster_states: wanted, ti_header, ti_dialect } = args.kind;
     let interface = args.interface.clone();
-    let options =
-        ReadOptions { interface, sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
+    let sensor_id = args.sensor_id;
+    let options = ReadOptions { interface, sensor_id, profile, wanted, ti_header, ti_dialect, ..Default::default() };
     let report = match (&args.can, &args.log) {
         (Some(interface), _) => listen(interface, args.seconds.unwrap_or(USUAL_S), &options)?,
         (None, Some(log)) => examine(log, &options)?,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile::Ars408Profile;
-use viewshed::inputs::ars408::quality::Wanted;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ars408::receiver::{cluster_status, object_status};
 use viewshed::inputs::ars408::state::{RadarState, Version};
 use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters};
@@ -79,8 +79,11 @@ pub fn all(lines: &[Line], profile: &Ars408Profile) -> Vec<Sensor> {
 }
 
 fn examine(interface: &str, sensor: u8, lines: &[&Line], profile: &Ars408Profile) -> Sensor {
-    let mut radar =
-        Ars408::<1024>::new(Ars408Config { wanted: Wanted::ALL, profile: *profile, ..Ars408Config::sensor(sensor) });
+    let mut radar = Ars408::<1024>::new(Ars408Config {
+        wanted: Ars408Wanted::ALL,
+        profile: *profile,
+        ..Ars408Config::sensor(sensor)
+    });
     let (mut times, mut entries, mut odd) = (Vec::new(), 0, 0);
     scans(&mut radar, lines, |scan| {
         times.push(scan.time.micros());

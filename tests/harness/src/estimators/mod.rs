@@ -471,6 +471,7 @@ impl Intake {
     pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection], FrameStatus) {
         self.detections.clear();
         let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
+        let unwanted = u16::try_from(frame.unwanted).unwrap_or(u16::MAX);
         self.dropped += frame.refused;
         for d in &frame.detections {
             let why = match Detection::new(&measurement(d)) {
@@ -488,7 +489,7 @@ impl Intake {
             }
         }
         let micros = u64::try_from(frame.time_ns / 1000).unwrap_or(0);
-        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused })
+        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused, unwanted })
     }
 
     fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {

@@ -316,6 +316,7 @@ mod tests {
             time_ns: 1_000_000_000 + k * 66_000_000,
             detections: (0..vehicles).map(detection).collect(),
             refused: 0,
+            unwanted: 0,
             fault: false,
         }
     }

@@ -115,6 +115,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
                 time_ns: frames.len() as i64 * BLOCK_NS,
                 detections: Vec::new(),
                 refused: 0,
+                unwanted: 0,
                 fault: false,
             });
             counted += second.frames;

@@ -368,7 +368,13 @@ pub mod by_hand {
             },
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
             frames: (0..frames)
-                .map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new(), refused: 0, fault: false })
+                .map(|k| Frame {
+                    time_ns: k as i64 * PERIOD_NS,
+                    detections: Vec::new(),
+                    refused: 0,
+                    unwanted: 0,
+                    fault: false,
+                })
                 .collect(),
             ground: Ground::default(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),

@@ -39,17 +39,27 @@ pub fn read(name: String, bytes: &[u8], format: Format, options: &ReadOptions) -
         elsewhere as u64,
     );
     let profile = *options.profile.unwrap_or(&Ars408Profile::ARS408);
-    let mut radar = Ars408::<MOST_ENTRIES>::new(Ars408Config { profile, ..Ars408Config::sensor(sensor) });
+    let usual = Ars408Config::sensor(sensor);
+    let wanted = options.wanted.unwrap_or(usual.wanted);
+    let mut radar = Ars408::<MOST_ENTRIES>::new(Ars408Config { profile, wanted, ..usual });
     let mut frames = Vec::new();
     scans(&mut radar, &mine, |scan| {
         if scan.fault {
             problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
+        }
+        if scan.unwanted > 0 && scan.detections.is_empty() {
+            problems.add(
+                &interface,
+                "scan of which every entry was left out: it says nothing of the road",
+                nanoseconds(scan.time),
+            );
         }
         let detections = scan.detections.iter().map(capture::detection).collect();
         frames.push(Frame {
             time_ns: nanoseconds(scan.time),
             detections,
             refused: scan.refused.into(),
+            unwanted: scan.unwanted.into(),
             fault: scan.fault,
         });
     });
@@ -136,7 +146,10 @@ fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counte
         ("entry beyond those announced, refused", c.surplus),
         ("quality of an entry that did not arrive", c.unknown_entry),
         ("entry at no distance or beyond 655 m, dropped", c.no_range),
-        ("entry that the radar itself marks as predicted or invalid, left out", c.unwanted),
+        (
+            "entry that the radar itself marks as predicted, invalid (--cluster-states) or of ambiguous speed, left out",
+            c.unwanted,
+        ),
         ("entry beyond what is kept, dropped", c.overflow),
     ];
     for (what, n) in counted {
@@ -146,6 +159,7 @@ fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counte
 
 #[cfg(test)]
 mod tests {
+    use viewshed::inputs::ars408::quality::Ars408Wanted;
     use viewshed::sensor::road::RoadPoint;
 
     use super::*;
@@ -176,5 +190,34 @@ mod tests {
         // a persistent error in every message of its state
         let faulty = LOG.replace("201#401F40", "201#401F60");
         assert_eq!(seen(&faulty), (false, 28));
+    }
+
+    /// Every cluster of the log in this state, the byte's upper five bits.
+    fn of_state(state: u8) -> String {
+        let marked = |line: &str| match line.split_once("702#") {
+            Some((before, data)) => format!("{before}702#{}{:02X}", &data[..8], state << 3 | 3),
+            None => line.to_owned(),
+        };
+        LOG.lines().map(|line| marked(line) + "\n").collect()
+    }
+
+    #[test]
+    fn a_radar_all_of_whose_clusters_are_left_out_sees_nothing_and_is_asked_for_others() {
+        // "valid cluster with azimuth correction due to elevation", and "invalid due to near-field artefact"
+        assert!(seen(&of_state(0x08)).0);
+        assert!(!seen(&of_state(0x02)).0, "neither empty nor evidence");
+        let read = |state| {
+            let wanted = Ars408Wanted::default().with_clusters([state]);
+            let options = ReadOptions { sensor_id: Some(0), wanted, ..ReadOptions::default() };
+            read("log".into(), of_state(0x02).as_bytes(), Format::Candump, &options).unwrap()
+        };
+        let (without, with) = (read(0x00), read(0x02));
+        let entries = |r: &Recording| r.frames.iter().map(|f| f.detections.len()).sum::<usize>();
+        let unwanted = |r: &Recording| r.frames.iter().map(|f| f.unwanted).sum::<u64>();
+        assert_eq!((entries(&without), unwanted(&with)), (0, 0));
+        assert_eq!(unwanted(&without), entries(&with) as u64);
+        let said: Vec<_> = without.problems.iter().map(|p| (p.what, p.count)).collect();
+        assert!(said.iter().any(|(what, n)| what.contains("left out: it says nothing") && *n == 28), "{said:?}");
+        assert!(said.iter().any(|(what, n)| what.contains("--cluster-states") && *n == unwanted(&without)), "{said:?}");
     }
 }

@@ -259,7 +259,7 @@ impl Reader {
             self.topics_of_frames.insert(topic.to_owned());
         }
         let refused = points.not_finite + points.not_a_range;
-        self.frames.push(Frame { time_ns, detections: points.detections, refused, fault: false });
+        self.frames.push(Frame { time_ns, detections: points.detections, refused, unwanted: 0, fault: false });
     }
 
     fn objects(&mut self, topic: &str, data: &[u8]) -> Result<(), String> {

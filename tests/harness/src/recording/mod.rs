@@ -68,6 +68,8 @@ pub struct Frame {
     pub detections: Vec<RadarDetection>,
     /// Points dropped when it was read: not finite, or at no distance.
     pub refused: u64,
+    /// Points left out by the radar's own marks.
+    pub unwanted: u64,
     /// The radar says that something is wrong with it.
     pub fault: bool,
 }
@@ -172,6 +174,8 @@ pub struct ReadOptions {
     pub sensor_id: Option<u8>,
     /// Which kind of radar a CAN log is of.
     pub profile: Option<&'static viewshed::inputs::ars408::profile::Ars408Profile>,
+    /// Which entries of an ARS408 are wanted.
+    pub wanted: Option<viewshed::inputs::ars408::quality::Ars408Wanted>,
     /// Kind of header of a TI capture.
     pub ti_header: Option<viewshed::inputs::ti::TiFamily>,
     /// What a TI capture does not say of its firmware.

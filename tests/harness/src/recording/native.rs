@@ -90,7 +90,13 @@ pub fn read(name: String, messages: &Messages, broken: u32, options: &ReadOption
             problems.add("native", "scan of a radar that reports a fault", time_ns);
         }
         let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame { time_ns, detections, refused: scan.refused.into(), fault: scan.fault });
+        frames.push(Frame {
+            time_ns,
+            detections,
+            refused: scan.refused.into(),
+            unwanted: scan.unwanted.into(),
+            fault: scan.fault,
+        });
     });
     let Some(start) = frames.first().map(|f| f.time_ns) else {
         bail!("{name}: no whole scan of sensor {sensor}; `viewshed doctor` says what there is")

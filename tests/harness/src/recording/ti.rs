@@ -57,6 +57,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
             time_ns: clock.time_ns(scan.number),
             detections,
             refused: scan.refused.into(),
+            unwanted: scan.unwanted.into(),
             fault: scan.fault,
         });
     });

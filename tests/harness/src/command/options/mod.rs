@@ -12,10 +12,13 @@ use clap::Args;
 use serde::Deserialize;
 use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ti::{TiDialect, TiFamily};
 
 pub(super) use self::given::given;
-use self::values::{far_road, field_of_view, ground_error, mount, noise, period, profile, ti_dialect, ti_header};
+use self::values::{
+    cluster_states, far_road, field_of_view, ground_error, mount, noise, period, profile, ti_dialect, ti_header,
+};
 pub(super) use self::values::{finite, seconds};
 use crate::configure::file as unit_file;
 use crate::estimators::{self, FarRoad, GroundError};
@@ -140,6 +143,10 @@ pub struct KindArgs {
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
     #[arg(long, value_name = "NAME", value_parser = profile)]
     pub radar: Option<&'static Ars408Profile>,
+    /// Clusters of an ARS408 that are wanted, by the validity states of their quality messages, between commas
+    /// [default: those the vendor calls valid, 0x00,0x04,0x08,0x09,0x0A,0x0B,0x0C,0x0F,0x10,0x11]
+    #[arg(long, value_name = "STATES", value_parser = cluster_states)]
+    pub cluster_states: Option<Ars408Wanted>,
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
     pub ti_header: Option<TiFamily>,
@@ -339,6 +346,7 @@ impl ReadingArgs {
             interface: self.interface.clone(),
             sensor_id: self.sensor_id,
             profile: self.kind.radar,
+            wanted: self.kind.cluster_states,
             ti_header: self.kind.ti_header,
             ti_dialect: self.kind.ti_dialect,
             frame_period_s: self.frame_period,

@@ -2,6 +2,7 @@
 
 use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
 use crate::estimators::{FarRoad, GroundError, MOST_RANGE_M};
@@ -32,6 +33,17 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 pub fn profile(text: &str) -> Result<&'static Ars408Profile, String> {
     let names = || Ars408Profile::ALL.map(|p| p.name).join(", ");
     Ars408Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
+}
+
+/// States between commas, in decimal or as 0x1F.
+pub fn cluster_states(text: &str) -> Result<Ars408Wanted, String> {
+    let number = |part: &str| {
+        let part = part.trim();
+        part.strip_prefix("0x").map_or_else(|| part.parse(), |digits| u8::from_str_radix(digits, 16)).ok()
+    };
+    let states: Option<Vec<u8>> = text.split(',').map(number).collect();
+    let wanted = states.and_then(|states| Ars408Wanted::default().with_clusters(states));
+    wanted.ok_or_else(|| format!("`{text}` are no numbers from 0 to 31 between commas"))
 }
 
 pub fn ti_header(text: &str) -> Result<TiFamily, String> {

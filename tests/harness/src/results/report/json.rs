@@ -333,6 +333,7 @@ pub fn reading(options: &ReadOptions) -> Value {
         "field_of_view": options.field_of_view.as_ref().map(field_of_view),
         "sensor_id": options.sensor_id,
         "profile": options.profile.map(|p| p.name),
+        "wanted_cluster_states": options.wanted.map(|w| (0..32).filter(|n| w.invalid_states >> n & 1 == 1).collect::<Vec<u8>>()),
         "ti_header": options.ti_header.map(|f| f.header()),
         "frame_period_s": options.frame_period_s,
         "from_s": options.from_s,

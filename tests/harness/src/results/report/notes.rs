@@ -12,8 +12,8 @@ use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
 use crate::evaluation::units::RUN_BLOCKS;
-use crate::recording::Recording;
 use crate::recording::truth::LabelsBeside;
+use crate::recording::{Frame, Recording};
 
 /// What the table is of.
 pub fn heading(replay: &Replay) -> String {
@@ -133,6 +133,7 @@ fn in_words(reason: &str) -> Option<&str> {
         _ if reason == Rejection::Rcs.name() => "with too low an RCS",
         _ if reason == Rejection::Velocity.name() => "with a velocity no vehicle has",
         _ if reason == Rejection::Overflow.name() => "too many for --max-detections, of crowded places first",
+        _ if reason == Rejection::Unwanted.name() => "left out by the radar's own marks",
         DROPPED => "not finite or without a range when read",
         NOT_FINITE => "not finite",
         NO_RANGE => "at no measurable range",
@@ -159,7 +160,10 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
     }
     let (all, what) = match recording.of_camera() {
         Some(camera) => (camera.frames.iter().map(|f| f.boxes.len() as u64 + f.refused).sum(), "boxes"),
-        None => (recording.frames.iter().map(|f| f.detections.len() as u64 + f.refused).sum::<u64>(), "detections"),
+        None => {
+            let came = |f: &Frame| f.detections.len() as u64 + f.refused + f.unwanted;
+            (recording.frames.iter().map(came).sum::<u64>(), "detections")
+        }
     };
     let line = |(counters, names): &(Counters, Vec<&str>)| {
         let named = |(reason, n): &(String, u64)| Some((in_words(reason)?.to_owned(), *n));
