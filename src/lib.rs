@@ -236,7 +236,7 @@ pub use sensor::road::RoadPoint;
 pub use camera::boxes::{ImageBox, VehicleClass};
 pub use camera::calibration::{Calibration, Intrinsics, PointPair};
 pub use camera::{Camera3d, Camera3dConfig, Camera3dParameters};
-pub use estimator::{Estimator, Progress};
+pub use estimator::{ESTIMATOR_VERSION, Estimator, Progress};
 pub use frame::gate::GateConfig;
 pub use frame::health::HealthConfig;
 pub use grid::evidence::EvidenceConfig;

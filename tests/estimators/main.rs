@@ -12,3 +12,4 @@ mod radar_3d;
 mod sizes;
 mod standing;
 mod text_pictures;
+mod version;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use viewshed::fixed::time::Time;
-use viewshed::probability::{Edges, ProbabilityTable};
+use viewshed::probability::{Edges, ProbabilityTable, fitted_with};
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::message::{Addresses, Epoch, Message, Packet};
 use viewshed_harness::bus::traffic::{A, Maps, W};
@@ -40,7 +40,8 @@ pub fn table(folder: &Path) -> PathBuf {
     };
     let values = [[std::array::from_fn(|step| 51 + 17 * step as u8); 8]; 8];
     let recording = read(SHIPPED.as_ref(), &ReadOptions::default()).unwrap();
-    let table = ProbabilityTable::new(edges, values, fingerprint(&recording, &Options::default()).unwrap()).unwrap();
+    let unit = fingerprint(&recording, &Options::default()).unwrap();
+    let table = ProbabilityTable::new(edges, values, fitted_with(unit)).unwrap();
     let mut counted = Grades::default();
     (51..=255).for_each(|p| counted.add(true, Some(p)));
     let file = folder.join("t.probability.toml");

@@ -13,6 +13,7 @@ use std::fmt::Write as _;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::json;
+use viewshed::ESTIMATOR_VERSION;
 use viewshed::unit::settings;
 use viewshed::wire::header::fingerprint;
 
@@ -377,7 +378,10 @@ impl Report<'_> {
         let detections: usize = recording.frames.iter().map(|f| f.detections.len()).sum();
         let facts = [
             ("Command", format!("<code>{}</code>", escaped(&self.command))),
-            ("Program", format!("viewshed {}", env!("CARGO_PKG_VERSION"))),
+            (
+                "Program",
+                format!("viewshed {}, version {ESTIMATOR_VERSION} of the estimator", env!("CARGO_PKG_VERSION")),
+            ),
             (
                 "Recording",
                 escaped(&format!(

@@ -6,6 +6,7 @@
 use anyhow::Result;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use viewshed::ESTIMATOR_VERSION;
 
 use super::ORIGIN;
 use crate::estimators;
@@ -52,6 +53,8 @@ pub struct Report {
     sensor: Value,
     input: Input,
     options: Value,
+    /// Of the library's estimators, with another of which the same recording may give other figures.
+    estimator_version: u16,
     origin: Option<&'static str>,
     /// Of all sensors of the file, with the first of them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -177,6 +180,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
             "reading": reading(options.reading),
             "estimators": options.estimators,
         }),
+        estimator_version: ESTIMATOR_VERSION,
         origin: recording.sensor.synthetic.then_some(ORIGIN),
         fused: None,
     }
