@@ -6,7 +6,7 @@
 use anyhow::Result;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use viewshed::ESTIMATOR_VERSION;
+use viewshed::{Ars408Wanted, ESTIMATOR_VERSION};
 
 use super::ORIGIN;
 use crate::estimators;
@@ -322,6 +322,11 @@ fn field_of_view(view: &FieldOfView) -> Value {
     })
 }
 
+/// Numbers of the cluster states that are wanted.
+fn cluster_states(wanted: Ars408Wanted) -> Vec<u32> {
+    (0..u32::BITS).filter(|state| wanted.invalid_states >> state & 1 == 1).collect()
+}
+
 /// Reading options as given; `null` where the file itself decided.
 pub fn reading(options: &ReadOptions) -> Value {
     let mount = options.mount.map(|[x, y, z, yaw, pitch, roll]| {
@@ -337,7 +342,7 @@ pub fn reading(options: &ReadOptions) -> Value {
         "field_of_view": options.field_of_view.as_ref().map(field_of_view),
         "sensor_id": options.sensor_id,
         "profile": options.profile.map(|p| p.name),
-        "wanted_cluster_states": options.wanted.map(|w| (0..32).filter(|n| w.invalid_states >> n & 1 == 1).collect::<Vec<u8>>()),
+        "cluster_states": options.wanted.map(cluster_states),
         "ti_header": options.ti_header.map(|f| f.header()),
         "frame_period_s": options.frame_period_s,
         "from_s": options.from_s,
