@@ -21,6 +21,7 @@ mod maps;
 mod monitor;
 mod radar_2d;
 mod radar_3d;
+mod shadows;
 mod stages;
 mod supervised;
 
