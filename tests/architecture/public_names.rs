@@ -35,7 +35,7 @@ fn and_is_enough_for_a_user() {
 #[test]
 fn and_for_the_example() {
     let output = cargo(&["test", "--package", "viewshed-example"]);
-    assert!(output.contains("1 passed"), "{output}");
+    assert!(output.contains("2 passed"), "{output}");
 }
 
 /// Names by kind.

@@ -1,5 +1,8 @@
 //! The example on the shipped log of an ARS408's bus.
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use viewshed::{CanFrame, CanId, FieldOfView, Mount, NoiseConfig, RoadPoint, Sensor, Time};
 use viewshed_example::Guard;
 
@@ -16,9 +19,8 @@ fn frame(line: &str) -> Option<(Time, CanFrame)> {
     Some((Time::from_micros(micros), CanFrame::classic(id, &bytes.ok()?)?))
 }
 
-#[test]
-fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
-    let sensor = Sensor {
+fn sensor() -> Sensor {
+    Sensor {
         mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 5.0, yaw_deg: 0.0, pitch_deg: 2.0, roll_deg: 0.0 },
         field_of_view: FieldOfView {
             azimuth_min_deg: -45.0,
@@ -29,10 +31,23 @@ fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
             range_max_m: 100.0,
         },
         noise: NoiseConfig::default(),
-    };
-    let mut guard = Guard::new(&sensor).unwrap();
+    }
+}
+
+/// On a controller without threads, a cell that is taken once.
+fn place() -> &'static Mutex<Guard> {
+    static GUARDS: [Mutex<Guard>; 2] = [const { Mutex::new(Guard::NOWHERE) }; 2];
+    static TAKEN: AtomicUsize = AtomicUsize::new(0);
+    &GUARDS[TAKEN.fetch_add(1, Ordering::Relaxed)]
+}
+
+#[test]
+fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
+    let mut guard = place().lock().unwrap();
     let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
     let behind = RoadPoint::from_metres(-20.0, 0.0).unwrap();
+    assert!(!guard.is_free(near, Time::from_micros(0)).unwrap(), "not begun");
+    guard.start(&sensor()).unwrap();
     let (mut now, mut frames, mut free) = (Time::from_micros(0), 0, 0);
     for (time, frame) in LOG.lines().filter_map(frame) {
         guard.take(&frame, time);
@@ -43,4 +58,28 @@ fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
     assert!(frames > 1700 && free > 1000, "{free} of {frames}");
     let later = Time::from_micros(now.micros() + 600_000);
     assert!(!guard.is_free(near, later).unwrap(), "silence is no free road");
+}
+
+#[test]
+fn nothing_is_free_while_parts_of_the_last_scan_are_missing() {
+    let mut guard = place().lock().unwrap();
+    guard.start(&sensor()).unwrap();
+    let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
+    let (mut scans, mut free) = (0, 0);
+    // of every second scan the third entry never comes
+    for line in LOG.lines() {
+        scans += usize::from(line.contains(" 600#"));
+        if line.contains(" 701#02") && scans % 2 == 0 {
+            continue;
+        }
+        let Some((time, frame)) = frame(line) else { continue };
+        guard.take(&frame, time);
+        // a scan is over when the next one begins
+        if line.contains(" 600#") && scans > 10 {
+            let is_free = guard.is_free(near, time).unwrap();
+            assert!(!(is_free && scans % 2 == 1), "scan {scans} is free by one with a hole");
+            free += usize::from(is_free);
+        }
+    }
+    assert!(free > 5, "{free} of {scans}");
 }
