@@ -12,6 +12,7 @@ mod setup;
 mod traffic;
 
 mod alignment;
+mod areas;
 mod configuration;
 mod detections;
 mod fixtures;

@@ -187,6 +187,10 @@ mod tests {
                 _ => CellState { visibility: Visibility::Invisible, grade, occupancy: 0, occupied: false },
             }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     #[test]

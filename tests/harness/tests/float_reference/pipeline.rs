@@ -5,6 +5,7 @@ use viewshed::frame::detection::Measurement;
 use viewshed::frame::gate::Rejection;
 use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
 use viewshed::grid::evidence::Around;
+use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
@@ -149,6 +150,11 @@ impl VisibilityMap for Pipeline {
     fn at(&self, p: RoadPoint) -> CellState {
         let at = self.levelled.place([p.x_cm, p.y_cm].map(|v| f64::from(v) / 100.0));
         self.axes.locate(at).map_or(CellState::UNKNOWN, |(a, r)| self.cell(a, r))
+    }
+
+    fn cells_in(&self, _: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        // its table asks of points only
+        visit(CellState::UNKNOWN);
     }
 }
 

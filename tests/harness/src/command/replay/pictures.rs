@@ -357,6 +357,7 @@ fn trade_off(replay: &Replay, counted: Counted, of: impl Fn(&Row) -> (&Vec<Curve
 
 #[cfg(test)]
 mod tests {
+    use viewshed::map::query::Footprint;
     use viewshed::map::{CellState, Visibility, VisibilityMap};
 
     use super::*;
@@ -371,6 +372,10 @@ mod tests {
         fn at(&self, point: RoadPoint) -> CellState {
             let visibility = if point.y_cm < 0 { Visibility::Visible } else { Visibility::Invisible };
             CellState { visibility, grade: 255, occupancy: 0, occupied: false }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

@@ -160,6 +160,10 @@ mod tests {
         fn at(&self, point: RoadPoint) -> CellState {
             if (self.0)(point) { CLEAR } else { BLOCKED }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     fn scene(map: &Half) -> Scene<'_> {
