@@ -108,6 +108,36 @@ fn a_log_is_played_and_its_sender_described() {
     assert_eq!(page.console(), Vec::<String>::new());
 }
 
+#[test]
+fn the_page_of_a_log_opens_on_its_first_map_and_before_it_nothing_is_alarming() {
+    let Some(browser) = Browser::start("first map") else { return };
+    let folder = folder("first-map");
+    let server = Server::run([Path::new("view"), &log(&folder)]);
+    let known = overview(&server);
+    let unknown = |sample: &Value| sample["unknown"].as_f64().unwrap() >= 1.0;
+    let begins = known["samples"].as_array().unwrap().iter().position(|sample| !unknown(sample)).unwrap();
+    assert!(begins > 1, "a log begins before its first map");
+    let page = browser.open(&server.url);
+    page.until(&format!("viewshed.source.done && viewshed.drawn.number === {begins}"));
+    page.rests();
+    let view = page.ask("[viewshed.plots.plan.view.left, viewshed.plots.plan.view.right]");
+    assert!(view[1].as_f64().unwrap() > 150.0 && view[0].as_f64().unwrap() < 0.0, "{view}");
+    let sender = page.ask("document.querySelector('.sender').textContent");
+    let sender = sender.as_str().unwrap();
+    assert!(sender.contains("its map is shown") && !sender.contains("None"), "{sender}");
+    let legend = page.ask("document.getElementById('legend').textContent");
+    assert!(!legend.as_str().unwrap().contains("occupied"), "what this log does not carry: {legend}");
+    page.picture(&folder.join("first.png"));
+    let again = browser.open(&server.url);
+    again.until(&format!("viewshed.source.done && viewshed.drawn.number === {begins}"));
+    again.key("Home");
+    again.until("viewshed.drawn.number === 0 && document.querySelector('.sender')");
+    let alarm = "getComputedStyle(document.querySelector('.sender')).color === getComputedStyle(document.body).color";
+    assert_eq!(again.ask(alarm), true, "{}", again.ask("document.querySelector('.sender').dataset.condition"));
+    assert_eq!(again.ask("document.getElementById('plan-title').textContent"), "no map has come yet");
+    again.picture(&folder.join("before.png"));
+}
+
 /// What is printed up to the address.
 fn told(arguments: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));

@@ -19,6 +19,7 @@ use crate::evaluation::Settings;
 #[cfg(unix)]
 use crate::recording::can_log;
 use crate::results::files::{Folder, Target};
+use crate::results::report::table::Extent;
 use crate::{estimators, recording};
 
 #[derive(Debug, clap::Args)]
@@ -62,7 +63,7 @@ pub fn run(
     paths: &[PathBuf],
     out: &Folder,
     json: Option<&Target>,
-    settings: &Settings,
+    (settings, extent): (&Settings, Extent),
 ) -> Result<ExitCode> {
     let board = match (args.board, &args.port) {
         (Some(board), _) if !args.live => board,
@@ -83,7 +84,7 @@ pub fn run(
             }
         }
     }
-    print(&table(&rows))?;
+    print(&table(&rows, extent))?;
     if let Some(file) = json {
         file.write(serde_json::to_string_pretty(&rows)?)?;
     }

@@ -158,7 +158,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             "--report has rates, and a comparison with a board has none; leave one of them out"
         );
         let pictures = out.map_or_else(|| outputs.folder("--out", Path::new("out")), Ok)?;
-        let ended = board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings)?;
+        let ended = board::run(
+            &args.processor,
+            &paths,
+            &pictures,
+            json_file.as_ref(),
+            (&settings, table::Extent::of(args.wide)),
+        )?;
         print(&outputs.told())?;
         return Ok(ended);
     }

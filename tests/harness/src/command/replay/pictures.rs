@@ -18,6 +18,7 @@ use crate::recording::truth::Object;
 use crate::results::files::Folder;
 use crate::results::pictures::birdseye;
 use crate::results::pictures::camera_view::{self, View};
+use crate::results::pictures::cells::Carries;
 use crate::results::pictures::polar::{self, PolarGrid};
 use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
 use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKind, Span, TradeOff};
@@ -195,6 +196,7 @@ fn scene<'a>(
     let recording = &replay.recording;
     Scene {
         map: estimator.map(),
+        carries: Carries::ALL,
         pose: recording.pose,
         field_of_view: recording.sensor.field_of_view,
         slice_height_m: settings.evaluation.slice_height_m,
@@ -274,6 +276,7 @@ pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> O
         narrow: cells.narrow,
         range_m: [0.0, cells.cell_m * cells.ranges as f64],
         state: &*cells.cell,
+        carries: Carries::ALL,
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),
     }))
