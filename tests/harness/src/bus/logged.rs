@@ -38,6 +38,9 @@ impl Log {
 /// A file that cannot be read, and one that is no log; says what it is.
 pub fn read(path: &Path, interface: Option<&str>) -> Result<Log> {
     let Content { bytes, damage } = file::read(path)?;
+    if bytes.is_empty() {
+        bail!("{} is empty", file::shown(path));
+    }
     if let Some(format) = Format::of(&bytes) {
         let mut problems = Problems::default();
         let lines = can_log::read(&bytes, format, interface, &mut problems)?;

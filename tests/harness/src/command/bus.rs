@@ -94,6 +94,7 @@ const LEAST_S: f64 = 1.8;
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.maps.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    settings.reading.check_for(paths.len())?;
     if args.log.is_some() && paths.len() > 1 {
         bail!("--log writes one recording and {} are to be sent; name one", paths.len());
     }

@@ -19,6 +19,7 @@ use super::replay::risk::{quantiser, share};
 use crate::bus::ears::Key;
 use crate::bus::listening::Listening;
 use crate::bus::logged::{self, Log, Logged};
+use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::probability::file::Fitted;
 use crate::pages::server::{LOOPBACK, Server};
@@ -190,6 +191,7 @@ fn from_file(
         "{}: a camera without a radar; `viewshed replay --report` shows what became of its boxes",
         recording.name
     );
+    radars.iter().try_for_each(|radar| estimators::usable::check(radar, &settings.estimators))?;
     let table = fitted.map(|fitted| quantiser(fitted, args.risk, recording, &settings)).transpose()?;
     let viewing = Viewing::recording(&radars, path, settings.evaluation.slice_height_m);
     let frames: Vec<String> = radars.iter().map(|radar| radar.frames.len().to_string()).collect();

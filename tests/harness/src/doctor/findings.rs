@@ -13,6 +13,7 @@ use super::sensor::{Output, Sensor};
 use super::{LIVE, Report};
 use crate::bus::listening::Listening;
 use crate::recording::can_log::{Content, Line};
+use crate::recording::kind;
 
 /// How much it matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -215,6 +216,15 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
         );
         return;
     }
+    // what is missing and odd by the wrong scales is no more than a consequence
+    if let Some(rather) = &sensor.rather {
+        found.add(
+            Severity::Error,
+            kind::said(&name, report.profile, rather),
+            format!("read it with --radar {}, here and in `viewshed replay`, and compare distances", rather.0),
+        );
+        return;
+    }
     if sensor.scans == 0 {
         found.add(
             Severity::Error,
@@ -264,7 +274,7 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
         found.add(
             Severity::Warning,
             format!("{name}: {:.0} % of its entries lie beyond 260 m or behind it", 100.0 * sensor.implausible),
-            "a clone with other scales? Try --radar SR75, here and in `viewshed replay`, and compare distances",
+            "a clone with scales that are not known here? Compare distances with the truth",
         );
     }
 }
@@ -345,14 +355,18 @@ fn lengths(found: &mut Findings, report: &Report) {
         if i.lengths.iter().any(|l| *l < expected) {
             found.add(
                 Severity::Error,
-                format!("{} ({message}) comes with {:?} bytes instead of {expected}", i.id, i.lengths),
+                format!("{} ({message}) comes with {} bytes, and {expected} are needed", i.id, listed(&i.lengths)),
                 "another device uses this identifier, or a gateway cuts it",
             );
         } else if i.lengths.iter().any(|l| *l > expected) {
             found.add(
                 Severity::Note,
-                format!("{} ({message}) comes with {:?} bytes instead of {expected}", i.id, i.lengths),
-                "nothing: longer frames are taken",
+                format!(
+                    "{} ({message}) comes with {} bytes, of which the first {expected} are read",
+                    i.id,
+                    listed(&i.lengths)
+                ),
+                "nothing has to be done: the bytes behind mean nothing to a radar",
             );
         }
         if i.expected && i.frames == 0 && !matches!(message, "SpeedInformation" | "YawRateInformation") {
@@ -363,6 +377,11 @@ fn lengths(found: &mut Findings, report: &Report) {
             );
         }
     }
+}
+
+/// Lengths in words: "2 or 8".
+fn listed(lengths: &[usize]) -> String {
+    lengths.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ")
 }
 
 /// The line that switches clusters on.

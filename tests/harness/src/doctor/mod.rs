@@ -18,7 +18,7 @@ use crate::recording::file::{self, Content};
 use crate::recording::foreign;
 use crate::recording::problems::{Problem, Problems};
 use crate::recording::ti::is_capture;
-use crate::recording::{self, ReadOptions};
+use crate::recording::{self, ReadOptions, ignored};
 use can::Identifier;
 use findings::{Finding, Severity};
 use sensor::Sensor;
@@ -28,6 +28,9 @@ use sensor::Sensor;
 pub struct Report {
     pub log: String,
     pub kind: &'static str,
+    /// By whose scales entries are read.
+    #[serde(skip)]
+    pub profile: &'static Ars408Profile,
     pub frames: usize,
     pub duration_s: f64,
     /// Frames in the busiest second.
@@ -64,6 +67,28 @@ impl Examined {
         }
     }
 
+    /// Leaves out the sensors that are not meant. Where the one that is meant is not there, all are shown.
+    fn only(&mut self, sensor: u8) {
+        let heard: Vec<u8> = match self {
+            Self::Can(report) => report.sensors.iter().map(|s| s.sensor).collect(),
+            Self::Native(report) => report.sensors.iter().map(|s| s.sensor).collect(),
+            Self::Ti(_) => {
+                let what = ignored::said("--sensor-id", "CAN logs and captures of the native format");
+                findings::add(self.findings_mut(), Severity::Note, what, "a capture of a TI radar is of one sensor");
+                return;
+            }
+        };
+        if !heard.contains(&sensor) {
+            let listed = heard.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+            let listed = if listed.is_empty() { "none".to_owned() } else { listed };
+            let what = format!("sensor {sensor} is not there; sensors heard: {listed}");
+            let remedy = "name another with --sensor-id, or give the radar this id (2x0, SensorID) and start it again";
+            findings::add(self.findings_mut(), Severity::Error, what, remedy);
+        } else if let Self::Native(report) = self {
+            report.sensors.retain(|s| s.sensor == sensor);
+        }
+    }
+
     /// The report to be read.
     pub fn text(&self) -> String {
         match self {
@@ -81,6 +106,7 @@ impl Examined {
 pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
     let Content { bytes, damage } = file::read(path)?;
     let mut examined = examine_bytes(path, &bytes, known)?;
+    known.sensor_id.into_iter().for_each(|sensor| examined.only(sensor));
     if let Some(damage) = damage {
         findings::add(examined.findings_mut(), Severity::Warning, damage, file::DAMAGE_REMEDY);
     }
@@ -92,6 +118,9 @@ fn examine_bytes(path: &Path, bytes: &[u8], known: &ReadOptions) -> Result<Exami
         name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
         _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
+    if bytes.is_empty() {
+        bail!("{log} is empty");
+    }
     if let Some(format) = Format::of(bytes) {
         return can(log, bytes, format, known);
     }
@@ -118,6 +147,7 @@ pub const LIVE: &str = "SocketCAN";
 /// Judges what was heard of a bus within some seconds.
 pub fn heard(interface: &str, seconds: f64, lines: &[Line], known: &ReadOptions) -> Examined {
     let mut examined = judged(interface.to_owned(), LIVE, lines, &Problems::default(), known, seconds);
+    known.sensor_id.into_iter().for_each(|sensor| examined.only(sensor));
     if let (Examined::Can(report), []) = (&mut examined, lines) {
         report.findings = vec![findings::silence(seconds)];
     }
@@ -139,7 +169,8 @@ fn judged(
     known: &ReadOptions,
     duration_s: f64,
 ) -> Examined {
-    let sensors = sensor::all(lines, known.profile.unwrap_or(&Ars408Profile::ARS408));
+    let profile = known.profile.unwrap_or(&Ars408Profile::ARS408);
+    let sensors = sensor::all(lines, profile);
     let native = recording::native::of_log(lines);
     if sensors.is_empty() && !native.is_empty() {
         return Examined::Native(native::examine(log, &native, 0));
@@ -147,6 +178,7 @@ fn judged(
     let mut report = Report {
         log,
         kind,
+        profile,
         frames: lines.len(),
         duration_s,
         busiest_second: can::busiest_second(lines),
@@ -155,6 +187,9 @@ fn judged(
         findings: Vec::new(),
         sensors,
     };
+    if let Some(sensor) = known.sensor_id.filter(|id| report.sensors.iter().any(|s| s.sensor == *id)) {
+        report.sensors.retain(|s| s.sensor == sensor);
+    }
     report.findings = findings::judge(&report, lines);
     Examined::Can(report)
 }

@@ -13,6 +13,7 @@ use viewshed::inputs::signal::word;
 
 use crate::recording::ars408::scans;
 use crate::recording::can_log::Line;
+use crate::recording::kind;
 
 /// What a sensor sends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -40,6 +41,8 @@ pub struct Sensor {
     pub counter_step: Option<u16>,
     /// Share of entries beyond 260 m or behind the sensor, where it does not look.
     pub implausible: f64,
+    /// The kind of radar by whose scales its frames make more sense, and why.
+    pub rather: Option<(&'static str, String)>,
     pub version: Option<String>,
     #[serde(serialize_with = "state")]
     pub state: Option<RadarState>,
@@ -115,6 +118,7 @@ fn examine(interface: &str, sensor: u8, lines: &[&Line], profile: &Ars408Profile
         period_ms: Spread::of(times.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 / 1000.0).collect()),
         counter_step: step(if clusters.len() > objects.len() { &clusters } else { &objects }),
         implausible: if entries > 0 { odd as f64 / entries as f64 } else { 0.0 },
+        rather: kind::rather(lines, sensor, profile),
         version: version.map(|v| v.release.map(|n| n.to_string()).join(".")),
         state: states.last().copied(),
         faults: faults(&states),

@@ -8,6 +8,7 @@ mod radar_2d;
 pub mod radar_3d;
 mod reference;
 mod site;
+pub mod usable;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
@@ -310,7 +311,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
 /// What a unit in a recording's place is given: its sensor, and all that is said of it and of the site.
 ///
 /// # Errors
-/// A field of view that grids here do not cover; heights that are none.
+/// A field of view that grids here do not cover; points of which [none can be used](usable::check); heights that are none.
 pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3dConfig)> {
     let (sensor, max_detections) = radar(recording, options)?;
     let mut config = options.radar_3d;
@@ -389,6 +390,7 @@ fn radar(recording: &Recording, options: &Options) -> Result<(Sensor, u16)> {
             view.range_m[0]
         );
     }
+    usable::check(recording, options)?;
     Ok((sensor(recording, &options.noise), max_detections))
 }
 

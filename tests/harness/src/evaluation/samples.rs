@@ -143,7 +143,7 @@ fn frame_samples(
     let mut samples = Vec::new();
     for (k, object) in objects.iter().enumerate() {
         let [x, y, _] = object.solid.center;
-        let slow = object.speed().is_some_and(|v| v < options.min_speed_mps);
+        let slow = object.slower_than(options.min_speed_mps);
         if slow || !recording.sensor.field_of_view.contains(pose.to_spherical(above(ground, [x, y], height))) {
             continue;
         }

@@ -11,8 +11,8 @@ use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters, Ars408Outco
 
 use super::can_log::{self, Format, Line};
 use super::capture::{self, Kind};
-use super::problems::Problems;
-use super::{Frame, ReadOptions, Recording, native};
+use super::problems::{POINTS, Problems};
+use super::{Frame, ReadOptions, Recording, kind, native};
 
 /// Entries of a scan that are kept; clones announce more than 255.
 const MOST_ENTRIES: usize = 1024;
@@ -64,9 +64,17 @@ pub fn read(name: String, bytes: &[u8], format: Format, options: &ReadOptions) -
         });
     });
     if frames.is_empty() {
+        if let Some(rather) = kind::rather(&mine, sensor, &profile) {
+            let what = kind::said(&format!("sensor {sensor} on {interface}"), &profile, &rather);
+            bail!("{name}: {what}; read it with --radar {}", rather.0);
+        }
         bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");
     }
     report(&mut problems, &interface, start, radar.counters());
+    if let Some(rather) = kind::rather(&mine, sensor, &profile) {
+        let what = kind::said(&format!("sensor {sensor}"), &profile, &rather);
+        problems.add(POINTS, format!("{what}; read it with --radar {}", rather.0), start);
+    }
     let kind = Kind {
         name: format!("{} {sensor} on {interface}", profile.name),
         azimuth_deg: 60.0,

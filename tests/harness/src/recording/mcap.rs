@@ -351,13 +351,18 @@ impl Reader {
         let radar_frame = options.radar_frame.clone().or(self.radar_frame.take()).unwrap_or_default();
         let road_frame = options.road_frame.as_deref().unwrap_or(ROAD_FRAME);
         let pose = match options.mount {
-            Some([x, y, z, yaw, pitch, roll]) => SensorPose::new([x, y, z], yaw, pitch, roll),
+            Some([x, y, z, yaw, pitch, roll]) => Ok(SensorPose::new([x, y, z], yaw, pitch, roll)),
             None => self.transforms.pose(road_frame, &radar_frame).ok_or_else(|| {
                 anyhow!(
                     "{name}: no mount: /tf_static joins no frame `{road_frame}` to the radar's `{radar_frame}` (transforms found: {}). Name the frames with --road-frame and --radar-frame, or give the mount with --mount x,y,z,yaw,pitch,roll (metres, degrees).",
                     self.transforms.describe()
                 )
-            })?,
+            }),
+        };
+        // both that are missing are asked for at once
+        let (pose, sensor) = match (pose, self.sensor(&name, options)) {
+            (Err(mount), Err(view)) => bail!("{mount:#} And {view:#}"),
+            (pose, sensor) => (pose?, sensor?),
         };
         if pose.position[2] <= 0.0 {
             bail!(
@@ -365,7 +370,6 @@ impl Reader {
                 pose.position[2]
             );
         }
-        let sensor = self.sensor(&name, options)?;
         let ground = self.ground(&name)?;
         let truth = self.labelled.then(|| Truth::new(self.labels));
         let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);

@@ -1,5 +1,6 @@
 //! Recordings: radar frames, mount, field of view and ground truth, whatever file they come from.
 
+pub mod against_labels;
 pub mod ars408;
 pub mod beside;
 pub mod boxes;
@@ -10,6 +11,7 @@ pub mod clock;
 pub mod file;
 pub mod foreign;
 pub mod ignored;
+pub mod kind;
 pub mod labels;
 pub mod mcap;
 pub mod native;
@@ -21,6 +23,7 @@ pub mod serial_log;
 pub mod ti;
 pub mod transforms;
 pub mod truth;
+pub mod used;
 pub mod write;
 
 use std::collections::BTreeMap;
@@ -152,11 +155,26 @@ impl Recording {
     }
 }
 
+/// Which labels a recording is judged by.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum LabelsFrom {
+    /// Those in `NAME.labels.csv` beside it, or else its own.
+    #[default]
+    Usual,
+    /// Those in `NAME.labels.csv` beside it.
+    Beside,
+    /// Its own.
+    Recording,
+    /// Those in another file.
+    File(PathBuf),
+}
+
 /// What replaces or restricts what the file itself says.
 #[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     pub radar_topic: Option<String>,
     pub truth_topic: Option<String>,
+    pub labels: LabelsFrom,
     /// The radar says + of what approaches.
     pub approaching_is_positive: bool,
     /// Frames of `/tf_static` that stand for `road` and for the one in the radar's headers.
@@ -184,6 +202,19 @@ pub struct ReadOptions {
     pub frame_period_s: Option<f64>,
     /// The file has other radars, too: what it says of one without naming it is not this one's.
     pub one_of_several: bool,
+}
+
+impl ReadOptions {
+    /// Refuses one file of labels for several recordings.
+    ///
+    /// # Errors
+    /// Which file that is.
+    pub fn check_for(&self, recordings: usize) -> Result<()> {
+        if let (LabelsFrom::File(file), 2..) = (&self.labels, recordings) {
+            bail!("--labels {}: it is of one recording, and there are {recordings}; name one", file.display());
+        }
+        Ok(())
+    }
 }
 
 /// Every file that [`read`] may read for a recording.
@@ -249,6 +280,9 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     let (Content { bytes, damage }, name) = (file::read(path)?, file::stem(path));
+    if bytes.is_empty() {
+        bail!("{} is empty", file::shown(path));
+    }
     let (mut recording, kind) = if boxes::is_boxes(path) {
         (boxes::read(path, &bytes, options)?, Kind::Other)
     } else if bytes.starts_with(::mcap::MAGIC) {

@@ -111,11 +111,11 @@ pub fn feed<const N: usize>(radar: &mut Ti<N>, mut bytes: &[u8], mut see: impl F
     }
 }
 
-/// What the decoder counted, in words.
+/// What the decoder counted, in words. The number of a frame that came damaged is missing, too: it is told once.
 pub fn flaws(c: &TiCounters) -> [(&'static str, u32); 6] {
     [
         ("frame cut short or damaged, dropped", c.broken),
-        ("frame that never came, by its number", c.lost),
+        ("frame that never came, by its number", c.lost.saturating_sub(c.broken)),
         ("radar started over", c.restarts),
         ("byte outside of frames", c.stray_bytes),
         ("point with values that are none, dropped", c.no_point),

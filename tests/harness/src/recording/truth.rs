@@ -38,6 +38,11 @@ impl Object {
     pub fn speed(&self) -> Option<f64> {
         self.velocity.map(|[x, y]| x.hypot(y))
     }
+
+    /// Whether it is known to be slower.
+    pub fn slower_than(&self, speed_mps: f64) -> bool {
+        self.speed().is_some_and(|speed| speed < speed_mps)
+    }
 }
 
 /// Every labelled object of a recording.
@@ -56,6 +61,8 @@ pub struct LabelsBeside {
     pub sized_by_class: usize,
     /// Objects that look along their path where the file gives no heading.
     pub turned_by_path: usize,
+    /// Objects of the recording's own labels, whose place they take.
+    pub left_out: Option<usize>,
 }
 
 impl Truth {

@@ -408,6 +408,13 @@ fn bad() -> Vec<Bad> {
             "no radar frame on topic /lidar; topics found: /ground_truth/objects",
         ),
         (
+            "neither mount nor field of view",
+            "a.mcap",
+            bag(|b| b.road = "map"),
+            "",
+            "(metres, degrees). And a: field of view unknown",
+        ),
+        (
             "two radars without a mount",
             "a.mcap",
             bag(|b| {

@@ -25,6 +25,7 @@ impl ReadingArgs {
         let Self {
             radar_topic,
             truth_topic,
+            labels,
             road_frame,
             radar_frame,
             velocity_sign,
@@ -40,6 +41,7 @@ impl ReadingArgs {
         given([
             ("--radar-topic", radar_topic.is_some()),
             ("--truth-topic", truth_topic.is_some()),
+            ("--labels", labels.is_some()),
             ("--road-frame", road_frame.is_some()),
             ("--radar-frame", radar_frame.is_some()),
             ("--velocity-sign", velocity_sign.is_some()),

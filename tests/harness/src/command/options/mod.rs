@@ -17,13 +17,13 @@ use viewshed::inputs::ti::{TiDialect, TiFamily};
 
 pub(super) use self::given::given;
 use self::values::{
-    cluster_states, far_road, field_of_view, ground_error, mount, noise, period, profile, ti_dialect, ti_header,
+    cluster_states, far_road, field_of_view, ground_error, labels, mount, noise, period, profile, ti_dialect, ti_header,
 };
 pub(super) use self::values::{finite, seconds};
 use crate::configure::file as unit_file;
 use crate::estimators::{self, FarRoad, GroundError};
 use crate::evaluation::{self, Grid, Settings};
-use crate::recording::{FieldOfView, ReadOptions};
+use crate::recording::{FieldOfView, LabelsFrom, ReadOptions};
 
 /// The tables of a configuration file.
 #[derive(Debug, Default, Deserialize)]
@@ -97,6 +97,10 @@ pub struct ReadingArgs {
     /// A file NAME.labels.csv beside NAME.mcap replaces them. Without labels there are maps and no rates.
     #[arg(long, value_name = "TOPIC")]
     truth_topic: Option<String>,
+    /// Labels to judge by: `recording` for those in it, `beside` for NAME.labels.csv beside it, or a file like that
+    /// [default: those beside it, or else its own]
+    #[arg(long, value_name = "WHICH", value_parser = labels)]
+    labels: Option<LabelsFrom>,
     /// Frame of /tf_static that is the road's [default: road]
     #[arg(long, value_name = "FRAME")]
     road_frame: Option<String>,
@@ -257,7 +261,7 @@ struct UnitArgs {
 impl SettingsArgs {
     /// Files these options name.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        self.judging.files()
+        self.reading.files().chain(self.judging.files())
     }
 
     /// Defaults, then the file, then the command line.
@@ -272,7 +276,7 @@ impl SettingsArgs {
 impl MapArgs {
     /// Files these options name.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        self.config.files()
+        self.reading.files().chain(self.config.files())
     }
 
     /// Defaults, then the file, then the command line.
@@ -332,10 +336,17 @@ fn read_config(path: &Path) -> Result<Config> {
 }
 
 impl ReadingArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let labels = if let Some(LabelsFrom::File(file)) = &self.labels { Some(file.clone()) } else { None };
+        labels.into_iter()
+    }
+
     pub fn options(&self) -> ReadOptions {
         ReadOptions {
             radar_topic: self.radar_topic.clone(),
             truth_topic: self.truth_topic.clone(),
+            labels: self.labels.clone().unwrap_or_default(),
             approaching_is_positive: self.velocity_sign.as_deref() == Some("approaching"),
             road_frame: self.road_frame.clone(),
             radar_frame: self.radar_frame.clone(),

@@ -6,7 +6,7 @@ use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
 use crate::estimators::{FarRoad, GroundError, MOST_RANGE_M};
-use crate::recording::FieldOfView;
+use crate::recording::{FieldOfView, LabelsFrom};
 
 pub fn far_road(text: &str) -> Result<FarRoad, String> {
     match text {
@@ -16,6 +16,15 @@ pub fn far_road(text: &str) -> Result<FarRoad, String> {
             .map(FarRoad::Degrees)
             .map_err(|_| format!("`{text}` is not a whole number of degrees, -128 to 127")),
     }
+}
+
+pub fn labels(text: &str) -> Result<LabelsFrom, String> {
+    Ok(match text {
+        "recording" => LabelsFrom::Recording,
+        "beside" => LabelsFrom::Beside,
+        "" => return Err("neither `recording` nor `beside` nor a file".into()),
+        file => LabelsFrom::File(file.into()),
+    })
 }
 
 pub fn finite(text: &str) -> Result<f64, String> {

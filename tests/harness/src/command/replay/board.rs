@@ -166,6 +166,7 @@ fn one(run: &Run<'_>, out: &Folder, differ: &mut bool) -> Result<Row> {
 
 /// The configuration block for a recording.
 fn block(recording: &recording::Recording, settings: &Settings) -> Result<Block> {
+    estimators::usable::check(recording, &settings.estimators)?;
     let radar_3d = &settings.estimators.radar_3d;
     let mut block = Block::of(estimators::sensor(recording, &settings.estimators.noise));
     (block.gate, block.visibility, block.health) = (radar_3d.gate, radar_3d.visibility, radar_3d.health);

@@ -146,6 +146,7 @@ const NO_CAUSES: &str =
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    settings.reading.check_for(paths.len())?;
     let run_in = RunIn::read(&args.run_in, &settings.reading)?;
     settings.estimators.before = run_in.before();
     let mut outputs = args.outputs.beside(paths.iter().chain(&args.run_in).flat_map(|path| recording::files(path)));
@@ -418,12 +419,10 @@ fn frame_at(recording: &Recording, time_s: f64) -> Result<usize> {
     Ok(frame)
 }
 
-/// Refuses a labelled recording of which nothing could be judged: a table without a number tells nobody anything.
+/// Refuses a recording of which no frame counts, and a labelled one of which nothing could be judged: a table without a
+/// number tells nobody anything.
 fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
     let (recording, summary) = (&replay.recording, &replay.summary);
-    let cells = summary.rows.iter().any(|row| row.cell_fvr().is_some() || row.cell_fir().is_some());
-    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty());
-    let Some(truth) = truth.filter(|_| summary.objects == 0 && !cells) else { return Ok(()) };
     let (name, frames) = (&recording.name, recording.frames.len());
     if summary.frames == 0 {
         bail!(
@@ -432,6 +431,9 @@ fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
             settings.evaluation.warm_up_s
         );
     }
+    let cells = summary.rows.iter().any(|row| row.cell_fvr().is_some() || row.cell_fir().is_some());
+    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty());
+    let Some(truth) = truth.filter(|_| summary.objects == 0 && !cells) else { return Ok(()) };
     bail!(
         "{name}: nothing can be judged: of its {} labelled objects none is faster than {} m/s and in the field of view in one of the {} frames that count; look at times, places and --fov, or set --min-speed",
         truth.tracks.len(),

@@ -24,7 +24,7 @@ use crate::evaluation::units::RUN_BLOCKS;
 use crate::evaluation::{self, Grid};
 use crate::geometry::pose::SensorPose;
 use crate::recording::problems::Problem;
-use crate::recording::{FieldOfView, ReadOptions, Recording};
+use crate::recording::{FieldOfView, LabelsFrom, ReadOptions, Recording};
 
 /// Everything one recording gave.
 #[derive(Serialize)]
@@ -338,6 +338,12 @@ pub fn reading(options: &ReadOptions) -> Value {
     json!({
         "radar_topic": options.radar_topic,
         "truth_topic": options.truth_topic,
+        "labels": match &options.labels {
+            LabelsFrom::Usual => None,
+            LabelsFrom::Beside => Some("beside".to_owned()),
+            LabelsFrom::Recording => Some("recording".to_owned()),
+            LabelsFrom::File(file) => Some(file.display().to_string()),
+        },
         "mount": mount,
         "field_of_view": options.field_of_view.as_ref().map(field_of_view),
         "sensor_id": options.sensor_id,
