@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 
 use super::labels::{self, LabelClock, LabelsRead};
-use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, plausible};
+use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, plausible, unfilled};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -46,6 +46,7 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if !recording.sensor.frames_independent {
         clock::check(&recording.frames, &mut recording.problems);
     }
+    unfilled::check(&mut recording);
     plausible::check(&mut recording);
     restrict(&mut recording, options);
     if recording.frames.is_empty() {
