@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 
 use super::labels::{self, LabelClock, LabelsRead};
-use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, plausible, unfilled};
+use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, labelled, plausible, unfilled};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -43,11 +43,16 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
         let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
         all.for_each(|d| d.radial_velocity_mps = -d.radial_velocity_mps);
     }
+    if let Some(scale) = options.velocity_scale {
+        let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
+        all.for_each(|d| d.radial_velocity_mps = (f64::from(d.radial_velocity_mps) * scale) as f32);
+    }
     if !recording.sensor.frames_independent {
         clock::check(&recording.frames, &mut recording.problems);
     }
     unfilled::check(&mut recording);
     plausible::check(&mut recording);
+    labelled::check(&mut recording);
     restrict(&mut recording, options);
     if recording.frames.is_empty() {
         bail!("{}: no frame between --from and --to", path.display());

@@ -17,7 +17,7 @@ use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
 use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording::truth::{Label, Truth};
+use crate::recording::truth::{self, Label, Truth};
 
 pub const POINTS_TOPIC: &str = "/radar/points";
 pub const TRUTH_TOPIC: &str = "/ground_truth/objects";
@@ -57,6 +57,7 @@ struct Topic {
     name: String,
     schema: String,
     encoding: String,
+    is_older: bool,
     messages: u64,
 }
 
@@ -72,6 +73,20 @@ impl Topic {
     }
 }
 
+/// A message type.
+#[derive(Debug, Clone, Default)]
+struct Schema {
+    name: String,
+    /// Its definition has fields of vision_msgs before 4.0.
+    is_older: bool,
+}
+
+/// What is said of vision_msgs before 4.0, whose messages are laid out otherwise.
+const OLDER: &str = "its layout is not that of vision_msgs since ROS 2 Humble (4.0) but perhaps of an older release (Galactic, Foxy); send it with the newer definition";
+
+/// Fields that vision_msgs had before 4.0.
+const OLDER_FIELDS: [&str; 4] = ["is_tracking", "tracking_id", "source_img", "source_cloud"];
+
 #[derive(Default)]
 struct Reader {
     radar_topic: Option<String>,
@@ -79,7 +94,7 @@ struct Reader {
     /// Whether a file has begun, and whether a record was read.
     begun: bool,
     any: bool,
-    schemas: BTreeMap<u16, String>,
+    schemas: BTreeMap<u16, Schema>,
     /// Places in `topics` by the numbers of the file that is read.
     channels: BTreeMap<u16, usize>,
     topics: Vec<Topic>,
@@ -88,6 +103,8 @@ struct Reader {
     /// What [`GROUND_METADATA`] says.
     ground: Option<String>,
     transforms: Transforms,
+    /// Those of `/tf`.
+    moving: Transforms,
     radar_frame: Option<String>,
     topics_of_frames: BTreeSet<String>,
     messages: Vec<Message>,
@@ -154,6 +171,23 @@ pub fn parse(bytes: &[u8], name: String, options: &ReadOptions) -> Result<Record
     reader.finish(name, options)
 }
 
+/// The truth of labels, if the recording is labelled and their ids are of one object each.
+fn truth_of(labelled: bool, labels: Vec<Label>, problems: &mut Problems) -> Option<Truth> {
+    if !labelled {
+        return None;
+    }
+    let (all, twice) = (labels.len(), truth::twice(&labels));
+    let first = labels.first().map_or(0, |l| l.time_ns);
+    let few = twice == 0 || twice * 100 < all;
+    if twice > 0 {
+        let becomes = if few { "the first is taken" } else { "the labels are left out" };
+        let what =
+            format!("object at several places at one time, of the same id: {becomes}; give each object its own id");
+        problems.add_many("labels", what, first, twice as u64);
+    }
+    few.then(|| Truth::new(labels))
+}
+
 /// What a record says of a radar; one by the radar's name is of the topic of that name.
 fn of_sensor(record: mcap::records::Metadata) -> Option<BTreeMap<String, String>> {
     let name = record.name.strip_prefix(SENSOR_METADATA)?;
@@ -199,12 +233,15 @@ impl Reader {
         };
         self.any = true;
         match record {
-            Record::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
+            Record::Schema { header, data } => {
+                let definition = String::from_utf8_lossy(&data);
+                let is_older = OLDER_FIELDS.iter().any(|field| definition.contains(field));
+                self.schemas.insert(header.id, Schema { name: header.name, is_older });
             }
             Record::Channel(c) => {
-                let schema = self.schemas.get(&c.schema_id).cloned().unwrap_or_else(|| "(no schema)".into());
-                let topic = Topic { name: c.topic, schema, encoding: c.message_encoding, messages: 0 };
+                let none = || Schema { name: "(no schema)".into(), is_older: false };
+                let Schema { name: schema, is_older } = self.schemas.get(&c.schema_id).cloned().unwrap_or_else(none);
+                let topic = Topic { name: c.topic, schema, encoding: c.message_encoding, is_older, messages: 0 };
                 let known = self.topics.iter().position(|t| t.is_same(&topic));
                 let place = known.unwrap_or(self.topics.len());
                 if known.is_none() {
@@ -226,7 +263,7 @@ impl Reader {
             return;
         };
         topic.messages += 1;
-        let Topic { name, schema, encoding, .. } = topic.clone();
+        let Topic { name, schema, encoding, is_older, .. } = topic.clone();
         let is_radar = self.radar_topic.as_deref().unwrap_or(POINTS_TOPIC) == name
             || (self.radar_topic.is_none() && schema == RADAR_SCAN);
         let is_truth = self.truth_topic.as_deref().unwrap_or(TRUTH_TOPIC) == name;
@@ -236,12 +273,17 @@ impl Reader {
             }
             POINT_CLOUD if is_radar => self.cloud(&name, header, data),
             RADAR_SCAN if is_radar => self.scan(&name, header, data),
-            DETECTIONS if is_truth => self.objects(&name, data),
+            DETECTIONS if is_truth && is_older => Err(OLDER.into()),
+            DETECTIONS if is_truth => self.objects(&name, data).map_err(|e| format!("{e}: {OLDER}")),
             BOXES if name == OBJECTS_TOPIC => {
-                ros::decode::<Detection2DArray>(data).map(|m| self.camera.boxes(m, &mut self.problems))
+                let decoded = ros::decode::<Detection2DArray>(data).map_err(|e| format!("{e}: {OLDER}"));
+                let decoded = if is_older { Err(OLDER.into()) } else { decoded };
+                self.camera.unread += u64::from(decoded.is_err());
+                decoded.map(|m| self.camera.boxes(m, header.log_time as i64, &mut self.problems))
             }
             CAMERA_INFO if name == INFO_TOPIC => ros::decode::<CameraInfo>(data).map(|m| self.camera.info(m)),
             TF if name.ends_with("tf_static") => ros::decode::<TfMessage>(data).map(|m| self.transforms.add(m)),
+            TF if name.ends_with("tf") => ros::decode::<TfMessage>(data).map(|m| self.moving.add(m)),
             _ if is_radar || is_truth => Err(format!("schema {schema} is none this reader knows")),
             _ => Ok(()),
         };
@@ -333,18 +375,19 @@ impl Reader {
         let topic = self.topics_of_frames.first().cloned().unwrap_or_default();
         self.frames = scans::assembled(std::mem::take(&mut self.messages), &topic, &mut self.problems)
             .map_err(|what| anyhow!("{name}: {what}"))?;
+        let level = self.ground.is_none();
         if self.frames.is_empty() {
             // boxes of a camera without a radar are a recording of their own
             let named_radar = |t: &Topic| t.is_of_a_radar() && t.name.starts_with("/radar/");
             let camera = match options.radar_topic {
                 None if !self.topics.iter().any(named_radar) => {
-                    std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems)
+                    std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, level, &mut self.problems)
                 }
                 _ => None,
             };
             if let Some(camera) = camera {
                 let ground = self.ground(&name)?;
-                let truth = self.labelled.then(|| Truth::new(self.labels));
+                let truth = truth_of(self.labelled, self.labels, &mut self.problems);
                 let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
                 return Ok(Recording {
                     ground,
@@ -363,7 +406,9 @@ impl Reader {
                 }
             };
             let ros_1 = self.topics.iter().any(|t| t.encoding == "ros1");
-            let remedy = if ros_1 {
+            let remedy = if self.problems.count(ros::PACKED) > 0 {
+                ""
+            } else if ros_1 {
                 "Messages of ROS 1 are not read: convert the bag (`pip install rosbags`, then `rosbags-convert --src OLD.bag --dst FOLDER --dst-storage mcap`)."
             } else {
                 "Name one with --radar-topic."
@@ -375,10 +420,7 @@ impl Reader {
         let pose = match options.mount {
             Some([x, y, z, yaw, pitch, roll]) => Ok(SensorPose::new([x, y, z], yaw, pitch, roll)),
             None => self.transforms.pose(road_frame, &radar_frame).ok_or_else(|| {
-                anyhow!(
-                    "{name}: no mount: /tf_static joins no frame `{road_frame}` to the radar's `{radar_frame}` (transforms found: {}). Name the frames with --road-frame and --radar-frame, or give the mount with --mount x,y,z,yaw,pitch,roll (metres, degrees).",
-                    self.transforms.describe()
-                )
+                anyhow!("{name}: no mount: {}", self.transforms.why_not(&self.moving, road_frame, &radar_frame))
             }),
         };
         // both that are missing are asked for at once
@@ -393,8 +435,8 @@ impl Reader {
             );
         }
         let ground = self.ground(&name)?;
-        let truth = self.labelled.then(|| Truth::new(self.labels));
-        let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);
+        let truth = truth_of(self.labelled, self.labels, &mut self.problems);
+        let camera = self.camera.finish(&self.transforms, road_frame, level, &mut self.problems);
         Ok(Recording {
             name,
             sensor,

@@ -13,15 +13,20 @@ pub mod file;
 pub mod foreign;
 pub mod ignored;
 pub mod kind;
+pub mod labelled;
 pub mod labels;
 pub mod mcap;
 pub mod native;
+pub mod picture;
 pub mod plausible;
 pub mod points;
 pub mod problems;
 pub mod ros;
+pub mod scale;
 pub mod scans;
 pub mod serial_log;
+#[cfg(test)]
+mod strange;
 pub mod ti;
 pub mod transforms;
 pub mod truth;
@@ -180,6 +185,8 @@ pub struct ReadOptions {
     pub labels: LabelsFrom,
     /// The radar says + of what approaches.
     pub approaching_is_positive: bool,
+    /// What makes m/s of the radar's velocities.
+    pub velocity_scale: Option<f64>,
     /// Frames of `/tf_static` that stand for `road` and for the one in the radar's headers.
     pub road_frame: Option<String>,
     pub radar_frame: Option<String>,

@@ -1,4 +1,4 @@
-//! What a recording says that contradicts itself: a velocity's sign, and a mount, that its own detections deny.
+//! What a recording says that contradicts itself: a velocity's sign or scale, and a mount, that its own detections deny.
 //!
 //! # Method
 //! A detection that moves is paired with detections of a later frame that have its radial velocity and lie where it
@@ -6,6 +6,7 @@
 //! pairs agree on.
 //!
 //! - *Sign*: over one frame, pairs with the velocity as it stands against pairs with its opposite.
+//! - *Scale*: by tracks of positions alone ([`scale`]).
 //! - *Yaw*: over [`PAUSE_S`], the direction in the road frame from one to the other. Most pairs have that of the road's
 //!   axis. A few degrees off it the yaw is wrong by as much. Farther off it may as well be another road's, or one's square
 //!   to it: then no angle is advised. Nothing is said of a direction in which labelled vehicles drive, too.
@@ -18,7 +19,7 @@
 use viewshed::sensor::noise::NoiseConfig;
 
 use super::problems::{MOUNT, Problems};
-use super::{Frame, RadarDetection, Recording, against_labels, used};
+use super::{Frame, RadarDetection, Recording, against_labels, scale, used};
 use crate::estimators;
 use crate::geometry::looks;
 use crate::geometry::pose::SensorPose;
@@ -82,6 +83,10 @@ fn of_used(recording: &mut Recording) {
             "velocities have the wrong sign, by how ranges change ({reversed} pairs against {as_it_stands}): + is receding; turn them with --velocity-sign approaching"
         );
         add(&mut recording.problems, what);
+        return;
+    }
+    if let Some(contradiction) = scale::contradiction(&recording.frames).filter(|_| follow) {
+        recording.problems.add("velocity", contradiction.told(), start);
         return;
     }
     let denied = against_labels::check(recording);

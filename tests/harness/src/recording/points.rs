@@ -4,7 +4,7 @@
 //! Values are metres, radians and metres per second as they stand: nothing is converted.
 
 use super::RadarDetection;
-use super::ros::{PointCloud2, PointField, RadarScan};
+use super::ros::{PointCloud2, RadarScan};
 
 /// Names a field goes by: ours first, then those of drivers.
 const RANGE: &[&str] = &["range"];
@@ -49,8 +49,7 @@ impl Points {
     fn push(&mut self, d: RadarDetection) {
         let needed = [d.range_m, d.azimuth_rad, d.radial_velocity_mps, d.elevation_rad.unwrap_or(0.0)];
         let all = |what: fn(f32) -> bool| what(d.range_m) && what(d.azimuth_rad);
-        let blank = (all(f32::is_nan) || all(|v| v == 0.0))
-            && needed[2..].iter().all(|v| v.is_nan() || *v == 0.0);
+        let blank = (all(f32::is_nan) || all(|v| v == 0.0)) && needed[2..].iter().all(|v| v.is_nan() || *v == 0.0);
         if needed.iter().any(|v| !v.is_finite()) {
             self.not_finite += 1;
             self.blank_nan += u64::from(blank);
@@ -282,7 +281,7 @@ pub fn from_scan(scan: &RadarScan) -> Points {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::ros::{Header, RadarReturn};
+    use crate::recording::ros::{Header, PointField, RadarReturn};
 
     fn cloud(names: &[&str], points: &[&[f32]]) -> PointCloud2 {
         let step = 4 * names.len() as u32;
@@ -388,6 +387,81 @@ mod tests {
         assert!(from_cloud(&c).is_err());
         c.point_step = 0;
         assert!(from_cloud(&c).is_err());
+    }
+
+    #[test]
+    fn data_that_contradict_their_size_are_no_empty_scan() {
+        let names = ["range", "azimuth", "radial_velocity"];
+        let points = [[1.0, 0.0, 0.0_f32]; 6];
+        let c = cloud(&names, &points.each_ref().map(|p| &p[..]));
+        for (width, height) in [(0, 1), (6, 0), (0, 0), (5, 1), (1, 1), (1, 2)] {
+            let wrong = PointCloud2 { width, height, ..c.clone() };
+            assert!(from_cloud(&wrong).is_err_and(|e| e.contains("72 bytes of data")), "{width} x {height}");
+        }
+        let empty = PointCloud2 { width: 0, data: Vec::new(), ..c.clone() };
+        assert_eq!(from_cloud(&empty), Ok(Points::default()));
+        assert_eq!(
+            from_cloud(&PointCloud2 { width: 2, height: 3, row_step: 24, ..c }).map(|p| p.detections.len()),
+            Ok(6)
+        );
+    }
+
+    #[test]
+    fn fields_that_points_may_lack_are_read_in_any_type() {
+        for (datatype, bytes, value) in [
+            (1, vec![0xF8], -8.0),
+            (2, vec![0xF8], 248.0),
+            (3, vec![0xFF, 0xFE], -2.0),
+            (4, vec![0x01, 0x02], 258.0),
+            (5, vec![0xFF, 0xFF, 0xFF, 0xFE], -2.0),
+            (6, vec![0, 0, 1, 0], 256.0),
+            (7, 2.5_f32.to_be_bytes().to_vec(), 2.5),
+            (8, (-2.5_f64).to_be_bytes().to_vec(), -2.5),
+        ] {
+            for is_bigendian in [false, true] {
+                let mut c = cloud(&["range", "azimuth", "radial_velocity"], &[&[10.0, 0.5, 2.0]]);
+                let extra = bytes.len() as u32;
+                c.fields.push(PointField { name: "rcs".into(), offset: 12, datatype, count: 1 });
+                (c.point_step, c.row_step, c.is_bigendian) = (12 + extra, 12 + extra, is_bigendian);
+                let mut extra = bytes.clone();
+                if is_bigendian {
+                    c.data.chunks_exact_mut(4).for_each(<[u8]>::reverse);
+                } else {
+                    extra.reverse();
+                }
+                c.data.extend(extra);
+                let d = from_cloud(&c).unwrap().detections[0];
+                assert_eq!((d.range_m, d.rcs_dbsm), (10.0, Some(value)), "{datatype} {is_bigendian}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_field_that_cannot_be_read_is_told_and_the_points_are_taken() {
+        let mut c = cloud(&["range", "azimuth", "radial_velocity", "snr"], &[&[10.0, 0.5, 2.0, 3.0]]);
+        c.fields[3].datatype = 99;
+        let p = from_cloud(&c).unwrap();
+        assert_eq!((p.detections[0].snr_db, p.unread.len()), (None, 1));
+        assert!(p.unread[0].contains("field `snr` has datatype 99"), "{:?}", p.unread);
+        // whole numbers of what is needed are of a unit that nobody tells
+        c.fields[0].datatype = 6;
+        assert!(from_cloud(&c).unwrap_err().contains("field `range` has whole numbers"));
+    }
+
+    #[test]
+    fn places_without_a_point_are_told_from_measurements_that_failed() {
+        let names = ["x", "y", "z", "velocity"];
+        let (nan, inf) = (f32::NAN, f32::INFINITY);
+        let rows: [&[f32]; 6] = [
+            &[nan; 4],
+            &[nan, nan, nan, 0.0],
+            &[0.0; 4],
+            &[nan, 1.0, 1.0, 1.0],
+            &[inf, 1.0, 1.0, 1.0],
+            &[0.0, 0.0, 0.0, 7.0],
+        ];
+        let p = from_cloud(&cloud(&names, &rows)).unwrap();
+        assert_eq!((p.not_finite, p.blank_nan, p.not_a_range, p.blank_zero, p.places()), (4, 2, 2, 1, 6));
     }
 
     #[test]

@@ -146,10 +146,9 @@ fn at(points: &[Point], place: [f64; 2]) -> Option<Point> {
     let away = |p: &Point| {
         let along = (p.range - range) / ALONG_M;
         // what is left of the distance is across
-        let across = ((p.place[0] - place[0]).powi(2) + (p.place[1] - place[1]).powi(2)
-            - (p.range - range).powi(2))
-        .max(0.0)
-        .sqrt()
+        let across = ((p.place[0] - place[0]).powi(2) + (p.place[1] - place[1]).powi(2) - (p.range - range).powi(2))
+            .max(0.0)
+            .sqrt()
             / across_m;
         along.hypot(across)
     };
@@ -205,4 +204,91 @@ fn followed(start: Point, points: &[Vec<Point>], times: &[f64]) -> Option<(f64, 
         }
     }
     best.map(|(_, rate, velocity)| (rate, velocity)).filter(|(rate, _)| rate.abs() >= LEAST_SPEED_MPS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::RadarDetection;
+
+    /// Numbers from 0 to 1, always the same.
+    struct Dice(u64);
+
+    impl Dice {
+        fn roll(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 40) as f64 / f64::from(1 << 24)
+        }
+    }
+
+    /// A road with rails and masts that are found in part, and vehicles of three reflections at these speeds.
+    fn scene(vehicles: &[(f64, f64)], scale: f64, noise: f64) -> Vec<Frame> {
+        let mut dice = Dice(7);
+        let frame = |k: i64| {
+            let time_s = k as f64 / 15.0;
+            let mut detections = Vec::new();
+            let mut add = |place: [f64; 2], velocity: f64, dice: &mut Dice, found: f64| {
+                if dice.roll() > found || place[0] < 3.0 || place[0] > 200.0 {
+                    return;
+                }
+                let (range, azimuth) = (place[0].hypot(place[1]), place[1].atan2(place[0]));
+                detections.push(RadarDetection {
+                    range_m: (range + noise * (dice.roll() - 0.5)) as f32,
+                    azimuth_rad: (azimuth + 0.01 * noise * (dice.roll() - 0.5)) as f32,
+                    elevation_rad: None,
+                    radial_velocity_mps: (velocity * scale) as f32,
+                    rcs_dbsm: None,
+                    snr_db: None,
+                });
+            };
+            for post in 0..45 {
+                add([4.0 * f64::from(post), 9.0], 0.0, &mut dice, 0.6);
+            }
+            for (n, (lane, speed)) in vehicles.iter().enumerate() {
+                let along = (31.0 * n as f64 + speed * time_s).rem_euclid(230.0) - 15.0;
+                for (ahead, aside) in [(0.0, -0.7), (0.4, 0.7), (3.1, 0.8)] {
+                    let place = [along + ahead, lane + aside];
+                    add(place, speed * place[0] / place[0].hypot(place[1]), &mut dice, 0.9);
+                }
+            }
+            Frame { time_ns: (time_s * 1e9) as i64, detections, refused: 0, fault: false }
+        };
+        (0..150).map(frame).collect()
+    }
+
+    const TRAFFIC: [(f64, f64); 6] =
+        [(-4.0, 14.0), (-4.0, 17.0), (3.5, -15.0), (3.5, -22.0), (-7.5, 28.0), (3.5, -9.0)];
+
+    #[test]
+    fn the_scale_of_velocities_is_told_by_positions() {
+        for noise in [0.0, 0.3] {
+            assert_eq!(contradiction(&scene(&TRAFFIC, 1.0, noise)), None);
+            for (scale, unit) in [
+                (3.6, "km/h"),
+                (1.0 / 0.447_04, "miles an hour"),
+                (100.0, "cm/s"),
+                (0.1, "another unit"),
+                (-3.6, "sign with --velocity-sign approaching"),
+            ] {
+                let found = contradiction(&scene(&TRAFFIC, scale, noise));
+                let Some(Contradiction::Scaled { factor, .. }) = found else { panic!("{scale}: {found:?}") };
+                assert!((factor * scale - 1.0).abs() < 0.05, "{scale}: {found:?}");
+                assert!(found.is_some_and(|f| f.told().contains(unit)), "{scale}: {found:?}");
+            }
+            let found = contradiction(&scene(&TRAFFIC, 0.0, noise));
+            assert!(
+                matches!(found, Some(Contradiction::NeverFilled { fastest_mps, .. }) if fastest_mps > 20.0),
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_scene_that_stands_is_no_evidence() {
+        for scale in [0.0, 1.0, 3.6] {
+            assert_eq!(contradiction(&scene(&[], scale, 0.3)), None, "{scale}");
+            // a queue that creeps
+            assert_eq!(contradiction(&scene(&[(-4.0, 0.5), (-4.0, 0.8), (3.5, -0.3)], scale, 0.3)), None, "{scale}");
+        }
+    }
 }

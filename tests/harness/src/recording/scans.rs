@@ -20,7 +20,11 @@ use super::{Frame, RadarDetection};
 /// Part of the period within which messages are of one scan.
 const TOGETHER: f64 = 0.2;
 
-/// Part of the period within which messages of one scan are logged.
+/// Stamps that go on more rarely are rounded, perhaps to seconds, or have pauses between: then only messages of one stamp
+/// are of one scan, and only if they are logged together.
+const SLOWEST_NS: f64 = 250_000_000.0;
+
+/// Part of the period between log times within which they are.
 const LOGGED_TOGETHER: f64 = 0.5;
 
 /// A longer gap between messages is a pause, nanoseconds.
@@ -54,17 +58,20 @@ pub fn assembled(messages: Vec<Message>, topic: &str, problems: &mut Problems) -
     let messages = in_order(messages, topic, problems);
     let messages = without_blanks(messages, topic, problems);
     note_frames(&messages, topic, problems);
-    let period_ns = period(&messages);
+    let period = period(&messages);
     let mut groups: Vec<Vec<Message>> = Vec::new();
-    let near = period_ns.filter(|period| is_rule(&messages, *period));
+    let near_ns = period
+        .filter(|period| period.ns <= SLOWEST_NS && is_rule(&messages, period.ns))
+        .map_or(0.0, |period| TOGETHER * period.ns);
     for message in messages {
-        match groups.last_mut().filter(|group| of_one_scan(&group[0], &message, period_ns, near)) {
+        match groups.last_mut().filter(|group| of_one_scan(&group[0], &message, period, near_ns)) {
             Some(group) => group.push(message),
             None => groups.push(vec![message]),
         }
     }
     let frames: Vec<Frame> = groups.into_iter().map(|group| joined(group, topic, problems)).collect();
     refuse_single_points(&frames, topic)?;
+    refuse_interleaved(&frames, topic)?;
     Ok(frames)
 }
 
@@ -132,7 +139,8 @@ fn is_step_of_clock(messages: &[Message]) -> bool {
         let (Some(end), Some(start)) = (before.last(), after.first()) else { return false };
         let within = |m: &&Message| m.time_ns >= start.time_ns && m.time_ns <= end.time_ns;
         // the same times again are the same messages again
-        let new = after.iter().filter(within).filter(|m| before.binary_search_by_key(&m.time_ns, |b| b.time_ns).is_err());
+        let new =
+            after.iter().filter(within).filter(|m| before.binary_search_by_key(&m.time_ns, |b| b.time_ns).is_err());
         new.count() >= 2 && before.iter().filter(within).count() >= 2
     };
     runs.windows(2).any(|pair| overlap(pair[0], pair[1]))
@@ -158,22 +166,35 @@ fn without_blanks(mut messages: Vec<Message>, topic: &str, problems: &mut Proble
     messages
 }
 
-/// The gap that half of the time between messages is made of, by their stamps or when they were logged, whichever is
-/// shorter; nanoseconds.
-fn period(messages: &[Message]) -> Option<f64> {
+/// What is learnt of a topic's times.
+#[derive(Debug, Clone, Copy)]
+struct Period {
+    /// Between scans.
+    ns: f64,
+    /// Within which the messages of a scan are logged.
+    logged_ns: f64,
+}
+
+/// The gaps that half of the time between messages is made of.
+fn period(messages: &[Message]) -> Option<Period> {
     let of = |time: fn(&Message) -> i64| {
         let gap = |pair: &[Message]| time(&pair[1]).saturating_sub(time(&pair[0]));
         let mut gaps: Vec<i64> = messages.windows(2).map(gap).filter(|gap| (1..=PAUSE_NS).contains(gap)).collect();
         gaps.sort_unstable();
         let half = gaps.iter().sum::<i64>() / 2;
         let mut passed = 0;
-        gaps.into_iter().find(|gap| {
+        let found = gaps.into_iter().find(|gap| {
             passed += gap;
             passed >= half
-        })
+        });
+        found.map(|gap| gap as f64)
     };
-    let (stamps, logged) = (of(|m| m.time_ns), of(|m| m.logged_ns));
-    stamps.map(|stamps| stamps.min(logged.unwrap_or(i64::MAX)) as f64)
+    let ns = of(|m| m.time_ns)?;
+    if ns <= SLOWEST_NS {
+        return Some(Period { ns, logged_ns: ns });
+    }
+    let ns = ns.min(of(|m| m.logged_ns).unwrap_or(ns));
+    Some(Period { ns, logged_ns: LOGGED_TOGETHER * ns })
 }
 
 /// Whether messages come in groups a period apart, many of them of several messages.
@@ -194,13 +215,12 @@ fn is_rule(messages: &[Message], period_ns: f64) -> bool {
     joined * 10 >= starts.len() && regular * 10 >= (starts.len() - 1) * 6
 }
 
-/// Whether a message is of the scan that another began.
-fn of_one_scan(first: &Message, message: &Message, period_ns: Option<f64>, near: Option<f64>) -> bool {
-    let Some(period_ns) = period_ns.filter(|_| first.frame_id == message.frame_id) else { return false };
+/// Whether a message is of the scan that another began; stamps nearer than `near_ns` are of one.
+fn of_one_scan(first: &Message, message: &Message, period: Option<Period>, near_ns: f64) -> bool {
+    let Some(period) = period.filter(|_| first.frame_id == message.frame_id) else { return false };
     let apart = |a: i64, b: i64| a.saturating_sub(b).saturating_abs() as f64;
     let (stamps, logged) = (apart(message.time_ns, first.time_ns), apart(message.logged_ns, first.logged_ns));
-    let together = stamps == 0.0 || near.is_some_and(|period_ns| stamps < TOGETHER * period_ns);
-    together && logged < LOGGED_TOGETHER * period_ns
+    (stamps == 0.0 || stamps < near_ns) && logged < period.logged_ns
 }
 
 /// One frame of the messages of a scan.
@@ -248,4 +268,216 @@ fn refuse_single_points(frames: &[Frame], topic: &str) -> Result<(), String> {
         "the messages of {topic} have one point each and come {:.0} times a second: each scan is in many messages, and nothing tells where it ends. Send one message a scan, or give all points of a scan one stamp",
         frames.len() as f64 / seconds.max(1e-3)
     ))
+}
+
+/// Refuses scans whose pieces come too far apart to be joined: what stands is found again only some messages later.
+fn refuse_interleaved(frames: &[Frame], topic: &str) -> Result<(), String> {
+    /// Pieces of a scan, at most.
+    const MOST_PIECES: usize = 6;
+    const MOST_COMPARED: usize = 60;
+    if frames.len() < LEAST_MESSAGES {
+        return Ok(());
+    }
+    let (mut all, mut again) = (0_usize, [0_usize; 2 * MOST_PIECES]);
+    let starts = frames.len() - again.len();
+    for k in (0..starts).step_by(starts.div_ceil(MOST_COMPARED).max(1)) {
+        for d in frames[k].detections.iter().take(MOST_COMPARED) {
+            let stands = |other: &RadarDetection| {
+                (other.range_m - d.range_m).abs() < 0.5 && (other.azimuth_rad - d.azimuth_rad).abs() < 0.02
+            };
+            all += 1;
+            for (count, later) in again.iter_mut().zip(&frames[k + 1..]) {
+                *count += usize::from(later.detections.iter().any(stands));
+            }
+        }
+    }
+    let is_period = |pieces: &usize| {
+        let (found, twice) = (again[pieces - 1], again[2 * pieces - 1]);
+        2 * found >= all && 2 * twice >= all && again[..pieces - 1].iter().all(|between| 3 * between < found)
+    };
+    match (2..=MOST_PIECES).find(is_period).filter(|_| all >= LEAST_MESSAGES) {
+        None => Ok(()),
+        Some(pieces) => Err(format!(
+            "each scan seems to come in {pieces} messages of {topic} that are too far apart to be joined: what stands is found again only in every {pieces}th. Send one message a scan, or give all points of a scan one stamp"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: i64 = 66_000_000;
+    const MS: i64 = 1_000_000;
+
+    fn detection(range_m: f32) -> RadarDetection {
+        RadarDetection {
+            range_m,
+            azimuth_rad: 0.01 * range_m,
+            elevation_rad: None,
+            radial_velocity_mps: 0.0,
+            rcs_dbsm: None,
+            snr_db: None,
+        }
+    }
+
+    fn message(time_ns: i64, logged_ns: i64, detections: &[RadarDetection]) -> Message {
+        let points = Points { detections: detections.to_vec(), ..Points::default() };
+        Message { time_ns, logged_ns, frame_id: "radar".into(), points }
+    }
+
+    /// One message a scan, of six points.
+    fn plain() -> Vec<Message> {
+        let points = |k: i64| (0..6).map(|n| detection(20.0 + 10.0 * n as f32 + 0.01 * k as f32)).collect::<Vec<_>>();
+        (0..120).map(|k| message(PERIOD_NS * k, PERIOD_NS * k + 9 * MS, &points(k))).collect()
+    }
+
+    /// Every scan in pieces of so many points, stamped and logged so much apart.
+    fn in_pieces(points: usize, stamped_ns: i64, logged_ns: i64) -> Vec<Message> {
+        let split = |m: Message| {
+            let pieces: Vec<_> = m.points.detections.chunks(points).map(<[_]>::to_vec).collect();
+            let at =
+                |(k, piece): (i64, Vec<_>)| message(m.time_ns + stamped_ns * k, m.logged_ns + logged_ns * k, &piece);
+            (0..).zip(pieces).map(at).collect::<Vec<_>>()
+        };
+        plain().into_iter().flat_map(split).collect()
+    }
+
+    fn twice(messages: Vec<Message>, logged_ns: i64) -> Vec<Message> {
+        let both = |m: Message| [m.clone(), Message { logged_ns: m.logged_ns + logged_ns, ..m }];
+        messages.into_iter().flat_map(both).collect()
+    }
+
+    fn read(messages: Vec<Message>) -> (Vec<Frame>, Vec<String>) {
+        let mut problems = Problems::default();
+        let frames = assembled(messages, "/points", &mut problems).unwrap();
+        (frames, problems.iter().map(|p| format!("{} {}x", p.what, p.count)).collect())
+    }
+
+    #[test]
+    fn scans_are_the_same_however_messages_bring_them() {
+        let (expected, nothing) = read(plain());
+        assert_eq!((expected.len(), nothing.len()), (120, 0));
+        let mut swapped = plain();
+        swapped.chunks_mut(2).for_each(<[_]>::reverse);
+        let mut shuffled = plain();
+        shuffled.chunks_mut(4).for_each(|four| four.rotate_left(1));
+        let mut unlogged = swapped.clone();
+        unlogged.iter_mut().for_each(|m| m.logged_ns = 0);
+        // logged as they came, with exchanged stamps
+        let mut stamps = swapped.clone();
+        (0..).zip(&mut stamps).for_each(|(k, m)| m.logged_ns = PERIOD_NS * k);
+        let mut halves = plain();
+        halves.rotate_left(50);
+        let newest_first: Vec<Message> = plain().into_iter().rev().collect();
+        for (how, messages, said) in [
+            ("swapped", swapped, "not in the order of time"),
+            ("shuffled", shuffled, "not in the order of time"),
+            ("halves", halves, "not in the order of time"),
+            ("newest first", newest_first, "not in the order of time"),
+            ("swapped, no log times", unlogged, "in the order of their stamps"),
+            ("stamps exchanged", stamps, "in the order of their stamps"),
+            ("two pieces of one stamp", in_pieces(3, 0, MS), "joined by their times 120x"),
+            ("three pieces", in_pieces(2, 2 * MS, 4 * MS), "joined by their times 120x"),
+            ("a point a message", in_pieces(1, 0, 1000), "joined by their times 120x"),
+            ("a point a message, half a millisecond apart", in_pieces(1, MS / 2, MS / 2), "joined by their times 120x"),
+            ("a point a message, logged as it is measured", in_pieces(1, 0, 11 * MS), "joined by their times 120x"),
+            ("each twice", twice(plain(), MS), "repeats another of the same scan, dropped 120x"),
+            ("pieces twice", twice(in_pieces(3, MS, MS), 0), "repeats another of the same scan, dropped 240x"),
+        ] {
+            let (frames, problems) = read(messages);
+            assert_eq!(frames.len(), 120, "{how}: {problems:?}");
+            assert_eq!(frames, expected, "{how}");
+            assert!(problems.iter().any(|p| p.contains(said)), "{how}: {problems:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_one_message_a_scan_stays() {
+        let jitter = |k: i64| [0, 11, -9, 4, -12, 7][(k % 6) as usize] * MS;
+        let moved = |shift: &dyn Fn(i64) -> i64| -> Vec<Message> {
+            let at = |(k, m): (i64, Message)| Message {
+                time_ns: m.time_ns + shift(k),
+                logged_ns: m.logged_ns + shift(k),
+                ..m
+            };
+            (0..).zip(plain()).map(at).collect()
+        };
+        let mut coarse = plain();
+        coarse.iter_mut().for_each(|m| m.time_ns -= m.time_ns % 1_000_000_000);
+        for (how, messages) in [
+            ("jitter", moved(&jitter)),
+            ("two frames that come together once", moved(&|k| if k == 60 { -60 * MS } else { 0 })),
+            (
+                "a frame in three lost",
+                plain().into_iter().enumerate().filter(|(k, _)| k % 3 > 0).map(|(_, m)| m).collect(),
+            ),
+            ("bursts with pauses", moved(&|k| k / 12 * 1_900 * MS)),
+            ("short bursts with pauses", moved(&|k| k / 5 * 1_900 * MS)),
+            ("stamps of whole seconds", coarse),
+            ("an hour's pause", moved(&|k| k / 60 * 3_600_000 * MS)),
+            ("a clock that steps back by 2 s", moved(&|k| if k >= 60 { -2_010 * MS } else { 0 })),
+        ] {
+            let (n, times): (usize, Vec<i64>) = (messages.len(), messages.iter().map(|m| m.time_ns).collect());
+            let (frames, problems) = read(messages);
+            assert_eq!((frames.len(), problems), (n, vec![]), "{how}");
+            assert_eq!(frames.iter().map(|f| f.time_ns).collect::<Vec<_>>(), times, "{how}");
+        }
+    }
+
+    #[test]
+    fn single_points_that_come_evenly_are_refused() {
+        let error = assembled(in_pieces(1, 11 * MS, 11 * MS), "/points", &mut Problems::default()).unwrap_err();
+        assert!(error.contains("one point each") && error.contains("91 times a second"), "{error}");
+        // a lone reflector of a fast radar stands still
+        let lone = (0..500).map(|k| message(10 * MS * k, 10 * MS * k, &[detection(20.0)])).collect();
+        assert!(assembled(lone, "/points", &mut Problems::default()).is_ok());
+    }
+
+    #[test]
+    fn pieces_too_far_apart_to_be_joined_are_refused() {
+        for (points, pieces, apart_ms) in [(3, 2, 25), (3, 2, 33), (2, 3, 22)] {
+            let messages = in_pieces(points, apart_ms * MS, apart_ms * MS);
+            let error = assembled(messages, "/points", &mut Problems::default()).unwrap_err();
+            assert!(error.contains(&format!("come in {pieces} messages of /points")), "{error}");
+        }
+        // found now and then
+        let some = plain().into_iter().enumerate().map(|(k, mut m)| {
+            m.points.detections.retain(|d| (d.range_m as usize + 7 * k) % 5 > 1);
+            m
+        });
+        assert!(assembled(some.collect(), "/points", &mut Problems::default()).is_ok());
+    }
+
+    #[test]
+    fn places_without_a_point_are_refused_measurements_only_where_the_size_follows_the_points() {
+        let blank = |nan: u64, zero: u64, size: usize| {
+            let mut messages = plain();
+            for (k, m) in messages.iter_mut().enumerate() {
+                m.points.detections.truncate(size.min(6) - k % 3);
+                let taken = m.points.detections.len() as u64;
+                let fill = size as u64 - taken;
+                (m.points.not_finite, m.points.blank_nan) = (nan * fill, nan * fill);
+                (m.points.not_a_range, m.points.blank_zero) = (zero * fill, zero * fill);
+            }
+            messages
+        };
+        for (nan, zero) in [(1, 0), (0, 1)] {
+            let (frames, problems) = read(blank(nan, zero, 64));
+            assert!(frames.iter().all(|f| f.refused == 0 && !f.detections.is_empty()), "{problems:?}");
+            assert!(problems[0].contains("place without a point"), "{problems:?}");
+            let mut varies = blank(nan, zero, 64);
+            varies[7].points.detections.pop();
+            assert!(read(varies).0.iter().all(|f| f.refused > 0));
+        }
+        let mut none = blank(1, 0, 64);
+        none.iter_mut().for_each(|m| {
+            m.points.detections.clear();
+            (m.points.not_finite, m.points.blank_nan) = (64, 64);
+        });
+        assert!(
+            read(none).0.iter().all(|f| f.refused == 64),
+            "not one point in all: the radar or its driver is broken"
+        );
+    }
 }

@@ -38,8 +38,7 @@ pub fn check(recording: &mut Recording) {
         if name == "elevation" {
             recording.sensor.has_elevation = false;
         }
-        let what =
-            format!("{name} is {value} in every detection, so it is not filled, and taken for not measured");
+        let what = format!("{name} is {value} in every detection, so it is not filled, and taken for not measured");
         recording.problems.add_many(TOPIC, what, start_ns, points);
     }
 }

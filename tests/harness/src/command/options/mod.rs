@@ -18,6 +18,7 @@ use viewshed::inputs::ti::{TiDialect, TiFamily};
 pub(super) use self::given::given;
 use self::values::{
     cluster_states, far_road, field_of_view, ground_error, labels, mount, noise, period, profile, ti_dialect, ti_header,
+    velocity_scale,
 };
 pub(super) use self::values::{finite, seconds};
 use crate::configure::file as unit_file;
@@ -110,6 +111,9 @@ pub struct ReadingArgs {
     /// What a positive radial velocity does [default: recedes]
     #[arg(long, value_name = "WHAT", value_parser = ["receding", "approaching"])]
     velocity_sign: Option<String>,
+    /// What makes m/s of the radar's velocities: 0.2778 where they are in km/h [default: 1]
+    #[arg(long, value_name = "FACTOR", value_parser = velocity_scale)]
+    velocity_scale: Option<f64>,
     /// Where the radar hangs: x,y,z,yaw,pitch,roll in metres and degrees [default: /tf_static of the file]
     ///
     /// In the road frame: x along the road, y to the left, z = height above the road. Yaw + to the left,
@@ -348,6 +352,7 @@ impl ReadingArgs {
             truth_topic: self.truth_topic.clone(),
             labels: self.labels.clone().unwrap_or_default(),
             approaching_is_positive: self.velocity_sign.as_deref() == Some("approaching"),
+            velocity_scale: self.velocity_scale,
             road_frame: self.road_frame.clone(),
             radar_frame: self.radar_frame.clone(),
             mount: self.mount,

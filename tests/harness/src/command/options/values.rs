@@ -93,6 +93,16 @@ pub fn period(text: &str) -> Result<f64, String> {
     if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
 }
 
+pub fn velocity_scale(text: &str) -> Result<f64, String> {
+    let factor = finite(text)?;
+    let within = (1e-4..=1e4).contains(&factor);
+    if within {
+        Ok(factor)
+    } else {
+        Err(format!("{factor} is not within 0.0001 to 10000; --velocity-sign turns velocities"))
+    }
+}
+
 pub fn noise(text: &str) -> Result<NoiseConfig, String> {
     let [range_m, azimuth_deg, elevation_deg, radial_velocity_mps] = numbers(text)?.map(|v| v as f32);
     let config = NoiseConfig { range_m, azimuth_deg, elevation_deg, radial_velocity_mps, ..NoiseConfig::default() };
