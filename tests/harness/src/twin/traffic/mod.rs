@@ -164,6 +164,8 @@ pub struct Collector {
     /// How often an id was taken up again after a gap.
     again: BTreeMap<(bool, String), u32>,
     jumps: Option<(Jump, u64)>,
+    /// When and where each was last, near or not.
+    last: BTreeMap<(bool, String), (f64, [f64; 2])>,
     /// Rows that come too late after the one before of their vehicle, and the shortest such time.
     late: (u64, f64),
     /// Least and greatest coordinates as the file has them, and the ids of the first two vehicles.
@@ -182,6 +184,7 @@ impl Collector {
             closed: Vec::new(),
             again: BTreeMap::new(),
             jumps: None,
+            last: BTreeMap::new(),
             late: (0, f64::INFINITY),
             extent: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
             ids: Vec::new(),
@@ -216,6 +219,7 @@ impl Collector {
         }
         let away = (row.center[0] - self.region.center[0]).hypot(row.center[1] - self.region.center[1]);
         self.nearest_m = self.nearest_m.min(away);
+        self.note_jump(&row);
         if away > self.region.radius_m {
             return Ok(());
         }
@@ -239,9 +243,6 @@ impl Collector {
         } else if way_m <= FASTEST_MPS * passed_s {
             known.samples.push(sample);
             return Ok(());
-        } else {
-            let first = Jump { id: row.id.clone(), time_s: row.time_s, way_m, passed_s };
-            self.jumps.get_or_insert((first, 0)).1 += 1;
         }
         let times = self.again.entry(key.clone()).or_insert(1);
         *times += 1;
@@ -251,6 +252,20 @@ impl Collector {
             self.closed.push((row.is_person, before));
         }
         Ok(())
+    }
+
+    /// Counts a row that is farther from the one before than its vehicle can drive, if one of them is near.
+    fn note_jump(&mut self, row: &Row) {
+        let now = (row.time_s, row.center);
+        let Some((time_s, center)) = self.last.insert((row.is_person, row.id.clone()), now) else { return };
+        let (passed_s, way_m) = (row.time_s - time_s, (row.center[0] - center[0]).hypot(row.center[1] - center[1]));
+        let is_near =
+            |[x, y]: [f64; 2]| (x - self.region.center[0]).hypot(y - self.region.center[1]) <= self.region.radius_m;
+        let jumps = passed_s > 0.0 && passed_s <= LONGEST_GAP_S && way_m > FASTEST_MPS * passed_s;
+        if jumps && (is_near(center) || is_near(row.center)) {
+            let first = Jump { id: row.id.clone(), time_s: row.time_s, way_m, passed_s };
+            self.jumps.get_or_insert((first, 0)).1 += 1;
+        }
     }
 
     /// Refuses coordinates that are degrees: two vehicles do not stand within a metre.
@@ -444,6 +459,9 @@ mod tests {
         let (jump, n) = traffic.jumps.unwrap();
         assert_eq!((jump.id.as_str(), jump.time_s, jump.way_m, jump.passed_s, n), ("a", 1.5, 80.0, 0.5, 1));
         assert_eq!(collect((0..6).map(|k| row(f64::from(k) * 0.5, 20.0 * f64::from(k)))).unwrap().jumps, None);
+        // away, and not to be seen again
+        let gone = collect([(0.0, 0.0), (0.5, 10.0), (1.0, 410.0), (1.5, 420.0)].map(|(t, x)| row(t, x))).unwrap();
+        assert_eq!((gone.vehicles.len(), gone.jumps.map(|(jump, n)| (jump.way_m, n))), (1, Some((400.0, 1))));
     }
 
     #[test]
