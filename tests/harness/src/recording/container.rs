@@ -68,6 +68,12 @@ fn one_file<'a>(mut bytes: &'a [u8], each: &mut dyn FnMut(Item<'_>)) -> &'a [u8]
         match opcode {
             op::CHUNK => match unpacked(&at[..HEADER_BYTES + body.len()]) {
                 (records, None) => records.into_iter().for_each(|record| each(Item::Record(record))),
+                (records, Some(_)) if !next_file(&at[..HEADER_BYTES + body.len()]).is_empty() => {
+                    // the recorder broke off within it, and another file follows
+                    records.into_iter().for_each(|record| each(Item::Record(record)));
+                    each(Item::Flaw("cut off before its end, read up to the break".into()));
+                    return next_file(at);
+                }
                 (_, Some(error)) => {
                     let why = match error {
                         McapError::BadChunkCrc { .. } => "its CRC-32 is wrong".to_owned(),

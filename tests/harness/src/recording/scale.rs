@@ -26,6 +26,9 @@ const ALONG_M: f64 = 0.5;
 const ACROSS_M: f64 = 0.8;
 const ACROSS_RAD: f64 = 0.012;
 
+/// Part of the frames in which a place is found occupied by what passes.
+const MOST_OCCUPIED: f64 = 0.35;
+
 /// Frames in which tracks begin, spread over the recording, and detections of each that are followed.
 const MOST_STARTS: usize = 120;
 const MOST_FOLLOWED: usize = 80;
@@ -162,8 +165,12 @@ fn at(points: &[Point], place: [f64; 2]) -> Option<Point> {
 fn followed(start: Point, points: &[Vec<Point>], times: &[f64]) -> Option<(f64, f64)> {
     let first_s = times[1] - times[0];
     let reach = FASTEST_MPS * first_s + ALONG_M;
-    // what stands is found again where it was
-    if points[1..=2].iter().any(|frame| at(frame, start.place).is_some()) {
+    // what stands is found again where it was, not always, and what passes is not there for long
+    let stands = |place: [f64; 2]| {
+        let found = points.iter().filter(|frame| at(frame, place).is_some()).count();
+        found as f64 > MOST_OCCUPIED * points.len() as f64
+    };
+    if points[1..=2].iter().any(|frame| at(frame, start.place).is_some()) || stands(start.place) {
         return None;
     }
     let from = points[1].partition_point(|p| p.range < start.range - reach);
@@ -192,7 +199,7 @@ fn followed(start: Point, points: &[Vec<Point>], times: &[f64]) -> Option<(f64, 
         let moved = (end.place[0] - start.place[0]).hypot(end.place[1] - start.place[1]);
         let mean = velocities.iter().sum::<f64>() / velocities.len() as f64;
         let same = velocities.iter().all(|v| (v - mean).abs() <= 0.15 * mean.abs() + 0.3);
-        let arrived = at(&points[0], end.place).is_none();
+        let arrived = at(&points[0], end.place).is_none() && !stands(end.place);
         if hits >= LEAST_FRAMES - 1
             && moved > LEAST_WAY_M
             && moved <= FASTEST_MPS * passed

@@ -136,8 +136,9 @@ fn is_step_of_clock(messages: &[Message]) -> bool {
         return false;
     }
     let overlap = |before: &[Message], after: &[Message]| {
-        let (Some(end), Some(start)) = (before.last(), after.first()) else { return false };
-        let within = |m: &&Message| m.time_ns >= start.time_ns && m.time_ns <= end.time_ns;
+        let ([first, .., last], [start, .., end]) = (before, after) else { return false };
+        let (from, to) = (first.time_ns.max(start.time_ns), last.time_ns.min(end.time_ns));
+        let within = |m: &&Message| (from..=to).contains(&m.time_ns);
         // the same times again are the same messages again
         let new =
             after.iter().filter(within).filter(|m| before.binary_search_by_key(&m.time_ns, |b| b.time_ns).is_err());
@@ -387,7 +388,7 @@ mod tests {
         ] {
             let (frames, problems) = read(messages);
             assert_eq!(frames.len(), 120, "{how}: {problems:?}");
-            assert_eq!(frames, expected, "{how}");
+            assert!(frames == expected, "{how}");
             assert!(problems.iter().any(|p| p.contains(said)), "{how}: {problems:?}");
         }
     }
