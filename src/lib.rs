@@ -240,6 +240,7 @@ pub use estimator::{ESTIMATOR_VERSION, Estimator, Progress};
 pub use frame::gate::GateConfig;
 pub use frame::health::HealthConfig;
 pub use grid::evidence::EvidenceConfig;
+pub use grid::settling::SettlingConfig;
 pub use obstacles::config::ObstacleConfig;
 pub use radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters, VisibilityConfig};
 

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::message::{Addresses, Plane};
@@ -288,6 +289,10 @@ struct OnRoad<'m>(&'m Map<'m>);
 impl VisibilityMap for OnRoad<'_> {
     fn at(&self, point: RoadPoint) -> CellState {
         as_sent(self.0, self.0.at(point))
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        self.0.cells_in(area, &mut |state| visit(as_sent(self.0, state)));
     }
 }
 

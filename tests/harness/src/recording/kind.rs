@@ -5,7 +5,7 @@
 //! such a radar sees or behind it, and from one scan to the next distances do not change as the velocities say.
 
 use viewshed::inputs::ars408::profile::Ars408Profile;
-use viewshed::inputs::ars408::quality::Wanted;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ars408::{Ars408, Ars408Config};
 
 use super::can_log::Line;
@@ -38,7 +38,7 @@ impl Fit {
     /// By these scales; `lines` are of one interface.
     pub fn of(lines: &[&Line], sensor: u8, profile: &Ars408Profile) -> Self {
         let mut radar = Ars408::<1024>::new(Ars408Config {
-            wanted: Wanted::ALL,
+            wanted: Ars408Wanted::ALL,
             profile: *profile,
             ..Ars408Config::sensor(sensor)
         });
@@ -52,6 +52,7 @@ impl Fit {
                 time_ns: i64::try_from(scan.time.micros()).unwrap_or(i64::MAX / 1000).saturating_mul(1000),
                 detections: scan.detections.iter().map(capture::detection).collect(),
                 refused: 0,
+                unwanted: 0,
                 fault: false,
             });
         });
