@@ -150,22 +150,25 @@ fn turned(frames: &[(&Frame, Vec<Expected>)], pose: &SensorPose) -> Option<Strin
     if off.abs() < YAW_DEG {
         return None;
     }
-    let right = wrapped(pose.yaw_rad() - off.to_radians());
+    // in tenths, and none of them -0
+    let tenths = |deg: f64| (10.0 * deg).round() / 10.0 + 0.0;
+    let right = tenths(wrapped(pose.yaw_rad() - off.to_radians()));
     let [x, y, z] = pose.position;
     let (given, word) = (pose.yaw_rad().to_degrees(), if off > 0.0 { "large" } else { "small" });
     Some(format!(
         "labelled vehicles do not lie where detections of their distance and speed do, of which {} agree: yaw {given:.1} degrees seems {:.1} too {word}; try --mount={x},{y},{z},{right:.1},{:.1},{:.1}",
         near.len(),
         off.abs(),
-        pose.pitch_rad().to_degrees(),
-        pose.roll_rad().to_degrees()
+        tenths(pose.pitch_rad().to_degrees()),
+        tenths(pose.roll_rad().to_degrees())
     ))
 }
 
 /// A position that is wrong.
 fn moved(frames: &[(&Frame, Vec<Expected>)], pose: &SensorPose) -> Option<String> {
     const BIN_M: f64 = 2.0;
-    const BINS: i32 = 30;
+    // farther, and vehicles that follow one another at one distance look like one that is elsewhere
+    const BINS: i32 = 16;
     let side = (2 * BINS + 1) as usize;
     let mut histogram = vec![0_usize; side * side];
     let at = |x: i32, y: i32| {

@@ -328,7 +328,7 @@ mod tests {
                 let along = (37.0 * f64::from(vehicle) + speed * 0.1 * k as f64).rem_euclid(444.0) - 222.0;
                 let place = [c * along - s * lane, s * along + c * lane, USUAL_HEIGHT_M];
                 let Spherical { range_m, azimuth_rad, elevation_rad } = recording.pose.to_spherical(place);
-                if range_m > 200.0 || azimuth_rad.abs() > 1.0 {
+                if range_m > 200.0 || azimuth_rad.abs() > 1.0 || elevation_rad.abs() > 0.5 {
                     continue;
                 }
                 let radial = (place[0] * c + place[1] * s) * speed / range_m;
