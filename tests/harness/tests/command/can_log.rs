@@ -189,8 +189,8 @@ fn the_doctor_finds_losses_faults_lengths_and_foreign_clocks() {
         ("radar's identifier in 29 bits", "11 bits"),
         ("scans miss most of their entries", "queue"),
         ("scans never came", "queue"),
-        ("60B (Obj_1_General) comes with [7, 8] bytes", "another device"),
-        ("301 (YawRateInformation) comes with [8] bytes", "longer frames are taken"),
+        ("60B (Obj_1_General) comes with 7 or 8 bytes, and 8 are needed", "another device"),
+        ("301 (YawRateInformation) comes with 8 bytes, of which the first 2 are read", "nothing has to be done"),
         ("time runs backwards", "one bus"),
     ] {
         let found = finding(&report, what).unwrap_or_else(|| panic!("{what}: {:#}", report["findings"]));
