@@ -216,6 +216,7 @@ impl<const K: usize> Monitor<K> {
     }
 
     /// Whether any part of an area lies in a sector that is judged blind.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)] // sectors, angles
     fn is_blind_in(&self, area: &Footprint) -> bool {
         let any = || (0..K).any(|sector| self.is_blind(sector));
         let Some(seen) = Seen::new(area, &self.levelling) else { return any() };

@@ -18,7 +18,7 @@ use crate::map::query::Footprint;
 use crate::sensor::mount::Levelling;
 
 /// Steps of 2^-16 turn by which bearings are off at most, and a bit.
-const STEPS: i32 = 4;
+const STEPS: i16 = 4;
 
 /// Nearer than this to the sensor bearings say nothing, centimetres.
 const NEAR_CM: i32 = 50;
@@ -74,8 +74,8 @@ impl Seen {
             let offset = (bearing - middle).raw();
             (right, left) = (offset.min(right), offset.max(left));
         }
-        let width = i32::from(left) - i32::from(right) + 2 * STEPS;
-        let right = middle + Angle::from_raw(right) - Angle::from_raw(STEPS as i16);
+        let width = i32::from(left) - i32::from(right) + 2 * i32::from(STEPS);
+        let right = middle + Angle::from_raw(right) - Angle::from_raw(STEPS);
         Some(Self { to_sensor, axis, half, corners, right, width })
     }
 
@@ -139,8 +139,8 @@ impl PolarGeometry {
                 (near, far) = (near.min(enters), far.max(leaves));
             }
             for (bearing, distance) in seen.corners {
-                let beside = Angle::from_raw(2 * STEPS as i16);
-                if i32::from((bearing - from + beside).raw() as u16) <= width + 4 * STEPS {
+                let beside = Angle::from_raw(2 * STEPS);
+                if i32::from((bearing - from + beside).raw() as u16) <= width + 4 * i32::from(STEPS) {
                     (near, far) = (near.min(distance), far.max(distance));
                 }
             }
