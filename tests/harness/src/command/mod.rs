@@ -99,13 +99,18 @@ impl Cli {
 
 /// One error with its causes on stderr.
 pub fn complain(error: &anyhow::Error) {
-    eprintln!("error: {error:#}");
+    told(&format!("error: {error:#}"));
+}
+
+/// A line on stderr. Where that is closed or full there is nobody to be told.
+pub fn told(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Prints to stderr what is wrong with a recording, where there is something: stdout may be another program's input.
 pub fn told_problems(recording: &Recording) {
     if !recording.problems.is_empty() {
-        eprintln!("{}: {}", recording.name, notes::problems(recording).join("\n"));
+        told(&format!("{}: {}", recording.name, notes::problems(recording).join("\n")));
     }
 }
 

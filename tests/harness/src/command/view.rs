@@ -14,8 +14,8 @@ use viewshed::wire::message::Addresses;
 use super::key::KeyArgs;
 use super::label::open;
 use super::options::{SettingsArgs, given};
-use super::print;
 use super::replay::risk::{quantiser, share};
+use super::{complain, print};
 use crate::bus::ears::Key;
 use crate::bus::listening::Listening;
 use crate::bus::logged::{self, Log, Logged};
@@ -199,7 +199,7 @@ fn from_file(
     let filling = viewing.clone();
     std::thread::spawn(move || {
         if let Err(error) = recorded::fill(&filling.instants, &radars, &settings, table.as_ref()) {
-            eprintln!("error: {error:#}");
+            complain(&error);
             filling.instants.end(format!("failed: {error:#}"));
         }
     });
@@ -294,7 +294,7 @@ fn now_ns() -> i64 {
 /// The source ends: pages say so, and what was shown stays until the program ends.
 #[cfg(unix)]
 fn ended(viewing: &Viewing, error: &anyhow::Error) {
-    eprintln!("error: {error:#}");
+    complain(error);
     viewing.instants.end(format!("ended: {error:#}"));
 }
 
