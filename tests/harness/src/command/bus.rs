@@ -139,9 +139,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Target>) -> Result<Report> {
-    let (first, last) = (maps.scans.first(), maps.scans.last());
-    let span = first.zip(last).and_then(|(first, last)| last.measured.since(first.measured)).unwrap_or(0);
-    let span_s = span as f64 / 1e6;
+    let span_s = maps.lasts_s();
     ensure!(
         span_s >= LEAST_S,
         "{name}: {span_s:.2} s of maps are too few to say what they cost: a load is of a whole second, and a receiver takes one and a half to settle; {LEAST_S} s are needed"
