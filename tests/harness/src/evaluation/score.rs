@@ -93,15 +93,21 @@ pub fn score(
     progress: &dyn Fn(),
 ) -> Score {
     let mut judged_on = grid;
-    let mut verdicts = Vec::with_capacity(samples.len());
-    let mut cells = Vec::with_capacity(samples.len());
+    let (mut verdicts, mut cells) = (Vec::new(), Vec::new());
     let mut settled = Vec::with_capacity(samples.len());
+    // hours without labels have nothing to be judged frame by frame
+    let judged = samples.iter().any(|sample| !sample.objects.is_empty() || !sample.cells.is_empty());
+    cells.extend((!judged && !samples.is_empty()).then(CellTally::default));
     for (frame, sample) in recording.frames.iter().zip(samples) {
         if recording.sensor.frames_independent {
             estimator.reset();
         }
         estimator.step(frame);
         progress();
+        settled.push(estimator.is_settled());
+        if !judged {
+            continue;
+        }
         let mut judge = |object: &Sample| {
             let map = estimator.map();
             if grid == Grid::Polar && estimator.polar().is_some() {
@@ -112,7 +118,6 @@ pub fn score(
         };
         verdicts.push(sample.objects.iter().map(&mut judge).collect());
         cells.push(tally(estimator.map(), &sample.cells));
-        settled.push(estimator.is_settled());
     }
     Score {
         name: estimator.name().to_owned(),

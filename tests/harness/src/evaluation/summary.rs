@@ -122,9 +122,13 @@ impl Summary {
         options: &Options,
     ) -> Self {
         let units = Units::new(recording, samples);
-        let object_draws = Draws::new(units.object_units, options.bootstrap, options.seed);
+        // without anything judged there is no rate to have an interval
+        let judged = samples.iter().any(|frame| !frame.objects.is_empty())
+            || scores.iter().any(|s| s.cells.iter().any(|cells| cells.counts != CellCounts::default()));
+        let repetitions = if judged { options.bootstrap } else { 0 };
+        let object_draws = Draws::new(units.object_units, repetitions, options.seed);
         let block_seed = options.seed.wrapping_add(BLOCK_SEED);
-        let block_draws = Draws::in_runs(units.block_units, RUN_BLOCKS, options.bootstrap, block_seed);
+        let block_draws = Draws::in_runs(units.block_units, RUN_BLOCKS, repetitions, block_seed);
         let boxes = bounds::boxes(samples);
         let drawn = |score: &Score| {
             let by_unit = units.by_object(|counts: &mut Counts, frame, object| {
