@@ -27,7 +27,7 @@ const WRONG: u8 = 1;
 
 /// Say what is on a radar's bus or line, what should be, what is wrong and what to do
 ///
-/// Reads a CAN log of `candump` (with -L, or -t a, d or z), of Vector's tools (ASC) or of SavvyCAN (CSV), or a capture of a
+/// Reads a CAN log of `candump` (with -L, or -t a, d or z), of Vector's tools (ASC) or of SavvyCAN or python-can (CSV), or a capture of a
 /// TI mmWave radar's data port or of the native format; each also gzipped. Or listens to a bus: `--can can0`. Which identifiers were seen and which an ARS408
 /// in its mode would send, with their lengths; its scans, counters, settings and faults; and what to do about what is
 /// wrong. Exit code 1 if something is wrong or doubtful, 2 if the log cannot be read.

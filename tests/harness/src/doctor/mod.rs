@@ -13,8 +13,9 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 
-use crate::recording::can_log::{self, FORMATS, Format, Line};
-use crate::recording::file::{self, Content};
+use crate::recording::can_log::log::{Found, Lines};
+use crate::recording::can_log::{self, FORMATS, Line};
+use crate::recording::file::{self, Content, Source};
 use crate::recording::foreign;
 use crate::recording::problems::{Problem, Problems};
 use crate::recording::ti::is_capture;
@@ -104,8 +105,25 @@ impl Examined {
 /// # Errors
 /// A file that cannot be read or is no such log.
 pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
-    let Content { bytes, damage } = file::read(path)?;
-    let mut examined = examine_bytes(path, &bytes, known)?;
+    let log = match file::shown(path) {
+        name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
+        _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    examine_source(log, &Source::of(path)?, known)
+}
+
+/// Judges a log of this name.
+///
+/// # Errors
+/// Those of [`examine`].
+pub fn examine_source(log: String, source: &Source, known: &ReadOptions) -> Result<Examined> {
+    let (mut examined, damage) = match can_log::log::find(source)? {
+        Some(found) => can(log, found, known)?,
+        None => {
+            let Content { bytes, damage } = source.read()?;
+            (examine_bytes(log, &bytes, known)?, damage)
+        }
+    };
     known.sensor_id.into_iter().for_each(|sensor| examined.only(sensor));
     if let Some(damage) = damage {
         findings::add(examined.findings_mut(), Severity::Warning, damage, file::DAMAGE_REMEDY);
@@ -113,16 +131,9 @@ pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
     Ok(examined)
 }
 
-fn examine_bytes(path: &Path, bytes: &[u8], known: &ReadOptions) -> Result<Examined> {
-    let log = match file::shown(path) {
-        name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
-        _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-    };
+fn examine_bytes(log: String, bytes: &[u8], known: &ReadOptions) -> Result<Examined> {
     if bytes.is_empty() {
         bail!("{log} is empty");
-    }
-    if let Some(format) = Format::of(bytes) {
-        return can(log, bytes, format, known);
     }
     if let Some(foreign) = foreign::named(bytes) {
         bail!("{log} cannot be read: {foreign}");
@@ -154,35 +165,39 @@ pub fn heard(interface: &str, seconds: f64, lines: &[Line], known: &ReadOptions)
     examined
 }
 
-fn can(log: String, bytes: &[u8], format: Format, known: &ReadOptions) -> Result<Examined> {
+fn can(log: String, found: Found, known: &ReadOptions) -> Result<(Examined, Option<String>)> {
     let mut problems = Problems::default();
-    let lines = can_log::read(bytes, format, known.interface.as_deref(), &mut problems)?;
-    let duration_s = can::duration_s(&lines);
-    Ok(judged(log, format.name(), &lines, &problems, known, duration_s))
+    let kind = found.format.name();
+    let lines = found.read(known.interface.as_deref(), &mut problems, &mut |_| false)?;
+    let duration_s = lines.duration_s();
+    Ok((judged(log, kind, &lines, &problems, known, duration_s), lines.damage().map(str::to_owned)))
 }
 
-fn judged(
+fn judged<L: Lines + ?Sized>(
     log: String,
     kind: &'static str,
-    lines: &[Line],
+    lines: &L,
     problems: &Problems,
     known: &ReadOptions,
     duration_s: f64,
 ) -> Examined {
     let profile = known.profile.unwrap_or(&Ars408Profile::ARS408);
     let sensors = sensor::all(lines, profile);
-    let native = recording::native::of_log(lines);
-    if sensors.is_empty() && !native.is_empty() {
-        return Examined::Native(native::examine(log, &native, 0));
+    if sensors.is_empty() {
+        let native = recording::native::of_log(lines);
+        if !native.is_empty() {
+            return Examined::Native(native::examine(log, &native, 0));
+        }
     }
+    let bus = can::Bus::of(lines);
     let mut report = Report {
         log,
         kind,
         profile,
-        frames: lines.len(),
+        frames: bus.frames,
         duration_s,
-        busiest_second: can::busiest_second(lines),
-        identifiers: can::identifiers(lines, &sensors),
+        busiest_second: bus.busiest_second,
+        identifiers: bus.identifiers(&sensors, duration_s),
         problems: problems.iter().collect(),
         findings: Vec::new(),
         sensors,
@@ -190,7 +205,7 @@ fn judged(
     if let Some(sensor) = known.sensor_id.filter(|id| report.sensors.iter().any(|s| s.sensor == *id)) {
         report.sensors.retain(|s| s.sensor == sensor);
     }
-    report.findings = findings::judge(&report, lines);
+    report.findings = findings::judge(&report, &bus);
     Examined::Can(report)
 }
 

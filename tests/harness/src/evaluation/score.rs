@@ -69,7 +69,7 @@ impl Score {
         let mut settled = Settled { of: counted.len(), ..Settled::default() };
         for k in counted.into_iter().filter(has_settled) {
             settled.frames += 1;
-            for (sample, verdict) in samples[k].objects.iter().zip(&self.verdicts[k]) {
+            for (sample, verdict) in samples[k].objects.iter().zip(self.verdicts.get(k).into_iter().flatten()) {
                 settled.counts.add(verdict.visible, sample.detected);
             }
             settled.cells += self.cells.get(k).map(|tally| tally.counts).unwrap_or_default();

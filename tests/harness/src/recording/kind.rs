@@ -5,12 +5,17 @@
 //! such a radar sees or behind it, and from one scan to the next distances do not change as the velocities say.
 
 use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::RadarScan;
+use viewshed::inputs::ars408::Ars408Config;
 use viewshed::inputs::ars408::quality::Ars408Wanted;
-use viewshed::inputs::ars408::{Ars408, Ars408Config};
 
 use super::can_log::Line;
 use super::plausible::signs;
-use super::{Frame, ars408, capture};
+use super::ars408::Feed;
+use super::{Frame, capture};
+
+/// Lines of a log that are enough to tell.
+pub const MOST_LINES: usize = 100_000;
 
 /// Beyond this no radar of the kind sees, centimetres.
 const FARTHEST_CM: u16 = 25_500;
@@ -37,13 +42,13 @@ pub struct Fit {
 impl Fit {
     /// By these scales; `lines` are of one interface.
     pub fn of(lines: &[&Line], sensor: u8, profile: &Ars408Profile) -> Self {
-        let mut radar = Ars408::<1024>::new(Ars408Config {
+        let mut feed = Feed::<1024>::new(Ars408Config {
             wanted: Ars408Wanted::ALL,
             profile: *profile,
             ..Ars408Config::sensor(sensor)
         });
         let (mut frames, mut entries, mut odd) = (Vec::new(), 0, 0);
-        ars408::scans(&mut radar, lines, |scan| {
+        let mut take = |scan: &RadarScan<'_>| {
             entries += scan.detections.len();
             // behind: more than a quarter turn to a side
             let is_odd = |range_cm: u16, azimuth: i16| range_cm > FARTHEST_CM || azimuth.unsigned_abs() > 1 << 14;
@@ -55,7 +60,9 @@ impl Fit {
                 unwanted: 0,
                 fault: false,
             });
-        });
+        };
+        lines.iter().for_each(|line| feed.push(line, &mut take));
+        feed.end(&mut take);
         let implausible = if entries > 0 { odd as f64 / entries as f64 } else { 0.0 };
         // what is slow has not moved enough from one scan to the next
         let mut apart: Vec<Frame> = Vec::new();
@@ -103,13 +110,15 @@ pub fn said(of: &str, profile: &Ars408Profile, (name, why): &(&str, String)) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::can_log::{self, Format};
+    use crate::recording::can_log::log;
+    use crate::recording::file::Source;
     use crate::recording::problems::Problems;
 
     #[test]
     fn frames_read_as_of_another_kind_are_told() {
         let log = include_bytes!("../../../recordings/ars408-made-up.log");
-        let lines = can_log::read(log, Format::Candump, None, &mut Problems::default()).unwrap();
+        let found = log::find(&Source::of_bytes(log)).unwrap().unwrap();
+        let lines = found.read(None, &mut Problems::default(), &mut |_| false).unwrap().collect();
         let lines: Vec<&Line> = lines.iter().collect();
         // clusters and objects
         for sensor in [0, 3] {

@@ -27,6 +27,7 @@ pub mod scans;
 pub mod serial_log;
 #[cfg(test)]
 mod strange;
+pub mod text;
 pub mod ti;
 pub mod transforms;
 pub mod truth;
@@ -43,7 +44,7 @@ use crate::geometry::ground::Ground;
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
 use camera::RecordedCamera;
-use file::Content;
+use file::{Content, Source};
 use ignored::Kind;
 use problems::Problems;
 
@@ -239,7 +240,9 @@ pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
 /// Those of [`read`]; several radars, some of them without a mount or a field of view: all are listed.
 pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, ReadOptions)>> {
     let asked = options.radar_topic.is_some() || path.as_os_str() == file::STANDARD_INPUT || boxes::is_boxes(path);
-    let Content { bytes, damage } = if asked { Content { bytes: Vec::new(), damage: None } } else { file::read(path)? };
+    let is_mcap = !asked && Source::of(path)?.begin(::mcap::MAGIC.len() as u64)? == ::mcap::MAGIC;
+    let Content { bytes, damage } =
+        if is_mcap { file::read(path)? } else { Content { bytes: Vec::new(), damage: None } };
     let topics = if bytes.starts_with(::mcap::MAGIC) { mcap::radar_topics(&bytes) } else { Vec::new() };
     if topics.len() < 2 {
         // whoever reads the file again finds the same topic
@@ -289,16 +292,20 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
-    let (Content { bytes, damage }, name) = (file::read(path)?, file::stem(path));
-    if bytes.is_empty() {
+    let (source, name) = (Source::of(path)?, file::stem(path));
+    if source.begin(1)?.is_empty() {
         bail!("{} is empty", file::shown(path));
     }
-    let (mut recording, kind) = if boxes::is_boxes(path) {
+    let known = boxes::is_boxes(path) || source.begin(::mcap::MAGIC.len() as u64)? == ::mcap::MAGIC;
+    if !known && let Some(log) = can_log::log::find(&source)? {
+        let (recording, damage) = ars408::read(&name, &log, options)?;
+        return complete(recording, Kind::CanLog, damage.as_deref(), path, options);
+    }
+    let Content { bytes, damage } = source.read()?;
+    let (recording, kind) = if boxes::is_boxes(path) {
         (boxes::read(path, &bytes, options)?, Kind::Other)
     } else if bytes.starts_with(::mcap::MAGIC) {
         (mcap::parse(&bytes, name, options)?, Kind::Other)
-    } else if let Some(format) = can_log::Format::of(&bytes) {
-        (ars408::read(name, &bytes, format, options)?, Kind::CanLog)
     } else if let Some(foreign) = foreign::named(&bytes) {
         bail!("{} cannot be read: {foreign}", file::shown(path));
     } else if ti::is_capture(&bytes) {
@@ -312,8 +319,19 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
             can_log::FORMATS
         );
     };
+    complete(recording, kind, damage.as_deref(), path, options)
+}
+
+/// Adds what is said beside a recording, and of how it was asked for.
+fn complete(
+    mut recording: Recording,
+    kind: Kind,
+    damage: Option<&str>,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<Recording> {
     ignored::note(&mut recording, options, kind);
-    note_damage(&mut recording, damage.as_deref());
+    note_damage(&mut recording, damage);
     beside::complete(recording, path, options)
 }
 

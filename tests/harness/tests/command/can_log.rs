@@ -191,7 +191,7 @@ fn the_doctor_finds_losses_faults_lengths_and_foreign_clocks() {
         ("scans never came", "queue"),
         ("60B (Obj_1_General) comes with 7 or 8 bytes, and 8 are needed", "another device"),
         ("301 (YawRateInformation) comes with 8 bytes, of which the first 2 are read", "nothing has to be done"),
-        ("time runs backwards", "one bus"),
+        ("lines that are not in the order of time, by up to 100.0 ms", "nothing for this report"),
     ] {
         let found = finding(&report, what).unwrap_or_else(|| panic!("{what}: {:#}", report["findings"]));
         assert!(found.1.contains(remedy), "{what}: {}", found.1);
@@ -352,4 +352,76 @@ fn the_doctor_knows_a_broadcast_of_visibility() {
     // and a log of a CAN bus goes through `bus` as any recording does
     let output = bus(&[LOG, "--sensor-id", "0", "--mount", "0,0,5,0,2,0"]);
     assert!(output.status.success() && stdout(&output).contains("classic-500k"), "{}", stderr(&output));
+}
+
+#[test]
+fn the_doctor_says_which_message_a_filter_left_out_and_not_that_the_radar_is_silent() {
+    let folder = folder("doctor_filtered");
+    let log = std::fs::read_to_string(LOG).unwrap();
+    for (sensor, status, name) in [(0, "600", "Cluster_0_Status"), (3, "63A", "Obj_0_Status")] {
+        let left: Vec<&str> = log.lines().filter(|line| !line.contains(&format!(" {status}#"))).collect();
+        let (code, report) = judge(&folder, &left);
+        assert_eq!(code, 1);
+        let what = format!("sensor {sensor} on can0: {status} ({name}) is missing");
+        assert!(finding(&report, &what).unwrap().1.contains("filter"), "{what}");
+        assert!(finding(&report, &format!("sensor {sensor} on can0 is there but sends no scans")).is_none());
+    }
+}
+
+#[test]
+fn a_log_that_was_not_understood_says_nothing_of_the_bus() {
+    let folder = folder("doctor_not_understood");
+    let rest = vec!["(1.1) can0 what is this"; 30];
+    let (code, report) = judge(&folder, &[vec!["(1.0) can0 123#00"], rest].concat());
+    assert_eq!(code, 1);
+    let (severity, remedy) = finding(&report, "could not be understood").unwrap();
+    assert!(severity == "error" && remedy.contains("candump -L"));
+    assert!(!report["findings"].to_string().contains("termination"), "{report:#}");
+}
+
+#[test]
+fn frames_marked_as_can_fd_and_lines_out_of_order_are_read_and_told() {
+    let folder = folder("doctor_marked");
+    let log = std::fs::read_to_string(LOG).unwrap();
+    let marked = log.replace('#', "##0");
+    let (code, report) = judge(&folder, &marked.lines().collect::<Vec<_>>());
+    assert_eq!((code, &report["sensors"][0]["scans"]), (0, &json!(28)));
+    assert!(finding(&report, "marked as CAN FD").unwrap().1.contains("classic CAN"));
+    let newest_first: Vec<&str> = log.lines().rev().collect();
+    let (code, report) = judge(&folder, &newest_first);
+    assert_eq!((code, &report["sensors"][0]["scans"]), (0, &json!(28)));
+    assert_eq!(finding(&report, "newest line comes first").unwrap().0, "note");
+    assert!(finding(&report, "runs backwards").is_none());
+    // the same clock once more
+    let twice = format!("{log}{log}");
+    let (code, report) = judge(&folder, &twice.lines().collect::<Vec<_>>());
+    assert_eq!(code, 0);
+    assert!(finding(&report, "time runs backwards").unwrap().1.contains("one bus"));
+}
+
+/// Words on a line that nobody can be told, and a file with a name of another country's letters.
+#[cfg(target_os = "linux")]
+#[test]
+fn neither_a_full_device_nor_a_name_that_is_no_utf_8_ends_in_a_panic() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder("can_names");
+    let viewshed = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_viewshed"));
+        command.current_dir(&folder);
+        command
+    };
+    let name = std::ffi::OsStr::from_bytes(b"gro\xDF.log");
+    std::fs::copy(LOG, folder.join(name)).unwrap();
+    let arguments = ["--sensor-id", "0", "--report", "r.html", "--force"];
+    let output = viewshed().arg("replay").arg(name).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(std::fs::read_to_string(folder.join("r.html")).unwrap().contains("gro\u{FFFD}.log"));
+    let full = || std::fs::File::options().write(true).open("/dev/full").unwrap();
+    for arguments in [["doctor", "nothing.log"], ["replay", "nothing.log"], ["doctor", LOG], ["bus", LOG]] {
+        // a panic is exit code 101
+        let code = viewshed().args(arguments).stderr(full()).output().unwrap().status.code().unwrap();
+        assert!(code <= 2, "{arguments:?}: {code}");
+        let code = viewshed().args(arguments).stdout(full()).stderr(full()).output().unwrap().status.code().unwrap();
+        assert_eq!(code, 2, "{arguments:?}");
+    }
 }
