@@ -332,10 +332,10 @@ fn fused(
     args: &Args,
     settings: &Settings,
 ) -> Result<Option<FusedReplay>> {
-    let radars: Vec<Recording> = radars.iter().map(|(recording, _)| recording.clone()).collect();
-    if !fused::is_due(&radars, args.fused)? {
+    if !fused::is_due(radars.first().map(|(first, _)| first), radars.len(), args.fused)? {
         return Ok(None);
     }
+    let radars: Vec<Recording> = radars.iter().map(|(recording, _)| recording.clone()).collect();
     FusedReplay::new(&file::stem(path), &radars, args.time, settings).map(Some)
 }
 
