@@ -114,8 +114,8 @@ impl Format {
         if python_can::is_log(lines) {
             return Some(Self::PythonCan);
         }
-        // the first line may have been cut
-        lines.iter().take(3).find_map(|line| match line {
+        // the first line may have been cut, and a tool may say something before it
+        lines.iter().take(10).find_map(|line| match line {
             _ if candump::line(line).is_ok() => Some(Self::Candump),
             _ if candump::is_screen(line) => Some(Self::Screen),
             _ => None,
