@@ -164,7 +164,7 @@ fn of_sqlite(bytes: &[u8]) -> &'static str {
     let has = |what: &[u8]| start.windows(what.len()).any(|w| w == what);
     if has(OF_PYTHON_CAN) {
         "a log of python-can in SQLite (.db); convert it: `pip install python-can`, then `can_logconvert FILE.db FILE.asc`"
-    } else if has(OF_ROS) {
+    } else if has(OF_ROS) || !has(b"CREATE TABLE") {
         "a ROS 2 bag stored in SQLite (.db3); convert it: `ros2 bag convert` to storage mcap, or `rosbags-convert --src FOLDER --dst NEW --dst-storage mcap`"
     } else {
         "a database of SQLite; export its table as CSV, as python-can has it"

@@ -32,6 +32,7 @@ pub struct Track {
     forward: u64,
     /// Lines behind the latest so far.
     behind: u64,
+    first: i64,
     last: i64,
     coarse: Parts,
     fine: Parts,
@@ -93,7 +94,7 @@ impl Parts {
 impl Track {
     pub fn see(&mut self, time: i64) {
         if self.lines == 0 {
-            (self.min, self.max, self.last) = (time, time, time);
+            (self.min, self.max, self.first, self.last) = (time, time, time, time);
         }
         self.lines += 1;
         self.back += u64::from(time < self.last);
@@ -111,7 +112,7 @@ impl Track {
 
     /// Times fall from line to line, but for a few.
     pub fn falls(&self) -> bool {
-        self.back > 9 * self.forward && self.lines > 2
+        self.back > 9 * self.forward && self.lines > 2 && self.last < self.first
     }
 
     /// Parts where the times step back far; or at all, where they do so seldom and stay there: single lines are late.
