@@ -10,8 +10,8 @@ use viewshed::{
     Addresses, Angle, Ars408, Ars408Config, BroadcastConfig, Calibration, Camera3d, Camera3dConfig, Camera3dParameters,
     CanFrame, CanId, Condition, Detection, Epoch, Estimator, Feed, FieldOfView, Frame, ImageBox, Intrinsics,
     Measurement, Medium, Mount, NativeConfig, NativeMedium, NativeReceiver, NativeSender, NoiseConfig, PointPair,
-    PolarMap, Radar3dConfig, Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, Settings, SettlingConfig, Ti,
-    TiConfig, Time, Unit, UnitState, VehicleClass, Visibility, VisibilityMap,
+    PolarMap, Radar3dConfig, Radar3dParameters, Receiver, ReceiverLimits, RoadGrid, RoadPoint, Sensor, Settings,
+    SettlingConfig, Ti, TiConfig, Time, Unit, UnitState, VehicleClass, Visibility, VisibilityMap,
 };
 
 /// Range cells and azimuths of the small size, and a receiver of its maps.

@@ -13,7 +13,7 @@ use viewshed::inputs::ars408::{Ars408Config, Ars408Counters};
 use viewshed::inputs::signal::word;
 use viewshed::wire::frame::CanFrame;
 
-use crate::recording::ars408::{Feed, classic};
+use crate::recording::ars408_feed::{Feed, classic};
 use crate::recording::can_log::Line;
 use crate::recording::can_log::log::Lines;
 use crate::recording::capture::weak;

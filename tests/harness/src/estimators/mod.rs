@@ -14,7 +14,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use viewshed::camera::Camera3dConfig;
 use viewshed::fixed::time::Time;
-use viewshed::frame::detection::{Detection, Measurement, NotADetection};
+use viewshed::frame::detection::{Detection, NotADetection};
 use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
 use viewshed::grid::settling::SettlingConfig;
@@ -24,16 +24,13 @@ use viewshed::obstacles::lanes;
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
-use viewshed::sensor::field_of_view::FieldOfView;
-use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::azimuths;
 use crate::geometry::ground::Ground;
 use crate::geometry::polyline::spaced;
-use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording::{Frame, RadarDetection, Recording};
+use crate::recording::{Frame, Recording};
 
 /// A visibility estimator as the harness drives it: one radar frame in, one map out.
 pub trait Estimator: Send {
@@ -267,6 +264,8 @@ impl Options {
 /// Most detections a frame that storage is compiled for.
 pub const MOST_DETECTIONS: usize = 4096;
 
+pub use crate::recording::sensor::{mount, sensor};
+pub use crate::recording::usable::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE, measurement};
 pub use before::Before;
 pub use radar_2d::MOST_RANGE_M;
 pub use radar_3d::Grid;
@@ -394,40 +393,6 @@ fn radar(recording: &Recording, options: &Options) -> Result<(Sensor, u16)> {
     Ok((sensor(recording, &options.noise), max_detections))
 }
 
-/// The recording's sensor as the library takes it.
-pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
-    let view = recording.sensor.field_of_view;
-    let degrees = |v: f64| v.to_degrees() as f32;
-    let mut mount = mount(&recording.pose);
-    // above the road below it
-    mount.height_m -= recording.ground.height(recording.pose.position[0]) as f32;
-    Sensor {
-        mount,
-        field_of_view: FieldOfView {
-            azimuth_min_deg: degrees(view.azimuth_rad[0]),
-            azimuth_max_deg: degrees(view.azimuth_rad[1]),
-            elevation_min_deg: degrees(view.elevation_rad[0]),
-            elevation_max_deg: degrees(view.elevation_rad[1]),
-            range_min_m: view.range_m[0] as f32,
-            range_max_m: view.range_m[1] as f32,
-        },
-        noise: *noise,
-    }
-}
-
-/// Where a sensor hangs, as the library takes it.
-pub fn mount(pose: &SensorPose) -> Mount {
-    let [x, y, z] = pose.position;
-    Mount {
-        x_m: x as f32,
-        y_m: y as f32,
-        height_m: z as f32,
-        yaw_deg: pose.yaw_rad().to_degrees() as f32,
-        pitch_deg: pose.pitch_rad().to_degrees() as f32,
-        roll_deg: pose.roll_rad().to_degrees() as f32,
-    }
-}
-
 /// A polar map's cells, for pictures and for judging on them.
 fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCells<'_> {
     let g = map.geometry();
@@ -438,24 +403,6 @@ fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCel
         narrow: g.narrow.to_bytes(),
         cell_m: f64::from(g.cell_cm) / 100.0,
         cell: Box::new(|a, r| map.cell(a, r)),
-    }
-}
-
-/// Why a point is no detection, as reports say it.
-pub const DROPPED: &str = "dropped when read";
-pub const NOT_FINITE: &str = "not finite";
-pub const NO_RANGE: &str = "range not measurable";
-pub const ABSURD: &str = "absurd";
-
-/// A recorded detection as the library takes it.
-pub fn measurement(d: &RadarDetection) -> Measurement {
-    Measurement {
-        range_m: d.range_m,
-        azimuth_rad: d.azimuth_rad,
-        elevation_rad: d.elevation_rad,
-        radial_velocity_mps: d.radial_velocity_mps,
-        rcs_dbsm: d.rcs_dbsm,
-        snr_db: d.snr_db,
     }
 }
 

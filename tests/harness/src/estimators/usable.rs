@@ -3,44 +3,13 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, bail};
-use viewshed::frame::detection::{Detection, NotADetection};
-use viewshed::frame::gate::{Gate, GateConfig, Rejection};
-use viewshed::sensor::noise::NoiseConfig;
 
-use super::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE, Options, measurement, sensor};
-use crate::recording::{RadarDetection, Recording};
+use super::Options;
+use crate::recording::Recording;
+use crate::recording::usable::{DROPPED, gate, hint, rejected};
 
 /// From this share of usable points on a map rests on something: a broken field lets a few pass by chance.
 const LEAST_OF: u64 = 1000;
-
-/// What is probably wrong, by what most of the points were rejected for.
-pub fn hint(reason: &str) -> &'static str {
-    match reason {
-        DROPPED | NOT_FINITE => "does the sensor send NaN?",
-        ABSURD => "angles in degrees?",
-        NO_RANGE => "ranges in another unit than metres?",
-        _ if reason == Rejection::Range.name() => "ranges in another unit than metres, or a wrong field of view?",
-        _ if reason == Rejection::Quality.name() => "is the field of the SNR never filled, or in another unit than dB?",
-        _ if reason == Rejection::Rcs.name() => "is the field of the RCS never filled, or in another unit than dBsm?",
-        _ if reason == Rejection::Velocity.name() => "velocities in another unit than m/s?",
-        _ => "angles in degrees, or a wrong field of view?",
-    }
-}
-
-/// The gate of a recording's radar; `None` where there can be none, which its estimators say.
-pub fn gate(recording: &Recording, config: &GateConfig) -> Option<Gate> {
-    config.gate(&sensor(recording, &NoiseConfig::default()).field_of_view.limits().ok()?).ok()
-}
-
-/// Why an estimator does not use a detection; `None` where it does.
-pub fn rejected(gate: &Gate, d: &RadarDetection) -> Option<&'static str> {
-    match Detection::new(&measurement(d)) {
-        Ok(d) => gate.judge(&d).err().map(Rejection::name),
-        Err(NotADetection::NotFinite) => Some(NOT_FINITE),
-        Err(NotADetection::Range) => Some(NO_RANGE),
-        Err(NotADetection::Absurd) => Some(ABSURD),
-    }
-}
 
 /// Refuses a radar's recording of whose points none, or hardly one, can be used. One without any point is an empty road,
 /// or a radar that is blind: its maps are unknown, and say so.

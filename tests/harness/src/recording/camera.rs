@@ -2,7 +2,6 @@
 
 use viewshed::camera::calibration;
 
-use super::picture;
 use super::problems::Problems;
 use super::ros::{
     BoundingBox2D, CameraInfo, Detection2D, Detection2DArray, Header, ObjectHypothesis, ObjectHypothesisWithPose, Pose,
@@ -205,15 +204,8 @@ impl CameraReader {
         frames
     }
 
-    /// The camera, if there are boxes of one whose mount and projection are told; on a road that is level, if they may
-    /// be of vehicles on it.
-    pub fn finish(
-        mut self,
-        transforms: &Transforms,
-        road: &str,
-        level: bool,
-        problems: &mut Problems,
-    ) -> Option<RecordedCamera> {
+    /// The camera, if there are boxes of one whose mount and projection are told.
+    pub fn finish(mut self, transforms: &Transforms, road: &str, problems: &mut Problems) -> Option<RecordedCamera> {
         let frames = self.in_order(problems);
         let first = frames.first()?.time_ns;
         if self.unread > 0 {
@@ -238,12 +230,7 @@ impl CameraReader {
         if info.d.iter().any(|d| *d != 0.0) {
             problems.add(INFO_TOPIC, "lens with distortion: boxes are taken as those of the rectified image", first);
         }
-        let camera = RecordedCamera { pose, intrinsics: delivered(&info), frames, alone: false };
-        if let Some(what) = picture::contradiction(&camera).filter(|_| level) {
-            problems.add(OBJECTS_TOPIC, format!("boxes left out: {what}"), first);
-            return None;
-        }
-        Some(camera)
+        Some(RecordedCamera { pose, intrinsics: delivered(&info), frames, alone: false })
     }
 }
 
@@ -374,7 +361,7 @@ mod tests {
         reader.boxes(frame(5, vec![b([1.0, 2.0, 3.0, 4.0]), b([f64::NAN; 4])]), 5, &mut problems);
         reader.boxes(frame(5, vec![]), 6, &mut problems);
         assert_eq!((reader.frames[0].1.boxes.len(), reader.frames[0].1.refused), (1, 1));
-        assert!(reader.finish(&Transforms::default(), "road", true, &mut problems).is_none());
+        assert!(reader.finish(&Transforms::default(), "road", &mut problems).is_none());
         assert_eq!((problems.count("not finite"), problems.count("does not go on")), (1, 1));
         assert_eq!(problems.count("there is no /camera/info"), 1);
     }

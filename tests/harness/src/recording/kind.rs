@@ -4,14 +4,14 @@
 //! Two radars send the same identifiers with other scales. By the wrong ones scans are not whole, entries lie beyond what
 //! such a radar sees or behind it, and from one scan to the next distances do not change as the velocities say.
 
-use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::Ars408Config;
+use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ars408::quality::Ars408Wanted;
 
+use super::ars408_feed::Feed;
 use super::can_log::Line;
 use super::plausible::signs;
-use super::ars408::Feed;
 use super::{Frame, capture};
 
 /// Lines of a log that are enough to tell.

@@ -13,7 +13,7 @@ use super::problems::Problems;
 use super::ros::{self, CameraInfo, Detection2DArray, Detection3DArray, PointCloud2, RadarScan, TfMessage};
 use super::scans::{self, Message};
 use super::transforms::Transforms;
-use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
+use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor, picture};
 use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
@@ -381,7 +381,9 @@ impl Reader {
             let named_radar = |t: &Topic| t.is_of_a_radar() && t.name.starts_with("/radar/");
             let camera = match options.radar_topic {
                 None if !self.topics.iter().any(named_radar) => {
-                    std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, level, &mut self.problems)
+                    let camera =
+                        std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems);
+                    picture::of_the_road(camera, level, &mut self.problems)
                 }
                 _ => None,
             };
@@ -436,7 +438,8 @@ impl Reader {
         }
         let ground = self.ground(&name)?;
         let truth = truth_of(self.labelled, self.labels, &mut self.problems);
-        let camera = self.camera.finish(&self.transforms, road_frame, level, &mut self.problems);
+        let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);
+        let camera = picture::of_the_road(camera, level, &mut self.problems);
         Ok(Recording {
             name,
             sensor,

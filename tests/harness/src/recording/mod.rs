@@ -2,6 +2,7 @@
 
 pub mod against_labels;
 pub mod ars408;
+pub mod ars408_feed;
 pub mod beside;
 pub mod boxes;
 pub mod camera;
@@ -9,6 +10,8 @@ pub mod can_log;
 pub mod capture;
 pub mod clock;
 pub mod container;
+#[cfg(test)]
+mod dialects;
 pub mod file;
 pub mod foreign;
 pub mod ignored;
@@ -24,6 +27,7 @@ pub mod problems;
 pub mod ros;
 pub mod scale;
 pub mod scans;
+pub mod sensor;
 pub mod serial_log;
 #[cfg(test)]
 mod strange;
@@ -32,6 +36,7 @@ pub mod ti;
 pub mod transforms;
 pub mod truth;
 pub mod unfilled;
+pub mod usable;
 pub mod used;
 pub mod write;
 

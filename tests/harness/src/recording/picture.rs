@@ -4,8 +4,9 @@
 //! of another size of the picture (binned, a region, scaled for the detector) lie above the horizon, or are far too large or
 //! small for where they stand.
 
-use super::camera::RecordedCamera;
+use super::camera::{OBJECTS_TOPIC, RecordedCamera};
 use super::labels::class_size;
+use super::problems::Problems;
 
 /// Boxes before anything is said.
 const LEAST_BOXES: usize = 30;
@@ -21,6 +22,15 @@ const HORIZON_PX: f64 = 10.0;
 
 /// Heights of a box over those of its class at its place that may be: vehicles are of many sizes, and partly hidden.
 const LIKELY: std::ops::RangeInclusive<f64> = 0.4..=2.5;
+
+/// A camera whose boxes may be of vehicles on the road, which is level; none where they cannot, and why.
+pub fn of_the_road(camera: Option<RecordedCamera>, level: bool, problems: &mut Problems) -> Option<RecordedCamera> {
+    let camera = camera?;
+    let Some(what) = contradiction(&camera).filter(|_| level) else { return Some(camera) };
+    let first = camera.frames.first().map_or(0, |frame| frame.time_ns);
+    problems.add(OBJECTS_TOPIC, format!("boxes left out: {what}"), first);
+    None
+}
 
 /// What contradicts that the boxes are of the picture as told; `None` where nothing does.
 pub fn contradiction(camera: &RecordedCamera) -> Option<String> {

@@ -19,8 +19,7 @@
 use viewshed::sensor::noise::NoiseConfig;
 
 use super::problems::{MOUNT, Problems};
-use super::{Frame, RadarDetection, Recording, against_labels, scale, used};
-use crate::estimators;
+use super::{Frame, RadarDetection, Recording, against_labels, scale, sensor, used};
 use crate::geometry::looks;
 use crate::geometry::pose::SensorPose;
 
@@ -62,7 +61,7 @@ pub fn check(recording: &mut Recording) {
     used::check(recording);
     if recording.ground.is_level() {
         let start = recording.frames.first().map_or(0, |f| f.time_ns);
-        for doubt in looks::doubts(&estimators::sensor(recording, &NoiseConfig::default())) {
+        for doubt in looks::doubts(&sensor::sensor(recording, &NoiseConfig::default())) {
             recording.problems.add(MOUNT, format!("{doubt}; --mount sets it"), start);
         }
     }

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use viewshed::frame::gate::{Gate, GateConfig, Rejection};
 
 use super::problems::POINTS;
+use super::usable::{self, ABSURD, DROPPED, NO_RANGE, NOT_FINITE};
 use super::{Frame, RadarDetection, Recording};
-use crate::estimators::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE, usable};
 
 /// Share of all points from which on it is said. A view that is a little narrower than the radar's is common.
 const MANY: f64 = 0.2;

@@ -20,4 +20,5 @@ mod scenes;
 mod simulate;
 #[path = "../../../common/skipped.rs"]
 mod skipped;
+mod starts;
 mod ti_capture;

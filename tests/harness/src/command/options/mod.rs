@@ -17,8 +17,8 @@ use viewshed::inputs::ti::{TiDialect, TiFamily};
 
 pub(super) use self::given::given;
 use self::values::{
-    cluster_states, far_road, field_of_view, ground_error, labels, mount, noise, period, profile, ti_dialect, ti_header,
-    velocity_scale,
+    cluster_states, far_road, field_of_view, ground_error, labels, mount, noise, period, profile, ti_dialect,
+    ti_header, velocity_scale,
 };
 pub(super) use self::values::{finite, seconds};
 use crate::configure::file as unit_file;

@@ -7,8 +7,6 @@
 pub mod asc;
 pub mod candump;
 mod columns;
-#[cfg(test)]
-mod kinds;
 #[cfg(target_os = "linux")]
 pub mod live;
 pub mod log;

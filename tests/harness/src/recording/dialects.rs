@@ -4,13 +4,13 @@ use std::fmt::Write;
 
 use viewshed::wire::frame::CanId;
 
-use super::log::find;
-use super::{Content, Line, candump};
-use crate::recording::ars408;
-use crate::recording::file::Source;
-use crate::recording::{Frame, ReadOptions, Recording};
+use super::ars408;
+use super::can_log::log::find;
+use super::can_log::{Content, Line, candump};
+use super::file::Source;
+use super::{Frame, ReadOptions, Recording};
 
-const LOG: &str = include_str!("../../../../recordings/ars408-made-up.log");
+const LOG: &str = include_str!("../../../recordings/ars408-made-up.log");
 
 fn lines() -> Vec<Line> {
     LOG.lines().map(|line| candump::line(line).unwrap()).collect()
