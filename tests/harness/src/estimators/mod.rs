@@ -455,6 +455,7 @@ impl Intake {
 mod tests {
     use super::*;
     use crate::evaluation::samples::by_hand::recording;
+    use crate::recording::RadarDetection;
 
     /// Options of a site of which all is said.
     fn all_said() -> Options {

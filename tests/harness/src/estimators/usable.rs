@@ -43,6 +43,7 @@ pub fn check(recording: &Recording, options: &Options) -> Result<()> {
 mod tests {
     use super::*;
     use crate::evaluation::samples::by_hand::recording;
+    use crate::recording::RadarDetection;
 
     const D: RadarDetection = RadarDetection {
         range_m: 50.0,

@@ -8,10 +8,11 @@ const MOTORWAY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motor
 
 #[test]
 fn a_start_and_a_gap_call_no_more_of_what_is_hidden_visible_than_a_unit_that_has_run() {
-    let folder = tempfile::tempdir().unwrap();
-    let json = folder.path().join("starts.json");
+    let json = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("starts.json");
     let output = Command::new(env!("CARGO_BIN_EXE_viewshed"))
-        .args(["starts", MOTORWAY, "--times", "3", "--run-in", "10", "--watch", "5", "--gaps", "2", "--json"])
+        .args([
+            "starts", MOTORWAY, "--times", "3", "--run-in", "10", "--watch", "5", "--gaps", "2", "--force", "--json",
+        ])
         .arg(&json)
         .output()
         .unwrap();

@@ -84,8 +84,8 @@ impl Obstacles {
             }
         }
         let stays = |fixture: &Fixture| fixture.away < AWAY;
-        let before = self.fixtures.iter().take(self.turn).filter(|fixture| !stays(fixture)).count();
-        self.turn -= before;
+        let gone = self.fixtures.iter().take(self.turn).filter(|fixture| !stays(fixture)).count();
+        self.turn -= gone;
         self.fixtures.retain(stays);
         let new = free.into_iter().filter(|d| !before.iter().any(|f| f.reaches(d, 2.0, rules)));
         let mut last: Option<&Placed> = None;
