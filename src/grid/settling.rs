@@ -6,7 +6,8 @@
 //! outwards, the farther the longer it was looked along, for what is near shows more reflections. And for as long as a
 //! vehicle may stand, it is settled no farther than to the first thing that stands there and was not seen moving. That
 //! may be a vehicle: what one of [`LEAST_HEIGHT_CM`] hides is invisible, and all behind that is unknown, for it may be
-//! taller. Healthy frames count, with detections or without: an empty road settles, too.
+//! taller. It is held there until its evidence has faded, and the distance grows by quarters of the view: a map whose
+//! edges flicker costs more on a bus. Healthy frames count, with detections or without: an empty road settles, too.
 //!
 //! A gap between frames takes off what may have happened in it: its length of the time for what moves, and
 //! [`GAP_COUNTS`] times as much of the time for what stands, since a vehicle may have come and stopped. What stood
@@ -16,7 +17,7 @@
 //! A vehicle that stood at the start and still does when the time for it is over hides what the grid alone knows of it.
 //!
 //! # Cost
-//! One byte an azimuth. While something that stands is not settled, a search in each column for its nearest evidence.
+//! Two bytes an azimuth. While something that stands is not settled, a search in each column for its nearest evidence.
 
 use crate::fixed::math;
 use crate::fixed::time::{Phase, Step};
@@ -83,6 +84,10 @@ const GAP_COUNTS: u16 = 10;
 const SAME: u8 = 2;
 /// Evidence from which on something stands in a cell: half of full.
 const STANDS: u8 = 128;
+/// Evidence down to which it still does: as long as there is any.
+const FADED: u8 = 8;
+/// Steps in which the distance grows that has settled.
+const STEPS: usize = 4;
 /// Height of what stands and may be a vehicle, centimetres: as high as a van at least, which is between cars and lorries.
 pub const LEAST_HEIGHT_CM: i32 = 200;
 /// No range cell.
@@ -97,6 +102,8 @@ pub struct Settling<const A: usize> {
     standing: u16,
     /// The nearest range cell in which something stood before the last gap, where that was settled then.
     stood: [u8; A],
+    /// The nearest in which something stands that is not settled.
+    held: [u8; A],
     phase: Phase,
 }
 
@@ -108,7 +115,7 @@ impl<const A: usize> Default for Settling<A> {
 
 impl<const A: usize> Settling<A> {
     /// Nothing was looked along.
-    pub const NEW: Self = Self { moving: 0, standing: 0, stood: [NONE; A], phase: Phase::START };
+    pub const NEW: Self = Self { moving: 0, standing: 0, stood: [NONE; A], held: [NONE; A], phase: Phase::START };
 
     /// A gap between frames. `grid` holds what stood before it.
     pub fn gap<const R: usize, const E: usize, const W: usize>(
@@ -122,6 +129,7 @@ impl<const A: usize> Settling<A> {
                 *stood = nearest(column);
             }
         }
+        self.held = [NONE; A];
         let gap = self.ticks(gap);
         self.moving = self.moving.saturating_sub(gap);
         self.standing = self.standing.saturating_sub(gap.saturating_mul(GAP_COUNTS));
@@ -145,13 +153,13 @@ impl<const A: usize> Settling<A> {
             return true;
         }
         let mut settled = reach >= R;
-        for ((a, column), stood) in grid.columns().enumerate().zip(&self.stood) {
-            let new = if stands { nearest(column) } else { NONE };
-            let end = if new == NONE || is_known(new, *stood) {
+        for (((a, column), stood), held) in grid.columns().enumerate().zip(&self.stood).zip(&mut self.held) {
+            *held = if stands { hold(column, *held, *stood) } else { NONE };
+            let end = if *held == NONE {
                 reach
             } else {
                 settled = false;
-                reach.min(hide_behind(usize::from(new), a, axes, map))
+                reach.min(hide_behind(usize::from(*held), a, axes, map))
             };
             map.forget_from(a, end);
         }
@@ -171,7 +179,7 @@ impl<const A: usize> Settling<A> {
             return ranges;
         }
         let growing = usize::from(t.far.saturating_sub(t.near)).max(1);
-        ranges * usize::from(self.moving.saturating_sub(t.near)) / growing
+        ranges * (STEPS * usize::from(self.moving.saturating_sub(t.near)) / growing) / STEPS
     }
 }
 
@@ -184,6 +192,14 @@ fn is_known(cell: u8, stood: u8) -> bool {
 fn nearest<const R: usize, const E: usize, const W: usize>(column: &Column<R, E, W>) -> u8 {
     let mut standing = column.stacks().filter(|(_, stack)| stack.iter().any(|cell| *cell >= STANDS));
     standing.next().and_then(|(r, _)| u8::try_from(r).ok()).unwrap_or(NONE)
+}
+
+/// The nearest range cell in which something stands that did not before a gap, given the one of the last frame.
+fn hold<const R: usize, const E: usize, const W: usize>(column: &Column<R, E, W>, held: u8, stood: u8) -> u8 {
+    let now = Some(nearest(column)).filter(|now| *now != NONE && !is_known(*now, stood)).unwrap_or(NONE);
+    let near_held = |r: usize| u8::try_from(r).is_ok_and(|r| r.abs_diff(held) <= SAME);
+    let still = |(r, stack): (usize, &[u8; E])| near_held(r) && stack.iter().any(|cell| *cell >= FADED);
+    if held == NONE || now.saturating_add(SAME) < held || !column.stacks().any(still) { now } else { held }
 }
 
 /// Hides what a vehicle in a range cell hides at least, and says in which cell that ends.
@@ -275,8 +291,8 @@ mod tests {
         let mut world = World::new();
         let pictures: Vec<(bool, String)> =
             [4, 6, 4, 4, 4].map(|frames| (world.look(frames), world.column(1))).to_vec();
-        // 0.4 s; 1.0 s: a sixth of the way, which is 10 m; 1.4 s: half; 1.8 s: five sixths; 2.2 s
-        let expected = ["??????????", "??????????", "....??????", "........??", ".........."];
+        // 0.4 s; 1.0 s: a sixth of the time; 1.4 s: not yet half, a quarter of the way; 1.8 s: three quarters; 2.2 s
+        let expected = ["??????????", "??????????", ".?????????", ".......???", ".........."];
         assert_eq!(pictures, expected.map(|picture| (picture == "..........", picture.into())).to_vec());
     }
 
@@ -290,6 +306,21 @@ mod tests {
         assert_eq!(world.column(2), "..........", "its own azimuth alone");
         assert!(!world.look(270) && world.column(1) == "....#?????", "29.5 s");
         assert!(world.look(10) && world.column(1) == "..........", "30.5 s");
+    }
+
+    #[test]
+    fn what_is_seen_now_and_then_stands_in_one_place_until_its_evidence_has_faded() {
+        let mut world = World::new();
+        world.put(1, 25);
+        world.look(25);
+        for (cell, evidence) in [(26, 200), (25, 60), (24, 200), (25, 9)] {
+            world.grid.column_mut(1).unwrap().empty(20..30);
+            world.grid.column_mut(1).unwrap().evidence(cell).unwrap()[0] = evidence;
+            assert!(!world.look(1));
+            assert_eq!(world.column(1), "....#?????", "{cell} {evidence}");
+        }
+        world.grid.column_mut(1).unwrap().evidence(25).unwrap()[0] = 7;
+        assert!(world.look(1) && world.column(1) == "..........");
     }
 
     #[test]

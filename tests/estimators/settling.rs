@@ -30,9 +30,9 @@ fn an_empty_road_settles_outwards_within_two_seconds() {
     assert!(report.condition.has_map());
     let known = |rig: &Rig| [20.0, 100.0, 190.0].map(|x| rig.visibility(x, 0.0) != Visibility::Unknown);
     assert_eq!(known(&rig), [false; 3]);
-    watch(&mut rig, &[], 1.0);
+    watch(&mut rig, &[], 1.2);
     assert_eq!(known(&rig), [true, false, false]);
-    watch(&mut rig, &[], 0.6);
+    watch(&mut rig, &[], 0.5);
     assert_eq!(known(&rig), [true, true, false]);
     assert_eq!(watch(&mut rig, &[], 0.6).map(|r| r.condition), Some(Condition::Healthy));
     assert_eq!(known(&rig), [true; 3]);

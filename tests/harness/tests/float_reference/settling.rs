@@ -8,6 +8,10 @@ use crate::shadow;
 
 /// Evidence from which on something stands.
 const STANDS: f64 = 0.5;
+/// Evidence down to which it still does.
+const FADED: f64 = 8.0 / 255.0;
+/// Steps in which the distance grows.
+const STEPS: f64 = 4.0;
 /// How much more a gap takes off the time for what stands than its length.
 const GAP_COUNTS: f64 = 10.0;
 /// How far from where something stood it is the same thing, range cells.
@@ -18,6 +22,7 @@ pub struct Settling {
     moving: f64,
     standing: f64,
     stood: Vec<Option<usize>>,
+    held: Vec<Option<usize>>,
 }
 
 impl Settling {
@@ -25,6 +30,7 @@ impl Settling {
         if self.standing >= f64::from(config.standing_s) {
             self.stood = (0..axes.azimuths).map(|a| nearest(grid, axes, a)).collect();
         }
+        self.held.clear();
         self.moving = (self.moving - gap).max(0.0);
         self.standing = (self.standing - GAP_COUNTS * gap).max(0.0);
     }
@@ -34,11 +40,19 @@ impl Settling {
         self.moving = (self.moving + dt).min(far);
         self.standing = (self.standing + dt).min(standing);
         let share = if self.moving >= far { 1.0 } else { ((self.moving - near) / (far - near)).max(0.0) };
-        let reach = (axes.ranges as f64 * share) as usize;
+        let reach = (axes.ranges as f64 * (share * STEPS).floor() / STEPS) as usize;
+        self.held.resize(axes.azimuths, None);
         for a in 0..axes.azimuths {
             let stands = if self.standing < standing { nearest(grid, axes, a) } else { None };
             let stood = self.stood.get(a).copied().flatten();
-            let end = match stands.filter(|r| !stood.is_some_and(|stood| r + SAME >= stood)) {
+            let now = stands.filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
+            let still = |held: usize| {
+                let mut near = held.saturating_sub(SAME)..=(held + SAME).min(axes.ranges - 1);
+                near.any(|r| grid.stack(a, r).iter().any(|cell| *cell >= FADED))
+            };
+            let held = self.held[a].filter(|held| still(*held) && !now.is_some_and(|now| now + SAME < *held));
+            self.held[a] = if self.standing < standing { held.or(now) } else { None };
+            let end = match self.held[a] {
                 Some(r) => reach.min(hide_behind(r, a, axes, map)),
                 None => reach,
             };
