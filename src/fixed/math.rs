@@ -136,7 +136,8 @@ pub(crate) const fn ratio<const BITS: u32>(a: i32, b: i32) -> i32 {
     debug_assert!((a / b).unsigned_abs() < 1 << (31 - BITS), "a ratio beyond 32 bits");
     let (high, low) = (BITS / 2, BITS - BITS / 2);
     let beyond = (1 + high).saturating_sub(b.leading_zeros());
-    let (a, b) = (a >> beyond, b >> beyond);
+    // at least 1, which the compiler does not see: an image must not be able to panic
+    let (a, b) = (a >> beyond, (b >> beyond).max(1));
     let (whole, left) = (a / b, (a % b) << high);
     let (upper, left) = (left / b, (left % b) << low);
     (whole << BITS) + (upper << low) + left / b
