@@ -236,10 +236,11 @@ pub use sensor::road::RoadPoint;
 pub use camera::boxes::{ImageBox, VehicleClass};
 pub use camera::calibration::{Calibration, Intrinsics, PointPair};
 pub use camera::{Camera3d, Camera3dConfig, Camera3dParameters};
-pub use estimator::{Estimator, Progress};
+pub use estimator::{ESTIMATOR_VERSION, Estimator, Progress};
 pub use frame::gate::GateConfig;
 pub use frame::health::HealthConfig;
 pub use grid::evidence::EvidenceConfig;
+pub use grid::settling::SettlingConfig;
 pub use obstacles::config::ObstacleConfig;
 pub use radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters, VisibilityConfig};
 
@@ -272,7 +273,7 @@ pub use wire::{
 };
 
 // Radars.
-pub use inputs::ars408::{Ars408, Ars408Config};
+pub use inputs::ars408::{Ars408, Ars408Config, quality::Ars408Wanted};
 pub use inputs::native::{NativeConfig, NativeMedium, NativeReceiver, NativeSender};
 pub use inputs::ti::{Ti, TiAngleUnit, TiConfig, TiDialect, TiFamily};
 pub use inputs::{Feed, Frame};

@@ -8,7 +8,7 @@
 //!                                                                      |                     |
 //!      unclaimed detections -> evidence -> spherical grid <------------+                     |
 //!                                               |                                            v
-//!                                               +-> ray casting -> slice at h -> polar map: grade, bit, occupancy
+//!                                               +-> ray casting -> slice at h -> settling -> polar map: grade, bit, occupancy
 //! ```
 
 use crate::estimator::{Estimator, Progress};
@@ -24,6 +24,7 @@ use crate::frame::scan::Scan;
 use crate::grid::axes::Axes;
 use crate::grid::evidence::{Around, BODY_CM, BODY_REFLECTIONS, EvidenceConfig, InverseSensor};
 use crate::grid::raycast;
+use crate::grid::settling::{Settling, SettlingConfig, SettlingTimes};
 use crate::grid::shadow;
 use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
@@ -53,6 +54,8 @@ pub struct Radar3dConfig {
     pub visibility: VisibilityConfig,
     /// When maps end.
     pub health: HealthConfig,
+    /// When they begin.
+    pub settling: SettlingConfig,
     /// Which way traffic goes, where that is known, of a crossing say: lanes as polylines in the direction of their
     /// traffic, metres in road coordinates, x along the road and y to the left. No part of a file's table.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -113,12 +116,19 @@ pub struct Radar3dParameters<const R: usize, const A: usize, const E: usize> {
     tracking: Tracking,
     inverse_sensor: InverseSensor,
     health: HealthLimits,
+    settling: SettlingTimes,
     visible_from: u8,
     occupied_from: u8,
 }
 
+/// Longest time from frame to frame that is none of a gap, microseconds.
+const LONGEST_STEP_US: u64 = 1_000_000;
+
 /// How far behind the field of view's range obstacles are followed, centimetres.
 const BEYOND_CM: i32 = 2500;
+
+/// Stages of a frame.
+const STAGES: usize = 7;
 
 impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> {
     /// Checks a configuration.
@@ -150,6 +160,7 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
             tracking,
             inverse_sensor: config.evidence.inverse_sensor(&sensor.noise, &axes)?,
             health: config.health.limits()?,
+            settling: config.settling.times()?,
             visible_from: config.visibility.least_grade()?,
             occupied_from: threshold("visibility.occupied_from", config.visibility.occupied_from)?,
             axes,
@@ -214,6 +225,8 @@ pub struct Radar3d<const R: usize, const A: usize, const E: usize, const W: usiz
     obstacles: Obstacles<N>,
     grid: SphericalGrid<R, A, E, W>,
     health: Health,
+    settling: Settling<A>,
+    is_settled: bool,
     rejections: Rejections,
 }
 
@@ -281,6 +294,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             obstacles: Obstacles::new(),
             grid: SphericalGrid::new(),
             health: Health::NEW,
+            settling: Settling::NEW,
+            is_settled: false,
             rejections: Rejections::NONE,
         }
     }
@@ -292,10 +307,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         self.obstacles.forget_what_was_learnt();
         self.grid.clear();
         self.health = Health::NEW;
+        self.settling = Settling::NEW;
     }
 
-    /// Takes a radar frame and brings the map up to its time. `status` is the sensor's own fault flag, and
-    /// where there can be any with it the number of points that are no detections.
+    /// Takes a radar frame and brings the map up to its time. `status` is the sensor's own fault flag, and where there can be any
+    /// with it the numbers of points that are no detections, and of those left out by the sensor's own marks.
     pub fn process<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
@@ -308,7 +324,6 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     /// [`process`](Self::process) that calls `ended` as each of its seven stages ends.
-    #[allow(clippy::cast_possible_truncation)] // bounded lists
     pub fn process_traced<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
@@ -318,23 +333,37 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         map: &mut PolarMap<R, A>,
         ended: &mut impl FnMut(),
     ) -> FrameReport {
-        let FrameStatus { fault, refused } = status.into();
+        let status = status.into();
         let noise = self.repeatability.noise(&p.noise);
         let place = |d: &Detection| noise.place_on(d, &p.levelling, p.axes.ground());
-        let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
+        let points = self.scan.gather(detections.into_iter(), status, &p.gate, place);
         let points = self.scan.within_reach(points, |r| p.reaches(r));
-        let continuity = self.health.frame(now, &points, fault, &p.health);
+        let continuity = self.health.frame(now, &points, status.fault, &p.health);
+        if continuity == Continuity::Unjudged {
+            for _ in 0..STAGES {
+                ended();
+            }
+            let condition = self.expire(p, now, map);
+            return self.report(continuity, condition);
+        }
         if continuity.resets() {
             self.obstacles.clear();
             self.grid.clear();
+            self.settling = Settling::NEW;
         }
-        let step = match continuity {
-            Continuity::Follows(micros) => Step::from_micros(micros),
-            _ => Step::from_micros(0),
+        let (step, gap) = match continuity {
+            Continuity::Follows(micros) if micros > LONGEST_STEP_US => {
+                (Step::from_micros(LONGEST_STEP_US), Step::from_micros(micros - LONGEST_STEP_US))
+            }
+            Continuity::Follows(micros) => (Step::from_micros(micros), Step::NONE),
+            _ => (Step::NONE, Step::NONE),
         };
+        if gap > Step::NONE {
+            self.bridge(p, gap, map);
+        }
         ended();
         let by_range = ByRange::sort(self.scan.reflections(), p.tracking.limit_cm);
-        if matches!(continuity, Continuity::Follows(_)) {
+        if gap == Step::NONE && matches!(continuity, Continuity::Follows(_)) {
             self.repeatability.compare(self.scan.reflections(), &by_range, &p.noise);
         }
         let claimed = self.follow_obstacles(p, &by_range, step, map);
@@ -348,7 +377,15 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         }
         ended();
         self.put_obstacles(p, map);
+        // in a gap nobody looked
+        let looked = if gap > Step::NONE { Step::NONE } else { step };
+        let condition = self.settle(p, condition, looked, map);
         ended();
+        self.report(continuity, condition)
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // bounded lists
+    fn report(&mut self, continuity: Continuity, condition: Condition) -> FrameReport {
         self.rejections.add_all(self.scan.rejections());
         let report = FrameReport {
             continuity,
@@ -361,6 +398,34 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         #[cfg(feature = "defmt")]
         report.log();
         report
+    }
+
+    /// Moves what is known on over a gap in the frames, less certain the longer it was. Nothing was looked at.
+    fn bridge(&mut self, p: &Radar3dParameters<R, A, E>, gap: Step, map: &mut PolarMap<R, A>) {
+        map.forget();
+        self.settling.gap(gap, &p.settling, &self.grid);
+        self.obstacles.bridge(gap, &p.tracking);
+        p.inverse_sensor.fade(&mut self.grid, map, gap);
+    }
+
+    /// Takes off the map what is not settled, if there is one.
+    fn settle(
+        &mut self,
+        p: &Radar3dParameters<R, A, E>,
+        condition: Condition,
+        looked: Step,
+        map: &mut PolarMap<R, A>,
+    ) -> Condition {
+        if condition != Condition::Healthy {
+            return condition;
+        }
+        self.is_settled = self.settling.settle(looked, &p.settling, &p.axes, &self.grid, map);
+        self.condition(condition)
+    }
+
+    /// What is to be said of a map, settled or not, of a sensor in this condition.
+    fn condition(&self, of_frames: Condition) -> Condition {
+        if of_frames == Condition::Healthy && !self.is_settled { Condition::Settling } else { of_frames }
     }
 
     fn follow_obstacles(
@@ -418,7 +483,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         if condition != Condition::Healthy {
             map.forget();
         }
-        condition
+        self.condition(condition)
     }
 
     /// Detections rejected since the start, by reason.

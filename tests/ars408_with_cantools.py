@@ -15,6 +15,8 @@ from pathlib import Path
 import cantools
 
 DBC = cantools.database.load_file(Path(__file__).parent / "dbc" / "ars408.dbc", strict=True)
+# clusters that the vendor calls valid, by their InvalidState
+VALID = (0x00, 0x04, 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0F, 0x10, 0x11)
 NAMES = {m.frame_id: m for m in DBC.messages}
 FIELDS = ["scan", "time_s", "range_m", "azimuth_deg", "elevation_deg", "radial_velocity_mps", "rcs_dbsm", "snr_db"]
 # what a detection's units allow: 1 cm, 0.011 degrees, 1 cm/s, 0.5 dB
@@ -54,7 +56,7 @@ def scans(log, sensor):
             }
         elif name == "Obj_2_Quality" and s["MeasState"] not in (1, 2, 5):
             current[1].pop(s["ID"], None)
-        elif name == "Cluster_2_Quality" and (s["InvalidState"] != 0 or s["AmbigState"] not in (3, 4)):
+        elif name == "Cluster_2_Quality" and (s["InvalidState"] not in VALID or s["AmbigState"] not in (3, 4)):
             current[1].pop(s["ID"], None)
     if current:
         yield current[0], list(current[1].values())
@@ -146,7 +148,7 @@ def make(name):
                     send(after + 1e-4, "Obj_3_Extended", sensor, ID=i, Class=1, ArelLong=0, ArelLat=0, OrientationAngle=0, Length=4.6, Width=1.8)
                 else:
                     odd = rng.random()
-                    send(after, "Cluster_2_Quality", sensor, ID=i, PdH0=1, AmbigState=1 if odd < 0.1 else 3, InvalidState=2 if odd > 0.95 else 0)
+                    send(after, "Cluster_2_Quality", sensor, ID=i, PdH0=1, AmbigState=1 if odd < 0.1 else 3, InvalidState=2 if odd > 0.95 else 8 if odd > 0.9 else 0)
     lines.sort(key=lambda line: line[0])
     with open(f"{name}.log", "w", encoding="ascii") as log:
         log.writelines(f"({time:.6f}) can0 {frame}\n" for time, frame in lines)

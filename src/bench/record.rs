@@ -168,8 +168,8 @@ impl Record {
                 bytes: [r.u32()?, r.u32()?, r.u32()?],
             }),
             b'F' => {
-                use Condition::{Blind, Healthy, Misaligned, SectorBlind, Stale, Starting, Unusable, Weaker};
-                let all = [Starting, Healthy, Blind, Stale, Unusable, SectorBlind, Misaligned, Weaker];
+                use Condition::{Blind, Healthy, Misaligned, SectorBlind, Settling, Stale, Starting, Unusable, Weaker};
+                let all = [Starting, Healthy, Settling, Blind, Stale, Unusable, SectorBlind, Misaligned, Weaker];
                 let condition = all.into_iter().find(|c| *c as u8 == detail)?;
                 let (frame, fingerprint) = (r.u32()?, r.u64()?);
                 let mut ticks = [0; Stage::COUNT];

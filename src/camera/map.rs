@@ -5,6 +5,7 @@ use crate::fixed::angle::Angle;
 use crate::fixed::trig;
 use crate::map::azimuths::Narrow;
 use crate::map::polar::PolarGeometry;
+use crate::map::query::Footprint;
 use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
@@ -146,12 +147,21 @@ impl<const NX: usize, const NY: usize> VisibilityMap for CameraMap<NX, NY> {
         let (x, y) = self.levelling.place(point);
         Self::locate(x, y).map_or(CellState::UNKNOWN, |(row, column)| self.cell(row, column))
     }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        let Some(area) = area.levelled(&self.levelling) else { return };
+        let right = RoadPoint::new(0, middle_of(0, NY) - CELL_CM / 2);
+        area.each_square(right, CELL_CM, |row, column| {
+            let cell = usize::try_from(row).ok().zip(usize::try_from(column).ok());
+            visit(cell.map_or(CellState::UNKNOWN, |(row, column)| self.cell(row, column)));
+        });
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::Visibility;
+    use crate::map::{Visibility, query};
     use crate::sensor::mount::Mount;
 
     /// 20 m ahead, 5 m to each side, turned 90 degrees to the left, at (3, 1).
@@ -210,5 +220,26 @@ mod tests {
             }
         }
         assert!(known > 1500, "{known}");
+    }
+
+    #[test]
+    fn an_area_is_no_better_than_any_of_its_points() {
+        let mut seen = 0;
+        for k in 0..2000_i32 {
+            let mut m = map();
+            (0..20).for_each(|row| (0..10).for_each(|column| set(&mut m, row, column, 200, 0)));
+            set(&mut m, (k % 19) as usize, (k % 7) as usize + 1, (k % 3) as u8, 0);
+            let heading = trig::direction(Angle::from_raw((k * 7919) as u16 as i16));
+            let centre = m.levelling.unplace(k * 37 % 2100, k * 53 % 1100 - 550);
+            let area = Footprint { centre, heading, half_length_cm: 150, half_width_cm: 60 };
+            let answer = query::area(&m, &area);
+            for (a, b) in (-10..=10).flat_map(|a| (-5..=5).map(move |b| (a * 15, b * 12))) {
+                let (x, y) = (heading.along(a, -b), heading.across(-a, b));
+                let here = query::point(&m, RoadPoint::new(centre.x_cm + x, centre.y_cm + y));
+                assert!(answer <= here, "{answer:?}, and {here:?} at ({a}, {b}) of {area:?}");
+            }
+            seen += usize::from(answer == query::Answer::VisibleFree);
+        }
+        assert!(seen > 300, "{seen}");
     }
 }

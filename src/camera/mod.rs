@@ -287,7 +287,8 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
         let status = status.into();
         let used = boxes.get(..MOST_BOXES).unwrap_or(boxes);
         let inside = used.iter().filter(|b| lift::check(b, &p.projection).is_ok()).count() as u32;
-        let points = Points { inside, outside: used.len() as u32 - inside, refused: u32::from(status.refused) };
+        let (refused, unwanted) = (status.refused.into(), status.unwanted.into());
+        let points = Points { inside, outside: used.len() as u32 - inside, refused, unwanted };
         let continuity = self.begin(p, now, &points, status.fault);
         let (mut filled, mut off_grid) = (0_u16, 0);
         let mut rejections = p.lift(boxes, |lifted| match self.fill(p, &lifted) {
@@ -295,7 +296,7 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
             false => off_grid += 1,
         });
         rejections.add(BoxRejection::OffGrid, off_grid);
-        rejections.add(BoxRejection::Refused, u32::from(status.refused));
+        rejections.add(BoxRejection::Refused, refused);
         self.rejections.add_all(&rejections);
         ended();
         let condition = self.finish(p, now, map);
@@ -316,7 +317,8 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
     ) -> Condition {
         let status = status.into();
         let inside = vehicles.len().min(u32::MAX as usize) as u32;
-        self.begin(p, now, &Points { inside, outside: 0, refused: u32::from(status.refused) }, status.fault);
+        let (refused, unwanted) = (status.refused.into(), status.unwanted.into());
+        self.begin(p, now, &Points { inside, outside: 0, refused, unwanted }, status.fault);
         for vehicle in vehicles {
             self.fill(p, vehicle);
         }
@@ -327,7 +329,7 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
         let continuity = self.health.frame(now, points, fault, &p.health);
         match continuity {
             Continuity::Follows(micros) => self.voxels.fade(Step::from_micros(micros), p.loss),
-            Continuity::First => {}
+            Continuity::First | Continuity::Unjudged => {}
             Continuity::Gap | Continuity::ClockStepped => self.voxels.clear(),
         }
         continuity

@@ -34,6 +34,9 @@ impl Time {
 pub struct Step(i32);
 
 impl Step {
+    /// No time.
+    pub const NONE: Self = Self(0);
+
     /// From microseconds, saturating.
     #[allow(clippy::cast_possible_truncation)] // bounded by the minimum
     pub const fn from_micros(micros: u64) -> Self {
@@ -44,6 +47,11 @@ impl Step {
     /// In 2^-16 s.
     pub const fn raw(self) -> i32 {
         self.0
+    }
+
+    /// What is left of it after a shorter one.
+    pub const fn less(self, other: Self) -> Self {
+        Self(if self.0 > other.0 { self.0 - other.0 } else { 0 })
     }
 
     /// What a memory of this length (2^-16 s) keeps over the step, 2^-16: 1 / (1 + step / memory),
@@ -116,6 +124,8 @@ mod tests {
         assert!((f64::from(s.raw()) / 65536.0 - 0.066_972).abs() < 2e-5);
         assert_eq!(Step::from_micros(1_000_000).times(2500), 2500);
         assert_eq!(Step::from_micros(u64::MAX).raw(), i32::MAX);
+        let (long, short) = (Step::from_micros(3_000_000), Step::from_micros(1_000_000));
+        assert_eq!((long.less(short).raw(), short.less(long)), (long.raw() - short.raw(), Step::NONE));
     }
 
     #[test]

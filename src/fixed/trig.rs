@@ -46,12 +46,22 @@ impl Direction {
 
     /// Cosine of the angle to another direction, 2^-14.
     pub fn cosine(self, other: Self) -> i32 {
-        (i32::from(self.x) * i32::from(other.x) + i32::from(self.y) * i32::from(other.y)) >> 14
+        self.cosine_wide(other) >> 14
     }
 
     /// Sine of the angle to another direction, 2^-14; + where that lies to the left.
     pub fn sine(self, other: Self) -> i32 {
-        (i32::from(self.x) * i32::from(other.y) - i32::from(self.y) * i32::from(other.x)) >> 14
+        self.sine_wide(other) >> 14
+    }
+
+    /// The cosine in 2^-28.
+    pub(crate) fn cosine_wide(self, other: Self) -> i32 {
+        i32::from(self.x) * i32::from(other.x) + i32::from(self.y) * i32::from(other.y)
+    }
+
+    /// The sine in 2^-28.
+    pub(crate) fn sine_wide(self, other: Self) -> i32 {
+        i32::from(self.x) * i32::from(other.y) - i32::from(self.y) * i32::from(other.x)
     }
 
     /// Component of the vector (x, y) to the left of this direction.

@@ -62,11 +62,13 @@ pub enum Rejection {
     Overflow,
     /// No detection at all: not finite, at no distance, or absurd. Dropped by whoever decoded it.
     Refused,
+    /// Left out by the sensor's own marks. Dropped by whoever decoded it.
+    Unwanted,
 }
 
 impl Rejection {
     /// Every reason, in the order of `Rejections::counts`.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Range,
         Self::Azimuth,
         Self::Elevation,
@@ -75,6 +77,7 @@ impl Rejection {
         Self::Velocity,
         Self::Overflow,
         Self::Refused,
+        Self::Unwanted,
     ];
 
     /// Short name for reports.
@@ -88,6 +91,7 @@ impl Rejection {
             Self::Velocity => "velocity",
             Self::Overflow => "overflow",
             Self::Refused => "no detection",
+            Self::Unwanted => "unwanted",
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Whether the sensor's silence means a free road, a blind sensor or no sensor at all.
 //!
-//! A healthy frame within its hold time is evidence for the whole field of view, so an empty road
-//! is visible. A run of empty frames after traffic is a sensor that went blind, and no frames at all
+//! A healthy frame within its hold time is evidence along every line of sight, so an empty road is visible once it has
+//! [settled](crate::grid::settling). A run of empty frames after traffic is a sensor that went blind, and no frames at all
 //! make everything unknown. Rejected is not empty: where points keep coming of which none can be
 //! right (not finite, in another unit, all outside the field of view), the sensor or its mount is not
-//! what it is taken for, and everything is unknown from the first such run on.
+//! what it is taken for, and everything is unknown from the first such run on. A frame of which all that lies in view was left out
+//! by the sensor's own marks is neither empty nor evidence: it is as if it had not come.
 
 use crate::fixed::time::Time;
 use crate::sensor::config::{ConfigError, within};
@@ -22,15 +23,18 @@ pub struct HealthConfig {
     /// How long frames may be empty after traffic before the sensor counts as blind; and how long, also
     /// from the first frame on, their points may be none that can be used.
     pub blind_after_s: f32,
-    /// A longer gap between frames resets the grids.
+    /// A longer gap between frames is a new start. Over a shorter one what is known is moved on.
     pub reset_gap_s: f32,
 }
 
 impl Default for HealthConfig {
     fn default() -> Self {
-        Self { hold_s: 0.5, blind_after_s: 1.0, reset_gap_s: 1.0 }
+        Self { hold_s: 0.5, blind_after_s: 1.0, reset_gap_s: 60.0 }
     }
 }
+
+/// A run of frames has no longer gap, microseconds.
+const BREAK_US: u64 = 1_000_000;
 
 /// [`HealthConfig`] in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,6 +68,8 @@ pub enum Condition {
     Starting,
     /// The last frame is evidence.
     Healthy,
+    /// It is, but lines of sight were not yet looked along for long enough since a start or gap: what is behind is unknown.
+    Settling,
     /// Frames come, but they have been empty since there was traffic, or the sensor says so.
     Blind,
     /// No frame within the hold time.
@@ -81,7 +87,7 @@ pub enum Condition {
 impl Condition {
     /// Whether there is a map.
     pub const fn has_map(self) -> bool {
-        matches!(self, Self::Healthy | Self::SectorBlind | Self::Misaligned | Self::Weaker)
+        matches!(self, Self::Healthy | Self::Settling | Self::SectorBlind | Self::Misaligned | Self::Weaker)
     }
 }
 
@@ -94,12 +100,15 @@ pub struct FrameStatus {
     /// Points that are no detections, see [`NotADetection`](crate::frame::detection::NotADetection): whoever
     /// decodes a frame drops them and counts them here.
     pub refused: u16,
+    /// Points that whoever decoded the frame left out by the sensor's own marks, see
+    /// [`Ars408Wanted`](crate::inputs::ars408::quality::Ars408Wanted).
+    pub unwanted: u16,
 }
 
 impl From<bool> for FrameStatus {
     /// Of a frame every point of which was a detection.
     fn from(fault: bool) -> Self {
-        Self { fault, refused: 0 }
+        Self { fault, refused: 0, unwanted: 0 }
     }
 }
 
@@ -113,9 +122,16 @@ pub struct Points {
     pub outside: u32,
     /// Nowhere: no detections.
     pub refused: u32,
+    /// Left out by the sensor's own marks, wherever they were.
+    pub unwanted: u32,
 }
 
 impl Points {
+    /// Whether nothing is known of what was measured in view: it was left out.
+    fn unjudged(&self) -> bool {
+        self.unwanted > 0 && self.inside == 0
+    }
+
     /// Whether there are points and nothing can be said from them. A field of view narrower than the
     /// radar's leaves most of its points outside; but no radar has most of them refused, and of angles
     /// in degrees a few always look like radians near the axis.
@@ -137,6 +153,8 @@ pub enum Continuity {
     Gap,
     /// The clock stepped back or stood still.
     ClockStepped,
+    /// Nothing of the frame could be judged: it is no evidence, and the next one follows the one before it.
+    Unjudged,
 }
 
 impl Continuity {
@@ -173,6 +191,10 @@ impl Health {
 
     /// Takes note of a frame and of what the radar reported in it, gated or not; `fault` is its own flag.
     pub fn frame(&mut self, now: Time, points: &Points, fault: bool, limits: &HealthLimits) -> Continuity {
+        if points.unjudged() {
+            self.blind |= fault;
+            return Continuity::Unjudged;
+        }
         let continuity = match self.last_frame {
             None => Continuity::First,
             Some(last) => match now.since(last) {
@@ -181,7 +203,11 @@ impl Health {
                 Some(gap) => Continuity::Follows(gap),
             },
         };
-        if continuity.resets() {
+        let broken = match continuity {
+            Continuity::Follows(gap) => gap > BREAK_US,
+            _ => true,
+        };
+        if broken {
             // a run of frames has to be seen without a break; a blind sensor stays blind
             (self.empty_since, self.unusable) = (None, None);
         }
@@ -282,8 +308,9 @@ mod tests {
         assert_eq!(h.frame(at(5000), &inside(1), false, &l), Continuity::First);
         assert_eq!(h.frame(at(5066), &inside(1), false, &l), Continuity::Follows(66_000));
         assert_eq!(h.frame(at(6066), &inside(1), false, &l), Continuity::Follows(1_000_000));
-        assert_eq!(h.frame(at(7067), &inside(1), false, &l), Continuity::Gap);
-        assert_eq!(h.frame(at(7067), &inside(1), false, &l), Continuity::ClockStepped);
+        assert_eq!(h.frame(at(66_066), &inside(1), false, &l), Continuity::Follows(60_000_000));
+        assert_eq!(h.frame(at(126_067), &inside(1), false, &l), Continuity::Gap);
+        assert_eq!(h.frame(at(126_067), &inside(1), false, &l), Continuity::ClockStepped);
         assert_eq!(h.frame(at(3000), &inside(0), false, &l), Continuity::ClockStepped);
         assert!(Continuity::Gap.resets() && !Continuity::First.resets());
         // a step back never makes a later moment look fresh
@@ -302,12 +329,12 @@ mod tests {
             .collect()
     }
 
-    const NOT_FINITE: Points = Points { inside: 0, outside: 0, refused: 80 };
-    const OUTSIDE: Points = Points { inside: 0, outside: 3, refused: 0 };
+    const NOT_FINITE: Points = Points { inside: 0, outside: 0, refused: 80, unwanted: 0 };
+    const OUTSIDE: Points = Points { inside: 0, outside: 3, refused: 0, unwanted: 0 };
 
     #[test]
     fn rejected_is_not_empty_from_the_first_frame_on() {
-        let mostly = Points { inside: 5, outside: 4, refused: 10 };
+        let mostly = Points { inside: 5, outside: 4, refused: 10, unwanted: 3 };
         for points in [NOT_FINITE, OUTSIDE, mostly] {
             let mut h = Health::NEW;
             let conditions = run(&mut h, 0, 20, points);
@@ -320,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_view_narrower_than_the_radars_and_weak_clutter_are_healthy() {
-        for points in [Points { inside: 1, outside: 90, refused: 1 }, inside(1)] {
+        for points in [Points { inside: 1, outside: 90, refused: 1, unwanted: 5 }, inside(1)] {
             assert!(run(&mut Health::default(), 0, 60, points).iter().all(|c| *c == Condition::Healthy), "{points:?}");
         }
         // a car beyond the view's edge, now and then one within
@@ -330,6 +357,27 @@ mod tests {
                 assert_eq!(run(&mut h, i * 990 + at, 1, points), [Condition::Healthy]);
             }
         }
+    }
+
+    #[test]
+    fn a_frame_that_was_left_out_is_neither_empty_nor_evidence() {
+        let (mut h, l) = (Health::NEW, limits());
+        let left_out = Points { unwanted: 12, ..Points::default() };
+        assert!(run(&mut h, 0, 30, left_out).iter().all(|c| *c == Condition::Starting));
+        run(&mut h, 2000, 1, inside(5));
+        let conditions = run(&mut h, 2066, 30, left_out);
+        assert!(conditions[..7].iter().all(|c| *c == Condition::Healthy), "until the hold time is over");
+        assert!(conditions[7..].iter().all(|c| *c == Condition::Stale), "{conditions:?}");
+        // what comes next follows the last that was judged
+        let mut h = Health::NEW;
+        run(&mut h, 0, 1, inside(5));
+        assert_eq!(h.frame(at(66), &left_out, false, &l), Continuity::Unjudged);
+        assert_eq!(h.frame(at(132), &inside(0), false, &l), Continuity::Follows(132_000));
+        // with a detection in view it is one like others, and a fault is one anyway
+        let some = Points { inside: 1, ..left_out };
+        assert_eq!(run(&mut h, 198, 1, some), [Condition::Healthy]);
+        h.frame(at(264), &left_out, true, &l);
+        assert_eq!(h.condition(at(264), &l), Condition::Blind);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use crate::frame::detection::Detection;
 use crate::frame::gate::{Gate, Rejection, Rejections};
-use crate::frame::health::Points;
+use crate::frame::health::{FrameStatus, Points};
 use crate::frame::reflection::Reflection;
 use crate::frame::thinning::Thinning;
 
@@ -33,17 +33,19 @@ impl<const D: usize> Scan<D> {
     }
 
     /// Takes the detections of a frame that pass the gate, as `place` places them, in the place of the last
-    /// frame's, and counts why others do not, the `refused` points among them. Returns where all of them were.
+    /// frame's, and counts why others do not, those refused or unwanted before among them. Returns where all of them were.
     pub fn gather<'a>(
         &mut self,
         detections: impl Iterator<Item = &'a Detection> + Clone,
-        refused: u16,
+        status: FrameStatus,
         gate: &Gate,
         place: impl Fn(&Detection) -> Reflection,
     ) -> Points {
         self.reflections.clear();
         self.rejections = Rejections::NONE;
-        self.rejections.add_many(Rejection::Refused, refused.into());
+        let (refused, unwanted) = (status.refused.into(), status.unwanted.into());
+        self.rejections.add_many(Rejection::Refused, refused);
+        self.rejections.add_many(Rejection::Unwanted, unwanted);
         let room = D.min(gate.max_detections);
         let mut kept: Vec<&Detection, D, u16> = Vec::new();
         let (mut reported, mut passed) = (0_u32, 0);
@@ -84,7 +86,7 @@ impl<const D: usize> Scan<D> {
             let _ = self.reflections.push(place(d));
         }
         let outside = self.rejections.outside();
-        Points { inside: reported.saturating_sub(outside), outside, refused: refused.into() }
+        Points { inside: reported.saturating_sub(outside), outside, refused, unwanted }
     }
 
     /// The same points, where a wrong mount puts all that were kept where no map reaches: they lie outside.
@@ -194,9 +196,11 @@ pub(crate) mod tests {
         let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
         let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
         let mut scan = Scan::new();
-        let points = scan.gather(detections.iter(), 7, &gate, |d| noise.place(d, &levelling));
-        assert_eq!(points, Points { inside: detections.len() as u32, outside: 0, refused: 7 });
-        assert_eq!(scan.rejections().count(Rejection::Refused), 7);
+        let status = FrameStatus { fault: false, refused: 7, unwanted: 3 };
+        let points = scan.gather(detections.iter(), status, &gate, |d| noise.place(d, &levelling));
+        assert_eq!(points, Points { inside: detections.len() as u32, outside: 0, refused: 7, unwanted: 3 });
+        let counted = [Rejection::Refused, Rejection::Unwanted].map(|reason| scan.rejections().count(reason));
+        assert_eq!(counted, [7, 3]);
         scan
     }
 

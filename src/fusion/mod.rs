@@ -2,35 +2,34 @@
 //! contradict each other.
 //!
 //! # Model
-//! The road is a grid of square cells. Of each sensor it holds what its newest map says of each cell's centre: the
-//! nearest cell of that map, never a better one. A place is
+//! The road is a grid of square cells. Of each sensor it holds the worst of what its newest map says anywhere in each
+//! cell: it sees a cell if it sees all of it. A cell is
 //!
 //! | it is | if, among the sensors whose newest map is fresh, |
 //! |---|---|
 //! | visible | any sees it |
 //! | hidden from all | none sees it, and any knows that it does not |
 //! | unknown | none knows anything of it: to be treated as hidden |
-//! | occupied | any that sees it says so, whatever the others say; where nobody sees it, any that knows of it |
-//! | in conflict | one sees it free, and nothing occupied beside it, where another sees it occupied |
+//! | occupied | any that sees some of it says so of that, whatever the others say; where nobody sees it, any that knows of it |
+//! | in conflict | one sees it free, and nothing occupied beside it, where another sees some of it occupied |
 //!
 //! A map that is late or claims to be of the future is refused; what is held of a sensor counts until it is too old. A
 //! newer map replaces all that its sensor said before. Maps of one sensor and one time are parts of the same scan, or
-//! repetitions: they are joined, and where both know a cell the worse of them counts. So as long as a sensor keeps its
-//! mount and its kind of map, neither the order in which maps come, nor repeating them, nor cutting them into parts
-//! makes a difference. Mount and kind are those of its first map until it is [forgotten](Fusion::forget), which is also
+//! repetitions: they are joined, and the worst of what they know of a cell counts. So as long as a sensor keeps its
+//! mount and its kind of map, neither the order in which maps come nor repeating them makes a difference, and cutting
+//! them into parts only makes cells unknown that no part holds as a whole. Mount and kind are those of its first map until it is [forgotten](Fusion::forget), which is also
 //! due when it starts over: a map does not say so.
 //!
 //! [`fill`] puts it into the cells of a polar map around a place of one's choice, which a
 //! [`Broadcaster`](crate::wire::broadcast::Broadcaster) sends.
 //!
 //! # Limits
-//! At most 8 sensors; `NX * NY * (3 * S + 1) + 4 * NX * S` bytes. What lies between the middles of cells is not looked
-//! at: cells are 2 m at most. Polar maps count up to 400 m from their sensor. Clocks are the caller's: times of all
+//! At most 8 sensors; `NX * NY * (5 * S + 3) + 4 * NX * S` bytes. Cells are 2 m at most. Polar maps count up to 400 m from their sensor. Clocks are the caller's: times of all
 //! sensors, and `now`, are of one clock. A sensor that sends its last picture again and again with new times cannot be
 //! told from a road on which nothing moves: its [`Monitor`] can, where others see what it should.
 //!
 //! # Cost
-//! Some 22 instructions for each cell that a polar map reaches; other maps are asked for each cell.
+//! Each cell looks at the polar cells it touches: some four at 100 m, a dozen at 20 m. Other maps are asked for each cell.
 
 mod alignment;
 mod fixtures;
@@ -44,6 +43,7 @@ mod window;
 
 use crate::fixed::time::Time;
 use crate::map::polar::PolarMap;
+use crate::map::query::Footprint;
 use crate::map::{Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
@@ -53,7 +53,7 @@ pub use alignment::{Alignment, AlignmentConfig};
 #[cfg(feature = "monitoring")]
 pub use fixtures::{Fixtures, FixturesConfig};
 pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
-use places::{Place, Places};
+use places::Places;
 pub use polar::{fill, polar};
 #[cfg(feature = "monitoring")]
 pub use supervised::{Supervised, Supervision};
@@ -132,10 +132,10 @@ pub struct Fusion<const S: usize, const NX: usize, const NY: usize> {
     cell_cm: i32,
     held: [Held; S],
     places: [Places<NX, NY>; S],
-    /// What each sensor says, 0 where unknown.
+    /// The worst that each sensor knows of a cell, 0 where it knows nothing.
     grades: [[[u8; NY]; NX]; S],
-    /// Who says that a cell is occupied, whether or not they see it: a bit a sensor.
-    occupied: [[u8; NY]; NX],
+    /// What else they say: a bit a sensor.
+    marks: [[Marks; NY]; NX],
 }
 
 impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
@@ -149,7 +149,7 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
             held: [Held::NOTHING; S],
             places: [const { Places::NONE }; S],
             grades: [[[0; NY]; NX]; S],
-            occupied: [[0; NY]; NX],
+            marks: [[Marks::NONE; NY]; NX],
         }
     };
 
@@ -179,7 +179,7 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         (held.measured, held.visible_from) = (None, USUAL_THRESHOLD);
         *places = Places::NONE;
         *grades = [[0; NY]; NX];
-        self.occupied.iter_mut().flatten().for_each(|bits| *bits &= !bit(sensor));
+        self.marks.iter_mut().flatten().for_each(|marks| marks.clear(bit(sensor)));
     }
 
     /// Takes a polar map. Where its cells lie is worked out with the first one, and again after
@@ -205,37 +205,26 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
             places.work_out(map, self.origin, self.cell_cm);
             held.visible_from = map.visible_from();
         }
-        let (bit, occupied_from) = (bit(sensor), map.occupied_from());
+        let (bit, visible_from, occupied_from) = (bit(sensor), map.visible_from(), map.occupied_from());
         let (from, occupancy) = map.cells();
-        // as long as the other, which spares a check a cell
-        let occupancy = occupancy.get(..from.len()).unwrap_or_default();
-        let rows = places.rows().iter().zip(places.spans()).zip(grades.iter_mut().zip(&mut self.occupied));
-        for ((places, (first, end)), (grades, occupied)) in rows {
+        let rows = places.rows().iter().zip(places.spans()).zip(grades.iter_mut().zip(&mut self.marks));
+        for ((places, (first, end)), (grades, marks)) in rows {
             let reached = usize::from(*first)..usize::from(*end);
-            let (Some(places), Some(grades), Some(occupied)) =
-                (places.get(reached.clone()), grades.get_mut(reached.clone()), occupied.get_mut(reached))
+            let (Some(places), Some(grades), Some(marks)) =
+                (places.get(reached.clone()), grades.get_mut(reached.clone()), marks.get_mut(reached))
             else {
                 continue;
             };
-            let cells = places.iter().zip(grades.iter_mut().zip(occupied));
-            // a place beyond the map is in neither
-            let said = |place: &Place| {
-                let place = usize::from(*place);
-                let said = from.get(place).copied().unwrap_or(0);
-                let occupancy = occupancy.get(place).copied().unwrap_or(0);
-                (said, (said != 0) & (occupancy >= occupied_from))
-            };
-            if join {
-                cells.for_each(|(place, (grade, occupied))| {
-                    let (said, is_occupied) = said(place);
-                    worse(grade, occupied, bit, said, is_occupied);
-                });
-            } else {
-                cells.for_each(|(place, (grade, occupied))| {
-                    let (said, is_occupied) = said(place);
-                    *grade = said;
-                    *occupied = (*occupied & !bit) | (bit * u8::from(is_occupied));
-                });
+            for (place, (grade, marks)) in places.iter().zip(grades.iter_mut().zip(marks)) {
+                let mut said = Said { complete: place.is_complete(), ..Said::NOTHING };
+                for cells in place.cells::<R>() {
+                    let cells = from.get(cells.clone()).zip(occupancy.get(cells));
+                    let (grades, occupancy) = cells.unwrap_or_default();
+                    for (grade, occupancy) in grades.iter().zip(occupancy) {
+                        said.add(*grade, *grade >= visible_from, *occupancy >= occupied_from);
+                    }
+                }
+                said.put(join, bit, grade, marks);
             }
         }
         Ok(())
@@ -261,19 +250,18 @@ impl<const S: usize, const NX: usize, const NY: usize> Fusion<S, NX, NY> {
         let join = held.admit(measured, now, self.config)?;
         let (bit, from) = (bit(sensor), held.visible_from);
         let (origin, cell_cm) = (self.origin, self.cell_cm);
-        for (i, (grades, occupied)) in (0..).zip(grades.iter_mut().zip(&mut self.occupied)) {
-            for (j, (grade, occupied)) in (0..).zip(grades.iter_mut().zip(occupied)) {
-                let state = map.at(centre(origin, cell_cm, i, j));
-                // the grade is held to what the map says, whatever its own threshold
-                let (said, is_occupied) = match state.visibility {
-                    Visibility::Unknown => (0, false),
-                    Visibility::Invisible => (state.grade.clamp(1, from - 1), state.occupied),
-                    Visibility::Visible => (state.grade.max(from), state.occupied),
-                };
-                if !join {
-                    (*grade, *occupied) = (0, *occupied & !bit);
-                }
-                worse(grade, occupied, bit, said, is_occupied);
+        for (i, (grades, marks)) in (0..).zip(grades.iter_mut().zip(&mut self.marks)) {
+            for (j, (grade, marks)) in (0..).zip(grades.iter_mut().zip(marks)) {
+                let mut said = Said { complete: true, ..Said::NOTHING };
+                map.cells_in(&Footprint::square(centre(origin, cell_cm, i, j), cell_cm), &mut |state| {
+                    // the grade is held to what the map says, whatever its own threshold
+                    match state.visibility {
+                        Visibility::Unknown => said.add(0, false, false),
+                        Visibility::Invisible => said.add(state.grade.clamp(1, from - 1), false, state.occupied),
+                        Visibility::Visible => said.add(state.grade.max(from), true, state.occupied),
+                    }
+                });
+                said.put(join, bit, grade, marks);
             }
         }
         Ok(())
@@ -298,11 +286,68 @@ fn bit(sensor: usize) -> u8 {
     1 << (sensor & 7)
 }
 
-/// Joins what a map of the same time says as well: the worse counts where both are known.
-fn worse(grade: &mut u8, occupied: &mut u8, bit: u8, said: u8, is_occupied: bool) {
-    if said != 0 {
-        *grade = if *grade == 0 { said } else { said.min(*grade) };
-        *occupied |= if is_occupied { bit } else { 0 };
+/// What sensors say of a cell besides their grades: a bit a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Marks {
+    /// Who knows all of it.
+    known: u8,
+    /// Who says that some of it is occupied, whether or not they see that.
+    occupied: u8,
+    /// Who sees that some of it is occupied, whether or not they see all of it.
+    seen_occupied: u8,
+}
+
+impl Marks {
+    const NONE: Self = Self { known: 0, occupied: 0, seen_occupied: 0 };
+
+    fn clear(&mut self, bit: u8) {
+        self.known &= !bit;
+        self.occupied &= !bit;
+        self.seen_occupied &= !bit;
+    }
+}
+
+/// What one map says of a cell.
+#[derive(Debug, Clone, Copy)]
+struct Said {
+    /// The worst grade of what it knows, 0 if that is nothing.
+    grade: u8,
+    /// Whether it knows all of the cell.
+    complete: bool,
+    occupied: bool,
+    seen_occupied: bool,
+}
+
+impl Said {
+    const NOTHING: Self = Self { grade: 0, complete: false, occupied: false, seen_occupied: false };
+
+    /// One of the map's own cells.
+    fn add(&mut self, grade: u8, visible: bool, occupied: bool) {
+        self.add_known(grade);
+        self.complete &= grade != 0;
+        self.occupied |= occupied & (grade != 0);
+        self.seen_occupied |= occupied & visible & (grade != 0);
+    }
+
+    /// In the place of what its sensor said before, or joined to a map of the same time: the worst of both counts.
+    fn put(mut self, join: bool, bit: u8, grade: &mut u8, marks: &mut Marks) {
+        let known = self.complete & (self.grade != 0);
+        if join {
+            self.add_known(*grade);
+        } else {
+            marks.clear(bit);
+        }
+        let mark = |yes: bool| if yes { bit } else { 0 };
+        *grade = self.grade;
+        marks.known |= mark(known);
+        marks.occupied |= mark(self.occupied);
+        marks.seen_occupied |= mark(self.seen_occupied);
+    }
+
+    /// The worst grade of two, nothing known left out.
+    fn add_known(&mut self, grade: u8) {
+        // 0, which is nothing known, wraps to the greatest
+        self.grade = self.grade.wrapping_sub(1).min(grade.wrapping_sub(1)).wrapping_add(1);
     }
 }
 

@@ -33,6 +33,8 @@ use crate::fixed::math;
 use crate::fixed::time::Time;
 use crate::fixed::trig;
 use crate::map::azimuths::Columns;
+use crate::map::overlap::Seen;
+use crate::map::query::Footprint;
 use crate::map::{CellState, VisibilityMap};
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::mount::{Levelling, Mount};
@@ -213,6 +215,23 @@ impl<const K: usize> Monitor<K> {
         self.sectors.get(sector).is_some_and(|sector| sector.blind)
     }
 
+    /// Whether any part of an area lies in a sector that is judged blind.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)] // sectors, angles
+    fn is_blind_in(&self, area: &Footprint) -> bool {
+        let any = || (0..K).any(|sector| self.is_blind(sector));
+        let Some(seen) = Seen::new(area, &self.levelling) else { return any() };
+        let columns = Columns::even(self.span, K);
+        let left = seen.right + Angle::from_raw(seen.width.min(i32::from(i16::MAX)) as i16);
+        let at_end = |end: Angle| self.is_blind(columns.nearest(end - self.right));
+        // a sector of which neither end of the area is part, but an edge lies in it
+        let holds = |sector: usize| {
+            let edge = self.right + columns.bearing((sector << 8) as i32);
+            i32::from((edge - seen.right).raw() as u16) <= seen.width
+        };
+        let within = |sector: usize| self.is_blind(sector) && (holds(sector) || holds(sector + 1));
+        at_end(seen.right) || at_end(left) || (0..K).any(within)
+    }
+
     /// The sensor's map, unknown in its blind sectors.
     pub fn watched<'m, M: VisibilityMap + ?Sized>(&'m self, map: &'m M) -> Watched<'m, M, K> {
         Watched { monitor: self, map }
@@ -231,5 +250,12 @@ impl<M: VisibilityMap + ?Sized, const K: usize> VisibilityMap for Watched<'_, M,
         let (x, y) = self.monitor.levelling.place(point);
         let sector = Columns::even(self.monitor.span, K).nearest(trig::bearing(x, y) - self.monitor.right);
         if self.monitor.is_blind(sector) { CellState::UNKNOWN } else { self.map.at(point) }
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        if self.monitor.is_blind_in(area) {
+            visit(CellState::UNKNOWN);
+        }
+        self.map.cells_in(area, visit);
     }
 }

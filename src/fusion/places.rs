@@ -1,12 +1,40 @@
-//! Which cell of a polar map lies at each cell of the road.
+//! Which cells of a polar map lie at each cell of the road.
 
 use crate::map::polar::{PolarGeometry, PolarMap};
+use crate::map::query::Footprint;
 use crate::sensor::road::RoadPoint;
 
-/// Number of a polar map's cell, azimuth by azimuth; [`NOWHERE`] beyond it.
-pub type Place = u16;
+/// Cells of a polar map that a cell of the road touches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// The first one's number, azimuth by azimuth.
+    first: u16,
+    /// How many azimuths, none where the map does not reach.
+    azimuths: u8,
+    /// How many ranges of each, and whether that is all: a bit says that a part of the cell lies beyond the map.
+    ranges: u8,
+}
 
-const NOWHERE: Place = Place::MAX;
+const NOWHERE: Place = Place { first: 0, azimuths: 0, ranges: BEYOND };
+
+/// A part lies beyond the map.
+const BEYOND: u8 = 0x80;
+
+impl Place {
+    /// Whether all of the cell lies on the map.
+    pub fn is_complete(self) -> bool {
+        self.ranges & BEYOND == 0
+    }
+
+    /// The numbers of the cells, of a map of `R` ranges.
+    pub fn cells<const R: usize>(self) -> impl Iterator<Item = core::ops::Range<usize>> {
+        let (first, ranges) = (usize::from(self.first), usize::from(self.ranges & !BEYOND));
+        (0..usize::from(self.azimuths)).map(move |azimuth| {
+            let first = first + azimuth * R;
+            first..first + ranges
+        })
+    }
+}
 
 /// From a sensor, along either axis.
 const FARTHEST_CM: u32 = 40_000;
@@ -41,7 +69,7 @@ impl<const NX: usize, const NY: usize> Places<NX, NY> {
     /// Works them out.
     #[inline(never)]
     pub fn work_out<const R: usize, const A: usize>(&mut self, map: &PolarMap<R, A>, origin: RoadPoint, cell_cm: i32) {
-        const { assert!(A <= 255 && R * A < NOWHERE as usize) }
+        const { assert!(A <= 255 && R * A <= u16::MAX as usize) }
         let sensor = map.geometry().levelling.origin();
         let near = |a: i32, b: i32| a.abs_diff(b) <= FARTHEST_CM;
         self.of = Some((*map.geometry(), R, A, map.visible_from()));
@@ -49,13 +77,9 @@ impl<const NX: usize, const NY: usize> Places<NX, NY> {
             *span = (0, 0);
             for (j, place) in (0..).zip(row) {
                 let point = super::centre(origin, cell_cm, i, i32::from(j));
-                let (x, y) = map.geometry().levelling.place(point);
                 // farther ones are placed nearer than they are
                 let reached = near(point.x_cm, sensor.x_cm) && near(point.y_cm, sensor.y_cm);
-                let cell = map
-                    .locate(x, y)
-                    .filter(|_| reached)
-                    .and_then(|(azimuth, range)| Place::try_from(azimuth * R + range).ok());
+                let cell = reached.then(|| touched(map, &Footprint::square(point, cell_cm))).flatten();
                 *place = cell.unwrap_or(NOWHERE);
                 if cell.is_some() {
                     let first = if span.1 == 0 { j } else { span.0 };
@@ -74,4 +98,22 @@ impl<const NX: usize, const NY: usize> Places<NX, NY> {
     pub fn spans(&self) -> &[(u16, u16); NX] {
         &self.spans
     }
+}
+
+/// The first and the last azimuth and range that an area touches, and whether that is all of it; none if it touches
+/// nothing, or more than can be told.
+fn touched<const R: usize, const A: usize>(map: &PolarMap<R, A>, area: &Footprint) -> Option<Place> {
+    let mut ends = None::<[usize; 4]>;
+    let complete = map.geometry().touched(area, R, A, |azimuth, near, far| {
+        let [right, _, nearest, farthest] = ends.unwrap_or([azimuth, azimuth, near, far]);
+        ends = Some([right, azimuth, nearest.min(near), farthest.max(far)]);
+    });
+    let [right, left, nearest, farthest] = ends?;
+    let number = |first: usize, last: usize| u8::try_from(last.checked_sub(first)? + 1).ok();
+    let ranges = number(nearest, farthest).filter(|ranges| ranges & BEYOND == 0)?;
+    Some(Place {
+        first: u16::try_from(right * R + nearest).ok()?,
+        azimuths: number(right, left)?,
+        ranges: ranges | if complete { 0 } else { BEYOND },
+    })
 }

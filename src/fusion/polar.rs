@@ -2,18 +2,19 @@
 
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
-use crate::fixed::trig;
+use crate::fixed::trig::{self, Direction};
 use crate::map::azimuths::Narrow;
 use crate::map::polar::{PolarGeometry, PolarMap};
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::query::Footprint;
+use crate::map::{CellState, Visibility, VisibilityMap, worst_in};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::mount::Mount;
 
 /// Least grade of a visible cell, and least occupancy of an occupied one.
 const THRESHOLD: u8 = 128;
 
-/// Most places of a cell that are looked at, along it and across.
-const MOST_PLACES: i32 = 8;
+/// Wider azimuths are looked at in parts, ten degrees: a rectangle around them would hold much else.
+const WIDEST: i32 = 1820;
 
 /// An unknown map of `A` azimuths by `R` ranges around a place that stands for a sensor: a mount, the right and the
 /// left edge of all azimuths from its heading in degrees, and the length of a cell in metres. Its
@@ -51,36 +52,24 @@ pub(super) fn edges([right, left]: [f32; 2]) -> Result<(Angle, u16), ConfigError
     Ok((Angle::from_degrees(right), span as u16))
 }
 
-/// Fills a polar map of [`polar`]: each cell has the worst of what is known at up to 8 by 8 places in it, a metre or
-/// more apart, and is occupied if any of them is. So it is never better than what it covers.
-#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // cell numbers; angles wrap
+/// Fills a polar map of [`polar`]: each cell has the worst of all that is known anywhere in it, and is occupied if any of
+/// it is. So it is never better than what it covers.
+#[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // cell numbers
 pub fn fill<const R: usize, const A: usize>(map: &mut PolarMap<R, A>, with: &(impl VisibilityMap + ?Sized)) {
     let geometry = *map.geometry();
-    let along = (geometry.cell_cm / 100).clamp(1, MOST_PLACES);
-    let (narrow, span) = (geometry.narrow, i64::from(geometry.azimuth_span));
-    let units = i64::from(narrow.units(A).max(1)) << 8;
+    let columns = geometry.columns(A);
     for azimuth in 0..A {
-        let [right, left] = [azimuth, azimuth + 1].map(|edge| i64::from(narrow.unit((edge as i32) << 8)));
+        let [right, left] = [azimuth, azimuth + 1].map(|edge| columns.bearing((edge << 8) as i32));
+        let width = i32::from((left - right).raw() as u16);
         let Some((grades, occupancy)) = map.rows_mut(azimuth) else { continue };
         for (range, (grade, occupied)) in (0_i32..).zip(grades.iter_mut().zip(occupancy)) {
-            let far = geometry.cell_cm * (range + 1);
-            // the arc of a cell at its far end, metres: a turn is 65 536 steps, and 6.28 times the distance
-            let arc = i64::from(far) * span * (left - right) / (10_430 * 100 * units);
-            let across = i32::try_from(arc + 1).unwrap_or(MOST_PLACES).clamp(1, MOST_PLACES);
-            let (mut worst, mut any) = (None::<CellState>, false);
-            for k in 0..across {
-                let steps = span * (i64::from(2 * across) * right + i64::from(2 * k + 1) * (left - right));
-                let turn = steps / (i64::from(2 * across) * units);
-                let direction = trig::direction(geometry.azimuth_origin + Angle::from_raw(turn as i16));
-                for l in 0..along {
-                    let distance = geometry.cell_cm * range + geometry.cell_cm * (2 * l + 1) / (2 * along);
-                    let part = |component: i16| (i32::from(component) * distance) >> 14;
-                    let state = with.at(geometry.levelling.unplace(part(direction.x), part(direction.y)));
-                    any |= state.occupied;
-                    if worst.is_none_or(|worst| (state.visibility, state.grade) < (worst.visibility, worst.grade)) {
-                        worst = Some(state);
-                    }
-                }
+            let mut worst = None::<CellState>;
+            let parts = 1 + width / WIDEST;
+            for part in 0..parts {
+                let end = |k: i32| i32::from(right.raw()) + width * k / parts;
+                let area = covering(&geometry, [end(part), end(part + 1)], geometry.cell_cm * range);
+                let state = worst_in(with, &area);
+                worst = Some(worst.map_or(state, |worst| worst.worse(state)));
             }
             let state = worst.unwrap_or(CellState::UNKNOWN);
             *grade = match state.visibility {
@@ -88,7 +77,28 @@ pub fn fill<const R: usize, const A: usize>(map: &mut PolarMap<R, A>, with: &(im
                 Visibility::Invisible => state.grade.clamp(1, THRESHOLD - 1),
                 Visibility::Visible => state.grade.max(THRESHOLD),
             };
-            *occupied = if any { u8::MAX } else { state.occupancy.min(THRESHOLD - 1) };
+            *occupied = if state.occupied { u8::MAX } else { state.occupancy.min(THRESHOLD - 1) };
         }
+    }
+}
+
+/// The rectangle around a cell, or a part of it between two bearings from the first azimuth's right edge; larger by what
+/// bearings and places are rounded by.
+#[allow(clippy::cast_possible_truncation)] // angles wrap, components of a direction
+fn covering(geometry: &PolarGeometry, [right, left]: [i32; 2], near_cm: i32) -> Footprint {
+    let middle = geometry.azimuth_origin + Angle::from_raw(((right + left) / 2) as i16);
+    let half = trig::direction(Angle::from_raw(((left - right) / 2 + 4) as i16));
+    let part = |component: i16, distance: i32| (i32::from(component) * distance) >> 14;
+    let far_cm = near_cm + geometry.cell_cm;
+    // its near corners lie nearer along the middle than its near side
+    let near_cm = part(half.x, near_cm);
+    let grown = 4 + (far_cm >> 11);
+    let (ray, at) = (trig::direction(middle), (near_cm + far_cm) / 2);
+    let (x, y) = geometry.levelling.unturn(i32::from(ray.x), i32::from(ray.y));
+    Footprint {
+        centre: geometry.levelling.unplace(part(ray.x, at), part(ray.y, at)),
+        heading: Direction { x: x as i16, y: y as i16 },
+        half_length_cm: (far_cm - near_cm) / 2 + grown,
+        half_width_cm: part(half.y, far_cm) + grown,
     }
 }

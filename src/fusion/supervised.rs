@@ -13,7 +13,7 @@
 use crate::estimator::{Estimator, Progress};
 use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
-use crate::frame::health::{Condition, FrameStatus};
+use crate::frame::health::{Condition, Continuity, FrameStatus};
 use crate::map::VisibilityMap;
 use crate::map::polar::PolarMap;
 use crate::sensor::config::ConfigError;
@@ -68,7 +68,9 @@ impl<E> Supervised<E> {
 
     /// What is to be said of a radar that is healthy otherwise.
     fn condition(&self, own: Condition) -> Condition {
-        let Some(standing) = self.standing().filter(|_| own == Condition::Healthy) else { return own };
+        let Some(standing) = self.standing().filter(|_| matches!(own, Condition::Healthy | Condition::Settling)) else {
+            return own;
+        };
         if standing.any_blind() {
             Condition::SectorBlind
         } else if standing.turned().is_some() || standing.tilted().is_some() {
@@ -117,11 +119,11 @@ where
             self.standing.begin(limits);
             self.is_watched = true;
         }
-        if self.is_watched {
+        if self.is_watched && progress.continuity != Continuity::Unjudged {
             let standing = &mut self.standing;
             input.iter().for_each(|detection| standing.observe(detection));
             // a radar that is blind or silent as a whole says nothing of what stands
-            if progress.condition == Condition::Healthy {
+            if matches!(progress.condition, Condition::Healthy | Condition::Settling) {
                 standing.advance(measured, |at| map.at(at).visible());
             }
             // nearly never

@@ -1,10 +1,11 @@
 //! The fused map as it is at a time.
 
 use crate::fixed::time::Time;
+use crate::map::query::Footprint;
 use crate::map::{CellState, Visibility, VisibilityMap};
 use crate::sensor::road::RoadPoint;
 
-use super::{Fusion, Held, bit, centre};
+use super::{Fusion, Held, Marks, bit, centre};
 
 /// Some of the sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -32,11 +33,11 @@ impl Sensors {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FusedCell {
-    /// Who sees it.
+    /// Who sees all of it.
     pub seen_by: Sensors,
-    /// From whom it is hidden.
+    /// From whom some of it is hidden.
     pub hidden_from: Sensors,
-    /// Who says that it is occupied: those who see it, or where nobody does those who know of it.
+    /// Who says that some of it is occupied: those who see that, and where nobody sees the cell those who know of it.
     pub occupied_by: Sensors,
     /// All of them together. The grade is the best of those who see it; where nobody does, the best of the others.
     pub state: CellState,
@@ -81,30 +82,33 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
 
     /// What is known of a cell, counted from the grid's origin; unknown outside.
     pub fn cell(&self, i: usize, j: usize) -> FusedCell {
-        let (visible, occupied) = self.bits(i, j);
-        let (mut known, mut best_seen, mut best) = (0_u8, 0, 0);
+        let (visible, marks) = self.bits(i, j);
+        let (mut best_seen, mut best) = (0, 0);
         for (sensor, grade) in self.grades(i, j) {
             let bit = bit(sensor);
-            if grade == 0 || self.fresh & bit == 0 {
+            if marks.known & bit == 0 {
                 continue;
             }
-            known |= bit;
             best = grade.max(best);
             if visible & bit != 0 {
                 best_seen = grade.max(best_seen);
             }
         }
-        let (visibility, grade) = match (visible, known) {
+        let (visibility, grade) = match (visible, marks.known) {
             (0, 0) => (Visibility::Unknown, 0),
             (0, _) => (Visibility::Invisible, best),
             _ => (Visibility::Visible, best_seen),
         };
-        let occupied = occupied & if visible == 0 { known } else { visible };
+        let occupied = match visibility {
+            Visibility::Unknown => 0,
+            Visibility::Invisible => marks.occupied & marks.known | marks.seen_occupied,
+            Visibility::Visible => marks.seen_occupied,
+        };
         let is_occupied = occupied != 0;
         let occupancy = if is_occupied { u8::MAX } else { 0 };
         FusedCell {
             seen_by: Sensors(visible),
-            hidden_from: Sensors(known & !visible),
+            hidden_from: Sensors(marks.known & !visible),
             occupied_by: Sensors(occupied),
             state: CellState { visibility, grade, occupancy, occupied: is_occupied },
         }
@@ -116,14 +120,18 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
         grades.enumerate()
     }
 
-    /// Fresh sensors that see a cell, and those that say that it is occupied.
-    fn bits(&self, i: usize, j: usize) -> (u8, u8) {
-        let sees = |(held, (sensor, grade)): (&Held, (usize, u8))| {
-            if grade != 0 && grade >= held.visible_from { bit(sensor) } else { 0 }
+    /// Fresh sensors that see a cell, and what fresh ones say of it.
+    fn bits(&self, i: usize, j: usize) -> (u8, Marks) {
+        let marks = self.fusion.marks.get(i).and_then(|row| row.get(j)).copied().unwrap_or(Marks::NONE);
+        let marks = Marks {
+            known: marks.known & self.fresh,
+            occupied: marks.occupied & self.fresh,
+            seen_occupied: marks.seen_occupied & self.fresh,
         };
+        let sees =
+            |(held, (sensor, grade)): (&Held, (usize, u8))| if grade >= held.visible_from { bit(sensor) } else { 0 };
         let visible = self.fusion.held.iter().zip(self.grades(i, j)).map(sees).fold(0, |all, bit| all | bit);
-        let occupied = self.fusion.occupied.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0);
-        (visible & self.fresh, occupied & self.fresh)
+        (visible & marks.known, marks)
     }
 
     /// Where sensors contradict each other. What one sees free counts only if it sees nothing occupied in the eight
@@ -134,14 +142,13 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
     }
 
     fn conflict(&self, i: usize, j: usize) -> Option<Conflict> {
-        let (visible, occupied) = self.bits(i, j);
-        let (occupied, mut free) = (occupied & visible, visible & !occupied);
+        let (visible, marks) = self.bits(i, j);
+        let (occupied, mut free) = (marks.seen_occupied, visible & !marks.occupied);
         if occupied == 0 || free == 0 {
             return None;
         }
         for (x, y) in (0..9).map(|k| (i.wrapping_add(k / 3).wrapping_sub(1), j.wrapping_add(k % 3).wrapping_sub(1))) {
-            let (visible, occupied) = self.bits(x, y);
-            free &= !(visible & occupied);
+            free &= !self.bits(x, y).1.seen_occupied;
         }
         let [x, y] = [i, j].map(|k| i32::try_from(k).unwrap_or(i32::MAX));
         let at = centre(self.fusion.origin, self.fusion.cell_cm, x, y);
@@ -164,5 +171,12 @@ impl<'f, const S: usize, const NX: usize, const NY: usize> Fused<'f, S, NX, NY> 
 impl<const S: usize, const NX: usize, const NY: usize> VisibilityMap for Fused<'_, S, NX, NY> {
     fn at(&self, point: RoadPoint) -> CellState {
         self.place(point).state
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        area.each_square(self.fusion.origin, self.fusion.cell_cm, |i, j| {
+            let cell = usize::try_from(i).ok().zip(usize::try_from(j).ok());
+            visit(cell.map_or(CellState::UNKNOWN, |(i, j)| self.cell(i, j).state));
+        });
     }
 }

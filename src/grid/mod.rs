@@ -9,6 +9,7 @@
 pub mod axes;
 pub mod evidence;
 pub mod raycast;
+pub mod settling;
 pub mod shadow;
 pub mod spherical;
 mod stack;

@@ -2,8 +2,12 @@
 //!
 //! # Model
 //! A column is covered by the share of a window around its centre, half a column wide, that the
-//! box's outline spans. At the half way mark this is "the centre is covered" exactly, and the
-//! result is graded towards the edges. Within a column the box reaches from where the ray enters to
+//! box's outline spans: half where its edge reaches the centre, graded from there to both sides. The column that the box's
+//! middle lies in is covered whole. It holds most of a box narrower than a column, and where such a box lies on an edge it
+//! covers no centre, and its shadow would be lost. What is hidden more by this, the columns beside are hidden less, so that
+//! in sum little changes. Where several boxes cover a column the largest share counts.
+//!
+//! Within a column the box reaches from where the ray enters to
 //! where it leaves. Seen from the height `H`, a box of height `T` that a ray leaves at the distance
 //! `d` hides the slice plane at `h` as far as `d (H - h) / (H - T)`; one as high as the sensor without
 //! end. Through the rows of the grid such an end is right to a tenth of a row, which is a metre 60 m
@@ -27,6 +31,15 @@
 //! | nothing: kept | 16.0 / 12.1 | +2.9 / +9.4 | 17.9 / 14.5 |
 //! | the farther quarter | 15.3 / 12.6 | +0.9 / +11.4 | 15.8 / 15.3 |
 //! | the farther half | 14.9 / 13.2 | -0.5 / +13.7 | 14.7 / 15.8 |
+//!
+//! To give the column of a box's middle no more than its share loses a third of the shadows of boxes 0.7 columns wide, and with
+//! them those of cars 150 m away. FVR / FIR on the five days of motorway, columns of 1 degree:
+//!
+//! | column of the middle | edges nearer in the others | cells | objects |
+//! |---|---|---|---|
+//! | its share | 0 | 13.2 / 14.7 | 22.0 / 8.5 |
+//! | whole | 0 | 12.0 / 15.6 | 21.7 / 8.7 |
+//! | whole: kept | 5 / 256 | 12.5 / 15.2 | 22.6 / 8.3 |
 
 use core::ops::Range;
 
@@ -39,6 +52,10 @@ use crate::obstacles::solid::Solid;
 
 /// Half the window a column's coverage is taken over, 2^-8 columns.
 const WINDOW: i32 = 64;
+
+/// By so much a box's edges count as nearer to its middle in the columns beside, 2^-8 columns: what the column of its middle
+/// gains of the others' place, they lose.
+const BESIDE: i32 = 5;
 
 /// What a box covers of a column.
 struct Covered {
@@ -91,6 +108,7 @@ fn columns<const R: usize, const A: usize, const E: usize>(
 ) -> impl Iterator<Item = Covered> {
     let origin = solid.origin();
     let (low, high) = outline(solid, axes);
+    let middle = (low + high) >> 1;
     let first = (low >> 8).clamp(0, A as i32);
     let last = (high >> 8).clamp(-1, A as i32 - 1);
     let farthest = R as i32 * axes.cell_cm;
@@ -98,15 +116,20 @@ fn columns<const R: usize, const A: usize, const E: usize>(
         // here, where the divisions below show that they cannot be by nothing
         let cell_cm = axes.cell_cm.max(1);
         let centre = column_centre(a as usize);
-        let (from, to) = (low.max(centre - WINDOW), high.min(centre + WINDOW));
+        let holds_most = middle >> 8 == a;
+        let less = if holds_most { 0 } else { BESIDE };
+        let (mut from, mut to) = ((low + less).max(centre - WINDOW), (high - less).min(centre + WINDOW));
         if from >= to {
-            return None;
+            if !holds_most {
+                return None;
+            }
+            (from, to) = (middle, middle);
         }
         let (enter, leave) = solid.crossing(origin, axes.direction_of((from + to) / 2))?;
         let (enter_cm, leave_cm) = (enter.min(farthest), leave.min(farthest));
         let nearest = (enter_cm / cell_cm) as usize;
         let end = (((leave_cm + cell_cm / 2) / cell_cm) as usize).max(nearest + 1).min(R);
-        let share = ((to - from) * 255 / (2 * WINDOW)) as u8;
+        let share = if holds_most { u8::MAX } else { ((to - from) * 255 / (2 * WINDOW)) as u8 };
         Some(Covered { column: a as usize, share, enter_cm, leave_cm, cells: nearest..end })
     })
 }
@@ -134,6 +157,7 @@ mod tests {
     use crate::sensor::ground::Ground;
     use crate::sensor::mount::Mount;
     use crate::sensor::place::Points;
+    use std::string::String;
     use std::vec::Vec;
 
     type World = (Axes<60, 4, 16>, SphericalGrid<60, 4, 16>, PolarMap<60, 4>);
@@ -275,6 +299,62 @@ mod tests {
         cast(&solid, &axes, &mut grid, &mut map);
         let covered: Vec<bool> = (0..4).map(|a| (0..60).any(|r| map.cell(a, r).occupied)).collect();
         assert_eq!(covered, [false, false, false, true]);
+    }
+
+    /// Columns from left to right, a line each: `#` invisible, `O` occupied, `.` the rest; from 16 to 34 m.
+    fn picture(solids: &[Solid]) -> String {
+        let (axes, mut grid, mut map) = world(6.0);
+        solids.iter().for_each(|solid| cast(solid, &axes, &mut grid, &mut map));
+        let mut picture = String::from("\n");
+        for a in (0..4).rev() {
+            picture.extend((16..34).map(|r| match map.cell(a, r) {
+                cell if cell.visibility == Visibility::Invisible => '#',
+                cell if cell.occupied => 'O',
+                _ => '.',
+            }));
+            picture.push('\n');
+        }
+        picture
+    }
+
+    #[test]
+    fn a_box_narrower_than_a_column_hides_the_one_that_holds_most_of_it() {
+        // a column is 5 m wide there; rays leave at 22 m, and the shadow ends at 22 * 5 / 3
+        let car = |y_cm: i32| Solid { half_width_cm: 90, y_cm, ..wall(1800, 2200, 300) };
+        let left = "
+..................
+..OOOO############
+..................
+..................
+";
+        let right = "
+..................
+..................
+..OOOO############
+..................
+";
+        // on the edge between both, and beside it, where no centre is covered
+        assert!([left, right].contains(&&*picture(&[car(0)])));
+        assert_eq!(picture(&[car(20)]), left);
+        assert_eq!(picture(&[car(-20)]), right);
+        assert_eq!(picture(&[car(100)]), left);
+    }
+
+    #[test]
+    fn boxes_that_share_a_column_hide_it_once() {
+        let car = |y_cm: i32| Solid { half_width_cm: 90, y_cm, ..wall(1800, 2200, 300) };
+        let grades = |solids: &[Solid]| {
+            let (axes, mut grid, mut map) = world(6.0);
+            solids.iter().for_each(|solid| cast(solid, &axes, &mut grid, &mut map));
+            (0..4).map(|a| map.cell(a, 30).grade).collect::<Vec<_>>()
+        };
+        let one = grades(&[car(20)]);
+        // both lie on the edge: the column beside is not hidden by the two of them either
+        assert_eq!(grades(&[car(20), car(30)]), one);
+        assert_eq!(one, [255, 255, 1, 255]);
+        // a lane to the left a third one covers some of the next column, more than none and less than half
+        let with = grades(&[car(20), car(420)]);
+        assert_eq!((with[1], with[2]), (255, 1));
     }
 
     #[test]

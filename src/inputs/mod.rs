@@ -32,6 +32,8 @@ pub struct RadarScan<'a, T = Detection> {
     pub missing: u16,
     /// Points that arrived and are no detections: not finite, at no distance, or absurd; boxes of no known class.
     pub refused: u16,
+    /// Points that arrived and were left out by the radar's own marks: something was measured, and where is not known.
+    pub unwanted: u16,
     /// Whether the radar says that something is wrong with it.
     pub fault: bool,
 }
@@ -39,7 +41,7 @@ pub struct RadarScan<'a, T = Detection> {
 impl<T> RadarScan<'_, T> {
     /// What the estimators get besides the detections.
     pub fn status(&self) -> FrameStatus {
-        FrameStatus { fault: self.fault, refused: self.refused }
+        FrameStatus { fault: self.fault, refused: self.refused, unwanted: self.unwanted }
     }
 
     /// As a frame for an estimator.

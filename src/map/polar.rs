@@ -4,12 +4,13 @@ use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig;
 use crate::map::azimuths::{Columns, Narrow};
+use crate::map::query::Footprint;
 use crate::map::{CellState, UNKNOWN, VisibilityMap};
 use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
 
 /// Places from here on are on no map: [`Levelling::place`] has them at 450 m along an axis, less what rounding takes.
-const FARTHEST_CM: i32 = 44_900;
+pub(crate) const FARTHEST_CM: i32 = 44_900;
 
 /// Where the cells of a polar map lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +106,14 @@ impl<const R: usize, const A: usize> PolarMap<R, A> {
         }
     }
 
+    /// Makes an azimuth unknown from a range cell on.
+    pub(crate) fn forget_from(&mut self, azimuth: usize, range: usize) {
+        if let Some((grades, occupancy)) = self.rows_mut(azimuth) {
+            grades.iter_mut().skip(range).for_each(|grade| *grade = UNKNOWN);
+            occupancy.iter_mut().skip(range).for_each(|occupied| *occupied = 0);
+        }
+    }
+
     /// Where the cells lie.
     pub fn geometry(&self) -> &PolarGeometry {
         &self.geometry
@@ -162,6 +171,15 @@ impl<const R: usize, const A: usize> VisibilityMap for PolarMap<R, A> {
     fn at(&self, point: RoadPoint) -> CellState {
         let (x, y) = self.geometry.levelling.place(point);
         self.locate(x, y).map_or(CellState::UNKNOWN, |(a, r)| self.cell(a, r))
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        let complete = self.geometry.touched(area, R, A, |azimuth, near, far| {
+            (near..=far).for_each(|range| visit(self.cell(azimuth, range)));
+        });
+        if !complete {
+            visit(CellState::UNKNOWN);
+        }
     }
 }
 

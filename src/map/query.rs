@@ -3,8 +3,9 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::fixed::trig::{self, Direction};
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::{CellState, Visibility, VisibilityMap, worst_in};
 use crate::sensor::config::{ConfigError, within};
+use crate::sensor::mount::Levelling;
 use crate::sensor::road::RoadPoint;
 
 /// What a map answers.
@@ -32,7 +33,7 @@ impl From<CellState> for Answer {
     }
 }
 
-/// A rectangle on the road.
+/// A rectangle on the road. One whose sides are not 2 cm to 100 m, or whose heading is no direction, cannot be.
 ///
 /// # Units
 /// Centimetres in the road frame.
@@ -52,13 +53,13 @@ pub struct Footprint {
 const MAX_SIDE_M: i32 = 100;
 
 /// What of this point?
-pub fn point(map: &impl VisibilityMap, at: RoadPoint) -> Answer {
+pub fn point(map: &(impl VisibilityMap + ?Sized), at: RoadPoint) -> Answer {
     map.at(at).into()
 }
 
 /// Could an object with this footprint be seen? As the metrics define it: it is visible if any
 /// cell it overlaps is, invisible if none is and some is known.
-pub fn object(map: &impl VisibilityMap, footprint: &Footprint) -> Answer {
+pub fn object(map: &(impl VisibilityMap + ?Sized), footprint: &Footprint) -> Answer {
     let (mut best, mut occupied) = (Answer::Unknown, false);
     let complete = footprint.each_cell(|cell| {
         let answer = Answer::from(map.at(cell));
@@ -72,15 +73,10 @@ pub fn object(map: &impl VisibilityMap, footprint: &Footprint) -> Answer {
     }
 }
 
-/// Is this whole area seen and free? The worst answer of all cells it overlaps.
-pub fn area(map: &impl VisibilityMap, footprint: &Footprint) -> Answer {
-    let mut worst = Answer::VisibleFree;
-    let mut any = false;
-    let complete = footprint.each_cell(|cell| {
-        any = true;
-        worst = worst.min(map.at(cell).into());
-    });
-    if complete && any { worst } else { Answer::Unknown }
+/// Is this whole area seen and free? The worst answer of all of the map's own cells that hold any point of it: an area
+/// that is visible and free is so everywhere.
+pub fn area(map: &(impl VisibilityMap + ?Sized), footprint: &Footprint) -> Answer {
+    worst_in(map, footprint).into()
 }
 
 impl Footprint {
@@ -102,38 +98,116 @@ impl Footprint {
         })
     }
 
-    /// Visits the centres of the 1 m cells that share area with the footprint; false, and no visit,
-    /// if it is larger than 100 m or turned inside out.
-    pub(crate) fn each_cell(&self, mut visit: impl FnMut(RoadPoint)) -> bool {
-        let limit = MAX_SIDE_M * 50;
-        if !(1..=limit).contains(&self.half_length_cm) || !(1..=limit).contains(&self.half_width_cm) {
-            return false;
-        }
+    /// A square along the road's axes, of a side of whole centimetres; a centimetre more if that is odd.
+    pub(crate) const fn square(centre: RoadPoint, side_cm: i32) -> Self {
+        let half = side_cm / 2 + side_cm % 2;
+        Self { centre, heading: Direction::AHEAD, half_length_cm: half, half_width_cm: half }
+    }
+
+    /// The same in a sensor's levelled frame, 2 cm larger to each side for what is rounded; none if it cannot be.
+    #[allow(clippy::cast_possible_truncation)] // components of a direction
+    pub(crate) fn levelled(&self, levelling: &Levelling) -> Option<Self> {
+        self.reach()?;
+        let (x, y) = levelling.place(self.centre);
+        let ahead = levelling.heading();
+        let heading = Direction { x: ahead.cosine(self.heading) as i16, y: ahead.sine(self.heading) as i16 };
+        // a hundredth of a per cent of the sides, and centimetres of places
+        let grown = |half: i32| half + 2 + (half >> 12);
+        let (half_length_cm, half_width_cm) = (grown(self.half_length_cm), grown(self.half_width_cm));
+        Some(Self { centre: RoadPoint::new(x, y), heading, half_length_cm, half_width_cm })
+    }
+
+    /// Half its extent along the road's axes, rounded up; none if it cannot be.
+    pub(crate) fn reach(&self) -> Option<(i32, i32)> {
+        let sound = 1..=MAX_SIDE_M * 50;
+        let direction = UNIT - UNIT / 64..=UNIT + UNIT / 64;
+        let can_be = sound.contains(&self.half_length_cm)
+            && sound.contains(&self.half_width_cm)
+            && direction.contains(&self.heading.cosine_wide(self.heading));
         let (hx, hy) = (i32::from(self.heading.x).abs(), i32::from(self.heading.y).abs());
-        // half the extent along the road's axes, rounded up
-        let reach_x = ((hx * self.half_length_cm + hy * self.half_width_cm) >> 14) + 1;
-        let reach_y = ((hy * self.half_length_cm + hx * self.half_width_cm) >> 14) + 1;
-        let span = |centre: i32, reach: i32| {
-            (centre.saturating_sub(reach)).div_euclid(100)..=(centre.saturating_add(reach)).div_euclid(100)
+        let reach = |a: i32, b: i32| ((a * self.half_length_cm + b * self.half_width_cm) >> 14) + 1;
+        can_be.then(|| (reach(hx, hy), reach(hy, hx)))
+    }
+
+    /// Its corners, rounded down.
+    pub(crate) fn corners(&self) -> [RoadPoint; 4] {
+        let axis = Direction { y: -self.heading.y, ..self.heading };
+        let (length, width) = (self.half_length_cm, self.half_width_cm);
+        [(length, width), (length, -width), (-length, width), (-length, -width)].map(|(along, left)| {
+            let (x, y) = (axis.along(along, left), axis.across(along, left));
+            RoadPoint::new(self.centre.x_cm.saturating_add(x), self.centre.y_cm.saturating_add(y))
+        })
+    }
+
+    /// Visits parts of at most so many centimetres along and across, which cover it and overlap by a little; none if it
+    /// cannot be.
+    pub(crate) fn parts(&self, most_cm: i32, mut visit: impl FnMut(&Self)) {
+        if self.reach().is_none() {
+            return;
+        }
+        let number = |half: i32| (2 * half / most_cm.max(1)).saturating_add(1);
+        let (along, across) = (number(self.half_length_cm), number(self.half_width_cm));
+        // the middle of one of so many parts of a side
+        let middle = |half: i32, k: i32, number: i32| half * (2 * k + 1 - number) / number.max(1);
+        let axis = Direction { y: -self.heading.y, ..self.heading };
+        for k in 0..along {
+            for l in 0..across {
+                let (x, y) = (middle(self.half_length_cm, k, along), middle(self.half_width_cm, l, across));
+                let (x, y) = (axis.along(x, y), axis.across(x, y));
+                let half = |half: i32, number: i32| half / number.max(1) + 3;
+                visit(&Self {
+                    centre: RoadPoint::new(self.centre.x_cm.saturating_add(x), self.centre.y_cm.saturating_add(y)),
+                    heading: self.heading,
+                    half_length_cm: half(self.half_length_cm, along),
+                    half_width_cm: half(self.half_width_cm, across),
+                });
+            }
+        }
+    }
+
+    /// Visits the centres of the 1 m cells that share area with the footprint; false, and no visit,
+    /// if it cannot be.
+    pub fn each_cell(&self, mut visit: impl FnMut(RoadPoint)) -> bool {
+        self.each_square(RoadPoint::new(0, 0), 100, |i, j| visit(RoadPoint::cell_centre(i, j)))
+    }
+
+    /// Visits the cells of a grid along the road's axes that share area with the footprint, counted from a corner of one;
+    /// false, and no visit, if it cannot be.
+    #[allow(clippy::cast_possible_truncation)] // cell numbers
+    pub(crate) fn each_square(&self, corner: RoadPoint, side_cm: i32, mut visit: impl FnMut(i32, i32)) -> bool {
+        let Some((reach_x, reach_y)) = self.reach() else { return false };
+        let wide = |at: i32, from: i32| i64::from(at) - i64::from(from);
+        let (x, y) = (wide(self.centre.x_cm, corner.x_cm), wide(self.centre.y_cm, corner.y_cm));
+        let side = i64::from(side_cm.max(1));
+        let cells = |centre: i64, reach: i32| {
+            let end = |at: i64| at.div_euclid(side) as i32;
+            end(centre - i64::from(reach))..=end(centre + i64::from(reach))
         };
-        // half a cell's extent along the footprint's axes
-        let cell = ((hx + hy) * 50) >> 14;
-        for i in span(self.centre.x_cm, reach_x) {
-            for j in span(self.centre.y_cm, reach_y) {
-                let at = RoadPoint::cell_centre(i, j);
-                let (dx, dy) = (at.x_cm.saturating_sub(self.centre.x_cm), at.y_cm.saturating_sub(self.centre.y_cm));
-                let apart = dx.abs() >= reach_x + 50
-                    || dy.abs() >= reach_y + 50
-                    || self.heading.along(dx, dy).abs() >= self.half_length_cm + cell
-                    || self.heading.across(dx, dy).abs() >= self.half_width_cm + cell;
+        // everything doubled, since middles of cells are, and in 2^-14
+        let [length, width] = [self.half_length_cm, self.half_width_cm].map(|half| 2 * i64::from(half));
+        let (hx, hy) = (i64::from(self.heading.x), i64::from(self.heading.y));
+        let squared = (hx * hx + hy * hy) >> 14;
+        let own = (hx.abs() + hy.abs()) * side;
+        let extent = |a: i64, b: i64| a.abs() * length + b.abs() * width + (side << 14);
+        let (along_x, along_y) = (extent(hx, hy), extent(hy, hx));
+        for i in cells(x, reach_x) {
+            for j in cells(y, reach_y) {
+                let (dx, dy) = ((2 * i64::from(i) + 1) * side - 2 * x, (2 * i64::from(j) + 1) * side - 2 * y);
+                let apart = (dx << 14).abs() >= along_x
+                    || (dy << 14).abs() >= along_y
+                    || (dx * hx + dy * hy).abs() >= length * squared + own
+                    || (dy * hx - dx * hy).abs() >= width * squared + own;
                 if !apart {
-                    visit(at);
+                    visit(i, j);
                 }
             }
         }
         true
     }
 }
+
+/// Square of a direction's length.
+const UNIT: i32 = 1 << 28;
 
 #[cfg(test)]
 mod tests {
@@ -151,6 +225,10 @@ mod tests {
             let visibility = if p.x_cm < 1000 { Visibility::Visible } else { Visibility::Invisible };
             let occupied = p.x_cm / 100 == 5 && p.y_cm / 100 == 2;
             CellState { visibility, grade: 200, occupancy: if occupied { 255 } else { 0 }, occupied }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

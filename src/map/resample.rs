@@ -1,7 +1,11 @@
-//! Any map onto the Cartesian 1 m grid of the road: the nearest cell, never a better one.
+//! Any map onto the Cartesian 1 m grid of the road: each cell is the worst of what the map says anywhere in it.
 
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::query::Footprint;
+use crate::map::{CellState, Visibility, VisibilityMap, worst_in};
 use crate::sensor::road::RoadPoint;
+
+/// Side of a cell.
+const CELL_CM: i32 = 100;
 
 /// `NX` by `NY` cells of one metre; the first covers [x, x + 1) by [y, y + 1) metres.
 ///
@@ -52,12 +56,14 @@ impl<const NX: usize, const NY: usize> RoadGrid<NX, NY> {
         Self { origin: (x, y), cells: [[Packed::UNKNOWN; NY]; NX] }
     }
 
-    /// Takes over what a map says of each cell's centre.
-    pub fn resample(&mut self, map: &impl VisibilityMap) {
+    /// Takes over the worst of what a map says anywhere in each cell: visible is what is visible as a whole, and it is
+    /// occupied if any of it is. What only touches an edge may count as well.
+    pub fn resample(&mut self, map: &(impl VisibilityMap + ?Sized)) {
         let (x, y) = self.origin;
         for (i, row) in self.cells.iter_mut().enumerate() {
             for (j, cell) in row.iter_mut().enumerate() {
-                *cell = Packed::of(map.at(RoadPoint::cell_centre(x + i as i32, y + j as i32)));
+                let (i, j) = (x.saturating_add(i as i32), y.saturating_add(j as i32));
+                *cell = Packed::of(worst_in(map, &Footprint::square(RoadPoint::cell_centre(i, j), CELL_CM)));
             }
         }
     }
@@ -72,7 +78,11 @@ impl<const NX: usize, const NY: usize> RoadGrid<NX, NY> {
 
 impl<const NX: usize, const NY: usize> VisibilityMap for RoadGrid<NX, NY> {
     fn at(&self, point: RoadPoint) -> CellState {
-        self.cell(point.x_cm.div_euclid(100), point.y_cm.div_euclid(100))
+        self.cell(point.x_cm.div_euclid(CELL_CM), point.y_cm.div_euclid(CELL_CM))
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        area.each_square(RoadPoint::new(0, 0), CELL_CM, |i, j| visit(self.cell(i, j)));
     }
 }
 
@@ -90,6 +100,10 @@ mod tests {
             }
             let visibility = if p.y_cm > 0 { Visibility::Visible } else { Visibility::Invisible };
             CellState { visibility, grade: 77, occupancy: 5, occupied: p.x_cm > 200 }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

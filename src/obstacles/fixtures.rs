@@ -7,7 +7,7 @@
 //! # Model
 //! A detection that does not move and belongs to no obstacle is a candidate. One that is seen again and again at its place, and
 //! never stays away for 3 s, is a fixture after half a minute. Time in which it may be a part of a vehicle does not count: within
-//! 2 m of a vehicle's centre line and 10 m of its outline. From then on detections that do not move and lie there belong to no
+//! 2 m of a vehicle's centre line and 10 m of its outline; nor does more than a second of a gap between frames. From then on detections that do not move and lie there belong to no
 //! obstacle, but to the grid. A fixture that stays away for 3 s in plain view is forgotten; hidden, it stays for three minutes.
 //!
 //! What is learnt late needs another rule: an obstacle that stands, reflects at one point alone and reflects high is a mast. Something as tall
@@ -20,7 +20,7 @@
 //!
 //! # Cost
 //! 20 bytes each: 1.9 kB on the reference grid. A stretch of the sorted detections is looked through for each in every frame; an
-//! eighth of the candidates is compared with all obstacles.
+//! eighth of them, in turn, is compared with all obstacles where it is a candidate.
 //!
 //! # What was tried
 //! On the training scenes of `tests/recordings/tuning.toml`, with elevation, from the 30th second on, so that what is learnt works in
@@ -69,7 +69,11 @@ const HIDDEN: u16 = 64;
 /// How near the centre line of an obstacle, and beyond its outline, parts of it are looked for, centimetres.
 const PART_CM: [i32; 2] = [200, 1000];
 /// One in so many candidates is compared with the obstacles in a frame.
-const TURNS: u16 = 8;
+const TURNS: usize = 8;
+/// Most that a frame adds to times: longer, nobody looked.
+const MOST_PASSED: u16 = SECOND;
+/// What a fixture has been known for: no candidate's time comes so far.
+const LEARNT: u16 = u16::MAX;
 /// New candidates in a frame.
 const MOST_NEW: usize = 4;
 /// Share of the way to where it is seen by which its place follows: a 16th.
@@ -84,8 +88,10 @@ struct Fixture {
     place: (i32, i32),
     /// How far away that is, centimetres.
     distance_cm: i32,
-    /// How long it has been known, 2^-8 s, no longer than it takes; `None` for a fixture.
-    known_for: Option<u16>,
+    /// How long it has been known and was no part of a vehicle, 2^-8 s; [`LEARNT`] of a fixture.
+    known_for: u16,
+    /// How long ago it was compared with the obstacles, 2^-8 s.
+    compared: u16,
     /// How long it has not been seen, 2^-8 s, and what of hidden time is left over.
     away: u16,
     hidden: u16,
@@ -96,7 +102,8 @@ struct Fixture {
 pub(super) struct Fixtures<const N: usize> {
     list: Vec<Fixture, N, u16>,
     phase: Phase,
-    turn: u16,
+    /// The first that is compared with the obstacles in the next frame.
+    turn: usize,
 }
 
 fn stands(r: &Reflection) -> bool {
@@ -106,7 +113,11 @@ fn stands(r: &Reflection) -> bool {
 impl Fixture {
     fn new(r: &Reflection) -> Self {
         let place = (r.x_cm * FOLLOWS, r.y_cm * FOLLOWS);
-        Self { place, distance_cm: length(r.x_cm, r.y_cm), known_for: Some(0), away: 0, hidden: 0 }
+        Self { place, distance_cm: length(r.x_cm, r.y_cm), known_for: 0, compared: 0, away: 0, hidden: 0 }
+    }
+
+    fn is_learnt(&self) -> bool {
+        self.known_for == LEARNT
     }
 
     fn place_cm(&self) -> (i32, i32) {
@@ -144,7 +155,7 @@ impl Fixture {
             self.place = (self.place.0 + r.x_cm - x, self.place.1 + r.y_cm - y);
             let (x, y) = self.place_cm();
             self.distance_cm = length(x, y);
-        } else if self.known_for.is_some() || in_view(x, y) {
+        } else if !self.is_learnt() || in_view(x, y) {
             self.away = self.away.saturating_add(passed);
         } else {
             self.hidden = self.hidden.saturating_add(passed);
@@ -162,6 +173,26 @@ impl<const N: usize> Fixtures<N> {
     pub fn clear(&mut self) {
         self.list.clear();
     }
+
+    /// Whose turn it is: one in [`TURNS`], and in as many frames all.
+    fn next_turn(&mut self) -> core::ops::Range<usize> {
+        let first = if self.turn < self.list.len() { self.turn } else { 0 };
+        self.turn = first + self.list.len().div_ceil(TURNS);
+        first..self.turn
+    }
+
+    /// Forgets what stays away; whose turn is next does not change by it.
+    fn forget_what_went(&mut self) {
+        let (mut place, mut before) = (0, 0);
+        let turn = self.turn;
+        self.list.retain(|fixture| {
+            let stays = fixture.away < AWAY;
+            before += usize::from(!stays && place < turn);
+            place += 1;
+            stays
+        });
+        self.turn = turn.saturating_sub(before);
+    }
 }
 
 impl<const N: usize> Obstacles<N> {
@@ -173,7 +204,7 @@ impl<const N: usize> Obstacles<N> {
         t: &Tracking,
     ) -> Claimed<D> {
         let mut kept = Claimed::NONE;
-        for fixture in self.fixtures.list.iter().filter(|f| f.known_for.is_none()) {
+        for fixture in self.fixtures.list.iter().filter(|f| f.is_learnt()) {
             fixture.around(reflections, by_range, t).filter(|seen| seen.2).for_each(|(i, ..)| kept.insert(i));
         }
         kept
@@ -190,26 +221,29 @@ impl<const N: usize> Obstacles<N> {
         in_view: impl Fn(i32, i32) -> bool,
     ) {
         let fixtures = &mut self.fixtures;
-        let passed = u16::try_from(fixtures.phase.times(step, i32::from(SECOND))).unwrap_or(u16::MAX);
+        let passed = u16::try_from(fixtures.phase.times(step, i32::from(SECOND))).unwrap_or(u16::MAX).min(MOST_PASSED);
         fixtures.phase = fixtures.phase.after(step);
-        fixtures.turn = (fixtures.turn + 1) % TURNS;
-        let (mut known, mut turn) = (*claimed, fixtures.turn);
-        for fixture in &mut fixtures.list {
+        let turn = fixtures.next_turn();
+        let mut known = *claimed;
+        for (place, fixture) in fixtures.list.iter_mut().enumerate() {
             let mut seen = None;
             for (i, r, is_of_it) in fixture.around(reflections, by_range, t).filter(|(i, ..)| !claimed.contains(*i)) {
                 known.insert(i);
                 seen = seen.or(Some(r).filter(|_| is_of_it));
             }
             fixture.follow(seen, passed, &in_view);
-            turn = (turn + 1) % TURNS;
-            let Some(known_for) = fixture.known_for.filter(|_| turn == 0) else { continue };
+            fixture.compared = fixture.compared.saturating_add(passed);
+            if fixture.is_learnt() || !turn.contains(&place) {
+                continue;
+            }
+            let since = core::mem::take(&mut fixture.compared);
             let (x, y) = fixture.place_cm();
             if !self.list.iter().any(|o| o.may_have_a_part_at(x, y, t)) {
-                let known_for = known_for.saturating_add(passed.saturating_mul(TURNS));
-                fixture.known_for = Some(known_for).filter(|known_for| *known_for < t.fixture_after);
+                let known_for = fixture.known_for.saturating_add(since);
+                fixture.known_for = if known_for < t.fixture_after { known_for } else { LEARNT };
             }
         }
-        fixtures.list.retain(|fixture| fixture.away < AWAY);
+        fixtures.forget_what_went();
         let new = reflections.iter().enumerate().filter(|(i, r)| stands(r) && !known.contains(*i));
         // of several detections of one thing the next frame knows all but the first
         let mut last = None;
@@ -290,6 +324,39 @@ mod tests {
         assert!(at(0, 0, 40) && at(0, 0, -40) && !at(0, 0, 60) && !at(0, 0, -60), "it does not move");
         // its range is measured better than its azimuth
         assert!(at(50, 0, 0) && !at(75, 0, 0) && at(0, 80, 0) && !at(0, 130, 0) && !at(0, -130, 0));
+    }
+
+    #[test]
+    fn a_gap_counts_as_no_longer_than_it_is_and_than_a_second() {
+        // seven frames and a gap, so many times; which of the eight it is
+        let after_gaps = |seconds: u64, times: usize, which: usize| {
+            let (mut list, t) = (Obstacles::<16>::new(), rules());
+            for k in 0..8 * times {
+                let gap = if k % 8 == which { seconds * 1_000_000 } else { 67_000 };
+                let (seen, step) = ([mast(k)], Step::from_micros(gap));
+                list.step(&seen, &ByRange::<16>::sort(&seen, t.limit_cm), step, &t, |_, _| true);
+            }
+            is_fixture(&list, &mast(0))
+        };
+        for which in 0..8 {
+            // 12 x 1.5 s
+            assert!(!after_gaps(1, 12, which) && !after_gaps(50, 12, which), "the gap is before frame {which}");
+            assert!(after_gaps(1, 24, which), "35 s");
+        }
+    }
+
+    #[test]
+    fn what_comes_and_goes_before_it_in_the_list_changes_no_turns() {
+        // others, each seen once at a place of its own, that are forgotten one by one
+        let other = |k: usize| seen_at(2000 + 300 * k as i32, -2500, 0);
+        for others in 40..48 {
+            let mut list = Obstacles::<64>::new();
+            (0..others).for_each(|k| step(&mut list, &[other(k)], true));
+            watch(&mut list, 27.0, |k| Some(mast(k)));
+            assert!(!is_fixture(&list, &mast(0)), "after 27 s behind {others} others");
+            watch(&mut list, 5.0, |k| Some(mast(k)));
+            assert!(is_fixture(&list, &mast(0)), "after 32 s behind {others} others");
+        }
     }
 
     #[test]

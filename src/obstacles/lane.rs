@@ -201,7 +201,7 @@ impl Obstacle {
         let drives = self.seen() && self.existence >= t.confirmed && self.hits >= TEACHING_HITS && self.is_mover(t);
         let speed = self.speed();
         let known = speed >= TEACHING_SPEED && self.free.is_sure_of(speed >> FRACTION, TEACHING_SIGMAS);
-        if t.lane_vehicles == 0 || !drives || !known || self.travelled_cm < self.teaches_from_cm {
+        if t.lane_vehicles == 0 || !drives || !known || self.teaches_in_cm > 0 {
             return;
         }
         // of what fills a wide angle the reflections move along the side that it shows, and its motion seems another
@@ -220,8 +220,8 @@ impl Obstacle {
         lanes.learn(self.global(along, aside), heading);
         // in the mean as often, whatever way it makes in a frame
         let spacing = spacing_cm(heading);
-        let next = self.teaches_from_cm.saturating_add(spacing);
-        self.teaches_from_cm = if next > self.travelled_cm { next } else { self.travelled_cm.saturating_add(spacing) };
+        let next = self.teaches_in_cm.saturating_add(spacing);
+        self.teaches_in_cm = if next > 0 { next } else { spacing };
     }
 
     /// Whether it follows a lane that was given.
@@ -396,6 +396,32 @@ mod tests {
         // the car is 4.5 m long
         assert!((12.5..20.0).contains(&nearest(6.0)), "{} m", nearest(6.0));
         assert!((14.0..18.0).contains(&nearest(15.0)), "{} m", nearest(15.0));
+    }
+
+    /// How often a car teaches on 40 m of way, by what it has counted of its way before.
+    fn taught(before_cm: u16) -> usize {
+        let (t, mut lanes) = (learning(), LearntLanes::<16>::new());
+        let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 0, 0), Direction::AHEAD, 1000);
+        (o.existence, o.hits, o.travelled_cm) = (t.existence_max, 100, before_cm);
+        let step = Step::from_micros(100_000);
+        let mut taught = 0;
+        for _ in 0..40 {
+            o.predict(step, 1 << 16, &t);
+            o.gathered.count = 1;
+            o.free = FreeMotion::new(o.position, 100, o.velocity, 10);
+            let before = o.teaches_in_cm;
+            o.teach(&mut lanes, &t);
+            taught += usize::from(o.teaches_in_cm != before);
+        }
+        taught
+    }
+
+    #[test]
+    fn a_vehicle_teaches_as_often_however_far_it_has_come() {
+        // a cell is 2.56 m
+        assert_eq!(taught(0), 16);
+        assert_eq!(taught(u16::MAX - 2000), 16);
+        assert_eq!(taught(u16::MAX), 16);
     }
 
     #[test]

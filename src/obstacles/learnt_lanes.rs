@@ -125,9 +125,9 @@ const COUNTS_EACH: i32 = 3;
 /// Way between two places that a vehicle teaches, centimetres: a cell's side where it drives along the cells, and as much
 /// more as its way through them is longer where it drives across them.
 #[allow(clippy::cast_possible_truncation)] // at most the diagonal of a cell
-pub(super) fn spacing_cm(heading: Direction) -> u16 {
+pub(super) fn spacing_cm(heading: Direction) -> i16 {
     let (x, y) = (heading.x.unsigned_abs(), heading.y.unsigned_abs());
-    (((u32::from(x) + u32::from(y)) << CELL_SHIFT) >> 14) as u16
+    (((u32::from(x) + u32::from(y)) << CELL_SHIFT) >> 14) as i16
 }
 
 /// What drove through a cell in one direction.

@@ -301,6 +301,28 @@ impl<const N: usize> Obstacles<N> {
         claimed
     }
 
+    /// Moves all on over a gap in the frames in which nobody looked. What moves is believed in for seconds, what stands for
+    /// as long as a red light lasts, and neither what was not confirmed.
+    pub fn bridge(&mut self, gap: Step, t: &Tracking) {
+        let (mut left, second) = (gap, Step::from_micros(1_000_000));
+        self.list.retain(|o| o.existence >= t.confirmed);
+        for o in self.list.iter_mut().filter(|o| o.is_standing(t)) {
+            o.existence = o.existence.saturating_sub(gap.times(t.standing_hidden_loss));
+        }
+        while left.raw() > 0 && self.list.iter().any(|o| !o.is_standing(t)) {
+            let step = left.min(second);
+            left = left.less(step);
+            let kept = t.kept_over(step);
+            for o in self.list.iter_mut().filter(|o| !o.is_standing(t)) {
+                o.predict(step, kept.lateral, t);
+                o.keep_to_learnt(&self.lanes, t);
+                o.existence -= step.times(t.hidden_loss);
+            }
+            self.list.retain(|o| o.existence > 0 && o.is_within_reach(t));
+        }
+        self.list.retain(|o| o.existence > 0);
+    }
+
     /// Gives each detection to the obstacle it fits best, or else to the one whose wheel it may be; of
     /// equals, to the elder in the list. What is of fixtures belongs to none.
     #[allow(clippy::cast_possible_truncation)] // the list is bounded
@@ -426,15 +448,7 @@ impl<const N: usize> Obstacles<N> {
             o.existence -= self.phase.times(step, loss);
         }
         self.phase = self.phase.after(step);
-        self.list.retain(|o| {
-            let (x, y) = o.anchor();
-            o.existence > 0
-                && !o.is_fixture(t)
-                && !o.is_a_mast(t)
-                && x > BEHIND_CM
-                && x < t.limit_cm
-                && y.abs() < t.limit_cm
-        });
+        self.list.retain(|o| o.existence > 0 && !o.is_fixture(t) && !o.is_a_mast(t) && o.is_within_reach(t));
     }
 }
 
@@ -476,6 +490,29 @@ mod tests {
         assert_eq!(lost(confirmed, |x, _| x > 5450), tenth(t.hidden_loss));
         assert_eq!(lost(t.confirmed - 1, |_, _| true), tenth(t.tentative_loss));
         assert!(t.hidden_loss < t.visible_loss && t.visible_loss < t.tentative_loss);
+    }
+
+    #[test]
+    fn over_a_gap_what_moves_is_believed_in_for_seconds_and_what_stands_for_a_minute() {
+        let t = tracking();
+        let after = |speed: i32, gap_s: u64| {
+            let mut all = Obstacles::<4>::new();
+            let mut o = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, speed);
+            (o.existence, o.travelled_cm) = (t.existence_max, 1000);
+            let _ = all.list.push(o);
+            all.bridge(Step::from_micros(gap_s * 1_000_000), &t);
+            all.iter().next().map(|o| (o.anchor().0, o.existence > t.confirmed))
+        };
+        assert_eq!(after(2000, 3), Some((11_000, true)), "60 m on");
+        assert_eq!(after(-2000, 2), Some((1000, true)));
+        assert_eq!(after(2000, 10), None);
+        assert_eq!(after(0, 59), Some((5000, true)));
+        let mut all = Obstacles::<4>::new();
+        let mut tentative = Obstacle::new(&reflection(5000, 0, 0), Direction::AHEAD, 2000);
+        tentative.existence = t.confirmed - 1;
+        let _ = all.list.push(tentative);
+        all.bridge(Step::from_micros(100_000), &t);
+        assert_eq!(all.iter().count(), 0, "what was not confirmed is forgotten");
     }
 
     #[test]

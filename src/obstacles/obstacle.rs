@@ -1,5 +1,6 @@
 //! One moving obstacle: where it is, how it moves, and the outline its reflections have drawn.
 
+use super::BEHIND_CM;
 use super::gathered::Gathered;
 use super::lanes::NO_LANE;
 use super::motion::FreeMotion;
@@ -63,8 +64,8 @@ pub struct Obstacle {
     pub(super) heading_variance: u16,
     /// Segment of the lane it follows, [`LEARNT`](super::lanes::LEARNT), or [`NO_LANE`].
     pub(super) lane: u8,
-    /// Way after which [lanes are learnt](super::learnt_lanes) from it again, centimetres.
-    pub(super) teaches_from_cm: u16,
+    /// Way to go until [lanes are learnt](super::learnt_lanes) from it again, centimetres, and what it has gone beyond.
+    pub(super) teaches_in_cm: i16,
     /// What this frame's detections add up to.
     pub(super) gathered: Gathered,
 }
@@ -99,7 +100,7 @@ impl Obstacle {
             free_heading: false,
             heading_variance: u16::MAX,
             lane: NO_LANE,
-            teaches_from_cm: 0,
+            teaches_in_cm: 0,
             heading,
             profile: Profile::EMPTY,
             extent: Extent { rear_cm: -BIN_CM / 2, front_cm: BIN_CM / 2 },
@@ -158,6 +159,7 @@ impl Obstacle {
         self.position.1 += dy;
         let way = u16::try_from(hypot_gate(dx, dy) >> FRACTION).unwrap_or(u16::MAX);
         self.travelled_cm = self.travelled_cm.saturating_add(way);
+        self.teaches_in_cm = self.teaches_in_cm.saturating_sub_unsigned(way);
         self.free.predict(step, t.turning_noise);
         self.lateral_weight = mul_shift(self.lateral_weight, lateral_kept, 16);
         self.gathered = Gathered::NONE;
@@ -174,6 +176,12 @@ impl Obstacle {
     /// Whether it stands still without ever having moved.
     pub fn is_fixture(&self, t: &Tracking) -> bool {
         !self.is_mover(t) && self.age >= 2 && self.speed() < t.fixture_speed
+    }
+
+    /// Whether it is where obstacles are followed.
+    pub(super) fn is_within_reach(&self, t: &Tracking) -> bool {
+        let (x, y) = self.anchor();
+        x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
     }
 
     /// Whether it has come to a stop.

@@ -104,13 +104,14 @@ impl Obstacle {
         let (speed, way_cm) = (fine >> FRACTION, step.times(fine) >> FRACTION);
         let variance = (i32::from(self.heading_variance) + way_cm.min(ANY / TURN) * TURN).min(ANY);
         // the variance across, over the square of the speed; 2^-16
-        let seen = ratio::<8>(self.free.speed_variance() << 4, (speed * speed) >> 4).min(ANY);
+        let (across, square) = (self.free.speed_variance(), speed * speed);
+        let seen = if across < square { ratio::<8>(across << 4, (square >> 4).max(1)).min(ANY) } else { ANY };
         let seen = (seen * SHARED / step.raw().max(1)).clamp(seen, 1 << 20);
         if self.heading.cosine(motion) < 0 {
             (self.heading, self.heading_variance) = (motion, seen.min(ANY) as u16);
             return;
         }
-        let gain = ratio::<12>(variance, variance + seen);
+        let gain = ratio::<12>(variance, (variance + seen).max(1));
         let turned = |from: i16, to: i16| (i32::from(from) << 12) + (i32::from(to) - i32::from(from)) * gain;
         self.heading = Direction::of(turned(self.heading.x, motion.x), turned(self.heading.y, motion.y));
         self.heading_variance = (variance - mul_shift(variance, gain, 12)).clamp(0, ANY) as u16;
@@ -258,6 +259,14 @@ mod tests {
             assert!(turned(12.0, PERIOD_S, 200) < fast / 2.0, "its motion is known worse");
             let (once, often) = (turned(8.0, 0.2, 100), turned(8.0, 0.05, 100));
             assert!(often < once / 3.0, "{often} and {once} degrees: four frames in the time of one tell no more");
+        }
+    }
+
+    #[test]
+    fn a_motion_that_is_hardly_one_turns_nothing_however_sure_it_need_not_be() {
+        for mps in [0.0, 0.01, 0.02, 0.05, 0.1] {
+            let turned = turned(mps, PERIOD_S, 2000, 20.0);
+            assert!((-0.5..2.0).contains(&turned), "{turned} degrees at {mps} m/s");
         }
     }
 

@@ -7,7 +7,7 @@
 //! |---|---|
 //! | 4 | `VSPT` |
 //! | 4 | layout, 1; steps of the grade, bins of range, bins of azimuth |
-//! | 4 | fingerprint of the configuration it was fitted with |
+//! | 4 | fingerprint of configuration and estimator it was fitted with, see [`fitted_with`](super::fitted_with) |
 //! | 11, 2 x 7, 2 x 7 | edges of grades, of ranges (centimetres), of azimuths (2^-16 turn, signed) |
 //! | 12 x 8 x 8 | probabilities in 1/255: grades within ranges within azimuths |
 //! | 4 | CRC-32 (IEEE 802.3) of everything before it |

@@ -25,7 +25,9 @@ pub use levels::Levels;
 pub use quantiser::Quantiser;
 pub use threshold::{Counted, Threshold};
 
+use crate::estimator::ESTIMATOR_VERSION;
 use crate::fixed::angle::Angle;
+use crate::fixed::bytes;
 use crate::map::polar::{PolarGeometry, PolarMap};
 use crate::map::query::Footprint;
 use crate::map::{UNKNOWN, VisibilityMap};
@@ -114,11 +116,11 @@ pub enum TableError {
         /// Counted from the nearest.
         range: usize,
     },
-    /// Fitted with another mount or configuration.
+    /// Fitted with another mount, configuration or [version of the estimator](ESTIMATOR_VERSION).
     Configuration {
         /// The table's fingerprint.
         table: u32,
-        /// The unit's own.
+        /// That of a table of this unit.
         unit: u32,
     },
 }
@@ -136,13 +138,20 @@ impl core::fmt::Display for TableError {
             }
             Self::Configuration { table, unit } => write!(
                 f,
-                "the probability table was fitted with configuration {table:08x}, this is {unit:08x}; fit one for this mount and these settings"
+                "the probability table was fitted with configuration {table:08x}, this is {unit:08x}; fit one for this mount, these settings and version {ESTIMATOR_VERSION} of the estimator"
             ),
         }
     }
 }
 
 impl core::error::Error for TableError {}
+
+/// Fingerprint of a table that is fitted to the maps of a unit: that of the unit's configuration (`Settings::fingerprint`)
+/// together with [`ESTIMATOR_VERSION`], low bytes first.
+pub fn fitted_with(unit: u32) -> u32 {
+    let ([a, b, c, d], [low, high]) = (unit.to_le_bytes(), ESTIMATOR_VERSION.to_le_bytes());
+    bytes::fingerprint(&[a, b, c, d, low, high])
+}
 
 /// Probabilities of one unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -153,7 +162,7 @@ pub struct ProbabilityTable {
 }
 
 impl ProbabilityTable {
-    /// A table of the unit with this fingerprint (`Settings::fingerprint`).
+    /// A table with this fingerprint, see [`fitted_with`].
     ///
     /// # Errors
     /// Edges that do not rise, and a bin in which the probability falls as the grade rises.
@@ -171,12 +180,13 @@ impl ProbabilityTable {
         Ok(Self { edges, values, fingerprint })
     }
 
-    /// The table, if it is that of a unit with this fingerprint.
+    /// The table, if it was fitted to the maps of a unit with this fingerprint (`Settings::fingerprint`) by this version of the
+    /// estimator.
     ///
     /// # Errors
     /// It is of another.
     pub fn of_unit(self, unit: u32) -> Result<Self, TableError> {
-        let table = self.fingerprint;
+        let (table, unit) = (self.fingerprint, fitted_with(unit));
         if table == unit { Ok(self) } else { Err(TableError::Configuration { table, unit }) }
     }
 
@@ -190,7 +200,7 @@ impl ProbabilityTable {
         &self.values
     }
 
-    /// The configuration it was fitted with.
+    /// What it was fitted with, see [`fitted_with`].
     pub fn fingerprint(&self) -> u32 {
         self.fingerprint
     }
@@ -332,9 +342,26 @@ mod tests {
 
     #[test]
     fn a_table_of_another_unit_is_refused() {
-        let refused = table().of_unit(8).unwrap_err();
-        assert_eq!(refused, TableError::Configuration { table: 7, unit: 8 });
-        assert!(table().of_unit(7).is_ok());
+        let table = |fingerprint| ProbabilityTable::new(edges(), values(), fingerprint).unwrap();
+        let [of_7, of_8] = [7, 8].map(fitted_with);
+        assert_eq!(table(of_7).of_unit(8), Err(TableError::Configuration { table: of_7, unit: of_8 }));
+        assert!(table(of_7).of_unit(7).is_ok());
+    }
+
+    #[test]
+    fn a_table_of_another_version_of_the_estimator_is_refused() {
+        let of = |version: u16| {
+            let bytes = [&7_u32.to_le_bytes()[..], &version.to_le_bytes()].concat();
+            ProbabilityTable::new(edges(), values(), bytes::fingerprint(&bytes)).unwrap()
+        };
+        assert!(of(ESTIMATOR_VERSION).of_unit(7).is_ok());
+        for version in [0, ESTIMATOR_VERSION - 1, ESTIMATOR_VERSION + 1] {
+            let refused = of(version).of_unit(7).unwrap_err();
+            assert!(matches!(refused, TableError::Configuration { .. }));
+            assert!(std::format!("{refused}").ends_with("of the estimator"));
+        }
+        // those of before versions, of a configuration alone
+        assert!(ProbabilityTable::new(edges(), values(), 7).unwrap().of_unit(7).is_err());
     }
 
     #[test]

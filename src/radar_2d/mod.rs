@@ -14,6 +14,7 @@ use crate::frame::gate::{Gate, GateConfig, Rejections};
 use crate::frame::health::{Condition, Continuity, FrameStatus, Health, HealthConfig, HealthLimits};
 use crate::frame::reflection::Reflection;
 use crate::frame::scan::Scan;
+use crate::map::query::Footprint;
 use crate::map::{CellState, Visibility, VisibilityMap};
 use crate::radar_2d::cartesian::{CELL_CM, CartesianConfig, CartesianGrid, CartesianParameters, OCCUPIED};
 use crate::radar_2d::sightlines::{Fan, Sightlines};
@@ -148,8 +149,8 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         self.known = false;
     }
 
-    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the
-    /// number of points that are no detections.
+    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the numbers of
+    /// points that are no detections, and of those left out by the sensor's own marks.
     pub fn process<'a>(
         &mut self,
         p: &Radar2dParameters,
@@ -157,15 +158,16 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
         status: impl Into<FrameStatus>,
     ) -> Condition {
-        let FrameStatus { fault, refused } = status.into();
+        let status = status.into();
         let place = |d: &Detection| p.noise.place_flat(d, &p.levelling);
-        let points = self.scan.gather(detections.into_iter(), refused, &p.gate, place);
+        let points = self.scan.gather(detections.into_iter(), status, &p.gate, place);
         self.rejections.add_all(self.scan.rejections());
         let points = self.scan.within_reach(points, |r| p.reaches(r));
-        match self.health.frame(now, &points, fault, &p.health) {
+        match self.health.frame(now, &points, status.fault, &p.health) {
             Continuity::Follows(micros) => self.grid.fade(Step::from_micros(micros), &p.cartesian),
             Continuity::First => {}
             Continuity::Gap | Continuity::ClockStepped => self.grid.clear(),
+            Continuity::Unjudged => return self.expire(p, now),
         }
         for r in self.scan.reflections() {
             self.grid.add(r, &p.noise, &p.levelling, &p.cartesian);
@@ -211,21 +213,46 @@ pub struct Radar2dMap<'a, const NX: usize, const NW: usize, const N: usize> {
     parameters: &'a Radar2dParameters,
 }
 
-impl<const NX: usize, const NW: usize, const N: usize> VisibilityMap for Radar2dMap<'_, NX, NW, N> {
-    fn at(&self, point: RoadPoint) -> CellState {
+impl<const NX: usize, const NW: usize, const N: usize> Radar2dMap<'_, NX, NW, N> {
+    fn looks_at(&self, (x, y): (i32, i32)) -> bool {
         let p = self.parameters;
-        let (x, y) = p.levelling.place(point);
-        if !self.known || !p.view.contains(p.levelling.unlevel([x, y, p.slice_height_cm - p.levelling.height_cm])) {
-            return CellState::UNKNOWN;
-        }
-        let grade = self.sightlines.grade(x, y, &p.fan);
-        let cell = (point.x_cm.div_euclid(CELL_CM), point.y_cm.div_euclid(CELL_CM));
-        let occupancy = self.grid.occupancy(cell.0, cell.1, &p.cartesian).unwrap_or(0);
+        self.known && p.view.contains(p.levelling.unlevel([x, y, p.slice_height_cm - p.levelling.height_cm]))
+    }
+
+    fn state(&self, grade: u8, occupancy: u8) -> CellState {
         CellState {
             visibility: if grade >= self.visible_from { Visibility::Visible } else { Visibility::Invisible },
             grade,
             occupancy,
             occupied: occupancy >= OCCUPIED,
         }
+    }
+}
+
+impl<const NX: usize, const NW: usize, const N: usize> VisibilityMap for Radar2dMap<'_, NX, NW, N> {
+    fn at(&self, point: RoadPoint) -> CellState {
+        let p = self.parameters;
+        let (x, y) = p.levelling.place(point);
+        if !self.looks_at((x, y)) {
+            return CellState::UNKNOWN;
+        }
+        let grade = self.sightlines.grade(x, y, &p.fan);
+        let cell = (point.x_cm.div_euclid(CELL_CM), point.y_cm.div_euclid(CELL_CM));
+        self.state(grade, self.grid.occupancy(cell.0, cell.1, &p.cartesian).unwrap_or(0))
+    }
+
+    /// One state: rays and occupied cells do not share edges. Between corners of parts of half a metre the edge of the
+    /// view is straight to a centimetre or two, by which parts reach over.
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        let p = self.parameters;
+        let (mut inside, mut occupancy) = (true, 0);
+        area.parts(CELL_CM / 2, |part| {
+            inside &= part.corners().iter().all(|corner| self.looks_at(p.levelling.place(*corner)));
+        });
+        area.each_square(RoadPoint::new(0, 0), CELL_CM, |i, j| {
+            occupancy = self.grid.occupancy(i, j, &p.cartesian).unwrap_or(0).max(occupancy);
+        });
+        let grade = self.sightlines.least_grade(area, &p.levelling, &p.fan);
+        visit(if inside { self.state(grade, occupancy) } else { CellState::UNKNOWN });
     }
 }

@@ -11,7 +11,11 @@ use crate::fixed::angle::Angle;
 use crate::fixed::bits::RangeBits;
 use crate::fixed::math;
 use crate::fixed::trig;
+use crate::map::azimuths::Narrow;
+use crate::map::polar::PolarGeometry;
+use crate::map::query::Footprint;
 use crate::sensor::field_of_view::Limits;
+use crate::sensor::mount::Levelling;
 
 /// Grade of a place behind every run.
 const BLOCKED: u8 = 1;
@@ -108,7 +112,31 @@ impl<const N: usize> Sightlines<N> {
     /// Graded visibility of a place, 1 to 255.
     pub fn grade(&self, x_cm: i32, y_cm: i32, fan: &Fan) -> u8 {
         let (here, place) = fan.locate(x_cm, y_cm);
-        let Some(bits) = usize::try_from(place >> 8).ok().and_then(|i| self.rays.get(i)) else { return BLOCKED };
+        usize::try_from(place >> 8).map_or(BLOCKED, |ray| self.grade_on(ray, here))
+    }
+
+    /// The least grade of an area; blocked if a part of it lies on no ray.
+    pub fn least_grade(&self, area: &Footprint, levelling: &Levelling, fan: &Fan) -> u8 {
+        let geometry = PolarGeometry {
+            levelling: *levelling,
+            cell_cm: fan.side_cm,
+            azimuth_origin: fan.origin,
+            azimuth_span: fan.span as u16,
+            narrow: Narrow::NONE,
+        };
+        let mut least = u8::MAX;
+        let complete = geometry.touched(area, RANGES, N, |ray, near, far| {
+            // the scale from bearings to rays is rounded
+            for ray in ray.saturating_sub(1)..=ray + 1 {
+                least = (near..=far).fold(least, |least, here| least.min(self.grade_on(ray, here)));
+            }
+        });
+        if complete { least } else { BLOCKED }
+    }
+
+    /// Graded visibility of a range cell on a ray.
+    fn grade_on(&self, ray: usize, here: usize) -> u8 {
+        let Some(bits) = self.rays.get(ray) else { return BLOCKED };
         let (mut runs, mut behind, mut end) = (0_u32, 0_u32, None::<usize>);
         for r in bits.iter() {
             // cells crossed diagonally leave one bit out

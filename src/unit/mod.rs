@@ -157,8 +157,13 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
         if incomplete {
             self.degrade(measured, Reason::IncompleteScans);
         }
-        self.set_status(progress.condition, measured);
-        self.offer(measured);
+        if progress.continuity == Continuity::Unjudged {
+            // the map is still that of the frame before, and is not sent as of now
+            self.idle(measured);
+        } else {
+            self.set_status(progress.condition, measured);
+            self.offer(measured);
+        }
         event(Event::Ended);
         event(Event::Done(progress));
         progress
@@ -223,7 +228,10 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             (Condition::SectorBlind, _) => (UnitState::Degraded, Reason::SectorBlind),
             (Condition::Misaligned, _) => (UnitState::Degraded, Reason::Misaligned),
             (Condition::Weaker, None) => (UnitState::Degraded, Reason::Weaker),
-            (Condition::Healthy | Condition::Weaker, Some(reason)) => (UnitState::Degraded, reason),
+            (Condition::Settling, None) => (UnitState::Degraded, Reason::Settling),
+            (Condition::Healthy | Condition::Settling | Condition::Weaker, Some(reason)) => {
+                (UnitState::Degraded, reason)
+            }
             (Condition::Healthy, None) => {
                 self.lacking.map_or((UnitState::Ok, Reason::None), |reason| (UnitState::Degraded, reason))
             }
@@ -322,10 +330,15 @@ mod tests {
             rows: &usize,
             measured: Time,
             input: &[Outline],
-            _: FrameStatus,
+            status: FrameStatus,
             map: &mut Squares,
             ended: &mut impl FnMut(),
         ) -> Progress {
+            if status.unwanted > 0 {
+                ended();
+                let condition = self.expire(rows, measured, map);
+                return Progress { continuity: Continuity::Unjudged, condition, used: 0 };
+            }
             for (row, squares) in map.iter_mut().enumerate().take(*rows) {
                 squares.fill(!input.iter().any(|[from, to]| (*from..*to).contains(&row)));
             }
@@ -400,6 +413,24 @@ mod tests {
         fn lost(&self) -> u32 {
             self.0
         }
+    }
+
+    #[test]
+    fn a_map_is_not_sent_as_of_a_frame_that_was_left_out() {
+        let (mut camera, mut map, mut kept) = (Camera::default(), [[true; 4]; 4], Kept::default());
+        let mut unit = Unit::new(&3, &mut camera, &mut map, &mut kept);
+        let mut sent = |ms: u64, unwanted: u16| {
+            let status = FrameStatus { unwanted, ..FrameStatus::default() };
+            let input = &[[1, 2]][..];
+            let frame = Frame { measured: Time::from_micros(ms * 1000), input, incomplete: false, status };
+            unit.frame(&frame, &mut |_| {});
+            let Kept(maps, status) = unit.broadcast();
+            (maps.len(), maps.last().unwrap()[0][0], status.state)
+        };
+        assert_eq!(sent(100, 0), (1, true, UnitState::Ok));
+        assert_eq!(sent(200, 9), (1, true, UnitState::Ok));
+        assert_eq!(sent(700, 9), (2, false, UnitState::Blind), "what is unknown by then is sent");
+        assert_eq!(sent(800, 0), (3, true, UnitState::Ok));
     }
 
     #[test]

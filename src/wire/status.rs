@@ -75,6 +75,8 @@ pub enum Reason {
     Weaker,
     /// The table of probabilities that was given is not used: maps are by grades.
     NoProbabilities,
+    /// Since a start or gap lines of sight were not yet looked along for long enough: what is behind is unknown.
+    Settling,
     /// A number given by the integrator, or by a later version.
     Other(u8),
 }
@@ -98,6 +100,7 @@ impl Reason {
             Self::Misaligned => 12,
             Self::Weaker => 13,
             Self::NoProbabilities => 14,
+            Self::Settling => 15,
             Self::Other(number) => number,
         }
     }
@@ -120,6 +123,7 @@ impl Reason {
             12 => Self::Misaligned,
             13 => Self::Weaker,
             14 => Self::NoProbabilities,
+            15 => Self::Settling,
             other => Self::Other(other),
         }
     }

@@ -7,6 +7,7 @@ use viewshed::bench::start;
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
+use viewshed::grid::settling::SettlingConfig;
 use viewshed::map::polar::PolarMap;
 use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_3d::{FrameReport, Radar3d, Radar3dConfig, Radar3dParameters};
@@ -131,8 +132,9 @@ pub struct Rig {
 }
 
 impl Rig {
+    /// Of a unit that has run for long: what is there is believed from the first frame on.
     pub fn new(sensor: Sensor) -> Self {
-        Self::with(sensor, &Radar3dConfig::default())
+        Self::with(sensor, &Radar3dConfig { settling: SettlingConfig::AT_ONCE, ..Radar3dConfig::default() })
     }
 
     pub fn with(sensor: Sensor, config: &Radar3dConfig) -> Self {

@@ -9,6 +9,8 @@ mod camera_3d;
 mod obstacles;
 mod radar_2d;
 mod radar_3d;
+mod settling;
 mod sizes;
 mod standing;
 mod text_pictures;
+mod version;

@@ -264,11 +264,26 @@ fn rejected_is_not_empty() {
     ];
     for (what, sensor, refused, detections) in cases {
         let mut rig = Rig::new(sensor);
-        let (seen, known) = conditions(&mut rig, FrameStatus { fault: false, refused }, &detections);
+        let (seen, known) = conditions(&mut rig, FrameStatus { refused, ..FrameStatus::default() }, &detections);
         assert_eq!(seen.first(), Some(&Condition::Healthy), "{what}");
         assert_eq!(seen.last(), Some(&Condition::Unusable), "{what}: unknown within 1.5 s");
         assert!(!known, "{what}");
     }
+}
+
+#[test]
+fn what_was_left_out_is_neither_empty_nor_evidence() {
+    let left_out = FrameStatus { unwanted: 40, ..FrameStatus::default() };
+    let mut rig = Rig::new(gantry(6.0, 0.0));
+    let (seen, known) = conditions(&mut rig, left_out, &[]);
+    assert!(!known && seen.iter().all(|c| *c == Condition::Starting), "{seen:?}");
+    assert_eq!(rig.state.rejections().count(Rejection::Unwanted), 23 * 40);
+    rig.drive(&[Vehicle::truck(110.0, 0.0, -20.0)], 30, true);
+    let obstacles = rig.state.obstacles().iter().count();
+    let (seen, known) = conditions(&mut rig, left_out, &[]);
+    assert_eq!((seen[6], seen[7]), (Condition::Healthy, Condition::Stale), "half a second after the last frame");
+    assert!(!known && !seen.contains(&Condition::Blind), "{seen:?}");
+    assert_eq!(rig.state.obstacles().iter().count(), obstacles, "nobody saw that they are gone");
 }
 
 #[test]
@@ -291,9 +306,9 @@ fn weak_clutter_few_detections_and_what_stands_at_the_sensors_feet_stay_visible(
 }
 
 #[test]
-fn a_gap_or_a_step_back_of_the_clock_forgets_the_obstacles() {
+fn a_gap_of_more_than_a_minute_or_a_step_back_of_the_clock_forgets_the_obstacles() {
     let truck = Vehicle::truck(110.0, 0.0, -20.0);
-    for jump in [2_000_000_i64, -5_000_000] {
+    for jump in [61_000_000_i64, -5_000_000] {
         let mut rig = Rig::new(gantry(6.0, 0.0));
         rig.drive(&[truck], 60, true);
         let now = Time::from_micros(rig.now().micros().saturating_add_signed(jump));

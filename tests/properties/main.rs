@@ -12,6 +12,7 @@ mod setup;
 mod traffic;
 
 mod alignment;
+mod areas;
 mod configuration;
 mod detections;
 mod fixtures;
@@ -21,6 +22,7 @@ mod maps;
 mod monitor;
 mod radar_2d;
 mod radar_3d;
+mod shadows;
 mod stages;
 mod supervised;
 

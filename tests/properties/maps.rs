@@ -59,6 +59,10 @@ impl VisibilityMap for Chequered {
             },
         }
     }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        area.each_cell(|cell| visit(self.at(cell)));
+    }
 }
 
 /// No coarse cell says more than any fine cell it shares area with.

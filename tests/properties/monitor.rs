@@ -1,7 +1,10 @@
 //! A sensor is blind where others see what it should: not where a shadow explains it, and not for a single miss.
 
+use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
+use viewshed::fixed::trig;
 use viewshed::fusion::{Monitor, MonitorConfig, Observed};
+use viewshed::map::query::{self, Answer, Footprint};
 use viewshed::map::{CellState, Visibility, VisibilityMap};
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::road::RoadPoint;
@@ -25,6 +28,10 @@ struct Clear;
 impl VisibilityMap for Clear {
     fn at(&self, _: RoadPoint) -> CellState {
         says(Visibility::Visible)
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        visit(self.at(area.centre));
     }
 }
 
@@ -191,4 +198,32 @@ fn what_watches_a_sensor_is_as_small_as_its_page_says() {
     use viewshed::fusion::{Alignment, Fixtures};
     let bytes = [size_of::<Monitor<6>>(), size_of::<Alignment<3>>(), size_of::<Fixtures<64, 6>>()];
     assert_eq!(bytes, [2240, 312, 1600]);
+}
+
+#[test]
+fn no_area_is_seen_that_reaches_into_a_blind_sector() {
+    let mut monitor = monitor(MonitorConfig::default());
+    run(&mut monitor, 0, 1, Visibility::Visible, true);
+    run(&mut monitor, 1000, 9, Visibility::Visible, false).expect("the fourth sector becomes blind");
+    let map = monitor.watched(&Clear);
+    let (mut seen, mut hidden) = (0, 0);
+    for k in 0..4000 {
+        // all around the sensor, some across all sectors
+        let centre = RoadPoint::new(500 + (k % 63 - 31) * 130, -300 + (k / 63 - 31) * 130);
+        let heading = trig::direction(Angle::from_raw((k * 7919) as u16 as i16));
+        let half_length_cm = if k % 5 == 0 { 2000 } else { 230 };
+        let area = Footprint { centre, heading, half_length_cm, half_width_cm: 90 };
+        let answer = query::area(&map, &area);
+        let points = (-200..=200).flat_map(|a| [-1, 0, 1].map(|b| (a * half_length_cm / 200, b * 90)));
+        let worst = points
+            .map(|(a, b)| {
+                let (x, y) = (heading.along(a, -b), heading.across(-a, b));
+                query::point(&map, RoadPoint::new(centre.x_cm + x, centre.y_cm + y))
+            })
+            .min();
+        assert!(Some(answer) <= worst, "{answer:?} and {worst:?} of {area:?}");
+        seen += usize::from(answer == Answer::VisibleFree);
+        hidden += usize::from(worst != Some(Answer::VisibleFree));
+    }
+    assert!(seen + hidden > 3600, "{seen} are seen, {hidden} are not");
 }

@@ -1,8 +1,11 @@
 //! radar-2d: whatever comes in, the map says no more than it may.
 
 use proptest::prelude::*;
+use viewshed::fixed::angle::Angle;
 use viewshed::fixed::time::Time;
+use viewshed::fixed::trig;
 use viewshed::frame::health::Condition;
+use viewshed::map::query::{self, Footprint};
 use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::radar_2d::sightlines::{Fan, Sightlines};
 use viewshed::radar_2d::{Radar2d, Radar2dParameters, Radar2dReading};
@@ -50,6 +53,16 @@ impl Rig {
             prop_assert_eq!(first.occupancy, last.occupancy);
             prop_assert!(condition == Condition::Healthy || last.visibility == Visibility::Unknown);
             prop_assert!((last.visibility == Visibility::Unknown) == (last.grade == 0));
+        }
+        for (k, centre) in self.points().enumerate().filter(|(k, _)| k % 5 == 0) {
+            let heading = trig::direction(Angle::from_raw((k * 7919) as u16 as i16));
+            let area = Footprint { centre, heading, half_length_cm: 230, half_width_cm: 90 };
+            let answer = query::area(&last, &area);
+            for (a, b) in (-4..=4).flat_map(|a| (-4..=4).map(move |b| (a * 57, b * 22))) {
+                let (x, y) = (heading.along(a, -b), heading.across(-a, b));
+                let here = query::point(&last, RoadPoint::new(centre.x_cm + x, centre.y_cm + y));
+                prop_assert!(answer <= here, "{answer:?}, and {here:?} at ({a}, {b}) of {area:?}");
+            }
         }
         Ok(())
     }

@@ -125,6 +125,6 @@ fn what_was_learned_is_forgotten_with_the_map() {
     watched.run(25, Some);
     watched.run(12, left_dark);
     watched.state.forget(&mut watched.map);
-    assert_eq!(watched.run(12, left_dark), Condition::Healthy, "usual from now on");
+    assert_eq!(watched.run(12, left_dark), Condition::Settling, "usual from now on, as after a start");
     assert_eq!(watched.state.standing().unwrap().learned(), None);
 }

@@ -120,6 +120,57 @@ pub fn frames(setup: &Setup, most: usize) -> impl Strategy<Value = Vec<Frame>> +
     })
 }
 
+/// A vehicle that drives about in the field of view: where it is at first, as parts of range and width, and its velocity, m/s.
+#[derive(Debug, Clone, Copy)]
+struct Drive {
+    at: [f64; 2],
+    velocity: [f64; 2],
+}
+
+impl Drive {
+    /// What is detected of it: so many standard deviations off in range, azimuth and speed.
+    fn detection(&self, setup: &Setup, seconds: f64, off: [f64; 3]) -> Detection {
+        let (view, noise) = (&setup.sensor.field_of_view, &setup.sensor.noise);
+        let [right, left] = [view.azimuth_min_deg, view.azimuth_max_deg].map(|a| f64::from(a).to_radians());
+        let (range, azimuth) = (self.at[0] * f64::from(view.range_max_m), right + self.at[1] * (left - right));
+        let [vx, vy] = self.velocity;
+        let (x, y) = (range * azimuth.cos() + vx * seconds, range * azimuth.sin() + vy * seconds);
+        let distance = x.hypot(y);
+        let range = distance + off[0] * f64::from(noise.range_m);
+        let azimuth = y.atan2(x) + off[1] * f64::from(noise.azimuth_deg).to_radians();
+        let radial = (x * vx + y * vy) / distance.max(1.0) + off[2] * f64::from(noise.radial_velocity_mps);
+        Detection {
+            range_cm: (range * 100.0).clamp(1.0, 65_535.0) as u16,
+            azimuth: Angle::from_radians(azimuth as f32),
+            elevation: None,
+            radial_velocity_cm_s: (radial * 100.0) as i16,
+            rcs_half_dbsm: None,
+            snr_half_db: None,
+        }
+    }
+}
+
+/// Frames of vehicles that drive about, each detected twice in each of them, with as much noise as the setup says.
+pub fn drives(setup: &Setup, most: usize) -> impl Strategy<Value = Vec<Frame>> + use<> {
+    let setup = *setup;
+    let speed = || prop_oneof![1 => Just(0.0), 1 => -3.0..3.0_f64, 2 => -30.0..30.0_f64];
+    let drive = ([0.1..1.0_f64, 0.0..1.0_f64], [speed(), speed()]).prop_map(|(at, velocity)| Drive { at, velocity });
+    let off = proptest::collection::vec([-2.0..2.0_f64, -2.0..2.0_f64, -2.0..2.0_f64], 12);
+    let frame = (prop_oneof![6 => 40_000..120_000_u64, 1 => 0..1_000_000_u64], off);
+    let drives = proptest::collection::vec(drive, 1..6);
+    (drives, proptest::collection::vec(frame, 2..most)).prop_map(move |(drives, frames)| {
+        let (mut now, mut seconds) = (1_000_000, 0.0);
+        let frames = frames.into_iter().map(|(micros, off)| {
+            now += micros;
+            seconds += micros as f64 * 1e-6;
+            let twice = drives.iter().chain(&drives).zip(off);
+            let detections = twice.map(|(drive, off)| drive.detection(&setup, seconds, off)).collect();
+            Frame { now: Time::from_micros(now), fault: false, detections }
+        });
+        frames.collect()
+    })
+}
+
 /// As many detections as wanted, of any value within the field of view, from a seed.
 pub fn crowd(setup: &Setup, seed: u64, count: usize) -> Vec<Detection> {
     let mut state = seed | 1;

@@ -3,7 +3,7 @@
 use viewshed::bench::flash::Flash;
 use viewshed::bench::start_stored;
 use viewshed::fixed::time::Time;
-use viewshed::probability::{Edges, ProbabilityTable, TableError};
+use viewshed::probability::{Edges, ProbabilityTable, TableError, fitted_with};
 use viewshed::sensor::place::{LaneList, Place, Points};
 use viewshed::unit::Flow;
 use viewshed::unit::can_service::{Answers, CanService, CanServiceConfig, Tool};
@@ -61,7 +61,7 @@ fn table(fingerprint: u32) -> Vec<u8> {
         azimuths: [-6000, -3000, -1500, 0, 1500, 3000, 6000],
     };
     let values = std::array::from_fn(|_| std::array::from_fn(|_| std::array::from_fn(|g| 100 + 10 * g as u8)));
-    table_block(GRID, &ProbabilityTable::new(edges, values, fingerprint).unwrap(), None).to_vec()
+    table_block(GRID, &ProbabilityTable::new(edges, values, fitted_with(fingerprint)).unwrap(), None).to_vec()
 }
 
 fn stored(flash: &Flash) -> StoredSettings {
@@ -202,7 +202,7 @@ fn a_table_is_of_one_grid_and_one_configuration_and_without_it_the_unit_says_so(
     let mut flash = flash(&[&settings().to_block(0), &place[0], &place[1]]);
     let unit = with_place().fingerprint();
     let error = stored(&flash.clone()).write(&table(settings().fingerprint()), &mut flash).unwrap_err();
-    let other = TableError::Configuration { table: settings().fingerprint(), unit };
+    let other = TableError::Configuration { table: fitted_with(settings().fingerprint()), unit: fitted_with(unit) };
     assert_eq!(error, refused(Kind::Probabilities, BlockError::Table(other)), "that of the flat road without lanes");
     let mut of_another_grid = table(unit);
     of_another_grid[12] = 200;

@@ -6,13 +6,14 @@ use viewshed::bench::record::{RECORD_LEN, Record};
 use viewshed::bench::{Bench, run};
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::Detection;
+use viewshed::frame::health::Condition;
 use viewshed::radar_3d::Radar3dParameters;
 use viewshed::sensor::Sensor;
 use viewshed::unit::Unit;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::serial::MOST_STUFFED;
-use viewshed::wire::status::UnitState;
+use viewshed::wire::status::{Reason, UnitState};
 
 use crate::common::{SmallSender, SmallState, Vehicle, gantry, small_unit};
 
@@ -57,15 +58,18 @@ fn unit(settings: &Settings) -> (Radar3dParameters<50, 40, 8>, SmallSender) {
     small_unit(settings, Medium::Serial, 0, Time::from_micros(0))
 }
 
+/// Long enough for azimuths to settle within a few scans, and for no map to run out between two.
+const PERIOD_US: u64 = 450_000;
+
 fn scans() -> Vec<Vec<Detection>> {
     let car = Vehicle::car(40.0, 2.0, 22.0);
-    (0..8).map(|k| car.at(f64::from(k) / 15.0).detections(&sensor(), true)).collect()
+    (0..8).map(|k| car.at(f64::from(k) * PERIOD_US as f64 * 1e-6).detections(&sensor(), true)).collect()
 }
 
 fn job(dump: Option<u32>, scans: &[Vec<Detection>]) -> Vec<u8> {
     let mut bytes = Job { settings: Settings::of(sensor()), dump }.to_bytes().to_vec();
     for (k, scan) in scans.iter().enumerate() {
-        let time = Time::from_micros(k as u64 * 66_667);
+        let time = Time::from_micros(k as u64 * PERIOD_US);
         let head = ScanHead { time, detections: scan.len() as u16, fault: false, reset: k == 5 };
         bytes.extend(head.to_bytes());
         bytes.extend(scan.iter().flat_map(JobEntry::to_bytes));
@@ -105,10 +109,14 @@ fn every_frame_is_answered_with_the_fingerprint_of_its_map() {
             state.reset();
             map.forget();
         }
-        let now = Time::from_micros(k as u64 * 66_667);
+        let now = Time::from_micros(k as u64 * PERIOD_US);
         let report = state.process(&parameters, now, scan, false, &mut map);
         let _ = sender.scan(now, &map);
-        sender.status_mut().state = UnitState::Ok;
+        let status = sender.status_mut();
+        (status.state, status.reason) = match report.condition {
+            Condition::Settling => (UnitState::Degraded, Reason::Settling),
+            _ => (UnitState::Ok, Reason::None),
+        };
         let mut fingerprint = Fingerprint::of_map(&map);
         while let Some(n) = sender.next_line(now, &mut line) {
             fingerprint.bytes(&line[..n]);
@@ -127,10 +135,10 @@ fn every_frame_is_answered_with_the_fingerprint_of_its_map() {
 
 #[test]
 fn a_map_is_sent_when_asked_for() {
-    let (_, bytes) = answer(job(Some(6), &scans()));
-    let at = 8 * RECORD_LEN;
+    let (_, bytes) = answer(job(Some(4), &scans()));
+    let at = 6 * RECORD_LEN;
     let record = Record::from_bytes(bytes[at..at + RECORD_LEN].try_into().unwrap());
-    assert_eq!(record, Some(Record::Map { frame: 6, cells: [50, 40] }));
+    assert_eq!(record, Some(Record::Map { frame: 4, cells: [50, 40] }));
     let grades = &bytes[at + RECORD_LEN..][..50 * 40];
     assert!(grades.contains(&255) && grades.contains(&0), "clear and unknown cells");
     assert_eq!(bytes.len(), 11 * RECORD_LEN + 2 * 50 * 40);

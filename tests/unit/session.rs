@@ -91,8 +91,9 @@ fn a_radar_that_stops_is_told_by_the_units_own_clock() {
         sent.push((ms, status.state, status.reason, offered / 1000, line.messages > before));
     }
     // held for half a second, then unknown, ten times a second
-    let (ok, silent) = ((UnitState::Ok, Reason::None), (UnitState::Blind, Reason::RadarSilent));
-    let expected = [(400, ok, 0), (500, ok, 0), (501, silent, 501), (550, silent, 501), (601, silent, 601)];
+    // a second after the start
+    let (settling, silent) = ((UnitState::Degraded, Reason::Settling), (UnitState::Blind, Reason::RadarSilent));
+    let expected = [(400, settling, 0), (500, settling, 0), (501, silent, 501), (550, silent, 501), (601, silent, 601)];
     for (sent, (ms, (state, reason), offered)) in sent.iter().zip(expected) {
         assert_eq!((sent.0, sent.1, sent.2, sent.3), (ms, state, reason, offered));
     }

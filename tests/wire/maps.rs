@@ -3,9 +3,12 @@
 use std::collections::VecDeque;
 
 use crate::shadows::{A, Map, R, Shadows, W, header};
+use viewshed::fixed::angle::Angle;
 use viewshed::fixed::bits::Bits;
 use viewshed::fixed::time::Time;
-use viewshed::map::query::{self, Answer};
+use viewshed::fixed::trig;
+use viewshed::map::VisibilityMap;
+use viewshed::map::query::{self, Answer, Footprint};
 use viewshed::sensor::road::RoadPoint;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium, NotSent};
 use viewshed::wire::code::ray::{Known, Ray};
@@ -131,6 +134,25 @@ fn grade_and_occupancy_travel_beside_visibility() {
     // straight ahead, 41 m away
     let answer = query::point(&received, RoadPoint::new(4100, 10));
     assert_eq!(answer, cell.into());
+    areas_are_no_better_than_their_points(&received);
+    areas_are_no_better_than_their_points(&line.receiver.together(now));
+}
+
+fn areas_are_no_better_than_their_points(map: &impl VisibilityMap) {
+    let mut seen = 0;
+    for k in 0..400 {
+        let heading = trig::direction(Angle::from_raw((k * 7919) as u16 as i16));
+        let centre = RoadPoint::new(300 + (k % 20) * 500, (k / 20 - 10) * 300);
+        let area = Footprint { centre, heading, half_length_cm: 230, half_width_cm: 90 };
+        let answer = query::area(map, &area);
+        for (a, b) in (-9..=9).flat_map(|a| (-4..=4).map(move |b| (a * 25, b * 22))) {
+            let (x, y) = (heading.along(a, -b), heading.across(-a, b));
+            let here = query::point(map, RoadPoint::new(centre.x_cm + x, centre.y_cm + y));
+            assert!(answer <= here, "{answer:?}, and {here:?} at ({a}, {b}) of {area:?}");
+        }
+        seen += usize::from(answer >= Answer::VisibleOccupied);
+    }
+    assert!(seen > 20, "{seen}");
 }
 
 #[test]

@@ -6,9 +6,9 @@ use serde::Deserialize;
 use viewshed::board::{Ars408Configuration, Ars408Profile, Identity, SettingsCheck, UnitConfig};
 use viewshed::fusion::FixturesConfig;
 use viewshed::{
-    Addresses, Ars408Config, BroadcastConfig, CanId, ConfigError, EvidenceConfig, FieldOfView, GateConfig,
-    HealthConfig, Medium, Mount, NoiseConfig, ObstacleConfig, Sensor, Settings, TiAngleUnit, TiConfig, TiDialect,
-    TiFamily, VisibilityConfig, reference, small,
+    Addresses, Ars408Config, Ars408Wanted, BroadcastConfig, CanId, ConfigError, EvidenceConfig, FieldOfView,
+    GateConfig, HealthConfig, Medium, Mount, NoiseConfig, ObstacleConfig, Sensor, Settings, TiAngleUnit, TiConfig,
+    TiDialect, TiFamily, VisibilityConfig, reference, small,
 };
 
 use crate::locate;
@@ -144,12 +144,21 @@ pub enum ClockSource {
 #[serde(default, deny_unknown_fields)]
 pub struct Ars408 {
     pub profile: String,
+    pub cluster_states: Option<Vec<u8>>,
     pub configure: Option<Wanted>,
 }
 
 impl Default for Ars408 {
     fn default() -> Self {
-        Self { profile: Ars408Profile::ARS408.name.into(), configure: None }
+        Self { profile: Ars408Profile::ARS408.name.into(), cluster_states: None, configure: None }
+    }
+}
+
+impl Ars408 {
+    /// The entries that are wanted, if the states are some.
+    fn wanted(&self) -> Option<Ars408Wanted> {
+        let usual = Ars408Wanted::default();
+        self.cluster_states.as_ref().map_or(Some(usual), |states| usual.with_clusters(states.iter().copied()))
     }
 }
 
@@ -304,6 +313,9 @@ impl Config {
             if Ars408Profile::named(&ars408.profile).is_none() {
                 let known: Vec<&str> = Ars408Profile::ALL.iter().map(|p| p.name).collect();
                 add("input.ars408.profile", &format!("\"{}\" is none of {}", ars408.profile, known.join(", ")));
+            }
+            if ars408.wanted().is_none() {
+                add("input.ars408.cluster_states", "numbers from 0 to 31, at least one");
             }
         }
         if let Some(ti) = &input.ti {
@@ -510,7 +522,9 @@ impl Input {
     pub fn ars408(&self) -> Ars408Config {
         let name = self.ars408.as_ref().map_or(Ars408Profile::ARS408.name, |a| &a.profile);
         let profile = *Ars408Profile::named(name).unwrap_or(&Ars408Profile::ARS408);
-        Ars408Config { profile, ..Ars408Config::sensor(self.sensor_id) }
+        let usual = Ars408Config::sensor(self.sensor_id);
+        let wanted = self.ars408.as_ref().and_then(Ars408::wanted).unwrap_or(usual.wanted);
+        Ars408Config { profile, wanted, ..usual }
     }
 
     /// What the ARS408 is configured to, if anything.
@@ -566,6 +580,20 @@ mod tests {
              [field_of_view]\nazimuth_min_deg = -60.0\nazimuth_max_deg = 60.0\nelevation_min_deg = -16.0\n\
              elevation_max_deg = 16.0\nrange_min_m = 3.0\nrange_max_m = 200.0\n{tables}"
         ))
+    }
+
+    #[test]
+    fn the_clusters_that_are_wanted_are_those_called_valid_or_those_of_the_file() {
+        let wanted = |tables: &str| with(tables).unwrap().input.ars408().wanted;
+        assert_eq!(wanted(""), Ars408Wanted::MEASURED);
+        assert_eq!(wanted("[input.ars408]\n"), Ars408Wanted::MEASURED);
+        let given = wanted("[input.ars408]\ncluster_states = [0x00, 0x08]\n");
+        assert_eq!(given, Ars408Wanted { invalid_states: 0x101, ..Ars408Wanted::MEASURED });
+        for states in ["[]", "[0, 32]"] {
+            let text = format!("[input.ars408]\ncluster_states = {states}\n");
+            let problems = format!("{:?}", with(&text).unwrap().problems());
+            assert!(problems.contains("input.ars408.cluster_states"), "{problems}");
+        }
     }
 
     #[test]

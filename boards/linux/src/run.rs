@@ -228,7 +228,7 @@ impl Watch {
         let status = unit.broadcast().status_mut();
         let shown = (status.state, status.reason);
         // what one frame does not say the next does: only states are worth a line, and what is wrong for long
-        let lasts = matches!(shown.1, Reason::SectorBlind | Reason::Misaligned | Reason::Weaker);
+        let lasts = matches!(shown.1, Reason::SectorBlind | Reason::Misaligned | Reason::Weaker | Reason::Settling);
         let found = lasts && self.found.replace(shown.1) != Some(shown.1);
         if shown.0 == UnitState::Ok {
             self.found = None;

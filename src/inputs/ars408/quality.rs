@@ -64,8 +64,8 @@ pub fn deviation_mm(index: u32) -> Option<u16> {
 /// Which entries are wanted, by the radar's own marks. Entries without marks always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Wanted {
-    /// Bit `n`: clusters whose invalid state is `n`.
+pub struct Ars408Wanted {
+    /// Bit `n`: clusters whose invalid state is `n`, see [`VALID_CLUSTERS`](Self::VALID_CLUSTERS).
     pub invalid_states: u32,
     /// Bit `n`: clusters whose ambiguity state is `n`.
     pub ambiguities: u8,
@@ -77,17 +77,27 @@ pub struct Wanted {
     pub least_existence: u8,
 }
 
-impl Default for Wanted {
+impl Default for Ars408Wanted {
     fn default() -> Self {
         Self::MEASURED
     }
 }
 
-impl Wanted {
-    /// Valid clusters whose speed is known or that stand still; objects that were measured, not
+impl Ars408Wanted {
+    /// Bit `n`: the radar itself calls clusters of state `n` valid. Besides plain ones (0x00) these are of a small cross section
+    /// (0x04), corrected in azimuth for their elevation (0x08), probably a part of another (0x09), an artefact 50 degrees
+    /// beside one (0x0A) or another (0x0C), no local maximum (0x0B), beyond 95 m in the near scan (0x0F), several targets (0x10), at
+    /// a doubtful angle (0x11). Not among them: cross section too small (0x01), artefact of the near field (0x02), far
+    /// but not confirmed near by (0x03), mirror image (0x06), outside the field of view (0x07), harmonic (0x0E), and what is reserved.
+    ///
+    /// # References
+    /// The vendor's table, as nuScenes' devkit repeats it (`RadarPointCloud.from_file`, `nuscenes/utils/data_classes.py`).
+    pub const VALID_CLUSTERS: u32 = 0x0003_9F11;
+
+    /// Clusters that the radar calls valid, whose speed is known or that stand still; objects that were measured, not
     /// predicted or deleted.
     pub const MEASURED: Self = Self {
-        invalid_states: 1,
+        invalid_states: Self::VALID_CLUSTERS,
         ambiguities: 1 << 3 | 1 << 4,
         most_false_alarm: 7,
         measured: 1 << 1 | 1 << 2 | 1 << 5,
@@ -97,6 +107,12 @@ impl Wanted {
     /// All of them.
     pub const ALL: Self =
         Self { invalid_states: u32::MAX, ambiguities: 0xFF, most_false_alarm: 7, measured: 0xFF, least_existence: 0 };
+
+    /// The same with clusters of these states and no others; `None` without any, and where one is above 31.
+    pub fn with_clusters(self, states: impl IntoIterator<Item = u8>) -> Option<Self> {
+        let bits = states.into_iter().try_fold(0, |bits, state| Some(bits | 1_u32.checked_shl(state.into())?));
+        bits.filter(|bits| *bits != 0).map(|invalid_states| Self { invalid_states, ..self })
+    }
 
     /// Whether a cluster with this quality message is wanted.
     pub const fn cluster(&self, word: u64) -> bool {
@@ -151,20 +167,25 @@ mod tests {
     #[test]
     fn invalid_and_ambiguous_clusters_are_not_wanted_and_standing_ones_are() {
         let wanted = |invalid, ambiguity| {
-            Wanted::default().cluster(cluster::AMBIGUITY.put(cluster::INVALID.put(0, invalid), ambiguity))
+            Ars408Wanted::default().cluster(cluster::AMBIGUITY.put(cluster::INVALID.put(0, invalid), ambiguity))
         };
         assert!(wanted(0, 3) && wanted(0, 4));
         assert!(!wanted(0, 1) && !wanted(1, 3) && !wanted(0x1F, 3));
-        let strict = Wanted { most_false_alarm: 1, ..Wanted::ALL };
+        let valid: std::vec::Vec<u32> = (0..32).filter(|state| wanted(*state, 3)).collect();
+        assert_eq!(valid, [0x00, 0x04, 0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0F, 0x10, 0x11], "the vendor's table");
+        let of =
+            |states: &[u8]| Ars408Wanted::default().with_clusters(states.iter().copied()).map(|w| w.invalid_states);
+        assert_eq!((of(&[0, 31]), of(&[0, 32]), of(&[])), (Some(1 << 31 | 1), None, None));
+        let strict = Ars408Wanted { most_false_alarm: 1, ..Ars408Wanted::ALL };
         assert!(strict.cluster(cluster::FALSE_ALARM.put(0, 1)) && !strict.cluster(cluster::FALSE_ALARM.put(0, 2)));
     }
 
     #[test]
     fn predicted_and_deleted_objects_are_not_wanted() {
         let wanted: std::vec::Vec<u32> =
-            (0..8).filter(|state| Wanted::default().object(object::MEASURED.put(0, *state))).collect();
+            (0..8).filter(|state| Ars408Wanted::default().object(object::MEASURED.put(0, *state))).collect();
         assert_eq!(wanted, [1, 2, 5], "new, measured, new from merge");
-        let sure = Wanted { least_existence: 6, ..Wanted::ALL };
+        let sure = Ars408Wanted { least_existence: 6, ..Ars408Wanted::ALL };
         assert!(sure.object(object::EXISTENCE.put(0, 6)) && !sure.object(object::EXISTENCE.put(0, 5)));
     }
 

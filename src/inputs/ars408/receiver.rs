@@ -3,7 +3,7 @@
 use super::counter::{Advance, MeasurementCounter};
 use super::message::Message;
 use super::profile::{Ars408Profile, CountRule, General};
-use super::quality::{self, Wanted};
+use super::quality::{self, Ars408Wanted};
 use super::state::{RadarState, Version};
 use crate::fixed::time::Time;
 use crate::inputs::collected::{Added, Collected};
@@ -45,7 +45,7 @@ pub struct Ars408Config {
     /// Its kind.
     pub profile: Ars408Profile,
     /// Which entries are wanted, by its own marks.
-    pub wanted: Wanted,
+    pub wanted: Ars408Wanted,
     /// A scan is over when nothing of it has come for so long, whatever is missing; shorter than the
     /// pause between two scans, so that entries whose status message was lost do not fill the gaps of
     /// the scan before.
@@ -55,7 +55,7 @@ pub struct Ars408Config {
 impl Ars408Config {
     /// An ARS408 of a sensor id: entries it measured, scans over after 30 ms of silence.
     pub const fn sensor(sensor: u8) -> Self {
-        Self { sensor, profile: Ars408Profile::ARS408, wanted: Wanted::MEASURED, timeout_us: 30_000 }
+        Self { sensor, profile: Ars408Profile::ARS408, wanted: Ars408Wanted::MEASURED, timeout_us: 30_000 }
     }
 }
 
@@ -170,6 +170,8 @@ struct Gathering {
     arrived: u16,
     /// Of these, entries at no distance.
     refused: u16,
+    /// Of these, entries left out by the sensor's own marks.
+    unwanted: u16,
     qualified: u16,
     entries: Numbers,
     qualities: Numbers,
@@ -311,6 +313,7 @@ impl<const N: usize> Ars408<N> {
             announced,
             arrived: 0,
             refused: 0,
+            unwanted: 0,
             qualified: 0,
             entries: Numbers::default(),
             qualities: Numbers::default(),
@@ -396,6 +399,7 @@ impl<const N: usize> Ars408<N> {
         if let Some(place) = self.collected.place(number, scan.next) {
             scan.next = place + 1;
             if !wanted {
+                scan.unwanted += 1;
                 count(&mut self.counters.unwanted);
                 self.collected.reject(place);
             }
@@ -447,6 +451,7 @@ impl<const N: usize> Ars408<N> {
             detections: self.collected.detections(),
             missing,
             refused: scan.refused,
+            unwanted: scan.unwanted,
             fault: self.fault,
         })
     }

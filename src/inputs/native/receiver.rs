@@ -332,6 +332,7 @@ impl<const N: usize, T: NativeEntry> NativeReceiver<N, T> {
             detections: self.collected.detections(),
             missing,
             refused: scan.refused,
+            unwanted: 0,
             fault: scan.fault,
         }))
     }

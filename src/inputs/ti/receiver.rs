@@ -402,6 +402,7 @@ impl<const N: usize> Ti<N> {
             detections: self.collected.detections(),
             missing: announced.saturating_sub(self.points),
             refused: self.refused,
+            unwanted: 0,
             fault: false,
         })
     }

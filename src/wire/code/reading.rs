@@ -63,6 +63,12 @@ impl Resume {
     /// At the block's start.
     pub const START: Self = Self { azimuth: 0, as_expected: true, still: true, used: 0, value: 0, width: 0 };
 
+    /// Somewhere behind the start.
+    #[cfg(test)]
+    pub fn at(azimuth: u8) -> Self {
+        Self { azimuth, used: 1, ..Self::START }
+    }
+
     fn of(azimuth: usize, before: Before, (used, value, width): (usize, u64, u64)) -> Self {
         let Before { as_expected, still, .. } = before;
         let number = |n: usize| u8::try_from(n).ok();

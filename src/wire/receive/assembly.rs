@@ -2,8 +2,10 @@
 //!
 //! # Model
 //! Words of blocks that are not complete wait in one row, the one that came last at the end. A word that
-//! comes again moves there. The row is full: its first word makes room. With [`ROOM`] words all first
-//! words of a refresh may come before the second ones, or frames be displaced by 50 ms.
+//! comes again moves there, and takes the place of the one before: with another sender of the same number, epoch and
+//! clock it may say something else, and what was read of the one before is no beginning of its block. The row is full:
+//! its first word makes room. With [`ROOM`] words all first words of a refresh may come before the second ones, or
+//! frames be displaced by 50 ms.
 //!
 //! # ReceiverLimits
 //! Eight bytes a word.
@@ -141,6 +143,8 @@ impl Assembly {
         }
         *self.words.get_mut(usize::from(self.count))? = new;
         self.count += 1;
+        // whatever comes, reading goes on there at most once
+        let read = self.read.take();
         if again {
             return None;
         }
@@ -152,12 +156,11 @@ impl Assembly {
             begun.delta |= waiting.0 >> 51 & 1 == 1;
         }
         begun.count = there.trailing_ones() as usize;
-        if let Some((block, reading)) = self.read
+        if let Some((block, reading)) = read
             && block == place
         {
             begun.reading = reading;
         }
-        self.read = None;
         // only then the new one is among them
         (begun.count > index).then_some(begun)
     }
@@ -203,6 +206,26 @@ mod tests {
         assert!(a.take(place(50), 1, false, 1).is_none());
         assert_eq!(a.take(place(0), 0, false, 2).unwrap().words(), [2, 1]);
         assert_eq!(a.take(place(1), 0, false, 2).unwrap().words(), [2], "it made room");
+    }
+
+    #[test]
+    fn a_word_that_comes_again_has_its_block_read_from_the_beginning() {
+        let read = reading::Resume::at(2);
+        for (index, delta, word) in [(0, false, 11), (0, true, 10), (1, false, 21), (0, false, 10)] {
+            let mut a = Assembly::NEW;
+            a.take(place(3), 0, false, 10);
+            a.take(place(3), 1, false, 20);
+            a.read_up_to(place(3), read, false);
+            assert!(a.take(place(3), index, delta, word).is_none(), "nothing is read with it");
+            let begun = a.take(place(3), 2, false, 30).unwrap();
+            assert_eq!(begun.reading, reading::Resume::START, "{index} {delta} {word}");
+            let words = [if index == 0 { word } else { 10 }, if index == 1 { word } else { 20 }, 30];
+            assert_eq!((begun.words(), begun.delta), (&words[..], delta));
+        }
+        let mut a = Assembly::NEW;
+        a.take(place(3), 0, false, 10);
+        a.read_up_to(place(3), read, false);
+        assert_eq!(a.take(place(3), 1, false, 20).unwrap().reading, read, "goes on where it ended");
     }
 
     #[test]

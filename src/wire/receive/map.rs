@@ -5,7 +5,7 @@ use super::sensor::SensorReceiver;
 use crate::fixed::time::Time;
 use crate::map::polar::PolarGeometry;
 use crate::map::query::Footprint;
-use crate::map::{CellState, Visibility, VisibilityMap};
+use crate::map::{CellState, Visibility, VisibilityMap, worst_in};
 use crate::probability::{self, Probability};
 use crate::sensor::road::RoadPoint;
 use crate::wire::code::ray::Ray;
@@ -125,6 +125,18 @@ impl<const A: usize, const W: usize, const P: usize> VisibilityMap for ReceivedM
     fn at(&self, point: RoadPoint) -> CellState {
         self.locate(point).map_or(CellState::UNKNOWN, |(azimuth, range)| self.cell(azimuth, range))
     }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        let complete = self.shown.as_ref().is_some_and(|(_, header, geometry)| {
+            let (ranges, azimuths) = (usize::from(header.ranges), usize::from(header.azimuths));
+            geometry.touched(area, ranges, azimuths, |azimuth, near, far| {
+                (near..=far).for_each(|range| visit(self.cell(azimuth, range)));
+            })
+        });
+        if !complete {
+            visit(CellState::UNKNOWN);
+        }
+    }
 }
 
 /// The maps of all sensors at a moment: visible is what any of them sees.
@@ -139,16 +151,29 @@ impl<'a, const N: usize, const A: usize, const W: usize, const P: usize> Togethe
     }
 }
 
+/// Parts of an area that one sensor has to see as a whole, centimetres.
+const PART_CM: i32 = 100;
+
 impl<const N: usize, const A: usize, const W: usize, const P: usize> VisibilityMap for Together<'_, N, A, W, P> {
     /// The clearest state of all sensors; occupied if any that sees the place says so.
     fn at(&self, point: RoadPoint) -> CellState {
-        self.maps.iter().map(|map| map.at(point)).fold(CellState::UNKNOWN, |a, b| {
-            let (better, worse) = if (b.visibility, b.grade) > (a.visibility, a.grade) { (b, a) } else { (a, b) };
-            if better.visible() && worse.visible() {
-                let occupied = better.occupied || worse.occupied;
-                return CellState { occupancy: better.occupancy.max(worse.occupancy), occupied, ..better };
-            }
-            better
-        })
+        self.maps.iter().map(|map| map.at(point)).fold(CellState::UNKNOWN, better)
     }
+
+    /// Cells of several maps share no edges: of each metre of the area what the best of them says of all of it.
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        area.parts(PART_CM, |part| {
+            visit(self.maps.iter().map(|map| worst_in(map, part)).fold(CellState::UNKNOWN, better));
+        });
+    }
+}
+
+/// What two sensors say of a place.
+fn better(a: CellState, b: CellState) -> CellState {
+    let (better, worse) = if (b.visibility, b.grade) > (a.visibility, a.grade) { (b, a) } else { (a, b) };
+    if better.visible() && worse.visible() {
+        let occupied = better.occupied || worse.occupied;
+        return CellState { occupancy: better.occupancy.max(worse.occupancy), occupied, ..better };
+    }
+    better
 }

@@ -56,16 +56,19 @@ pub enum Class {
     Probabilities,
     /// The same, and some of its azimuths are narrow.
     NarrowAzimuths,
+    /// A second sender of the same number, epoch, header and clock, and of other maps: its words are of the same blocks
+    /// and say something else.
+    SynchronisedSenders,
 }
 
 use Class::{
     ClockJumps, Cuts, DelayPasses, DelayStays, DrainAfterStall, DrainAtStart, Echo, Flips, HeaderFaults, Jitter, Late1,
     LateAndRepeated, Loss1, Loss5, Loss20, Lossless, MadeUpMaps, Mailboxes, MailboxesFull, NarrowAzimuths, Others,
-    Probabilities, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays, TwoSenders,
+    Probabilities, ReceiverRestarts, Reordered, Repeated20, SenderRestarts, Strays, SynchronisedSenders, TwoSenders,
 };
 
 impl Class {
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
         Lossless,
         Loss1,
         Loss5,
@@ -94,6 +97,7 @@ impl Class {
         MadeUpMaps,
         Probabilities,
         NarrowAzimuths,
+        SynchronisedSenders,
     ];
 
     pub fn name(self) -> &'static str {
@@ -126,6 +130,7 @@ impl Class {
             MadeUpMaps => "made-up-maps",
             Probabilities => "probabilities",
             NarrowAzimuths => "narrow-azimuths",
+            SynchronisedSenders => "synchronised-senders",
         }
     }
 
@@ -151,6 +156,8 @@ impl Class {
             SenderRestarts => [77.0, 76.0, 76.0],
             ReceiverRestarts => [84.2, 87.2, 87.0],
             TwoSenders => [65.0, 65.0, 63.0],
+            // maps of one road are much alike
+            SynchronisedSenders => [96.0, 96.5, 97.0],
             // a clock that jumps forward is no other than a delay, which is waited out for 5.12 s
             ClockJumps => [61.5, 60.0, 62.0],
             MailboxesFull => [92.2, 98.0, 98.0],
@@ -172,6 +179,7 @@ impl Class {
             Cuts | HeaderFaults => 30.0,
             ClockJumps | TwoSenders | DelayPasses | DelayStays => 15.0,
             DrainAtStart | DrainAfterStall | SenderRestarts | ReceiverRestarts | Reordered | Loss20 | MadeUpMaps => 6.0,
+            SynchronisedSenders => 3.0,
             _ => 1.0,
         }
     }

@@ -15,6 +15,7 @@ pub mod world;
 use std::path::Path;
 
 use anyhow::Result;
+use viewshed::grid::settling::SettlingConfig;
 use viewshed_harness::bus::traffic::Maps;
 use viewshed_harness::{estimators, recording};
 
@@ -25,7 +26,10 @@ use viewshed_harness::{estimators, recording};
 pub fn maps() -> Result<Maps> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/motorway.mcap");
     let recording = recording::read(&path, &recording::ReadOptions::default())?;
-    let mut maps = Maps::new(&recording, &estimators::Options::default(), None, &|| ())?;
+    // as of a unit that has been on for long
+    let mut options = estimators::Options::default();
+    options.radar_3d.settling = SettlingConfig::AT_ONCE;
+    let mut maps = Maps::new(&recording, &options, None, &|| ())?;
     maps.scans.drain(..15);
     Ok(maps)
 }

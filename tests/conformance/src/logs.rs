@@ -18,7 +18,7 @@ use crate::world::{Looks, World};
 pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/logs");
 
 /// Most bytes of all of them together.
-pub const MOST_BYTES: u64 = 4_000_000;
+pub const MOST_BYTES: u64 = 4_200_000;
 
 /// One log.
 #[derive(Debug, Clone, PartialEq, Eq)]

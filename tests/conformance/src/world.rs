@@ -43,7 +43,8 @@ pub struct World {
     pub inputs: Vec<(u64, Input)>,
     /// From these moments on a map is to be shown again: a queue is drained and a header has come since.
     pub drained: Vec<u64>,
-    /// After this moment a delay has stayed for so long that it is taken for none.
+    /// After this moment what is shown may be wrong: a delay has stayed for so long that it is taken for none, or two
+    /// senders speak as one.
     pub strict_to: u64,
 }
 
@@ -100,13 +101,18 @@ impl World {
         }
         sent.sort_by_key(|one| one.at);
         let [sender, ..] = plans[..] else { bail!("nobody sends") };
+        // whose words are whose no receiver can see
+        let strict_to = match plans[..] {
+            [_, second] if class == Class::SynchronisedSenders => second.from,
+            _ => u64::MAX,
+        };
         let mut faults = Faults {
             random,
             bus,
             sender,
             header: maps.header,
             end,
-            strict_to: u64::MAX,
+            strict_to,
             drained: Vec::new(),
             jumps: Vec::new(),
             starts: vec![START],
@@ -223,15 +229,24 @@ fn plans(class: Class, random: &mut Random, end: u64) -> Vec<Plan> {
         let epoch = Epoch::new(plan.epoch.number() + 1 + random.below(15) as u8);
         all.push(Plan { from, to, epoch, ahead: random.below(100 * S), first_map: plan.first_map + 200, ..plan });
     }
+    if class == Class::SynchronisedSenders {
+        // whole scans after the first, so that its scans have the same numbers
+        let from = START + SCAN_US * (random.between(3 * S, 6 * S) / SCAN_US);
+        let to = (from + random.between(4 * S, 8 * S)).min(end);
+        all.push(Plan { from, to, first_map: plan.first_map + 200, ..plan });
+    }
     all
 }
 
 impl Faults {
     fn apply(&mut self, class: Class, sent: Vec<Sent>) -> Vec<Sent> {
         match class {
-            Class::Lossless | Class::SenderRestarts | Class::TwoSenders | Class::Mailboxes | Class::MailboxesFull => {
-                sent
-            }
+            Class::Lossless
+            | Class::SenderRestarts
+            | Class::TwoSenders
+            | Class::SynchronisedSenders
+            | Class::Mailboxes
+            | Class::MailboxesFull => sent,
             Class::MadeUpMaps => self.add(sent, S, 3 * S, Maker::edges_of_nothing),
             Class::Loss1 => self.lose(sent, 10),
             Class::Loss5 | Class::Probabilities | Class::NarrowAzimuths => self.lose(sent, 50),

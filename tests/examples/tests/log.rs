@@ -1,5 +1,8 @@
 //! The example on the shipped log of an ARS408's bus.
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use viewshed::{CanFrame, CanId, FieldOfView, Mount, NoiseConfig, RoadPoint, Sensor, Time};
 use viewshed_example::Guard;
 
@@ -16,9 +19,14 @@ fn frame(line: &str) -> Option<(Time, CanFrame)> {
     Some((Time::from_micros(micros), CanFrame::classic(id, &bytes.ok()?)?))
 }
 
-#[test]
-fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
-    let sensor = Sensor {
+/// The log three times over: it lasts two seconds.
+fn log() -> impl Iterator<Item = (Time, CanFrame)> {
+    let later = |time: Time, round: u64| Time::from_micros(time.micros() + round * 2_000_000);
+    (0..3).flat_map(move |round| LOG.lines().filter_map(frame).map(move |(time, frame)| (later(time, round), frame)))
+}
+
+fn sensor() -> Sensor {
+    Sensor {
         mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 5.0, yaw_deg: 0.0, pitch_deg: 2.0, roll_deg: 0.0 },
         field_of_view: FieldOfView {
             azimuth_min_deg: -45.0,
@@ -29,18 +37,56 @@ fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
             range_max_m: 100.0,
         },
         noise: NoiseConfig::default(),
-    };
-    let mut guard = Guard::new(&sensor).unwrap();
+    }
+}
+
+/// On a controller without threads, a cell that is taken once.
+fn place() -> &'static Mutex<Guard> {
+    static GUARDS: [Mutex<Guard>; 2] = [const { Mutex::new(Guard::NOWHERE) }; 2];
+    static TAKEN: AtomicUsize = AtomicUsize::new(0);
+    &GUARDS[TAKEN.fetch_add(1, Ordering::Relaxed)]
+}
+
+#[test]
+fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
+    let mut guard = place().lock().unwrap();
     let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
     let behind = RoadPoint::from_metres(-20.0, 0.0).unwrap();
+    assert!(!guard.is_free(near, Time::from_micros(0)).unwrap(), "not begun");
+    guard.start(&sensor()).unwrap();
     let (mut now, mut frames, mut free) = (Time::from_micros(0), 0, 0);
-    for (time, frame) in LOG.lines().filter_map(frame) {
+    for (time, frame) in log() {
         guard.take(&frame, time);
         (now, frames) = (time, frames + 1);
         free += u32::from(guard.is_free(near, time).unwrap());
         assert!(!guard.is_free(behind, time).unwrap(), "nobody looks there");
     }
-    assert!(frames > 1700 && free > 1000, "{free} of {frames}");
+    // two seconds after the start the road ahead has settled
+    assert!(frames > 5000 && free > 2000, "{free} of {frames}");
     let later = Time::from_micros(now.micros() + 600_000);
     assert!(!guard.is_free(near, later).unwrap(), "silence is no free road");
+}
+
+#[test]
+fn nothing_is_free_while_parts_of_the_last_scan_are_missing() {
+    let mut guard = place().lock().unwrap();
+    guard.start(&sensor()).unwrap();
+    let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
+    let (mut scans, mut free) = (0, 0);
+    let is = |frame: &CanFrame, id: u16| Some(frame.id) == CanId::standard(id);
+    // of every second scan the third entry never comes
+    for (time, frame) in log() {
+        scans += usize::from(is(&frame, 0x600));
+        if is(&frame, 0x701) && frame.data().first() == Some(&2) && scans % 2 == 0 {
+            continue;
+        }
+        guard.take(&frame, time);
+        // a scan is over when the next one begins
+        if is(&frame, 0x600) && scans > 40 {
+            let is_free = guard.is_free(near, time).unwrap();
+            assert!(!(is_free && scans % 2 == 1), "scan {scans} is free by one with a hole");
+            free += usize::from(is_free);
+        }
+    }
+    assert!(free > 5, "{free} of {scans}");
 }

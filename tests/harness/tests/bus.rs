@@ -23,7 +23,13 @@ fn sent(name: &str, more: &[&str]) -> (Value, PathBuf) {
     let (report, log) = (scratch(&format!("{name}.json")), scratch(&format!("{name}.log")));
     let to = if cfg!(debug_assertions) { "8" } else { "30" };
     let paths = [report.to_str().expect("UTF-8"), log.to_str().expect("UTF-8")];
-    let arguments = [&["bus", recording, "--to", to, "--json", paths[0], "--log", paths[1], "--force"], more].concat();
+    // as a unit sends that has been on for long: what a start costs has a test of its own
+    let settled = scratch(&format!("{name}-settled.toml"));
+    std::fs::write(&settled, "[estimators.radar_3d.settling]\nnear_s = 0.0\nfar_s = 0.0\nstanding_s = 0.0\n")
+        .expect("written");
+    let settled = settled.to_str().expect("UTF-8");
+    let options = ["--to", to, "--json", paths[0], "--log", paths[1], "--config", settled, "--force"];
+    let arguments = [&["bus", recording][..], &options, more].concat();
     let output = viewshed(&arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     (json(&report), log)
@@ -64,6 +70,21 @@ fn maps_fit_their_buses_and_arrive() {
         }
     }
     listens(&log, report["scans"].as_u64().expect("scans"));
+}
+
+#[test]
+fn a_start_costs_more_of_a_bus_and_shows_nothing_that_the_sender_does_not() {
+    let report = scratch("bus-start.json");
+    let recording = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/motorway.mcap");
+    let output = viewshed(&["bus", recording, "--to", "12", "--json", report.to_str().expect("UTF-8"), "--force"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report = json(&report);
+    for (bus, most) in report["buses"].as_array().expect("buses").iter().zip([0.22, 0.11, 0.05, 0.3]) {
+        assert!(number(bus, "load_median") <= most, "{bus}");
+    }
+    for received in report["received"].as_array().expect("received") {
+        assert_eq!(number(received, "wrongly_visible"), 0.0, "{received}");
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use viewshed::fixed::angle::Angle;
 use viewshed::frame::detection::Detection;
 use viewshed::inputs::ars408::profile::Ars408Profile;
-use viewshed::inputs::ars408::quality::Wanted;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Outcome};
 
 use super::{at, frame, radar};
@@ -128,7 +128,8 @@ fn the_radars_own_marks_sort_out() {
     }
     let Ars408Outcome::Scan(scan) = radar.push(&frame(&quality(4, 0x0B)), at(71)) else { panic!() };
     assert_eq!(scan.detections.len(), 2, "the ambiguous and the invalid one are gone");
+    assert_eq!((scan.unwanted, scan.missing, scan.refused), (2, 0, 0), "they arrived");
     assert_eq!((radar.counters().unwanted, radar.counters().incomplete), (2, 0));
-    let all = Ars408Config { wanted: Wanted::ALL, ..Ars408Config::sensor(0) };
-    assert_eq!(Ars408::<64>::new(all).config().wanted, Wanted::ALL);
+    let all = Ars408Config { wanted: Ars408Wanted::ALL, ..Ars408Config::sensor(0) };
+    assert_eq!(Ars408::<64>::new(all).config().wanted, Ars408Wanted::ALL);
 }

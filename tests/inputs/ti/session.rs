@@ -19,14 +19,16 @@ use super::frames::Frame;
 #[test]
 fn frames_of_nothing_but_nan_are_blindness_with_a_reason_and_end_with_the_first_good_point() {
     let good = [1.0, 30.0, -5.0, -12.0];
-    let shown = |points: &[[f32; 4]]| run(|_| points.to_vec(), 32);
+    let shown = |points: &[[f32; 4]]| run(|_| points.to_vec(), 64);
     assert_eq!(shown(&[[f32::NAN; 4]; 9]), (UnitState::Blind, Reason::UnusablePoints, 0));
     assert_eq!(shown(&[]).0, UnitState::Ok);
     // a point to the right of the field of view, x and y taken for one another
     assert_eq!(shown(&[[30.0, 1.0, -5.0, 0.0]]), (UnitState::Blind, Reason::UnusablePoints, 0));
     assert_eq!(shown(&[[f32::NAN; 4], good]).0, UnitState::Ok);
     assert!(shown(&[[f32::NAN; 4], good]).2 > 1000);
-    assert_eq!(run(|k| vec![if k < 30 { [f32::NAN; 4] } else { good }], 32).0, UnitState::Ok);
+    let mended = run(|k| vec![if k < 30 { [f32::NAN; 4] } else { good }], 32);
+    assert_eq!((mended.0, mended.1), (UnitState::Degraded, Reason::Settling), "a map again, of what is near");
+    assert_eq!(run(|k| vec![if k < 30 { [f32::NAN; 4] } else { good }], 64).0, UnitState::Ok);
 }
 
 type Small = Radar3d<50, 40, 8, 2, 16, 64>;
@@ -78,7 +80,7 @@ fn settings() -> Settings {
 fn every_frame_becomes_a_map_and_silence_is_reported() {
     with_unit(|unit, radar| {
         let mut now = Time::from_micros(0);
-        for k in 0..30_u32 {
+        for k in 0..60_u32 {
             now = Time::from_micros(500_000 + 50_000 * u64::from(k));
             // frame 7 never comes
             let frame = Frame::new(TiFamily::Bytes40, if k < 7 { k } else { k + 1 });
@@ -91,11 +93,11 @@ fn every_frame_becomes_a_map_and_silence_is_reported() {
             assert_eq!(unit.next_line(now, &mut [0; 242]), None, "a sender for CAN gives no lines");
             assert!(std::iter::from_fn(|| unit.next_frame(now)).count() > 0);
         }
-        assert_eq!(radar.counters().scans, 30);
+        assert_eq!(radar.counters().scans, 60);
         let status = *unit.broadcast().status_mut();
         assert_eq!((status.state, status.radar_lost), (UnitState::Ok, 1));
         // two points of three: reported as long as it is recent, not until the next look
-        let mut frame = Frame::new(TiFamily::Bytes40, 31);
+        let mut frame = Frame::new(TiFamily::Bytes40, 61);
         frame.points = 1;
         now = Time::from_micros(now.micros() + 50_000);
         unit.take(radar, &frame.cartesian(&[[1.0, 30.0, -5.0, -12.0], [2.0, 40.0, -5.0, -12.0]]).bytes(), now);

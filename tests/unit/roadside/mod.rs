@@ -347,7 +347,7 @@ fn a_radar_that_stops_ends_the_map_and_the_status_goes_on() {
         assert!(times.len() >= 4 && times.windows(2).all(|w| w[1] - w[0] <= 500), "{times:?}");
     }
     world.radar = Some(500);
-    world.run(1000);
+    world.run(3000);
     assert!(world.visible().iter().all(|cells| *cells > 1000), "and it comes back");
 }
 

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use comfy_table::{Cell, CellAlignment, Table, presets};
 use serde::Serialize;
 use viewshed::bench::stage::Stage;
 use viewshed::map::{CellState, Visibility};
@@ -12,7 +11,9 @@ use super::Run;
 use super::check::{Checked, Difference};
 use super::image::Image;
 use crate::results::files::Folder;
+use crate::results::pictures::cells::Carries;
 use crate::results::pictures::polar::{self, PolarGrid};
+use crate::results::report::table::{Extent, tables};
 
 /// Median and worst of a number of instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -86,25 +87,20 @@ impl Row {
 /// Headings of the memory an image takes, bytes.
 const MEMORY: [&str; 3] = ["flash", "RAM", "stack\nused"];
 
-/// All runs as one table.
-pub fn table(rows: &[Row]) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_FULL_CONDENSED);
-    let stages = Stage::ALL.map(|s| s.name().to_owned());
+/// All runs as one table, or as several of the width of a terminal below each other.
+pub fn table(rows: &[Row], extent: Extent) -> String {
     let fixed = ["recording", "board", "profile", "equal frames", "1000 instructions\nmedian / worst"];
-    let heading = fixed.map(str::to_owned).into_iter().chain(stages).chain(MEMORY.map(str::to_owned));
-    table.set_header(heading.collect::<Vec<_>>());
-    for row in rows {
-        let words = [row.recording.clone(), row.board.into(), row.profile.into()].map(Cell::new);
-        let numbers = [format!("{} / {}", row.equal, row.frames), Cost::text(row.instructions)]
-            .into_iter()
-            .chain(row.stages.iter().map(|(_, cost)| Cost::text(*cost)))
-            .chain([row.flash_bytes.to_string(), row.ram_bytes.to_string()])
-            .chain([if row.stack_bytes > 0 { row.stack_used_bytes.to_string() } else { "–".into() }]);
-        let numbers = numbers.map(|n| Cell::new(n).set_alignment(CellAlignment::Right));
-        table.add_row(words.into_iter().chain(numbers).collect::<Vec<_>>());
-    }
-    format!("{table}\n")
+    let heading = fixed.into_iter().chain(Stage::ALL.map(Stage::name)).chain(MEMORY);
+    let cells = |row: &Row| -> Vec<String> {
+        let words = [row.recording.clone(), row.board.into(), row.profile.into()];
+        let stack = if row.stack_bytes > 0 { row.stack_used_bytes.to_string() } else { "–".into() };
+        let numbers = [format!("{} / {}", row.equal, row.frames), Cost::text(row.instructions)];
+        let stages = row.stages.iter().map(|(_, cost)| Cost::text(*cost));
+        let memory = [row.flash_bytes.to_string(), row.ram_bytes.to_string(), stack];
+        words.into_iter().chain(numbers).chain(stages).chain(memory).collect()
+    };
+    let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+    tables(&heading.collect::<Vec<_>>(), &rows, 3, extent) + "\n"
 }
 
 impl Difference {
@@ -164,6 +160,7 @@ impl Difference {
                 narrow: self.narrow,
                 range_m: [0.0, self.cell_m * self.ranges as f64],
                 state: &|row, column| of(row * self.ranges + column),
+                carries: Carries::ALL,
                 title: format!("{title}, frame {}: {name}", self.frame),
                 caption: Some(self.text()),
             };
@@ -204,6 +201,31 @@ mod tests {
         let bytes = |k: usize| std::fs::read(&files[k]).unwrap();
         assert!(bytes(0) != bytes(1) && bytes(1) != bytes(2));
         std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn the_table_fits_a_terminal_unless_it_is_asked_for_wide() {
+        let cost = Some(Cost { median: 123_400, worst: 2_345_600 });
+        let row = Row {
+            recording: "roadside".into(),
+            board: "nucleo-h743zi",
+            profile: "reference",
+            frames: 896,
+            equal: 896,
+            first_difference: None,
+            instructions: cost,
+            stages: Stage::ALL.iter().map(|s| (s.name(), cost)).collect(),
+            state_bytes: 0,
+            parameter_bytes: 0,
+            map_bytes: 0,
+            stack_used_bytes: 1000,
+            stack_bytes: 9000,
+            flash_bytes: 123_456,
+            ram_bytes: 345_678,
+        };
+        let widest = |extent| table(&[row.clone()], extent).lines().map(|line| line.chars().count()).max();
+        assert!(widest(Extent::Terminal).unwrap() <= 80, "{}", table(&[row.clone()], Extent::Terminal));
+        assert!(widest(Extent::Wide).unwrap() > 200);
     }
 
     #[test]

@@ -77,6 +77,9 @@ pub struct Mounted {
     pub narrow: Option<[u8; 3]>,
     pub ranges: u16,
     pub cell_m: f64,
+    /// Whether cells say how sure they are, and whether something stands there.
+    pub grades: bool,
+    pub occupancy: bool,
     pub fingerprint: u32,
     /// Of a sender with a table of probabilities.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -242,6 +245,8 @@ impl Listening {
                 narrow: Some(h.narrow.to_bytes()).filter(|narrow| *narrow != EVEN),
                 ranges: h.ranges,
                 cell_m: f64::from(h.cell_cm) / 100.0,
+                grades: self.map(number).has(Plane::Grade) && h.probability.is_none(),
+                occupancy: self.map(number).has(Plane::Occupancy),
                 fingerprint: h.fingerprint,
                 probability: h.probability.map(|levels| {
                     let bits = [(false, false), (true, false), (true, true)];
@@ -291,7 +296,11 @@ impl Listening {
 
 /// A cell as pictures show it: occupied only where that is sent.
 pub fn shown(map: &Map<'_>, azimuth: usize, range: usize) -> CellState {
-    let cell = map.cell(azimuth, range);
+    as_sent(map, map.cell(azimuth, range))
+}
+
+/// A cell of a map, occupied only where that is sent.
+pub fn as_sent(map: &Map<'_>, cell: CellState) -> CellState {
     let occupied = cell.occupied && map.has(Plane::Occupancy) && cell.visibility != Visibility::Unknown;
     CellState { occupied, ..cell }
 }

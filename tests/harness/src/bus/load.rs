@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::traffic::Traffic;
+use super::traffic::{LEAP_US, Traffic};
 
 /// Shares of a bus, 0 to 1.
 #[derive(Debug, Clone, Serialize)]
@@ -28,7 +28,9 @@ impl Load {
             traffic.sent.iter().map(|s| (s.at.micros(), s.duration_s)).filter(|(at, _)| *at >= begin).collect();
         let counted = traffic.sent.iter().filter(|s| s.at.micros() >= begin);
         let (frames, bytes) = counted.fold((0, 0), |(n, b), s| (n + 1, b + s.bytes.len()));
-        let mut windows = windows(&sent);
+        // a leap of the clock is no time in which the bus was free
+        let parts = sent.chunk_by(|a, b| b.0.checked_sub(a.0).is_some_and(|pause| pause <= LEAP_US));
+        let mut windows: Vec<f64> = parts.flat_map(windows).collect();
         windows.sort_by(f64::total_cmp);
         let per_scan = |n: usize| n as f64 / traffic.scans.max(1) as f64;
         Self {
@@ -95,7 +97,9 @@ mod tests {
         let mut sent: Vec<(u64, f64)> = (0..100).map(|k| (k * 100_000, 0.001)).collect();
         sent.extend((0..900).map(|k| (5_000_000 + k * 1000, 0.001)));
         sent.sort_by_key(|s| s.0);
-        let mut windows = windows(&sent);
+        // a leap of the clock is no time in which the bus was free
+        let parts = sent.chunk_by(|a, b| b.0.checked_sub(a.0).is_some_and(|pause| pause <= LEAP_US));
+        let mut windows: Vec<f64> = parts.flat_map(windows).collect();
         windows.sort_by(f64::total_cmp);
         assert!((windows[windows.len() / 2] - 0.01).abs() < 1e-9, "the median is of the quiet seconds");
     }

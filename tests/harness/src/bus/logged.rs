@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
-use crate::recording::can_log::{self, FORMATS, Format, Line};
-use crate::recording::file::{self, Content};
-use crate::recording::foreign;
+use crate::recording::can_log::log::Lines;
+use crate::recording::can_log::{self, FORMATS, Line};
+use crate::recording::file::{self, Source};
 use crate::recording::problems::Problems;
 use crate::recording::serial_log::Chunk;
+use crate::recording::{foreign, text};
 
 /// A line of a log.
 pub enum Logged {
@@ -37,27 +38,31 @@ impl Log {
 /// # Errors
 /// A file that cannot be read, and one that is no log; says what it is.
 pub fn read(path: &Path, interface: Option<&str>) -> Result<Log> {
-    let Content { bytes, damage } = file::read(path)?;
-    if let Some(format) = Format::of(&bytes) {
-        let mut problems = Problems::default();
-        let lines = can_log::read(&bytes, format, interface, &mut problems)?;
-        let lines = lines.into_iter().map(Logged::Frame).collect();
-        return Ok(Log::new(lines, problems.count("line skipped"), damage));
+    let source = Source::of(path)?;
+    if source.begin(1)?.is_empty() {
+        bail!("{} is empty", file::shown(path));
     }
-    let text = String::from_utf8_lossy(&bytes);
-    let lines = text.lines().filter(|line| !line.trim().is_empty());
+    if let Some(found) = can_log::log::find(&source)? {
+        let mut problems = Problems::default();
+        let log = found.read(interface, &mut problems, &mut |_| false)?;
+        let mut lines = Vec::new();
+        log.each(&mut |line| lines.push(Logged::Frame(line.clone())));
+        return Ok(Log::new(lines, problems.count("line skipped"), log.damage().map(str::to_owned)));
+    }
     let (mut chunks, mut unread) = (Vec::new(), 0);
-    for line in lines {
+    let mut text = text::Lines::new(source.open()?);
+    while let Some(line) = text.next().with_context(|| format!("cannot read {}", source.shown()))? {
         match Chunk::parse(line) {
             Ok(chunk) => chunks.push(Logged::Chunk(chunk)),
             Err(_) => unread += 1,
         }
     }
     if chunks.is_empty() {
-        let why = foreign::named(&bytes).unwrap_or_else(|| format!("it is no log of {FORMATS}, nor of a serial line"));
+        let known = foreign::named(&source.read()?.bytes);
+        let why = known.unwrap_or_else(|| format!("it is no log of {FORMATS}, nor of a serial line"));
         bail!("{} cannot be read: {why}", file::shown(path));
     }
-    Ok(Log::new(chunks, unread, damage))
+    Ok(Log::new(chunks, unread, text.source().damage().map(str::to_owned)))
 }
 
 impl Logged {

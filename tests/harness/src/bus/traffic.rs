@@ -107,6 +107,12 @@ impl Maps {
         let header = Header { probability: quantiser.map(Quantiser::levels), ..header };
         Ok(Self { estimator: estimators::unit_row(&config, options), header, scans, holes })
     }
+
+    /// The time from the first map to the last, without that which leaps skip, seconds.
+    pub fn lasts_s(&self) -> f64 {
+        let passed = |pair: &[Scan]| pair[1].measured.since(pair[0].measured).filter(|us| *us <= LEAP_US).unwrap_or(0);
+        self.scans.windows(2).map(passed).sum::<u64>() as f64 / 1e6
+    }
 }
 
 fn holes_of(map: &PolarMap<{ radar_3d::RANGES }, A>, rays: &[Ray<W>]) -> u64 {
@@ -160,6 +166,10 @@ impl Planes<W> for Scan {
 /// How often the sender is asked, microseconds.
 const POLL_US: u64 = 250;
 
+/// A pause longer than this, a clock that leaps among them, is a new start: what a unit would send meanwhile is not counted,
+/// so that time and memory follow the number of scans. Microseconds.
+pub const LEAP_US: u64 = 5_000_000;
+
 impl Traffic {
     /// Sends maps over a bus, with a key authenticated.
     ///
@@ -183,7 +193,8 @@ impl Traffic {
                 scans += 1;
                 offered += u64::from(sender.pending());
             }
-            let end = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_667, |next| next.measured.micros());
+            let next = maps.scans.get(k + 1).map_or(scan.measured.micros() + 66_667, |next| next.measured.micros());
+            let end = next.min(scan.measured.micros().saturating_add(LEAP_US));
             let mut now = scan.measured.max(free);
             while now.micros() < end {
                 if let Some(one) = Sent::next(&mut sender, sealer.as_mut(), &bus, now, k + 1) {
@@ -249,6 +260,27 @@ mod tests {
         assert_eq!(azimuths, scans * A as u64);
         let (scans, azimuths) = offered(Header { probability: Levels::from_bytes([61, 178, 242, 0, 1]), ..plain });
         assert_eq!(azimuths, scans * (A + A / 2) as u64);
+    }
+
+    #[test]
+    fn a_leap_of_the_clock_is_a_new_start() {
+        let header = Maps::new(&recording(3, 1), &Options::default(), None, &|| ()).unwrap().header;
+        // 30 scans in 1970, 30 some decades later, 30 with a clock that was set back
+        let starts = [0, 1_700_000_000_000_000, 1_600_000_000_000_000];
+        let scan = |begin: u64, k: u64| Scan {
+            measured: Time::from_micros(begin + 500_000 + k * 66_667),
+            rays: vec![Ray::clear(Known::new(3, 100)); A],
+            probable: Vec::new(),
+        };
+        let scans = starts.into_iter().flat_map(|begin| (0..30).map(move |k| scan(begin, k))).collect();
+        let maps = Maps { estimator: String::new(), header, scans, holes: 0 };
+        let traffic = Traffic::new(&maps, BUSES[0], None, 0, None).unwrap();
+        assert!((60..90).contains(&traffic.scans), "{}", traffic.scans);
+        let seconds: std::collections::BTreeSet<u64> = traffic.sent.iter().map(|s| s.at.micros() / 1_000_000).collect();
+        assert!(seconds.len() < 3 * 8, "nothing is sent in between: {seconds:?}");
+        let load = crate::bus::load::Load::new(&traffic);
+        assert!(load.load_median > 0.0 && load.load_worst < 1.0, "{load:?}");
+        assert!((maps.lasts_s() - 3.0 * 29.0 / 15.0).abs() < 0.1, "{}", maps.lasts_s());
     }
 
     #[test]

@@ -94,6 +94,7 @@ const LEAST_S: f64 = 1.8;
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.maps.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    settings.reading.check_for(paths.len())?;
     if args.log.is_some() && paths.len() > 1 {
         bail!("--log writes one recording and {} are to be sent; name one", paths.len());
     }
@@ -138,9 +139,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 fn send(name: &str, maps: &Maps, args: &Args, key: Option<&Key>, log: Option<&Target>) -> Result<Report> {
-    let (first, last) = (maps.scans.first(), maps.scans.last());
-    let span = first.zip(last).and_then(|(first, last)| last.measured.since(first.measured)).unwrap_or(0);
-    let span_s = span as f64 / 1e6;
+    let span_s = maps.lasts_s();
     ensure!(
         span_s >= LEAST_S,
         "{name}: {span_s:.2} s of maps are too few to say what they cost: a load is of a whole second, and a receiver takes one and a half to settle; {LEAST_S} s are needed"

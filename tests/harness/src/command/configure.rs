@@ -17,6 +17,7 @@ use crate::configure::grids::GRIDS;
 use crate::configure::kept::{self, Blocks, KINDS, Kept};
 use crate::configure::link::Link;
 use crate::configure::{Found, Stored, Wanted, find, name};
+use crate::geometry::looks;
 use crate::results::files::OutputArgs;
 
 /// Write the configuration of a unit on a controller, over its serial port or its CAN bus
@@ -89,7 +90,7 @@ Examples:
   viewshed configure unit.toml --can can0 --chip 1A2B3C4D       one of two new units on a bus
   viewshed configure --port /dev/ttyACM0 --timing               how long frames take on it, in cycles and microseconds
 
-Exit codes: 0 done; 1 --check found differences; 2 nothing was changed, and why.";
+Exit codes: 0 done; 1 --check found differences or something doubtful; 2 nothing was changed, and why.";
 
 fn chip(text: &str) -> Result<u32, String> {
     u32::from_str_radix(text.trim_start_matches("0x"), 16).map_err(|_| "not eight hexadecimal digits".into())
@@ -124,6 +125,9 @@ fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
     let file = args.file.as_deref().map(file::read).transpose()?;
     if let Some(file) = &file {
         left_out(file)?;
+        let doubts = looks::doubts(&file.settings.sensor);
+        doubts.iter().try_for_each(|doubt| print(&format!("doubtful: {doubt}\n")))?;
+        told.insert("doubts".into(), doubts.into());
         if args.check && args.can.is_none() && args.port.is_none() {
             return on_grids(file, told);
         }
@@ -237,6 +241,12 @@ fn left_out(file: &UnitFile) -> Result<()> {
     print(&format!("not part of a unit's configuration, the daemon's alone: {}\n", file.left_out.join(", ")))
 }
 
+/// What a check of a file without differences ends with.
+fn checked(told: &Told) -> ExitCode {
+    let doubtful = told.get("doubts").and_then(Value::as_array).is_some_and(|doubts| !doubts.is_empty());
+    if doubtful { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+}
+
 /// Whether a file can be used, without a unit.
 fn on_grids(file: &UnitFile, told: &mut Told) -> Result<ExitCode> {
     let (mut any, mut refusals, mut without) = (false, Map::new(), Map::new());
@@ -254,7 +264,7 @@ fn on_grids(file: &UnitFile, told: &mut Told) -> Result<ExitCode> {
     told.insert("refused_by_grid".into(), refusals.into());
     told.insert("no_room_by_board".into(), without.into());
     ensure!(any, "no unit can run with this");
-    Ok(ExitCode::SUCCESS)
+    Ok(checked(told))
 }
 
 fn read(unit: &mut Found<'_>, told: &mut Told) -> Result<ExitCode> {
@@ -351,7 +361,7 @@ fn compare(unit: &mut Found<'_>, file: &UnitFile, told: &mut Told) -> Result<Exi
     told.insert("differences".into(), each.collect());
     if found.is_empty() {
         print(&format!("block {} is what the file says\n", stored.sequence))?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(checked(told));
     }
     for (name, has, wanted) in &found {
         print(&format!("{name}: {has} in the unit, {wanted} in the file\n"))?;

@@ -52,6 +52,7 @@ const STRETCHES: [[f64; 2]; 5] = [[12.5, 25.0], [25.0, 50.0], [50.0, 100.0], [10
 pub fn run(args: &Args) -> Result<ExitCode> {
     let settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    settings.reading.check_for(paths.len())?;
     let mut outputs = args.outputs.beside(paths.iter().chain(&args.real).flat_map(|path| recording::files(path)));
     outputs.reads(args.settings.files());
     let picture = outputs.picture("--out", args.out.as_deref())?;

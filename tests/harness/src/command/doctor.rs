@@ -22,15 +22,15 @@ use crate::recording::{self, ReadOptions};
 use crate::results::files::until_ctrl_c;
 use crate::results::files::{OutputArgs, Target};
 
-/// Exit code for a log in which something is wrong.
+/// Exit code for a log in which something is wrong or doubtful.
 const WRONG: u8 = 1;
 
 /// Say what is on a radar's bus or line, what should be, what is wrong and what to do
 ///
-/// Reads a CAN log of `candump` (with -L, or -t a, d or z), of Vector's tools (ASC) or of SavvyCAN (CSV), or a capture of a
+/// Reads a CAN log of `candump` (with -L, or -t a, d or z), of Vector's tools (ASC) or of SavvyCAN or python-can (CSV), or a capture of a
 /// TI mmWave radar's data port or of the native format; each also gzipped. Or listens to a bus: `--can can0`. Which identifiers were seen and which an ARS408
 /// in its mode would send, with their lengths; its scans, counters, settings and faults; and what to do about what is
-/// wrong. Exit code 1 if something is wrong, 2 if the log cannot be read.
+/// wrong. Exit code 1 if something is wrong or doubtful, 2 if the log cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The log; - reads standard input
@@ -51,7 +51,7 @@ pub struct Args {
     /// Only this bus of a CAN log: can0, or the channel of an ASC log
     #[arg(long, value_name = "NAME")]
     interface: Option<String>,
-    /// Sensor id for --detections, if there are several
+    /// Only the sensor with this id, if there are several
     #[arg(long, value_name = "ID")]
     sensor_id: Option<u8>,
     #[command(flatten)]
@@ -68,10 +68,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut outputs = args.outputs.beside(args.log.iter().flat_map(|log| recording::files(log)));
     let json = outputs.file("--json", args.json.as_deref())?;
     let detections = outputs.file("--detections", args.detections.as_deref())?;
-    let KindArgs { radar: profile, ti_header, ti_dialect } = args.kind;
+    let KindArgs { radar: profile, cluster_states: wanted, ti_header, ti_dialect } = args.kind;
     let interface = args.interface.clone();
-    let options =
-        ReadOptions { interface, sensor_id: args.sensor_id, profile, ti_header, ti_dialect, ..Default::default() };
+    let sensor_id = args.sensor_id;
+    let options = ReadOptions { interface, sensor_id, profile, wanted, ti_header, ti_dialect, ..Default::default() };
     let report = match (&args.can, &args.log) {
         (Some(interface), _) => listen(interface, args.seconds.unwrap_or(USUAL_S), &options)?,
         (None, Some(log)) => examine(log, &options)?,
@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         write_detections(&file, &recording::read(log, &options)?)?;
     }
     print(&outputs.told())?;
-    let wrong = report.findings().iter().any(|f| f.severity == Severity::Error);
+    let wrong = report.findings().iter().any(|f| f.severity <= Severity::Warning);
     Ok(if wrong { ExitCode::from(WRONG) } else { ExitCode::SUCCESS })
 }
 

@@ -60,14 +60,25 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let Some(name) = labels.file_name() else { bail!("{} is no file", path.display()) };
     let target = OutputArgs::default().beside([path.clone()]).folder("labels", folder)?.file(name)?;
     let recording = recording::read(path, &args.reading.options()).with_context(|| path.display().to_string())?;
+    let options = estimators::Options::default();
+    estimators::usable::check(&recording, &options)?;
     let server = Server::bind(args.bind, args.port)?;
     let frames = recording.frames.len();
-    let labelling = Labelling::new(path, recording, target, estimators::Options::default())?;
+    let own = recording.truth.as_ref().and_then(|truth| match &truth.beside {
+        Some(beside) => beside.left_out,
+        None => Some(truth.tracks.len()),
+    });
+    let labelling = Labelling::new(path, recording, target, options)?;
     print(&format!(
         "{frames} radar frames; labels go to {}\n{}\nCtrl-C ends the server.\n",
         labels.display(),
         server.url()
     ))?;
+    if let Some(objects) = own.filter(|objects| *objects > 0) {
+        print(&format!(
+            "The recording has labels of its own, of {objects} objects. What you draw takes their place; `viewshed replay --labels recording` judges by them.\n"
+        ))?;
+    }
     if !args.no_open && !open(&server.url()) {
         print("No browser was found: open the address above.\n")?;
     }

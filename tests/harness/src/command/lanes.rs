@@ -9,7 +9,7 @@ use viewshed::obstacles::lanes::{MOST_LANES, MOST_SEGMENTS};
 use super::options::ReadingArgs;
 use super::progress::bar;
 use super::{print, told_problems};
-use crate::estimators::Lane;
+use crate::estimators::{self, Lane};
 use crate::labels::lanes::{self, segments};
 use crate::recording::{self, Recording};
 use crate::twin::traffic::frame::RoadFrame;
@@ -149,6 +149,7 @@ fn of_recordings(paths: &[PathBuf], reading: &ReadingArgs) -> Result<(Vec<Counte
         );
     }
     for recording in &all {
+        estimators::usable::check(recording, &estimators::Options::default())?;
         told_problems(recording);
     }
     let learning = bar("learning lanes", 100);

@@ -8,21 +8,28 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use viewshed::wire::message::Addresses;
+use viewshed::map::query::Footprint;
+use viewshed::map::{CellState, VisibilityMap};
+use viewshed::sensor::road::RoadPoint;
+use viewshed::wire::message::{Addresses, Plane};
 
 use super::key::KeyArgs;
 use super::options::seconds;
 use super::print;
-use crate::bus::listening::{Counted, Heard, Listening, Moment, SENSORS, shown};
+use crate::bus::listening::{Counted, Heard, Listening, Map, Moment, SENSORS, StatusSeen, as_sent, shown};
 use crate::bus::logged::{self, Log, Logged};
-#[cfg(target_os = "linux")]
 use crate::geometry::azimuths;
+use crate::geometry::pose::SensorPose;
+use crate::recording::FieldOfView;
 use crate::recording::can_log;
 use crate::recording::file;
 #[cfg(target_os = "linux")]
 use crate::results::files::until_ctrl_c;
 use crate::results::files::{Folder, OutputArgs, Target};
+use crate::results::pictures::birdseye;
+use crate::results::pictures::cells::Carries;
 use crate::results::pictures::polar::{self, PolarGrid};
+use crate::results::pictures::scene::{Scene, Window};
 
 /// Decode the maps that sensors broadcast on a CAN bus, in its log, or in one of a serial line by viewshed bus
 ///
@@ -46,7 +53,7 @@ pub struct Args {
     /// Write what was found as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a picture of every sensor's map into this folder now and then
+    /// Write pictures of every sensor's map into this folder now and then: azimuth over range, and from above
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Time between two looks at the maps, in seconds
@@ -217,28 +224,96 @@ fn look(listening: &Listening, maps: &mut [Vec<Moment>], out: Option<&Folder>) -
     for sensor in listening.sensors() {
         let Some(moment) = listening.moment(sensor) else { continue };
         if let Some(folder) = out {
-            let name = format!("sensor-{sensor}-{:04}.png", maps[usize::from(sensor)].len());
-            draw(listening, sensor, moment.time_s, &folder.file(name)?)?;
+            let name = format!("sensor-{sensor}-{:04}", maps[usize::from(sensor)].len());
+            let [polar, above] = ["", "-from-above"].map(|kind| folder.file(format!("{name}{kind}.png")));
+            draw(listening, sensor, moment.time_s, [&polar?, &above?])?;
         }
         maps[usize::from(sensor)].push(moment);
     }
     Ok(())
 }
 
-fn draw(listening: &Listening, sensor: u8, time_s: f64, target: &Target) -> Result<()> {
+/// Draws a map as it is sent, azimuth over range, and from above.
+fn draw(listening: &Listening, sensor: u8, time_s: f64, [polar_file, above_file]: [&Target; 2]) -> Result<()> {
     let map = listening.map(sensor);
     let Some(header) = map.header() else { return Ok(()) };
+    let carries =
+        Carries { grades: map.has(Plane::Grade) && header.probability.is_none(), occupancy: map.has(Plane::Occupancy) };
+    let (azimuth_rad, far_m) = (
+        azimuths::ends_rad(header.azimuth_origin, header.azimuth_span),
+        f64::from(header.ranges) * f64::from(header.cell_cm) / 100.0,
+    );
+    let title = format!("sensor {sensor} as received, {time_s:.3} s");
     let grid = PolarGrid {
         azimuths: usize::from(header.azimuths),
         ranges: usize::from(header.ranges),
-        azimuth_rad: azimuths::ends_rad(header.azimuth_origin, header.azimuth_span),
+        azimuth_rad,
         narrow: header.narrow.to_bytes(),
-        range_m: [0.0, f64::from(header.ranges) * f64::from(header.cell_cm) / 100.0],
+        range_m: [0.0, far_m],
         state: &|azimuth, range| shown(&map, azimuth, range),
-        title: format!("sensor {sensor} as received, {time_s:.3} s"),
+        carries,
+        title: title.clone(),
         caption: None,
     };
-    polar::draw(&grid).save(target)
+    polar::draw(&grid).save(polar_file)?;
+    let mount = &header.mount;
+    let metres = |cm: i32| f64::from(cm) / 100.0;
+    let [x, y] = [metres(mount.origin.x_cm), metres(mount.origin.y_cm)];
+    let [yaw, pitch, roll] = [mount.yaw, mount.pitch, mount.roll].map(|angle| f64::from(angle.radians()));
+    let [right, left] = azimuth_rad;
+    let arc = (0..=16).map(|k| yaw + right + (left - right) * f64::from(k) / 16.0);
+    let reached = arc.map(|heading| [x + far_m * heading.cos(), y + far_m * heading.sin()]);
+    let scene = Scene {
+        map: &OnRoad(&map),
+        carries,
+        pose: SensorPose::new([x, y, metres(mount.height_cm.into())], yaw, pitch, roll),
+        // what a header says of it
+        field_of_view: FieldOfView { azimuth_rad, elevation_rad: [-1.5, 1.5], range_m: [0.0, far_m] },
+        slice_height_m: 1.0,
+        window: Window::around([[x, y]].into_iter().chain(reached), 2.0),
+        detections: &[],
+        boxes: Vec::new(),
+        road: &[],
+        lanes: [].as_slice().into(),
+        lanes_numbered: false,
+        title,
+        caption: None,
+        highlight: None,
+    };
+    birdseye::draw(&scene).save(above_file)
+}
+
+/// A received map in road coordinates, occupied only where that is sent.
+struct OnRoad<'m>(&'m Map<'m>);
+
+impl VisibilityMap for OnRoad<'_> {
+    fn at(&self, point: RoadPoint) -> CellState {
+        as_sent(self.0, self.0.at(point))
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        self.0.cells_in(area, &mut |state| visit(as_sent(self.0, state)));
+    }
+}
+
+/// A state's name as it is read: "BusOff" is "bus off".
+fn in_words(name: &str) -> String {
+    let mut words = String::new();
+    for letter in name.chars() {
+        if letter.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(letter.to_lowercase());
+    }
+    words
+}
+
+/// What a unit says of its state, and why where there is something to say.
+fn state(status: &StatusSeen) -> String {
+    match status.reason.as_str() {
+        "None" => in_words(&status.state),
+        reason => format!("{} ({})", in_words(&status.state), in_words(reason)),
+    }
 }
 
 /// What happened to a sensor's frames: those that were not used by reason, with their total; and what their counters
@@ -301,10 +376,9 @@ fn report(sensors: &[Heard], listening: &Listening, problems: &[String]) -> Stri
         if let Some(s) = &heard.status {
             let _ = writeln!(
                 text,
-                "  state {} ({}), up for {} s, firmware {}.{}.{}, wire version {}; lost from the radar {}, dropped {}, \
+                "  state {}, up for {} s, firmware {}.{}.{}, wire version {}; lost from the radar {}, dropped {}, \
                  E2E errors {}, bus-off {}",
-                s.state,
-                s.reason,
+                state(s),
                 s.uptime_s,
                 s.firmware[0],
                 s.firmware[1],
@@ -334,4 +408,31 @@ fn report(sensors: &[Heard], listening: &Listening, problems: &[String]) -> Stri
         let _ = writeln!(text, "{problem}");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_is_said_in_words() {
+        let said = |state_name: &str, reason: &str| {
+            state(&StatusSeen {
+                state: state_name.into(),
+                reason: reason.into(),
+                reset_cause: "PowerOn".into(),
+                uptime_s: 1,
+                firmware: [0; 3],
+                wire_version: 1,
+                fingerprint: 0,
+                radar_lost: 0,
+                dropped: 0,
+                e2e_errors: 0,
+                bus_off: 0,
+                frame_ms: [None; 2],
+            })
+        };
+        assert_eq!(said("Ok", "None"), "ok");
+        assert_eq!(said("Unavailable", "NoFrames"), "unavailable (no frames)");
+    }
 }

@@ -18,6 +18,7 @@ pub mod progress;
 pub mod replay;
 pub mod simulate;
 pub mod site;
+pub mod starts;
 pub mod tune;
 #[cfg(feature = "pages")]
 pub mod view;
@@ -51,6 +52,7 @@ enum Command {
     Simulate(simulate::Args),
     Experiment(Box<experiment::Args>),
     Site(Box<site::Args>),
+    Starts(Box<starts::Args>),
     Compare(compare::Args),
     Tune(Box<tune::Args>),
     Detect(detect::Args),
@@ -75,6 +77,7 @@ impl Cli {
             Command::Simulate(args) => simulate::run(args),
             Command::Experiment(args) => experiment::run(args),
             Command::Site(args) => site::run(args),
+            Command::Starts(args) => starts::run(args),
             Command::Tune(args) => tune::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Detect(args) => detect::run(args),
@@ -96,13 +99,18 @@ impl Cli {
 
 /// One error with its causes on stderr.
 pub fn complain(error: &anyhow::Error) {
-    eprintln!("error: {error:#}");
+    told(&format!("error: {error:#}"));
+}
+
+/// A line on stderr. Where that is closed or full there is nobody to be told.
+pub fn told(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// Prints to stderr what is wrong with a recording, where there is something: stdout may be another program's input.
 pub fn told_problems(recording: &Recording) {
     if !recording.problems.is_empty() {
-        eprintln!("{}: {}", recording.name, notes::problems(recording).join("\n"));
+        told(&format!("{}: {}", recording.name, notes::problems(recording).join("\n")));
     }
 }
 

@@ -126,6 +126,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             ends_s.ceil()
         ))?;
     }
+    if let Some(jumps) = simulation.jumps() {
+        print(&format!("{jumps}\n"))?;
+    }
     if let Some(file) = json_file {
         let all = json!({
             "recording": args.out.display().to_string(),

@@ -14,11 +14,12 @@ use viewshed::wire::message::Addresses;
 use super::key::KeyArgs;
 use super::label::open;
 use super::options::{SettingsArgs, given};
-use super::print;
 use super::replay::risk::{quantiser, share};
+use super::{complain, print};
 use crate::bus::ears::Key;
 use crate::bus::listening::Listening;
 use crate::bus::logged::{self, Log, Logged};
+use crate::estimators;
 use crate::evaluation::Settings;
 use crate::evaluation::probability::file::Fitted;
 use crate::pages::server::{LOOPBACK, Server};
@@ -190,6 +191,7 @@ fn from_file(
         "{}: a camera without a radar; `viewshed replay --report` shows what became of its boxes",
         recording.name
     );
+    radars.iter().try_for_each(|radar| estimators::usable::check(radar, &settings.estimators))?;
     let table = fitted.map(|fitted| quantiser(fitted, args.risk, recording, &settings)).transpose()?;
     let viewing = Viewing::recording(&radars, path, settings.evaluation.slice_height_m);
     let frames: Vec<String> = radars.iter().map(|radar| radar.frames.len().to_string()).collect();
@@ -197,7 +199,7 @@ fn from_file(
     let filling = viewing.clone();
     std::thread::spawn(move || {
         if let Err(error) = recorded::fill(&filling.instants, &radars, &settings, table.as_ref()) {
-            eprintln!("error: {error:#}");
+            complain(&error);
             filling.instants.end(format!("failed: {error:#}"));
         }
     });
@@ -292,7 +294,7 @@ fn now_ns() -> i64 {
 /// The source ends: pages say so, and what was shown stays until the program ends.
 #[cfg(unix)]
 fn ended(viewing: &Viewing, error: &anyhow::Error) {
-    eprintln!("error: {error:#}");
+    complain(error);
     viewing.instants.end(format!("ended: {error:#}"));
 }
 

@@ -1,6 +1,6 @@
 //! Whether units can be configured with a file: by grid, and by what the boards have room for.
 
-use viewshed::probability::TableError;
+use viewshed::probability::{TableError, fitted_with};
 use viewshed::unit::profile::{reference, small};
 use viewshed::unit::settings::{BlockError, Kind, Settings, SettingsCheck, UnitConfig};
 
@@ -97,7 +97,7 @@ pub fn table_refused(file: &UnitFile, cells: [u8; 2]) -> Option<String> {
     }
     // what watches the radar changes no grade
     let unit = UnitConfig { supervise: false, ..file.settings.unit };
-    let unit = Settings { unit, ..file.settings }.fingerprint();
+    let unit = fitted_with(Settings { unit, ..file.settings }.fingerprint());
     (table != unit).then(|| format!("{key}: {}", TableError::Configuration { table, unit }))
 }
 
@@ -117,7 +117,7 @@ mod tests {
         std::fs::remove_file(&path).unwrap();
         if let Some(other) = table {
             let unit = UnitConfig { supervise: false, ..file.settings.unit };
-            file.fitted_with = Some(Settings { unit, ..file.settings }.fingerprint() ^ other);
+            file.fitted_with = Some(fitted_with(Settings { unit, ..file.settings }.fingerprint()) ^ other);
             file.blocks[2] = Some(Vec::new());
         }
         file

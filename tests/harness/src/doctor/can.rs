@@ -4,9 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use viewshed::inputs::ars408::message::Message;
+use viewshed::inputs::ars408::motion;
 use viewshed::wire::frame::CanId;
+use viewshed::wire::message::Addresses;
 
 use super::sensor::{Output, Sensor};
+use crate::bus::listening::Listening;
+use crate::recording::can_log::log::Lines;
 use crate::recording::can_log::{Content, Line};
 
 /// One identifier on one interface.
@@ -27,49 +31,101 @@ pub struct Identifier {
     pub expected: bool,
 }
 
-pub fn duration_s(lines: &[Line]) -> f64 {
-    let times = lines.iter().map(|l| l.time_ns);
-    match (times.clone().min(), times.max()) {
-        (Some(first), Some(last)) => last.saturating_sub(first) as f64 * 1e-9,
-        _ => 0.0,
-    }
-}
-
-/// Most frames of one interface within a second.
-pub fn busiest_second(lines: &[Line]) -> usize {
-    let mut seconds: BTreeMap<(&str, i64), usize> = BTreeMap::new();
-    for line in lines {
-        *seconds.entry((&line.interface, line.time_ns.div_euclid(1_000_000_000))).or_default() += 1;
-    }
-    seconds.into_values().max().unwrap_or(0)
-}
-
+/// What is said of a bus without knowing its radars, found in one go.
 #[derive(Default)]
+pub struct Bus {
+    pub frames: usize,
+    /// Most frames of one interface within a second.
+    pub busiest_second: usize,
+    seen: BTreeMap<String, BTreeMap<(u32, bool), Seen>>,
+    /// Error frames by their class.
+    pub errors: BTreeMap<u32, usize>,
+    /// Sensors whose visibility broadcast is there, on the usual identifiers.
+    pub broadcasters: Vec<u8>,
+    /// Frames on 400 to 4FF, where visibility is broadcast by default.
+    pub broadcasts: usize,
+    /// Frames with a radar's identifier in 29 bits, and those marked as CAN FD.
+    pub extended: usize,
+    pub flexible: usize,
+    /// The greatest speed that sensors are told, by interface and sensor, cm/s.
+    pub told_cm_s: BTreeMap<(String, u8), i32>,
+}
+
+#[derive(Default, Clone)]
 struct Seen {
     frames: usize,
     lengths: BTreeSet<usize>,
 }
 
-/// All identifiers seen, and those that the sensors' modes let expect.
-pub fn identifiers(lines: &[Line], sensors: &[Sensor]) -> Vec<Identifier> {
-    let mut seen: BTreeMap<(String, u32, bool), Seen> = BTreeMap::new();
-    for line in lines {
+impl Bus {
+    pub fn of<L: Lines + ?Sized>(lines: &L) -> Self {
+        let mut bus = Self::default();
+        let mut seconds: BTreeMap<String, (i64, usize)> = BTreeMap::new();
+        let mut listening = Listening::new(Addresses::STANDARD, None);
+        lines.each(&mut |line| {
+            bus.frames += 1;
+            let now = line.time_ns.div_euclid(1_000_000_000);
+            let (second, frames) = entry(&mut seconds, &line.interface);
+            if *second != now {
+                (*second, *frames) = (now, 0);
+            }
+            *frames += 1;
+            bus.busiest_second = bus.busiest_second.max(*frames);
+            listening.take(line);
+            bus.take(line);
+        });
+        bus.broadcasters = listening.sensors();
+        bus
+    }
+
+    fn take(&mut self, line: &Line) {
         let (id, length) = match &line.content {
             Content::Data(frame) => (frame.id, Some(frame.data().len())),
             Content::Remote(id) => (*id, None),
-            Content::Error(_) => continue,
+            Content::Error(class) => {
+                *self.errors.entry(*class).or_default() += 1;
+                return;
+            }
         };
-        let extended = matches!(id, CanId::Extended(_));
-        let one = seen.entry((line.interface.clone(), id.raw(), extended)).or_default();
+        let is_extended = matches!(id, CanId::Extended(_));
+        let one = entry(&mut self.seen, &line.interface).entry((id.raw(), is_extended)).or_default();
         one.frames += 1;
         one.lengths.extend(length);
+        let Some(frame) = line.frame() else { return };
+        self.broadcasts += usize::from(matches!(id, CanId::Standard(0x400..=0x4FF)));
+        let in_11_bits = u16::try_from(id.raw()).ok().and_then(CanId::standard).and_then(Message::of);
+        let Some((message, sensor)) = in_11_bits else { return };
+        self.extended += usize::from(is_extended);
+        self.flexible += usize::from(!is_extended && frame.fd && frame.data().len() <= 8);
+        if message == Message::Speed && !is_extended && frame.data().len() >= 2 {
+            let told = self.told_cm_s.entry((line.interface.clone(), sensor)).or_default();
+            *told = (*told).max(i32::from(motion::speed_cm_s(frame.data())).abs());
+        }
     }
+
+    /// All identifiers seen, and those that the sensors' modes let expect.
+    pub fn identifiers(&self, sensors: &[Sensor], seconds: f64) -> Vec<Identifier> {
+        let seen = self.seen.iter().flat_map(|(interface, seen)| {
+            seen.iter().map(|((raw, extended), seen)| ((interface.clone(), *raw, *extended), seen.clone()))
+        });
+        identifiers(seen.collect(), sensors, seconds)
+    }
+}
+
+/// Of an interface; its name is copied once.
+fn entry<'a, T: Default>(all: &'a mut BTreeMap<String, T>, interface: &str) -> &'a mut T {
+    if !all.contains_key(interface) {
+        all.insert(interface.to_owned(), T::default());
+    }
+    all.entry(interface.to_owned()).or_default()
+}
+
+fn identifiers(mut seen: BTreeMap<(String, u32, bool), Seen>, sensors: &[Sensor], seconds: f64) -> Vec<Identifier> {
     for sensor in sensors {
         for message in expected(sensor) {
             seen.entry((sensor.interface.clone(), message.id(sensor.sensor).raw(), false)).or_default();
         }
     }
-    let seconds = duration_s(lines);
     let identifier = |((interface, raw, extended), seen): ((String, u32, bool), Seen)| {
         let id = if extended { None } else { u16::try_from(raw).ok().and_then(CanId::standard) };
         let of_sensor = id.and_then(Message::of);

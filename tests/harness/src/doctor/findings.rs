@@ -1,18 +1,17 @@
 //! What is wrong, and what to do.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use serde::Serialize;
 use viewshed::inputs::ars408::configuration::Ars408Configuration;
 use viewshed::inputs::ars408::message::Message;
-use viewshed::inputs::ars408::motion::{self, standing};
-use viewshed::wire::frame::{CanFrame, CanId};
-use viewshed::wire::message::Addresses;
+use viewshed::inputs::ars408::motion::standing;
+use viewshed::wire::frame::CanFrame;
 
+use super::can::Bus;
 use super::sensor::{Output, Sensor};
 use super::{LIVE, Report};
-use crate::bus::listening::Listening;
-use crate::recording::can_log::{Content, Line};
+use crate::recording::kind;
 
 /// How much it matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -51,14 +50,14 @@ impl Findings {
 }
 
 /// Everything found, the worst first.
-pub fn judge(report: &Report, lines: &[Line]) -> Vec<Finding> {
+pub fn judge(report: &Report, heard: &Bus) -> Vec<Finding> {
     let mut found = Findings::default();
-    bus(&mut found, report, lines);
+    bus(&mut found, report, heard);
     for sensor in &report.sensors {
         scans(&mut found, sensor, report);
         settings(&mut found, sensor);
         faults(&mut found, sensor);
-        told_motion(&mut found, sensor, lines);
+        told_motion(&mut found, sensor, heard);
     }
     lengths(&mut found, report);
     found.0.sort_by_key(|f| f.severity);
@@ -80,7 +79,7 @@ pub fn silence(seconds: f64) -> Finding {
     }
 }
 
-fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
+fn bus(found: &mut Findings, report: &Report, heard: &Bus) {
     if report.duration_s < LEAST_S {
         found.add(
             Severity::Warning,
@@ -93,6 +92,15 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
         );
     }
     let problems: u64 = report.problems.iter().filter(|p| p.what.starts_with("line skipped")).map(|p| p.count).sum();
+    let sorted =
+        |what: &str| what.contains("in the order of time") || what.contains("before 0") || what.contains("minus");
+    for problem in report.problems.iter().filter(|p| sorted(&p.what)) {
+        found.add(
+            Severity::Note,
+            format!("{}: {} ({}x)", problem.topic, problem.what, problem.count),
+            "nothing for this report; where the log came from its times are not as they should be",
+        );
+    }
     if problems > 0 {
         found.add(
             Severity::Warning,
@@ -107,14 +115,8 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
             "record one bus a log, and let no clock be set while recording",
         );
     }
-    let mut errors: BTreeMap<u32, usize> = BTreeMap::new();
-    for line in lines {
-        if let Content::Error(class) = line.content {
-            *errors.entry(class).or_default() += 1;
-        }
-    }
-    for (class, n) in errors {
-        let (what, remedy) = match class {
+    for (class, n) in &heard.errors {
+        let (what, remedy) = match *class {
             c if c & 0x40 != 0 => ("the controller went off the bus", "check bit rate, wiring and termination"),
             c if c & 0x20 != 0 => ("frames are not acknowledged", "a second node must be on the bus, awake"),
             c if c & 0x04 != 0 => {
@@ -124,12 +126,22 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
         };
         found.add(Severity::Error, format!("{what}: {n} error frames of class {class:03X}"), remedy);
     }
-    let broadcasters = broadcasters(lines);
+    let broadcasters = &heard.broadcasters;
     if report.sensors.is_empty() && !broadcasters.is_empty() {
         found.add(
             Severity::Note,
             "no radar is on this bus, but the visibility broadcast of a unit",
             "`viewshed listen` shows its maps",
+        );
+    } else if report.sensors.is_empty() && (report.frames == 0 || problems > report.frames as u64) {
+        // what was not understood says nothing of the bus
+        found.add(
+            Severity::Error,
+            format!(
+                "the log could not be understood: of its lines {} are frames and {problems} are not",
+                report.frames
+            ),
+            "the lines above say why; record with `candump -L`, or export as Vector ASC",
         );
     } else if report.sensors.is_empty() {
         let seen: Vec<&str> = report.identifiers.iter().map(|i| i.id.as_str()).collect();
@@ -144,7 +156,7 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
             "check that this is the radar's bus, its supply, 500 kbit/s on both sides, and termination at both ends (the radar has none of its own)",
         );
     }
-    extended(found, lines);
+    marked(found, heard);
     if report.sensors.len() > 1 {
         let ids: BTreeSet<u8> = report.sensors.iter().map(|s| s.sensor).collect();
         let listed: Vec<String> = report.sensors.iter().map(|s| format!("{} on {}", s.sensor, s.interface)).collect();
@@ -158,7 +170,7 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
             },
         );
     }
-    let ours = lines.iter().filter_map(Line::frame).filter(|f| matches!(f.id, CanId::Standard(0x400..=0x4FF))).count();
+    let ours = heard.broadcasts;
     if !broadcasters.is_empty() {
         let listed: Vec<String> = broadcasters.iter().map(u8::to_string).collect();
         found.add(
@@ -175,31 +187,39 @@ fn bus(found: &mut Findings, report: &Report, lines: &[Line]) {
     }
 }
 
-/// Sensors whose visibility broadcast is on the bus, on the usual identifiers.
-fn broadcasters(lines: &[Line]) -> Vec<u8> {
-    let mut listening = Listening::new(Addresses::STANDARD, None);
-    lines.iter().for_each(|line| listening.take(line));
-    listening.sensors()
-}
-
-/// Extended identifiers whose number is a radar's.
-fn extended(found: &mut Findings, lines: &[Line]) {
-    let alike = |id: CanId| match id {
-        CanId::Extended(raw) => u16::try_from(raw).ok().and_then(CanId::standard).and_then(Message::of).is_some(),
-        CanId::Standard(_) => false,
-    };
-    let n = lines.iter().filter_map(Line::frame).filter(|f| alike(f.id)).count();
-    if n > 0 {
+/// Frames of a radar that are not as it sends them.
+fn marked(found: &mut Findings, heard: &Bus) {
+    if heard.extended > 0 {
         found.add(
             Severity::Warning,
-            format!("{n} frames have a radar's identifier in 29 bits"),
+            format!("{} frames have a radar's identifier in 29 bits", heard.extended),
             "the radar uses 11 bits: set gateway or adapter to standard frames",
+        );
+    }
+    if heard.flexible > 0 {
+        found.add(
+            Severity::Warning,
+            format!("{} frames have a radar's identifier and are marked as CAN FD", heard.flexible),
+            "the radar sends classic frames, and a unit takes no others: set gateway or adapter to classic CAN; of a log they are read",
         );
     }
 }
 
 fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
     let (name, c) = (of(sensor), &sensor.counters);
+    if sensor.announced == 0 && sensor.output != Output::Nothing {
+        let status = if sensor.output == Output::Clusters { Message::ClusterStatus } else { Message::ObjectStatus };
+        found.add(
+            Severity::Error,
+            format!(
+                "{name}: {:03X} ({}) is missing: entries come, and the status message that begins each scan does not",
+                status.id(sensor.sensor).raw(),
+                status.name()
+            ),
+            "let the log or the gateway pass it: a filter on identifiers leaves it out",
+        );
+        return;
+    }
     if sensor.announced == 0 {
         let heard = match sensor.state.map(|s| s.output) {
             Some(output) => format!(
@@ -212,6 +232,15 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
             Severity::Error,
             format!("{name} is there but sends no scans; {heard}"),
             format!("switch clusters on, and read 2{}1 back: {}", sensor.sensor, clusters(sensor)),
+        );
+        return;
+    }
+    // what is missing and odd by the wrong scales is no more than a consequence
+    if let Some(rather) = &sensor.rather {
+        found.add(
+            Severity::Error,
+            kind::said(&name, report.profile, rather),
+            format!("read it with --radar {}, here and in `viewshed replay`, and compare distances", rather.0),
         );
         return;
     }
@@ -260,11 +289,18 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
             "check the time stamps of the log",
         );
     }
+    if let Some(rcs) = sensor.only_rcs_dbsm {
+        found.add(
+            Severity::Warning,
+            format!("{name}: the RCS of all {} entries is {rcs} dBsm: it is not filled", sensor.entries),
+            "look for the gateway's or the clone's settings; until then it is taken as not measured",
+        );
+    }
     if sensor.implausible > 0.2 {
         found.add(
             Severity::Warning,
             format!("{name}: {:.0} % of its entries lie beyond 260 m or behind it", 100.0 * sensor.implausible),
-            "a clone with other scales? Try --radar SR75, here and in `viewshed replay`, and compare distances",
+            "a clone with scales that are not known here? Compare distances with the truth",
         );
     }
 }
@@ -326,10 +362,8 @@ fn faults(found: &mut Findings, sensor: &Sensor) {
 }
 
 /// A fixed sensor that is told it moves.
-fn told_motion(found: &mut Findings, sensor: &Sensor, lines: &[Line]) {
-    let mine = lines.iter().filter(|l| l.interface == sensor.interface).filter_map(Line::frame);
-    let speeds = mine.filter(|f| f.id == Message::Speed.id(sensor.sensor) && f.data().len() >= 2);
-    let fastest = speeds.map(|f| motion::speed_cm_s(f.data()).abs()).max().unwrap_or(0);
+fn told_motion(found: &mut Findings, sensor: &Sensor, heard: &Bus) {
+    let fastest = heard.told_cm_s.get(&(sensor.interface.clone(), sensor.sensor)).copied().unwrap_or(0);
     if fastest > 0 {
         found.add(
             if fastest > 50 { Severity::Warning } else { Severity::Note },
@@ -345,14 +379,18 @@ fn lengths(found: &mut Findings, report: &Report) {
         if i.lengths.iter().any(|l| *l < expected) {
             found.add(
                 Severity::Error,
-                format!("{} ({message}) comes with {:?} bytes instead of {expected}", i.id, i.lengths),
+                format!("{} ({message}) comes with {} bytes, and {expected} are needed", i.id, listed(&i.lengths)),
                 "another device uses this identifier, or a gateway cuts it",
             );
         } else if i.lengths.iter().any(|l| *l > expected) {
             found.add(
                 Severity::Note,
-                format!("{} ({message}) comes with {:?} bytes instead of {expected}", i.id, i.lengths),
-                "nothing: longer frames are taken",
+                format!(
+                    "{} ({message}) comes with {} bytes, of which the first {expected} are read",
+                    i.id,
+                    listed(&i.lengths)
+                ),
+                "nothing has to be done: the bytes behind mean nothing to a radar",
             );
         }
         if i.expected && i.frames == 0 && !matches!(message, "SpeedInformation" | "YawRateInformation") {
@@ -363,6 +401,11 @@ fn lengths(found: &mut Findings, report: &Report) {
             );
         }
     }
+}
+
+/// Lengths in words: "2 or 8".
+fn listed(lengths: &[usize]) -> String {
+    lengths.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ")
 }
 
 /// The line that switches clusters on.

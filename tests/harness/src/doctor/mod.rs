@@ -13,12 +13,13 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 
-use crate::recording::can_log::{self, FORMATS, Format, Line};
-use crate::recording::file::{self, Content};
+use crate::recording::can_log::log::{Found, Lines};
+use crate::recording::can_log::{self, FORMATS, Line};
+use crate::recording::file::{self, Content, Source};
 use crate::recording::foreign;
 use crate::recording::problems::{Problem, Problems};
 use crate::recording::ti::is_capture;
-use crate::recording::{self, ReadOptions};
+use crate::recording::{self, ReadOptions, ignored};
 use can::Identifier;
 use findings::{Finding, Severity};
 use sensor::Sensor;
@@ -28,6 +29,9 @@ use sensor::Sensor;
 pub struct Report {
     pub log: String,
     pub kind: &'static str,
+    /// By whose scales entries are read.
+    #[serde(skip)]
+    pub profile: &'static Ars408Profile,
     pub frames: usize,
     pub duration_s: f64,
     /// Frames in the busiest second.
@@ -64,6 +68,28 @@ impl Examined {
         }
     }
 
+    /// Leaves out the sensors that are not meant. Where the one that is meant is not there, all are shown.
+    fn only(&mut self, sensor: u8) {
+        let heard: Vec<u8> = match self {
+            Self::Can(report) => report.sensors.iter().map(|s| s.sensor).collect(),
+            Self::Native(report) => report.sensors.iter().map(|s| s.sensor).collect(),
+            Self::Ti(_) => {
+                let what = ignored::said("--sensor-id", "CAN logs and captures of the native format");
+                findings::add(self.findings_mut(), Severity::Note, what, "a capture of a TI radar is of one sensor");
+                return;
+            }
+        };
+        if !heard.contains(&sensor) {
+            let listed = heard.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+            let listed = if listed.is_empty() { "none".to_owned() } else { listed };
+            let what = format!("sensor {sensor} is not there; sensors heard: {listed}");
+            let remedy = "name another with --sensor-id, or give the radar this id (2x0, SensorID) and start it again";
+            findings::add(self.findings_mut(), Severity::Error, what, remedy);
+        } else if let Self::Native(report) = self {
+            report.sensors.retain(|s| s.sensor == sensor);
+        }
+    }
+
     /// The report to be read.
     pub fn text(&self) -> String {
         match self {
@@ -79,21 +105,35 @@ impl Examined {
 /// # Errors
 /// A file that cannot be read or is no such log.
 pub fn examine(path: &Path, known: &ReadOptions) -> Result<Examined> {
-    let Content { bytes, damage } = file::read(path)?;
-    let mut examined = examine_bytes(path, &bytes, known)?;
+    let log = match file::shown(path) {
+        name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
+        _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    examine_source(log, &Source::of(path)?, known)
+}
+
+/// Judges a log of this name.
+///
+/// # Errors
+/// Those of [`examine`].
+pub fn examine_source(log: String, source: &Source, known: &ReadOptions) -> Result<Examined> {
+    let (mut examined, damage) = match can_log::log::find(source)? {
+        Some(found) => can(log, found, known)?,
+        None => {
+            let Content { bytes, damage } = source.read()?;
+            (examine_bytes(log, &bytes, known)?, damage)
+        }
+    };
+    known.sensor_id.into_iter().for_each(|sensor| examined.only(sensor));
     if let Some(damage) = damage {
         findings::add(examined.findings_mut(), Severity::Warning, damage, file::DAMAGE_REMEDY);
     }
     Ok(examined)
 }
 
-fn examine_bytes(path: &Path, bytes: &[u8], known: &ReadOptions) -> Result<Examined> {
-    let log = match file::shown(path) {
-        name if path.as_os_str() == file::STANDARD_INPUT => name.into_owned(),
-        _ => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-    };
-    if let Some(format) = Format::of(bytes) {
-        return can(log, bytes, format, known);
+fn examine_bytes(log: String, bytes: &[u8], known: &ReadOptions) -> Result<Examined> {
+    if bytes.is_empty() {
+        bail!("{log} is empty");
     }
     if let Some(foreign) = foreign::named(bytes) {
         bail!("{log} cannot be read: {foreign}");
@@ -118,44 +158,54 @@ pub const LIVE: &str = "SocketCAN";
 /// Judges what was heard of a bus within some seconds.
 pub fn heard(interface: &str, seconds: f64, lines: &[Line], known: &ReadOptions) -> Examined {
     let mut examined = judged(interface.to_owned(), LIVE, lines, &Problems::default(), known, seconds);
+    known.sensor_id.into_iter().for_each(|sensor| examined.only(sensor));
     if let (Examined::Can(report), []) = (&mut examined, lines) {
         report.findings = vec![findings::silence(seconds)];
     }
     examined
 }
 
-fn can(log: String, bytes: &[u8], format: Format, known: &ReadOptions) -> Result<Examined> {
+fn can(log: String, found: Found, known: &ReadOptions) -> Result<(Examined, Option<String>)> {
     let mut problems = Problems::default();
-    let lines = can_log::read(bytes, format, known.interface.as_deref(), &mut problems)?;
-    let duration_s = can::duration_s(&lines);
-    Ok(judged(log, format.name(), &lines, &problems, known, duration_s))
+    let kind = found.format.name();
+    let lines = found.read(known.interface.as_deref(), &mut problems, &mut |_| false)?;
+    let duration_s = lines.duration_s();
+    Ok((judged(log, kind, &lines, &problems, known, duration_s), lines.damage().map(str::to_owned)))
 }
 
-fn judged(
+fn judged<L: Lines + ?Sized>(
     log: String,
     kind: &'static str,
-    lines: &[Line],
+    lines: &L,
     problems: &Problems,
     known: &ReadOptions,
     duration_s: f64,
 ) -> Examined {
-    let sensors = sensor::all(lines, known.profile.unwrap_or(&Ars408Profile::ARS408));
-    let native = recording::native::of_log(lines);
-    if sensors.is_empty() && !native.is_empty() {
-        return Examined::Native(native::examine(log, &native, 0));
+    let profile = known.profile.unwrap_or(&Ars408Profile::ARS408);
+    let sensors = sensor::all(lines, profile);
+    if sensors.is_empty() {
+        let native = recording::native::of_log(lines);
+        if !native.is_empty() {
+            return Examined::Native(native::examine(log, &native, 0));
+        }
     }
+    let bus = can::Bus::of(lines);
     let mut report = Report {
         log,
         kind,
-        frames: lines.len(),
+        profile,
+        frames: bus.frames,
         duration_s,
-        busiest_second: can::busiest_second(lines),
-        identifiers: can::identifiers(lines, &sensors),
+        busiest_second: bus.busiest_second,
+        identifiers: bus.identifiers(&sensors, duration_s),
         problems: problems.iter().collect(),
         findings: Vec::new(),
         sensors,
     };
-    report.findings = findings::judge(&report, lines);
+    if let Some(sensor) = known.sensor_id.filter(|id| report.sensors.iter().any(|s| s.sensor == *id)) {
+        report.sensors.retain(|s| s.sensor == sensor);
+    }
+    report.findings = findings::judge(&report, &bus);
     Examined::Can(report)
 }
 

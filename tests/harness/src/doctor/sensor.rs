@@ -3,16 +3,21 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
+use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile::Ars408Profile;
-use viewshed::inputs::ars408::quality::Wanted;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ars408::receiver::{cluster_status, object_status};
 use viewshed::inputs::ars408::state::{RadarState, Version};
-use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters};
+use viewshed::inputs::ars408::{Ars408Config, Ars408Counters};
 use viewshed::inputs::signal::word;
+use viewshed::wire::frame::CanFrame;
 
-use crate::recording::ars408::scans;
+use crate::recording::ars408_feed::{Feed, classic};
 use crate::recording::can_log::Line;
+use crate::recording::can_log::log::Lines;
+use crate::recording::capture::weak;
+use crate::recording::kind;
 
 /// What a sensor sends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -40,6 +45,11 @@ pub struct Sensor {
     pub counter_step: Option<u16>,
     /// Share of entries beyond 260 m or behind the sensor, where it does not look.
     pub implausible: f64,
+    /// The kind of radar by whose scales its frames make more sense, and why.
+    pub rather: Option<(&'static str, String)>,
+    /// The RCS of all entries, where it never changes and is below the gate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub only_rcs_dbsm: Option<f32>,
     pub version: Option<String>,
     #[serde(serialize_with = "state")]
     pub state: Option<RadarState>,
@@ -65,57 +75,137 @@ impl Spread {
 }
 
 /// Every sensor that sent something.
-pub fn all(lines: &[Line], profile: &Ars408Profile) -> Vec<Sensor> {
-    let mut of_sensor: BTreeMap<(&str, u8), Vec<&Line>> = BTreeMap::new();
-    for line in lines {
-        let Some(frame) = line.frame().filter(|f| !f.fd) else { continue };
-        if let Some((message, sensor)) = Message::of(frame.id)
-            && message.from_sensor()
-        {
-            of_sensor.entry((&line.interface, sensor)).or_default().push(line);
-        }
-    }
-    of_sensor.into_iter().map(|((interface, sensor), lines)| examine(interface, sensor, &lines, profile)).collect()
+pub fn all<L: Lines + ?Sized>(lines: &L, profile: &Ars408Profile) -> Vec<Sensor> {
+    let mut found: Vec<Examining> = Vec::new();
+    lines.each(&mut |line| {
+        let Some(frame) = classic(line).filter(|f| !f.fd) else { return };
+        let Some((message, sensor)) = Message::of(frame.id).filter(|(message, _)| message.from_sensor()) else {
+            return;
+        };
+        let place = found.iter().position(|one| one.sensor == sensor && one.interface == line.interface);
+        let place = place.unwrap_or_else(|| {
+            found.push(Examining::new(&line.interface, sensor, profile));
+            found.len() - 1
+        });
+        found[place].take(line, &frame, message);
+    });
+    found.sort_by(|a, b| (&a.interface, a.sensor).cmp(&(&b.interface, b.sensor)));
+    found.into_iter().map(Examining::end).collect()
 }
 
-fn examine(interface: &str, sensor: u8, lines: &[&Line], profile: &Ars408Profile) -> Sensor {
-    let mut radar =
-        Ars408::<1024>::new(Ars408Config { wanted: Wanted::ALL, profile: *profile, ..Ars408Config::sensor(sensor) });
-    let (mut times, mut entries, mut odd) = (Vec::new(), 0, 0);
-    scans(&mut radar, lines, |scan| {
-        times.push(scan.time.micros());
-        entries += scan.detections.len();
+/// What was heard of a sensor so far.
+struct Examining {
+    interface: String,
+    sensor: u8,
+    feed: Feed<1024>,
+    scans: Scans,
+    clusters: Vec<u32>,
+    objects: Vec<u32>,
+    /// General entries of clusters and of objects.
+    entries: [usize; 2],
+    states: Vec<RadarState>,
+    version: Option<Version>,
+    profile: Ars408Profile,
+    /// The first lines, which show by whose scales they make sense.
+    first: Vec<Line>,
+}
+
+#[derive(Default)]
+struct Scans {
+    times: Vec<u64>,
+    entries: usize,
+    odd: usize,
+    only_rcs: Option<i16>,
+}
+
+/// Entries that tell that a value never changes.
+const TELLING: usize = 50;
+
+impl Scans {
+    fn take(&mut self, scan: &RadarScan<'_>) {
+        self.times.push(scan.time.micros());
+        for detection in scan.detections {
+            let same = self.entries == 0 || self.only_rcs == detection.rcs_half_dbsm;
+            self.only_rcs = detection.rcs_half_dbsm.filter(|_| same);
+            self.entries += 1;
+        }
         // behind: more than a quarter turn to a side
-        odd +=
+        self.odd +=
             scan.detections.iter().filter(|d| d.range_cm > 26_000 || d.azimuth.raw().unsigned_abs() > 1 << 14).count();
-    });
-    let frames = |wanted: Message| {
-        let mine = lines.iter().filter_map(|l| l.frame());
-        mine.filter(move |f| f.id == wanted.id(sensor) && f.data().len() >= wanted.length())
-    };
-    let clusters = frames(Message::ClusterStatus).map(|f| cluster_status::COUNTER.get(word(f.data())));
-    let objects = frames(Message::ObjectStatus).map(|f| object_status::COUNTER.get(word(f.data())));
-    let (clusters, objects): (Vec<u32>, Vec<u32>) = (clusters.collect(), objects.collect());
-    let states: Vec<RadarState> = frames(Message::RadarState).filter_map(|f| RadarState::read(f.data())).collect();
-    let version = frames(Message::Version).filter_map(|f| Version::read(f.data())).next_back();
-    Sensor {
-        interface: interface.to_owned(),
-        sensor,
-        output: match (clusters.len(), objects.len()) {
-            (0, 0) => Output::Nothing,
-            (c, o) if c > o => Output::Clusters,
-            _ => Output::Objects,
-        },
-        announced: clusters.len() + objects.len(),
-        scans: times.len(),
-        entries,
-        period_ms: Spread::of(times.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 / 1000.0).collect()),
-        counter_step: step(if clusters.len() > objects.len() { &clusters } else { &objects }),
-        implausible: if entries > 0 { odd as f64 / entries as f64 } else { 0.0 },
-        version: version.map(|v| v.release.map(|n| n.to_string()).join(".")),
-        state: states.last().copied(),
-        faults: faults(&states),
-        counters: *radar.counters(),
+    }
+}
+
+impl Examining {
+    fn new(interface: &str, sensor: u8, profile: &Ars408Profile) -> Self {
+        let config = Ars408Config { wanted: Ars408Wanted::ALL, profile: *profile, ..Ars408Config::sensor(sensor) };
+        Self {
+            interface: interface.to_owned(),
+            sensor,
+            feed: Feed::new(config),
+            scans: Scans::default(),
+            clusters: Vec::new(),
+            objects: Vec::new(),
+            entries: [0; 2],
+            states: Vec::new(),
+            version: None,
+            profile: *profile,
+            first: Vec::new(),
+        }
+    }
+
+    fn take(&mut self, line: &Line, frame: &CanFrame, message: Message) {
+        if self.first.len() < kind::MOST_LINES {
+            self.first.push(line.clone());
+        }
+        let scans = &mut self.scans;
+        self.feed.push(line, &mut |scan| scans.take(scan));
+        let data = frame.data();
+        if data.len() < message.length() {
+            return;
+        }
+        match message {
+            Message::ClusterStatus => self.clusters.push(cluster_status::COUNTER.get(word(data))),
+            Message::ObjectStatus => self.objects.push(object_status::COUNTER.get(word(data))),
+            Message::ClusterGeneral => self.entries[0] += 1,
+            Message::ObjectGeneral => self.entries[1] += 1,
+            Message::RadarState => self.states.extend(RadarState::read(data)),
+            Message::Version => self.version = Version::read(data).or(self.version.take()),
+            _ => {}
+        }
+    }
+
+    fn end(mut self) -> Sensor {
+        let Scans { times, entries, odd, only_rcs } = {
+            let scans = &mut self.scans;
+            self.feed.end(&mut |scan| scans.take(scan));
+            std::mem::take(scans)
+        };
+        let (clusters, objects) = (self.clusters, self.objects);
+        Sensor {
+            interface: self.interface,
+            sensor: self.sensor,
+            output: match (clusters.len(), objects.len()) {
+                // a filter may leave the status messages out
+                (0, 0) if self.entries == [0; 2] => Output::Nothing,
+                (0, 0) if self.entries[0] > self.entries[1] => Output::Clusters,
+                (c, o) if c > o => Output::Clusters,
+                _ => Output::Objects,
+            },
+            announced: clusters.len() + objects.len(),
+            scans: times.len(),
+            entries,
+            period_ms: Spread::of(times.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 / 1000.0).collect()),
+            counter_step: step(if clusters.len() > objects.len() { &clusters } else { &objects }),
+            only_rcs_dbsm: only_rcs
+                .map(|rcs| f32::from(rcs) / 2.0)
+                .filter(|rcs| *rcs < weak()[1] && entries >= TELLING),
+            rather: kind::rather(&self.first.iter().collect::<Vec<_>>(), self.sensor, &self.profile),
+            implausible: if entries > 0 { odd as f64 / entries as f64 } else { 0.0 },
+            version: self.version.map(|v| v.release.map(|n| n.to_string()).join(".")),
+            state: self.states.last().copied(),
+            faults: faults(&self.states),
+            counters: *self.feed.radar.counters(),
+        }
     }
 }
 

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use viewshed::inputs::ti::{Entries, Ti, TiConfig, TiDialect, TiFamily, TiOutcome};
 
-use super::findings::{Finding, Severity};
+use super::findings::{self, Finding, Severity};
 use crate::recording::ReadOptions;
-use crate::recording::ti::{MAGIC, feed, flaw, flaws, learn};
+use crate::recording::capture::weak;
+use crate::recording::ti::{MAGIC, feed, flaw, flaws, learn, of_cars, records_of_cars};
 
 /// What is said of a capture.
 #[derive(Debug, Serialize)]
@@ -31,6 +32,9 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
+/// Points that tell that a value never changes.
+const TELLING: usize = 50;
+
 /// Judges a capture, by the header and the dialect that are known or else by what can be learnt.
 pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
     let family = known.ti_header.or_else(|| learn(bytes));
@@ -50,6 +54,7 @@ pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
         counters: BTreeMap::new(),
         findings: Vec::new(),
     };
+    let mut only_ratio = None;
     if let Some(family) = family {
         let mut radar = Ti::<1024>::new(TiConfig { family: Some(family), dialect });
         feed(&mut radar, bytes, |outcome| match outcome {
@@ -57,14 +62,36 @@ pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
                 report.scans += 1;
                 report.empty_scans += usize::from(s.detections.is_empty());
                 report.points += s.detections.len();
-                report.points_with_snr += s.detections.iter().filter(|d| d.snr_half_db.is_some()).count();
+                for ratio in s.detections.iter().filter_map(|d| d.snr_half_db) {
+                    report.points_with_snr += 1;
+                    let same = report.points_with_snr == 1 || only_ratio == Some(ratio);
+                    only_ratio = Some(ratio).filter(|_| same);
+                }
             }
             TiOutcome::Broken(why) => *report.broken.entry(flaw(why)).or_default() += 1,
             _ => {}
         });
         report.counters = flaws(radar.counters()).into_iter().collect();
     }
-    report.findings = judge(&report, family, dialect.entries);
+    report.findings = match records_of_cars(bytes) {
+        Some(size) => {
+            let [what, remedy] = of_cars(size);
+            vec![Finding { severity: Severity::Error, what, remedy }]
+        }
+        None => judge(&report, family, dialect.entries),
+    };
+    if let Some(raw) = only_ratio.filter(|raw| f32::from(*raw) / 2.0 < weak()[0] && report.points_with_snr >= TELLING) {
+        findings::add(
+            &mut report.findings,
+            Severity::Warning,
+            format!(
+                "the signal-to-noise ratio of all {} points is {} dB, below the gate: it is not filled",
+                report.points_with_snr,
+                f32::from(raw) / 2.0
+            ),
+            "look for the firmware's side information; until then it is taken as not measured",
+        );
+    }
     report
 }
 

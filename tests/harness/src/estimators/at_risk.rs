@@ -1,6 +1,7 @@
 //! `radar-3d-risk`: the map of `radar-3d` with bits that keep a risk, by a unit's table of probabilities.
 
 use viewshed::map::polar::PolarGeometry;
+use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::probability::Quantiser;
 use viewshed::sensor::road::RoadPoint;
@@ -30,6 +31,11 @@ impl VisibilityMap for AtRisk {
     fn at(&self, point: RoadPoint) -> CellState {
         self.quantiser.of_point(&self.grid, [RANGES, AZIMUTHS], self.inner.map().at(point), point).0
     }
+
+    fn cells_in(&self, _: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        // its table asks of points only
+        visit(CellState::UNKNOWN);
+    }
 }
 
 impl Estimator for AtRisk {
@@ -39,6 +45,10 @@ impl Estimator for AtRisk {
 
     fn reset(&mut self) {
         self.inner.reset();
+    }
+
+    fn is_settled(&self) -> bool {
+        self.inner.is_settled()
     }
 
     fn step(&mut self, frame: &Frame) {
@@ -81,6 +91,10 @@ mod tests {
                 ..0 => CellState::UNKNOWN,
                 _ => CellState { visibility: Visibility::Visible, grade, occupancy: 0, occupied: false },
             }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

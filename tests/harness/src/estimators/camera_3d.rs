@@ -105,7 +105,7 @@ impl Estimator for Driver {
         let (boxes, named) = vehicles(own);
         self.no_vehicle += (own.boxes.len() - named) as u64;
         let refused = own.refused + (named - boxes.len()) as u64;
-        let status = FrameStatus { fault: false, refused: u16::try_from(refused).unwrap_or(u16::MAX) };
+        let status = FrameStatus { refused: u16::try_from(refused).unwrap_or(u16::MAX), ..FrameStatus::default() };
         self.state.process(&self.parameters, time(frame.time_ns), &boxes, status, &mut self.map);
     }
 
@@ -172,7 +172,7 @@ mod tests {
     }
 
     fn frame(time_ns: i64) -> Frame {
-        Frame { time_ns, detections: Vec::new(), refused: 0, fault: false }
+        Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: 0, fault: false }
     }
 
     /// A truck to the left: 12 x 2.5 x 4 m, its rear at 40 m, 3 m to the left.

@@ -3,6 +3,7 @@
 use anyhow::{Result, anyhow, ensure};
 use viewshed::fixed::time::Time;
 use viewshed::fusion::{FusedCell, Fusion, FusionConfig, MOST_SENSORS};
+use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 
@@ -104,5 +105,9 @@ impl Estimator for Fused {
 impl VisibilityMap for Fused {
     fn at(&self, point: RoadPoint) -> CellState {
         self.road.at(self.now).at(point)
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        self.road.at(self.now).cells_in(area, visit);
     }
 }

@@ -8,30 +8,29 @@ mod radar_2d;
 pub mod radar_3d;
 mod reference;
 mod site;
+pub mod usable;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use viewshed::camera::Camera3dConfig;
 use viewshed::fixed::time::Time;
-use viewshed::frame::detection::{Detection, Measurement, NotADetection};
+use viewshed::frame::detection::{Detection, NotADetection};
 use viewshed::frame::gate::{Rejection, Rejections};
 use viewshed::frame::health::FrameStatus;
+use viewshed::grid::settling::SettlingConfig;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::obstacles::lanes;
 use viewshed::radar_2d::{Radar2dConfig, Radar2dReading};
 use viewshed::radar_3d::Radar3dConfig;
 use viewshed::sensor::Sensor;
-use viewshed::sensor::field_of_view::FieldOfView;
-use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::azimuths;
 use crate::geometry::ground::Ground;
 use crate::geometry::polyline::spaced;
-use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording::{Frame, RadarDetection, Recording};
+use crate::recording::{Frame, Recording};
 
 /// A visibility estimator as the harness drives it: one radar frame in, one map out.
 pub trait Estimator: Send {
@@ -74,6 +73,12 @@ pub trait Estimator: Send {
     /// What was rejected or dropped since construction, by reason.
     fn counters(&self) -> Vec<(&'static str, u64)> {
         Vec::new()
+    }
+
+    /// Whether its map has [settled](viewshed::grid::settling): nothing of it is unknown because the unit has just started, or
+    /// frames were missing.
+    fn is_settled(&self) -> bool {
+        true
     }
 
     /// Azimuth's noise that it now works with, degrees, where that is learnt and not the configured one.
@@ -259,6 +264,8 @@ impl Options {
 /// Most detections a frame that storage is compiled for.
 pub const MOST_DETECTIONS: usize = 4096;
 
+pub use crate::recording::sensor::{mount, sensor};
+pub use crate::recording::usable::{ABSURD, DROPPED, NO_RANGE, NOT_FINITE, measurement};
 pub use before::Before;
 pub use radar_2d::MOST_RANGE_M;
 pub use radar_3d::Grid;
@@ -303,7 +310,7 @@ pub fn all(recording: &Recording, options: &Options) -> Result<Vec<Box<dyn Estim
 /// What a unit in a recording's place is given: its sensor, and all that is said of it and of the site.
 ///
 /// # Errors
-/// A field of view that grids here do not cover; heights that are none.
+/// A field of view that grids here do not cover; points of which [none can be used](usable::check); heights that are none.
 pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3dConfig)> {
     let (sensor, max_detections) = radar(recording, options)?;
     let mut config = options.radar_3d;
@@ -316,6 +323,9 @@ pub fn unit(recording: &Recording, options: &Options) -> Result<(Sensor, Radar3d
         config.ground = given(&ground, options.ground_error)?.kept();
     }
     config.lanes = kept(&options.lanes);
+    if recording.sensor.frames_independent {
+        config.settling = SettlingConfig::AT_ONCE;
+    }
     Ok((sensor, config))
 }
 
@@ -379,41 +389,8 @@ fn radar(recording: &Recording, options: &Options) -> Result<(Sensor, u16)> {
             view.range_m[0]
         );
     }
+    usable::check(recording, options)?;
     Ok((sensor(recording, &options.noise), max_detections))
-}
-
-/// The recording's sensor as the library takes it.
-pub fn sensor(recording: &Recording, noise: &NoiseConfig) -> Sensor {
-    let view = recording.sensor.field_of_view;
-    let degrees = |v: f64| v.to_degrees() as f32;
-    let mut mount = mount(&recording.pose);
-    // above the road below it
-    mount.height_m -= recording.ground.height(recording.pose.position[0]) as f32;
-    Sensor {
-        mount,
-        field_of_view: FieldOfView {
-            azimuth_min_deg: degrees(view.azimuth_rad[0]),
-            azimuth_max_deg: degrees(view.azimuth_rad[1]),
-            elevation_min_deg: degrees(view.elevation_rad[0]),
-            elevation_max_deg: degrees(view.elevation_rad[1]),
-            range_min_m: view.range_m[0] as f32,
-            range_max_m: view.range_m[1] as f32,
-        },
-        noise: *noise,
-    }
-}
-
-/// Where a sensor hangs, as the library takes it.
-pub fn mount(pose: &SensorPose) -> Mount {
-    let [x, y, z] = pose.position;
-    Mount {
-        x_m: x as f32,
-        y_m: y as f32,
-        height_m: z as f32,
-        yaw_deg: pose.yaw_rad().to_degrees() as f32,
-        pitch_deg: pose.pitch_rad().to_degrees() as f32,
-        roll_deg: pose.roll_rad().to_degrees() as f32,
-    }
 }
 
 /// A polar map's cells, for pictures and for judging on them.
@@ -426,24 +403,6 @@ fn polar_cells<const R: usize, const A: usize>(map: &PolarMap<R, A>) -> PolarCel
         narrow: g.narrow.to_bytes(),
         cell_m: f64::from(g.cell_cm) / 100.0,
         cell: Box::new(|a, r| map.cell(a, r)),
-    }
-}
-
-/// Why a point is no detection, as reports say it.
-pub const DROPPED: &str = "dropped when read";
-pub const NOT_FINITE: &str = "not finite";
-pub const NO_RANGE: &str = "range not measurable";
-pub const ABSURD: &str = "absurd";
-
-/// A recorded detection as the library takes it.
-pub fn measurement(d: &RadarDetection) -> Measurement {
-    Measurement {
-        range_m: d.range_m,
-        azimuth_rad: d.azimuth_rad,
-        elevation_rad: d.elevation_rad,
-        radial_velocity_mps: d.radial_velocity_mps,
-        rcs_dbsm: d.rcs_dbsm,
-        snr_db: d.snr_db,
     }
 }
 
@@ -461,6 +420,7 @@ impl Intake {
     pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection], FrameStatus) {
         self.detections.clear();
         let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
+        let unwanted = u16::try_from(frame.unwanted).unwrap_or(u16::MAX);
         self.dropped += frame.refused;
         for d in &frame.detections {
             let why = match Detection::new(&measurement(d)) {
@@ -478,7 +438,7 @@ impl Intake {
             }
         }
         let micros = u64::try_from(frame.time_ns / 1000).unwrap_or(0);
-        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused })
+        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused, unwanted })
     }
 
     fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {
@@ -495,6 +455,7 @@ impl Intake {
 mod tests {
     use super::*;
     use crate::evaluation::samples::by_hand::recording;
+    use crate::recording::RadarDetection;
 
     /// Options of a site of which all is said.
     fn all_said() -> Options {

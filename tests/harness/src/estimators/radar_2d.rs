@@ -1,6 +1,7 @@
 //! `radar-2d` and `radar-2d-first`: the two readings of the conventional grid.
 
 use anyhow::Result;
+use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading};
 use viewshed::sensor::Sensor;
@@ -48,6 +49,10 @@ pub fn new(
 impl<const D: usize> VisibilityMap for Driver<D> {
     fn at(&self, point: RoadPoint) -> CellState {
         self.state.map(&self.parameters, self.reading).at(point)
+    }
+
+    fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        self.state.map(&self.parameters, self.reading).cells_in(area, visit);
     }
 }
 

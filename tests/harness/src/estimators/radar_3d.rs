@@ -4,6 +4,7 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use viewshed::fixed::time::Time;
 use viewshed::fixed::trig::Direction;
+use viewshed::frame::health::Condition;
 use viewshed::map::VisibilityMap;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::radar_3d::{Radar3d, Radar3dConfig, Radar3dParameters};
@@ -71,6 +72,7 @@ struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, co
     mount: Mount,
     intake: Intake,
     no_room: u32,
+    is_settled: bool,
     /// What was counted before the recording that is judged.
     counted_before: Vec<(&'static str, u64)>,
 }
@@ -152,7 +154,17 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let map = Box::new(parameters.map());
         let (state, intake) = (Box::new(Radar3d::new()), Intake::default());
         let (name, mount) = (name.to_owned(), sensor.mount);
-        Ok(Self { name, parameters, state, map, mount, intake, no_room: 0, counted_before: Vec::new() })
+        Ok(Self {
+            name,
+            parameters,
+            state,
+            map,
+            mount,
+            intake,
+            no_room: 0,
+            is_settled: false,
+            counted_before: Vec::new(),
+        })
     }
 
     /// A place ahead of the sensor and to its left, in road coordinates, metres.
@@ -196,6 +208,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let (now, detections, status) = self.intake.take(frame);
         let report = self.state.process(&self.parameters, now, detections, status, &mut self.map);
         self.no_room = report.obstacles_dropped;
+        self.is_settled = report.condition != Condition::Settling;
     }
 
     fn map(&self) -> &dyn VisibilityMap {
@@ -232,6 +245,10 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let all = self.intake.counters(self.state.rejections()).into_iter().chain(full);
         let before = |name| self.counted_before.iter().find(|(of, _)| *of == name).map_or(0, |(_, n)| *n);
         all.map(|(name, n)| (name, n - before(name))).filter(|(_, n)| *n > 0).collect()
+    }
+
+    fn is_settled(&self) -> bool {
+        self.is_settled
     }
 
     fn azimuth_noise_deg(&self) -> Option<f64> {
@@ -299,6 +316,7 @@ mod tests {
             time_ns: 1_000_000_000 + k * 66_000_000,
             detections: (0..vehicles).map(detection).collect(),
             refused: 0,
+            unwanted: 0,
             fault: false,
         }
     }

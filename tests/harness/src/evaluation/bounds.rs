@@ -20,7 +20,9 @@ pub fn slice(samples: &[FrameSamples]) -> Score {
         tally
     };
     let mut score = row(SLICE, samples, |s| s.slice_in_sight);
-    score.cells = samples.iter().map(cells).collect();
+    // where none was judged one tally is as good as many
+    let judged = samples.iter().any(|frame| !frame.cells.is_empty());
+    score.cells = samples.iter().take(if judged { samples.len() } else { 1 }).map(cells).collect();
     score
 }
 
@@ -31,6 +33,8 @@ pub fn boxes(samples: &[FrameSamples]) -> Score {
 
 fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool) -> Score {
     let verdict = |s| Verdict { visible: in_sight(s), grade: None };
+    let judged = samples.iter().any(|frame| !frame.objects.is_empty());
+    let samples = if judged { samples } else { &[] };
     Score {
         name: name.to_owned(),
         grid: Grid::Cartesian,
@@ -40,5 +44,26 @@ fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool)
         counters: Vec::new(),
         azimuth_noise_deg: None,
         learnt_lanes: None,
+        settled: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::by_hand::sample;
+    use super::*;
+
+    #[test]
+    fn frames_without_anything_to_judge_are_no_rows_of_their_own() {
+        let mut samples = vec![FrameSamples { counted: true, ..FrameSamples::default() }; 1000];
+        for score in [slice(&samples), boxes(&samples)] {
+            assert!(score.cells.len() <= 1 && score.verdicts.is_empty());
+        }
+        assert_eq!(slice(&samples).cells.len(), 1, "cells were judged, and there were none");
+        samples[7].objects.push(sample(0, 50.0, true, true));
+        samples[8].cells.push(((9, 0), true));
+        let score = slice(&samples);
+        assert_eq!((score.cells.len(), score.verdicts.len(), score.verdicts[7].len()), (1000, 1000, 1));
+        assert_eq!(score.cell_counts().clear, 1);
     }
 }

@@ -288,6 +288,7 @@ fn larger(solid: &Solid) -> Solid {
 
 #[cfg(test)]
 mod tests {
+    use viewshed::map::query::Footprint;
     use viewshed::map::{CellState, Visibility, VisibilityMap};
 
     use super::super::samples::by_hand::recording;
@@ -326,6 +327,10 @@ mod tests {
                 false => Visibility::Visible,
             };
             CellState { visibility, grade: 0, occupancy: 0, occupied: false }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

@@ -6,6 +6,8 @@
 //! point; choosing at random between two settings reaches every point of the chord between theirs,
 //! so what can be had is the lower convex hull of all settings ([`Envelope`]).
 
+use std::ops::{Deref, DerefMut};
+
 use serde::Serialize;
 
 /// Grades 0..=255, and one place for unknown.
@@ -14,17 +16,37 @@ pub const GRADE_SLOTS: usize = 257;
 /// How often each grade was given where the truth says visible, and where it says not.
 ///
 /// Truth: detected or not for objects, in sight or blocked for cells.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Grades {
-    pub positive: Box<[u64; GRADE_SLOTS]>,
-    pub negative: Box<[u64; GRADE_SLOTS]>,
+    pub positive: Slots,
+    pub negative: Slots,
 }
 
-impl Default for Grades {
-    fn default() -> Self {
-        Self { positive: Box::new([0; GRADE_SLOTS]), negative: Box::new([0; GRADE_SLOTS]) }
+/// A count for each grade. Of frames most are empty, and take no memory.
+#[derive(Debug, Clone, Default)]
+pub struct Slots(Option<Box<[u64; GRADE_SLOTS]>>);
+
+impl Deref for Slots {
+    type Target = [u64; GRADE_SLOTS];
+
+    fn deref(&self) -> &Self::Target {
+        self.0.as_deref().unwrap_or(&[0; GRADE_SLOTS])
     }
 }
+
+impl DerefMut for Slots {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        self.0.get_or_insert_with(|| Box::new([0; GRADE_SLOTS]))
+    }
+}
+
+impl PartialEq for Slots {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl Eq for Slots {}
 
 impl Grades {
     /// `grade` is `None` where unknown: not visible at any threshold.
@@ -35,6 +57,9 @@ impl Grades {
 
     pub fn add_times(&mut self, other: &Self, n: u64) {
         for (mine, theirs) in [(&mut self.positive, &other.positive), (&mut self.negative, &other.negative)] {
+            if theirs.0.is_none() {
+                continue;
+            }
             mine.iter_mut().zip(theirs.iter()).for_each(|(a, b)| *a += b * n);
         }
     }
@@ -135,6 +160,16 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn grades_that_were_never_given_take_no_memory() {
+        let mut grades = Grades::default();
+        grades.add_times(&Grades::default(), 3);
+        assert!(grades.is_empty() && grades.positive.0.is_none() && grades.negative.0.is_none());
+        grades.add(true, Some(200));
+        assert_eq!((grades.positive[200], grades.positive[0], grades.negative[200]), (1, 0, 0));
+        assert!(grades.negative.0.is_none() && grades != Grades::default());
+    }
 
     #[test]
     fn a_higher_threshold_never_makes_more_visible() {

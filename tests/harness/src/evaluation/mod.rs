@@ -24,7 +24,6 @@ pub mod over_time;
 pub mod paired;
 pub mod pool;
 pub mod probability;
-pub mod rejected;
 pub mod replay;
 pub mod returns;
 pub mod samples;

@@ -35,6 +35,9 @@ struct Second {
     cells: Vec<CellTally>,
 }
 
+/// A pause that is a leap of the clock, nanoseconds.
+const LEAP_NS: i64 = 3600 * BLOCK_NS;
+
 impl Seconds {
     /// Sums up what was scored; `samples` lie in the recording's order.
     pub fn new(mut recording: Recording, samples: &[FrameSamples], mut scores: Vec<Score>) -> Self {
@@ -42,11 +45,19 @@ impl Seconds {
         let frames = std::mem::take(&mut recording.frames);
         let start = frames.first().map_or(0, |f| f.time_ns);
         let mut seconds: Vec<Second> = Vec::new();
+        // a leap of the clock is no time: what follows it is counted from the next second on
+        let (mut skipped_ns, mut before_ns) = (0_i64, start);
         for (k, (frame, sample)) in frames.iter().zip(samples).enumerate() {
+            let pause_ns = frame.time_ns.saturating_sub(before_ns);
+            if pause_ns > LEAP_NS {
+                skipped_ns = skipped_ns.saturating_add(pause_ns - BLOCK_NS);
+            }
+            before_ns = frame.time_ns;
             if !sample.counted {
                 continue;
             }
-            let at = usize::try_from(frame.time_ns.saturating_sub(start) / BLOCK_NS).unwrap_or(0);
+            let since_ns = frame.time_ns.saturating_sub(start).saturating_sub(skipped_ns);
+            let at = usize::try_from(since_ns / BLOCK_NS).unwrap_or(0);
             if seconds.len() <= at {
                 let empty = Second {
                     verdicts: vec![Vec::new(); scores.len()],
@@ -64,7 +75,7 @@ impl Seconds {
                 s
             }));
             for (i, score) in scores.iter().enumerate() {
-                second.verdicts[i].extend_from_slice(&score.verdicts[k]);
+                second.verdicts[i].extend(score.verdicts.get(k).into_iter().flatten());
                 if let Some(tally) = score.cells.get(k) {
                     second.cells[i].counts += tally.counts;
                     second.cells[i].grades.add_times(&tally.grades, 1);
@@ -91,7 +102,13 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
     let mut scores: Vec<Score> = first
         .scores
         .iter()
-        .map(|s| Score { counters: Vec::new(), azimuth_noise_deg: None, learnt_lanes: None, ..s.clone() })
+        .map(|s| Score {
+            counters: Vec::new(),
+            azimuth_noise_deg: None,
+            learnt_lanes: None,
+            settled: Vec::new(),
+            ..s.clone()
+        })
         .collect();
     for part in parts {
         let known = tracks.len();
@@ -109,6 +126,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
                 time_ns: frames.len() as i64 * BLOCK_NS,
                 detections: Vec::new(),
                 refused: 0,
+                unwanted: 0,
                 fault: false,
             });
             counted += second.frames;

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::Options;
 use super::camera;
-use super::rejected;
 use super::samples::{self, FrameSamples};
 use super::score::{Score, score};
 use super::summary::Summary;
@@ -28,7 +27,7 @@ pub struct Replay {
 impl Replay {
     /// Runs estimators over a recording. `progress` is called after each of [`steps`].
     pub fn new(
-        mut recording: Recording,
+        recording: Recording,
         estimators: &mut [Box<dyn Estimator>],
         options: &Options,
         progress: &(dyn Fn() + Sync),
@@ -38,7 +37,6 @@ impl Replay {
             .par_iter_mut()
             .map(|e| score(e.as_mut(), &recording, &samples, options.grid, &|| progress()))
             .collect();
-        rejected::report(&mut recording, &scores);
         let summary = Summary::new(&recording, &samples, &scores, options);
         Self { recording, samples, scores, summary, camera: None }
     }

@@ -143,7 +143,7 @@ fn frame_samples(
     let mut samples = Vec::new();
     for (k, object) in objects.iter().enumerate() {
         let [x, y, _] = object.solid.center;
-        let slow = object.speed().is_some_and(|v| v < options.min_speed_mps);
+        let slow = object.slower_than(options.min_speed_mps);
         if slow || !recording.sensor.field_of_view.contains(pose.to_spherical(above(ground, [x, y], height))) {
             continue;
         }
@@ -368,7 +368,13 @@ pub mod by_hand {
             },
             pose: SensorPose::new([0.0, 0.0, 6.0], 0.0, 0.0, 0.0),
             frames: (0..frames)
-                .map(|k| Frame { time_ns: k as i64 * PERIOD_NS, detections: Vec::new(), refused: 0, fault: false })
+                .map(|k| Frame {
+                    time_ns: k as i64 * PERIOD_NS,
+                    detections: Vec::new(),
+                    refused: 0,
+                    unwanted: 0,
+                    fault: false,
+                })
                 .collect(),
             ground: Ground::default(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),

@@ -34,6 +34,18 @@ pub struct Score {
     pub azimuth_noise_deg: Option<f64>,
     /// Places at which it has learnt a lane until the end; `None` of several recordings together.
     pub learnt_lanes: Option<usize>,
+    /// Whether its map had settled, by frame; empty where that is not known.
+    pub settled: Vec<bool>,
+}
+
+/// The frames whose map had settled, and what is counted in them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Settled {
+    pub frames: usize,
+    /// Counted frames in all.
+    pub of: usize,
+    pub counts: Counts,
+    pub cells: CellCounts,
 }
 
 impl Score {
@@ -45,6 +57,24 @@ impl Score {
             }
         }
         counts
+    }
+
+    /// What is left without the frames whose map had not settled; `None` where all had.
+    pub fn settled(&self, samples: &[FrameSamples]) -> Option<Settled> {
+        let counted: Vec<usize> = (0..samples.len()).filter(|k| samples[*k].counted).collect();
+        let has_settled = |k: &usize| self.settled.get(*k).copied().unwrap_or(true);
+        if counted.iter().all(has_settled) {
+            return None;
+        }
+        let mut settled = Settled { of: counted.len(), ..Settled::default() };
+        for k in counted.into_iter().filter(has_settled) {
+            settled.frames += 1;
+            for (sample, verdict) in samples[k].objects.iter().zip(self.verdicts.get(k).into_iter().flatten()) {
+                settled.counts.add(verdict.visible, sample.detected);
+            }
+            settled.cells += self.cells.get(k).map(|tally| tally.counts).unwrap_or_default();
+        }
+        Some(settled)
     }
 
     pub fn cell_counts(&self) -> CellCounts {
@@ -63,14 +93,21 @@ pub fn score(
     progress: &dyn Fn(),
 ) -> Score {
     let mut judged_on = grid;
-    let mut verdicts = Vec::with_capacity(samples.len());
-    let mut cells = Vec::with_capacity(samples.len());
+    let (mut verdicts, mut cells) = (Vec::new(), Vec::new());
+    let mut settled = Vec::with_capacity(samples.len());
+    // hours without labels have nothing to be judged frame by frame
+    let judged = samples.iter().any(|sample| !sample.objects.is_empty() || !sample.cells.is_empty());
+    cells.extend((!judged && !samples.is_empty()).then(CellTally::default));
     for (frame, sample) in recording.frames.iter().zip(samples) {
         if recording.sensor.frames_independent {
             estimator.reset();
         }
         estimator.step(frame);
         progress();
+        settled.push(estimator.is_settled());
+        if !judged {
+            continue;
+        }
         let mut judge = |object: &Sample| {
             let map = estimator.map();
             if grid == Grid::Polar && estimator.polar().is_some() {
@@ -91,6 +128,7 @@ pub fn score(
         counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
         azimuth_noise_deg: estimator.azimuth_noise_deg(),
         learnt_lanes: Some(estimator.learnt_lanes().len()),
+        settled,
     }
 }
 
@@ -154,6 +192,10 @@ mod tests {
                 _ => CellState { visibility: Visibility::Invisible, grade, occupancy: 0, occupied: false },
             }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     #[test]
@@ -199,6 +241,7 @@ pub mod by_hand {
             counters: Vec::new(),
             azimuth_noise_deg: None,
             learnt_lanes: None,
+            settled: Vec::new(),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::comparison::{Comparison, compare};
 use super::counts::Counts;
 use super::curve::{CurvePoint, Grades, trade_off};
 use super::samples::FrameSamples;
-use super::score::Score;
+use super::score::{Score, Settled};
 use super::units::{RUN_BLOCKS, Units};
 use super::{Grid, Options};
 use crate::recording::Recording;
@@ -41,6 +41,8 @@ pub struct Row {
     pub azimuth_noise_deg: Option<f64>,
     /// Places at which it has learnt a lane; `None` of several recordings together.
     pub learnt_lanes: Option<usize>,
+    /// Without the frames whose map had not settled, where there are any.
+    pub settled: Option<Settled>,
     /// Counts of each object unit, and of each block: what is drawn again.
     pub by_unit: Vec<Counts>,
     pub by_block: Vec<CellCounts>,
@@ -120,9 +122,13 @@ impl Summary {
         options: &Options,
     ) -> Self {
         let units = Units::new(recording, samples);
-        let object_draws = Draws::new(units.object_units, options.bootstrap, options.seed);
+        // without anything judged there is no rate to have an interval
+        let judged = samples.iter().any(|frame| !frame.objects.is_empty())
+            || scores.iter().any(|s| s.cells.iter().any(|cells| cells.counts != CellCounts::default()));
+        let repetitions = if judged { options.bootstrap } else { 0 };
+        let object_draws = Draws::new(units.object_units, repetitions, options.seed);
         let block_seed = options.seed.wrapping_add(BLOCK_SEED);
-        let block_draws = Draws::in_runs(units.block_units, RUN_BLOCKS, options.bootstrap, block_seed);
+        let block_draws = Draws::in_runs(units.block_units, RUN_BLOCKS, repetitions, block_seed);
         let boxes = bounds::boxes(samples);
         let drawn = |score: &Score| {
             let by_unit = units.by_object(|counts: &mut Counts, frame, object| {
@@ -157,6 +163,7 @@ impl Summary {
                 counters: score.counters.clone(),
                 azimuth_noise_deg: score.azimuth_noise_deg,
                 learnt_lanes: score.learnt_lanes,
+                settled: score.settled(samples),
                 by_unit: drawn.by_unit.clone(),
                 by_block: drawn.by_block.clone(),
             }

@@ -3,6 +3,7 @@
 pub mod azimuths;
 pub mod ground;
 pub mod heading;
+pub mod looks;
 pub mod polygon;
 pub mod polyline;
 pub mod pose;

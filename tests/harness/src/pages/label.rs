@@ -1,5 +1,6 @@
 //! What the page of `viewshed label` asks for, one answer a path.
 
+use std::io::Write;
 use std::sync::{Arc, OnceLock};
 
 use anyhow::Result;
@@ -62,7 +63,8 @@ impl Labelling {
             let found = serde_json::to_vec(&propose(&worker.recording, &|_| ()));
             let _ = worker.proposals.set(found.unwrap_or_else(|_| b"[]".to_vec()));
             if let Err(error) = worker.maps.fill(&worker.recording, &options) {
-                eprintln!("no estimated visibility: {error:#}");
+                // where nobody reads it, nobody is told
+                let _ = writeln!(std::io::stderr(), "no estimated visibility: {error:#}");
             }
         });
         Ok(this)

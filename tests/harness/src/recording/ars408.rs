@@ -1,62 +1,144 @@
 //! Recordings from CAN logs of an ARS408 or one of its kin.
 
-use std::collections::BTreeMap;
-
 use anyhow::{Result, bail};
 use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile::Ars408Profile;
-use viewshed::inputs::ars408::{Ars408, Ars408Config, Ars408Counters, Ars408Outcome};
+use viewshed::inputs::ars408::{Ars408Config, Ars408Counters};
 
-use super::can_log::{self, Format, Line};
+use super::ars408_feed::{Feed, classic};
+use super::can_log::log::{Found, Lines, Log};
+use super::can_log::{Format, Line};
 use super::capture::{self, Kind};
-use super::problems::Problems;
-use super::{Frame, ReadOptions, Recording, native};
+use super::problems::{POINTS, Problems};
+use super::{Frame, ReadOptions, Recording, kind, native};
 
 /// Entries of a scan that are kept; clones announce more than 255.
 const MOST_ENTRIES: usize = 1024;
 
-/// Reads the scans of one sensor.
+/// Beyond the time asked for, what is read to make the last scan whole and to find lines that come late, seconds.
+const MORE_S: f64 = 3.0;
+
+/// Scans closer together than this are of a log whose times are in another unit than its format says, milliseconds: these
+/// radars send one about every 70.
+const LEAST_PERIOD_MS: f64 = 7.0;
+
+/// Reads the scans of one sensor; of a log that goes on beyond the time asked for only what is needed.
 ///
 /// # Errors
-/// No scan of such a radar, or several sensors and none named, or no such interface.
-pub fn read(name: String, bytes: &[u8], format: Format, options: &ReadOptions) -> Result<Recording> {
-    let mut problems = Problems::default();
-    let lines = can_log::read(bytes, format, options.interface.as_deref(), &mut problems)?;
-    let native = native::of_log(&lines);
-    if !native.is_empty() && !lines.iter().any(|l| sensor_of(l).is_some()) {
-        return native::read(name, &native, 0, options);
+/// No scan of such a radar, or several sensors and none named, or no such interface; times that cannot be.
+pub fn read(name: &str, found: &Found, options: &ReadOptions) -> Result<(Recording, Option<String>)> {
+    // what comes first may be of no use: then all of it is read
+    if options.to_s.is_some()
+        && let Ok((recording, damage, whole)) = read_up_to(name, found, options, options.to_s)
+        && (whole || recording.duration_s() >= options.to_s.unwrap_or(0.0))
+    {
+        return Ok((recording, damage));
     }
-    let (interface, sensor) = choose(&name, &lines, options)?;
-    let mine: Vec<&Line> = lines.iter().filter(|line| line.interface == interface).collect();
-    let elsewhere = lines.iter().filter(|l| l.interface != interface && sensor_of(l) == Some(sensor)).count();
-    let start = mine.first().map_or(0, |l| l.time_ns);
-    problems.add_many(
-        &interface,
-        "frames of the same sensor id on another interface, left out",
-        start,
-        elsewhere as u64,
-    );
+    let (recording, damage, _) = read_up_to(name, found, options, None)?;
+    Ok((recording, damage))
+}
+
+/// Reads up to a time after the first radar frame; and whether that was all of the log.
+fn read_up_to(
+    name: &str,
+    found: &Found,
+    options: &ReadOptions,
+    to_s: Option<f64>,
+) -> Result<(Recording, Option<String>, bool)> {
+    let mut problems = Problems::default();
+    let (mut heard, mut native, mut begin, mut whole) = (Heard::default(), false, None, true);
+    let log = found.clone().read(options.interface.as_deref(), &mut problems, &mut |line| {
+        let of_native = native::message(line).is_some();
+        native |= of_native;
+        let sensor = sensor_of(line);
+        if let Some(sensor) = sensor {
+            heard.add(&line.interface, sensor);
+        }
+        if begin.is_none() && (of_native || sensor.is_some_and(|s| options.sensor_id.is_none_or(|id| id == s))) {
+            begin = Some(line.time_ns);
+        }
+        let passed = begin.map_or(0.0, |begin| line.time_ns.saturating_sub(begin) as f64 * 1e-9);
+        let enough = to_s.is_some_and(|to_s| passed > to_s + MORE_S);
+        whole &= !enough;
+        enough
+    })?;
+    let damage = log.damage().map(str::to_owned);
+    if log.stands_still() {
+        bail!("{name}: all frames bear the same time, so no map can be made: log them with times, in microseconds");
+    }
+    if native && heard.0.is_empty() {
+        return Ok((native::read(name.to_owned(), &native::of_log(&log), 0, options)?, damage, whole));
+    }
+    let recording = of_log(name, &log, &heard, problems, options)?;
+    Ok((recording, damage, whole))
+}
+
+fn of_log(name: &str, log: &Log, heard: &Heard, mut problems: Problems, options: &ReadOptions) -> Result<Recording> {
+    let (interface, sensor) = choose(name, heard, options)?;
+    let elsewhere = heard.0.iter().filter(|(i, s, _)| *i != interface && *s == sensor).map(|(.., n)| n).sum::<u64>();
     let profile = *options.profile.unwrap_or(&Ars408Profile::ARS408);
-    let mut radar = Ars408::<MOST_ENTRIES>::new(Ars408Config { profile, ..Ars408Config::sensor(sensor) });
-    let mut frames = Vec::new();
-    scans(&mut radar, &mine, |scan| {
+    let usual = Ars408Config::sensor(sensor);
+    let wanted = options.wanted.unwrap_or(usual.wanted);
+    let mut feed = Feed::<MOST_ENTRIES>::new(Ars408Config { profile, wanted, ..usual });
+    let (mut frames, mut start, mut flexible, mut first) = (Vec::new(), None, 0, Vec::new());
+    let mut take = |scan: &RadarScan<'_>| {
         if scan.fault {
             problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
+        }
+        if scan.unwanted > 0 && scan.detections.is_empty() {
+            problems.add(
+                &interface,
+                "scan of which every entry was left out: it says nothing of the road",
+                nanoseconds(scan.time),
+            );
         }
         let detections = scan.detections.iter().map(capture::detection).collect();
         frames.push(Frame {
             time_ns: nanoseconds(scan.time),
             detections,
             refused: scan.refused.into(),
+            unwanted: scan.unwanted.into(),
             fault: scan.fault,
         });
+    };
+    log.each(&mut |line| {
+        if line.interface == interface {
+            start.get_or_insert(line.time_ns);
+            if first.len() < kind::MOST_LINES {
+                first.push(line.clone());
+            }
+            flexible += u64::from(sensor_of(line) == Some(sensor) && line.frame().is_some_and(|frame| frame.fd));
+            feed.push(line, &mut take);
+        }
     });
+    feed.end(&mut take);
+    let start = start.unwrap_or(0);
+    problems.add_many(&interface, "frames of the same sensor id on another interface, left out", start, elsewhere);
+    problems.add_many(
+        &interface,
+        "frames that are marked as CAN FD, taken as the classic ones a radar sends",
+        start,
+        flexible,
+    );
+    if log.format() == Format::PythonCan {
+        problems.add("log", "Python-can's CSV does not say on which bus a frame was: all are taken for one bus", start);
+    }
+    let mine: Vec<&Line> = first.iter().collect();
     if frames.is_empty() {
+        if let Some(rather) = kind::rather(&mine, sensor, &profile) {
+            let what = kind::said(&format!("sensor {sensor} on {interface}"), &profile, &rather);
+            bail!("{name}: {what}; read it with --radar {}", rather.0);
+        }
         bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");
     }
-    report(&mut problems, &interface, start, radar.counters());
+    plausible_times(name, &frames)?;
+    report(&mut problems, &interface, start, feed.radar.counters());
+    if let Some(rather) = kind::rather(&mine, sensor, &profile) {
+        let what = kind::said(&format!("sensor {sensor}"), &profile, &rather);
+        problems.add(POINTS, format!("{what}; read it with --radar {}", rather.0), start);
+    }
     let kind = Kind {
         name: format!("{} {sensor} on {interface}", profile.name),
         azimuth_deg: 60.0,
@@ -64,28 +146,21 @@ pub fn read(name: String, bytes: &[u8], format: Format, options: &ReadOptions) -
         range_m: [0.2, 250.0],
         has_elevation: profile.cluster.up_cm.is_some(),
     };
-    Ok(capture::recording(name, kind, frames, problems, options))
+    Ok(capture::recording(name.to_owned(), kind, frames, problems, options))
 }
 
-/// Feeds a radar with frames; `scan` is given every scan that comes of them, to the last.
-pub fn scans<const N: usize>(radar: &mut Ars408<N>, lines: &[&Line], mut scan: impl FnMut(&RadarScan<'_>)) {
-    let mut give = |outcome: Ars408Outcome<'_>| {
-        if let Ars408Outcome::Scan(s) = outcome {
-            scan(&s);
-        }
-    };
-    let mut end = 0;
-    for line in lines {
-        let Some(frame) = line.frame() else { continue };
-        let micros = u64::try_from(line.time_ns / 1000).unwrap_or(0);
-        let now = Time::from_micros(micros);
-        // what timed out before this frame came
-        radar.poll(now).map(&mut give);
-        give(radar.push(frame, now));
-        radar.poll(now).map(&mut give);
-        end = micros;
+/// Refuses times of which no map can be made.
+fn plausible_times(name: &str, frames: &[Frame]) -> Result<()> {
+    let mut periods: Vec<i64> = frames.windows(2).map(|w| w[1].time_ns.saturating_sub(w[0].time_ns)).collect();
+    periods.sort_unstable();
+    let Some(period) = periods.get(periods.len() / 2).filter(|_| periods.len() >= 5) else { return Ok(()) };
+    let period_ms = *period as f64 * 1e-6;
+    if (0.0..LEAST_PERIOD_MS).contains(&period_ms) {
+        bail!(
+            "{name}: a scan every {period_ms:.2} ms, and these radars send one about every 70: the log's times seem to be in another unit than its format has; write them in microseconds (SavvyCAN) or seconds"
+        );
     }
-    radar.poll(Time::from_micros(end.saturating_add(10_000_000))).map(&mut give);
+    Ok(())
 }
 
 fn nanoseconds(time: Time) -> i64 {
@@ -94,22 +169,31 @@ fn nanoseconds(time: Time) -> i64 {
 
 /// The sensor whose scan a frame belongs to.
 fn sensor_of(line: &Line) -> Option<u8> {
-    let (message, sensor) = Message::of(line.frame().filter(|f| !f.fd)?.id)?;
+    let (message, sensor) = Message::of(classic(line).filter(|f| !f.fd)?.id)?;
     let scan = [Message::ClusterStatus, Message::ClusterGeneral, Message::ObjectStatus, Message::ObjectGeneral];
     scan.contains(&message).then_some(sensor)
 }
 
-/// Interface and sensor id to be read.
-fn choose(name: &str, lines: &[Line], options: &ReadOptions) -> Result<(String, u8)> {
-    let mut found: BTreeMap<(String, u8), usize> = BTreeMap::new();
-    for line in lines {
-        if let Some(sensor) = sensor_of(line) {
-            *found.entry((line.interface.clone(), sensor)).or_default() += 1;
+/// Frames of scans, by interface and sensor.
+#[derive(Default)]
+struct Heard(Vec<(String, u8, u64)>);
+
+impl Heard {
+    fn add(&mut self, interface: &str, sensor: u8) {
+        match self.0.iter_mut().find(|(i, s, _)| *s == sensor && i == interface) {
+            Some((.., n)) => *n += 1,
+            None => self.0.push((interface.to_owned(), sensor, 1)),
         }
     }
-    let listed = || found.iter().map(|((i, s), n)| format!("{s} on {i} ({n} frames)")).collect::<Vec<_>>().join(", ");
-    let wanted = found.iter().filter(|((_, sensor), _)| options.sensor_id.is_none_or(|id| id == *sensor));
-    let Some((chosen, _)) = wanted.clone().max_by_key(|(_, n)| **n) else {
+}
+
+/// Interface and sensor id to be read.
+fn choose(name: &str, heard: &Heard, options: &ReadOptions) -> Result<(String, u8)> {
+    let mut found = heard.0.clone();
+    found.sort();
+    let listed = || found.iter().map(|(i, s, n)| format!("{s} on {i} ({n} frames)")).collect::<Vec<_>>().join(", ");
+    let wanted = found.iter().filter(|(_, sensor, _)| options.sensor_id.is_none_or(|id| id == *sensor));
+    let Some((interface, sensor, _)) = wanted.clone().max_by_key(|(.., n)| *n) else {
         match options.sensor_id {
             Some(id) if !found.is_empty() => bail!("{name}: no scan of sensor {id}; sensors found: {}", listed()),
             _ => bail!(
@@ -117,10 +201,10 @@ fn choose(name: &str, lines: &[Line], options: &ReadOptions) -> Result<(String, 
             ),
         }
     };
-    if wanted.clone().any(|((_, sensor), _)| *sensor != chosen.1) {
+    if wanted.clone().any(|(_, other, _)| other != sensor) {
         bail!("{name}: several sensors: {}; choose one with --sensor-id", listed());
     }
-    Ok(chosen.clone())
+    Ok((interface.clone(), *sensor))
 }
 
 /// What the decoder counted, as problems of the input.
@@ -136,7 +220,10 @@ fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counte
         ("entry beyond those announced, refused", c.surplus),
         ("quality of an entry that did not arrive", c.unknown_entry),
         ("entry at no distance or beyond 655 m, dropped", c.no_range),
-        ("entry that the radar itself marks as predicted or invalid, left out", c.unwanted),
+        (
+            "entry that the radar itself marks as predicted, invalid (--cluster-states) or of ambiguous speed, left out",
+            c.unwanted,
+        ),
         ("entry beyond what is kept, dropped", c.overflow),
     ];
     for (what, n) in counted {
@@ -146,10 +233,13 @@ fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counte
 
 #[cfg(test)]
 mod tests {
+    use viewshed::inputs::ars408::quality::Ars408Wanted;
     use viewshed::sensor::road::RoadPoint;
 
+    use super::super::can_log::log;
     use super::*;
     use crate::estimators::{self, Options};
+    use crate::recording::file::Source;
 
     const LOG: &str = include_str!("../../../recordings/ars408-made-up.log");
 
@@ -157,7 +247,8 @@ mod tests {
     fn seen(log: &str) -> (bool, usize) {
         let mount = Some([0.0, 0.0, 5.0, 0.0, 0.03, 0.0]);
         let options = ReadOptions { sensor_id: Some(0), mount, ..ReadOptions::default() };
-        let recording = read("log".into(), log.as_bytes(), Format::Candump, &options).unwrap();
+        let found = log::find(&Source::of_bytes(log.as_bytes())).unwrap().unwrap();
+        let (recording, _) = read("log", &found, &options).unwrap();
         let mut seen = false;
         for estimator in &mut estimators::all(&recording, &Options::default()).unwrap() {
             for frame in &recording.frames {
@@ -176,5 +267,35 @@ mod tests {
         // a persistent error in every message of its state
         let faulty = LOG.replace("201#401F40", "201#401F60");
         assert_eq!(seen(&faulty), (false, 28));
+    }
+
+    /// Every cluster of the log in this state, the byte's upper five bits.
+    fn of_state(state: u8) -> String {
+        let marked = |line: &str| match line.split_once("702#") {
+            Some((before, data)) => format!("{before}702#{}{:02X}", &data[..8], state << 3 | 3),
+            None => line.to_owned(),
+        };
+        LOG.lines().map(|line| marked(line) + "\n").collect()
+    }
+
+    #[test]
+    fn a_radar_all_of_whose_clusters_are_left_out_sees_nothing_and_is_asked_for_others() {
+        // "valid cluster with azimuth correction due to elevation", and "invalid due to near-field artefact"
+        assert!(seen(&of_state(0x08)).0);
+        assert!(!seen(&of_state(0x02)).0, "neither empty nor evidence");
+        let read = |state| {
+            let wanted = Ars408Wanted::default().with_clusters([state]);
+            let options = ReadOptions { sensor_id: Some(0), wanted, ..ReadOptions::default() };
+            let found = log::find(&Source::of_bytes(of_state(0x02).as_bytes())).unwrap().unwrap();
+            read("log", &found, &options).unwrap().0
+        };
+        let (without, with) = (read(0x00), read(0x02));
+        let entries = |r: &Recording| r.frames.iter().map(|f| f.detections.len()).sum::<usize>();
+        let unwanted = |r: &Recording| r.frames.iter().map(|f| f.unwanted).sum::<u64>();
+        assert_eq!((entries(&without), unwanted(&with)), (0, 0));
+        assert_eq!(unwanted(&without), entries(&with) as u64);
+        let said: Vec<_> = without.problems.iter().map(|p| (p.what, p.count)).collect();
+        assert!(said.iter().any(|(what, n)| what.contains("left out: it says nothing") && *n == 28), "{said:?}");
+        assert!(said.iter().any(|(what, n)| what.contains("--cluster-states") && *n == unwanted(&without)), "{said:?}");
     }
 }

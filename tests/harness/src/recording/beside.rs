@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 
 use super::labels::{self, LabelClock, LabelsRead};
-use super::{Frame, ReadOptions, Recording, clock, file, plausible};
+use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, labelled, plausible, unfilled};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -16,30 +16,25 @@ pub fn files(path: &Path) -> [PathBuf; 2] {
     ["labels", "occlusion"].map(|suffix| path.with_file_name(format!("{name}.{suffix}.csv")))
 }
 
-/// Adds `NAME.labels.csv` (replaces the labels inside) and `NAME.occlusion.csv`, and cuts to the time asked for.
+/// Adds `NAME.labels.csv`, in place of the labels inside unless those are asked for, and `NAME.occlusion.csv`, and cuts to
+/// the time asked for.
 ///
 /// # Errors
-/// Files that cannot be read, and a time without frames.
+/// Files that cannot be read, labels that are asked for and not there, and a time without frames.
 pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) -> Result<Recording> {
     let [labels_csv, occlusion_csv] = files(path);
-    if labels_csv.exists() {
-        let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
-        let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
-        let LabelsRead { mut labels, sized_by_class, turned_by_path, clock: labels_clock } =
-            labels::read_labels(&labels_csv, start_ns, end_ns)?;
-        labels::check_places(&labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
-        // they say nothing of heights
-        labels.iter_mut().for_each(|label| recording.ground.lift(&mut label.solid));
-        let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if labels_clock == LabelClock::Either {
-            let start_s = start_ns as f64 * 1e-9;
-            let what = format!(
-                "times fit the recording's own clock and as counted from its first frame, which are {start_s:.3} s apart; the first is taken: if they count from the first frame, add {start_s:.3} s to each"
-            );
-            recording.problems.add(&file, what, start_ns);
+    match &options.labels {
+        LabelsFrom::Usual if labels_csv.exists() => add_labels(&mut recording, &labels_csv, options)?,
+        LabelsFrom::Usual => {}
+        LabelsFrom::Beside => {
+            ensure!(labels_csv.exists(), "--labels beside: there is no {}", labels_csv.display());
+            add_labels(&mut recording, &labels_csv, options)?;
         }
-        let beside = Some(LabelsBeside { file, sized_by_class, turned_by_path });
-        recording.truth = Some(Truth { beside, ..Truth::new(labels) });
+        LabelsFrom::Recording => {
+            let name = &recording.name;
+            ensure!(recording.truth.is_some(), "--labels recording: {name} has no labels of its own");
+        }
+        LabelsFrom::File(file) => add_labels(&mut recording, file, options)?,
     }
     if occlusion_csv.exists() {
         recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
@@ -48,15 +43,52 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
         let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
         all.for_each(|d| d.radial_velocity_mps = -d.radial_velocity_mps);
     }
+    if let Some(scale) = options.velocity_scale {
+        let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
+        all.for_each(|d| d.radial_velocity_mps = (f64::from(d.radial_velocity_mps) * scale) as f32);
+    }
     if !recording.sensor.frames_independent {
         clock::check(&recording.frames, &mut recording.problems);
     }
+    unfilled::check(&mut recording);
     plausible::check(&mut recording);
+    labelled::check(&mut recording);
     restrict(&mut recording, options);
     if recording.frames.is_empty() {
         bail!("{}: no frame between --from and --to", path.display());
     }
     Ok(recording)
+}
+
+/// Takes the labels of a file.
+fn add_labels(recording: &mut Recording, labels_csv: &Path, options: &ReadOptions) -> Result<()> {
+    let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
+    let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
+    let LabelsRead { mut labels, sized_by_class, turned_by_path, clock: labels_clock } =
+        labels::read_labels(labels_csv, start_ns, end_ns)?;
+    labels::check_places(labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
+    // they say nothing of heights
+    labels.iter_mut().for_each(|label| recording.ground.lift(&mut label.solid));
+    let file = labels_csv.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if labels_clock == LabelClock::Either {
+        let start_s = start_ns as f64 * 1e-9;
+        let what = format!(
+            "times fit the recording's own clock and as counted from its first frame, which are {start_s:.3} s apart; the first is taken: if they count from the first frame, add {start_s:.3} s to each"
+        );
+        recording.problems.add(&file, what, start_ns);
+    }
+    let new = Truth::new(labels);
+    let left_out = recording.truth.take().map(|own| own.tracks.len()).filter(|objects| *objects > 0);
+    if let Some(objects) = left_out.filter(|_| options.labels == LabelsFrom::Usual) {
+        let what = format!(
+            "its labels of {} objects take the place of the recording's own of {objects}; --labels recording takes those, --labels beside these without this line",
+            new.tracks.len()
+        );
+        recording.problems.add(&file, what, start_ns);
+    }
+    let beside = Some(LabelsBeside { file, sized_by_class, turned_by_path, left_out });
+    recording.truth = Some(Truth { beside, ..new });
+    Ok(())
 }
 
 fn restrict(recording: &mut Recording, options: &ReadOptions) {
@@ -139,6 +171,22 @@ mod tests {
         std::fs::write(files(&path)[0].clone(), rows(&labels)).unwrap();
         let beside = read(&path);
         assert_eq!((&beside.ground, &inside.ground), (&ground, &ground));
+        // labels beside one that has its own are told, and either can be chosen
+        let both = write("both.mcap", true);
+        std::fs::write(files(&both)[0].clone(), rows(&labels[..1])).unwrap();
+        let with = |labels| crate::recording::read(&both, &ReadOptions { labels, ..ReadOptions::default() });
+        let told = |r: &Recording| (r.truth.as_ref().unwrap().tracks.len(), r.problems.count("take the place"));
+        assert_eq!(told(&with(LabelsFrom::Usual).unwrap()), (1, 1));
+        assert_eq!(told(&with(LabelsFrom::Beside).unwrap()), (1, 0));
+        assert_eq!(told(&with(LabelsFrom::Recording).unwrap()), (2, 0));
+        assert_eq!(told(&with(LabelsFrom::File(files(&path)[0].clone())).unwrap()), (2, 0));
+        std::fs::remove_file(files(&both)[0].clone()).unwrap();
+        assert!(with(LabelsFrom::Beside).unwrap_err().to_string().contains("there is no"));
+        let own = ReadOptions { labels: LabelsFrom::Recording, ..ReadOptions::default() };
+        std::fs::rename(files(&path)[0].clone(), folder.join("kept.csv")).unwrap();
+        let error = crate::recording::read(&path, &own).unwrap_err().to_string();
+        assert!(error.contains("beside has no labels of its own"), "{error}");
+        std::fs::rename(folder.join("kept.csv"), files(&path)[0].clone()).unwrap();
         let slice = |recording: &Recording| -> Vec<_> {
             let frames = collect(recording, &Default::default(), &|| ());
             let objects = frames.iter().flat_map(|f| &f.objects);

@@ -23,7 +23,7 @@ use viewshed::camera::calibration::Calibration;
 
 use super::camera::{Box2d, CameraFrame, Intrinsics, RecordedCamera};
 use super::problems::Problems;
-use super::{ReadOptions, Recording, Sensor, file};
+use super::{ReadOptions, Recording, Sensor, file, labels, picture};
 use crate::geometry::pose::SensorPose;
 
 const SUFFIX: &str = ".boxes.csv";
@@ -74,6 +74,9 @@ pub fn read(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recordin
     }
     let (frames, problems) = pictures(bytes).with_context(|| path.display().to_string())?;
     camera.frames = frames;
+    if let Some(what) = picture::contradiction(&camera) {
+        bail!("{}: {what}", path.display());
+    }
     let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
     Ok(Recording { problems, ..camera.alone(name, Sensor::CAMERA, None, range_max_m) })
 }
@@ -120,7 +123,9 @@ pub fn rows(frames: &[CameraFrame]) -> String {
 }
 
 fn pictures(bytes: &[u8]) -> Result<(Vec<CameraFrame>, Problems)> {
-    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let mut bytes = bytes.to_vec();
+    labels::pass_over_separator(&mut bytes);
+    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(&bytes[..]);
     let (mut frames, mut problems) = (Vec::<CameraFrame>::new(), Problems::default());
     for row in csv.deserialize::<Row>() {
         let row = row?;

@@ -131,7 +131,7 @@ impl RecordedCamera {
     /// As a recording of its own, its frames without detections; `sensor` says what is known beside the view.
     pub fn alone(mut self, name: String, sensor: Sensor, truth: Option<Truth>, range_max_m: f64) -> Recording {
         self.alone = true;
-        let frame = |time_ns| Frame { time_ns, detections: Vec::new(), refused: 0, fault: false };
+        let frame = |time_ns| Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: 0, fault: false };
         Recording {
             name,
             sensor: Sensor {
@@ -155,7 +155,10 @@ impl RecordedCamera {
 #[derive(Debug, Default)]
 pub struct CameraReader {
     info: Option<CameraInfo>,
-    frames: Vec<CameraFrame>,
+    /// With the times they were logged at.
+    frames: Vec<(i64, CameraFrame)>,
+    /// Messages of boxes that cannot be read.
+    pub unread: u64,
 }
 
 impl CameraReader {
@@ -163,12 +166,8 @@ impl CameraReader {
         self.info.get_or_insert(info);
     }
 
-    pub fn boxes(&mut self, array: Detection2DArray, problems: &mut Problems) {
+    pub fn boxes(&mut self, array: Detection2DArray, logged_ns: i64, problems: &mut Problems) {
         let time_ns = array.header.stamp.nanoseconds();
-        if self.frames.last().is_some_and(|last| time_ns <= last.time_ns) {
-            problems.add(OBJECTS_TOPIC, "time does not go on, frame dropped", time_ns);
-            return;
-        }
         let mut frame = CameraFrame { time_ns, boxes: Vec::new(), refused: 0 };
         for d in array.detections {
             let ([x, y], [w, h]) = (d.bbox.center, d.bbox.size);
@@ -181,12 +180,39 @@ impl CameraReader {
             frame.boxes.push(Box2d { class, score, edges: [x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0] });
         }
         problems.add_many(OBJECTS_TOPIC, "box with a value that is not finite, dropped", time_ns, frame.refused);
-        self.frames.push(frame);
+        self.frames.push((logged_ns, frame));
+    }
+
+    /// The frames in the order of time: as they were logged where that is the better order.
+    fn in_order(&mut self, problems: &mut Problems) -> Vec<CameraFrame> {
+        let back = |frames: &[(i64, CameraFrame)]| {
+            frames.windows(2).filter(|pair| pair[1].1.time_ns < pair[0].1.time_ns).count()
+        };
+        let mut logged = self.frames.clone();
+        logged.sort_by_key(|(logged_ns, _)| *logged_ns);
+        if back(&logged) < back(&self.frames) {
+            self.frames = logged;
+        }
+        let mut frames: Vec<CameraFrame> = Vec::new();
+        for (_, frame) in self.frames.drain(..) {
+            if frames.last().is_some_and(|last| frame.time_ns <= last.time_ns) {
+                problems.add(OBJECTS_TOPIC, "time does not go on, frame dropped", frame.time_ns);
+            } else {
+                frames.push(frame);
+            }
+        }
+        frames
     }
 
     /// The camera, if there are boxes of one whose mount and projection are told.
-    pub fn finish(self, transforms: &Transforms, road: &str, problems: &mut Problems) -> Option<RecordedCamera> {
-        let first = self.frames.first()?.time_ns;
+    pub fn finish(mut self, transforms: &Transforms, road: &str, problems: &mut Problems) -> Option<RecordedCamera> {
+        let frames = self.in_order(problems);
+        let first = frames.first()?.time_ns;
+        if self.unread > 0 {
+            let what = "boxes left out: of a camera whose messages cannot all be read, those without a box would say that nothing is there";
+            problems.add_many(OBJECTS_TOPIC, what, first, self.unread);
+            return None;
+        }
         let Some(info) = self.info else {
             problems.add(OBJECTS_TOPIC, format!("boxes left out: there is no {INFO_TOPIC}"), first);
             return None;
@@ -204,9 +230,26 @@ impl CameraReader {
         if info.d.iter().any(|d| *d != 0.0) {
             problems.add(INFO_TOPIC, "lens with distortion: boxes are taken as those of the rectified image", first);
         }
-        let [fx, _, cx, _, fy, cy, ..] = info.k;
-        let intrinsics = Intrinsics { size_px: [info.width, info.height], focal_px: [fx, fy], center_px: [cx, cy] };
-        Some(RecordedCamera { pose, intrinsics, frames: self.frames, alone: false })
+        Some(RecordedCamera { pose, intrinsics: delivered(&info), frames, alone: false })
+    }
+}
+
+/// The projection of the picture that is sent: K is of the full one, of which a region is cut out and then binned
+/// (`sensor_msgs/msg/CameraInfo`). 0 is the same as 1 for binning, and a region without size is the whole.
+fn delivered(info: &CameraInfo) -> Intrinsics {
+    let [fx, _, cx, _, fy, cy, ..] = info.k;
+    let roi = &info.roi;
+    let (offset, size) = if roi.width == 0 || roi.height == 0 {
+        ([0, 0], [info.width, info.height])
+    } else {
+        ([roi.x_offset, roi.y_offset], [roi.width, roi.height])
+    };
+    let [binning_x, binning_y] = [info.binning_x, info.binning_y].map(|binning| binning.max(1));
+    let by = [f64::from(binning_x), f64::from(binning_y)];
+    Intrinsics {
+        size_px: [size[0] / binning_x, size[1] / binning_y],
+        focal_px: [fx / by[0], fy / by[1]],
+        center_px: [(cx - f64::from(offset[0])) / by[0], (cy - f64::from(offset[1])) / by[1]],
     }
 }
 
@@ -315,12 +358,42 @@ mod tests {
         let b = |edges| Box2d { class: "car".into(), score: 1.0, edges };
         let frame = |time_ns, boxes| message(&CameraFrame { time_ns, boxes, refused: 0 }, &header(time_ns));
         let (mut reader, mut problems) = (CameraReader::default(), Problems::default());
-        reader.boxes(frame(5, vec![b([1.0, 2.0, 3.0, 4.0]), b([f64::NAN; 4])]), &mut problems);
-        reader.boxes(frame(5, vec![]), &mut problems);
-        assert_eq!((reader.frames.len(), reader.frames[0].boxes.len(), reader.frames[0].refused), (1, 1, 1));
-        assert_eq!((problems.count("not finite"), problems.count("does not go on")), (1, 1));
+        reader.boxes(frame(5, vec![b([1.0, 2.0, 3.0, 4.0]), b([f64::NAN; 4])]), 5, &mut problems);
+        reader.boxes(frame(5, vec![]), 6, &mut problems);
+        assert_eq!((reader.frames[0].1.boxes.len(), reader.frames[0].1.refused), (1, 1));
         assert!(reader.finish(&Transforms::default(), "road", &mut problems).is_none());
+        assert_eq!((problems.count("not finite"), problems.count("does not go on")), (1, 1));
         assert_eq!(problems.count("there is no /camera/info"), 1);
+    }
+
+    #[test]
+    fn frames_are_read_in_the_order_they_were_logged_in() {
+        let header =
+            |ns| Header { stamp: super::super::ros::Stamp::from_nanoseconds(ns), frame_id: OPTICAL_FRAME.into() };
+        let frame = |time_ns| message(&CameraFrame { time_ns, boxes: Vec::new(), refused: 0 }, &header(time_ns));
+        let (mut reader, mut problems) = (CameraReader::default(), Problems::default());
+        [3, 1, 2].into_iter().for_each(|ns| reader.boxes(frame(ns), ns + 10, &mut problems));
+        let times: Vec<i64> = reader.in_order(&mut problems).iter().map(|f| f.time_ns).collect();
+        assert_eq!(times, [1, 2, 3]);
+        assert!(problems.is_empty());
+    }
+
+    #[test]
+    fn binning_and_a_region_are_those_of_the_picture_that_is_sent() {
+        let full = Intrinsics { size_px: [1920, 1080], focal_px: [1660.0, 1650.0], center_px: [960.0, 540.0] };
+        let header = Header::default();
+        let told = CameraInfo { binning_x: 2, binning_y: 3, ..info(&full, &header) };
+        let half = Intrinsics { size_px: [960, 360], focal_px: [830.0, 550.0], center_px: [480.0, 180.0] };
+        assert_eq!(delivered(&told), half);
+        let roi = RegionOfInterest { x_offset: 100, y_offset: 40, width: 800, height: 600, do_rectify: false };
+        let told = CameraInfo { binning_x: 2, binning_y: 1, roi, ..info(&full, &header) };
+        let cut = Intrinsics { size_px: [400, 600], focal_px: [830.0, 1650.0], center_px: [430.0, 500.0] };
+        assert_eq!(delivered(&told), cut);
+        assert_eq!(delivered(&info(&full, &header)), full);
+        // a place seen at a pixel of the full picture is seen at that of the cut and binned one
+        let [u, v] = full.pixel([0.1, 0.05]);
+        let [x, y] = cut.pixel([0.1, 0.05]);
+        assert!(((u - 100.0) / 2.0 - x).abs() < 1e-9 && (v - 40.0 - y).abs() < 1e-9);
     }
 
     #[test]

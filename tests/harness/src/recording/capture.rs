@@ -7,6 +7,7 @@ use super::{FieldOfView, Frame, RadarDetection, ReadOptions, Recording, Sensor};
 use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use viewshed::frame::detection::Detection;
+use viewshed::frame::gate::GateConfig;
 
 /// Height of a mount that is not given, metres: a usual pole or gantry.
 const HEIGHT_M: f64 = 6.0;
@@ -69,6 +70,12 @@ pub fn recording(
         camera: None,
         problems,
     }
+}
+
+/// Values below these are of points too weak to be taken, in dB and dBsm: a number that a field is left at is often one.
+pub fn weak() -> [f32; 2] {
+    let gate = GateConfig::default();
+    [gate.min_snr_db, gate.min_rcs_dbsm]
 }
 
 /// The library's detection as recordings have it.

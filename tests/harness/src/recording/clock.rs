@@ -67,7 +67,13 @@ mod tests {
     use super::*;
 
     fn told(seconds: &[f64]) -> Vec<String> {
-        let frame = |s: &f64| Frame { time_ns: (s * 1e9) as i64, detections: Vec::new(), refused: 0, fault: false };
+        let frame = |s: &f64| Frame {
+            time_ns: (s * 1e9) as i64,
+            detections: Vec::new(),
+            refused: 0,
+            unwanted: 0,
+            fault: false,
+        };
         let frames: Vec<Frame> = seconds.iter().map(frame).collect();
         let mut problems = Problems::default();
         check(&frames, &mut problems);

@@ -2,9 +2,10 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::{IsTerminal, Read};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Cursor, ErrorKind, IsTerminal, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use anyhow::{Context, Result, anyhow, bail};
 use flate2::read::MultiGzDecoder;
@@ -40,42 +41,135 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
 /// # Errors
 /// A file that cannot be read or unpacked; a terminal as standard input.
 pub fn read(path: &Path) -> Result<Content> {
-    let place = || format!("cannot read {}", shown(path));
-    if path.is_dir() {
-        bail!("{}: it is a folder; name a recording in it, of a ROS 2 bag the .mcap", place());
-    }
-    let bytes = if path == Path::new(STANDARD_INPUT) {
-        standard_input()?
-    } else if is_pipe(path) {
-        pipe(path).with_context(place)?
-    } else {
-        std::fs::read(path).with_context(place)?
-    };
-    if !bytes.starts_with(&GZIP) {
-        return Ok(Content { bytes, damage: None });
-    }
-    let mut unpacked = Vec::new();
-    match MultiGzDecoder::new(&bytes[..]).read_to_end(&mut unpacked) {
-        Ok(_) => Ok(Content { bytes: unpacked, damage: None }),
-        // what comes before the break is read, as of other files
-        Err(error) if !unpacked.is_empty() => {
-            let damage =
-                format!("the packed file {} is damaged or cut off, read as far as it goes: {error}", shown(path));
-            Ok(Content { bytes: unpacked, damage: Some(damage) })
+    Source::of(path)?.read()
+}
+
+/// Where the bytes of a recording are: they can be read from their begin as often as wanted, and are kept in memory only
+/// where they come once.
+#[derive(Debug, Clone)]
+pub struct Source {
+    shown: String,
+    held: Held,
+}
+
+#[derive(Debug, Clone)]
+enum Held {
+    File(PathBuf),
+    Memory(Arc<[u8]>),
+}
+
+impl Source {
+    /// Those of a file, of standard input or of a pipe.
+    ///
+    /// # Errors
+    /// A folder, a terminal as standard input, a pipe that cannot be read.
+    pub fn of(path: &Path) -> Result<Self> {
+        let shown = shown(path).into_owned();
+        if path.is_dir() {
+            bail!("cannot read {shown}: it is a folder; name a recording in it, of a ROS 2 bag the .mcap");
         }
-        Err(error) => Err(error).with_context(place),
+        let held = if path == Path::new(STANDARD_INPUT) {
+            Held::Memory(standard_input()?)
+        } else if is_pipe(path) {
+            Held::Memory(pipe(path).with_context(|| format!("cannot read {shown}"))?)
+        } else {
+            Held::File(path.to_owned())
+        };
+        Ok(Self { shown, held })
+    }
+
+    /// Bytes that are there already.
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        Self { shown: "bytes".into(), held: Held::Memory(bytes.into()) }
+    }
+
+    /// Reads from the begin.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub fn open(&self) -> Result<Unpacked> {
+        let place = || format!("cannot read {}", self.shown);
+        let mut plain: Box<dyn BufRead> = match &self.held {
+            Held::File(path) => Box::new(BufReader::with_capacity(1 << 16, File::open(path).with_context(place)?)),
+            Held::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
+        };
+        let packed = plain.fill_buf().with_context(place)?.starts_with(&GZIP);
+        let source: Box<dyn Read> = if packed { Box::new(MultiGzDecoder::new(plain)) } else { Box::new(plain) };
+        Ok(Unpacked { shown: self.shown.clone(), source, packed, any: false, damage: None })
+    }
+
+    /// The first bytes, at most `count`.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`].
+    pub fn begin(&self, count: u64) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.open()?.take(count).read_to_end(&mut bytes).with_context(|| format!("cannot read {}", self.shown))?;
+        Ok(bytes)
+    }
+
+    /// All bytes.
+    ///
+    /// # Errors
+    /// A file that cannot be read or unpacked.
+    pub fn read(&self) -> Result<Content> {
+        let mut bytes = Vec::new();
+        let mut unpacked = self.open()?;
+        unpacked.read_to_end(&mut bytes).with_context(|| format!("cannot read {}", self.shown))?;
+        Ok(Content { bytes, damage: unpacked.damage })
+    }
+
+    /// The path to be shown.
+    pub fn shown(&self) -> &str {
+        &self.shown
     }
 }
 
-fn standard_input() -> Result<Vec<u8>> {
-    static READ: OnceLock<Result<Vec<u8>, String>> = OnceLock::new();
+/// Bytes, unpacked as they are read; of a packed file that is damaged, those before the break.
+pub struct Unpacked {
+    shown: String,
+    source: Box<dyn Read>,
+    packed: bool,
+    any: bool,
+    damage: Option<String>,
+}
+
+impl Unpacked {
+    /// That not all could be unpacked, with the file's name; known when all was read.
+    pub fn damage(&self) -> Option<&str> {
+        self.damage.as_deref()
+    }
+}
+
+impl Read for Unpacked {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        if self.damage.is_some() {
+            return Ok(0);
+        }
+        match self.source.read(into) {
+            Err(error) if self.packed && self.any && error.kind() != ErrorKind::Interrupted => {
+                let of = &self.shown;
+                let damage = format!("the packed file {of} is damaged or cut off, read as far as it goes: {error}");
+                self.damage = Some(damage);
+                Ok(0)
+            }
+            read => {
+                self.any |= read.as_ref().is_ok_and(|n| *n > 0);
+                read
+            }
+        }
+    }
+}
+
+fn standard_input() -> Result<Arc<[u8]>> {
+    static READ: OnceLock<Result<Arc<[u8]>, String>> = OnceLock::new();
     let mut input = std::io::stdin().lock();
     if READ.get().is_none() && input.is_terminal() {
         bail!("`-` is standard input, and that is a terminal: give a file, or pipe a log into it");
     }
     let read = READ.get_or_init(|| {
         let mut bytes = Vec::new();
-        input.read_to_end(&mut bytes).map(|_| bytes).map_err(|error| error.to_string())
+        input.read_to_end(&mut bytes).map(|_| bytes.into()).map_err(|error| error.to_string())
     });
     read.clone().map_err(|error| anyhow!("cannot read standard input: {error}"))
 }
@@ -86,14 +180,14 @@ fn is_pipe(path: &Path) -> bool {
 }
 
 /// The bytes of a pipe, which come once: who asks again is given the same.
-fn pipe(path: &Path) -> std::io::Result<Vec<u8>> {
-    static READ: Mutex<BTreeMap<PathBuf, Vec<u8>>> = Mutex::new(BTreeMap::new());
+fn pipe(path: &Path) -> std::io::Result<Arc<[u8]>> {
+    static READ: Mutex<BTreeMap<PathBuf, Arc<[u8]>>> = Mutex::new(BTreeMap::new());
     let mut read = READ.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(bytes) = read.get(path) {
-        return Ok(bytes.clone());
+        return Ok(Arc::clone(bytes));
     }
-    let bytes = std::fs::read(path)?;
-    read.insert(path.to_owned(), bytes.clone());
+    let bytes: Arc<[u8]> = std::fs::read(path)?.into();
+    read.insert(path.to_owned(), Arc::clone(&bytes));
     Ok(bytes)
 }
 

@@ -24,6 +24,7 @@ pub fn note(recording: &mut Recording, options: &ReadOptions, kind: Kind) {
     for (option, given, applies, of) in [
         ("--interface", options.interface.is_some(), of_can, can),
         ("--radar", options.profile.is_some(), of_can, can),
+        ("--cluster-states", options.wanted.is_some(), of_can, can),
         ("--sensor-id", options.sensor_id.is_some(), has_sensors, "CAN logs and captures of the native format"),
         ("--ti-header", options.ti_header.is_some(), of_ti, ti),
         ("--ti-dialect", options.ti_dialect.is_some(), of_ti, ti),

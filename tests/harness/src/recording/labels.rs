@@ -55,8 +55,12 @@ pub struct LabelRow {
 /// Names file and line of the first row that is malformed.
 pub fn read_rows<Row: DeserializeOwned>(path: &Path) -> Result<Vec<(u64, Row)>> {
     let place = || path.display().to_string();
-    let mut csv =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_path(path).with_context(place)?;
+    let mut bytes = std::fs::read(path).with_context(place)?;
+    if bytes.trim_ascii().is_empty() {
+        bail!("{}: it is empty: not even a heading", place());
+    }
+    pass_over_separator(&mut bytes);
+    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(&bytes[..]);
     let headers = csv.headers().with_context(place)?.clone();
     if let Some(wrong) = other_separator(&headers, path) {
         bail!("{}: {wrong}", place());
@@ -66,9 +70,36 @@ pub fn read_rows<Row: DeserializeOwned>(path: &Path) -> Result<Vec<(u64, Row)>> 
         // the error of a record that is none has its line in it
         let record = record.with_context(place)?;
         let line = record.position().map_or(0, csv::Position::line);
-        rows.push((line, record.deserialize(Some(&headers)).with_context(|| at_line(path, line))?));
+        let row = record.deserialize(Some(&headers)).map_err(|error| named(error, &headers, &record));
+        rows.push((line, row.with_context(|| at_line(path, line))?));
     }
     Ok(rows)
+}
+
+/// Makes a comment of the line that tells spreadsheets their separator, so that lines keep their numbers.
+pub fn pass_over_separator(bytes: &mut [u8]) {
+    let start = if bytes.starts_with(b"\xEF\xBB\xBF") { 3 } else { 0 };
+    if bytes[start..].starts_with(b"sep=") {
+        // a comment begins at the very first byte
+        bytes[..=start].fill(b'#');
+    }
+}
+
+/// The error of a value, with the name of its column and what stands there.
+fn named(error: csv::Error, headers: &csv::StringRecord, record: &csv::StringRecord) -> anyhow::Error {
+    let csv::ErrorKind::Deserialize { err, .. } = error.kind() else { return error.into() };
+    let column = err.field().and_then(|field| usize::try_from(field).ok());
+    let (Some(name), Some(value)) = (column.and_then(|c| headers.get(c)), column.and_then(|c| record.get(c))) else {
+        return error.into();
+    };
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let is_date = value.len() > 9 && value.get(..4).is_some_and(digits) && value.get(4..5) == Some("-");
+    let seconds = if is_date {
+        ": it is a date, and seconds are read, of the recording's own clock or since its first frame"
+    } else {
+        ""
+    };
+    anyhow::anyhow!("{name} is `{value}`{seconds}: {}", err.kind())
 }
 
 /// What a spreadsheet of another language writes between columns, if that stands in a file's one column; and in numbers.
@@ -171,6 +202,10 @@ pub struct LabelsRead {
 /// Names file and line of the first row that is malformed or whose class has no known size; labels of another time.
 pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<LabelsRead> {
     let mut rows = read_rows::<LabelRow>(path)?;
+    if rows.is_empty() {
+        bail!("{}: it has a heading and no label, so nothing can be judged", path.display());
+    }
+    refuse_twice(path, &rows)?;
     let turned_by_path = turn_along_paths(&mut rows);
     let clock = clock(&rows, start_ns, end_ns);
     let (mut labels, mut sized_by_class) = (Vec::new(), BTreeSet::new());
@@ -185,6 +220,24 @@ pub fn read_labels(path: &Path, start_ns: i64, end_ns: i64) -> Result<LabelsRead
         l.time_ns = l.time_ns.saturating_add(clock.add_ns(start_ns));
     }
     Ok(LabelsRead { labels, sized_by_class: sized_by_class.len(), turned_by_path, clock })
+}
+
+/// Refuses objects that are at two places at one time.
+fn refuse_twice(path: &Path, rows: &[(u64, LabelRow)]) -> Result<()> {
+    let mut known: BTreeMap<(i64, &str), (u64, [f64; 2])> = BTreeMap::new();
+    let mut twice = rows.iter().filter_map(|(line, row)| {
+        let place = [row.x_m, row.y_m];
+        let (first, other) = *known.entry((nanoseconds(row.time_s), row.object_id.as_str())).or_insert((*line, place));
+        (first != *line && place != other).then_some((first, *line, row))
+    });
+    let Some((first, line, row)) = twice.next() else { return Ok(()) };
+    bail!(
+        "{}: object_id `{}` is at two places at one time, {} s (first in line {first}), and {} more such rows: several objects of the same id; give each its own",
+        at_line(path, line),
+        row.object_id,
+        row.time_s,
+        twice.count()
+    );
 }
 
 /// Refuses labels of which none is of the recording's time, and times that are milliseconds.
@@ -314,6 +367,33 @@ mod tests {
         }
         assert!(read("object_id\n1\n").unwrap_err().contains("missing field `time_s`"));
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn tables_that_say_nothing_or_twice_are_refused_with_what_is_wrong() {
+        let path = std::env::temp_dir().join(format!("viewshed-tables-{}.labels.csv", std::process::id()));
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            read_labels(&path, 0, 2_000_000_000).map(|read| read.labels.len()).map_err(|error| format!("{error:#}"))
+        };
+        let head = "time_s,object_id,class,x_m,y_m\n";
+        assert!(read("").unwrap_err().contains("it is empty"));
+        assert!(read(head).unwrap_err().contains("no label"));
+        let rows = "0.5,1,car,20.5,-1.75\n0.5,2,car,30,1\n";
+        for sep in ["sep=,\n", "\u{FEFF}sep=,\r\n", "\u{FEFF}", ""] {
+            assert_eq!(read(&format!("{sep}{head}{rows}")), Ok(2), "{sep:?}");
+        }
+        let twice = read(&format!("sep=,\n{head}{rows}0.5,1,car,60,3\n")).unwrap_err();
+        assert!(
+            twice.contains("line 5: object_id `1` is at two places at one time, 0.5 s (first in line 3)"),
+            "{twice}"
+        );
+        assert_eq!(read(&format!("{head}{rows}0.5,1,car,20.5,-1.75\n")), Ok(3), "the same row again");
+        let iso = read(&format!("{head}{rows}2026-05-04T06:00:00Z,3,car,1,1\n")).unwrap_err();
+        assert!(iso.contains("line 4") && iso.contains("time_s is `2026-05-04T06:00:00Z`: it is a date"), "{iso}");
+        let word = read(&format!("{head}0.5,1,car,left,1\n")).unwrap_err();
+        assert!(word.contains("x_m is `left`") && !word.contains("date"), "{word}");
+        std::fs::remove_file(&path).unwrap();
     }
 
     /// A fresh file with these rows after the usual heading.

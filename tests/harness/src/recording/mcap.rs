@@ -7,15 +7,17 @@ use mcap::records::{MessageHeader, Record};
 use viewshed::camera::Camera3dConfig;
 
 use super::camera::{CameraReader, INFO_TOPIC, OBJECTS_TOPIC};
-use super::points::{self, NOT_A_RANGE, NOT_FINITE, Points};
+use super::container::{self, Item};
+use super::points::{self, Points};
 use super::problems::Problems;
 use super::ros::{self, CameraInfo, Detection2DArray, Detection3DArray, PointCloud2, RadarScan, TfMessage};
+use super::scans::{self, Message};
 use super::transforms::Transforms;
-use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor};
+use super::{FieldOfView, Frame, ReadOptions, Recording, Sensor, picture};
 use crate::geometry::ground::Ground;
 use crate::geometry::pose::SensorPose;
 use crate::geometry::solid::Solid;
-use crate::recording::truth::{Label, Truth};
+use crate::recording::truth::{self, Label, Truth};
 
 pub const POINTS_TOPIC: &str = "/radar/points";
 pub const TRUTH_TOPIC: &str = "/ground_truth/objects";
@@ -55,10 +57,15 @@ struct Topic {
     name: String,
     schema: String,
     encoding: String,
+    is_older: bool,
     messages: u64,
 }
 
 impl Topic {
+    fn is_same(&self, other: &Self) -> bool {
+        (&self.name, &self.schema, &self.encoding) == (&other.name, &other.schema, &other.encoding)
+    }
+
     /// Whether its messages are of a radar, by their type; ROS 1 leaves the `/msg` out.
     fn is_of_a_radar(&self) -> bool {
         let schema = self.schema.replace("/msg/", "/");
@@ -66,19 +73,41 @@ impl Topic {
     }
 }
 
+/// A message type.
+#[derive(Debug, Clone, Default)]
+struct Schema {
+    name: String,
+    /// Its definition has fields of vision_msgs before 4.0.
+    is_older: bool,
+}
+
+/// What is said of vision_msgs before 4.0, whose messages are laid out otherwise.
+const OLDER: &str = "its layout is not that of vision_msgs since ROS 2 Humble (4.0) but perhaps of an older release (Galactic, Foxy); send it with the newer definition";
+
+/// Fields that vision_msgs had before 4.0.
+const OLDER_FIELDS: [&str; 4] = ["is_tracking", "tracking_id", "source_img", "source_cloud"];
+
 #[derive(Default)]
 struct Reader {
     radar_topic: Option<String>,
     truth_topic: Option<String>,
-    schemas: BTreeMap<u16, String>,
-    channels: BTreeMap<u16, Topic>,
+    /// Whether a file has begun, and whether a record was read.
+    begun: bool,
+    any: bool,
+    schemas: BTreeMap<u16, Schema>,
+    /// Places in `topics` by the numbers of the file that is read.
+    channels: BTreeMap<u16, usize>,
+    topics: Vec<Topic>,
     /// Records of [`SENSOR_METADATA`].
     metadata: Vec<BTreeMap<String, String>>,
     /// What [`GROUND_METADATA`] says.
     ground: Option<String>,
     transforms: Transforms,
+    /// Those of `/tf`.
+    moving: Transforms,
     radar_frame: Option<String>,
     topics_of_frames: BTreeSet<String>,
+    messages: Vec<Message>,
     frames: Vec<Frame>,
     labels: Vec<Label>,
     labelled: bool,
@@ -90,26 +119,31 @@ struct Reader {
 ///
 /// A lidar's clouds, which have no velocity, are none of them.
 pub fn radar_topics(bytes: &[u8]) -> Vec<String> {
-    let options = mcap::read::Options::IgnoreEndMagic.into();
-    let Ok(messages) = mcap::MessageStream::new_with_options(bytes, options) else { return Vec::new() };
+    let (mut schemas, mut channels) = (BTreeMap::new(), BTreeMap::new());
     let (mut radars, mut seen) = (BTreeSet::new(), BTreeSet::new());
-    // a file that breaks off has told by then which topics it has
-    for message in messages.map_while(Result::ok) {
-        let channel = &message.channel;
-        if !seen.insert(channel.id) || channel.message_encoding != ENCODING {
-            continue;
+    container::read(bytes, &mut |item| match item {
+        Item::File => {
+            schemas.clear();
+            channels.clear();
         }
-        let is_radar = match channel.schema.as_ref().map(|schema| schema.name.as_str()) {
-            Some(POINT_CLOUD) => {
-                ros::decode::<PointCloud2>(&message.data).is_ok_and(|c| points::from_cloud(&c).is_ok())
+        Item::Record(Record::Schema { header, .. }) => drop(schemas.insert(header.id, header.name)),
+        Item::Record(Record::Channel(c)) => drop(channels.insert(c.id, (c.topic, c.schema_id, c.message_encoding))),
+        Item::Record(Record::Message { header, data }) => {
+            let Some((topic, schema, encoding)) = channels.get(&header.channel_id) else { return };
+            if encoding != ENCODING || !seen.insert(topic.clone()) {
+                return;
             }
-            Some(RADAR_SCAN) => ros::decode::<RadarScan>(&message.data).is_ok(),
-            _ => false,
-        };
-        if is_radar {
-            radars.insert(channel.topic.clone());
+            let is_radar = match schemas.get(schema).map(String::as_str) {
+                Some(POINT_CLOUD) => ros::decode::<PointCloud2>(&data).is_ok_and(|c| points::from_cloud(&c).is_ok()),
+                Some(RADAR_SCAN) => ros::decode::<RadarScan>(&data).is_ok(),
+                _ => false,
+            };
+            if is_radar {
+                radars.insert(topic.clone());
+            }
         }
-    }
+        _ => {}
+    });
     radars.into_iter().collect()
 }
 
@@ -137,6 +171,23 @@ pub fn parse(bytes: &[u8], name: String, options: &ReadOptions) -> Result<Record
     reader.finish(name, options)
 }
 
+/// The truth of labels, if the recording is labelled and their ids are of one object each.
+fn truth_of(labelled: bool, labels: Vec<Label>, problems: &mut Problems) -> Option<Truth> {
+    if !labelled {
+        return None;
+    }
+    let (all, twice) = (labels.len(), truth::twice(&labels));
+    let first = labels.first().map_or(0, |l| l.time_ns);
+    let few = twice == 0 || twice * 100 < all;
+    if twice > 0 {
+        let becomes = if few { "the first is taken" } else { "the labels are left out" };
+        let what =
+            format!("object at several places at one time, of the same id: {becomes}; give each object its own id");
+        problems.add_many("labels", what, first, twice as u64);
+    }
+    few.then(|| Truth::new(labels))
+}
+
 /// What a record says of a radar; one by the radar's name is of the topic of that name.
 fn of_sensor(record: mcap::records::Metadata) -> Option<BTreeMap<String, String>> {
     let name = record.name.strip_prefix(SENSOR_METADATA)?;
@@ -153,62 +204,66 @@ fn of_sensor(record: mcap::records::Metadata) -> Option<BTreeMap<String, String>
 
 impl Reader {
     fn records(&mut self, bytes: &[u8]) -> Result<()> {
-        let options = mcap::read::Options::IgnoreEndMagic.into();
-        let records = mcap::read::ChunkFlattener::new_with_options(bytes, options)
-            .map_err(|e| anyhow!("not an MCAP file: {e}"))?;
-        let mut any = false;
-        let mut ended = false;
-        for record in records {
-            let record = match record {
-                Ok(r) => r,
-                Err(e) if !any => bail!("not an MCAP file: {e}"),
-                Err(e) => {
-                    let last = self.frames.last().map_or(0, |f| f.time_ns);
-                    self.problems.add("file", format!("damaged or cut off, read up to the break: {e}"), last);
-                    ended = true;
-                    break;
-                }
-            };
-            any = true;
-            match record {
-                Record::Schema { header, .. } => {
-                    self.schemas.insert(header.id, header.name);
-                }
-                Record::Channel(c) => {
-                    let schema = self.schemas.get(&c.schema_id).cloned().unwrap_or_else(|| "(no schema)".into());
-                    self.channels.entry(c.id).or_insert(Topic {
-                        name: c.topic,
-                        schema,
-                        encoding: c.message_encoding,
-                        messages: 0,
-                    });
-                }
-                Record::Message { header, data } => self.message(&header, &data),
-                Record::Metadata(m) if m.name == GROUND_METADATA => self.ground = m.metadata.get("points_m").cloned(),
-                Record::Metadata(m) => self.metadata.extend(of_sensor(m)),
-                Record::DataEnd(_) => {
-                    ended = true;
-                }
-                _ => {}
-            }
-        }
-        if !any {
+        container::read(bytes, &mut |item| self.item(item));
+        if !self.any {
             bail!("not an MCAP file: it holds no record");
-        }
-        if !ended {
-            let last = self.frames.last().map_or(0, |f| f.time_ns);
-            self.problems.add("file", "cut off before its end, read up to the break", last);
         }
         Ok(())
     }
 
+    /// Time of the last message of a radar, where something without a time of its own is told.
+    fn now(&self) -> i64 {
+        self.messages.last().map_or(0, |m| m.time_ns)
+    }
+
+    fn item(&mut self, item: Item<'_>) {
+        let record = match item {
+            Item::File => {
+                if self.begun {
+                    let what = "two files joined: another follows the end of the one before, and is read too";
+                    self.problems.add("file", what, self.now());
+                }
+                self.begun = true;
+                self.schemas.clear();
+                self.channels.clear();
+                return;
+            }
+            Item::Flaw(what) => return self.problems.add("file", what, self.now()),
+            Item::Record(record) => record,
+        };
+        self.any = true;
+        match record {
+            Record::Schema { header, data } => {
+                let definition = String::from_utf8_lossy(&data);
+                let is_older = OLDER_FIELDS.iter().any(|field| definition.contains(field));
+                self.schemas.insert(header.id, Schema { name: header.name, is_older });
+            }
+            Record::Channel(c) => {
+                let none = || Schema { name: "(no schema)".into(), is_older: false };
+                let Schema { name: schema, is_older } = self.schemas.get(&c.schema_id).cloned().unwrap_or_else(none);
+                let topic = Topic { name: c.topic, schema, encoding: c.message_encoding, is_older, messages: 0 };
+                let known = self.topics.iter().position(|t| t.is_same(&topic));
+                let place = known.unwrap_or(self.topics.len());
+                if known.is_none() {
+                    self.topics.push(topic);
+                }
+                self.channels.entry(c.id).or_insert(place);
+            }
+            Record::Message { header, data } => self.message(&header, &data),
+            Record::Metadata(m) if m.name == GROUND_METADATA => self.ground = m.metadata.get("points_m").cloned(),
+            Record::Metadata(m) => self.metadata.extend(of_sensor(m)),
+            _ => {}
+        }
+    }
+
     fn message(&mut self, header: &MessageHeader, data: &[u8]) {
-        let Some(topic) = self.channels.get_mut(&header.channel_id) else {
+        let place = self.channels.get(&header.channel_id);
+        let Some(topic) = place.and_then(|&place| self.topics.get_mut(place)) else {
             self.problems.add("file", "message on a channel never announced, skipped", header.log_time as i64);
             return;
         };
         topic.messages += 1;
-        let Topic { name, schema, encoding, .. } = topic.clone();
+        let Topic { name, schema, encoding, is_older, .. } = topic.clone();
         let is_radar = self.radar_topic.as_deref().unwrap_or(POINTS_TOPIC) == name
             || (self.radar_topic.is_none() && schema == RADAR_SCAN);
         let is_truth = self.truth_topic.as_deref().unwrap_or(TRUTH_TOPIC) == name;
@@ -218,12 +273,17 @@ impl Reader {
             }
             POINT_CLOUD if is_radar => self.cloud(&name, header, data),
             RADAR_SCAN if is_radar => self.scan(&name, header, data),
-            DETECTIONS if is_truth => self.objects(&name, data),
+            DETECTIONS if is_truth && is_older => Err(OLDER.into()),
+            DETECTIONS if is_truth => self.objects(&name, data).map_err(|e| format!("{e}: {OLDER}")),
             BOXES if name == OBJECTS_TOPIC => {
-                ros::decode::<Detection2DArray>(data).map(|m| self.camera.boxes(m, &mut self.problems))
+                let decoded = ros::decode::<Detection2DArray>(data).map_err(|e| format!("{e}: {OLDER}"));
+                let decoded = if is_older { Err(OLDER.into()) } else { decoded };
+                self.camera.unread += u64::from(decoded.is_err());
+                decoded.map(|m| self.camera.boxes(m, header.log_time as i64, &mut self.problems))
             }
             CAMERA_INFO if name == INFO_TOPIC => ros::decode::<CameraInfo>(data).map(|m| self.camera.info(m)),
             TF if name.ends_with("tf_static") => ros::decode::<TfMessage>(data).map(|m| self.transforms.add(m)),
+            TF if name.ends_with("tf") => ros::decode::<TfMessage>(data).map(|m| self.moving.add(m)),
             _ if is_radar || is_truth => Err(format!("schema {schema} is none this reader knows")),
             _ => Ok(()),
         };
@@ -252,14 +312,15 @@ impl Reader {
             time_ns = message.log_time as i64;
             self.problems.add(topic, "header without a stamp, log time taken", time_ns);
         }
-        self.problems.add_many(topic, NOT_FINITE, time_ns, points.not_finite);
-        self.problems.add_many(topic, NOT_A_RANGE, time_ns, points.not_a_range);
+        for what in &points.unread {
+            self.problems.add(topic, format!("{what}; taken for not measured"), time_ns);
+        }
         self.radar_frame.get_or_insert_with(|| header.frame_id.clone());
         if !self.topics_of_frames.contains(topic) {
             self.topics_of_frames.insert(topic.to_owned());
         }
-        let refused = points.not_finite + points.not_a_range;
-        self.frames.push(Frame { time_ns, detections: points.detections, refused, fault: false });
+        let (logged_ns, frame_id) = (message.log_time as i64, header.frame_id.clone());
+        self.messages.push(Message { time_ns, logged_ns, frame_id, points });
     }
 
     fn objects(&mut self, topic: &str, data: &[u8]) -> Result<(), String> {
@@ -288,18 +349,18 @@ impl Reader {
 
     /// Topics of the types that radars send, whatever they are called.
     fn radar_topics(&self) -> Vec<String> {
-        let found = self.channels.values().filter(|t| t.is_of_a_radar() && t.messages > 0).map(|t| t.name.clone());
+        let found = self.topics.iter().filter(|t| t.is_of_a_radar() && t.messages > 0).map(|t| t.name.clone());
         found.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
     fn topics(&self) -> String {
-        if self.channels.is_empty() {
+        if self.topics.is_empty() {
             return "none".into();
         }
         let encoding = |t: &Topic| if t.encoding == ENCODING { String::new() } else { format!("{}, ", t.encoding) };
         let mut found: Vec<_> = self
-            .channels
-            .values()
+            .topics
+            .iter()
             .map(|t| format!("{} ({}, {}{} messages)", t.name, t.schema, encoding(t), t.messages))
             .collect();
         found.sort();
@@ -307,18 +368,28 @@ impl Reader {
     }
 
     fn finish(mut self, name: String, options: &ReadOptions) -> Result<Recording> {
+        if let [_, _, ..] = &self.topics_of_frames.iter().collect::<Vec<_>>()[..] {
+            let radars: Vec<_> = self.topics_of_frames.iter().map(String::as_str).collect();
+            bail!("{name}: several radars: {}; choose one with --radar-topic", radars.join(", "));
+        }
+        let topic = self.topics_of_frames.first().cloned().unwrap_or_default();
+        self.frames = scans::assembled(std::mem::take(&mut self.messages), &topic, &mut self.problems)
+            .map_err(|what| anyhow!("{name}: {what}"))?;
+        let level = self.ground.is_none();
         if self.frames.is_empty() {
             // boxes of a camera without a radar are a recording of their own
             let named_radar = |t: &Topic| t.is_of_a_radar() && t.name.starts_with("/radar/");
             let camera = match options.radar_topic {
-                None if !self.channels.values().any(named_radar) => {
-                    std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems)
+                None if !self.topics.iter().any(named_radar) => {
+                    let camera =
+                        std::mem::take(&mut self.camera).finish(&self.transforms, ROAD_FRAME, &mut self.problems);
+                    picture::of_the_road(camera, level, &mut self.problems)
                 }
                 _ => None,
             };
             if let Some(camera) = camera {
                 let ground = self.ground(&name)?;
-                let truth = self.labelled.then(|| Truth::new(self.labels));
+                let truth = truth_of(self.labelled, self.labels, &mut self.problems);
                 let range_max_m = f64::from(Camera3dConfig::default().range_max_m);
                 return Ok(Recording {
                     ground,
@@ -336,28 +407,28 @@ impl Reader {
                     format!("no radar frame: no topic {POINTS_TOPIC}, nor any of type {POINT_CLOUD} or {RADAR_SCAN}")
                 }
             };
-            let ros_1 = self.channels.values().any(|t| t.encoding == "ros1");
-            let remedy = if ros_1 {
+            let ros_1 = self.topics.iter().any(|t| t.encoding == "ros1");
+            let remedy = if self.problems.count(ros::PACKED) > 0 {
+                ""
+            } else if ros_1 {
                 "Messages of ROS 1 are not read: convert the bag (`pip install rosbags`, then `rosbags-convert --src OLD.bag --dst FOLDER --dst-storage mcap`)."
             } else {
                 "Name one with --radar-topic."
             };
             bail!("{name}: {found}; topics found: {}. {remedy}{skipped}", self.topics());
         }
-        if let [_, _, ..] = &self.topics_of_frames.iter().collect::<Vec<_>>()[..] {
-            let radars: Vec<_> = self.topics_of_frames.iter().map(String::as_str).collect();
-            bail!("{name}: several radars: {}; choose one with --radar-topic", radars.join(", "));
-        }
         let radar_frame = options.radar_frame.clone().or(self.radar_frame.take()).unwrap_or_default();
         let road_frame = options.road_frame.as_deref().unwrap_or(ROAD_FRAME);
         let pose = match options.mount {
-            Some([x, y, z, yaw, pitch, roll]) => SensorPose::new([x, y, z], yaw, pitch, roll),
+            Some([x, y, z, yaw, pitch, roll]) => Ok(SensorPose::new([x, y, z], yaw, pitch, roll)),
             None => self.transforms.pose(road_frame, &radar_frame).ok_or_else(|| {
-                anyhow!(
-                    "{name}: no mount: /tf_static joins no frame `{road_frame}` to the radar's `{radar_frame}` (transforms found: {}). Name the frames with --road-frame and --radar-frame, or give the mount with --mount x,y,z,yaw,pitch,roll (metres, degrees).",
-                    self.transforms.describe()
-                )
-            })?,
+                anyhow!("{name}: no mount: {}", self.transforms.why_not(&self.moving, road_frame, &radar_frame))
+            }),
+        };
+        // both that are missing are asked for at once
+        let (pose, sensor) = match (pose, self.sensor(&name, options)) {
+            (Err(mount), Err(view)) => bail!("{mount:#} And {view:#}"),
+            (pose, sensor) => (pose?, sensor?),
         };
         if pose.position[2] <= 0.0 {
             bail!(
@@ -365,10 +436,10 @@ impl Reader {
                 pose.position[2]
             );
         }
-        let sensor = self.sensor(&name, options)?;
         let ground = self.ground(&name)?;
-        let truth = self.labelled.then(|| Truth::new(self.labels));
+        let truth = truth_of(self.labelled, self.labels, &mut self.problems);
         let camera = self.camera.finish(&self.transforms, road_frame, &mut self.problems);
+        let camera = picture::of_the_road(camera, level, &mut self.problems);
         Ok(Recording {
             name,
             sensor,

@@ -1,26 +1,43 @@
 //! Recordings: radar frames, mount, field of view and ground truth, whatever file they come from.
 
+pub mod against_labels;
 pub mod ars408;
+pub mod ars408_feed;
 pub mod beside;
 pub mod boxes;
 pub mod camera;
 pub mod can_log;
 pub mod capture;
 pub mod clock;
+pub mod container;
+#[cfg(test)]
+mod dialects;
 pub mod file;
 pub mod foreign;
 pub mod ignored;
+pub mod kind;
+pub mod labelled;
 pub mod labels;
 pub mod mcap;
 pub mod native;
+pub mod picture;
 pub mod plausible;
 pub mod points;
 pub mod problems;
 pub mod ros;
+pub mod scale;
+pub mod scans;
+pub mod sensor;
 pub mod serial_log;
+#[cfg(test)]
+mod strange;
+pub mod text;
 pub mod ti;
 pub mod transforms;
 pub mod truth;
+pub mod unfilled;
+pub mod usable;
+pub mod used;
 pub mod write;
 
 use std::collections::BTreeMap;
@@ -32,7 +49,7 @@ use crate::geometry::ground::Ground;
 use crate::geometry::pose::{SensorPose, Spherical};
 use crate::recording::truth::Truth;
 use camera::RecordedCamera;
-use file::Content;
+use file::{Content, Source};
 use ignored::Kind;
 use problems::Problems;
 
@@ -68,6 +85,8 @@ pub struct Frame {
     pub detections: Vec<RadarDetection>,
     /// Points dropped when it was read: not finite, or at no distance.
     pub refused: u64,
+    /// Points left out by the radar's own marks.
+    pub unwanted: u64,
     /// The radar says that something is wrong with it.
     pub fault: bool,
 }
@@ -150,13 +169,30 @@ impl Recording {
     }
 }
 
+/// Which labels a recording is judged by.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum LabelsFrom {
+    /// Those in `NAME.labels.csv` beside it, or else its own.
+    #[default]
+    Usual,
+    /// Those in `NAME.labels.csv` beside it.
+    Beside,
+    /// Its own.
+    Recording,
+    /// Those in another file.
+    File(PathBuf),
+}
+
 /// What replaces or restricts what the file itself says.
 #[derive(Debug, Clone, Default)]
 pub struct ReadOptions {
     pub radar_topic: Option<String>,
     pub truth_topic: Option<String>,
+    pub labels: LabelsFrom,
     /// The radar says + of what approaches.
     pub approaching_is_positive: bool,
+    /// What makes m/s of the radar's velocities.
+    pub velocity_scale: Option<f64>,
     /// Frames of `/tf_static` that stand for `road` and for the one in the radar's headers.
     pub road_frame: Option<String>,
     pub radar_frame: Option<String>,
@@ -172,6 +208,8 @@ pub struct ReadOptions {
     pub sensor_id: Option<u8>,
     /// Which kind of radar a CAN log is of.
     pub profile: Option<&'static viewshed::inputs::ars408::profile::Ars408Profile>,
+    /// Which entries of an ARS408 are wanted.
+    pub wanted: Option<viewshed::inputs::ars408::quality::Ars408Wanted>,
     /// Kind of header of a TI capture.
     pub ti_header: Option<viewshed::inputs::ti::TiFamily>,
     /// What a TI capture does not say of its firmware.
@@ -180,6 +218,19 @@ pub struct ReadOptions {
     pub frame_period_s: Option<f64>,
     /// The file has other radars, too: what it says of one without naming it is not this one's.
     pub one_of_several: bool,
+}
+
+impl ReadOptions {
+    /// Refuses one file of labels for several recordings.
+    ///
+    /// # Errors
+    /// Which file that is.
+    pub fn check_for(&self, recordings: usize) -> Result<()> {
+        if let (LabelsFrom::File(file), 2..) = (&self.labels, recordings) {
+            bail!("--labels {}: it is of one recording, and there are {recordings}; name one", file.display());
+        }
+        Ok(())
+    }
 }
 
 /// Every file that [`read`] may read for a recording.
@@ -194,7 +245,9 @@ pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
 /// Those of [`read`]; several radars, some of them without a mount or a field of view: all are listed.
 pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, ReadOptions)>> {
     let asked = options.radar_topic.is_some() || path.as_os_str() == file::STANDARD_INPUT || boxes::is_boxes(path);
-    let Content { bytes, damage } = if asked { Content { bytes: Vec::new(), damage: None } } else { file::read(path)? };
+    let is_mcap = !asked && Source::of(path)?.begin(::mcap::MAGIC.len() as u64)? == ::mcap::MAGIC;
+    let Content { bytes, damage } =
+        if is_mcap { file::read(path)? } else { Content { bytes: Vec::new(), damage: None } };
     let topics = if bytes.starts_with(::mcap::MAGIC) { mcap::radar_topics(&bytes) } else { Vec::new() };
     if topics.len() < 2 {
         // whoever reads the file again finds the same topic
@@ -244,13 +297,20 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
-    let (Content { bytes, damage }, name) = (file::read(path)?, file::stem(path));
-    let (mut recording, kind) = if boxes::is_boxes(path) {
+    let (source, name) = (Source::of(path)?, file::stem(path));
+    if source.begin(1)?.is_empty() {
+        bail!("{} is empty", file::shown(path));
+    }
+    let known = boxes::is_boxes(path) || source.begin(::mcap::MAGIC.len() as u64)? == ::mcap::MAGIC;
+    if !known && let Some(log) = can_log::log::find(&source)? {
+        let (recording, damage) = ars408::read(&name, &log, options)?;
+        return complete(recording, Kind::CanLog, damage.as_deref(), path, options);
+    }
+    let Content { bytes, damage } = source.read()?;
+    let (recording, kind) = if boxes::is_boxes(path) {
         (boxes::read(path, &bytes, options)?, Kind::Other)
     } else if bytes.starts_with(::mcap::MAGIC) {
         (mcap::parse(&bytes, name, options)?, Kind::Other)
-    } else if let Some(format) = can_log::Format::of(&bytes) {
-        (ars408::read(name, &bytes, format, options)?, Kind::CanLog)
     } else if let Some(foreign) = foreign::named(&bytes) {
         bail!("{} cannot be read: {foreign}", file::shown(path));
     } else if ti::is_capture(&bytes) {
@@ -264,8 +324,19 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
             can_log::FORMATS
         );
     };
+    complete(recording, kind, damage.as_deref(), path, options)
+}
+
+/// Adds what is said beside a recording, and of how it was asked for.
+fn complete(
+    mut recording: Recording,
+    kind: Kind,
+    damage: Option<&str>,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<Recording> {
     ignored::note(&mut recording, options, kind);
-    note_damage(&mut recording, damage.as_deref());
+    note_damage(&mut recording, damage);
     beside::complete(recording, path, options)
 }
 

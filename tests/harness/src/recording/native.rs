@@ -10,6 +10,7 @@ use viewshed::wire::e2e::Profile;
 use viewshed::wire::serial::Unstuffer;
 
 use super::can_log::Line;
+use super::can_log::log::Lines;
 use super::capture::{self, Kind};
 use super::problems::Problems;
 use super::{Frame, ReadOptions, Recording};
@@ -35,14 +36,20 @@ pub fn unstuff(mut bytes: &[u8]) -> (Messages, u32) {
     (messages, unstuffer.errors())
 }
 
+/// The data of a frame that is such a message.
+pub fn message(line: &Line) -> Option<&[u8]> {
+    let frame = line.frame()?;
+    sensor(frame.data()).filter(|sensor| frame.id == id(*sensor)).map(|_| frame.data())
+}
+
 /// The data of CAN FD frames that are such messages.
-pub fn of_log(lines: &[Line]) -> Messages {
-    let message = |line: &Line| {
-        let frame = line.frame()?;
-        let sensor = sensor(frame.data()).filter(|s| frame.id == id(*s));
-        sensor.map(|_| (u64::try_from(line.time_ns / 1000).unwrap_or(0), frame.data().to_vec()))
-    };
-    lines.iter().filter_map(message).collect()
+pub fn of_log<L: Lines + ?Sized>(lines: &L) -> Messages {
+    let mut messages = Messages::new();
+    lines.each(&mut |line| {
+        let micros = u64::try_from(line.time_ns / 1000).unwrap_or(0);
+        messages.extend(message(line).map(|data| (micros, data.to_vec())));
+    });
+    messages
 }
 
 /// Whether a file looks like a serial capture.
@@ -90,7 +97,13 @@ pub fn read(name: String, messages: &Messages, broken: u32, options: &ReadOption
             problems.add("native", "scan of a radar that reports a fault", time_ns);
         }
         let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame { time_ns, detections, refused: scan.refused.into(), fault: scan.fault });
+        frames.push(Frame {
+            time_ns,
+            detections,
+            refused: scan.refused.into(),
+            unwanted: scan.unwanted.into(),
+            fault: scan.fault,
+        });
     });
     let Some(start) = frames.first().map(|f| f.time_ns) else {
         bail!("{name}: no whole scan of sensor {sensor}; `viewshed doctor` says what there is")

@@ -1,4 +1,4 @@
-//! What a recording says that contradicts itself: a velocity's sign, and a mount, that its own detections deny.
+//! What a recording says that contradicts itself: a velocity's sign or scale, and a mount, that its own detections deny.
 //!
 //! # Method
 //! A detection that moves is paired with detections of a later frame that have its radial velocity and lie where it
@@ -6,14 +6,21 @@
 //! pairs agree on.
 //!
 //! - *Sign*: over one frame, pairs with the velocity as it stands against pairs with its opposite.
+//! - *Scale*: by tracks of positions alone ([`scale`]).
 //! - *Yaw*: over [`PAUSE_S`], the direction in the road frame from one to the other. Most pairs have that of the road's
 //!   axis. A few degrees off it the yaw is wrong by as much. Farther off it may as well be another road's, or one's square
 //!   to it: then no angle is advised. Nothing is said of a direction in which labelled vehicles drive, too.
 //! - *Height and pitch*: the median height above the road of what moves, over its distance. By a height that is wrong
 //!   it is off everywhere, by a pitch that is wrong the more the farther.
+//!
+//! Only detections that an estimator can use are asked: where they are [no such](used), velocities and directions mean
+//! nothing. What labels deny of a mount is told [from them](against_labels), and no more of its yaw then.
 
-use super::problems::Problems;
-use super::{Frame, RadarDetection, Recording};
+use viewshed::sensor::noise::NoiseConfig;
+
+use super::problems::{MOUNT, Problems};
+use super::{Frame, RadarDetection, Recording, against_labels, scale, sensor, used};
+use crate::geometry::looks;
 use crate::geometry::pose::SensorPose;
 
 /// What is slower tells no direction, m/s.
@@ -36,8 +43,6 @@ const HEIGHT_M: f64 = 0.6;
 /// Farther off it may be another road.
 const MOST_YAW_DEG: f64 = 6.0;
 
-const TOPIC: &str = "mount";
-
 /// By how much a mount as given is more than what the detections say; `None` where they say nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MountError {
@@ -50,12 +55,28 @@ pub struct MountError {
 
 /// Adds what contradicts itself to a recording's problems.
 pub fn check(recording: &mut Recording) {
-    if recording.sensor.platform_moving || recording.sensor.frames_independent {
+    if recording.of_camera().is_some() {
         return;
     }
+    used::check(recording);
+    if recording.ground.is_level() {
+        let start = recording.frames.first().map_or(0, |f| f.time_ns);
+        for doubt in looks::doubts(&sensor::sensor(recording, &NoiseConfig::default())) {
+            recording.problems.add(MOUNT, format!("{doubt}; --mount sets it"), start);
+        }
+    }
+    let used = used::frames(recording);
+    let as_read = std::mem::replace(&mut recording.frames, used);
+    of_used(recording);
+    recording.frames = as_read;
+}
+
+/// What the detections contradict that an estimator can use.
+fn of_used(recording: &mut Recording) {
+    let follow = !recording.sensor.platform_moving && !recording.sensor.frames_independent;
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
-    let add = |problems: &mut Problems, what: String| problems.add(TOPIC, what, start);
-    let (as_it_stands, reversed) = signs(&recording.frames);
+    let add = |problems: &mut Problems, what: String| problems.add(MOUNT, what, start);
+    let (as_it_stands, reversed) = if follow { signs(&recording.frames) } else { (0, 0) };
     if reversed > 100 && reversed > 2 * as_it_stands {
         let what = format!(
             "velocities have the wrong sign, by how ranges change ({reversed} pairs against {as_it_stands}): + is receding; turn them with --velocity-sign approaching"
@@ -63,7 +84,18 @@ pub fn check(recording: &mut Recording) {
         add(&mut recording.problems, what);
         return;
     }
-    let error = mount_error(&recording.frames, &recording.pose);
+    if let Some(contradiction) = scale::contradiction(&recording.frames).filter(|_| follow) {
+        recording.problems.add("velocity", contradiction.told(), start);
+        return;
+    }
+    let denied = against_labels::check(recording);
+    if !follow {
+        return;
+    }
+    let mut error = mount_error(&recording.frames, &recording.pose);
+    if denied {
+        (error.yaw_deg, error.off_axis_deg) = (None, None);
+    }
     if let Some(yaw) = error.yaw_deg.filter(|yaw| yaw.abs() >= YAW_DEG && !is_a_road(*yaw, recording)) {
         add(
             &mut recording.problems,
@@ -295,7 +327,7 @@ mod tests {
                 let along = (37.0 * f64::from(vehicle) + speed * 0.1 * k as f64).rem_euclid(444.0) - 222.0;
                 let place = [c * along - s * lane, s * along + c * lane, USUAL_HEIGHT_M];
                 let Spherical { range_m, azimuth_rad, elevation_rad } = recording.pose.to_spherical(place);
-                if range_m > 200.0 || azimuth_rad.abs() > 1.0 {
+                if range_m > 200.0 || azimuth_rad.abs() > 1.0 || elevation_rad.abs() > 0.5 {
                     continue;
                 }
                 let radial = (place[0] * c + place[1] * s) * speed / range_m;
@@ -335,18 +367,52 @@ mod tests {
     }
 
     #[test]
-    fn a_yaw_that_is_badly_wrong_is_named_and_no_angle_advised() {
+    fn a_yaw_that_is_badly_wrong_is_named_and_no_angle_advised_but_by_labels() {
         for yaw in [-84.0, -60.0, -28.0, -14.0, -8.0, 8.0, 10.0, 15.0, 30.0, 45.0, 84.0_f64] {
-            for labelled in [false, true] {
-                let mut recording = traffic(0.0, yaw, false);
-                // labels are in the frame of the road, whatever the mount is said to be
-                recording.truth = traffic(0.0, 0.0, labelled).truth;
-                let said = said(recording);
-                let off = format!("runs {:.1} degrees off the road's axis and {:.1} off", yaw.abs(), 90.0 - yaw.abs());
-                assert!(said.contains(&off) && said.contains("look at the picture"), "{yaw}: {said}");
-                assert!(!said.contains("too large") && !said.contains("too small"), "{yaw}: {said}");
-            }
+            let unlabelled = said(traffic(0.0, yaw, false));
+            let off = format!("runs {:.1} degrees off the road's axis and {:.1} off", yaw.abs(), 90.0 - yaw.abs());
+            assert!(unlabelled.contains(&off) && unlabelled.contains("look at the picture"), "{yaw}: {unlabelled}");
+            assert!(!unlabelled.contains("too large") && !unlabelled.contains("too small"), "{yaw}: {unlabelled}");
         }
+        for yaw in [-178.0, -120.0, -90.0, -14.0, -4.0, 4.0, 30.0, 90.0, 135.0, 180.0_f64] {
+            // labels are in the frame of the road, whatever the mount is said to be
+            let said = said(traffic(0.0, yaw, true));
+            let word = if yaw > 0.0 { "large" } else { "small" };
+            // half a turn is as far either way
+            let value =
+                if yaw == 180.0 { "seems 180.0 too".into() } else { format!("seems {:.1} too {word}", yaw.abs()) };
+            assert!(said.contains(&value) && said.contains(",0.0,0.0,0.0"), "{yaw}: {said}");
+            assert_eq!(said.lines().count(), 1, "{yaw}: {said}");
+        }
+    }
+
+    #[test]
+    fn labels_deny_a_place_and_sides_that_are_exchanged() {
+        let mut elsewhere = traffic(0.0, 0.0, true);
+        let [x, y, z] = elsewhere.pose.position;
+        elsewhere.pose = SensorPose::new([x + 24.0, y, z], 0.0, 0.0, 0.0);
+        let told = said(elsewhere);
+        assert!(told.contains("these lie +24 m along x and +0 m along y"), "{told}");
+        let mut exchanged = traffic(0.0, 0.0, true);
+        exchanged.frames.iter_mut().flat_map(|f| &mut f.detections).for_each(|d| d.azimuth_rad = -d.azimuth_rad);
+        let told = said(exchanged);
+        assert!(told.contains("left and right are exchanged"), "{told}");
+        let mut late = traffic(0.0, 0.0, true);
+        late.frames.iter_mut().flat_map(|f| &mut f.detections).for_each(|d| d.range_m += 30.0);
+        late.sensor.frames_independent = true;
+        let told = said(late);
+        assert!(told.contains("have a detection at their place: the mount is wrong, or place or clock"), "{told}");
+    }
+
+    #[test]
+    fn of_detections_that_nobody_can_use_nothing_follows() {
+        let mut degrees = traffic(0.0, 0.0, false);
+        degrees.frames.iter_mut().flat_map(|f| &mut f.detections).for_each(|d| {
+            d.azimuth_rad = d.azimuth_rad.to_degrees() + 4.0;
+            d.radial_velocity_mps = -d.radial_velocity_mps;
+        });
+        let told = said(degrees);
+        assert!(told.contains("points rejected") && !told.contains("wrong sign"), "{told}");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! Values are metres, radians and metres per second as they stand: nothing is converted.
 
 use super::RadarDetection;
-use super::ros::{PointCloud2, PointField, RadarScan};
+use super::ros::{PointCloud2, RadarScan};
 
 /// Names a field goes by: ours first, then those of drivers.
 const RANGE: &[&str] = &["range"];
@@ -33,23 +33,71 @@ pub const NOT_FINITE: &str = "detection with a value that is not finite, dropped
 pub const NOT_A_RANGE: &str = "detection with a range of zero or below, dropped";
 
 /// Points of one message, and how many were dropped for which reason.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
     pub detections: Vec<RadarDetection>,
     pub not_finite: u64,
     pub not_a_range: u64,
+    /// Of these, places in which nothing is filled: NaN or zero throughout.
+    pub blank_nan: u64,
+    pub blank_zero: u64,
+    /// Fields that are there and cannot be read; points are taken without them.
+    pub unread: Vec<String>,
 }
 
 impl Points {
     fn push(&mut self, d: RadarDetection) {
         let needed = [d.range_m, d.azimuth_rad, d.radial_velocity_mps, d.elevation_rad.unwrap_or(0.0)];
+        let all = |what: fn(f32) -> bool| what(d.range_m) && what(d.azimuth_rad);
+        let blank = (all(f32::is_nan) || all(|v| v == 0.0)) && needed[2..].iter().all(|v| v.is_nan() || *v == 0.0);
         if needed.iter().any(|v| !v.is_finite()) {
             self.not_finite += 1;
+            self.blank_nan += u64::from(blank);
         } else if d.range_m <= 0.0 {
             self.not_a_range += 1;
+            self.blank_zero += u64::from(blank);
         } else {
             self.detections.push(d);
         }
+    }
+
+    /// Points of the message, taken or not.
+    pub fn places(&self) -> u64 {
+        self.detections.len() as u64 + self.not_finite + self.not_a_range
+    }
+}
+
+/// How a value is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Datatype {
+    Int8,
+    Uint8,
+    Int16,
+    Uint16,
+    Int32,
+    Uint32,
+    Float32,
+    Float64,
+}
+
+impl Datatype {
+    /// As `sensor_msgs/msg/PointField` numbers them.
+    fn of(number: u8) -> Option<Self> {
+        use Datatype::{Float32, Float64, Int8, Int16, Int32, Uint8, Uint16, Uint32};
+        [Int8, Uint8, Int16, Uint16, Int32, Uint32, Float32, Float64].get(usize::from(number).checked_sub(1)?).copied()
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::Int8 | Self::Uint8 => 1,
+            Self::Int16 | Self::Uint16 => 2,
+            Self::Int32 | Self::Uint32 | Self::Float32 => 4,
+            Self::Float64 => 8,
+        }
+    }
+
+    fn is_float(self) -> bool {
+        matches!(self, Self::Float32 | Self::Float64)
     }
 }
 
@@ -57,26 +105,45 @@ impl Points {
 #[derive(Clone, Copy)]
 struct Column {
     offset: usize,
-    double: bool,
+    datatype: Datatype,
 }
 
 impl Column {
+    /// A field of real numbers; whole ones would be of a unit that nobody tells.
     fn find(cloud: &PointCloud2, names: &[&str]) -> Result<Option<Self>, String> {
+        let found = Self::of_any_type(cloud, names)?;
+        match found {
+            Some((column, name)) if !column.datatype.is_float() => {
+                Err(format!("field `{name}` has whole numbers, not FLOAT32 (7) or FLOAT64 (8)"))
+            }
+            found => Ok(found.map(|(column, _)| column)),
+        }
+    }
+
+    /// A field with its name.
+    fn of_any_type<'a>(cloud: &'a PointCloud2, names: &[&str]) -> Result<Option<(Self, &'a str)>, String> {
         let Some(field) = names.iter().find_map(|n| cloud.fields.iter().find(|f| f.name == *n)) else {
             return Ok(None);
         };
-        let double = match field.datatype {
-            PointField::FLOAT32 => false,
-            PointField::FLOAT64 => true,
-            other => {
-                return Err(format!("field `{}` has datatype {other}, not FLOAT32 (7) or FLOAT64 (8)", field.name));
-            }
+        let Some(datatype) = Datatype::of(field.datatype) else {
+            return Err(format!("field `{}` has datatype {}, which is none", field.name, field.datatype));
         };
         let offset = field.offset as usize;
-        if offset.saturating_add(if double { 8 } else { 4 }) > cloud.point_step as usize {
+        if offset.saturating_add(datatype.bytes()) > cloud.point_step as usize {
             return Err(format!("field `{}` ends beyond point_step {}", field.name, cloud.point_step));
         }
-        Ok(Some(Self { offset, double }))
+        Ok(Some((Self { offset, datatype }, &field.name)))
+    }
+
+    /// A field that points may lack, in any type; one that cannot be read is noted and left out.
+    fn optional(cloud: &PointCloud2, names: &[&str], unread: &mut Vec<String>) -> Option<Self> {
+        match Self::of_any_type(cloud, names) {
+            Ok(found) => found.map(|(column, _)| column),
+            Err(what) => {
+                unread.push(what);
+                None
+            }
+        }
     }
 
     fn needed(cloud: &PointCloud2, names: &[&str]) -> Result<Self, String> {
@@ -86,28 +153,36 @@ impl Column {
     }
 
     fn read(self, point: &[u8], big_endian: bool) -> f32 {
-        let wide = |n: usize| -> [u8; 8] {
-            let mut b = [0; 8];
-            b[..n].copy_from_slice(&point[self.offset..self.offset + n]);
-            b
-        };
-        if self.double {
-            let b = wide(8);
-            (if big_endian { f64::from_be_bytes(b) } else { f64::from_le_bytes(b) }) as f32
-        } else {
-            let [b0, b1, b2, b3, ..] = wide(4);
-            let b = [b0, b1, b2, b3];
-            if big_endian { f32::from_be_bytes(b) } else { f32::from_le_bytes(b) }
+        let mut b = [0; 8];
+        let bytes = &point[self.offset..self.offset + self.datatype.bytes()];
+        // as if all were little-endian
+        for (place, byte) in b.iter_mut().zip(bytes) {
+            *place = *byte;
+        }
+        if big_endian {
+            b[..bytes.len()].reverse();
+        }
+        let [b0, b1, b2, b3, ..] = b;
+        match self.datatype {
+            Datatype::Int8 => f32::from(b0 as i8),
+            Datatype::Uint8 => f32::from(b0),
+            Datatype::Int16 => f32::from(i16::from_le_bytes([b0, b1])),
+            Datatype::Uint16 => f32::from(u16::from_le_bytes([b0, b1])),
+            Datatype::Int32 => i32::from_le_bytes([b0, b1, b2, b3]) as f32,
+            Datatype::Uint32 => u32::from_le_bytes([b0, b1, b2, b3]) as f32,
+            Datatype::Float32 => f32::from_le_bytes([b0, b1, b2, b3]),
+            Datatype::Float64 => f64::from_le_bytes(b) as f32,
         }
     }
 }
 
 /// Points of a cloud; the error names the field that is missing or malformed.
 pub fn from_cloud(cloud: &PointCloud2) -> Result<Points, String> {
-    let place = Place::find(cloud)?;
+    let mut points = Points::default();
+    let place = Place::find(cloud, &mut points.unread)?;
     let velocity = Column::needed(cloud, RADIAL_VELOCITY)?;
-    let rcs = Column::find(cloud, RCS)?;
-    let snr = Column::find(cloud, SNR)?;
+    let rcs = Column::optional(cloud, RCS, &mut points.unread);
+    let snr = Column::optional(cloud, SNR, &mut points.unread);
 
     let (width, step, row) = (cloud.width as usize, cloud.point_step as usize, cloud.row_step as usize);
     let row = if cloud.height <= 1 { width.saturating_mul(step) } else { row };
@@ -115,10 +190,14 @@ pub fn from_cloud(cloud: &PointCloud2) -> Result<Points, String> {
         return Err(format!("row_step {row} is shorter than {width} points of {step} bytes"));
     }
     let needed = row.saturating_mul(cloud.height as usize);
-    if cloud.data.len() < needed {
-        return Err(format!("{} bytes of data, {needed} announced", cloud.data.len()));
+    // rows may be padded to the next point, and not by a whole one
+    if cloud.data.len() < needed || cloud.data.len() >= needed.saturating_add(step) {
+        return Err(format!(
+            "{} bytes of data, {needed} announced by width {width}, height {} and point_step {step}: it is no empty scan, and which of them is wrong is not known",
+            cloud.data.len(),
+            cloud.height
+        ));
     }
-    let mut points = Points::default();
     for line in cloud.data[..needed].chunks_exact(row.max(1)) {
         for point in line[..width * step].chunks_exact(step) {
             let get = |c: Column| c.read(point, cloud.is_bigendian);
@@ -149,10 +228,14 @@ enum Place {
 }
 
 impl Place {
-    fn find(cloud: &PointCloud2) -> Result<Self, String> {
+    fn find(cloud: &PointCloud2, unread: &mut Vec<String>) -> Result<Self, String> {
         let find = |names| Column::find(cloud, names);
         if let (Some(range), Some(azimuth)) = (find(RANGE)?, find(AZIMUTH)?) {
-            return Ok(Self::Polar(range, azimuth, find(ELEVATION)?));
+            let elevation = find(ELEVATION).unwrap_or_else(|what| {
+                unread.push(what);
+                None
+            });
+            return Ok(Self::Polar(range, azimuth, elevation));
         }
         match (find(X)?, find(Y)?, find(Z)?) {
             (Some(x), Some(y), Some(z)) => Ok(Self::Cartesian(x, y, z)),
@@ -167,8 +250,9 @@ impl Place {
             Self::Cartesian(x, y, z) => {
                 let [x, y, z] = [x, y, z].map(|c| f64::from(get(c)));
                 let flat = x.hypot(y);
-                // a point that is not finite stays so
-                [flat.hypot(z) as f32, y.atan2(x) as f32, if z.is_nan() { f32::INFINITY } else { z.atan2(flat) as f32 }]
+                // without a z the height is not measured
+                let range = if z.is_nan() { flat } else { flat.hypot(z) };
+                [range as f32, y.atan2(x) as f32, z.atan2(flat) as f32]
             }
         }
     }
@@ -197,7 +281,7 @@ pub fn from_scan(scan: &RadarScan) -> Points {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::ros::{Header, RadarReturn};
+    use crate::recording::ros::{Header, PointField, RadarReturn};
 
     fn cloud(names: &[&str], points: &[&[f32]]) -> PointCloud2 {
         let step = 4 * names.len() as u32;
@@ -258,7 +342,9 @@ mod tests {
             assert_eq!(one(&[30.0, -40.0, 0.0], name).detections[0].elevation_rad, None, "all in the radar's plane");
         }
         assert_eq!(one(&[f32::NAN, 1.0, 1.0], "vr").not_finite, 1);
-        assert_eq!(one(&[1.0, 1.0, f32::NAN], "vr").not_finite, 1);
+        assert_eq!(one(&[1.0, 1.0, f32::INFINITY], "vr").not_finite, 1);
+        let flat = one(&[3.0, 4.0, f32::NAN], "vr").detections[0];
+        assert_eq!((flat.range_m, flat.elevation_rad), (5.0, None), "a height that is not measured");
         assert_eq!(one(&[0.0, 0.0, 0.0], "vr").not_a_range, 1);
     }
 
@@ -301,6 +387,81 @@ mod tests {
         assert!(from_cloud(&c).is_err());
         c.point_step = 0;
         assert!(from_cloud(&c).is_err());
+    }
+
+    #[test]
+    fn data_that_contradict_their_size_are_no_empty_scan() {
+        let names = ["range", "azimuth", "radial_velocity"];
+        let points = [[1.0, 0.0, 0.0_f32]; 6];
+        let c = cloud(&names, &points.each_ref().map(|p| &p[..]));
+        for (width, height) in [(0, 1), (6, 0), (0, 0), (5, 1), (1, 1), (1, 2)] {
+            let wrong = PointCloud2 { width, height, ..c.clone() };
+            assert!(from_cloud(&wrong).is_err_and(|e| e.contains("72 bytes of data")), "{width} x {height}");
+        }
+        let empty = PointCloud2 { width: 0, data: Vec::new(), ..c.clone() };
+        assert_eq!(from_cloud(&empty), Ok(Points::default()));
+        assert_eq!(
+            from_cloud(&PointCloud2 { width: 2, height: 3, row_step: 24, ..c }).map(|p| p.detections.len()),
+            Ok(6)
+        );
+    }
+
+    #[test]
+    fn fields_that_points_may_lack_are_read_in_any_type() {
+        for (datatype, bytes, value) in [
+            (1, vec![0xF8], -8.0),
+            (2, vec![0xF8], 248.0),
+            (3, vec![0xFF, 0xFE], -2.0),
+            (4, vec![0x01, 0x02], 258.0),
+            (5, vec![0xFF, 0xFF, 0xFF, 0xFE], -2.0),
+            (6, vec![0, 0, 1, 0], 256.0),
+            (7, 2.5_f32.to_be_bytes().to_vec(), 2.5),
+            (8, (-2.5_f64).to_be_bytes().to_vec(), -2.5),
+        ] {
+            for is_bigendian in [false, true] {
+                let mut c = cloud(&["range", "azimuth", "radial_velocity"], &[&[10.0, 0.5, 2.0]]);
+                let extra = bytes.len() as u32;
+                c.fields.push(PointField { name: "rcs".into(), offset: 12, datatype, count: 1 });
+                (c.point_step, c.row_step, c.is_bigendian) = (12 + extra, 12 + extra, is_bigendian);
+                let mut extra = bytes.clone();
+                if is_bigendian {
+                    c.data.chunks_exact_mut(4).for_each(<[u8]>::reverse);
+                } else {
+                    extra.reverse();
+                }
+                c.data.extend(extra);
+                let d = from_cloud(&c).unwrap().detections[0];
+                assert_eq!((d.range_m, d.rcs_dbsm), (10.0, Some(value)), "{datatype} {is_bigendian}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_field_that_cannot_be_read_is_told_and_the_points_are_taken() {
+        let mut c = cloud(&["range", "azimuth", "radial_velocity", "snr"], &[&[10.0, 0.5, 2.0, 3.0]]);
+        c.fields[3].datatype = 99;
+        let p = from_cloud(&c).unwrap();
+        assert_eq!((p.detections[0].snr_db, p.unread.len()), (None, 1));
+        assert!(p.unread[0].contains("field `snr` has datatype 99"), "{:?}", p.unread);
+        // whole numbers of what is needed are of a unit that nobody tells
+        c.fields[0].datatype = 6;
+        assert!(from_cloud(&c).unwrap_err().contains("field `range` has whole numbers"));
+    }
+
+    #[test]
+    fn places_without_a_point_are_told_from_measurements_that_failed() {
+        let names = ["x", "y", "z", "velocity"];
+        let (nan, inf) = (f32::NAN, f32::INFINITY);
+        let rows: [&[f32]; 6] = [
+            &[nan; 4],
+            &[nan, nan, nan, 0.0],
+            &[0.0; 4],
+            &[nan, 1.0, 1.0, 1.0],
+            &[inf, 1.0, 1.0, 1.0],
+            &[0.0, 0.0, 0.0, 7.0],
+        ];
+        let p = from_cloud(&cloud(&names, &rows)).unwrap();
+        assert_eq!((p.not_finite, p.blank_nan, p.not_a_range, p.blank_zero, p.places()), (4, 2, 2, 1, 6));
     }
 
     #[test]

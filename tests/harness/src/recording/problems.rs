@@ -13,6 +13,10 @@ pub struct Problem {
     pub first_time_ns: i64,
 }
 
+/// Topics of what is said of all points of a recording, and of its mount.
+pub const POINTS: &str = "points";
+pub const MOUNT: &str = "mount";
+
 /// All flaws found in one recording.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Problems(BTreeMap<(String, String), (u64, i64)>);
@@ -32,8 +36,15 @@ impl Problems {
         self.0.is_empty()
     }
 
+    /// Causes before what follows from them: what a mount seems to be comes of detections, of which all may be wrong.
     pub fn iter(&self) -> impl Iterator<Item = Problem> + '_ {
-        self.0.iter().map(|((topic, what), &(count, first_time_ns))| Problem {
+        let mut all: Vec<_> = self.0.iter().collect();
+        all.sort_by_key(|((topic, _), _)| match topic.as_str() {
+            POINTS => 0,
+            MOUNT => 2,
+            _ => 1,
+        });
+        all.into_iter().map(|((topic, what), &(count, first_time_ns))| Problem {
             topic: topic.clone(),
             what: what.clone(),
             count,
@@ -51,12 +62,42 @@ impl Problem {
     /// The problem in words, its time counted from the start of the recording.
     pub fn since(&self, start_ns: i64) -> String {
         let seconds = self.first_time_ns.saturating_sub(start_ns) as f64 * 1e-9;
-        format!("{}: {} ({}x, first at {seconds:.3} s)", self.topic, self.what, self.count)
+        // of a scan some comes before it is whole
+        let first = if seconds < 0.0 {
+            format!("{:.3} s before the first frame", -seconds)
+        } else {
+            format!("at {seconds:.3} s")
+        };
+        format!("{}: {} ({}x, first {first})", self.topic, self.what, self.count)
     }
 }
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.since(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_time_is_negative() {
+        let at = |first_time_ns| {
+            Problem { topic: "a".into(), what: "b".into(), count: 2, first_time_ns }.since(1_000_000_000)
+        };
+        assert_eq!(at(1_500_000_000), "a: b (2x, first at 0.500 s)");
+        assert_eq!(at(998_000_000), "a: b (2x, first 0.002 s before the first frame)");
+    }
+
+    #[test]
+    fn causes_stand_before_what_follows_from_them() {
+        let mut problems = Problems::default();
+        for topic in [MOUNT, "/radar/points", POINTS, "zoo"] {
+            problems.add(topic, "wrong", 0);
+        }
+        let topics: Vec<String> = problems.iter().map(|p| p.topic).collect();
+        assert_eq!(topics, [POINTS, "/radar/points", "zoo", MOUNT]);
     }
 }

@@ -208,8 +208,17 @@ pub struct CameraInfo {
     pub roi: RegionOfInterest,
 }
 
+/// What packed data begins with; no CDR header is this.
+const ZSTD: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
+
+/// Of messages that are packed one by one.
+pub const PACKED: &str = "packed with zstd by itself, as `ros2 bag record --compression-mode message` does; unpack the bag with `ros2 bag convert`, or record with --compression-mode file or none";
+
 /// Decodes a CDR message with its four-byte encapsulation header.
 pub fn decode<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
+    if data.starts_with(&ZSTD) {
+        return Err(PACKED.into());
+    }
     let (header, body) = data.split_at_checked(4).ok_or("shorter than the CDR header")?;
     let decoded = match header[1] {
         0 => cdr_encoding::from_bytes::<T, BigEndian>(body),

@@ -34,6 +34,10 @@ pub fn is_capture(bytes: &[u8]) -> bool {
 /// # Errors
 /// A kind of header that cannot be learnt, and no frame at all.
 pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    if let Some(size) = records_of_cars(bytes) {
+        let [what, remedy] = of_cars(size);
+        bail!("{name}: {what}; {remedy}");
+    }
     let family = match options.ti_header.or_else(|| learn(bytes)) {
         Some(family) => family,
         None => bail!(
@@ -50,16 +54,22 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
     }
     let mut radar = Ti::<MOST_POINTS>::new(TiConfig { family: Some(family), dialect });
     let mut frames: Vec<Frame> = Vec::new();
-    let mut clock = Clock::new(period_s);
+    let mut numbers = Vec::new();
     scans(&mut radar, bytes, |scan| {
         let detections = scan.detections.iter().map(capture::detection).collect();
+        numbers.push(scan.number);
         frames.push(Frame {
-            time_ns: clock.time_ns(scan.number),
+            time_ns: START_NS,
             detections,
             refused: scan.refused.into(),
+            unwanted: scan.unwanted.into(),
             fault: scan.fault,
         });
     });
+    let (times, stood) = times(&numbers, period_s);
+    frames.iter_mut().zip(times).for_each(|(frame, time_ns)| frame.time_ns = time_ns);
+    let what = format!("frame whose number stands still: taken {period_s} s after the one before");
+    problems.add_many("capture", what, START_NS, stood as u64);
     let c = *radar.counters();
     let first = frames.first().map(|f| f.time_ns).with_context(|| {
         format!(
@@ -110,11 +120,11 @@ pub fn feed<const N: usize>(radar: &mut Ti<N>, mut bytes: &[u8], mut see: impl F
     }
 }
 
-/// What the decoder counted, in words.
+/// What the decoder counted, in words. The number of a frame that came damaged is missing, too: it is told once.
 pub fn flaws(c: &TiCounters) -> [(&'static str, u32); 6] {
     [
         ("frame cut short or damaged, dropped", c.broken),
-        ("frame that never came, by its number", c.lost),
+        ("frame that never came, by its number", c.lost.saturating_sub(c.broken)),
         ("radar started over", c.restarts),
         ("byte outside of frames", c.stray_bytes),
         ("point with values that are none, dropped", c.no_point),
@@ -133,47 +143,63 @@ pub fn flaw(flaw: Flaw) -> &'static str {
     }
 }
 
-/// Times from frame numbers.
-struct Clock {
-    period_ns: i64,
-    last: Option<Stamp>,
-}
+/// Sub-frames of a frame, at most.
+const MOST_SUB_FRAMES: usize = 4;
 
-#[derive(Clone, Copy)]
-struct Stamp {
-    number: u32,
-    /// Of the first sub-frame of the number, from which the next number counts.
-    first_ns: i64,
-    time_ns: i64,
-}
+/// Numbers of frames that a radar may have left out; what is farther is a restart.
+const MOST_LEFT_OUT: u32 = 10_000;
 
-impl Clock {
-    fn new(period_s: f64) -> Self {
-        Self { period_ns: (period_s * 1e9) as i64, last: None }
+/// Times of frames from their numbers, each later than the one before: sub-frames share a number, restarts begin anew, and a
+/// number that stands still for more frames than there are sub-frames says nothing. How many sub-frames there are is not
+/// known, so they are a quarter of a period apart. And how many frames bear a number that stood still.
+fn times(numbers: &[u32], period_s: f64) -> (Vec<i64>, usize) {
+    let period_ns = (period_s * 1e9) as i64;
+    let (mut times, mut stood, mut next_ns) = (Vec::with_capacity(numbers.len()), 0, START_NS);
+    let mut runs = numbers.chunk_by(|a, b| a == b).peekable();
+    while let Some(run) = runs.next() {
+        let still = run.len() > MOST_SUB_FRAMES;
+        stood += if still { run.len() } else { 0 };
+        let step_ns = if still { period_ns } else { period_ns / MOST_SUB_FRAMES as i64 };
+        times.extend((0..run.len() as i64).map(|k| next_ns + k * step_ns));
+        let lasts_ns = if still { run.len() as i64 * period_ns } else { period_ns };
+        let advance = runs.peek().and_then(|next| next.first()?.checked_sub(*run.first()?));
+        let left_out = advance.filter(|advance| *advance < MOST_LEFT_OUT && !still).map_or(0, |n| i64::from(n) - 1);
+        next_ns += lasts_ns + left_out * period_ns;
     }
+    (times, stood)
+}
 
-    /// Later than the time before, whatever the number: sub-frames share one, restarts begin anew. A radar has at most four
-    /// sub-frames; how many is not known from the first, so they are a quarter of a period apart.
-    fn time_ns(&mut self, number: u32) -> i64 {
-        let stamp = match self.last {
-            None => Stamp { number, first_ns: START_NS, time_ns: START_NS },
-            Some(last) => {
-                let later_ns = last.time_ns + self.period_ns / 4;
-                match number.checked_sub(last.number) {
-                    Some(0) => Stamp { time_ns: later_ns, ..last },
-                    advance => {
-                        let periods = advance.filter(|advance| *advance < 10_000).unwrap_or(1);
-                        let next_ns = last.first_ns + i64::from(periods) * self.period_ns;
-                        // a number that stood still for more sub-frames than there are has come too far
-                        let time_ns = if next_ns > last.time_ns { next_ns } else { later_ns };
-                        Stamp { number, first_ns: time_ns, time_ns }
-                    }
-                }
-            }
+/// The size of the records of TI's demos for cars (medium range and ultra short range), if that is what a capture holds:
+/// their item of type 1 begins with a number of records and a binary point, and they have 8 or 10 bytes each.
+pub fn records_of_cars(bytes: &[u8]) -> Option<usize> {
+    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    let starts = bytes.windows(MAGIC.len()).enumerate().filter(|(_, w)| *w == MAGIC).map(|(at, _)| at);
+    let (mut frames, mut found) = (0_usize, [0_usize; 2]);
+    for start in starts.take(200) {
+        let of_header = |header: usize| {
+            let (kind, length) = (word(start + header)?, word(start + header + 4)?);
+            let count = word(start + header + 8)? & 0xFFFF;
+            let fits = |size: usize| kind == 1 && count > 0 && length == 4 + count * size;
+            [8, 10].into_iter().position(fits)
         };
-        self.last = Some(stamp);
-        stamp.time_ns
+        let sizes = [36, 40, 44].into_iter().find_map(of_header);
+        frames += 1;
+        if let Some(k) = sizes {
+            found[k] += 1;
+        }
     }
+    let (k, n) = if found[0] >= found[1] { (0, found[0]) } else { (1, found[1]) };
+    (n >= 3 && 2 * n > frames).then_some([8, 10][k])
+}
+
+/// What is said of their captures, and what to do.
+pub fn of_cars(size: usize) -> [String; 2] {
+    [
+        format!(
+            "the points are records of {size} bytes, as TI's demos for cars send them (medium range, MRR, and ultra short range, USRR), and these are not read"
+        ),
+        "run the out-of-box demo of the SDK or a firmware of the Radar Toolbox, whose points are read".into(),
+    ]
 }
 
 #[cfg(test)]
@@ -181,16 +207,47 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sub_frames_do_not_slow_time_down() {
+    fn sub_frames_do_not_slow_time_down_and_numbers_that_stand_still_do_not_stop_it() {
         let times = |numbers: &[u32]| {
-            let mut clock = Clock::new(0.1);
-            numbers.iter().map(|n| (clock.time_ns(*n) - START_NS) / 1_000_000).collect::<Vec<_>>()
+            let (times, stood) = times(numbers, 0.1);
+            (times.iter().map(|time| (time - START_NS) / 1_000_000).collect::<Vec<_>>(), stood)
         };
-        assert_eq!(times(&[1, 1, 2, 2]), [0, 25, 100, 125]);
-        assert_eq!(times(&[7, 7, 7, 7, 8, 8, 8, 8, 9]), [0, 25, 50, 75, 100, 125, 150, 175, 200]);
-        assert_eq!(times(&[1, 2, 5, 6]), [0, 100, 400, 500], "frames that never came");
-        // restarts, and more of one number than a radar has
-        assert_eq!(times(&[90, 90, 0, 0, 1]), [0, 25, 100, 125, 200]);
-        assert_eq!(times(&[3, 3, 3, 3, 3, 3, 4, 5]), [0, 25, 50, 75, 100, 125, 150, 250]);
+        let running =
+            |numbers: &[u32], expected: &[i64]| assert_eq!(times(numbers), (expected.to_vec(), 0), "{numbers:?}");
+        running(&[1, 1, 2, 2], &[0, 25, 100, 125]);
+        running(&[7, 7, 7, 7, 8, 8, 8, 8, 9], &[0, 25, 50, 75, 100, 125, 150, 175, 200]);
+        // frames that never came; restarts, and a number that begins anew
+        running(&[1, 2, 5, 6], &[0, 100, 400, 500]);
+        running(&[90, 90, 0, 0, 1], &[0, 25, 100, 125, 200]);
+        running(&[1, 2, 90_000, 90_001], &[0, 100, 200, 300]);
+        running(&[], &[]);
+        // more of one number than a radar has sub-frames: always, and for a while
+        assert_eq!(times(&[0; 40]), ((0..40).map(|k| 100 * k).collect(), 40));
+        assert_eq!(times(&[3, 3, 3, 3, 3, 3, 4, 5]), (vec![0, 100, 200, 300, 400, 500, 600, 700], 6));
+        assert_eq!(
+            times(&[3, 3, 3, 3, 3, 9]),
+            (vec![0, 100, 200, 300, 400, 500], 5),
+            "what passed meanwhile is not known"
+        );
+    }
+
+    #[test]
+    fn records_of_demos_for_cars_are_known_by_their_size() {
+        let frame = |header: usize, size: usize, count: u16| {
+            let mut bytes = MAGIC.to_vec();
+            bytes.resize(header, 0);
+            bytes.extend(1_u32.to_le_bytes());
+            bytes.extend((4 + u32::from(count) * size as u32).to_le_bytes());
+            bytes.extend([count.to_le_bytes(), 7_u16.to_le_bytes()].concat());
+            bytes.resize(bytes.len() + usize::from(count) * size, 0);
+            bytes
+        };
+        for header in [36, 40, 44] {
+            for (size, expected) in [(8, Some(8)), (10, Some(10)), (12, None), (16, None)] {
+                let capture: Vec<u8> = (1..9).flat_map(|count| frame(header, size, count)).collect();
+                assert_eq!(records_of_cars(&capture), expected, "{header}, {size}");
+            }
+        }
+        assert_eq!((records_of_cars(&MAGIC.repeat(9)), records_of_cars(b"")), (None, None));
     }
 }

@@ -6,7 +6,7 @@ use super::ros::{Quaternion, TfMessage, Transform, Vector3};
 use crate::geometry::pose::SensorPose;
 
 /// Static transforms by child frame.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Transforms(BTreeMap<String, (String, Transform)>);
 
 impl Transforms {
@@ -23,6 +23,36 @@ impl Transforms {
             return "none".into();
         }
         self.0.iter().map(|(child, (parent, _))| format!("{parent} -> {child}")).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Why no transform joins `frame` to `root`, and what to do; `moving` are those of `/tf`.
+    pub fn why_not(&self, moving: &Self, root: &str, frame: &str) -> String {
+        let found = format!(
+            "/tf_static joins no frame `{root}` to the radar's `{frame}` (transforms found: {})",
+            self.describe()
+        );
+        let give = "give the mount with --mount x,y,z,yaw,pitch,roll (metres, degrees)";
+        if let Some((child, (parent, t))) = self.0.iter().find(|(_, (_, t))| !is_rotation(&t.rotation)) {
+            let Quaternion { x, y, z, w } = t.rotation;
+            return format!(
+                "the rotation of the transform {parent} -> {child} is none: its quaternion is {x}, {y}, {z}, {w}, whose length is not 1 (no rotation is 0, 0, 0, 1); mend the one who sends it, or {give}"
+            );
+        }
+        let mut all = moving.clone();
+        all.0.extend(self.0.clone());
+        if let Some(pose) = all.pose(root, frame) {
+            let [x, y, z] = pose.position;
+            let [yaw, pitch, roll] = [pose.yaw_rad(), pose.pitch_rad(), pose.roll_rad()].map(f64::to_degrees);
+            return format!(
+                "{found}; the transform is there on /tf, which is for what moves: send it on /tf_static, or, if it does not move, --mount={x:.3},{y:.3},{z:.3},{yaw:.2},{pitch:.2},{roll:.2}"
+            );
+        }
+        if self.0.is_empty() {
+            return format!(
+                "there is no /tf_static; of a split bag only the first part has it (its name ends in _0.mcap): read that one, or {give}"
+            );
+        }
+        format!("{found}. Name the frames with --road-frame and --radar-frame, or {give}.")
     }
 
     /// Pose of `frame` in `root`, if a chain of transforms joins them.
@@ -44,13 +74,22 @@ impl Transforms {
     }
 }
 
+fn length(q: &Quaternion) -> f64 {
+    (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w).sqrt()
+}
+
+/// Whether a quaternion is one of a rotation, but for rounding.
+fn is_rotation(q: &Quaternion) -> bool {
+    (0.5..2.0).contains(&length(q))
+}
+
 /// First `inner`, then `outer`; `None` where the rotation is no rotation.
 fn chain(outer: &Transform, inner: &Transform) -> Option<Transform> {
     let q = &outer.rotation;
-    let norm = (q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w).sqrt();
-    if !(0.5..2.0).contains(&norm) {
+    if !is_rotation(q) {
         return None;
     }
+    let norm = length(q);
     let q = Quaternion { x: q.x / norm, y: q.y / norm, z: q.z / norm, w: q.w / norm };
     let pose = SensorPose::from_quaternion(
         [outer.translation.x, outer.translation.y, outer.translation.z],
@@ -101,6 +140,25 @@ mod tests {
         assert!((pose.position[2] - 5.5).abs() < 1e-12);
         assert!((pose.yaw_rad() - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         assert!(tf.pose("map", "radar").is_none());
+    }
+
+    #[test]
+    fn a_mount_that_cannot_be_used_is_told_with_what_is_there() {
+        let with = |steps: Vec<TransformStamped>| {
+            let mut tf = Transforms::default();
+            tf.add(TfMessage { transforms: steps });
+            tf
+        };
+        let none = Transforms::default();
+        let on_tf = with(vec![step("road", "radar", [1.0, 2.0, 5.0], 0.1)]);
+        let said = none.why_not(&on_tf, "road", "radar");
+        assert!(said.contains("on /tf,") && said.contains("--mount=1.000,2.000,5.000,5.73,"), "{said}");
+        assert!(none.why_not(&none, "road", "radar").contains("split bag only the first part has it"));
+        let mut zero = step("road", "radar", [0.0; 3], 0.0);
+        zero.transform.rotation.w = 0.0;
+        assert!(with(vec![zero]).why_not(&none, "road", "radar").contains("road -> radar is none: its quaternion"));
+        let other = with(vec![step("map", "base", [0.0; 3], 0.0)]).why_not(&none, "road", "radar");
+        assert!(other.contains("transforms found: map -> base") && other.contains("--road-frame"), "{other}");
     }
 
     #[test]

@@ -38,6 +38,11 @@ impl Object {
     pub fn speed(&self) -> Option<f64> {
         self.velocity.map(|[x, y]| x.hypot(y))
     }
+
+    /// Whether it is known to be slower.
+    pub fn slower_than(&self, speed_mps: f64) -> bool {
+        self.speed().is_some_and(|speed| speed < speed_mps)
+    }
 }
 
 /// Every labelled object of a recording.
@@ -56,6 +61,19 @@ pub struct LabelsBeside {
     pub sized_by_class: usize,
     /// Objects that look along their path where the file gives no heading.
     pub turned_by_path: usize,
+    /// Objects of the recording's own labels, whose place they take.
+    pub left_out: Option<usize>,
+}
+
+/// Labels that put an object elsewhere than another of the same id and time does.
+pub fn twice(labels: &[Label]) -> usize {
+    let mut places: BTreeMap<(i64, &str), [f64; 3]> = BTreeMap::new();
+    let mut twice = 0;
+    for l in labels {
+        let first = *places.entry((l.time_ns, l.id.as_str())).or_insert(l.solid.center);
+        twice += usize::from(first != l.solid.center);
+    }
+    twice
 }
 
 impl Truth {
@@ -97,6 +115,15 @@ impl Track {
     /// Its boxes, in the order of time.
     pub fn solids(&self) -> impl Iterator<Item = &Solid> {
         self.solids.iter()
+    }
+
+    /// When each label but the first is, and how fast the object comes there from the one before, m/s.
+    pub fn steps(&self) -> impl Iterator<Item = (i64, f64)> {
+        self.times_ns.windows(2).zip(self.solids.windows(2)).map(|(times, solids)| {
+            let way = [0, 1].map(|k| solids[1].center[k] - solids[0].center[k]);
+            let passed = times[1].saturating_sub(times[0]) as f64 * 1e-9;
+            (times[1], way[0].hypot(way[1]) / passed.max(1e-9))
+        })
     }
 
     /// Whether it is ever anywhere else.
@@ -175,6 +202,14 @@ mod tests {
         let t = Truth::new(vec![label(0.0, 0.0, 0.0), label(1.0, 1.0, 0.0), label(2.0, 4.0, 0.0)]);
         let v = |s: i64| t.at(s * 1_000_000_000)[0].velocity.unwrap()[0];
         assert_eq!((v(0), v(1), v(2)), (1.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn labels_of_one_id_at_two_places_are_counted() {
+        let (a, b) = (label(0.0, 1.0, 0.0), label(0.0, 9.0, 0.0));
+        let other = Label { id: "b".into(), ..b.clone() };
+        assert_eq!(twice(&[a.clone(), a.clone(), other, label(1.0, 9.0, 0.0)]), 0);
+        assert_eq!(twice(&[a.clone(), b, a]), 1);
     }
 
     #[test]

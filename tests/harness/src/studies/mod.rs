@@ -2,4 +2,5 @@
 
 pub mod experiment;
 pub mod site;
+pub mod starts;
 pub mod tune;

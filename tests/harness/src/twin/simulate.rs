@@ -147,6 +147,15 @@ impl Simulation {
         Ok(Self { radar: radar(&scene.radar), further_radars, vehicles, structures, ground, traffic, scene })
     }
 
+    /// That vehicles of the traffic jump, in words.
+    pub fn jumps(&self) -> Option<String> {
+        let (jump, n) = self.traffic.jumps.as_ref()?;
+        Some(format!(
+            "vehicle `{}` jumps {:.0} m in {:.1} s at {:.1} s of the traffic (SUMO teleports what blocks others; {n} jumps in all): it is left out between, and another one after",
+            jump.id, jump.way_m, jump.passed_s, jump.time_s
+        ))
+    }
+
     /// When the last vehicle leaves, seconds since the begin.
     pub fn traffic_ends_s(&self) -> f64 {
         let ends = self.traffic.vehicles.iter().filter_map(|v| v.ends_s());
@@ -193,7 +202,7 @@ impl Simulation {
             }
         };
         let in_view = self.in_view(&labels);
-        let frame = |detections| Frame { time_ns, detections, refused: 0, fault: false };
+        let frame = |detections| Frame { time_ns, detections, refused: 0, unwanted: 0, fault: false };
         let further = (1..).zip(&self.further_radars);
         let further =
             further.map(|(k, radar)| frame(self.scan(radar, since_s, number + (k << FURTHER_BITS)))).collect();

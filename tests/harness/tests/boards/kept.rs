@@ -3,7 +3,7 @@
 use viewshed::estimator::Estimator;
 use viewshed::frame::health::FrameStatus;
 use viewshed::map::polar::PolarMap;
-use viewshed::probability::{Edges, ProbabilityTable, Quantiser, Threshold};
+use viewshed::probability::{Edges, ProbabilityTable, Quantiser, Threshold, fitted_with};
 use viewshed::unit::profile::reference::{Map, State};
 use viewshed::unit::settings::{Settings, table_block};
 use viewshed::wire::header::Header;
@@ -22,7 +22,7 @@ pub fn with_place(settings: &Settings) -> Settings {
     Settings { lanes: &LANES, ground: &HEIGHTS, ..*settings }
 }
 
-/// A made-up table that rises with the grade and falls with range.
+/// A made-up table of a unit with this fingerprint that rises with the grade and falls with range.
 pub fn table(fingerprint: u32) -> ProbabilityTable {
     let edges = Edges {
         grades: [2, 26, 51, 76, 102, 128, 153, 179, 204, 230, 255],
@@ -31,7 +31,7 @@ pub fn table(fingerprint: u32) -> ProbabilityTable {
     };
     let values =
         std::array::from_fn(|a| std::array::from_fn(|r| std::array::from_fn(|g| (100 + 14 * g - 3 * r - a) as u8)));
-    ProbabilityTable::new(edges, values, fingerprint).unwrap()
+    ProbabilityTable::new(edges, values, fitted_with(fingerprint)).unwrap()
 }
 
 /// Blocks of heights, lanes, and the table of a unit with these settings.

@@ -307,3 +307,18 @@ fn random_damage_to_the_points_never_panics() {
         }
     }
 }
+
+#[test]
+fn a_units_file_whose_mount_sees_little_of_the_road_is_doubtful() {
+    let folder = folder("doubtful_unit");
+    let example = stdout(&viewshed(&folder, "configure --example"));
+    let pitch = example.lines().find(|line| line.starts_with("pitch_deg")).unwrap();
+    for (angle, code) in [("4.0", 0), ("40.0", 1)] {
+        std::fs::write(folder.join("unit.toml"), example.replace(pitch, &format!("pitch_deg = {angle}"))).unwrap();
+        let output = viewshed(&folder, "configure unit.toml --check");
+        let text = stdout(&output);
+        assert_eq!(output.status.code(), Some(code), "{text}{}", stderr(&output));
+        assert_eq!(text.contains("doubtful: mount.pitch_deg 40 with an elevation of"), code == 1, "{text}");
+        assert!(text.contains("reference grid: can be used"), "{text}");
+    }
+}

@@ -54,7 +54,7 @@ fn boxes_as_csv_are_replayed_into_every_kind_of_result() {
     let output = viewshed(&folder, arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
-    assert!(text.contains("a (sensor camera): 20 frames, 2 trajectories, coverage 100.0 %"), "{text}");
+    assert!(text.contains("a (sensor camera): 20 of 30 frames, 2 trajectories, coverage 100.0 %"), "{text}");
     assert!(text.contains("a box of the camera's own") && text.contains("Problems of the input: none."), "{text}");
     let report = json(&folder.join("r.json"));
     let rows = report["estimators"].as_array().unwrap();

@@ -7,6 +7,7 @@ mod camera;
 mod can_log;
 mod foxglove;
 mod lanes;
+mod mutated;
 mod native_capture;
 mod outputs;
 mod own_data;
@@ -19,4 +20,5 @@ mod scenes;
 mod simulate;
 #[path = "../../../common/skipped.rs"]
 mod skipped;
+mod starts;
 mod ti_capture;

@@ -88,7 +88,7 @@ fn a_serial_capture_is_replayed() {
     assert_eq!(json(&folder.join("r.json"))["input"]["frames"], json!(29));
     assert!(folder.join("out/birdseye-radar-3d.png").exists());
     let (code, report) = doctor(&folder, "a.bin");
-    assert_eq!((code, &report["sensors"][0]["scans"]), (0, &json!(29)));
+    assert_eq!((code, &report["sensors"][0]["scans"]), (1, &json!(29)));
     assert!(report["findings"][0]["what"].as_str().unwrap().contains("1 messages are damaged"), "{report:#}");
 }
 
@@ -100,6 +100,6 @@ fn can_fd_frames_in_a_log_are_replayed() {
     assert_eq!((recording.frames.len(), recording.problems.count("parts are missing")), (30, 1));
     assert_eq!((recording.frames[7].detections.len(), recording.frames[8].detections.len()), (12, 7));
     let (code, report) = doctor(&folder, "a.log");
-    assert_eq!((code, &report["kind"], &report["sensors"][0]["sensor"]), (0, &json!("native"), &json!(3)));
+    assert_eq!((code, &report["kind"], &report["sensors"][0]["sensor"]), (1, &json!("native"), &json!(3)));
     assert!(report["findings"].as_array().unwrap().iter().any(|f| f["what"].as_str().unwrap().contains("never came")));
 }

@@ -332,7 +332,7 @@ fn bad() -> Vec<Bad> {
     vec![
         // no recording at all
         ("no file", "absent.mcap", vec![], "", "cannot read absent.mcap"),
-        ("an empty file", "a.mcap", vec![], "", "not an MCAP file"),
+        ("an empty file", "a.mcap", vec![], "", "a.mcap is empty"),
         ("a folder", ".", vec![], "", "cannot read .: it is a folder; name a recording in it"),
         ("a text", "a.txt", b"hello\n".to_vec(), "", "not an MCAP file, nor another that is read: a log of `candump`"),
         ("JSON", "a.json", b"{\"a\": 1}".to_vec(), "", "it is JSON; export it as MCAP"),
@@ -406,6 +406,13 @@ fn bad() -> Vec<Bad> {
             scene(),
             "--radar-topic /lidar",
             "no radar frame on topic /lidar; topics found: /ground_truth/objects",
+        ),
+        (
+            "neither mount nor field of view",
+            "a.mcap",
+            bag(|b| b.road = "map"),
+            "",
+            "(metres, degrees). And a: field of view unknown",
         ),
         (
             "two radars without a mount",
@@ -486,7 +493,7 @@ fn bad() -> Vec<Bad> {
             "a.mcap",
             scene(),
             "--fov=-57,57,-17,17,3,20",
-            "none is faster than 1 m/s and in the field of view",
+            "points rejected (most: range): ranges in another unit than metres, or a wrong field of view?",
         ),
     ]
 }

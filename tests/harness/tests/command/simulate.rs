@@ -131,7 +131,7 @@ fn a_camera_beside_the_radar_has_rows_of_its_own() {
     assert!(rows[0]["tvr"].as_f64().unwrap() > 0.7 && rows[1]["tvr"].as_f64().unwrap() > 0.9, "{rows:#?}");
     assert!(rows[0]["curve"].as_array().unwrap().len() > 1, "over the threshold of the mean");
     assert_eq!(camera["sensor"]["mount"]["pitch_deg"].as_f64().map(f64::round), Some(6.0));
-    assert!(stdout(&output).contains("r, camera (sensor camera): 10 frames"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("r, camera (sensor camera): 10 of "), "{}", stdout(&output));
 }
 
 #[test]

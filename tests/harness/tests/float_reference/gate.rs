@@ -149,7 +149,7 @@ mod tests {
             let exact = Scan::new(&measurements, &config, &VIEW, &noise, &Levelled::new(&mount));
             let mut scan = viewshed::frame::scan::Scan::<256>::new();
             let detections: Vec<Detection> = measurements.iter().map(|m| Detection::new(m).unwrap()).collect();
-            let points = scan.gather(detections.iter(), 0, &gate, |d| noises.place(d, &levelling));
+            let points = scan.gather(detections.iter(), false.into(), &gate, |d| noises.place(d, &levelling));
             assert_eq!(points, exact.points);
             assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
             for (got, exact) in scan.reflections().iter().zip(&exact.placed) {

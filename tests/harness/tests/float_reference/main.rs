@@ -24,6 +24,7 @@ mod evidence;
 
 mod raycast;
 
+mod settling;
 mod shadow;
 
 mod pipeline;

@@ -5,6 +5,7 @@ use viewshed::frame::detection::Measurement;
 use viewshed::frame::gate::Rejection;
 use viewshed::frame::health::{Condition, Continuity, Health, HealthLimits};
 use viewshed::grid::evidence::Around;
+use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
 use viewshed::sensor::Sensor;
@@ -20,10 +21,13 @@ use crate::obstacles::{Obstacles, Rules};
 use crate::raycast::{Map, cast};
 use crate::repeatability::Repeatability;
 use crate::scene::{AZIMUTHS, ELEVATIONS, RANGES};
+use crate::settling::Settling;
 use crate::shadow;
 
 /// Obstacles followed at most.
 const OBSTACLES: usize = 96;
+/// Longest time from frame to frame that is none of a gap, seconds.
+const LONGEST_STEP_S: f64 = 1.0;
 /// How far behind the field of view's range obstacles are followed, metres.
 const BEYOND_M: f64 = 25.0;
 
@@ -36,6 +40,7 @@ pub struct Pipeline {
     pub axes: Axes,
     health_limits: HealthLimits,
     health: Health,
+    settling: Settling,
     repeatability: Repeatability,
     pub obstacles: Obstacles,
     grid: Grid,
@@ -58,6 +63,7 @@ impl Pipeline {
             inverse_sensor: InverseSensor::new(&config.evidence, &sensor.noise, &axes),
             health_limits: config.health.limits().expect("checked before"),
             health: Health::NEW,
+            settling: Settling::default(),
             repeatability: Repeatability::default(),
             obstacles: Obstacles::new(OBSTACLES),
             grid: Grid::new(&axes),
@@ -85,12 +91,20 @@ impl Pipeline {
         if continuity.resets() {
             self.obstacles.list.clear();
             self.grid.clear();
+            self.settling = Settling::default();
         }
-        let (first, dt) = match continuity {
+        let (first, passed) = match continuity {
             Continuity::Follows(micros) => (false, micros as f64 * 1e-6),
             _ => (true, 0.0),
         };
-        if !first {
+        let (dt, gap) = (passed.min(LONGEST_STEP_S), (passed - LONGEST_STEP_S).max(0.0));
+        if gap > 0.0 {
+            self.map.forget();
+            self.settling.gap(gap, &self.config.settling, &self.axes, &self.grid);
+            self.obstacles.bridge(gap, &self.rules);
+            self.inverse_sensor.fade(&mut self.grid, &self.map, &self.axes, gap);
+        }
+        if !first && gap == 0.0 {
             self.repeatability.compare(&scan.placed, &self.sensor.noise);
         }
         let (axes, map, visible_from) = (&self.axes, &self.map, self.visible_from());
@@ -107,13 +121,18 @@ impl Pipeline {
                 self.inverse_sensor.add(d, around, &self.axes, &mut self.grid);
             }
         }
-        if self.health.condition(now, &self.health_limits) == Condition::Healthy {
+        let healthy = self.health.condition(now, &self.health_limits) == Condition::Healthy;
+        if healthy {
             cast(&self.grid, &self.axes, &mut self.map);
         } else {
             self.map.forget();
         }
         for solid in self.obstacles.solids(&self.rules) {
             shadow::cast(&solid, &self.axes, &mut self.grid, &mut self.map);
+        }
+        if healthy {
+            let looked = if gap > 0.0 { 0.0 } else { dt };
+            self.settling.settle(looked, &self.config.settling, &self.axes, &self.grid, &mut self.map);
         }
         self.refused.extend(scan.refused);
     }
@@ -132,6 +151,11 @@ impl VisibilityMap for Pipeline {
         let at = self.levelled.place([p.x_cm, p.y_cm].map(|v| f64::from(v) / 100.0));
         self.axes.locate(at).map_or(CellState::UNKNOWN, |(a, r)| self.cell(a, r))
     }
+
+    fn cells_in(&self, _: &Footprint, visit: &mut dyn FnMut(CellState)) {
+        // its table asks of points only
+        visit(CellState::UNKNOWN);
+    }
 }
 
 impl Estimator for Pipeline {
@@ -144,6 +168,7 @@ impl Estimator for Pipeline {
         self.obstacles = Obstacles::new(OBSTACLES);
         self.grid.clear();
         self.health = Health::NEW;
+        self.settling = Settling::default();
         self.map.forget();
     }
 

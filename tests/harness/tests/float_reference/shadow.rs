@@ -11,7 +11,10 @@ use crate::raycast::Map;
 /// Half the window a column's coverage is taken over, columns.
 const WINDOW: f64 = 0.25;
 
-/// What a box covers of a column: a share of the window, from where to where along the ray, and the
+/// By so much a box's edges count as nearer to its middle in the columns its middle does not lie in.
+const BESIDE: f64 = 5.0 / 256.0;
+
+/// What a box covers of a column: a share of the window, all of it in the column its middle lies in, from where to where along the ray, and the
 /// range cells it fills.
 struct Covered {
     column: usize,
@@ -32,19 +35,23 @@ pub fn cast(solid: &Solid, axes: &Axes, grid: &mut Grid, map: &mut Map) {
                 *occupancy = occupancy.max(share);
             }
         }
-        let (from, to) = hidden(axes, solid.top(), enter, leave);
-        for r in cells.end..axes.ranges {
-            let (near, far) = (r as f64 * axes.cell_m, (r + 1) as f64 * axes.cell_m);
-            // the cell a shadow begins in is all of it in shadow
-            let part = if from < far { ((to.min(far) - near) / axes.cell_m).clamp(0.0, 1.0) } else { 0.0 };
-            let (grade, _) = map.cell_mut(column, r);
-            *grade = grade.map(|g| g.min(1.0 - share * part));
-        }
+        shade(map, axes, column, cells.end, hidden(axes, solid.top(), enter, leave), share);
+    }
+}
+
+/// Lowers the grades of a column from a cell on, between two distances.
+pub fn shade(map: &mut Map, axes: &Axes, column: usize, first: usize, (from, to): (f64, f64), share: f64) {
+    for r in first..axes.ranges {
+        let (near, far) = (r as f64 * axes.cell_m, (r + 1) as f64 * axes.cell_m);
+        // the cell a shadow begins in is all of it in shadow
+        let part = if from < far { ((to.min(far) - near) / axes.cell_m).clamp(0.0, 1.0) } else { 0.0 };
+        let (grade, _) = map.cell_mut(column, r);
+        *grade = grade.map(|g| g.min(1.0 - share * part));
     }
 }
 
 /// Between which distances the slice plane is hidden behind a box of this height.
-fn hidden(axes: &Axes, top: f64, enter: f64, leave: f64) -> (f64, f64) {
+pub fn hidden(axes: &Axes, top: f64, enter: f64, leave: f64) -> (f64, f64) {
     let nothing = (f64::INFINITY, 0.0);
     let (sensor, slice) = (axes.height_m, axes.slice_m);
     match (sensor > slice, top) {
@@ -61,15 +68,21 @@ fn columns(solid: &Solid, axes: &Axes) -> impl Iterator<Item = Covered> {
     let (low, high) = outline(solid, axes);
     (0..axes.azimuths).filter_map(move |column| {
         let centre = column as f64 + 0.5;
-        let (from, to) = (low.max(centre - WINDOW), high.min(centre + WINDOW));
-        if from >= to {
-            return None;
-        }
-        let (enter, leave) = crossing(solid, axes.azimuth_of((from + to) / 2.0))?;
+        let middle = f64::midpoint(low, high);
+        let holds_most = middle.floor() == column as f64;
+        let less = if holds_most { 0.0 } else { BESIDE };
+        let (from, to) = ((low + less).max(centre - WINDOW), (high - less).min(centre + WINDOW));
+        let (share, ray) = match (holds_most, from < to) {
+            (true, true) => (1.0, f64::midpoint(from, to)),
+            (true, false) => (1.0, middle),
+            (false, true) => ((to - from) / (2.0 * WINDOW), f64::midpoint(from, to)),
+            (false, false) => return None,
+        };
+        let (enter, leave) = crossing(solid, axes.azimuth_of(ray))?;
         let nearest = (enter / axes.cell_m) as usize;
         // the last cell counts where the box reaches its middle
         let end = ((leave / axes.cell_m).round() as usize).max(nearest + 1).min(axes.ranges);
-        Some(Covered { column, share: (to - from) / (2.0 * WINDOW), enter, leave, cells: nearest..end })
+        Some(Covered { column, share, enter, leave, cells: nearest..end })
     })
 }
 
@@ -159,17 +172,24 @@ mod tests {
     }
 
     #[test]
-    fn a_share_is_the_part_of_the_window_whose_rays_the_box_stops() {
+    fn a_share_is_the_part_of_the_window_whose_rays_the_box_stops_and_all_where_its_middle_is() {
         let mut random = Random::new(8);
         let (_, axes) = scene::axes(&mounts()[0]);
         for _ in 0..20 {
             let (_, solid) = any_box(&mut random);
             let mut shares = [0.0; AZIMUTHS];
             columns(&solid, &axes).for_each(|c| shares[c.column] = c.share);
+            let (low, high) = outline(&solid, &axes);
             for (a, share) in shares.into_iter().enumerate() {
+                if f64::midpoint(low, high).floor() == a as f64 {
+                    assert_eq!(share, 1.0, "from {low} to {high}");
+                    continue;
+                }
                 let place = |k: i32| a as f64 + 0.5 + WINDOW * (f64::from(k) / 500.0 - 1.0);
                 let stopped = (0..=1000).filter(|k| crossing(&solid, axes.azimuth_of(place(*k))).is_some()).count();
-                assert!((share - stopped as f64 / 1001.0).abs() < 0.002, "{share} {stopped}");
+                // less what an edge counts as nearer
+                let more = stopped as f64 / 1001.0 - share;
+                assert!((-0.002..=BESIDE / (2.0 * WINDOW) + 0.002).contains(&more), "{share} {stopped}");
             }
         }
     }

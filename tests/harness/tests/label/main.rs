@@ -6,6 +6,7 @@
 mod appearance;
 #[allow(dead_code, reason = "pages of other commands need more of it")]
 mod browser;
+mod layouts;
 mod looks;
 mod offered;
 mod page;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use viewshed::fixed::time::Time;
-use viewshed::probability::{Edges, ProbabilityTable};
+use viewshed::probability::{Edges, ProbabilityTable, fitted_with};
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::message::{Addresses, Epoch, Message, Packet};
 use viewshed_harness::bus::traffic::{A, Maps, W};
@@ -40,7 +40,8 @@ pub fn table(folder: &Path) -> PathBuf {
     };
     let values = [[std::array::from_fn(|step| 51 + 17 * step as u8); 8]; 8];
     let recording = read(SHIPPED.as_ref(), &ReadOptions::default()).unwrap();
-    let table = ProbabilityTable::new(edges, values, fingerprint(&recording, &Options::default()).unwrap()).unwrap();
+    let unit = fingerprint(&recording, &Options::default()).unwrap();
+    let table = ProbabilityTable::new(edges, values, fitted_with(unit)).unwrap();
     let mut counted = Grades::default();
     (51..=255).for_each(|p| counted.add(true, Some(p)));
     let file = folder.join("t.probability.toml");
@@ -105,6 +106,36 @@ fn a_log_is_played_and_its_sender_described() {
     page.until("viewshed.told !== null");
     page.picture(&folder.join("log.png"));
     assert_eq!(page.console(), Vec::<String>::new());
+}
+
+#[test]
+fn the_page_of_a_log_opens_on_its_first_map_and_before_it_nothing_is_alarming() {
+    let Some(browser) = Browser::start("first map") else { return };
+    let folder = folder("first-map");
+    let server = Server::run([Path::new("view"), &log(&folder)]);
+    let known = overview(&server);
+    let unknown = |sample: &Value| sample["unknown"].as_f64().unwrap() >= 1.0;
+    let begins = known["samples"].as_array().unwrap().iter().position(|sample| !unknown(sample)).unwrap();
+    assert!(begins > 1, "a log begins before its first map");
+    let page = browser.open(&server.url);
+    page.until(&format!("viewshed.source.done && viewshed.drawn.number === {begins}"));
+    page.rests();
+    let view = page.ask("[viewshed.plots.plan.view.left, viewshed.plots.plan.view.right]");
+    assert!(view[1].as_f64().unwrap() > 150.0 && view[0].as_f64().unwrap() < 0.0, "{view}");
+    let sender = page.ask("document.querySelector('.sender').textContent");
+    let sender = sender.as_str().unwrap();
+    assert!(sender.contains("its map is shown") && !sender.contains("None"), "{sender}");
+    let legend = page.ask("document.getElementById('legend').textContent");
+    assert!(!legend.as_str().unwrap().contains("occupied"), "what this log does not carry: {legend}");
+    page.picture(&folder.join("first.png"));
+    let again = browser.open(&server.url);
+    again.until(&format!("viewshed.source.done && viewshed.drawn.number === {begins}"));
+    again.key("Home");
+    again.until("viewshed.drawn.number === 0 && document.querySelector('.sender')");
+    let alarm = "getComputedStyle(document.querySelector('.sender')).color === getComputedStyle(document.body).color";
+    assert_eq!(again.ask(alarm), true, "{}", again.ask("document.querySelector('.sender').dataset.condition"));
+    assert_eq!(again.ask("document.getElementById('plan-title').textContent"), "no map has come yet");
+    again.picture(&folder.join("before.png"));
 }
 
 /// What is printed up to the address.

@@ -12,15 +12,19 @@ use clap::Args;
 use serde::Deserialize;
 use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ti::{TiDialect, TiFamily};
 
 pub(super) use self::given::given;
-use self::values::{far_road, field_of_view, ground_error, mount, noise, period, profile, ti_dialect, ti_header};
+use self::values::{
+    cluster_states, far_road, field_of_view, ground_error, labels, mount, noise, period, profile, ti_dialect,
+    ti_header, velocity_scale,
+};
 pub(super) use self::values::{finite, seconds};
 use crate::configure::file as unit_file;
 use crate::estimators::{self, FarRoad, GroundError};
 use crate::evaluation::{self, Grid, Settings};
-use crate::recording::{FieldOfView, ReadOptions};
+use crate::recording::{FieldOfView, LabelsFrom, ReadOptions};
 
 /// The tables of a configuration file.
 #[derive(Debug, Default, Deserialize)]
@@ -94,6 +98,10 @@ pub struct ReadingArgs {
     /// A file NAME.labels.csv beside NAME.mcap replaces them. Without labels there are maps and no rates.
     #[arg(long, value_name = "TOPIC")]
     truth_topic: Option<String>,
+    /// Labels to judge by: `recording` for those in it, `beside` for NAME.labels.csv beside it, or a file like that
+    /// [default: those beside it, or else its own]
+    #[arg(long, value_name = "WHICH", value_parser = labels)]
+    labels: Option<LabelsFrom>,
     /// Frame of /tf_static that is the road's [default: road]
     #[arg(long, value_name = "FRAME")]
     road_frame: Option<String>,
@@ -103,6 +111,9 @@ pub struct ReadingArgs {
     /// What a positive radial velocity does [default: recedes]
     #[arg(long, value_name = "WHAT", value_parser = ["receding", "approaching"])]
     velocity_sign: Option<String>,
+    /// What makes m/s of the radar's velocities: 0.2778 where they are in km/h [default: 1]
+    #[arg(long, value_name = "FACTOR", value_parser = velocity_scale)]
+    velocity_scale: Option<f64>,
     /// Where the radar hangs: x,y,z,yaw,pitch,roll in metres and degrees [default: /tf_static of the file]
     ///
     /// In the road frame: x along the road, y to the left, z = height above the road. Yaw + to the left,
@@ -140,6 +151,10 @@ pub struct KindArgs {
     /// Kind of the radar in a CAN log: ARS408, or SR75 whose scales differ [default: ARS408]
     #[arg(long, value_name = "NAME", value_parser = profile)]
     pub radar: Option<&'static Ars408Profile>,
+    /// Clusters of an ARS408 that are wanted, by the validity states of their quality messages, between commas
+    /// [default: those the vendor calls valid, 0x00,0x04,0x08,0x09,0x0A,0x0B,0x0C,0x0F,0x10,0x11]
+    #[arg(long, value_name = "STATES", value_parser = cluster_states)]
+    pub cluster_states: Option<Ars408Wanted>,
     /// Bytes of the header in a TI mmWave capture: 36, 40, 44, 48 or 52 [default: learnt from three frames]
     #[arg(long, value_name = "BYTES", value_parser = ti_header)]
     pub ti_header: Option<TiFamily>,
@@ -250,7 +265,7 @@ struct UnitArgs {
 impl SettingsArgs {
     /// Files these options name.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        self.judging.files()
+        self.reading.files().chain(self.judging.files())
     }
 
     /// Defaults, then the file, then the command line.
@@ -265,7 +280,7 @@ impl SettingsArgs {
 impl MapArgs {
     /// Files these options name.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        self.config.files()
+        self.reading.files().chain(self.config.files())
     }
 
     /// Defaults, then the file, then the command line.
@@ -325,11 +340,19 @@ fn read_config(path: &Path) -> Result<Config> {
 }
 
 impl ReadingArgs {
+    /// Files these options name.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let labels = if let Some(LabelsFrom::File(file)) = &self.labels { Some(file.clone()) } else { None };
+        labels.into_iter()
+    }
+
     pub fn options(&self) -> ReadOptions {
         ReadOptions {
             radar_topic: self.radar_topic.clone(),
             truth_topic: self.truth_topic.clone(),
+            labels: self.labels.clone().unwrap_or_default(),
             approaching_is_positive: self.velocity_sign.as_deref() == Some("approaching"),
+            velocity_scale: self.velocity_scale,
             road_frame: self.road_frame.clone(),
             radar_frame: self.radar_frame.clone(),
             mount: self.mount,
@@ -339,6 +362,7 @@ impl ReadingArgs {
             interface: self.interface.clone(),
             sensor_id: self.sensor_id,
             profile: self.kind.radar,
+            wanted: self.kind.cluster_states,
             ti_header: self.kind.ti_header,
             ti_dialect: self.kind.ti_dialect,
             frame_period_s: self.frame_period,

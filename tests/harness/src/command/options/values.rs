@@ -2,10 +2,11 @@
 
 use viewshed::NoiseConfig;
 use viewshed::inputs::ars408::profile::Ars408Profile;
+use viewshed::inputs::ars408::quality::Ars408Wanted;
 use viewshed::inputs::ti::{Entries, PolarPoints, TiAngleUnit, TiDialect, TiFamily};
 
 use crate::estimators::{FarRoad, GroundError, MOST_RANGE_M};
-use crate::recording::FieldOfView;
+use crate::recording::{FieldOfView, LabelsFrom};
 
 pub fn far_road(text: &str) -> Result<FarRoad, String> {
     match text {
@@ -15,6 +16,15 @@ pub fn far_road(text: &str) -> Result<FarRoad, String> {
             .map(FarRoad::Degrees)
             .map_err(|_| format!("`{text}` is not a whole number of degrees, -128 to 127")),
     }
+}
+
+pub fn labels(text: &str) -> Result<LabelsFrom, String> {
+    Ok(match text {
+        "recording" => LabelsFrom::Recording,
+        "beside" => LabelsFrom::Beside,
+        "" => return Err("neither `recording` nor `beside` nor a file".into()),
+        file => LabelsFrom::File(file.into()),
+    })
 }
 
 pub fn finite(text: &str) -> Result<f64, String> {
@@ -32,6 +42,17 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 pub fn profile(text: &str) -> Result<&'static Ars408Profile, String> {
     let names = || Ars408Profile::ALL.map(|p| p.name).join(", ");
     Ars408Profile::named(text).ok_or_else(|| format!("no radar `{text}`; there are {}", names()))
+}
+
+/// States between commas, in decimal or as 0x1F.
+pub fn cluster_states(text: &str) -> Result<Ars408Wanted, String> {
+    let number = |part: &str| {
+        let part = part.trim();
+        part.strip_prefix("0x").map_or_else(|| part.parse(), |digits| u8::from_str_radix(digits, 16)).ok()
+    };
+    let states: Option<Vec<u8>> = text.split(',').map(number).collect();
+    let wanted = states.and_then(|states| Ars408Wanted::default().with_clusters(states));
+    wanted.ok_or_else(|| format!("`{text}` are no numbers from 0 to 31 between commas"))
 }
 
 pub fn ti_header(text: &str) -> Result<TiFamily, String> {
@@ -70,6 +91,16 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 pub fn period(text: &str) -> Result<f64, String> {
     let seconds = finite(text)?;
     if (1e-3..=10.0).contains(&seconds) { Ok(seconds) } else { Err(format!("{seconds} s is not within 0.001 to 10")) }
+}
+
+pub fn velocity_scale(text: &str) -> Result<f64, String> {
+    let factor = finite(text)?;
+    let within = (1e-4..=1e4).contains(&factor);
+    if within {
+        Ok(factor)
+    } else {
+        Err(format!("{factor} is not within 0.0001 to 10000; --velocity-sign turns velocities"))
+    }
 }
 
 pub fn noise(text: &str) -> Result<NoiseConfig, String> {

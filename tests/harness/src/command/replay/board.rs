@@ -19,6 +19,7 @@ use crate::evaluation::Settings;
 #[cfg(unix)]
 use crate::recording::can_log;
 use crate::results::files::{Folder, Target};
+use crate::results::report::table::Extent;
 use crate::{estimators, recording};
 
 #[derive(Debug, clap::Args)]
@@ -62,7 +63,7 @@ pub fn run(
     paths: &[PathBuf],
     out: &Folder,
     json: Option<&Target>,
-    settings: &Settings,
+    (settings, extent): (&Settings, Extent),
 ) -> Result<ExitCode> {
     let board = match (args.board, &args.port) {
         (Some(board), _) if !args.live => board,
@@ -83,7 +84,7 @@ pub fn run(
             }
         }
     }
-    print(&table(&rows))?;
+    print(&table(&rows, extent))?;
     if let Some(file) = json {
         file.write(serde_json::to_string_pretty(&rows)?)?;
     }
@@ -165,6 +166,7 @@ fn one(run: &Run<'_>, out: &Folder, differ: &mut bool) -> Result<Row> {
 
 /// The configuration block for a recording.
 fn block(recording: &recording::Recording, settings: &Settings) -> Result<Block> {
+    estimators::usable::check(recording, &settings.estimators)?;
     let radar_3d = &settings.estimators.radar_3d;
     let mut block = Block::of(estimators::sensor(recording, &settings.estimators.noise));
     (block.gate, block.visibility, block.health) = (radar_3d.gate, radar_3d.visibility, radar_3d.health);

@@ -26,12 +26,12 @@ pub struct FusedReplay {
     picture: Canvas,
 }
 
-/// Whether there is something to be fused: several radars, or one with a camera if that is asked for.
-pub fn is_due(radars: &[Recording], asked: bool) -> Result<bool> {
-    let Some(first) = radars.first().filter(|first| first.truth.is_some() && !first.sensor.frames_independent) else {
+/// Whether there is something to be fused: several radars, or the first with its camera if that is asked for.
+pub fn is_due(first: Option<&Recording>, radars: usize, asked: bool) -> Result<bool> {
+    let Some(first) = first.filter(|first| first.truth.is_some() && !first.sensor.frames_independent) else {
         return Ok(false);
     };
-    match (radars.len(), &first.camera) {
+    match (radars, &first.camera) {
         (1, Some(camera)) if !camera.alone => Ok(asked),
         (0 | 1, _) if asked => {
             bail!(

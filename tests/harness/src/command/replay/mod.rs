@@ -146,6 +146,7 @@ const NO_CAUSES: &str =
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut settings = args.settings.settings()?;
     let paths = if args.recordings.is_empty() { shipped::recordings()? } else { args.recordings.clone() };
+    settings.reading.check_for(paths.len())?;
     let run_in = RunIn::read(&args.run_in, &settings.reading)?;
     settings.estimators.before = run_in.before();
     let mut outputs = args.outputs.beside(paths.iter().chain(&args.run_in).flat_map(|path| recording::files(path)));
@@ -158,7 +159,13 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             "--report has rates, and a comparison with a board has none; leave one of them out"
         );
         let pictures = out.map_or_else(|| outputs.folder("--out", Path::new("out")), Ok)?;
-        let ended = board::run(&args.processor, &paths, &pictures, json_file.as_ref(), &settings)?;
+        let ended = board::run(
+            &args.processor,
+            &paths,
+            &pictures,
+            json_file.as_ref(),
+            (&settings, table::Extent::of(args.wide)),
+        )?;
         print(&outputs.told())?;
         return Ok(ended);
     }
@@ -325,10 +332,10 @@ fn fused(
     args: &Args,
     settings: &Settings,
 ) -> Result<Option<FusedReplay>> {
-    let radars: Vec<Recording> = radars.iter().map(|(recording, _)| recording.clone()).collect();
-    if !fused::is_due(&radars, args.fused)? {
+    if !fused::is_due(radars.first().map(|(first, _)| first), radars.len(), args.fused)? {
         return Ok(None);
     }
+    let radars: Vec<Recording> = radars.iter().map(|(recording, _)| recording.clone()).collect();
     FusedReplay::new(&file::stem(path), &radars, args.time, settings).map(Some)
 }
 
@@ -412,12 +419,10 @@ fn frame_at(recording: &Recording, time_s: f64) -> Result<usize> {
     Ok(frame)
 }
 
-/// Refuses a labelled recording of which nothing could be judged: a table without a number tells nobody anything.
+/// Refuses a recording of which no frame counts, and a labelled one of which nothing could be judged: a table without a
+/// number tells nobody anything.
 fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
     let (recording, summary) = (&replay.recording, &replay.summary);
-    let cells = summary.rows.iter().any(|row| row.cell_fvr().is_some() || row.cell_fir().is_some());
-    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty());
-    let Some(truth) = truth.filter(|_| summary.objects == 0 && !cells) else { return Ok(()) };
     let (name, frames) = (&recording.name, recording.frames.len());
     if summary.frames == 0 {
         bail!(
@@ -426,6 +431,9 @@ fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
             settings.evaluation.warm_up_s
         );
     }
+    let cells = summary.rows.iter().any(|row| row.cell_fvr().is_some() || row.cell_fir().is_some());
+    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty());
+    let Some(truth) = truth.filter(|_| summary.objects == 0 && !cells) else { return Ok(()) };
     bail!(
         "{name}: nothing can be judged: of its {} labelled objects none is faster than {} m/s and in the field of view in one of the {} frames that count; look at times, places and --fov, or set --min-speed",
         truth.tracks.len(),

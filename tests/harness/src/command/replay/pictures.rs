@@ -18,6 +18,7 @@ use crate::recording::truth::Object;
 use crate::results::files::Folder;
 use crate::results::pictures::birdseye;
 use crate::results::pictures::camera_view::{self, View};
+use crate::results::pictures::cells::Carries;
 use crate::results::pictures::polar::{self, PolarGrid};
 use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
 use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKind, Span, TradeOff};
@@ -195,6 +196,7 @@ fn scene<'a>(
     let recording = &replay.recording;
     Scene {
         map: estimator.map(),
+        carries: Carries::ALL,
         pose: recording.pose,
         field_of_view: recording.sensor.field_of_view,
         slice_height_m: settings.evaluation.slice_height_m,
@@ -274,6 +276,7 @@ pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> O
         narrow: cells.narrow,
         range_m: [0.0, cells.cell_m * cells.ranges as f64],
         state: &*cells.cell,
+        carries: Carries::ALL,
         title: title(replay, estimator.name(), frame),
         caption: caption(replay),
     }))
@@ -357,6 +360,7 @@ fn trade_off(replay: &Replay, counted: Counted, of: impl Fn(&Row) -> (&Vec<Curve
 
 #[cfg(test)]
 mod tests {
+    use viewshed::map::query::Footprint;
     use viewshed::map::{CellState, Visibility, VisibilityMap};
 
     use super::*;
@@ -371,6 +375,10 @@ mod tests {
         fn at(&self, point: RoadPoint) -> CellState {
             let visibility = if point.y_cm < 0 { Visibility::Visible } else { Visibility::Invisible };
             CellState { visibility, grade: 255, occupancy: 0, occupied: false }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

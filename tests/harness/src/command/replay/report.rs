@@ -67,7 +67,7 @@ pub fn write(target: &Target, replayed: &Replayed, settings: &Settings) -> Resul
         settings,
         mount_error: mount_error.as_deref(),
         causes,
-        command: command(std::env::args()),
+        command: command(std::env::args_os().map(|word| word.to_string_lossy().into_owned())),
         pictures: drawn,
         strips,
         shares,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, ensure};
 
 use crate::estimators::Before;
-use crate::recording::{self, ReadOptions, Recording};
+use crate::recording::{self, LabelsFrom, ReadOptions, Recording};
 
 /// Recordings of one radar, oldest first.
 pub struct RunIn {
@@ -18,8 +18,9 @@ impl RunIn {
     /// # Errors
     /// One that cannot be read, is of a camera or of frames that do not follow one another.
     pub fn read(paths: &[PathBuf], reading: &ReadOptions) -> Result<Self> {
-        // --from and --to are of what is judged
-        let reading = ReadOptions { from_s: None, to_s: None, ..reading.clone() };
+        // --from, --to and --labels are of what is judged
+        let labels = LabelsFrom::Usual;
+        let reading = ReadOptions { from_s: None, to_s: None, labels, ..reading.clone() };
         let read = |path: &PathBuf| -> Result<Recording> {
             let recording = recording::read(path, &reading).with_context(|| format!("--run-in {}", path.display()))?;
             let follows = recording.of_camera().is_none() && !recording.sensor.frames_independent;

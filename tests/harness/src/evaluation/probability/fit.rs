@@ -12,7 +12,7 @@
 use std::collections::BTreeSet;
 
 use viewshed::fixed::angle::Angle;
-use viewshed::probability::{AZIMUTHS, Edges, GRADES, ProbabilityTable, RANGES};
+use viewshed::probability::{AZIMUTHS, Edges, GRADES, ProbabilityTable, RANGES, fitted_with};
 
 use super::samples::{Place, Places};
 use crate::evaluation::curve::{GRADE_SLOTS, Grades};
@@ -203,7 +203,7 @@ pub fn table(places: &Places, fingerprint: u32) -> Option<ProbabilityTable> {
         azimuths: std::array::from_fn(|k| fit.bins.azimuths[k] as i16),
     };
     let values = std::array::from_fn(|a| std::array::from_fn(|r| std::array::from_fn(|g| byte(fit.values[a][r][g]))));
-    ProbabilityTable::new(edges, values, fingerprint).ok()
+    ProbabilityTable::new(edges, values, fitted_with(fingerprint)).ok()
 }
 
 /// Parts that samples are left out in.

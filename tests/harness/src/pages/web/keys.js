@@ -66,13 +66,37 @@ export function table(page) {
   ].map(([key, group, what, run, repeats, button]) => ({ key, group, what, run, repeats, button }));
 }
 
+// What a key of a US keyboard writes, alone and with Shift, by KeyboardEvent.code.
+const US = {
+  Comma: ',<', Period: '.>', BracketLeft: '[{', BracketRight: ']}', Minus: '-_', Equal: '=+', Slash: '/?', Digit0: '0)',
+  Digit1: '1!', Digit2: '2@', Digit3: '3#', Digit4: '4$', Digit5: '5%', Digit6: '6^', Digit7: '7&', Digit8: '8*', Digit9: '9(',
+};
+
+// Where the event does not tell the place of a key: letters of usual layouts, on the places of a to z.
+const LAYOUTS = ['фисвуапршолдьтщзйкыегмцчня', 'αβψδεφγηιξκλμνοπ;ρστθωςχυζ'];
+
+// What a key writes, on the place where a US keyboard has it if the layout has no Latin letters, or it is a dead key or an input method's.
+function written({ key, code = '', shiftKey }) {
+  const writesLatin = key.length === 1 && (key <= '~' || /\p{Script=Latin}/u.test(key));
+  const isOther = key.length === 1 || ['Dead', 'Process', 'Unidentified'].includes(key);
+  if (writesLatin || !isOther) return key;
+  if (/^Key[A-Z]$/.test(code)) return code[3].toLowerCase();
+  if (US[code]) return US[code][shiftKey ? 1 : 0];
+  const places = LAYOUTS.map((letters) => letters.indexOf(key.toLowerCase())).filter((place) => place >= 0);
+  return places.length > 0 ? String.fromCharCode(97 + places[0]) : key;
+}
+
 // The key of an event as the table writes it; letters do not depend on Caps Lock.
 export function named(event) {
-  const { key } = event;
+  const key = written(event);
   const letter = key.length === 1 && key !== key.toUpperCase() ? key : key.toLowerCase();
   const plain = key.length === 1 ? letter : key;
+  // AltGr and Option write signs, and some systems tell them as Ctrl and Alt: what they write is meant
+  const writesSign = event.altKey && !event.metaKey && plain.length === 1 && !/[a-z0-9 ]/.test(plain);
+  const ctrl = (event.ctrlKey && !writesSign) || event.metaKey;
+  const alt = event.altKey && !writesSign;
   const shift = event.shiftKey && (key.length > 1 || (event.ctrlKey && /[a-z]/.test(plain)));
-  return `${event.ctrlKey || event.metaKey ? 'Ctrl+' : ''}${event.altKey ? 'Alt+' : ''}${shift ? 'Shift+' : ''}${plain}`;
+  return `${ctrl ? 'Ctrl+' : ''}${alt ? 'Alt+' : ''}${shift ? 'Shift+' : ''}${plain}`;
 }
 
 // Carries out keys, except where text is written, and buttons that stand for one.

@@ -6,7 +6,7 @@ const STATES = ['unknown', 'invisible', 'visible'];
 const CONDITIONS = {
   ok: 'its map is shown',
   waiting: 'silent or late: all of its map is unknown',
-  'no header': 'heard, its header is not complete: unknown',
+  'no header': 'heard, its header has not come yet: all of it is unknown',
   unusable: 'another version, or a map too large: all of it is unknown',
   conflict: 'two senders use this number: all of it is unknown',
 };
@@ -57,6 +57,10 @@ export function showCell(told, instant, name) {
   ]);
 }
 
+// A state's name as it is read: "BusOff" is "bus off".
+const inWords = (name) => name.replace(/(?<=.)(?=[A-Z])/g, ' ').toLowerCase();
+const stateOf = ({ state, reason }) => (reason === 'None' ? inWords(state) : `${inWords(state)} (${inWords(reason)})`);
+
 export function showSenders(instant) {
   element('senders-section').hidden = instant.senders.length === 0;
   const ages = (sensor) => {
@@ -79,7 +83,7 @@ export function showSenders(instant) {
       ['sectors’ ages', ages(sender.sensor)],
       ['messages', [`${c.accepted} used`, `${c.lost} lost`, ...byCounters].join(', ')],
       ['not used', counted(UNUSED).join(', ')],
-      ['unit', status && `${status.state} (${status.reason}), up ${status.uptime_s} s`],
+      ['unit', status && `${stateOf(status)}, up ${status.uptime_s} s`],
       ['wire version', status?.wire_version],
       ['fingerprint', header && header.fingerprint.toString(16).toUpperCase().padStart(8, '0')],
     ]);

@@ -18,6 +18,8 @@ const STEP_PX = 12;
 // Seconds of a live source that are shown.
 const RECENT_S = 60;
 const TOGETHER = 'all sensors together';
+// What is in view before there is a map: a usual sensor's road.
+const NOWHERE = { left: -10, right: 210, bottom: -60, top: 60 };
 
 class Page {
   constructor() {
@@ -110,6 +112,8 @@ class Page {
       if (this.instant) this.show(this.instant);
     });
     this.following = this.isLive;
+    // before a map has come it is not known how far it reaches
+    if (!this.fitted) for (const name of ['plan', 'second']) this.plots[name].show(NOWHERE);
     this.showPlaying();
     if (this.isLive && this.source.count > 0) this.goTo(this.source.count - 1, true);
     document.documentElement.dataset.ready = 'true';
@@ -165,8 +169,11 @@ class Page {
     if (done && (this.isLive || says.startsWith('failed'))) this.complain(says);
     showEvents(events);
     if (this.number < 0 && count > 0) this.goTo(this.isLive ? count - 1 : 0, true);
-    // the first instants of an estimator say little
-    const begins = samples.findIndex((sample) => sample && sample.tv + sample.fv + sample.ti + sample.fi > 0);
+    // the first instants of an estimator say little, and those of a broadcast before its first map nothing
+    const saysSomething = this.about.labelled
+      ? (sample) => sample.tv + sample.fv + sample.ti + sample.fi > 0
+      : (sample) => sample.unknown < 1;
+    const begins = samples.findIndex((sample) => sample && saysSomething(sample));
     if (!this.isLive && !this.touched && begins > 0 && this.number < begins) this.goTo(begins, true);
     this.fitTime(samples);
     this.plots.time.changed();
@@ -231,6 +238,7 @@ class Page {
     this.chosen = Math.min(this.chosen, Math.max(0, this.names.length - 1));
     element('map').selectedIndex = this.chosen;
     element('beside-button').hidden = maps.length < 2;
+    this.legend();
   }
 
   // The maps that a plot shows.
@@ -267,7 +275,7 @@ class Page {
 
   titleOf(name) {
     const maps = this.mapsOf(name);
-    const title = maps.length > 1 ? TOGETHER : (maps[0]?.name ?? 'no map');
+    const title = maps.length > 1 ? TOGETHER : (maps[0]?.name ?? 'no map has come yet');
     if (name === 'plan' || maps.length !== 1) return title;
     const [own] = this.mapsOf('plan');
     const [a, b] = [own, maps[0]].map((map) => map && codes(map));
@@ -426,12 +434,16 @@ class Page {
 
   legend() {
     const colours = codeColours().map((colour) => colour && `rgb(${colour.join(' ')})`);
-    const entries = [
-      ['visible (paler: less sure)', { background: `linear-gradient(90deg, ${colours[15]}, ${colours[9]})` }],
-      ['invisible (paler: less sure)', { background: `linear-gradient(90deg, ${colours[1]}, ${colours[7]})` }],
-      ['occupied', { background: colours[16] }],
-      ['unknown', {}],
-    ];
+    // a broadcast may say no more than visible or not
+    const carries = (what) => this.about.source === 'recording' || Boolean(this.instant?.senders.some(({ header }) => header?.[what]));
+    const entries = carries('grades')
+      ? [
+        ['visible (paler: less sure)', { background: `linear-gradient(90deg, ${colours[15]}, ${colours[9]})` }],
+        ['invisible (paler: less sure)', { background: `linear-gradient(90deg, ${colours[1]}, ${colours[7]})` }],
+      ]
+      : [['visible', { background: colours[15] }], ['invisible', { background: colours[1] }]];
+    if (carries('occupancy')) entries.push(['occupied', { background: colours[16] }]);
+    entries.push(['unknown', {}]);
     if (this.about.source === 'recording') entries.push(['obstacle', { background: css('--quiet') }]);
     if (this.about.labelled) {
       entries.push(['TV: visible and detected', { borderColor: css('--tv'), borderWidth: '2px' }]);

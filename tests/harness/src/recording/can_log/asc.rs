@@ -5,34 +5,74 @@
 //! base hex  timestamps absolute
 //!    0.004301 1  60A             Rx   d 4 01 C2 49 10
 //!    0.004501 1  18DAF110x       Rx   r
+//!    0.006000 1  Cluster_1_General Rx d 4 01 C2 49 10  Length = 222000 BitCount = 114 ID = 1793
 //!    0.016305 CANFD   1 Rx        400  Map        1 0 9 12 00 01 02 03 04 05 06 07 08 09 0A 0B  130000  130  303000
 //! ```
 //!
 //! Times are seconds since the start of the log or, after `timestamps relative`, since the line before. After a frame's
-//! bytes more may follow.
+//! bytes more may follow. Loggers write `D` for `d` and a header in other letters or indented, version 8.1 the direction
+//! of CAN FD after the identifier.
 
 use viewshed::wire::frame::{CanFrame, CanId};
 
-use super::{Content, Line, add_up, seconds};
+use super::time::{Stamps, seconds};
+use super::{Content, Line};
 
-/// Whether a file begins like such a log.
-pub fn is_log(start: &str) -> bool {
-    start.lines().take(20).any(|line| line.starts_with("base hex") || line.starts_with("base dec"))
+/// Whether a file begins like such a log, or like a piece of one, whose numbers are taken for hexadecimal.
+pub fn is_log(lines: &[String]) -> bool {
+    let is_frame = |line: &String| matches!(event(line, 16), Some((_, Some(Ok(_)))));
+    lines.iter().take(60).any(|line| base(line).is_some()) || lines.iter().take(3).any(is_frame)
 }
 
-/// Reads a log. Lines that begin with no time are its headers and remarks.
-pub fn read(text: &str) -> Vec<Result<Line, String>> {
-    let base = text.lines().find(|line| line.starts_with("base ")).unwrap_or_default();
-    let radix = if base.starts_with("base dec") { 10 } else { 16 };
-    let mut events: Vec<_> = text.lines().filter_map(|line| event(line, radix)).collect();
-    if base.contains("timestamps relative") {
-        add_up(events.iter_mut().map(|(time_ns, _)| time_ns));
+/// What a line says of the numbers and times after it: `base hex  timestamps absolute`.
+fn base(line: &str) -> Option<(u32, bool)> {
+    let mut words = line.split_whitespace();
+    let is = |word: Option<&str>, what: &str| word.is_some_and(|word| word.eq_ignore_ascii_case(what));
+    if !is(words.next(), "base") {
+        return None;
     }
-    let line = |(time_ns, event): (i64, Event<'_>)| {
-        let line = |(channel, content): (&str, Content)| Line { time_ns, interface: channel.to_owned(), content };
-        event.map(|read| read.map(line))
+    let radix = match words.next()? {
+        word if word.eq_ignore_ascii_case("hex") => 16,
+        word if word.eq_ignore_ascii_case("dec") => 10,
+        _ => return None,
     };
-    events.into_iter().filter_map(line).collect()
+    Some((radix, is(words.nth(1), "relative")))
+}
+
+/// Reads line by line.
+#[derive(Debug, Clone)]
+pub struct Reader {
+    radix: u32,
+    stamps: Stamps,
+}
+
+impl Default for Reader {
+    fn default() -> Self {
+        Self { radix: 16, stamps: Stamps::default() }
+    }
+}
+
+impl Reader {
+    /// The frame of a line; nothing where it is one of the headers and remarks, which begin with no number.
+    pub fn line(&mut self, line: &str) -> Option<Result<Line, String>> {
+        if let Some((radix, relative)) = base(line) {
+            (self.radix, self.stamps) = (radix, Stamps::new(relative));
+            return None;
+        }
+        let first = line.split_whitespace().next()?;
+        if !first.starts_with(|c: char| c.is_ascii_digit() || "-+.,\u{2212}".contains(c)) {
+            return None;
+        }
+        match event(line, self.radix) {
+            Some((time_ns, event)) => {
+                let time_ns = self.stamps.at(time_ns);
+                let line =
+                    |(channel, content): (&str, Content)| Line { time_ns, interface: channel.to_owned(), content };
+                event.map(|read| read.map(line))
+            }
+            None => Some(Err(format!("`{first}` is no time"))),
+        }
+    }
 }
 
 /// A frame and its channel, or why a line is none; nothing of what is neither a frame nor a flaw.
@@ -49,12 +89,15 @@ fn event(line: &str, radix: u32) -> Option<(i64, Event<'_>)> {
             return Some((time_ns, None));
         }
         ["CANFD", channel, _, "ErrorFrame", ..] | [channel, "ErrorFrame", ..] => Ok((*channel, Content::Error(0))),
-        ["CANFD", channel, _, id, rest @ ..] => flexible(id, rest, radix).map(|content| (*channel, content)),
-        [channel, id, _, "d", length, bytes @ ..] if is_channel(channel) => {
-            classic(id, length, bytes, radix).map(|content| (*channel, content))
+        ["CANFD", channel, id, direction, rest @ ..] if is_direction(direction) => {
+            flexible(id, rest, radix).map(|content| (*channel, content))
         }
-        [channel, id, _, "r", ..] if is_channel(channel) => {
-            identifier(id, radix).map(|id| (*channel, Content::Remote(id)))
+        ["CANFD", channel, _, id, rest @ ..] => flexible(id, rest, radix).map(|content| (*channel, content)),
+        [channel, id, _, "d" | "D", length, bytes @ ..] if is_channel(channel) => {
+            classic(identified(id, rest, radix), length, bytes, radix).map(|content| (*channel, content))
+        }
+        [channel, id, _, "r" | "R", ..] if is_channel(channel) => {
+            identified(id, rest, radix).map(|id| (*channel, Content::Remote(id)))
         }
         _ => Err("an event that is no frame".into()),
     };
@@ -65,10 +108,24 @@ fn is_channel(word: &str) -> bool {
     word.bytes().all(|b| b.is_ascii_digit())
 }
 
+fn is_direction(word: &str) -> bool {
+    ["Rx", "Tx", "TxRq"].iter().any(|direction| word.eq_ignore_ascii_case(direction))
+}
+
+/// The identifier of a line: of `ID = 1793` at its end, which is decimal, for before it there may be the message's name.
+fn identified(id: &str, words: &[&str], radix: u32) -> Result<CanId, String> {
+    let at = words.windows(2).position(|pair| pair == ["ID", "="]);
+    let said = at.and_then(|at| identifier(words.get(at + 2)?, 10).ok());
+    said.map_or_else(|| identifier(id, radix), Ok)
+}
+
 /// An identifier; those of 29 bits end with an x.
 fn identifier(text: &str, radix: u32) -> Result<CanId, String> {
-    let (digits, extended) = text.strip_suffix('x').map_or((text, false), |digits| (digits, true));
-    let raw = u32::from_str_radix(digits, radix).map_err(|_| format!("`{text}` is no identifier"))?;
+    let (digits, extended) = text.strip_suffix(['x', 'X']).map_or((text, false), |digits| (digits, true));
+    let raw = u32::from_str_radix(digits, radix).map_err(|_| match text.bytes().any(|b| b.is_ascii_alphabetic()) {
+        true => format!("`{text}` is the name of a message and no identifier: log numbers in place of names"),
+        false => format!("`{text}` is no identifier"),
+    })?;
     let id = if extended { CanId::extended(raw) } else { u16::try_from(raw).ok().and_then(CanId::standard) };
     id.ok_or_else(|| format!("`{text}` is no identifier"))
 }
@@ -78,11 +135,11 @@ fn bytes(words: &[&str], count: usize, radix: u32) -> Result<Vec<u8>, String> {
     found.filter(|found| found.len() == count).ok_or_else(|| format!("not the {count} bytes it announces"))
 }
 
-fn classic(id: &str, length: &str, words: &[&str], radix: u32) -> Result<Content, String> {
+fn classic(id: Result<CanId, String>, length: &str, words: &[&str], radix: u32) -> Result<Content, String> {
     let count = usize::from_str_radix(length, 16).map_err(|_| format!("`{length}` is no length"))?;
     // a length code above 8 is of 8 bytes
     let bytes = bytes(words, count.min(8), radix)?;
-    let frame = CanFrame::classic(identifier(id, radix)?, &bytes);
+    let frame = CanFrame::classic(id?, &bytes);
     frame.map(Content::Data).ok_or_else(|| format!("{count} bytes are too many"))
 }
 
@@ -113,8 +170,12 @@ fn flexible(id: &str, rest: &[&str], radix: u32) -> Result<Content, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candump;
+    use super::super::{Format, all, candump};
     use super::*;
+
+    fn read(text: &str) -> Vec<Result<Line, String>> {
+        all(Format::Asc, text)
+    }
 
     /// Lines of `candump -L` that say the same.
     fn same(asc: &str, candump: &[&str]) {
@@ -185,6 +246,31 @@ mod tests {
     }
 
     #[test]
+    fn what_loggers_write_is_the_same() {
+        let usual = "base hex  timestamps absolute\n 1.5 1 60A Rx d 4 01 C2 49 10\n 2.0 2 18DAF110x Tx d 1 FF\n";
+        for other in [
+            usual.replace(" d ", " D "),
+            usual.replace("base hex", "  Base Hex"),
+            usual.replace("base hex", "BASE HEX"),
+            usual.replace("1.5", "1,5").replace("2.0", "2,0"),
+            format!("{}{}", "// a remark\n".repeat(50), usual),
+            usual
+                .replace("60A Rx d 4 01 C2 49 10", "Obj_0 Rx d 4 01 C2 49 10 Length = 2 BitCount = 1 ID = 1546")
+                .replace("18DAF110x Tx d 1 FF", "Other Tx d 1 FF ID = 417001744x"),
+            "base dec  timestamps absolute\n 1.5 1 1546 Rx D 4 1 194 73 16\n 2.0 2 417001744x Tx D 1 255\n".into(),
+            "base hex  timestamps relative\n 1.5 1 60A Rx d 4 01 C2 49 10\n 0,5 2 18DAF110x Tx d 1 FF\n".into(),
+        ] {
+            same(&other, &["(1.5) 1 60A#01C24910", "(2.0) 2 18DAF110#FF"]);
+        }
+        same("base hex timestamps absolute\n -0,5 1 60A Rx d 1 01\n", &["(-0.5) 1 60A#01"]);
+        // the direction of CAN FD before the identifier and after it
+        let tail = "1 0 4 4 01 C2 49 10";
+        for order in ["Rx 60A", "60A Rx", "60A Tx Name"] {
+            same(&format!("base hex timestamps absolute\n 1.5 CANFD 1 {order} {tail}\n"), &["(1.5) 1 60A##101C24910"]);
+        }
+    }
+
+    #[test]
     fn what_is_no_frame_is_counted() {
         let why = |line: &str| match &read(&format!("base hex timestamps absolute\n{line}\n"))[..] {
             [one] => one.clone().unwrap_err(),
@@ -193,6 +279,8 @@ mod tests {
         assert_eq!(why("1.0 1  Trigger event"), "an event that is no frame");
         assert_eq!(why("1.0 1  60A Rx d 4 01 C2 49"), "not the 4 bytes it announces");
         assert_eq!(why("1.0 1  8FF Rx d 1 01"), "`8FF` is no identifier");
+        assert_eq!(why("1;0 1  60A Rx d 1 01"), "`1;0` is no time");
+        assert!(why("1.0 1  Obj_0 Rx d 1 01").contains("log numbers in place of names"));
         let long = format!("1.0 CANFD 1 Rx 400 1 0 f 65 {}", "00 ".repeat(65));
         assert_eq!(why(&long), "65 bytes are no length of CAN FD");
     }

@@ -8,7 +8,8 @@ use std::fmt;
 
 use viewshed::wire::frame::{CanFrame, CanId};
 
-use super::{Content, ERROR_FLAG, Line, add_up, identifier, seconds};
+use super::time::seconds;
+use super::{Content, ERROR_FLAG, Line, identifier};
 
 /// Reads a line of `candump -L`; the error says what is wrong with it.
 pub fn line(line: &str) -> Result<Line, String> {
@@ -25,7 +26,7 @@ pub fn line(line: &str) -> Result<Line, String> {
 }
 
 /// Reads a line of the screen; the error says what is wrong with it.
-fn screen_line(line: &str) -> Result<Line, String> {
+pub fn screen_line(line: &str) -> Result<Line, String> {
     let shape = || "not `(seconds) interface identifier [length] bytes`".to_owned();
     let mut words = line.split_whitespace();
     let (Some(time), Some(interface), Some(mut id)) = (words.next(), words.next(), words.next()) else {
@@ -55,37 +56,14 @@ fn screen_line(line: &str) -> Result<Line, String> {
     Ok(Line { time_ns, interface, content })
 }
 
-/// Reads what `candump -t a`, `-t z` or `-t d` prints. Times that are [differences](are_differences) are added up.
-pub fn screen(text: &str) -> Vec<Result<Line, String>> {
-    let lines = text.lines().filter(|line| !line.trim().is_empty());
-    // a line whose frame cannot be read passes time, too
-    let time = |line: &str| line.split_whitespace().next().and_then(|word| nanoseconds(word).ok());
-    let mut lines: Vec<_> = lines.map(|line| (time(line), screen_line(line))).collect();
-    if are_differences(&lines.iter().filter_map(|(time, _)| *time).collect::<Vec<_>>()) {
-        add_up(lines.iter_mut().filter_map(|(time, _)| time.as_mut()));
-    }
-    let line = |(time, line): (Option<i64>, Result<Line, String>)| {
-        line.map(|line| Line { time_ns: time.unwrap_or(line.time_ns), ..line })
-    };
-    lines.into_iter().map(line).collect()
-}
-
-/// Whether times are since the line before (`-t d`). Then they go back again and again, by about as much as forward; the
-/// first is 0, unless it was cut off.
-fn are_differences(times: &[i64]) -> bool {
-    let steps = || times.windows(2).map(|pair| pair[1].saturating_sub(pair[0]));
-    let back = || steps().filter(|step| *step < 0);
-    let sum = |all: &mut dyn Iterator<Item = i64>| all.fold(0_i64, i64::saturating_add);
-    let [forward, backward] = [sum(&mut steps().filter(|step| *step > 0)), -sum(&mut back())];
-    match times.first() {
-        Some(0) => backward > 0,
-        _ => back().count() >= 2 && backward > forward / 2,
-    }
-}
-
 /// Whether a line is one of the screen.
 pub fn is_screen(line: &str) -> bool {
     screen_line(line).is_ok()
+}
+
+/// The time a line begins with, whatever follows it.
+pub fn time(line: &str) -> Option<i64> {
+    nanoseconds(line.split_whitespace().next()?).ok()
 }
 
 /// `(seconds.fraction)` with any number of digits.
@@ -118,12 +96,12 @@ fn content(text: &str) -> Result<Content, String> {
 
 /// Bytes of hexadecimal digits, with or without points between them.
 pub(in crate::recording) fn bytes(digits: &str) -> Option<Vec<u8>> {
-    let digits: Vec<u8> = digits.bytes().filter(|b| *b != b'.').collect();
-    let pairs = digits.chunks(2).map(|pair| match std::str::from_utf8(pair) {
-        Ok(text) if text.len() == 2 && text.bytes().all(|b| b.is_ascii_hexdigit()) => u8::from_str_radix(text, 16).ok(),
-        _ => None,
-    });
-    pairs.collect()
+    let mut digits = digits.bytes().filter(|b| *b != b'.').map(|b| char::from(b).to_digit(16));
+    let mut bytes = Vec::with_capacity(8);
+    while let Some(high) = digits.next() {
+        bytes.push((high? << 4 | digits.next()??) as u8);
+    }
+    Some(bytes)
 }
 
 impl fmt::Display for Line {
@@ -148,6 +126,7 @@ impl fmt::Display for Line {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Format, all};
     use super::*;
 
     fn parse(text: &str) -> Line {
@@ -204,7 +183,11 @@ mod tests {
     /// Times and content of lines of the screen.
     fn on_screen(text: &str) -> Vec<(i64, Option<Vec<u8>>)> {
         let data = |line: &Line| line.frame().map(|frame| frame.data().to_vec());
-        screen(text).into_iter().map(|line| line.unwrap()).map(|line| (line.time_ns, data(&line))).collect()
+        all(Format::Screen, text)
+            .into_iter()
+            .map(|line| line.unwrap())
+            .map(|line| (line.time_ns, data(&line)))
+            .collect()
     }
 
     #[test]
@@ -247,7 +230,7 @@ mod tests {
         // the first line was cut off; and one was garbled
         let cut = of(&["000.070000", "000.001000", "000.069000", "000.002000", "000.068000"]);
         assert_eq!(times(&cut), [70, 71, 140, 142, 210]);
-        let garbled = screen(&cut.replacen("60A", "60", 2));
+        let garbled = all(Format::Screen, &cut.replacen("60A", "60", 2));
         let read: Vec<_> = garbled.iter().flatten().map(|line| line.time_ns / 1_000_000).collect();
         assert_eq!(read, [140, 142, 210]);
         // a clock that stepped back

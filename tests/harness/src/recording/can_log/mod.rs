@@ -1,19 +1,29 @@
-//! Logs of CAN buses, whatever tool wrote them: `candump` with and without `-L`, Vector's ASC, SavvyCAN's CSV.
+//! Logs of CAN buses, whatever tool wrote them: `candump` with and without `-L`, Vector's ASC, the CSV of SavvyCAN and of
+//! python-can.
+//!
+//! [`text`](super::text) makes lines of bytes, a format's reader makes a frame of a line, and [`log`] brings frames into the
+//! [order of time](order). Nothing is kept but what is out of order.
 
 pub mod asc;
 pub mod candump;
+mod columns;
 #[cfg(target_os = "linux")]
 pub mod live;
+pub mod log;
+pub mod order;
+pub mod python_can;
 pub mod savvycan;
+pub mod time;
 
-use std::collections::BTreeSet;
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
 use viewshed::wire::frame::{CanFrame, CanId};
 
-use super::file;
+use super::file::Source;
 use super::problems::Problems;
+use super::text;
+use time::Stamps;
 
 /// One frame of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,27 +68,52 @@ pub enum Format {
     /// CANalyzer, CANoe and many others
     Asc,
     SavvyCan,
+    /// python-can's CSV
+    PythonCan,
 }
 
 /// The names of all of them, for messages.
-pub const FORMATS: &str = "`candump` (with -L, or -t a, d or z), Vector ASC or SavvyCAN CSV";
+pub const FORMATS: &str = "`candump` (with -L, or -t a, d or z), Vector ASC, SavvyCAN CSV or python-can CSV";
 
-/// Bytes at the start of a file that show its kind.
-const START: usize = 4096;
+/// Text at the start of a file that shows its kind, without remarks before it.
+const START: usize = 1 << 20;
+
+/// The first lines of a file, without the remarks before them; those of Vector's tools stay.
+fn begin(source: &Source) -> Result<Vec<String>> {
+    let mut text = text::Lines::new(source.open()?);
+    let (mut lines, mut bytes) = (Vec::new(), 0);
+    while let Some(line) = text.next().with_context(|| format!("cannot read {}", source.shown()))? {
+        if is_remark(line) {
+            continue;
+        }
+        bytes += line.len();
+        lines.push(line.to_owned());
+        if bytes > START || lines.len() >= time::SHOWN {
+            break;
+        }
+    }
+    Ok(lines)
+}
+
+/// Whether a line is for people.
+fn is_remark(line: &str) -> bool {
+    line.trim_start().starts_with(['#', ';']) || line.trim_start().starts_with("//")
+}
 
 impl Format {
-    /// What a file looks like.
-    pub fn of(bytes: &[u8]) -> Option<Self> {
-        let start = String::from_utf8_lossy(&bytes[..bytes.len().min(START)]);
-        if asc::is_log(&start) {
+    /// What a file that begins with these lines looks like.
+    pub fn of(lines: &[String]) -> Option<Self> {
+        if asc::is_log(lines) {
             return Some(Self::Asc);
         }
-        if savvycan::is_log(&start) {
+        if savvycan::is_log(lines) {
             return Some(Self::SavvyCan);
         }
-        // the first line may have been cut
-        let lines = start.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).take(3);
-        lines.into_iter().find_map(|line| match line {
+        if python_can::is_log(lines) {
+            return Some(Self::PythonCan);
+        }
+        // the first line may have been cut, and a tool may say something before it
+        lines.iter().take(10).find_map(|line| match line {
             _ if candump::line(line).is_ok() => Some(Self::Candump),
             _ if candump::is_screen(line) => Some(Self::Screen),
             _ => None,
@@ -91,53 +126,81 @@ impl Format {
             Self::Screen => "candump",
             Self::Asc => "Vector ASC",
             Self::SavvyCan => "SavvyCAN CSV",
+            Self::PythonCan => "python-can CSV",
         }
     }
 
-    fn read(self, text: &str) -> Vec<Result<Line, String>> {
+    /// What brings the lines of a file into the order of time.
+    fn sorting(self) -> &'static str {
         match self {
-            Self::Candump => text.lines().filter(|line| !line.trim().is_empty()).map(candump::line).collect(),
-            Self::Screen => candump::screen(text),
-            Self::Asc => asc::read(text),
-            Self::SavvyCan => savvycan::read(text),
-        }
-    }
-}
-
-/// All frames of a log, in its order, of one interface if it is named; lines that are none are counted.
-///
-/// # Errors
-/// Nothing is of the interface that is named; those found are listed.
-pub fn read(bytes: &[u8], format: Format, interface: Option<&str>, problems: &mut Problems) -> Result<Vec<Line>> {
-    let mut lines: Vec<Line> = Vec::new();
-    let (mut last, mut others) = (None, BTreeSet::new());
-    for line in format.read(&String::from_utf8_lossy(bytes)) {
-        match line {
-            Ok(line) if interface.is_some_and(|name| name != line.interface) => drop(others.insert(line.interface)),
-            Ok(line) => {
-                if last.is_some_and(|last| line.time_ns < last) {
-                    problems.add(&line.interface, "time runs backwards", line.time_ns);
-                }
-                last = Some(line.time_ns);
-                lines.push(line);
+            Self::Candump | Self::Screen => "`sort --stable --key 1,1 FILE > NEW`",
+            Self::Asc => "`sort --stable --numeric-sort --key 1,1 FILE > NEW`, and put its headers first again",
+            Self::SavvyCan | Self::PythonCan => {
+                "`sort --stable --numeric-sort --field-separator , --key 1,1 FILE > NEW`, which leaves the headings first"
             }
-            Err(why) => problems.add("log", format!("line skipped: {}", kind_of(&why)), last.unwrap_or(0)),
         }
     }
-    if let Some(name) = interface.filter(|_| lines.is_empty()) {
-        let found: Vec<_> = others.into_iter().collect();
-        bail!("no frame on interface {name}; interfaces found: {}", found.join(", "));
-    }
-    Ok(lines)
 }
 
-/// The frames of a file, as [`read`] has them; `None` if it is no such log.
+/// Reads the lines of one log, one after the other.
+#[derive(Debug, Clone)]
+enum Reader {
+    Candump(Stamps),
+    Screen(Stamps),
+    Asc(asc::Reader),
+    SavvyCan(savvycan::Reader),
+    PythonCan(python_can::Reader),
+}
+
+impl Reader {
+    /// For a log that begins with these lines.
+    fn new(format: Format, begin: &[String]) -> Self {
+        let stamps = || Stamps::of(&begin.iter().filter_map(|line| candump::time(line)).collect::<Vec<_>>());
+        match format {
+            Format::Candump => Self::Candump(stamps()),
+            Format::Screen => Self::Screen(stamps()),
+            Format::Asc => Self::Asc(asc::Reader::default()),
+            Format::SavvyCan => Self::SavvyCan(savvycan::Reader::default()),
+            Format::PythonCan => Self::PythonCan(python_can::Reader::default()),
+        }
+    }
+
+    /// The frame of a line, or why it is none; nothing of one that is for people.
+    fn line(&mut self, line: &str) -> Option<Result<Line, String>> {
+        let stamped = |stamps: &mut Stamps, read: Result<Line, String>| {
+            if !stamps.differences {
+                return Some(read);
+            }
+            let time_ns = candump::time(line).map(|time| stamps.at(time));
+            Some(read.map(|line| Line { time_ns: time_ns.unwrap_or(line.time_ns), ..line }))
+        };
+        match self {
+            _ if is_remark(line) => None,
+            Self::Candump(stamps) => stamped(stamps, candump::line(line)),
+            Self::Screen(stamps) => stamped(stamps, candump::screen_line(line)),
+            Self::Asc(reader) => reader.line(line),
+            Self::SavvyCan(reader) => reader.line(line),
+            Self::PythonCan(reader) => reader.line(line),
+        }
+    }
+}
+
+/// The frames of a file with their bus in the order of time; `None` if it is no log.
 ///
 /// # Errors
-/// A file that cannot be read, and those of [`read`].
+/// A file that cannot be read, and those of [`log::Found::read`].
 pub fn of_file(path: &Path, interface: Option<&str>) -> Result<Option<Vec<Line>>> {
-    let bytes = file::bytes(path)?;
-    Format::of(&bytes).map(|format| read(&bytes, format, interface, &mut Problems::default())).transpose()
+    let found = log::find(&Source::of(path)?)?;
+    let read = |found: log::Found| found.read(interface, &mut Problems::default(), &mut |_| false);
+    Ok(found.map(read).transpose()?.map(|log| log.collect()))
+}
+
+/// The lines of a text, as its format's reader has them.
+#[cfg(test)]
+fn all(format: Format, text: &str) -> Vec<Result<Line, String>> {
+    let begin: Vec<String> = text.lines().map(str::to_owned).collect();
+    let mut reader = Reader::new(format, &begin);
+    begin.iter().filter(|line| !line.trim().is_empty()).filter_map(|line| reader.line(line)).collect()
 }
 
 /// A reason without the text it names, so that many of a kind are one problem; what a line should be stays.
@@ -146,28 +209,6 @@ fn kind_of(why: &str) -> String {
         ["not ", ..] => why.to_owned(),
         [before, _, after] => format!("{before}something{after}").trim().to_owned(),
         _ => why.to_owned(),
-    }
-}
-
-/// Seconds with or without a fraction, of any number of digits each, in nanoseconds.
-fn seconds(text: &str) -> Option<i64> {
-    let (seconds, fraction) = text.split_once('.').unwrap_or((text, "0"));
-    let digits = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
-    if !digits(seconds) || !digits(fraction) {
-        return None;
-    }
-    let nine: String = fraction.chars().chain("000000000".chars()).take(9).collect();
-    let (seconds, fraction): (i64, i64) = (seconds.parse().ok()?, nine.parse().ok()?);
-    seconds.checked_mul(1_000_000_000)?.checked_add(fraction)
-}
-
-/// Times that count from the line before, counted from the first. Lines without one are left out, those whose frame
-/// cannot be read are not.
-fn add_up<'a>(times: impl Iterator<Item = &'a mut i64>) {
-    let mut now = 0_i64;
-    for time in times {
-        now = now.saturating_add(*time);
-        *time = now;
     }
 }
 
@@ -187,41 +228,45 @@ fn identifier(digits: &str) -> Result<Result<CanId, u32>, String> {
 mod tests {
     use super::*;
 
+    fn read(text: &[u8], interface: Option<&str>) -> (Vec<Line>, Problems) {
+        let mut problems = Problems::default();
+        let found = log::find(&Source::of_bytes(text)).unwrap().unwrap();
+        let log = found.read(interface, &mut problems, &mut |_| false).unwrap();
+        (log.collect(), problems)
+    }
+
     #[test]
     fn each_format_is_known_by_its_begin_and_by_nothing_else() {
+        let remarks = "# a remark\n".repeat(200_000);
         for (text, format) in [
             ("(1.0) can0 60A#01\n", Some(Format::Candump)),
             ("60A#01C24910\n(1.0) can0 60A#01\n", Some(Format::Candump)),
             (" (1.0)  can0  60A   [1]  01\n", Some(Format::Screen)),
             ("date today\nbase hex  timestamps absolute\n", Some(Format::Asc)),
             ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1\n", Some(Format::SavvyCan)),
+            ("timestamp,arbitration_id,extended,remote,error,dlc,data\n", Some(Format::PythonCan)),
             ("time_s,class\n1,car\n", None),
             ("(1.0) ttyS0 00FF\n", None),
             ("", None),
         ] {
-            assert_eq!(Format::of(text.as_bytes()), format, "{text}");
+            for before in ["", "\u{feff}", "\0\0\0", &remarks] {
+                let found = log::find(&Source::of_bytes(format!("{before}{text}").as_bytes())).unwrap();
+                assert_eq!(found.map(|found| found.format), format, "{text}");
+            }
         }
     }
 
     #[test]
     fn a_skipped_line_says_what_it_should_be() {
-        let mut problems = Problems::default();
-        read(
-            b"(2.0) can0 60A#01\n(3.0) can0\n(4.0) can0 60A#0\n(5.0) can0 60A#1\n",
-            Format::Candump,
-            None,
-            &mut problems,
-        )
-        .unwrap();
+        let (_, problems) = read(b"(2.0) can0 60A#01\n(3.0) can0\n(4.0) can0 60A#0\n(5.0) can0 60A#1\n", None);
         assert_eq!(problems.count("line skipped: not `(seconds) interface identifier#data`"), 1);
         assert_eq!(problems.count("line skipped: something is not whole bytes"), 2, "one problem whatever the bytes");
     }
 
     #[test]
-    fn times_that_run_backwards_and_lines_that_are_none_are_counted() {
-        let mut problems = Problems::default();
-        let log = b"(2.0) can0 60A#01\n(1.0) can0 60A#02\n(3.0) can1 60A#03\nwhat\n(4.0) can0 60A#0\n";
-        let lines = read(log, Format::Candump, Some("can0"), &mut problems).unwrap();
-        assert_eq!((lines.len(), problems.count("runs backwards"), problems.count("line skipped")), (2, 1, 2));
+    fn lines_that_are_none_are_counted() {
+        let log = b"(2.0) can0 60A#01\n(2.5) can0 60A#02\n(3.0) can1 60A#03\nwhat\n(4.0) can0 60A#0\n# who\n";
+        let (lines, problems) = read(log, Some("can0"));
+        assert_eq!((lines.len(), problems.count(""), problems.count("line skipped")), (2, 2, 2));
     }
 }

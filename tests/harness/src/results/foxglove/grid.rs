@@ -150,6 +150,10 @@ mod tests {
                 _ => CellState { visibility: Visibility::Invisible, ..CellState::UNKNOWN },
             }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     #[test]

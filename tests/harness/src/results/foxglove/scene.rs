@@ -176,6 +176,10 @@ mod tests {
             let known = CellState { visibility: Visibility::Visible, grade: 255, occupancy: 255, occupied: true };
             if p.x_cm < 0 { known } else { CellState { occupied: true, ..CellState::UNKNOWN } }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     #[test]

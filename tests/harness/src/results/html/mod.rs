@@ -13,6 +13,7 @@ use std::fmt::Write as _;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::json;
+use viewshed::ESTIMATOR_VERSION;
 use viewshed::unit::settings;
 use viewshed::wire::header::fingerprint;
 
@@ -189,8 +190,11 @@ impl Report<'_> {
             let list: String = missing.iter().map(|what| format!("<li>{what}</li>")).collect();
             return format!(
                 "<section id=\"summary\" class=\"nothing\"><h2>This recording has no labels</h2>\n<p>So nobody can say how \
-                 often its map is wrong, and this report lacks:</p>\n<ul>{list}</ul>\n<p>{}</p></section>\n",
-                with_code(notes::WITHOUT_LABELS)
+                 often its map is wrong, and this report lacks:</p>\n<ul>{list}</ul>\n<p>{}</p>\n<h3>What the map rests \
+                 on</h3>\n<p>{}</p>\n{}</section>\n",
+                with_code(notes::WITHOUT_LABELS),
+                escaped(&notes::heading(self.replay)),
+                self.notes()
             );
         };
         let i = &row.intervals;
@@ -259,7 +263,7 @@ impl Report<'_> {
         html += "<p class=\"note\">TVR + FIR = 100 % of the detected, FVR + TIR = 100 % of the undetected. The rows geometry-slice \
                  (1 m above the road) and geometry-box (all of a vehicle) are exact lines of sight past the labelled boxes: the bounds \
                  of any such method. Slice in the last columns is geometry-slice.</p>\n";
-        html += &list(&notes::below(self.replay, &self.settings.evaluation));
+        html += &self.notes();
         html += "<p class=\"note\">Point at a curve, or give a chart the focus and use the arrow keys; the buttons hide and show. \
                  Hollow points are of fewer than 50 samples; triangles lead to the worst moments.</p>\n";
         html += &charts::of_rates(self.replay, self.shown, &marks);
@@ -285,6 +289,11 @@ impl Report<'_> {
             html += "</section>\n";
         }
         html
+    }
+
+    /// What was counted, left out and assumed, and what was wrong with the input.
+    fn notes(&self) -> String {
+        format!("<div id=\"notes\">\n{}</div>\n", list(&notes::below(self.replay, &self.settings.evaluation)))
     }
 
     fn time_s(&self, time_ns: i64) -> f64 {
@@ -377,7 +386,10 @@ impl Report<'_> {
         let detections: usize = recording.frames.iter().map(|f| f.detections.len()).sum();
         let facts = [
             ("Command", format!("<code>{}</code>", escaped(&self.command))),
-            ("Program", format!("viewshed {}", env!("CARGO_PKG_VERSION"))),
+            (
+                "Program",
+                format!("viewshed {}, version {ESTIMATOR_VERSION} of the estimator", env!("CARGO_PKG_VERSION")),
+            ),
             (
                 "Recording",
                 escaped(&format!(
@@ -401,7 +413,8 @@ impl Report<'_> {
             (
                 "Mount",
                 format!(
-                    "x {x:.2} m, y {y:.2} m, {z:.2} m above the road; yaw {:.2}°, pitch {:.2}°, roll {:.2}°",
+                    "{}x {x:.2} m, y {y:.2} m, {z:.2} m above the road; yaw {:.2}°, pitch {:.2}°, roll {:.2}°",
+                    if self.is_assumed("no mount") { "assumed: " } else { "" },
                     recording.pose.yaw_rad().to_degrees(),
                     recording.pose.pitch_rad().to_degrees(),
                     recording.pose.roll_rad().to_degrees()
@@ -410,8 +423,14 @@ impl Report<'_> {
             (
                 "Field of view",
                 format!(
-                    "azimuth {:.1}° to {:.1}°, elevation {:.1}° to {:.1}°, range {:.1} to {:.1} m",
-                    azimuth[0], azimuth[1], elevation[0], elevation[1], view.range_m[0], view.range_m[1]
+                    "{}azimuth {:.1}° to {:.1}°, elevation {:.1}° to {:.1}°, range {:.1} to {:.1} m",
+                    if self.is_assumed("no field of view") { "assumed: " } else { "" },
+                    azimuth[0],
+                    azimuth[1],
+                    elevation[0],
+                    elevation[1],
+                    view.range_m[0],
+                    view.range_m[1]
                 ),
             ),
             (
@@ -426,6 +445,11 @@ impl Report<'_> {
              <pre>{}</pre></details></section>\n",
             escaped(&options)
         )
+    }
+
+    /// Whether the recording lacks this, and something usual was taken.
+    fn is_assumed(&self, what: &str) -> bool {
+        self.replay.recording.problems.iter().any(|p| p.what.contains(what) && p.what.contains(" assumed; "))
     }
 
     /// What a unit with this configuration broadcasts of it.

@@ -51,7 +51,10 @@ pub fn lines(replay: &Replay) -> Vec<String> {
         );
     }
     if !recording.problems.is_empty() {
-        lines.push("<strong>The input had problems.</strong> They are listed under the table of rates.".into());
+        lines.push(
+            "<strong>The input had problems.</strong> <a href=\"#notes\">They are listed</a>, with what was assumed."
+                .into(),
+        );
     }
     lines.extend(
         [

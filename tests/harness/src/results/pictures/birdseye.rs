@@ -57,7 +57,7 @@ fn axes(canvas: &mut Canvas, plot: &Plot) {
 }
 
 fn layout(scene: &Scene) -> Layout {
-    let mut ground = cells::legend();
+    let mut ground = cells::legend(scene.carries);
     if !scene.road.is_empty() {
         ground.push(overlay::samples::road());
     }
@@ -68,7 +68,7 @@ fn layout(scene: &Scene) -> Layout {
     if !scene.boxes.is_empty() {
         legend.push(overlay::samples::boxes());
     }
-    legend.push(overlay::samples::radar());
+    legend.push(overlay::samples::radar(!scene.detections.is_empty()));
     let surround = Surround { title: scene.title.clone(), caption: scene.caption.clone(), legend };
     let overview = scene.window.plot(surround.above_px());
     let mut plots_bottom = overview.area.bottom() + BELOW_PX;
@@ -160,11 +160,16 @@ mod tests {
         fn at(&self, point: RoadPoint) -> CellState {
             if (self.0)(point) { CLEAR } else { BLOCKED }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     fn scene(map: &Half) -> Scene<'_> {
         Scene {
             map,
+            carries: cells::Carries::ALL,
             pose: SensorPose::new([0.0, 0.0, 5.0], 0.0, 0.0, 0.0),
             field_of_view: FieldOfView { azimuth_rad: [-1.0, 1.0], elevation_rad: [-0.3, 0.1], range_m: [1.0, 150.0] },
             slice_height_m: 1.0,

@@ -142,6 +142,10 @@ mod tests {
             let visibility = if visible { Visibility::Visible } else { Visibility::Invisible };
             CellState { visibility, grade: if visible { 255 } else { 1 }, occupancy: 0, occupied: false }
         }
+
+        fn cells_in(&self, area: &viewshed::query::Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
+        }
     }
 
     fn view<'a>(boxes: &'a [Box2d], lifted: &'a [Solid]) -> View<'a> {

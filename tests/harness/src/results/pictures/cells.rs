@@ -19,8 +19,22 @@ pub fn shade(canvas: &mut Canvas, plot: &Plot, x: [f64; 2], y: [f64; 2], colour:
     canvas.shade(Area::new(left, top, right - left, bottom - top), colour);
 }
 
-/// Visible, invisible, unknown, occupied.
-pub fn legend() -> Vec<Entry> {
+/// What the cells of a map say beside visible, invisible and unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Carries {
+    /// How sure it is.
+    pub grades: bool,
+    /// Whether something stands there.
+    pub occupancy: bool,
+}
+
+impl Carries {
+    /// As an estimator's.
+    pub const ALL: Self = Self { grades: true, occupancy: true };
+}
+
+/// Visible, invisible, unknown, occupied; only what the cells carry.
+pub fn legend(carries: Carries) -> Vec<Entry> {
     let state = |visibility, grade| CellState { visibility, grade, occupancy: 0, occupied: false };
     let swatch = |label: &str, width: i32, at: fn(f32) -> u8, of: Visibility| {
         Entry::new(label, width, move |canvas, area| {
@@ -33,12 +47,17 @@ pub fn legend() -> Vec<Entry> {
             border(canvas, area);
         })
     };
-    vec![
-        swatch("visible (paler: lower grade)", 56, |f| 255 - (127.0 * f) as u8, Visibility::Visible),
-        swatch("invisible (paler: higher grade)", 56, |f| (127.0 * f) as u8, Visibility::Invisible),
-        swatch("unknown", 34, |_| 0, Visibility::Unknown),
-        occupied(),
-    ]
+    let mut entries = if carries.grades {
+        vec![
+            swatch("visible (paler: lower grade)", 56, |f| 255 - (127.0 * f) as u8, Visibility::Visible),
+            swatch("invisible (paler: higher grade)", 56, |f| (127.0 * f) as u8, Visibility::Invisible),
+        ]
+    } else {
+        vec![swatch("visible", 34, |_| 255, Visibility::Visible), swatch("invisible", 34, |_| 0, Visibility::Invisible)]
+    };
+    entries.push(swatch("unknown", 34, |_| 0, Visibility::Unknown));
+    entries.extend(carries.occupancy.then(occupied));
+    entries
 }
 
 /// The lattice over what is occupied.
@@ -64,6 +83,17 @@ fn border(canvas: &mut Canvas, area: Area) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_legend_has_what_the_cells_carry_and_no_more() {
+        let labels = |grades, occupancy| {
+            let entries = legend(Carries { grades, occupancy });
+            entries.iter().map(|entry| entry.label().to_owned()).collect::<Vec<_>>().join("; ")
+        };
+        assert_eq!(labels(false, false), "visible; invisible; unknown");
+        assert!(labels(true, false).contains("lower grade") && !labels(true, false).contains("occupied"));
+        assert!(labels(false, true).ends_with("unknown; occupied, over visible and invisible"));
+    }
 
     #[test]
     fn neighbouring_cells_leave_no_seam_and_do_not_overlap() {

@@ -34,6 +34,11 @@ impl Entry {
         Self { label: label.into(), symbol_px, symbol: Box::new(symbol) }
     }
 
+    /// What it means.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
     fn width(&self) -> i32 {
         self.symbol_px + SYMBOL_GAP_PX + ENTRY.width(&self.label).ceil() as i32
     }

@@ -18,7 +18,7 @@ pub mod tradeoff;
 pub mod who_sees;
 
 mod axes;
-mod cells;
+pub mod cells;
 mod labels;
 mod legend;
 mod overlay;

@@ -195,7 +195,8 @@ pub mod samples {
         })
     }
 
-    pub fn radar() -> Vec<Entry> {
+    /// The sensor, and its detections where there are any.
+    pub fn radar(detections: bool) -> Vec<Entry> {
         let tick = |label: String, velocity: f32| {
             let width = (EXAMPLE_MPS * DOPPLER_PX_PER_MPS) as i32 + 12;
             Entry::new(label, width, move |canvas, area| {
@@ -212,17 +213,21 @@ pub mod samples {
                 canvas.line([area.left as f32, middle(area)], [area.right() as f32, middle(area)], pen);
             })
         };
-        vec![
+        let mut entries = vec![
             Entry::new("sensor", 26, |canvas, area| {
                 super::sensor(canvas, [area.left as f32 + 13.0, middle(area)], [area.right() as f32, middle(area)]);
             }),
             line("field of view", FIELD_OF_VIEW, None),
+        ];
+        let ticks = [
             tick(
                 format!("detection receding at {EXAMPLE_MPS} m/s: tick away from the sensor (here at the left)"),
                 EXAMPLE_MPS,
             ),
             tick(format!("approaching at {EXAMPLE_MPS} m/s: towards it"), -EXAMPLE_MPS),
-        ]
+        ];
+        entries.extend(ticks.into_iter().filter(|_| detections));
+        entries
     }
 
     pub fn lanes() -> Entry {

@@ -4,7 +4,7 @@ use viewshed::map::CellState;
 
 use super::axes::{BELOW_PX, LEFT_PX, Plot, RIGHT_PX};
 use super::canvas::{Area, Canvas, Colour};
-use super::cells;
+use super::cells::{self, Carries};
 use super::legend::{Surround, WIDTH_PX};
 use crate::geometry::azimuths::bearing_rad;
 
@@ -24,6 +24,7 @@ pub struct PolarGrid<'a> {
     pub range_m: [f64; 2],
     /// State of (row, column).
     pub state: &'a dyn Fn(usize, usize) -> CellState,
+    pub carries: Carries,
     /// Recording, estimator, time.
     pub title: String,
     /// What has to be said of the data.
@@ -50,7 +51,11 @@ pub fn draw(grid: &PolarGrid) -> Canvas {
 }
 
 fn layout(grid: &PolarGrid) -> (Surround, Plot) {
-    let surround = Surround { title: grid.title.clone(), caption: grid.caption.clone(), legend: vec![cells::legend()] };
+    let surround = Surround {
+        title: grid.title.clone(),
+        caption: grid.caption.clone(),
+        legend: vec![cells::legend(grid.carries)],
+    };
     let area = Area::new(LEFT_PX, surround.above_px(), WIDTH_PX - LEFT_PX - RIGHT_PX, HEIGHT_PX);
     (surround, Plot { area, x: grid.range_m, y: grid.azimuth_rad.map(f64::to_degrees) })
 }
@@ -82,6 +87,7 @@ mod tests {
             narrow: EVEN,
             range_m: [0.0, 100.0],
             state: &state,
+            carries: Carries::ALL,
             title: "title".into(),
             caption: None,
         };

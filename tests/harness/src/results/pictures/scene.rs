@@ -6,6 +6,7 @@ use viewshed::map::VisibilityMap;
 
 use super::axes::{LEFT_PX, Plot, RIGHT_PX};
 use super::canvas::Area;
+use super::cells::Carries;
 use super::legend::WIDTH_PX;
 use super::palette::Outcome;
 use crate::estimators::Lane;
@@ -66,6 +67,7 @@ pub struct TruthBox {
 /// Everything on one bird's-eye picture.
 pub struct Scene<'a> {
     pub map: &'a dyn VisibilityMap,
+    pub carries: Carries,
     pub pose: SensorPose,
     pub field_of_view: FieldOfView,
     /// Height at which visibility is judged; detections without elevation are drawn where they lie at it.

@@ -105,6 +105,7 @@ mod tests {
     use viewshed::fixed::time::Time;
     use viewshed::fusion::{Fusion, FusionConfig};
     use viewshed::map::VisibilityMap;
+    use viewshed::map::query::Footprint;
 
     use super::*;
 
@@ -116,6 +117,10 @@ mod tests {
             let visible = point.x_cm < self.0;
             let visibility = if visible { Visibility::Visible } else { Visibility::Invisible };
             CellState { visibility, grade: if visible { 255 } else { 0 }, occupancy: 0, occupied: false }
+        }
+
+        fn cells_in(&self, area: &Footprint, visit: &mut dyn FnMut(CellState)) {
+            area.each_cell(|cell| visit(self.at(cell)));
         }
     }
 

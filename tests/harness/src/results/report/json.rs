@@ -6,6 +6,7 @@
 use anyhow::Result;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use viewshed::{Ars408Wanted, ESTIMATOR_VERSION};
 
 use super::ORIGIN;
 use crate::estimators;
@@ -23,7 +24,7 @@ use crate::evaluation::units::RUN_BLOCKS;
 use crate::evaluation::{self, Grid};
 use crate::geometry::pose::SensorPose;
 use crate::recording::problems::Problem;
-use crate::recording::{FieldOfView, ReadOptions, Recording};
+use crate::recording::{FieldOfView, LabelsFrom, ReadOptions, Recording};
 
 /// Everything one recording gave.
 #[derive(Serialize)]
@@ -52,6 +53,8 @@ pub struct Report {
     sensor: Value,
     input: Input,
     options: Value,
+    /// Of the library's estimators, with another of which the same recording may give other figures.
+    estimator_version: u16,
     origin: Option<&'static str>,
     /// Of all sensors of the file, with the first of them.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,6 +99,9 @@ pub struct Estimator {
     /// Places at which it has learnt a lane.
     #[serde(skip_serializing_if = "Option::is_none")]
     learnt_lanes: Option<usize>,
+    /// Frames whose map had settled since the start and since gaps, of how many, and the rates over these alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    settled: Option<Value>,
     /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
     by_unit: Vec<String>,
     /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s, in the order of time.
@@ -174,6 +180,7 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
             "reading": reading(options.reading),
             "estimators": options.estimators,
         }),
+        estimator_version: ESTIMATOR_VERSION,
         origin: recording.sensor.synthetic.then_some(ORIGIN),
         fused: None,
     }
@@ -234,6 +241,16 @@ pub(super) fn estimator(row: &Row) -> Estimator {
         counters: row.counters.iter().map(|(reason, n)| (reason.clone(), json!(n))).collect(),
         azimuth_noise_deg: row.azimuth_noise_deg,
         learnt_lanes: row.learnt_lanes.filter(|places| *places > 0),
+        settled: row.settled.map(|s| {
+            json!({
+                "frames": s.frames,
+                "of": s.of,
+                "rates": rates(&s.counts),
+                "cells": s.cells,
+                "cell_fvr": s.cells.fvr(),
+                "cell_fir": s.cells.fir(),
+            })
+        }),
         by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
         by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }
@@ -305,6 +322,11 @@ fn field_of_view(view: &FieldOfView) -> Value {
     })
 }
 
+/// Numbers of the cluster states that are wanted.
+fn cluster_states(wanted: Ars408Wanted) -> Vec<u32> {
+    (0..u32::BITS).filter(|state| wanted.invalid_states >> state & 1 == 1).collect()
+}
+
 /// Reading options as given; `null` where the file itself decided.
 pub fn reading(options: &ReadOptions) -> Value {
     let mount = options.mount.map(|[x, y, z, yaw, pitch, roll]| {
@@ -316,10 +338,17 @@ pub fn reading(options: &ReadOptions) -> Value {
     json!({
         "radar_topic": options.radar_topic,
         "truth_topic": options.truth_topic,
+        "labels": match &options.labels {
+            LabelsFrom::Usual => None,
+            LabelsFrom::Beside => Some("beside".to_owned()),
+            LabelsFrom::Recording => Some("recording".to_owned()),
+            LabelsFrom::File(file) => Some(file.display().to_string()),
+        },
         "mount": mount,
         "field_of_view": options.field_of_view.as_ref().map(field_of_view),
         "sensor_id": options.sensor_id,
         "profile": options.profile.map(|p| p.name),
+        "cluster_states": options.wanted.map(cluster_states),
         "ti_header": options.ti_header.map(|f| f.header()),
         "frame_period_s": options.frame_period_s,
         "from_s": options.from_s,

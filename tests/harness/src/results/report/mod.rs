@@ -11,6 +11,7 @@ pub mod scenes;
 pub mod sensor_set;
 pub mod several_sensors;
 pub mod site;
+pub mod starts;
 pub mod table;
 
 /// To be said wherever results of synthetic recordings are shown.

@@ -12,8 +12,8 @@ use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::Row;
 use crate::evaluation::units::RUN_BLOCKS;
-use crate::recording::Recording;
 use crate::recording::truth::LabelsBeside;
+use crate::recording::{Frame, Recording};
 
 /// What the table is of.
 pub fn heading(replay: &Replay) -> String {
@@ -23,17 +23,19 @@ pub fn heading(replay: &Replay) -> String {
     } else {
         format!(" (sensor {})", recording.sensor.name)
     };
+    // a pool of recordings keeps no samples
+    let all = replay.samples.len();
+    let frames = if all > summary.frames { format!("{} of {all}", summary.frames) } else { summary.frames.to_string() };
     if recording.truth.is_none() {
-        return format!("{}{sensor}: {} frames", recording.name, summary.frames);
+        return format!("{}{sensor}: {frames} frames", recording.name);
     }
     let spread = summary
         .coverage_interval
         .map(|Interval(low, high)| format!(" ({:.1}–{:.1})", 100.0 * low, 100.0 * high))
         .unwrap_or_default();
     format!(
-        "{}{sensor}: {} frames, {} trajectories, coverage {} %{spread}",
+        "{}{sensor}: {frames} frames, {} trajectories, coverage {} %{spread}",
         recording.name,
-        summary.frames,
         summary.objects,
         percent(summary.coverage_rate)
     )
@@ -43,6 +45,14 @@ pub fn heading(replay: &Replay) -> String {
 pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     let (recording, summary) = (&replay.recording, &replay.summary);
     let mut lines = Vec::new();
+    let not_counted = replay.samples.iter().filter(|samples| !samples.counted).count();
+    if not_counted > 0 && !recording.sensor.frames_independent {
+        lines.push(format!(
+            "Not counted: the first {} s, {not_counted} frames, in which maps begin; --warm-up sets that.",
+            options.warm_up_s
+        ));
+    }
+    lines.extend(slow(recording, options));
     if recording.truth.is_some() && options.bootstrap > 0 {
         let cells = if recording.sensor.frames_independent {
             String::new()
@@ -54,24 +64,44 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
             options.bootstrap, summary.drawn_units, summary.drawn, options.seed
         ));
     }
-    if let Some(LabelsBeside { file, sized_by_class, turned_by_path }) =
+    if let Some(LabelsBeside { file, sized_by_class, turned_by_path, left_out }) =
         recording.truth.as_ref().and_then(|t| t.beside.as_ref())
     {
         let objects = recording.truth.as_ref().map_or(0, |t| t.tracks.len());
+        let instead = left_out
+            .map(|own| format!(" They stand in place of the recording's own, of {own} objects."))
+            .unwrap_or_default();
         lines.push(format!(
             "Labels of {file}: only what was labelled counts, usually what moves and was seen at least once; \
-             {sized_by_class} of {objects} objects have the size of their class, {turned_by_path} the heading of their path."
+             {sized_by_class} of {objects} objects have the size of their class, {turned_by_path} the heading of their path.{instead}"
         ));
     }
     let cartesian = summary.rows.iter().filter(|r| !r.curve.is_empty() && r.grid != options.grid);
     lines.extend(cartesian.map(|r| format!("{} was judged on the {} grid: its map has no other.", r.name, r.grid)));
     lines.extend(summary.comparisons.iter().map(comparison));
+    lines.extend(settled(&summary.rows));
     lines.extend(noise_learnt(&summary.rows));
     lines.extend(lanes_learnt(&summary.rows));
     lines.extend(left_out(recording, &summary.rows));
     lines.extend(problems(recording));
     lines.extend(recording.sensor.licence.as_ref().map(|l| format!("Licence of the recording: {l}.")));
     lines
+}
+
+/// Which vehicles rates are not of.
+fn slow(recording: &Recording, options: &Options) -> Option<String> {
+    let truth = recording.truth.as_ref().filter(|truth| !truth.tracks.is_empty() && options.min_speed_mps > 0.0)?;
+    let is_slow =
+        |frame: &Frame| truth.at(frame.time_ns).iter().filter(|o| o.slower_than(options.min_speed_mps)).count();
+    let all = |frame: &Frame| truth.at(frame.time_ns).len();
+    let count = |of: &dyn Fn(&Frame) -> usize| recording.frames.iter().map(of).sum::<usize>();
+    let (slow, all) = (count(&is_slow), count(&all));
+    // a pool of recordings keeps no frames
+    let share = if all > 0 { format!(", {slow} of {all} by frames") } else { String::new() };
+    Some(format!(
+        "Rates of vehicles leave out those slower than {} m/s{share}; they hide others, and cells count. --min-speed sets that.",
+        options.min_speed_mps
+    ))
 }
 
 /// What intervals of cells are drawn of.
@@ -132,6 +162,7 @@ fn in_words(reason: &str) -> Option<&str> {
         _ if reason == Rejection::Rcs.name() => "with too low an RCS",
         _ if reason == Rejection::Velocity.name() => "with a velocity no vehicle has",
         _ if reason == Rejection::Overflow.name() => "too many for --max-detections, of crowded places first",
+        _ if reason == Rejection::Unwanted.name() => "left out by the radar's own marks",
         DROPPED => "not finite or without a range when read",
         NOT_FINITE => "not finite",
         NO_RANGE => "at no measurable range",
@@ -158,7 +189,10 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
     }
     let (all, what) = match recording.of_camera() {
         Some(camera) => (camera.frames.iter().map(|f| f.boxes.len() as u64 + f.refused).sum(), "boxes"),
-        None => (recording.frames.iter().map(|f| f.detections.len() as u64 + f.refused).sum::<u64>(), "detections"),
+        None => {
+            let came = |f: &Frame| f.detections.len() as u64 + f.refused + f.unwanted;
+            (recording.frames.iter().map(came).sum::<u64>(), "detections")
+        }
     };
     let line = |(counters, names): &(Counters, Vec<&str>)| {
         let named = |(reason, n): &(String, u64)| Some((in_words(reason)?.to_owned(), *n));
@@ -176,6 +210,22 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
         }
     };
     said.iter().map(line).collect()
+}
+
+/// How much of the frames had a map that had settled, and the rates over these alone.
+fn settled(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
+    rows.iter().filter_map(|row| {
+        let settled = row.settled?;
+        let pair = |fvr, fir| format!("{} / {}", percent(fvr), percent(fir));
+        let share = 100.0 * settled.frames as f64 / settled.of.max(1) as f64;
+        Some(format!(
+            "{}: {share:.0} % of the frames had settled since the start and since gaps (before that what is behind things that \
+             stand is unknown); over these alone FVR / FIR {} %, cells {} %.",
+            row.name,
+            pair(settled.counts.fvr(), settled.counts.fir()),
+            pair(settled.cells.fvr(), settled.cells.fir())
+        ))
+    })
 }
 
 /// What fixtures taught estimators of the azimuth's noise.
@@ -206,9 +256,10 @@ fn lanes_learnt(rows: &[Row]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::{frames, recording, sample};
+    use crate::evaluation::samples::by_hand::{PERIOD_NS, frames, recording, sample};
     use crate::evaluation::score::by_hand::score;
     use crate::evaluation::summary::Summary;
+    use crate::recording::truth::{Label, Truth};
 
     #[test]
     fn what_was_not_used_is_said_once_with_its_reasons() {
@@ -254,6 +305,33 @@ mod tests {
         scores[2].learnt_lanes = None;
         let pooled = Summary::new(&recording(1, 1), &samples, &scores, &Options::default()).rows;
         assert_eq!(lanes_learnt(&pooled[1..]), None, "what is pooled has no number");
+    }
+
+    #[test]
+    fn what_is_not_counted_is_said() {
+        let mut samples = frames([vec![sample(0, 50.0, true, true)], vec![sample(0, 50.0, true, true)]]);
+        samples[0].counted = false;
+        let scores = [score("a", &samples, |_| Some(255))];
+        let mut recording = recording(2, 1);
+        // one label has no speed
+        let mut solid = *recording.truth.as_ref().unwrap().solids().next().unwrap();
+        let mut label = |k: i64, x: f64| {
+            solid.center[0] = 50.0 + x;
+            let id = if x > 0.0 || k == 0 { "fast" } else { "slow" };
+            Label { time_ns: k * PERIOD_NS, id: id.into(), class: "car".into(), solid }
+        };
+        let both = [label(0, 0.0), label(1, 3.0), Label { id: "slow".into(), ..label(0, 0.0) }, label(1, 0.0)];
+        recording.truth = Some(Truth::new(both.to_vec()));
+        let options = Options { bootstrap: 0, ..Options::default() };
+        let summary = Summary::new(&recording, &samples, &scores, &options);
+        let mut replay = Replay { recording, samples, scores: Vec::new(), summary, camera: None };
+        assert!(heading(&replay).starts_with("by-hand: 1 of 2 frames, 1 trajectories"), "{}", heading(&replay));
+        let lines = below(&replay, &options);
+        assert_eq!(lines[0], "Not counted: the first 1 s, 1 frames, in which maps begin; --warm-up sets that.");
+        assert!(lines[1].contains("leave out those slower than 1 m/s, 2 of 4 by frames; they hide"), "{}", lines[1]);
+        replay.recording.truth = None;
+        assert_eq!(heading(&replay), "by-hand: 1 of 2 frames");
+        assert_eq!(below(&replay, &options)[0], lines[0]);
     }
 
     #[test]

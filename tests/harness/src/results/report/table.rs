@@ -92,7 +92,7 @@ pub fn table(heading: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> T
 
 /// The same as text; in a terminal as several tables below each other where one would be too wide, each with the
 /// first `fixed` columns.
-pub(super) fn tables(heading: &[&str], rows: &[Vec<String>], fixed: usize, extent: Extent) -> String {
+pub fn tables(heading: &[&str], rows: &[Vec<String>], fixed: usize, extent: Extent) -> String {
     let longest = |text: &str| text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
     // with its border and the space to it
     let width = |k: usize| {

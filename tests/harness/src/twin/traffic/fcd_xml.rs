@@ -80,7 +80,8 @@ fn row(element: &BytesStart, time_s: f64, types: &VehicleTypes, frame: &RoadFram
             None => bail!("no attribute `type`"),
         }?;
         let bumper = [number("x")?, number("y")?];
-        Ok(from_bumper(id.clone(), time_s, kind, bumper, number("angle")?, frame))
+        let row = from_bumper(id.clone(), time_s, kind, bumper, number("angle")?, frame);
+        Ok(Row { is_person: person, ..row })
     };
     read().with_context(|| format!("{} `{id}`", if person { "person" } else { "vehicle" }))
 }
@@ -104,7 +105,8 @@ pub fn from_bumper(
     let (s, c) = heading_rad.sin_cos();
     let [x, y] = frame.place(bumper);
     let half = kind.size[0] / 2.0;
-    Row { time_s, id, kind, center: [x - half * c, y - half * s], heading_rad }
+    let center = [x - half * c, y - half * s];
+    Row { time_s, id, kind, is_person: false, written: bumper, center, heading_rad }
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@
 //! # Model
 //! Between two rows of a vehicle its centre follows a cubic through the rows around (finite-difference
 //! tangents, Catmull and Rom 1974), so that speed is continuous; its heading turns the short way. A row is
-//! missing where the next comes later than [`LONGEST_GAP_S`]: the vehicle is another one after it.
+//! missing where the next comes later than [`LONGEST_GAP_S`]: the vehicle is another one after it. So it is where it comes
+//! faster than [`FASTEST_MPS`] to the next: SUMO teleports vehicles that block others.
 //!
 //! # Limits
 //! The road is flat: heights in the file are not read.
@@ -20,7 +21,7 @@ pub mod opened;
 pub mod trajectories;
 pub mod types;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
@@ -31,6 +32,12 @@ use types::{Kind, VehicleTypes};
 
 /// Time between two rows of one vehicle beyond which it is not followed, seconds.
 pub const LONGEST_GAP_S: f64 = 2.5;
+
+/// What comes faster from one row to the next does not drive there, m/s.
+pub const FASTEST_MPS: f64 = 100.0;
+
+/// Coordinates that all lie this close together are degrees, not metres.
+const LEAST_EXTENT: f64 = 1.0;
 
 /// Rows are kept for this long before and after the recording, so that every vehicle has neighbours.
 const MARGIN_S: f64 = LONGEST_GAP_S;
@@ -64,6 +71,10 @@ pub struct Row {
     pub time_s: f64,
     pub id: String,
     pub kind: Kind,
+    /// A person, whose names are others than vehicles' in SUMO.
+    pub is_person: bool,
+    /// x and y as they stand in the file.
+    pub written: [f64; 2],
     /// Middle of the footprint, road frame, metres.
     pub center: [f64; 2],
     /// From +x, counter-clockwise, radians.
@@ -97,6 +108,17 @@ pub struct Pose {
 #[derive(Debug, Clone, Default)]
 pub struct Traffic {
     pub vehicles: Vec<Vehicle>,
+    /// Vehicles that jump: who first, when, by how many metres in how many seconds; and how often in all.
+    pub jumps: Option<(Jump, u64)>,
+}
+
+/// A vehicle that is elsewhere in its next row, farther than it can drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Jump {
+    pub id: String,
+    pub time_s: f64,
+    pub way_m: f64,
+    pub passed_s: f64,
 }
 
 /// Reads the vehicles that come within a region.
@@ -136,10 +158,19 @@ pub fn read(source: &Source, region: &Region) -> Result<Traffic> {
 #[derive(Debug)]
 pub struct Collector {
     region: Region,
-    open: BTreeMap<String, Vehicle>,
-    closed: Vec<Vehicle>,
+    /// By whether they are persons, and their id.
+    open: BTreeMap<(bool, String), Vehicle>,
+    closed: Vec<(bool, Vehicle)>,
     /// How often an id was taken up again after a gap.
-    again: BTreeMap<String, u32>,
+    again: BTreeMap<(bool, String), u32>,
+    jumps: Option<(Jump, u64)>,
+    /// When and where each was last, near or not.
+    last: BTreeMap<(bool, String), (f64, [f64; 2])>,
+    /// Rows that come too late after the one before of their vehicle, and the shortest such time.
+    late: (u64, f64),
+    /// Least and greatest coordinates as the file has them, and the ids of the first two vehicles.
+    extent: [[f64; 2]; 2],
+    ids: Vec<String>,
     rows: u64,
     times_s: [f64; 2],
     nearest_m: f64,
@@ -152,6 +183,11 @@ impl Collector {
             open: BTreeMap::new(),
             closed: Vec::new(),
             again: BTreeMap::new(),
+            jumps: None,
+            last: BTreeMap::new(),
+            late: (0, f64::INFINITY),
+            extent: [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]],
+            ids: Vec::new(),
             rows: 0,
             times_s: [f64::INFINITY, f64::NEG_INFINITY],
             nearest_m: f64::INFINITY,
@@ -169,48 +205,105 @@ impl Collector {
     /// Two rows of one vehicle at one time, or one earlier than the one before.
     pub fn add(&mut self, row: Row) -> Result<()> {
         self.rows += 1;
+        self.extent = [0, 1].map(|end| {
+            [0, 1].map(|k| {
+                if end == 0 { row.written[k].min(self.extent[0][k]) } else { row.written[k].max(self.extent[1][k]) }
+            })
+        });
+        if self.ids.len() < 2 && !self.ids.contains(&row.id) && !row.is_person {
+            self.ids.push(row.id.clone());
+        }
         self.times_s = [self.times_s[0].min(row.time_s), self.times_s[1].max(row.time_s)];
         if !self.wants(row.time_s) {
             return Ok(());
         }
         let away = (row.center[0] - self.region.center[0]).hypot(row.center[1] - self.region.center[1]);
         self.nearest_m = self.nearest_m.min(away);
+        self.note_jump(&row);
         if away > self.region.radius_m {
             return Ok(());
         }
         let sample = Sample { time_s: row.time_s, center: row.center, heading_rad: row.heading_rad };
-        if let Some(known) = self.open.get_mut(&row.id) {
-            let last = known.samples[known.samples.len() - 1].time_s;
-            ensure!(
-                row.time_s > last,
-                "time runs from {last} s to {} s; rows of one vehicle must come in the order of time",
-                row.time_s
-            );
-            if row.time_s - last <= LONGEST_GAP_S {
-                known.samples.push(sample);
-                return Ok(());
-            }
-            let times = self.again.entry(row.id.clone()).or_insert(1);
-            *times += 1;
-            let id = format!("{}#{times}", row.id);
-            let next = Vehicle { id, kind: row.kind, samples: vec![sample] };
-            if let Some(before) = self.open.insert(row.id, next) {
-                self.closed.push(before);
-            }
+        let key = (row.is_person, row.id.clone());
+        let Some(known) = self.open.get_mut(&key) else {
+            self.open.insert(key, Vehicle { id: row.id, kind: row.kind, samples: vec![sample] });
+            return Ok(());
+        };
+        let last = known.samples[known.samples.len() - 1];
+        let passed_s = row.time_s - last.time_s;
+        ensure!(
+            passed_s > 0.0,
+            "time runs from {} s to {} s; rows of one vehicle must come in the order of time",
+            last.time_s,
+            row.time_s
+        );
+        let way_m = (row.center[0] - last.center[0]).hypot(row.center[1] - last.center[1]);
+        if passed_s > LONGEST_GAP_S {
+            self.late = (self.late.0 + 1, self.late.1.min(passed_s));
+        } else if way_m <= FASTEST_MPS * passed_s {
+            known.samples.push(sample);
             return Ok(());
         }
-        self.open.insert(row.id.clone(), Vehicle { id: row.id, kind: row.kind, samples: vec![sample] });
+        let times = self.again.entry(key.clone()).or_insert(1);
+        *times += 1;
+        let id = format!("{}#{times}", row.id);
+        let next = Vehicle { id, kind: row.kind, samples: vec![sample] };
+        if let Some(before) = self.open.insert(key, next) {
+            self.closed.push((row.is_person, before));
+        }
+        Ok(())
+    }
+
+    /// Counts a row that is farther from the one before than its vehicle can drive, if one of them is near.
+    fn note_jump(&mut self, row: &Row) {
+        let now = (row.time_s, row.center);
+        let Some((time_s, center)) = self.last.insert((row.is_person, row.id.clone()), now) else { return };
+        let (passed_s, way_m) = (row.time_s - time_s, (row.center[0] - center[0]).hypot(row.center[1] - center[1]));
+        let is_near =
+            |[x, y]: [f64; 2]| (x - self.region.center[0]).hypot(y - self.region.center[1]) <= self.region.radius_m;
+        let jumps = passed_s > 0.0 && passed_s <= LONGEST_GAP_S && way_m > FASTEST_MPS * passed_s;
+        if jumps && (is_near(center) || is_near(row.center)) {
+            let first = Jump { id: row.id.clone(), time_s: row.time_s, way_m, passed_s };
+            self.jumps.get_or_insert((first, 0)).1 += 1;
+        }
+    }
+
+    /// Refuses coordinates that are degrees: two vehicles do not stand within a metre.
+    fn refuse_degrees(&self, path: &Path) -> Result<()> {
+        let [[left, down], [right, up]] = self.extent;
+        let is_near = right - left < LEAST_EXTENT && up - down < LEAST_EXTENT;
+        let on_earth = left.min(right) >= -180.0 && right <= 180.0 && down >= -90.0 && up <= 90.0;
+        ensure!(
+            self.ids.len() < 2 || !is_near || !on_earth,
+            "{}: all its vehicles lie within a metre of ({left:.4}, {down:.4}): these are degrees, longitude and latitude, as SUMO's --fcd-output.geo writes; write metres, without that option",
+            path.display()
+        );
         Ok(())
     }
 
     fn finish(mut self, path: &Path) -> Result<Traffic> {
         let Region { from_s, to_s, center: [x, y], radius_m } = self.region;
         ensure!(self.rows > 0, "{}: it holds no vehicle at all", path.display());
-        self.closed.extend(self.open.into_values());
-        self.closed.retain(|v| v.samples.len() > 1);
-        self.closed.sort_by(|a, b| a.id.cmp(&b.id));
-        if self.closed.is_empty() {
+        self.refuse_degrees(path)?;
+        self.closed.extend(self.open.into_iter().map(|((person, _), vehicle)| (person, vehicle)));
+        let names: BTreeSet<String> =
+            self.closed.iter().filter(|(person, _)| !person).map(|(_, v)| v.id.clone()).collect();
+        let named = |(person, vehicle): (bool, Vehicle)| {
+            let id =
+                if person && names.contains(&vehicle.id) { format!("{} (person)", vehicle.id) } else { vehicle.id };
+            Vehicle { id, ..vehicle }
+        };
+        let mut closed: Vec<Vehicle> = self.closed.into_iter().map(named).collect();
+        closed.retain(|v| v.samples.len() > 1);
+        closed.sort_by(|a, b| a.id.cmp(&b.id));
+        if closed.is_empty() {
             let [first, last] = self.times_s;
+            let (late, apart_s) = self.late;
+            ensure!(
+                late == 0,
+                "{}: rows of one vehicle are {apart_s:.1} s apart and more, and {LONGEST_GAP_S} s is the most between which it is followed: write them more often, `sumo --fcd-output FILE --device.fcd.period 0.5`",
+                path.display()
+            );
             let near = if self.nearest_m.is_finite() {
                 format!("the nearest stays {:.0} m away", self.nearest_m)
             } else {
@@ -221,7 +314,7 @@ impl Collector {
                 path.display()
             );
         }
-        Ok(Traffic { vehicles: self.closed })
+        Ok(Traffic { vehicles: closed, jumps: self.jumps })
     }
 }
 
@@ -297,7 +390,7 @@ mod tests {
 
     fn row(time_s: f64, x: f64) -> Row {
         let kind = Kind { class: Class::Car, size: [4.0, 2.0, 1.5] };
-        Row { time_s, id: "a".into(), kind, center: [x, 1.0], heading_rad: 0.0 }
+        Row { time_s, id: "a".into(), kind, is_person: false, written: [x, 1.0], center: [x, 1.0], heading_rad: 0.0 }
     }
 
     fn collect(rows: impl IntoIterator<Item = Row>) -> Result<Traffic> {
@@ -354,6 +447,47 @@ mod tests {
         let late = collect([row(100.0, 0.0), row(100.5, 1.0)]).unwrap_err().to_string();
         assert!(late.contains("100 s to 100.5 s"), "{late}");
         assert!(collect([]).unwrap_err().to_string().contains("no vehicle at all"));
+    }
+
+    #[test]
+    fn what_jumps_does_not_drive_and_is_told() {
+        // a lorry at 40 m/s drives, one that is 400 m on in half a second does not
+        let xs = [-60.0, -40.0, -20.0, 60.0, 80.0, 100.0];
+        let traffic = collect(xs.iter().enumerate().map(|(k, x)| row(k as f64 * 0.5, *x))).unwrap();
+        let ids: Vec<&str> = traffic.vehicles.iter().map(|v| v.id.as_str()).collect();
+        assert_eq!((ids, traffic.at(1.25).count()), (vec!["a", "a#2"], 0));
+        let (jump, n) = traffic.jumps.unwrap();
+        assert_eq!((jump.id.as_str(), jump.time_s, jump.way_m, jump.passed_s, n), ("a", 1.5, 80.0, 0.5, 1));
+        assert_eq!(collect((0..6).map(|k| row(f64::from(k) * 0.5, 20.0 * f64::from(k)))).unwrap().jumps, None);
+        // away, and not to be seen again
+        let gone = collect([(0.0, 0.0), (0.5, 10.0), (1.0, 410.0), (1.5, 420.0)].map(|(t, x)| row(t, x))).unwrap();
+        assert_eq!((gone.vehicles.len(), gone.jumps.map(|(jump, n)| (jump.way_m, n))), (1, Some((400.0, 1))));
+    }
+
+    #[test]
+    fn a_person_may_be_called_like_a_vehicle() {
+        let both = (0..4).flat_map(|k| {
+            let one = row(f64::from(k) * 0.5, f64::from(k));
+            [Row { is_person: true, center: [5.0, 5.0], ..one.clone() }, one]
+        });
+        let traffic = collect(both).unwrap();
+        let ids: Vec<&str> = traffic.vehicles.iter().map(|v| v.id.as_str()).collect();
+        assert_eq!(ids, ["a", "a (person)"]);
+    }
+
+    #[test]
+    fn degrees_and_rows_too_far_apart_are_named() {
+        let geo = (0..6).map(|k| {
+            let written = [13.33 + 1e-4 * f64::from(k), 52.5];
+            // headings and lengths put the middles metres apart
+            let center = [written[0] + if k % 2 == 0 { -2.3 } else { 2.3 }, written[1]];
+            Row { id: format!("{}", k % 2), written, center, ..row(f64::from(k / 2) * 0.5, 0.0) }
+        });
+        assert!(collect(geo).unwrap_err().to_string().contains("degrees, longitude and latitude"));
+        // one vehicle that stands is none of that
+        assert!(collect((0..4).map(|k| row(f64::from(k) * 0.5, 0.0))).is_ok());
+        let slow = collect([0.0, 5.0].map(|t| row(t, t))).unwrap_err().to_string();
+        assert!(slow.contains("5.0 s apart and more, and 2.5 s is the most"), "{slow}");
     }
 
     #[test]

@@ -43,6 +43,8 @@ pub fn read(text: &mut Text, path: &Path, frame: &RoadFrame, collected: &mut Col
             time_s: label.time_ns as f64 * 1e-9,
             id: label.id,
             kind: Kind { class, size: label.solid.size },
+            is_person: false,
+            written: [x, y],
             center: frame.place([x, y]),
             heading_rad: frame.heading(label.solid.yaw_rad),
         };

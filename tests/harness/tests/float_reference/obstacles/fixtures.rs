@@ -14,6 +14,8 @@ const AWAY: f64 = 3.0;
 const HIDDEN: f64 = 64.0;
 /// One in so many candidates is compared with the obstacles in a frame.
 const TURNS: usize = 8;
+/// Most that a frame adds to times, seconds.
+const MOST_PASSED: f64 = 1.0;
 const MOST_NEW: usize = 4;
 const FOLLOWS: f64 = 16.0;
 
@@ -22,6 +24,8 @@ pub struct Fixture {
     place: Ground,
     /// Seconds; `None` for a fixture.
     known_for: Option<f64>,
+    /// Seconds since it was compared with the obstacles.
+    compared: f64,
     away: f64,
 }
 
@@ -55,7 +59,9 @@ impl Obstacles {
         rules: &Rules,
         in_view: impl Fn(Ground) -> bool,
     ) {
-        self.turn = (self.turn + 1) % TURNS;
+        let dt = dt.min(MOST_PASSED);
+        let first = if self.turn < self.fixtures.len() { self.turn } else { 0 };
+        self.turn = first + self.fixtures.len().div_ceil(TURNS);
         let free: Vec<&Placed> =
             placed.iter().zip(claimed).filter(|(d, c)| !**c && stands(d)).map(|(d, _)| d).collect();
         let before = self.fixtures.clone();
@@ -68,14 +74,19 @@ impl Obstacles {
                 let counts = fixture.known_for.is_some() || in_view(fixture.place);
                 fixture.away += if counts { dt } else { dt / HIDDEN };
             }
-            let its_turn = (self.turn + k + 1).is_multiple_of(TURNS);
+            fixture.compared += dt;
+            let its_turn = (first..self.turn).contains(&k);
             let Some(known_for) = fixture.known_for.filter(|_| its_turn) else { continue };
+            let since = std::mem::take(&mut fixture.compared);
             if !self.list.iter().any(|o| o.may_have_a_part_at(fixture.place, rules)) {
-                let known_for = known_for + TURNS as f64 * dt;
+                let known_for = known_for + since;
                 fixture.known_for = Some(known_for).filter(|known_for| *known_for < rules.fixture_after);
             }
         }
-        self.fixtures.retain(|fixture| fixture.away < AWAY);
+        let stays = |fixture: &Fixture| fixture.away < AWAY;
+        let gone = self.fixtures.iter().take(self.turn).filter(|fixture| !stays(fixture)).count();
+        self.turn -= gone;
+        self.fixtures.retain(stays);
         let new = free.into_iter().filter(|d| !before.iter().any(|f| f.reaches(d, 2.0, rules)));
         let mut last: Option<&Placed> = None;
         for d in new.take(if rules.fixture_after > 0.0 { MOST_NEW } else { 0 }) {
@@ -84,7 +95,7 @@ impl Obstacles {
                 dx.abs() + dy.abs() < 2.0 * ALONG
             });
             if !is_of_last && self.fixtures.len() < self.capacity {
-                self.fixtures.push(Fixture { place: d.at, known_for: Some(0.0), away: 0.0 });
+                self.fixtures.push(Fixture { place: d.at, known_for: Some(0.0), compared: 0.0, away: 0.0 });
             }
             last = Some(d);
         }

@@ -55,6 +55,24 @@ impl Obstacles {
         claimed
     }
 
+    /// Moves all on over a gap in the frames, in which nobody looked.
+    pub fn bridge(&mut self, gap: f64, rules: &Rules) {
+        self.list.retain(|o| o.existence >= rules.confirm_hits);
+        let mut left = gap;
+        for o in self.list.iter_mut().filter(|o| o.is_standing(rules)) {
+            o.existence -= gap * rules.standing_hidden_loss;
+        }
+        while left > 0.0 {
+            let dt = left.min(1.0);
+            left -= dt;
+            for o in self.list.iter_mut().filter(|o| !o.is_standing(rules)) {
+                o.predict(dt, rules);
+                o.existence -= dt * rules.hidden_loss;
+            }
+        }
+        self.list.retain(|o| o.existence > 0.0);
+    }
+
     /// Gives each detection to the obstacle it fits best; of equals, to the elder in the list.
     fn associate(&mut self, placed: &[Placed], of_fixtures: &[bool], dt: f64, rules: &Rules) -> Vec<bool> {
         let best = |d: &Placed| {

@@ -1,0 +1,77 @@
+//! What was not looked along for long enough since a start or a gap is unknown.
+
+use viewshed::grid::settling::{LEAST_HEIGHT_CM, SettlingConfig};
+
+use crate::grid::{Axes, Grid};
+use crate::raycast::Map;
+use crate::shadow;
+
+/// Evidence from which on something stands.
+const STANDS: f64 = 0.5;
+/// Evidence down to which it still does.
+const FADED: f64 = 8.0 / 255.0;
+/// Steps in which the distance grows.
+const STEPS: f64 = 4.0;
+/// How much more a gap takes off the time for what stands than its length.
+const GAP_COUNTS: f64 = 10.0;
+/// How far from where something stood it is the same thing, range cells.
+const SAME: usize = 2;
+
+#[derive(Debug, Default)]
+pub struct Settling {
+    moving: f64,
+    standing: f64,
+    stood: Vec<Option<usize>>,
+    held: Vec<Option<usize>>,
+}
+
+impl Settling {
+    pub fn gap(&mut self, gap: f64, config: &SettlingConfig, axes: &Axes, grid: &Grid) {
+        if self.standing >= f64::from(config.standing_s) {
+            self.stood = (0..axes.azimuths).map(|a| nearest(grid, axes, a)).collect();
+        }
+        self.held.clear();
+        self.moving = (self.moving - gap).max(0.0);
+        self.standing = (self.standing - GAP_COUNTS * gap).max(0.0);
+    }
+
+    pub fn settle(&mut self, dt: f64, config: &SettlingConfig, axes: &Axes, grid: &Grid, map: &mut Map) {
+        let [near, far, standing] = [config.near_s, config.far_s, config.standing_s].map(f64::from);
+        self.moving = (self.moving + dt).min(far);
+        self.standing = (self.standing + dt).min(standing);
+        let share = if self.moving >= far { 1.0 } else { ((self.moving - near) / (far - near)).max(0.0) };
+        let reach = (axes.ranges as f64 * (share * STEPS).floor() / STEPS) as usize;
+        self.held.resize(axes.azimuths, None);
+        for a in 0..axes.azimuths {
+            let stands = if self.standing < standing { nearest(grid, axes, a) } else { None };
+            let stood = self.stood.get(a).copied().flatten();
+            let now = stands.filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
+            let still = |held: usize| {
+                let mut near = held.saturating_sub(SAME)..=(held + SAME).min(axes.ranges - 1);
+                near.any(|r| grid.stack(a, r).iter().any(|cell| *cell >= FADED))
+            };
+            let held = self.held[a].filter(|held| still(*held) && !now.is_some_and(|now| now + SAME < *held));
+            self.held[a] = if self.standing < standing { held.or(now) } else { None };
+            let end = match self.held[a] {
+                Some(r) => reach.min(hide_behind(r, a, axes, map)),
+                None => reach,
+            };
+            for r in end..axes.ranges {
+                let (grade, occupancy) = map.cell_mut(a, r);
+                (*grade, *occupancy) = (None, 0.0);
+            }
+        }
+    }
+}
+
+fn nearest(grid: &Grid, axes: &Axes, azimuth: usize) -> Option<usize> {
+    (0..axes.ranges).find(|r| grid.stack(azimuth, *r).iter().any(|cell| *cell >= STANDS))
+}
+
+/// Hides what a vehicle in a cell hides at least; the cell in which that ends.
+fn hide_behind(r: usize, azimuth: usize, axes: &Axes, map: &mut Map) -> usize {
+    let (enter, leave) = (r as f64 * axes.cell_m, (r + 1) as f64 * axes.cell_m);
+    let (from, to) = shadow::hidden(axes, f64::from(LEAST_HEIGHT_CM) / 100.0, enter, leave);
+    shadow::shade(map, axes, azimuth, r + 1, (from, to), 1.0);
+    if from < to { ((to / axes.cell_m) as usize).max(r + 1) } else { r + 1 }
+}
