@@ -137,7 +137,7 @@ pub(crate) const fn ratio<const BITS: u32>(a: i32, b: i32) -> i32 {
     let (high, low) = (BITS / 2, BITS - BITS / 2);
     let beyond = (1 + high).saturating_sub(b.leading_zeros());
     // at least 1, which the compiler does not see: an image must not be able to panic
-    let (a, b) = (a >> beyond, (b >> beyond).max(1));
+    let (a, b) = (a >> beyond, if b >> beyond > 0 { b >> beyond } else { 1 });
     let (whole, left) = (a / b, (a % b) << high);
     let (upper, left) = (left / b, (left % b) << low);
     (whole << BITS) + (upper << low) + left / b

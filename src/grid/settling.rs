@@ -6,8 +6,9 @@
 //! outwards, the farther the longer it was looked along, for what is near shows more reflections. And for as long as a
 //! vehicle may stand, it is settled no farther than to the first thing that stands there and was not seen moving. That
 //! may be a vehicle: what one of [`LEAST_HEIGHT_CM`] hides is invisible, and all behind that is unknown, for it may be
-//! taller. It is held there until its evidence has faded, and the distance grows by quarters of the view: a map whose
-//! edges flicker costs more on a bus. Healthy frames count, with detections or without: an empty road settles, too.
+//! taller. It has to be there for a second before that, and gone for a second after it, and the distance grows by
+//! quarters of the view: a map whose edges flicker costs more on a bus. Healthy frames count, with detections or
+//! without: an empty road settles, too.
 //!
 //! A gap between frames takes off what may have happened in it: its length of the time for what moves, and
 //! [`GAP_COUNTS`] times as much of the time for what stands, since a vehicle may have come and stopped. What stood
@@ -17,7 +18,7 @@
 //! A vehicle that stood at the start and still does when the time for it is over hides what the grid alone knows of it.
 //!
 //! # Cost
-//! Two bytes an azimuth. While something that stands is not settled, a search in each column for its nearest evidence.
+//! Three bytes an azimuth. While something that stands is not settled, a search in each column for its nearest evidence.
 
 use crate::fixed::math;
 use crate::fixed::time::{Phase, Step};
@@ -84,8 +85,8 @@ const GAP_COUNTS: u16 = 10;
 const SAME: u8 = 2;
 /// Evidence from which on something stands in a cell: half of full.
 const STANDS: u8 = 128;
-/// Evidence down to which it still does: as long as there is any.
-const FADED: u8 = 8;
+/// How long something has to stand before it is held, and to be gone before it no longer is, 2^-6 s.
+const LASTS: u8 = 64;
 /// Steps in which the distance grows that has settled.
 const STEPS: usize = 4;
 /// Height of what stands and may be a vehicle, centimetres: as high as a van at least, which is between cars and lorries.
@@ -104,6 +105,8 @@ pub struct Settling<const A: usize> {
     stood: [u8; A],
     /// The nearest in which something stands that is not settled.
     held: [u8; A],
+    /// For how long it was seen there, 2^-6 s: up when it is, down when it is not, no longer than twice [`LASTS`].
+    seen: [u8; A],
     phase: Phase,
 }
 
@@ -115,7 +118,8 @@ impl<const A: usize> Default for Settling<A> {
 
 impl<const A: usize> Settling<A> {
     /// Nothing was looked along.
-    pub const NEW: Self = Self { moving: 0, standing: 0, stood: [NONE; A], held: [NONE; A], phase: Phase::START };
+    pub const NEW: Self =
+        Self { moving: 0, standing: 0, stood: [NONE; A], held: [NONE; A], seen: [0; A], phase: Phase::START };
 
     /// A gap between frames. `grid` holds what stood before it.
     pub fn gap<const R: usize, const E: usize, const W: usize>(
@@ -128,9 +132,9 @@ impl<const A: usize> Settling<A> {
             for (stood, column) in self.stood.iter_mut().zip(grid.columns()) {
                 *stood = nearest(column);
             }
+            (self.held, self.seen) = ([NONE; A], [0; A]);
         }
-        self.held = [NONE; A];
-        let gap = self.ticks(gap);
+        let (gap, _) = self.ticks(gap);
         self.moving = self.moving.saturating_sub(gap);
         self.standing = self.standing.saturating_sub(gap.saturating_mul(GAP_COUNTS));
     }
@@ -144,7 +148,7 @@ impl<const A: usize> Settling<A> {
         grid: &SphericalGrid<R, A, E, W>,
         map: &mut PolarMap<R, A>,
     ) -> bool {
-        let passed = self.ticks(step);
+        let (passed, seen_for) = self.ticks(step);
         self.moving = self.moving.saturating_add(passed).min(t.far);
         self.standing = self.standing.saturating_add(passed).min(t.standing);
         let reach = self.reach(R, t);
@@ -153,9 +157,14 @@ impl<const A: usize> Settling<A> {
             return true;
         }
         let mut settled = reach >= R;
-        for (((a, column), stood), held) in grid.columns().enumerate().zip(&self.stood).zip(&mut self.held) {
-            *held = if stands { hold(column, *held, *stood) } else { NONE };
-            let end = if *held == NONE {
+        let watched = self.held.iter_mut().zip(&mut self.seen).zip(&self.stood);
+        for ((a, column), ((held, seen), stood)) in grid.columns().enumerate().zip(watched) {
+            if stands {
+                watch(column, *stood, seen_for, held, seen);
+            } else {
+                (*held, *seen) = (NONE, 0);
+            }
+            let end = if *seen < LASTS {
                 reach
             } else {
                 settled = false;
@@ -166,9 +175,10 @@ impl<const A: usize> Settling<A> {
         settled
     }
 
-    /// A step in 2^-8 s, saturating; what is left over counts with the next.
-    fn ticks(&mut self, step: Step) -> u16 {
-        let ticks = u16::try_from(self.phase.times(step, 256)).unwrap_or(u16::MAX);
+    /// A step in 2^-8 s and in 2^-6 s, saturating; what is left over counts with the next.
+    fn ticks(&mut self, step: Step) -> (u16, u8) {
+        let of = |rate| self.phase.times(step, rate);
+        let ticks = (u16::try_from(of(256)).unwrap_or(u16::MAX), u8::try_from(of(64)).unwrap_or(u8::MAX));
         self.phase = self.phase.after(step);
         ticks
     }
@@ -194,12 +204,33 @@ fn nearest<const R: usize, const E: usize, const W: usize>(column: &Column<R, E,
     standing.next().and_then(|(r, _)| u8::try_from(r).ok()).unwrap_or(NONE)
 }
 
-/// The nearest range cell in which something stands that did not before a gap, given the one of the last frame.
-fn hold<const R: usize, const E: usize, const W: usize>(column: &Column<R, E, W>, held: u8, stood: u8) -> u8 {
+/// Follows, over a step, the nearest thing in a column that stands and did not before a gap: the cell it is `held` in,
+/// and for how long it was `seen` there. From [`LASTS`] on it counts; what stands nearer or is left takes its place.
+fn watch<const R: usize, const E: usize, const W: usize>(
+    column: &Column<R, E, W>,
+    stood: u8,
+    step: u8,
+    held: &mut u8,
+    seen: &mut u8,
+) {
     let now = Some(nearest(column)).filter(|now| *now != NONE && !is_known(*now, stood)).unwrap_or(NONE);
-    let near_held = |r: usize| u8::try_from(r).is_ok_and(|r| r.abs_diff(held) <= SAME);
-    let still = |(r, stack): (usize, &[u8; E])| near_held(r) && stack.iter().any(|cell| *cell >= FADED);
-    if held == NONE || now.saturating_add(SAME) < held || !column.stacks().any(still) { now } else { held }
+    let nearer = now.saturating_add(SAME) < *held;
+    let counted = *seen >= LASTS;
+    if !counted && nearer {
+        *held = now;
+    }
+    let near_held = |r: usize| u8::try_from(r).is_ok_and(|r| r.abs_diff(*held) <= SAME);
+    let still = |(r, stack): (usize, &[u8; E])| near_held(r) && stack.iter().any(|cell| *cell >= STANDS);
+    if *held != NONE && !(counted && nearer) && column.stacks().any(still) {
+        *seen = seen.saturating_add(step).min(2 * LASTS);
+        return;
+    }
+    *seen = seen.saturating_sub(step);
+    if counted && *seen < LASTS {
+        (*held, *seen) = (now, if now == NONE { 0 } else { LASTS });
+    } else if *seen == 0 {
+        *held = now;
+    }
 }
 
 /// Hides what a vehicle in a range cell hides at least, and says in which cell that ends.
@@ -309,18 +340,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_now_and_then_stands_in_one_place_until_its_evidence_has_faded() {
+    fn what_is_seen_now_and_then_stands_in_one_place_until_it_was_gone_for_a_second() {
         let mut world = World::new();
         world.put(1, 25);
         world.look(25);
-        for (cell, evidence) in [(26, 200), (25, 60), (24, 200), (25, 9)] {
+        for (cell, evidence) in [(26, 200), (25, 60), (24, 200), (25, 90)] {
             world.grid.column_mut(1).unwrap().empty(20..30);
             world.grid.column_mut(1).unwrap().evidence(cell).unwrap()[0] = evidence;
             assert!(!world.look(1));
             assert_eq!(world.column(1), "....#?????", "{cell} {evidence}");
         }
-        world.grid.column_mut(1).unwrap().evidence(25).unwrap()[0] = 7;
-        assert!(world.look(1) && world.column(1) == "..........");
+        world.grid.column_mut(1).unwrap().evidence(25).unwrap()[0] = 127;
+        assert!(!world.look(9) && world.column(1) == "....#?????", "0.9 s");
+        assert!(world.look(2) && world.column(1) == "..........", "1.1 s");
     }
 
     #[test]
@@ -330,7 +362,34 @@ mod tests {
         world.look(25);
         // an obstacle's box takes the evidence in its place out of the grid
         world.grid.column_mut(1).unwrap().empty(20..30);
-        assert!(world.look(1) && world.column(1) == "..........");
+        assert!(world.look(11) && world.column(1) == "..........");
+    }
+
+    #[test]
+    fn what_passes_within_a_second_stands_nowhere() {
+        let mut world = World::new();
+        assert!(world.look(25));
+        for cell in (20..50).step_by(3) {
+            world.grid.column_mut(1).unwrap().empty(0..60);
+            world.put(1, cell);
+            assert!(world.look(1) && world.column(1) == "..........", "{cell}");
+        }
+        assert!(world.look(5) && !world.look(6), "half a second, and 1.1 s, in the last");
+    }
+
+    #[test]
+    fn of_two_things_the_nearer_holds_and_then_the_one_that_is_left() {
+        let mut world = World::new();
+        world.put(1, 35);
+        world.look(25);
+        assert_eq!(world.column(1), "......#???");
+        world.put(1, 15);
+        assert!(!world.look(8) && world.column(1) == "......#???", "0.8 s");
+        assert!(!world.look(3) && world.column(1) == "..????????", "1.1 s");
+        world.look(10);
+        world.grid.column_mut(1).unwrap().empty(10..20);
+        assert!(!world.look(9) && world.column(1) == "..????????", "0.9 s");
+        assert!(!world.look(2) && world.column(1) == "......#???", "1.1 s; at no time all is let through");
     }
 
     #[test]
@@ -345,7 +404,7 @@ mod tests {
         assert!(!world.look(1) && world.column(1) == "??????????");
         assert!(world.look(20));
         world.put(1, 25);
-        assert!(!world.look(1), "it came in the gap, and stands");
+        assert!(!world.look(11), "it came in the gap, and stands");
         assert_eq!(world.column(1), "....#?????");
     }
 
@@ -357,7 +416,7 @@ mod tests {
         world.settling.gap(Step::from_micros(20_000_000), &times(), &world.grid);
         assert!(world.look(21) && world.column(1) == "..........");
         world.put(1, 15);
-        assert!(!world.look(1));
+        assert!(!world.look(11));
         assert_eq!(world.column(1), "..????????");
     }
 

@@ -79,6 +79,11 @@ pub fn silence(seconds: f64) -> Finding {
     }
 }
 
+/// Whether the log's clock steps back, or the log begins again.
+fn runs_backwards(report: &Report) -> bool {
+    report.problems.iter().any(|p| p.what == "time runs backwards")
+}
+
 fn bus(found: &mut Findings, report: &Report, heard: &Bus) {
     if report.duration_s < LEAST_S {
         found.add(
@@ -108,7 +113,7 @@ fn bus(found: &mut Findings, report: &Report, heard: &Bus) {
             "record with `candump -L`, and cut whole lines",
         );
     }
-    if report.problems.iter().any(|p| p.what == "time runs backwards") {
+    if runs_backwards(report) {
         found.add(
             Severity::Warning,
             "time runs backwards in the log",
@@ -272,7 +277,8 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
             found.add(severity, format!("{name}: {n} {what}"), full.clone());
         }
     }
-    if c.restarts > 0 {
+    // of a log that begins again so does the radar's counter
+    if c.restarts > 0 && !runs_backwards(report) {
         found.add(Severity::Warning, format!("{name} started over {} times", c.restarts), "check its supply");
     }
     if c.repeated + c.surplus > 0 {

@@ -119,8 +119,12 @@ impl<W: Write + Seek> RecordingWriter<W> {
         self.frame_of(0, frame)
     }
 
-    /// A frame of any radar, by its place among them.
+    /// A frame of any radar, by its place among them. One of which every point was refused or left out is not written:
+    /// read back, a cloud without points would be a radar that looks and sees nothing.
     pub fn frame_of(&mut self, radar: usize, frame: &Frame) -> Result<()> {
+        if frame.detections.is_empty() && frame.refused + frame.unwanted > 0 {
+            return Ok(());
+        }
         let [topic, frame_id] = self.radars.get(radar).context("a frame of no radar")?.clone();
         self.message(&topic, POINT_CLOUD, frame.time_ns, &cloud(frame, &frame_id))
     }

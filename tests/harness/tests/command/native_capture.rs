@@ -19,8 +19,8 @@ fn scan(i: u64) -> Vec<Detection> {
         azimuth: Angle::from_degrees(5.0 + f32::from(n)),
         elevation: Some(Angle::from_degrees(-2.0)),
         radial_velocity_cm_s: -750,
-        rcs_half_dbsm: Some(10),
-        snr_half_db: Some(40),
+        rcs_half_dbsm: Some(10 + n as i16),
+        snr_half_db: Some(40 + n as i16),
     };
     (0..12).map(one).collect()
 }
@@ -80,7 +80,9 @@ fn a_serial_capture_is_replayed() {
     for (d, s) in frame.detections.iter().zip(&sent) {
         assert_eq!((d.range_m, d.radial_velocity_mps), (f32::from(s.range_cm) / 100.0, -7.5));
         assert_eq!((d.azimuth_rad, d.elevation_rad), (s.azimuth.radians(), s.elevation.map(Angle::radians)));
-        assert_eq!((d.rcs_dbsm, d.snr_db), (Some(5.0), Some(20.0)));
+        let halves = |v: Option<f32>| v.map(|v| 2.0 * v);
+        assert_eq!(halves(d.rcs_dbsm), s.rcs_half_dbsm.map(f32::from));
+        assert_eq!(halves(d.snr_db), s.snr_half_db.map(f32::from));
     }
     assert_eq!(recording.problems.count("never came"), 1, "the damaged one");
     let output = replay(&folder, &["a.bin", "--mount", "0,0,5,0,2,0", "--json", "r.json", "--out", "out"]);

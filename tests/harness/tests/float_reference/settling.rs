@@ -8,8 +8,8 @@ use crate::shadow;
 
 /// Evidence from which on something stands.
 const STANDS: f64 = 0.5;
-/// Evidence down to which it still does.
-const FADED: f64 = 8.0 / 255.0;
+/// How long something has to stand before it is held, and to be gone before it no longer is, seconds.
+const LASTS: f64 = 1.0;
 /// Steps in which the distance grows.
 const STEPS: f64 = 4.0;
 /// How much more a gap takes off the time for what stands than its length.
@@ -22,15 +22,15 @@ pub struct Settling {
     moving: f64,
     standing: f64,
     stood: Vec<Option<usize>>,
-    held: Vec<Option<usize>>,
+    held: Vec<(Option<usize>, f64)>,
 }
 
 impl Settling {
     pub fn gap(&mut self, gap: f64, config: &SettlingConfig, axes: &Axes, grid: &Grid) {
         if self.standing >= f64::from(config.standing_s) {
             self.stood = (0..axes.azimuths).map(|a| nearest(grid, axes, a)).collect();
+            self.held.clear();
         }
-        self.held.clear();
         self.moving = (self.moving - gap).max(0.0);
         self.standing = (self.standing - GAP_COUNTS * gap).max(0.0);
     }
@@ -41,26 +41,51 @@ impl Settling {
         self.standing = (self.standing + dt).min(standing);
         let share = if self.moving >= far { 1.0 } else { ((self.moving - near) / (far - near)).max(0.0) };
         let reach = (axes.ranges as f64 * (share * STEPS).floor() / STEPS) as usize;
-        self.held.resize(axes.azimuths, None);
+        if reach >= axes.ranges && self.standing >= standing {
+            return;
+        }
+        self.held.resize(axes.azimuths, (None, 0.0));
         for a in 0..axes.azimuths {
-            let stands = if self.standing < standing { nearest(grid, axes, a) } else { None };
-            let stood = self.stood.get(a).copied().flatten();
-            let now = stands.filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
-            let still = |held: usize| {
-                let mut near = held.saturating_sub(SAME)..=(held + SAME).min(axes.ranges - 1);
-                near.any(|r| grid.stack(a, r).iter().any(|cell| *cell >= FADED))
-            };
-            let held = self.held[a].filter(|held| still(*held) && !now.is_some_and(|now| now + SAME < *held));
-            self.held[a] = if self.standing < standing { held.or(now) } else { None };
+            if self.standing < standing {
+                let stood = self.stood.get(a).copied().flatten();
+                let now = nearest(grid, axes, a).filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
+                self.held[a] = watch(self.held[a], now, dt, |held| {
+                    let mut near = held.saturating_sub(SAME)..=(held + SAME).min(axes.ranges - 1);
+                    near.any(|r| grid.stack(a, r).iter().any(|cell| *cell >= STANDS))
+                });
+            } else {
+                self.held[a] = (None, 0.0);
+            }
             let end = match self.held[a] {
-                Some(r) => reach.min(hide_behind(r, a, axes, map)),
-                None => reach,
+                (Some(r), seen) if seen >= LASTS => reach.min(hide_behind(r, a, axes, map)),
+                _ => reach,
             };
             for r in end..axes.ranges {
                 let (grade, occupancy) = map.cell_mut(a, r);
                 (*grade, *occupancy) = (None, 0.0);
             }
         }
+    }
+}
+
+/// What is held and for how long it was seen, a step later, `now` standing nearest.
+fn watch(
+    (held, seen): (Option<usize>, f64),
+    now: Option<usize>,
+    dt: f64,
+    still: impl Fn(usize) -> bool,
+) -> (Option<usize>, f64) {
+    let counted = seen >= LASTS;
+    let nearer = now.is_some_and(|now| held.is_none_or(|held| now + SAME < held));
+    let held = if !counted && nearer { now } else { held };
+    if held.is_some_and(&still) && !(counted && nearer) {
+        return (held, (seen + dt).min(2.0 * LASTS));
+    }
+    let left = (seen - dt).max(0.0);
+    if counted && left < LASTS {
+        (now, if now.is_some() { LASTS } else { 0.0 })
+    } else {
+        (if left > 0.0 { held } else { now }, left)
     }
 }
 

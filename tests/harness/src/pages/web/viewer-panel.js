@@ -6,6 +6,7 @@ const STATES = ['unknown', 'invisible', 'visible'];
 const CONDITIONS = {
   ok: 'its map is shown',
   waiting: 'silent or late: all of its map is unknown',
+  'no map': 'heard, no map of it has come yet: all of it is unknown',
   'no header': 'heard, its header has not come yet: all of it is unknown',
   unusable: 'another version, or a map too large: all of it is unknown',
   conflict: 'two senders use this number: all of it is unknown',
@@ -70,9 +71,12 @@ export function showSenders(instant) {
   element('senders').replaceChildren(...instant.senders.map((sender) => {
     const box = document.createElement('div');
     box.className = 'sender';
-    box.dataset.condition = sender.condition;
+    // what has not begun is not late
+    const begun = instant.maps.some(({ name }) => name === `sensor ${sender.sensor}`);
+    const condition = sender.condition === 'waiting' && !begun ? 'no map' : sender.condition;
+    box.dataset.condition = condition;
     const title = document.createElement('p');
-    title.textContent = `Sensor ${sender.sensor}: ${CONDITIONS[sender.condition] ?? sender.condition}`;
+    title.textContent = `Sensor ${sender.sensor}: ${CONDITIONS[condition] ?? condition}`;
     const rows = document.createElement('dl');
     const { counters: c, status, header } = sender;
     const counted = (names) => Object.entries(names).filter(([name]) => c[name] > 0).map(([name, what]) => `${c[name]} ${what}`);

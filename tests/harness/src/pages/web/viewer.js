@@ -169,9 +169,9 @@ class Page {
     if (done && (this.isLive || says.startsWith('failed'))) this.complain(says);
     showEvents(events);
     if (this.number < 0 && count > 0) this.goTo(this.isLive ? count - 1 : 0, true);
-    // the first instants of an estimator say little, and those of a broadcast before its first map nothing
+    // until an estimator has settled nothing is called visible, and a broadcast says nothing before its first map
     const saysSomething = this.about.labelled
-      ? (sample) => sample.tv + sample.fv + sample.ti + sample.fi > 0
+      ? (sample) => sample.tv + sample.fv > 0
       : (sample) => sample.unknown < 1;
     const begins = samples.findIndex((sample) => sample && saysSomething(sample));
     if (!this.isLive && !this.touched && begins > 0 && this.number < begins) this.goTo(begins, true);
