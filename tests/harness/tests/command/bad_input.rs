@@ -43,8 +43,10 @@ fn a_file_cut_anywhere_is_read_up_to_the_break_or_refused() {
         std::fs::write(folder.join("cut.mcap"), &whole[..whole.len() * tenth / 10]).unwrap();
         let (code, text, report) = outcome(&folder, &["cut.mcap"]);
         if code == 0 {
-            assert!(problem(&report, "break") > 0, "cut at {tenth}/10 says so");
-            assert!(report["input"]["frames"].as_u64().unwrap() <= FRAMES as u64);
+            // behind the data stands an index, which nothing is missed of
+            let all = report["input"]["frames"].as_u64().unwrap() == FRAMES as u64;
+            assert!(all || problem(&report, "break") > 0, "cut at {tenth}/10 says so");
+            assert!(all || tenth < 9);
         } else {
             assert_eq!(code, 2);
             assert!(text.starts_with("error: "), "{text}");
@@ -143,7 +145,9 @@ fn time_running_backwards_or_leaping_is_survived() {
     scene.save(&folder, "a");
     let (code, text, report) = outcome(&folder, &["a.mcap"]);
     assert_eq!(code, 0, "{text}");
-    assert_eq!((problem(&report, "the clock steps back"), problem(&report, "no frames for 50 min")), (1, 1));
+    // a second copy of the same times, as by two recorders, and then a leap
+    assert_eq!((problem(&report, "not in the order of time"), problem(&report, "no frames for 50 min")), (1, 1));
+    assert_eq!(problem(&report, "joined by their times"), 10);
 }
 
 #[test]

@@ -40,7 +40,8 @@ fn prepared(test: &str) -> std::path::PathBuf {
     ] {
         std::fs::write(folder.join(name), text).unwrap();
     }
-    std::fs::write(folder.join("a.labels.csv"), "time_s,object_id,class,x_m,y_m\n").unwrap();
+    let rows = "0.0,7,car,48,7\n2.8,7,car,81.6,7\n";
+    std::fs::write(folder.join("a.labels.csv"), format!("time_s,object_id,class,x_m,y_m\n{rows}")).unwrap();
     folder
 }
 

@@ -11,18 +11,18 @@ fn a_start_and_a_gap_call_no_more_of_what_is_hidden_visible_than_a_unit_that_has
     let json = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("starts.json");
     let output = Command::new(env!("CARGO_BIN_EXE_viewshed"))
         .args([
-            "starts", MOTORWAY, "--times", "3", "--run-in", "10", "--watch", "5", "--gaps", "2", "--force", "--json",
+            "starts", MOTORWAY, "--times", "5", "--run-in", "10", "--watch", "15", "--gaps", "2", "--force", "--json",
         ])
         .arg(&json)
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("3 starts") && text.contains("3 gaps of 2 s") && text.contains("FVR known"), "{text}");
+    assert!(text.contains("5 starts") && text.contains("5 gaps of 2 s") && text.contains("FVR known"), "{text}");
     let result: Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
     for outcome in result["outcomes"].as_array().unwrap() {
         let seconds = outcome["seconds"].as_array().unwrap();
-        assert_eq!(seconds.len(), 5);
+        assert_eq!(seconds.len(), 15);
         let sum = |unit: &str, of: &str, from: usize| -> f64 {
             seconds[from..].iter().map(|second| second[unit][of].as_u64().unwrap() as f64).sum()
         };

@@ -10,6 +10,7 @@ mod tests {
     use std::path::Path;
 
     use rayon::prelude::*;
+    use viewshed::grid::settling::SettlingConfig;
     use viewshed::map::{CellState, Visibility};
     use viewshed_harness::estimators::Estimator;
     use viewshed_harness::estimators::{self, Options};
@@ -30,8 +31,13 @@ mod tests {
     }
 
     /// The estimator of the library, and the same in double precision.
-    fn estimators(recording: &Recording, far_road_deg: Option<i8>) -> [Box<dyn Estimator>; 2] {
+    fn estimators(
+        recording: &Recording,
+        far_road_deg: Option<i8>,
+        settling: SettlingConfig,
+    ) -> [Box<dyn Estimator>; 2] {
         let mut options = Options::default();
+        options.radar_3d.settling = settling;
         options.radar_3d.visibility.far_road_deg = far_road_deg;
         let mut all = estimators::all(recording, &options).unwrap();
         let integer = all.remove(all.iter().position(|e| e.name() == "radar-3d").unwrap());
@@ -103,7 +109,8 @@ mod tests {
 
     fn maps_agree(far_road_deg: Option<i8>, bits_median: f64) {
         let recording = recording();
-        let [mut integer, mut exact] = estimators(&recording, far_road_deg);
+        // which azimuths have settled is decided in whole columns
+        let [mut integer, mut exact] = estimators(&recording, far_road_deg, SettlingConfig::AT_ONCE);
         let [maps_integer, maps_exact] = [&mut integer, &mut exact].map(|e| maps(e.as_mut(), &recording));
         assert_eq!(integer.counters(), exact.counters(), "the same detections are refused for the same reasons");
         let frames: Vec<[f64; 4]> = maps_integer.iter().zip(&maps_exact).map(|(a, b)| compare(a, b)).collect();
@@ -122,6 +129,21 @@ mod tests {
     }
 
     #[test]
+    fn the_same_azimuths_settle() {
+        let recording = recording();
+        let both = estimators(&recording, None, SettlingConfig::default());
+        let [maps_integer, maps_exact] = both.map(|mut e| maps(e.as_mut(), &recording));
+        let values: Vec<f64> = maps_integer.iter().zip(&maps_exact).map(|(a, b)| compare(a, b)[0]).collect();
+        let column = maps_integer[0].len() as f64 / 128.0;
+        within("columns known to one only, median frame", quantile(&values, 0.5) / column, 3.0);
+        // when a distance grows, it does in one of the two a frame before the other
+        within("columns known to one only, worst frame", quantile(&values, 1.0) / column, 32.0);
+        let known = |map: &[CellState]| map.iter().filter(|c| c.visibility != Visibility::Unknown).count();
+        let [begin, end] = [30, maps_exact.len() - 1].map(|k| known(&maps_exact[k]));
+        assert!(begin > 0 && begin < 3 * end / 4, "much is not settled at first: {begin}, then {end}");
+    }
+
+    #[test]
     fn rates_agree_over_copies_of_the_recording() {
         let recording = recording();
         let samples = samples::collect(&recording, &evaluation::Options::default(), &|| ());
@@ -129,7 +151,7 @@ mod tests {
             .into_par_iter()
             .map(|seed| {
                 let copy = moved(&recording, seed);
-                estimators(&recording, None)
+                estimators(&recording, None, SettlingConfig::default())
                     .map(|mut e| rates(&score(e.as_mut(), &copy, &samples, Grid::Cartesian, &|| ()), &samples))
             })
             .collect();

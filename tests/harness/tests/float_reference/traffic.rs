@@ -4,6 +4,7 @@
 mod tests {
     use viewshed::fixed::time::Time;
     use viewshed::frame::detection::{Detection, Measurement};
+    use viewshed::grid::settling::SettlingConfig;
     use viewshed::map::polar::PolarMap;
     use viewshed::map::{CellState, Visibility};
     use viewshed::radar_3d::{Radar3dConfig, Radar3dParameters};
@@ -107,7 +108,7 @@ mod tests {
 
     fn drive(mount: &Mount, scene: &Scene, random: &mut Random, tally: &mut Tally) {
         let sensor = Sensor { mount: *mount, field_of_view: VIEW, noise: NoiseConfig::default() };
-        let config = Radar3dConfig::default();
+        let config = Radar3dConfig { settling: SettlingConfig::AT_ONCE, ..Radar3dConfig::default() };
         let p = Box::new(Radar3dParameters::<RANGES, AZIMUTHS, ELEVATIONS>::new(&sensor, &config).unwrap());
         let mut map: Box<PolarMap<RANGES, AZIMUTHS>> = Box::new(p.map());
         let mut state = Box::new(State::new());

@@ -33,13 +33,9 @@ fn keys_of_other_layouts_mean_what_they_write_or_where_they_lie() {
     let server = Server::start(&recording("layouts"));
     let page = browser.open(&server.url);
     let without = "{ctrlKey: false, metaKey: false, altKey: false, shiftKey: false}";
-    let module = "import { named } from './keys.js'; globalThis.named = named;";
-    page.ask(&format!(
-        "document.head.append(Object.assign(document.createElement('script'), {{type: 'module', textContent: \"{module}\"}}))"
-    ));
-    page.until("globalThis.named");
     for (what, event, meant) in EVENTS {
-        let named = page.ask(&format!("named({{...{without}, ...{event}}})"));
+        let event = format!("{{...{without}, ...{event}}}");
+        let named = page.ask(&format!("import('./assets/keys.js').then((keys) => keys.named({event}))"));
         assert_eq!(named, *meant, "{what}: {event}");
     }
 }
