@@ -94,6 +94,22 @@ pub const LEAST_HEIGHT_CM: i32 = 200;
 /// No range cell.
 const NONE: u8 = u8::MAX;
 
+/// A range cell or [`NONE`], kept as what it lacks to that: a unit's state is all zeros at first, and takes no room in an image.
+#[derive(Debug, Clone, Copy)]
+struct Kept(u8);
+
+impl Kept {
+    const NONE: Self = Self::new(NONE);
+
+    const fn new(cell: u8) -> Self {
+        Self(!cell)
+    }
+
+    const fn cell(self) -> u8 {
+        !self.0
+    }
+}
+
 /// How long `A` azimuths were looked along.
 #[derive(Debug, Clone)]
 pub struct Settling<const A: usize> {
@@ -102,9 +118,9 @@ pub struct Settling<const A: usize> {
     /// For what stands.
     standing: u16,
     /// The nearest range cell in which something stood before the last gap, where that was settled then.
-    stood: [u8; A],
+    stood: [Kept; A],
     /// The nearest in which something stands that is not settled.
-    held: [u8; A],
+    held: [Kept; A],
     /// For how long it was seen there, 2^-6 s: up when it is, down when it is not, no longer than twice [`LASTS`].
     seen: [u8; A],
     phase: Phase,
@@ -118,8 +134,14 @@ impl<const A: usize> Default for Settling<A> {
 
 impl<const A: usize> Settling<A> {
     /// Nothing was looked along.
-    pub const NEW: Self =
-        Self { moving: 0, standing: 0, stood: [NONE; A], held: [NONE; A], seen: [0; A], phase: Phase::START };
+    pub const NEW: Self = Self {
+        moving: 0,
+        standing: 0,
+        stood: [Kept::NONE; A],
+        held: [Kept::NONE; A],
+        seen: [0; A],
+        phase: Phase::START,
+    };
 
     /// A gap between frames. `grid` holds what stood before it.
     pub fn gap<const R: usize, const E: usize, const W: usize>(
@@ -130,9 +152,9 @@ impl<const A: usize> Settling<A> {
     ) {
         if self.standing >= t.standing {
             for (stood, column) in self.stood.iter_mut().zip(grid.columns()) {
-                *stood = nearest(column);
+                *stood = Kept::new(nearest(column));
             }
-            (self.held, self.seen) = ([NONE; A], [0; A]);
+            (self.held, self.seen) = ([Kept::NONE; A], [0; A]);
         }
         let (gap, _) = self.ticks(gap);
         self.moving = self.moving.saturating_sub(gap);
@@ -160,15 +182,15 @@ impl<const A: usize> Settling<A> {
         let watched = self.held.iter_mut().zip(&mut self.seen).zip(&self.stood);
         for ((a, column), ((held, seen), stood)) in grid.columns().enumerate().zip(watched) {
             if stands {
-                watch(column, *stood, seen_for, held, seen);
+                watch(column, stood.cell(), seen_for, held, seen);
             } else {
-                (*held, *seen) = (NONE, 0);
+                (*held, *seen) = (Kept::NONE, 0);
             }
             let end = if *seen < LASTS {
                 reach
             } else {
                 settled = false;
-                reach.min(hide_behind(usize::from(*held), a, axes, map))
+                reach.min(hide_behind(usize::from(held.cell()), a, axes, map))
             };
             map.forget_from(a, end);
         }
@@ -210,26 +232,26 @@ fn watch<const R: usize, const E: usize, const W: usize>(
     column: &Column<R, E, W>,
     stood: u8,
     step: u8,
-    held: &mut u8,
+    kept: &mut Kept,
     seen: &mut u8,
 ) {
     let now = Some(nearest(column)).filter(|now| *now != NONE && !is_known(*now, stood)).unwrap_or(NONE);
-    let nearer = now.saturating_add(SAME) < *held;
+    let held = kept.cell();
+    let nearer = now.saturating_add(SAME) < held;
     let counted = *seen >= LASTS;
-    if !counted && nearer {
-        *held = now;
-    }
-    let near_held = |r: usize| u8::try_from(r).is_ok_and(|r| r.abs_diff(*held) <= SAME);
+    let held = if !counted && nearer { now } else { held };
+    *kept = Kept::new(held);
+    let near_held = |r: usize| u8::try_from(r).is_ok_and(|r| r.abs_diff(held) <= SAME);
     let still = |(r, stack): (usize, &[u8; E])| near_held(r) && stack.iter().any(|cell| *cell >= STANDS);
-    if *held != NONE && !(counted && nearer) && column.stacks().any(still) {
+    if held != NONE && !(counted && nearer) && column.stacks().any(still) {
         *seen = seen.saturating_add(step).min(2 * LASTS);
         return;
     }
     *seen = seen.saturating_sub(step);
     if counted && *seen < LASTS {
-        (*held, *seen) = (now, if now == NONE { 0 } else { LASTS });
+        (*kept, *seen) = (Kept::new(now), if now == NONE { 0 } else { LASTS });
     } else if *seen == 0 {
-        *held = now;
+        *kept = Kept::new(now);
     }
 }
 
