@@ -94,15 +94,17 @@ fn instruction_counts_repeat_exactly() {
 #[test]
 #[ignore = "needs QEMU"]
 fn a_controller_that_computes_something_else_is_found_out_cell_by_cell() {
-    let (settings, scans) = shipped(1.0);
-    let (here, geometry) = host::answer(Profile::Small, &settings, &scans, Some(3)).unwrap();
+    // of the first second nothing is known
+    const FRAME: usize = 40;
+    let (settings, scans) = shipped(3.0);
+    let (here, geometry) = host::answer(Profile::Small, &settings, &scans, Some(FRAME)).unwrap();
     let image = firmware::build(Board::Mps2An386, Profile::Small, "batch").unwrap();
     let mut other = settings;
     other.sensor.mount.pitch_deg += 0.5;
-    let answer = machine::batch(Board::Mps2An386, &image, &other, &scans, Some(3)).unwrap();
+    let answer = machine::batch(Board::Mps2An386, &image, &other, &scans, Some(FRAME)).unwrap();
     let checked = check::compare(&answer, &here, scans.len()).unwrap();
     assert!(checked.first_difference.is_some() && checked.equal < scans.len());
-    let difference = check::difference(&answer, &here, 3, &geometry).unwrap();
+    let difference = check::difference(&answer, &here, FRAME, &geometry).unwrap();
     assert!(difference.text().contains("cells differ"), "{}", difference.text());
     let folder = std::env::temp_dir().join("viewshed-boards-difference");
     let folder = OutputArgs::default().beside([]).folder("--out", &folder).unwrap();

@@ -66,7 +66,8 @@ fn every_map_of_two_hundred_scans_arrives_cell_by_cell() {
     let visible = told.last().unwrap().visible_cells;
     assert!((5_000..24_000).contains(&visible), "{visible} cells are visible in the end");
     let status = listener.receiver().sensor(SENSOR).and_then(|s| s.status().copied());
-    assert_eq!(status.map(|s| s.state), Some(UnitState::Ok));
+    // within 13 s what stands has not settled
+    assert_eq!(status.map(|s| (s.state, s.reason)), Some((UnitState::Degraded, Reason::Settling)));
 }
 
 #[test]
