@@ -30,7 +30,7 @@ const H743: Board = Board {
     dma: 0x2407_F000..0x2408_0000,
     coupled: Some([0x20..0x1_0000, 0x2000_0000..0x2002_0000]),
     most_flash: 190_000,
-    most_ram: 496_500,
+    most_ram: 497_000,
     least_stack: 64_000,
 };
 

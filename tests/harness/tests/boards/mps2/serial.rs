@@ -219,11 +219,10 @@ fn posts(seconds: f64, left: bool) -> Scan {
 fn a_supervised_radar_that_goes_blind_to_the_left_is_unknown_there_and_its_status_says_so() {
     let (mut settings, _) = shipped(1.0);
     settings.unit.supervise = true;
-    // hardly more than a scan in a second, so that two minutes of learning take 130 of them, and none a gap; then as usual,
-    // for the receiver
+    // a scan in a second, so that two minutes of learning take 121 of them, and none is a gap; then as usual, for the receiver
     (settings.health.hold_s, settings.health.reset_gap_s) = (2.0, 5.0);
-    let slow = (0..150).map(|k| posts(0.95 * f64::from(k), k < 138));
-    let scans: Vec<Scan> = slow.chain((0..20).map(|k| posts(142.5 + 0.1 * f64::from(k), false))).collect();
+    let slow = (0..140).map(|k| posts(f64::from(k), k < 126));
+    let scans: Vec<Scan> = slow.chain((0..20).map(|k| posts(139.1 + 0.1 * f64::from(k), false))).collect();
     let board = same(Profile::Reference, &script(&settings, &scans));
     let now = on_the_line(scans.last().unwrap().time, scans[0].time);
     let far = listen(board.expected.as_ref().unwrap());
