@@ -228,13 +228,15 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             (Condition::SectorBlind, _) => (UnitState::Degraded, Reason::SectorBlind),
             (Condition::Misaligned, _) => (UnitState::Degraded, Reason::Misaligned),
             (Condition::Weaker, None) => (UnitState::Degraded, Reason::Weaker),
-            (Condition::Settling, None) => (UnitState::Degraded, Reason::Settling),
             (Condition::Healthy | Condition::Settling | Condition::Weaker, Some(reason)) => {
                 (UnitState::Degraded, reason)
             }
-            (Condition::Healthy, None) => {
-                self.lacking.map_or((UnitState::Ok, Reason::None), |reason| (UnitState::Degraded, reason))
-            }
+            // what is lacking lasts longer than settling
+            (Condition::Healthy | Condition::Settling, None) => match self.lacking {
+                Some(reason) => (UnitState::Degraded, reason),
+                None if condition == Condition::Settling => (UnitState::Degraded, Reason::Settling),
+                None => (UnitState::Ok, Reason::None),
+            },
         };
     }
 

@@ -167,7 +167,7 @@ fn linux_a_block_that_does_not_go_with_the_files_heights_leaves_the_daemon_up_fo
     configure(&settings);
     daemon.wait_for_times("started", 3);
     stream(&mut radar, &mut Script::default(), &scans, Duration::from_secs(100));
-    daemon.wait_for("radar Ok");
+    daemon.wait_for("radar Degraded: Settling");
     daemon.terminate();
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
 }
