@@ -182,7 +182,8 @@ impl<const A: usize> Settling<A> {
         let watched = self.held.iter_mut().zip(&mut self.seen).zip(&self.stood);
         for ((a, column), ((held, seen), stood)) in grid.columns().enumerate().zip(watched) {
             if stands {
-                watch(column, stood.cell(), seen_for, held, seen);
+                let nearest = nearest(column);
+                (*held, *seen) = watch((*held, *seen), nearest, stood.cell(), seen_for);
             } else {
                 (*held, *seen) = (Kept::NONE, 0);
             }
@@ -226,32 +227,24 @@ fn nearest<const R: usize, const E: usize, const W: usize>(column: &Column<R, E,
     standing.next().and_then(|(r, _)| u8::try_from(r).ok()).unwrap_or(NONE)
 }
 
-/// Follows, over a step, the nearest thing in a column that stands and did not before a gap: the cell it is `held` in,
-/// and for how long it was `seen` there. From [`LASTS`] on it counts; what stands nearer or is left takes its place.
-fn watch<const R: usize, const E: usize, const W: usize>(
-    column: &Column<R, E, W>,
-    stood: u8,
-    step: u8,
-    kept: &mut Kept,
-    seen: &mut u8,
-) {
-    let now = Some(nearest(column)).filter(|now| *now != NONE && !is_known(*now, stood)).unwrap_or(NONE);
-    let held = kept.cell();
+/// What is held and for how long it was seen, a step later, of a column in which something stands `nearest`: it is what
+/// did not stand there before a gap. From [`LASTS`] on it counts; what stands nearer or is left takes its place.
+fn watch((held, seen): (Kept, u8), nearest: u8, stood: u8, step: u8) -> (Kept, u8) {
+    let held = held.cell();
+    let now = if is_known(nearest, stood) { NONE } else { nearest };
+    let counted = seen >= LASTS;
     let nearer = now.saturating_add(SAME) < held;
-    let counted = *seen >= LASTS;
     let held = if !counted && nearer { now } else { held };
-    *kept = Kept::new(held);
-    let near_held = |r: usize| u8::try_from(r).is_ok_and(|r| r.abs_diff(held) <= SAME);
-    let still = |(r, stack): (usize, &[u8; E])| near_held(r) && stack.iter().any(|cell| *cell >= STANDS);
-    if held != NONE && !(counted && nearer) && column.stacks().any(still) {
-        *seen = seen.saturating_add(step).min(2 * LASTS);
-        return;
+    // what is nearer than this was handled above, and of what is farther nothing stands here
+    let still = nearest != NONE && held != NONE && nearest.abs_diff(held) <= SAME;
+    if still {
+        return (Kept::new(held), seen.saturating_add(step).min(2 * LASTS));
     }
-    *seen = seen.saturating_sub(step);
-    if counted && *seen < LASTS {
-        (*kept, *seen) = (Kept::new(now), if now == NONE { 0 } else { LASTS });
-    } else if *seen == 0 {
-        *kept = Kept::new(now);
+    let left = seen.saturating_sub(step);
+    if counted && left < LASTS {
+        (Kept::new(now), if now == NONE { 0 } else { LASTS })
+    } else {
+        (Kept::new(if left == 0 { now } else { held }), left)
     }
 }
 

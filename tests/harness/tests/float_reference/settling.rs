@@ -48,11 +48,7 @@ impl Settling {
         for a in 0..axes.azimuths {
             if self.standing < standing {
                 let stood = self.stood.get(a).copied().flatten();
-                let now = nearest(grid, axes, a).filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
-                self.held[a] = watch(self.held[a], now, dt, |held| {
-                    let mut near = held.saturating_sub(SAME)..=(held + SAME).min(axes.ranges - 1);
-                    near.any(|r| grid.stack(a, r).iter().any(|cell| *cell >= STANDS))
-                });
+                self.held[a] = watch(self.held[a], nearest(grid, axes, a), stood, dt);
             } else {
                 self.held[a] = (None, 0.0);
             }
@@ -68,17 +64,18 @@ impl Settling {
     }
 }
 
-/// What is held and for how long it was seen, a step later, `now` standing nearest.
+/// What is held and for how long it was seen, a step later, of a column in which something stands `nearest`.
 fn watch(
     (held, seen): (Option<usize>, f64),
-    now: Option<usize>,
+    nearest: Option<usize>,
+    stood: Option<usize>,
     dt: f64,
-    still: impl Fn(usize) -> bool,
 ) -> (Option<usize>, f64) {
+    let now = nearest.filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
     let counted = seen >= LASTS;
     let nearer = now.is_some_and(|now| held.is_none_or(|held| now + SAME < held));
     let held = if !counted && nearer { now } else { held };
-    if held.is_some_and(&still) && !(counted && nearer) {
+    if held.zip(nearest).is_some_and(|(held, nearest)| nearest.abs_diff(held) <= SAME) {
         return (held, (seen + dt).min(2.0 * LASTS));
     }
     let left = (seen - dt).max(0.0);
