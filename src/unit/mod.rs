@@ -232,11 +232,11 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
                 (UnitState::Degraded, reason)
             }
             // what is lacking lasts longer than settling
-            (Condition::Healthy | Condition::Settling, None) => match self.lacking {
-                Some(reason) => (UnitState::Degraded, reason),
-                None if condition == Condition::Settling => (UnitState::Degraded, Reason::Settling),
-                None => (UnitState::Ok, Reason::None),
-            },
+            (Condition::Healthy | Condition::Settling, None) => {
+                let settling = (condition == Condition::Settling).then_some(Reason::Settling);
+                let lasting = self.lacking.or(settling);
+                lasting.map_or((UnitState::Ok, Reason::None), |reason| (UnitState::Degraded, reason))
+            }
         };
     }
 

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
+use viewshed::Settings;
 use viewshed::probability::{ProbabilityTable, Quantiser, Threshold};
-use viewshed::{Reason, Settings, Status, UnitState};
 
 use crate::config::Grid;
 
@@ -66,12 +66,5 @@ impl Table {
             Some(threshold) => format!("table of probabilities {sum:08x}, visible is {threshold}"),
             None => format!("table of probabilities {sum:08x}, visible is by grades"),
         }
-    }
-}
-
-/// Says in a status that would otherwise be well that the table is not used.
-pub fn say_refused(status: &mut Status) {
-    if status.state == UnitState::Ok {
-        (status.state, status.reason) = (UnitState::Degraded, Reason::NoProbabilities);
     }
 }

@@ -14,7 +14,6 @@ use super::size::supervised::{CHECK, Map, Parameters, State};
 use super::size::{QuantisedSender as Sender, State as Radar3d};
 use crate::config::{ClockSource, Config};
 use crate::output::{Output, version};
-use crate::probability::say_refused;
 use crate::state::{FileSlots, KeptEpoch};
 use crate::systemd::Systemd;
 
@@ -94,6 +93,9 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             parameters.as_ref().zip(sender.as_mut()).map(|(p, s)| Unit::new(p, &mut *state, &mut *map, &mut **s));
         if let Some(unit) = &mut unit {
             unit.broadcast().status_mut().firmware = version();
+            if no_table.is_some() {
+                unit.lacks(Reason::NoProbabilities);
+            }
         }
         output.start(config, epoch, input.now(clock.now()), stored);
         info!("started, epoch {}", epoch.number());
@@ -118,9 +120,6 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             if let Some(unit) = &mut unit {
                 if unit.offered() != offered && config.input.clock == ClockSource::System {
                     unit.took(now, began.elapsed().as_micros() as u64);
-                }
-                if watch.no_table.is_some() {
-                    say_refused(unit.broadcast().status_mut());
                 }
                 output.send(now, unit, input.line());
             }

@@ -18,7 +18,8 @@ use super::daemon::Daemon;
 use super::logs::{Sent, config, logged, read, twin};
 use crate::{kept, shipped};
 
-const MEDIUM: Medium = Medium::Can(Addresses::STANDARD);
+/// While a map settles, classic CAN is too narrow for it, and a status says that first.
+const MEDIUM: Medium = Medium::CanFd(Addresses::STANDARD);
 
 /// A made-up table that rises with the grade and falls with range; of the samples with p = 230 and more 4 % are missed,
 /// of all others half.
@@ -36,7 +37,7 @@ fn sent(settings: &Settings, log: &std::path::Path, table: &str, risk: &str) -> 
     std::fs::write(folder.0.join("epoch"), "4").unwrap();
     std::fs::write(folder.0.join("t.probability.toml"), table).unwrap();
     let tables = format!("[probability]\nfile = \"FOLDER/t.probability.toml\"\n{risk}\n");
-    let mut daemon = Daemon::start_in(folder, &(config(settings, log, 0, "can") + &tables), &[]);
+    let mut daemon = Daemon::start_in(folder, &(config(settings, log, 0, "can-fd") + &tables), &[]);
     assert_eq!(daemon.wait().code(), Some(0), "{}", daemon.log());
     let sent = read(&daemon.folder.0.join("maps.log"));
     (daemon, sent)
@@ -45,7 +46,7 @@ fn sent(settings: &Settings, log: &std::path::Path, table: &str, risk: &str) -> 
 #[test]
 #[ignore = "needs the daemon"]
 fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
-    let (settings, scans) = shipped(4.0);
+    let (settings, scans) = shipped(8.0);
     let (_folder, log) = logged(&scans);
     let fitted = fitted(settings.fingerprint());
     let quantiser = |threshold| Quantiser::new(fitted.table.clone(), threshold, 128);
@@ -57,7 +58,7 @@ fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
         assert_eq!((first, sent.len()), (None, expected.len()), "{risk}: first frame that differs, and how many came");
 
         // while its radar is heard
-        let now = Time::from_micros(sent[0].0 + 3_000_000);
+        let now = Time::from_micros(sent[0].0 + 7_000_000);
         let mut receiver = ears();
         for (at, frame) in sent.iter().filter(|(at, _)| *at <= now.micros()) {
             let _ = receiver.frame(Time::from_micros(*at), frame);
@@ -66,7 +67,7 @@ fn linux_a_table_becomes_the_bits_the_library_makes_of_it() {
         assert_eq!(map.header().unwrap().probability, Some(quantiser(threshold).levels()));
         let cells = (0..State::AZIMUTHS).flat_map(|a| (0..State::RANGES).map(move |r| (a, r)));
         let given = cells.filter(|(a, r)| map.probability(*a, *r).is_some_and(|p| p.raw() > 200)).count();
-        assert!(given > 200, "{risk}: {given} cells above 0.78");
+        assert!(given > 1000, "{risk}: {given} cells above 0.78");
     }
 }
 
@@ -108,11 +109,11 @@ fn linux_a_table_that_cannot_be_used_is_refused_by_its_reason_and_maps_are_by_gr
         for (at, frame) in &sent {
             let _ = receiver.frame(Time::from_micros(*at), frame);
             let status = receiver.sensor(0).unwrap().status();
-            // while the map settles, classic CAN is too narrow for it at times, which is said before
-            let tells = [Reason::NoProbabilities, Reason::BusOverload];
-            told += usize::from(status.is_some_and(|s| s.state == UnitState::Degraded && tells.contains(&s.reason)));
+            told += usize::from(
+                status.is_some_and(|s| (s.state, s.reason) == (UnitState::Degraded, Reason::NoProbabilities)),
+            );
             assert!(status.is_none_or(|s| s.state != UnitState::Ok), "{why}");
         }
-        assert!(told > 100, "{why}: {told}, {:?}", receiver.sensor(0).and_then(|s| s.status().copied()));
+        assert!(told > 100, "{why}: {told}");
     }
 }
