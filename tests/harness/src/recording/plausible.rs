@@ -401,7 +401,7 @@ mod tests {
         late.frames.iter_mut().flat_map(|f| &mut f.detections).for_each(|d| d.range_m += 30.0);
         late.sensor.frames_independent = true;
         let told = said(late);
-        assert!(told.contains("have a detection at their place: the mount is wrong, or place or clock"), "{told}");
+        assert!(told.contains("labelled vehicles in view within 100 m 18 have a detection at their place"), "{told}");
     }
 
     #[test]
