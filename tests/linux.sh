@@ -42,7 +42,7 @@ if [ -n "${VIEWSHED:-}" ] && ip link add dev vsprobe type vcan 2>/dev/null; then
     BROADCAST=$target/boards/linux/broadcast.log
     export BROADCAST
     mkdir -p "${BROADCAST%/*}"
-    "$VIEWSHED" bus tests/recordings/motorway.mcap --to 6 --log "$BROADCAST" --force >/dev/null || exit 1
+    broadcast "$VIEWSHED" "$BROADCAST" || exit 1
 fi
 echo "== the daemon's own tests"
 run daemon test -- --nocapture

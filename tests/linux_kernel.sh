@@ -49,7 +49,7 @@ cp "$(command -v busybox)" "$disk/bin/busybox"
 cp "$target/release/viewshedd" "$disk/bin/viewshedd"
 cp "$tests" "$disk/bin/vcan"
 cp "$viewshed" "$disk/bin/viewshed"
-"$viewshed" bus tests/recordings/motorway.mcap --to 6 --log "$disk/broadcast.log" >/dev/null
+broadcast "$viewshed" "$disk/broadcast.log"
 cp "$(PATH=$PATH:/usr/sbin:/sbin command -v ip)" "$disk/bin/ip"
 for program in "$disk"/bin/*; do ldd "$program" 2>/dev/null | grep -o '/[^ ]*' || true; done | sort -u |
     while read -r library; do

@@ -205,9 +205,10 @@ impl Bench {
         false
     }
 
-    /// Whether maps come and show something.
+    /// Whether maps come and show something, with nothing wrong: still settling, or settled on a machine so slow.
     fn is_ok(&self) -> bool {
-        self.state().is_some_and(|(state, _)| state == UnitState::Ok) && self.visible() > 5000
+        let well = [(UnitState::Ok, Reason::None), (UnitState::Degraded, Reason::Settling)];
+        self.state().is_some_and(|state| well.contains(&state)) && self.visible() > 5000
     }
 
     /// Listens until something is so; `false` if it is not within a minute: a loaded machine that emulates another is slow.
@@ -471,7 +472,9 @@ fn a_bus_off_of_the_radars_bus_is_in_the_status() {
     daemon.wait_for("warning: vsradar: bus-off", 1);
     let degraded = Some((UnitState::Degraded, Reason::BusOff));
     assert!(bench.play_until(|bench| bench.state() == degraded), "{:?}", bench.state());
-    let bus_off = bench.receiver.sensor(0).and_then(|sensor| sensor.status()).map(|status| status.bus_off);
-    assert_eq!(bus_off, Some(1));
+    // on classic CAN the counter is on a page of its own, which comes within the next few messages
+    let bus_off =
+        |bench: &Bench| bench.receiver.sensor(0).and_then(|sensor| sensor.status()).map(|status| status.bus_off);
+    assert!(bench.play_until(|bench| bus_off(bench) == Some(1)), "{:?}", bus_off(&bench));
     assert_eq!(daemon.terminate().code(), Some(0));
 }
