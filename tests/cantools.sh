@@ -1,6 +1,6 @@
 #!/bin/sh
 # An ARS408's log decoded by viewshed and by cantools: tests/cantools.sh [LOG [SENSOR_ID]]. Without a log, the
-# shipped one, both of its sensors. With --install only cantools is made ready; then a skip is exit code 1.
+# shipped one, both of its sensors. With --install only cantools is made ready.
 set -eu
 cd "$(dirname "$0")/.."
 . tests/tools.sh
@@ -10,13 +10,9 @@ python=$venv/bin/python
 if ! "$python" -c 'import cantools' 2>/dev/null; then
     { python3 -m venv "$venv" || { install python3-venv && python3 -m venv "$venv"; }; } >/dev/null 2>&1 &&
         "$venv/bin/pip" install -q 'cantools>=41' >/dev/null 2>&1 ||
-        {
-            echo "skipped: cantools: an ARS408's log, as neither it nor python3-venv can be installed here"
-            [ "${1:-}" != --install ]
-            exit
-        }
+        skip cantools "an ARS408's log, as neither it nor python3-venv can be installed here"
 fi
-[ "${1:-}" != --install ] || exit 0
+[ "$only" != --install ] || exit 0
 # VIEWSHED: one that is built already
 viewshed=${VIEWSHED:-${CARGO_TARGET_DIR:-target}/release/viewshed}
 [ -n "${VIEWSHED:-}" ] || cargo build --release --locked --package viewshed-harness

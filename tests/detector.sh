@@ -1,7 +1,7 @@
 #!/bin/sh
 # A small network and a picture for the tests of viewshed-detector, fetched into target/detector and never shipped: the
 # CenterNet of npm's @vladmandic/human as ONNX, and a street's picture of PyPI's ultralytics.
-# With --install only these are made ready (exit code 1 if they cannot be), for tests run with VIEWSHED_DETECTOR=target/detector.
+# With --install only these are made ready, for tests run with VIEWSHED_DETECTOR=target/detector.
 set -eu
 cd "$(dirname "$0")/.."
 . tests/tools.sh
@@ -21,9 +21,7 @@ fetch() {
     rm -rf "$folder"/*.tgz "$folder"/*.whl "$folder/package" "$folder/wheel" "$folder/venv"
 }
 if [ ! -f "$folder/centernet.onnx" ] && ! fetch >/dev/null 2>&1; then
-    echo "skipped: network: the detector on a real one cannot be fetched here (npm @vladmandic/human, PyPI onnx and ultralytics)"
-    [ "${1:-}" != --install ]
-    exit
+    skip network "the detector on a real one cannot be fetched here (npm @vladmandic/human, PyPI onnx and ultralytics)"
 fi
-[ "${1:-}" != --install ] || exit 0
+[ "$only" != --install ] || exit 0
 VIEWSHED_DETECTOR=$folder exec cargo test --release --locked --package viewshed-detector

@@ -3,32 +3,27 @@
 #
 # Every target of tests/fuzz (or those named), 30 s each, two at a time. cargo-fuzz is installed where it can be, into the
 # target folder; else one line says what was skipped. An input that breaks something is printed and kept.
-# With --install what it needs is only made ready, and a skip is exit code 1; with --build the targets are only built.
+# With --install what it needs is only made ready; with --build the targets are only built.
 set -u
 cd "$(dirname "$0")/.." || exit 1
 . tests/tools.sh
 need_compilers
-only=
-case ${1:-} in --install | --build) only=$1; shift ;; esac
+[ -z "$only" ] || shift
 target=${CARGO_TARGET_DIR:-$PWD/target}
 # cargo looks for its commands there
 PATH=$target/fuzz-tools/bin:$PATH
 
-skip() {
-    echo "skipped: fuzzing: $1; the kept inputs are replayed by cargo test"
-    [ "$only" != --install ]
-    exit
-}
+lacking() { skip fuzzing "$1; the kept inputs are replayed by cargo test"; }
 
 command -v cargo-fuzz >/dev/null || {
     say "installing cargo-fuzz"
     said=$(CARGO_TARGET_DIR=$target/fuzz-tools/build cargo install --quiet --locked cargo-fuzz@0.13.1 --root "$target/fuzz-tools" 2>&1) ||
-        skip "cargo-fuzz cannot be installed: $(printf '%s\n' "$said" | grep -m 1 '^error' || echo 'cargo install cargo-fuzz')"
+        lacking "cargo-fuzz cannot be installed: $(printf '%s\n' "$said" | grep -m 1 '^error' || echo 'cargo install cargo-fuzz')"
     rm -rf "$target/fuzz-tools/build"
 }
-command -v c++ >/dev/null || install g++ || skip "no C++ compiler for libFuzzer (apt-get install g++)"
+command -v c++ >/dev/null || install g++ || lacking "no C++ compiler for libFuzzer (apt-get install g++)"
 said=$(cargo fetch --quiet --manifest-path tests/fuzz/Cargo.toml 2>&1) ||
-    skip "libfuzzer-sys cannot be fetched: $(printf '%s\n' "$said" | grep -m 1 '^error' || echo 'cargo fetch')"
+    lacking "libfuzzer-sys cannot be fetched: $(printf '%s\n' "$said" | grep -m 1 '^error' || echo 'cargo fetch')"
 [ "$only" != --install ] || exit 0
 
 # the stable compiler, which lets libFuzzer's instrumentation pass when it is told that it is a nightly one; without the

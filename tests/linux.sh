@@ -10,10 +10,7 @@ set -u
 
 cd "$(dirname "$0")/.." || exit 1
 . tests/tools.sh
-if [ "$(uname)" != Linux ]; then
-    echo "skipped: linux: this is $(uname)"
-    exit 0
-fi
+[ "$(uname)" = Linux ] || skip linux "this is $(uname)"
 need_compilers
 status=0
 log=$(mktemp)
@@ -30,7 +27,7 @@ daemon() {
     shift
     cargo "$command" --release --locked --manifest-path boards/linux/Cargo.toml --target-dir "$target/boards/linux" "$@"
 }
-if [ "${1:-}" = --build ]; then
+if [ "$only" = --build ]; then
     daemon test --no-run && daemon build
     exit
 fi

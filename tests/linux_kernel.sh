@@ -2,22 +2,17 @@
 # Runs the daemon, and `viewshed listen`, `view` and `doctor`, on virtual CAN buses under Debian's kernel in QEMU: for
 # machines whose own kernel has no CAN. Downloads 80 MB, once, into the target folder; takes about a minute then.
 #
-#   tests/linux_kernel.sh              with --install what it needs is only made ready; then a skip is exit code 1
+#   tests/linux_kernel.sh              with --install what it needs is only made ready
 set -eu
 
 cd "$(dirname "$0")/.."
 . tests/tools.sh
-only=${1:-}
-skip() {
-    echo "skipped: kernel: virtual CAN buses under QEMU: $1"
-    [ "$only" != --install ]
-    exit
-}
+lacking() { skip kernel "virtual CAN buses under QEMU: $1"; }
 
-[ "$(uname -m)" = x86_64 ] || skip "written for x86-64"
+[ "$(uname -m)" = x86_64 ] || lacking "written for x86-64"
 need_compilers
 for program in qemu-system-x86_64:qemu-system-x86 busybox:busybox-static ip:iproute2; do
-    PATH=$PATH:/usr/sbin:/sbin command -v "${program%:*}" >/dev/null || install "${program#*:}" || skip "no ${program%:*}"
+    PATH=$PATH:/usr/sbin:/sbin command -v "${program%:*}" >/dev/null || install "${program#*:}" || lacking "no ${program%:*}"
 done
 harness=${CARGO_TARGET_DIR:-$PWD/target}
 target=$harness/boards/linux
@@ -30,7 +25,7 @@ if [ ! -e "$kernel/done" ]; then
         [ -n "$package" ] && (cd "$kernel" && apt-get download "$package" >/dev/null 2>&1 && dpkg -x ./*.deb files)
     }
     # the second time with lists of packages that are not absent or old
-    download || { may_install && apt_get update && download; } || skip "cannot download linux-image-amd64"
+    download || { may_install && apt_get update && download; } || lacking "cannot download linux-image-amd64"
     touch "$kernel/done"
 fi
 [ "$only" != --install ] || exit 0

@@ -15,7 +15,7 @@ ln -s "$(realpath "$viewshed")" "$folder/bin/viewshed"
 # made ready by mcap_ros2.sh and cantools.sh
 for writer in mcap_ros2:bag cantools:bus; do
     "$target/${writer%:*}/bin/python" tests/your_data.py "${writer#*:}" "$folder" 2>/dev/null ||
-        { echo "skipped: ${writer%:*}: the page of own recordings (tests/${writer%:*}.sh installs it)"; exit 0; }
+        skip "${writer%:*}" "the page of own recordings (tests/${writer%:*}.sh installs it)"
 done
 # every block of commands, as it stands on the page
 sed -n '/^```sh$/,/^```$/{/^```/!p}' tests/harness/src/recording/YOUR_DATA.md >"$folder/commands.sh"

@@ -106,6 +106,27 @@ fn every_skip_of_a_test_is_seen() {
     assert!(others.is_empty(), "use tests/common/skipped.rs: {others:?}");
 }
 
+/// Scripts have one function for it, which knows what they were asked for.
+#[test]
+fn a_skip_is_a_failure_only_where_things_are_to_be_made_ready() {
+    let ended = |arguments: &[&str]| {
+        let script = ["-c", ". tests/tools.sh; skip vcan 'no bus'; echo and went on", "sh"];
+        let output = Command::new("sh").args(script).args(arguments).current_dir(project()).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap())
+    };
+    let said = "skipped: vcan: no bus\n";
+    for (arguments, code) in [(&[][..], 0), (&["--build"], 0), (&["5"], 0), (&["--install"], 1)] {
+        assert_eq!(ended(arguments), (Some(code), said.to_owned()), "{arguments:?}");
+    }
+    let scripts = read_dir(project().join("tests")).unwrap().map(|entry| entry.unwrap().path());
+    let say = |path: &PathBuf| read_to_string(path).unwrap().contains("echo \"skipped: ");
+    let mut found: Vec<_> =
+        scripts.filter(|path| path.extension().is_some_and(|extension| extension == "sh")).filter(say).collect();
+    found.sort();
+    // that of the boards goes on with the next one
+    assert!(found.len() == 2 && found[0].ends_with("firmware.sh") && found[1].ends_with("tools.sh"), "{found:?}");
+}
+
 /// The boards' tests are ignored unless a script asks for them by a part of their names.
 #[test]
 fn every_board_test_is_asked_for_by_a_script() {
