@@ -311,7 +311,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     /// Takes a radar frame and brings the map up to its time. `status` is the sensor's own fault flag, and where there can be any
-    /// with it the numbers of points that are no detections, and of those left out by the sensor's own marks.
+    /// with it the number of points that are no detections.
     pub fn process<'a>(
         &mut self,
         p: &Radar3dParameters<R, A, E>,
@@ -336,7 +336,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let status = status.into();
         let noise = self.repeatability.noise(&p.noise);
         let place = |d: &Detection| noise.place_on(d, &p.levelling, p.axes.ground());
-        let points = self.scan.gather(detections.into_iter(), status, &p.gate, place);
+        let points = self.scan.gather(now, detections.into_iter(), status, &p.gate, place);
         let points = self.scan.within_reach(points, |r| p.reaches(r));
         let continuity = self.health.frame(now, &points, status.fault, &p.health);
         if continuity == Continuity::Unjudged {
@@ -377,9 +377,9 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         }
         ended();
         self.put_obstacles(p, map);
-        // in a gap nobody looked
-        let looked = if gap > Step::NONE { Step::NONE } else { step };
-        let condition = self.settle(p, condition, looked, map);
+        // in a gap nobody looked, and what cannot be judged is no look
+        let looked = if gap > Step::NONE || self.health.in_doubt() { Step::NONE } else { step };
+        let condition = self.settle(p, condition, (step, looked), map);
         ended();
         self.report(continuity, condition)
     }
@@ -413,9 +413,13 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         &mut self,
         p: &Radar3dParameters<R, A, E>,
         condition: Condition,
-        looked: Step,
+        (step, looked): (Step, Step),
         map: &mut PolarMap<R, A>,
     ) -> Condition {
+        if condition == Condition::Unusable {
+            // nobody knows what came meanwhile
+            self.settling.gap(step, &p.settling, &self.grid);
+        }
         if condition != Condition::Healthy {
             return condition;
         }

@@ -183,6 +183,7 @@ impl JobEntry for Detection {
             radial_velocity_cm_s: next()?,
             rcs_half_dbsm: measured(next()?),
             snr_half_db: measured(next()?),
+            marked: false,
         })
     }
 }

@@ -287,8 +287,8 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
         let status = status.into();
         let used = boxes.get(..MOST_BOXES).unwrap_or(boxes);
         let inside = used.iter().filter(|b| lift::check(b, &p.projection).is_ok()).count() as u32;
-        let (refused, unwanted) = (status.refused.into(), status.unwanted.into());
-        let points = Points { inside, outside: used.len() as u32 - inside, refused, unwanted };
+        let refused = status.refused.into();
+        let points = Points { inside, outside: used.len() as u32 - inside, refused, ..Points::default() };
         let continuity = self.begin(p, now, &points, status.fault);
         let (mut filled, mut off_grid) = (0_u16, 0);
         let mut rejections = p.lift(boxes, |lifted| match self.fill(p, &lifted) {
@@ -317,8 +317,8 @@ impl<const NX: usize, const NY: usize> Camera3d<NX, NY> {
     ) -> Condition {
         let status = status.into();
         let inside = vehicles.len().min(u32::MAX as usize) as u32;
-        let (refused, unwanted) = (status.refused.into(), status.unwanted.into());
-        self.begin(p, now, &Points { inside, outside: 0, refused, unwanted }, status.fault);
+        let points = Points { inside, refused: status.refused.into(), ..Points::default() };
+        self.begin(p, now, &points, status.fault);
         for vehicle in vehicles {
             self.fill(p, vehicle);
         }

@@ -23,6 +23,9 @@ pub struct Detection {
     pub rcs_half_dbsm: Option<i16>,
     /// Signal-to-noise ratio, half dB.
     pub snr_half_db: Option<i16>,
+    /// Left out by the radar's own marks, see [`Ars408Wanted`](crate::inputs::ars408::quality::Ars408Wanted): no estimator
+    /// uses it, and that something was measured there is still known.
+    pub marked: bool,
 }
 
 /// A measurement in SI units, as files and simulators have it.
@@ -99,6 +102,7 @@ impl Detection {
             radial_velocity_cm_s: speed as i16,
             rcs_half_dbsm: half_db(m.rcs_dbsm),
             snr_half_db: half_db(m.snr_db),
+            marked: false,
         })
     }
 

@@ -3,6 +3,7 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::frame::detection::Detection;
+use crate::frame::repeats::Point;
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::field_of_view::Limits;
 
@@ -62,7 +63,7 @@ pub enum Rejection {
     Overflow,
     /// No detection at all: not finite, at no distance, or absurd. Dropped by whoever decoded it.
     Refused,
-    /// Left out by the sensor's own marks. Dropped by whoever decoded it.
+    /// Left out by the sensor's own marks, wherever it lies.
     Unwanted,
 }
 
@@ -192,6 +193,26 @@ impl Gate {
     /// # Errors
     /// The first reason it may not.
     pub fn judge(&self, d: &Detection) -> Result<(), Rejection> {
+        if d.marked { Err(Rejection::Unwanted) } else { self.judge_unmarked(d) }
+    }
+
+    /// Whether a detection cannot be told from noise or cannot be right, and was not left out by choice or because of where it lies:
+    /// what is there is then not known.
+    pub fn cannot_judge(&self, d: &Detection) -> Option<Point> {
+        let speed = i32::from(d.radial_velocity_cm_s).abs();
+        if speed < self.min_speed_cm_s {
+            return None;
+        }
+        match self.judge_unmarked(d) {
+            Err(Rejection::Quality | Rejection::Rcs) => {}
+            Err(Rejection::Velocity) => return Some(Point::new(d, false)),
+            Ok(()) if d.marked => {}
+            _ => return None,
+        }
+        Some(Point::new(d, speed <= self.max_speed_cm_s))
+    }
+
+    fn judge_unmarked(&self, d: &Detection) -> Result<(), Rejection> {
         let within = |v: Angle, [low, high]: [Angle; 2]| v >= low && v <= high;
         let range = i32::from(d.range_cm);
         let speed = i32::from(d.radial_velocity_cm_s).abs();
@@ -237,6 +258,7 @@ mod tests {
         radial_velocity_cm_s: -2500,
         rcs_half_dbsm: Some(20),
         snr_half_db: Some(40),
+        marked: false,
     };
 
     #[test]
@@ -260,6 +282,26 @@ mod tests {
         }
         assert_eq!(g.judge(&D), Ok(()));
         assert_eq!(g.judge(&Detection { azimuth: degrees(-59.0), ..D }), Ok(()), "right is negative");
+    }
+
+    #[test]
+    fn what_cannot_be_judged_is_told_from_what_was_chosen_and_from_what_lies_elsewhere() {
+        let g = gate(GateConfig { min_speed_mps: 1.0, ..GateConfig::default() });
+        let weak = Detection { snr_half_db: Some(0), ..D };
+        let small = Detection { rcs_half_dbsm: Some(-128), ..D };
+        let fast = Detection { radial_velocity_cm_s: 7001, ..D };
+        let marked = Detection { marked: true, ..D };
+        assert_eq!(g.judge(&marked), Err(Rejection::Unwanted));
+        for d in [weak, small, marked] {
+            assert_eq!(g.cannot_judge(&d), Some(Point::new(&d, true)), "{d:?}");
+            for chosen in [Detection { radial_velocity_cm_s: 99, ..d }, Detection { range_cm: 20_001, ..d }] {
+                assert_eq!(g.cannot_judge(&chosen), None, "{chosen:?}");
+            }
+        }
+        for d in [fast, Detection { marked: true, ..fast }, Detection { snr_half_db: Some(0), ..fast }] {
+            assert_eq!(g.cannot_judge(&d), Some(Point::new(&d, false)), "{d:?}");
+        }
+        assert_eq!(g.cannot_judge(&D), None);
     }
 
     #[test]

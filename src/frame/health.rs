@@ -2,10 +2,18 @@
 //!
 //! A healthy frame within its hold time is evidence along every line of sight, so an empty road is visible once it has
 //! [settled](crate::grid::settling). A run of empty frames after traffic is a sensor that went blind, and no frames at all
-//! make everything unknown. Rejected is not empty: where points keep coming of which none can be
-//! right (not finite, in another unit, all outside the field of view), the sensor or its mount is not
-//! what it is taken for, and everything is unknown from the first such run on. A frame of which all that lies in view was left out
-//! by the sensor's own marks is neither empty nor evidence: it is as if it had not come.
+//! make everything unknown.
+//!
+//! Rejected is not empty. Where points keep coming and nothing can be concluded from them, everything is unknown, and the
+//! sensor, its mount or a setting is not what it is taken for:
+//!
+//! - none of them can be used for a second: not finite, in another unit, all outside the field of view;
+//! - for [`WINDOW_US`] at least [`LEAST_AGAIN`] a frame [come again](crate::frame::repeats), as what is there does and noise does not, and
+//!   [at most one in twenty](LET_THROUGH) is let through by the gate and the sensor's own marks. Points that were left out by choice, slow ones or
+//!   those of another sector, do not count.
+//!
+//! A frame of which all that lies in view was left out by the sensor's own marks is neither empty nor evidence: it is as if it
+//! had not come.
 
 use crate::fixed::time::Time;
 use crate::sensor::config::{ConfigError, within};
@@ -35,6 +43,21 @@ impl Default for HealthConfig {
 
 /// A run of frames has no longer gap, microseconds.
 const BREAK_US: u64 = 1_000_000;
+
+/// For so long points come again that cannot be judged until nothing is known, microseconds.
+pub const WINDOW_US: u64 = BLOCKS as u64 * BLOCK_US;
+
+/// So many of them a frame, in the mean.
+pub const LEAST_AGAIN: u32 = 5;
+
+/// Of so many that come again or are let through, one is let through at most.
+pub const LET_THROUGH: u32 = 20;
+
+/// Points are counted by blocks of time, microseconds each.
+const BLOCK_US: u64 = 500_000;
+const BLOCKS: usize = 6;
+/// What is let through for so many blocks ends it.
+const RECENT: usize = 2;
 
 /// [`HealthConfig`] in microseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +97,8 @@ pub enum Condition {
     Blind,
     /// No frame within the hold time.
     Stale,
-    /// Points keep coming, but none that can be used: not finite, or outside the field of view.
+    /// Points keep coming, but none that can be used: not finite, outside the field of view, or nearly all too weak or left out
+    /// by the sensor's own marks.
     Unusable,
     /// Evidence, but not of all sectors: nothing is seen of what stands in one, and it is unknown on the map.
     SectorBlind,
@@ -100,15 +124,12 @@ pub struct FrameStatus {
     /// Points that are no detections, see [`NotADetection`](crate::frame::detection::NotADetection): whoever
     /// decodes a frame drops them and counts them here.
     pub refused: u16,
-    /// Points that whoever decoded the frame left out by the sensor's own marks, see
-    /// [`Ars408Wanted`](crate::inputs::ars408::quality::Ars408Wanted).
-    pub unwanted: u16,
 }
 
 impl From<bool> for FrameStatus {
     /// Of a frame every point of which was a detection.
     fn from(fault: bool) -> Self {
-        Self { fault, refused: 0, unwanted: 0 }
+        Self { fault, refused: 0 }
     }
 }
 
@@ -124,6 +145,11 @@ pub struct Points {
     pub refused: u32,
     /// Left out by the sensor's own marks, wherever they were.
     pub unwanted: u32,
+    /// Let through by the gate.
+    pub passed: u32,
+    /// Of those that cannot be judged about as many came again from the frame before, see
+    /// [`Gate::cannot_judge`](crate::frame::gate::Gate::cannot_judge).
+    pub again: u32,
 }
 
 impl Points {
@@ -175,7 +201,102 @@ pub struct Health {
     blind: bool,
     /// First and last of the frames with points of which none could be used.
     unusable: Option<(Time, Time)>,
-    misled: bool,
+    /// The last frame, evidence or not.
+    last: Option<Time>,
+    unjudged: Unjudged,
+    misled: Misled,
+}
+
+/// By what everything is unknown though points come. The first is zero, as all of a new unit's state is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Misled {
+    /// By nothing.
+    No,
+    /// None can be used.
+    Unusable,
+    /// They come again, and nearly none is let through.
+    Unjudged,
+}
+
+/// Points that came again and could not be judged, and those let through, in the last [`WINDOW_US`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Unjudged {
+    /// First frame of the run.
+    since: Option<Time>,
+    /// When the newest block began.
+    begun: Time,
+    /// The newest first.
+    blocks: [Block; BLOCKS],
+}
+
+/// Sums over frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Block {
+    frames: u16,
+    passed: u16,
+    again: u16,
+}
+
+impl Block {
+    const NONE: Self = Self { frames: 0, passed: 0, again: 0 };
+
+    fn and(self, other: &Self) -> Self {
+        Self {
+            frames: self.frames.saturating_add(other.frames),
+            passed: self.passed.saturating_add(other.passed),
+            again: self.again.saturating_add(other.again),
+        }
+    }
+
+    fn is_let_through(&self) -> bool {
+        u32::from(self.passed) * LET_THROUGH > u32::from(self.passed) + u32::from(self.again)
+    }
+
+    fn cannot_be_judged(&self) -> bool {
+        self.frames > 0 && u32::from(self.again) >= u32::from(self.frames) * LEAST_AGAIN && !self.is_let_through()
+    }
+}
+
+impl Unjudged {
+    const NONE: Self = Self { since: None, begun: Time::from_micros(0), blocks: [Block::NONE; BLOCKS] };
+
+    /// Takes note of a frame.
+    fn frame(&mut self, now: Time, points: &Points) {
+        let since = *self.since.get_or_insert(now);
+        if since == now {
+            self.begun = now;
+        }
+        // no gap is longer than two blocks
+        for _ in 0..RECENT {
+            if now.since(self.begun).is_some_and(|us| us >= BLOCK_US) {
+                self.begun = Time::from_micros(self.begun.micros().saturating_add(BLOCK_US));
+                self.blocks.rotate_right(1);
+                if let Some(newest) = self.blocks.first_mut() {
+                    *newest = Block::NONE;
+                }
+            }
+        }
+        if let Some(newest) = self.blocks.first_mut() {
+            let of = |n: u32| u16::try_from(n).unwrap_or(u16::MAX);
+            *newest = newest.and(&Block { frames: 1, passed: of(points.passed), again: of(points.again) });
+        }
+    }
+
+    fn sum(&self, blocks: usize) -> Block {
+        self.blocks.iter().take(blocks).fold(Block::NONE, |sum, block| sum.and(block))
+    }
+
+    /// Whether it was so for the whole window.
+    fn for_long(&self, now: Time) -> bool {
+        let whole = self.since.is_some_and(|since| now.since(since).is_some_and(|us| us >= WINDOW_US));
+        whole && self.sum(BLOCKS).cannot_be_judged()
+    }
+
+    /// Whether enough of them are let through again.
+    fn is_over(&self) -> bool {
+        let recent = self.sum(RECENT);
+        u32::from(recent.passed) >= LEAST_AGAIN && recent.is_let_through()
+    }
 }
 
 impl Default for Health {
@@ -186,11 +307,20 @@ impl Default for Health {
 
 impl Health {
     /// Before the first frame.
-    pub const NEW: Self =
-        Self { last_frame: None, traffic: false, empty_since: None, blind: false, unusable: None, misled: false };
+    pub const NEW: Self = Self {
+        last_frame: None,
+        traffic: false,
+        empty_since: None,
+        blind: false,
+        unusable: None,
+        last: None,
+        unjudged: Unjudged::NONE,
+        misled: Misled::No,
+    };
 
     /// Takes note of a frame and of what the radar reported in it, gated or not; `fault` is its own flag.
     pub fn frame(&mut self, now: Time, points: &Points, fault: bool, limits: &HealthLimits) -> Continuity {
+        self.judge(now, points);
         if points.unjudged() {
             self.blind |= fault;
             return Continuity::Unjudged;
@@ -215,9 +345,14 @@ impl Health {
         if points.unusable() {
             let (since, _) = self.unusable.unwrap_or((now, now));
             self.unusable = Some((since, now));
-            self.misled |= long(since);
+            if self.misled == Misled::No && long(since) {
+                self.misled = Misled::Unusable;
+            }
         } else if points.inside > 0 {
-            (self.unusable, self.misled) = (None, false);
+            self.unusable = None;
+            if self.misled == Misled::Unusable {
+                self.misled = Misled::No;
+            }
         }
         if *points != Points::default() {
             self.traffic = true;
@@ -238,12 +373,34 @@ impl Health {
         continuity
     }
 
+    /// Whether points that cannot be judged keep coming.
+    fn judge(&mut self, now: Time, points: &Points) {
+        if self.last.is_none_or(|last| now.since(last).is_none_or(|us| us > BREAK_US)) {
+            self.unjudged = Unjudged::NONE;
+        }
+        self.last = Some(now);
+        self.unjudged.frame(now, points);
+        if self.unjudged.for_long(now) {
+            self.misled = Misled::Unjudged;
+        } else if self.misled == Misled::Unjudged && self.unjudged.is_over() {
+            (self.misled, self.unjudged) = (Misled::No, Unjudged::NONE);
+        }
+    }
+
+    /// Whether what came in the last half second was points that cannot be judged: it is no evidence of what is free.
+    pub fn in_doubt(&self) -> bool {
+        self.unjudged.sum(1).cannot_be_judged()
+    }
+
     /// The sensor's condition at a moment.
     pub fn condition(&self, now: Time, limits: &HealthLimits) -> Condition {
+        let held =
+            |last: Option<Time>| last.is_some_and(|last| now.since(last).is_some_and(|age| age <= limits.hold_us));
         match self.last_frame {
+            _ if self.misled == Misled::Unjudged && held(self.last) => Condition::Unusable,
             None => Condition::Starting,
-            Some(last) if now.since(last).is_none_or(|age| age > limits.hold_us) => Condition::Stale,
-            Some(_) if self.misled => Condition::Unusable,
+            Some(_) if !held(self.last_frame) => Condition::Stale,
+            Some(_) if self.misled != Misled::No => Condition::Unusable,
             Some(_) if self.blind => Condition::Blind,
             Some(_) => Condition::Healthy,
         }
@@ -329,12 +486,13 @@ mod tests {
             .collect()
     }
 
-    const NOT_FINITE: Points = Points { inside: 0, outside: 0, refused: 80, unwanted: 0 };
-    const OUTSIDE: Points = Points { inside: 0, outside: 3, refused: 0, unwanted: 0 };
+    const NO_POINTS: Points = Points { inside: 0, outside: 0, refused: 0, unwanted: 0, passed: 0, again: 0 };
+    const NOT_FINITE: Points = Points { refused: 80, ..NO_POINTS };
+    const OUTSIDE: Points = Points { outside: 3, ..NO_POINTS };
 
     #[test]
     fn rejected_is_not_empty_from_the_first_frame_on() {
-        let mostly = Points { inside: 5, outside: 4, refused: 10, unwanted: 3 };
+        let mostly = Points { inside: 5, outside: 4, refused: 10, unwanted: 3, ..NO_POINTS };
         for points in [NOT_FINITE, OUTSIDE, mostly] {
             let mut h = Health::NEW;
             let conditions = run(&mut h, 0, 20, points);
@@ -347,7 +505,7 @@ mod tests {
 
     #[test]
     fn a_view_narrower_than_the_radars_and_weak_clutter_are_healthy() {
-        for points in [Points { inside: 1, outside: 90, refused: 1, unwanted: 5 }, inside(1)] {
+        for points in [Points { inside: 1, outside: 90, refused: 1, unwanted: 5, ..NO_POINTS }, inside(1)] {
             assert!(run(&mut Health::default(), 0, 60, points).iter().all(|c| *c == Condition::Healthy), "{points:?}");
         }
         // a car beyond the view's edge, now and then one within
@@ -391,6 +549,51 @@ mod tests {
         }
     }
 
+    /// Points that come again and cannot be judged, and those let through.
+    fn unjudged(again: u32, passed: u32) -> Points {
+        Points { inside: again + passed, passed, again, ..NO_POINTS }
+    }
+
+    #[test]
+    fn points_that_come_again_and_cannot_be_judged_are_no_free_road_after_three_seconds() {
+        let mut h = Health::NEW;
+        let conditions = run(&mut h, 0, 47, unjudged(5, 0));
+        assert!(conditions[..46].iter().all(|c| *c == Condition::Healthy), "2970 ms: {conditions:?}");
+        assert_eq!(conditions[46], Condition::Unusable, "3036 ms");
+        assert!(h.in_doubt());
+        assert_eq!(run(&mut h, 47 * 66, 60, inside(0)).last(), Some(&Condition::Unusable), "silence does not mend it");
+        assert_eq!(run(&mut h, 107 * 66, 1, unjudged(0, 4)), [Condition::Unusable], "nor do a few points");
+        assert_eq!(run(&mut h, 108 * 66, 1, unjudged(0, 1)), [Condition::Healthy], "it is over when they pass");
+    }
+
+    #[test]
+    fn one_in_twenty_that_is_let_through_is_none_and_more_are_evidence() {
+        assert_eq!(run(&mut Health::default(), 0, 60, unjudged(19, 1)).last(), Some(&Condition::Unusable));
+        for points in [unjudged(18, 1), unjudged(4, 0), unjudged(100, 6)] {
+            assert!(run(&mut Health::default(), 0, 600, points).iter().all(|c| *c == Condition::Healthy), "{points:?}");
+        }
+        // after a day's traffic it is the last seconds that count
+        let mut h = Health::NEW;
+        run(&mut h, 0, 6000, unjudged(0, 80));
+        let conditions = run(&mut h, 6000 * 66, 76, unjudged(80, 0));
+        assert_eq!((conditions[0], conditions[75]), (Condition::Healthy, Condition::Unusable), "within 5 s");
+    }
+
+    #[test]
+    fn frames_all_of_whose_points_are_left_out_are_unusable_too() {
+        let (mut h, l) = (Health::NEW, limits());
+        let marked = Points { unwanted: 9, again: 9, ..NO_POINTS };
+        let conditions = run(&mut h, 0, 47, marked);
+        assert_eq!((conditions[45], conditions[46]), (Condition::Starting, Condition::Unusable));
+        assert_eq!(h.condition(at(46 * 66 + 501), &l), Condition::Starting, "and then nothing comes");
+        // a gap begins another run
+        assert_eq!(run(&mut h, 10_000, 20, marked).last(), Some(&Condition::Unusable), "it lasts until they pass");
+        let mut h = Health::NEW;
+        for i in 0..20 {
+            assert_eq!(run(&mut h, i * 4000, 30, unjudged(9, 0)).last(), Some(&Condition::Healthy), "{i}");
+        }
+    }
+
     #[test]
     fn points_that_are_none_do_not_end_blindness_and_points_outside_do() {
         let mut h = Health::NEW;
@@ -398,5 +601,172 @@ mod tests {
         assert_eq!(run(&mut h, 66, 20, inside(0)).last(), Some(&Condition::Blind));
         assert_eq!(run(&mut h, 21 * 66, 1, NOT_FINITE), [Condition::Blind]);
         assert_eq!(run(&mut h, 22 * 66, 1, OUTSIDE), [Condition::Healthy]);
+    }
+
+    /// A world for ten minutes, through the gate, from a cold start or after ten of traffic.
+    mod through_the_gate {
+        use super::*;
+        use crate::fixed::angle::Angle;
+        use crate::frame::detection::Detection;
+        use crate::frame::gate::GateConfig;
+        use crate::frame::scan::Scan;
+        use crate::sensor::field_of_view::FieldOfView;
+        use crate::sensor::mount::Mount;
+        use crate::sensor::noise::NoiseConfig;
+        use std::vec::Vec;
+
+        const FRAMES: u64 = 10 * 60 * 15;
+
+        struct World {
+            gate: GateConfig,
+            scan: Scan<256>,
+            health: Health,
+            frame: u64,
+            state: u32,
+        }
+
+        impl World {
+            fn new(gate: GateConfig) -> Self {
+                Self { gate, scan: Scan::new(), health: Health::NEW, frame: 0, state: 11 }
+            }
+
+            /// A number from the first to the second.
+            fn draw(&mut self, from: f32, to: f32) -> f32 {
+                self.state = self.state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                from + (self.state >> 8) as f32 / 16_777_216.0 * (to - from)
+            }
+
+            fn at(range_m: f32, azimuth_deg: f32, speed_mps: f32, snr_db: f32) -> Detection {
+                Detection {
+                    range_cm: (range_m * 100.0) as u16,
+                    azimuth: Angle::from_degrees(azimuth_deg),
+                    elevation: None,
+                    radial_velocity_cm_s: (speed_mps * 100.0) as i16,
+                    rcs_half_dbsm: None,
+                    snr_half_db: Some((snr_db * 2.0) as i16),
+                    marked: false,
+                }
+            }
+
+            /// So many points at random, within a range.
+            fn noise(&mut self, count: u8, to_m: f32, snr_db: f32) -> Vec<Detection> {
+                let one = |w: &mut Self| Self::at(w.draw(3.0, to_m), w.draw(-60.0, 60.0), w.draw(-8.0, 8.0), snr_db);
+                (0..count).map(|_| one(self)).collect()
+            }
+
+            /// Four lanes, a car each 60 m, three points of each, of which 15 % are missing, weaker by so many decibels.
+            fn traffic(&mut self, weaker_db: f32) -> Vec<Detection> {
+                let mut points = Vec::new();
+                for (lane, speed) in [(-6.0, -28.0), (-2.0, -33.0), (2.0, 25.0), (6.0, 30.0_f32)] {
+                    let passed = (self.frame as f32 * 0.066 * speed).rem_euclid(60.0);
+                    for range in [passed, passed + 60.0, passed + 120.0] {
+                        for _ in 0..3 {
+                            let place = 20.0 + range + self.draw(0.0, 0.8);
+                            let azimuth = (lane / place).to_degrees() + self.draw(-0.5, 0.5);
+                            let snr = self.draw(8.0, 18.0) - weaker_db;
+                            if self.draw(0.0, 1.0) > 0.15 {
+                                points.push(Self::at(place, azimuth, speed, snr));
+                            }
+                        }
+                    }
+                }
+                points
+            }
+
+            /// The conditions of so many frames.
+            fn run(&mut self, frames: u64, each: impl Fn(&mut Self) -> Vec<Detection>) -> Vec<Condition> {
+                let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+                let view = FieldOfView {
+                    azimuth_min_deg: -60.0,
+                    azimuth_max_deg: 60.0,
+                    elevation_min_deg: -16.0,
+                    elevation_max_deg: 16.0,
+                    range_min_m: 3.0,
+                    range_max_m: 200.0,
+                };
+                let gate = self.gate.gate(&view.limits().unwrap()).unwrap();
+                let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
+                let limits = limits();
+                let mut conditions = Vec::new();
+                for _ in 0..frames {
+                    self.frame += 1;
+                    let (now, all) = (at(self.frame * 66), each(self));
+                    let place = |d: &Detection| noise.place(d, &levelling);
+                    let points = self.scan.gather(now, all.iter(), FrameStatus::default(), &gate, place);
+                    self.health.frame(now, &points, false, &limits);
+                    conditions.push(self.health.condition(now, &limits));
+                }
+                conditions
+            }
+        }
+
+        /// From a cold start and after ten minutes of traffic.
+        fn twice(gate: GateConfig, frames: u64, each: impl Fn(&mut World) -> Vec<Detection>) -> [Vec<Condition>; 2] {
+            let (mut cold, mut warm) = (World::new(gate), World::new(gate));
+            let traffic = warm.run(FRAMES, |w| w.traffic(0.0));
+            assert!(traffic.iter().all(|c| *c == Condition::Healthy), "traffic as it is");
+            [cold.run(frames, &each), warm.run(frames, &each)]
+        }
+
+        fn is_never_unusable(gate: GateConfig, each: impl Fn(&mut World) -> Vec<Detection>) {
+            for conditions in twice(gate, FRAMES, each) {
+                let first = conditions.iter().position(|c| *c != Condition::Healthy);
+                assert_eq!(first, None, "{:?}", first.map(|i| conditions[i]));
+            }
+        }
+
+        #[test]
+        fn noise_below_the_gate_is_no_traffic() {
+            is_never_unusable(GateConfig::default(), |w| {
+                // none at all for long would be a blind sensor
+                let count = if w.frame % 7 == 0 { 1 } else { w.draw(0.0, 3.99) as u8 };
+                w.noise(count, 200.0, 2.0)
+            });
+        }
+
+        #[test]
+        fn rain_is_no_traffic() {
+            is_never_unusable(GateConfig::default(), |w| w.noise(20, 30.0, 2.0));
+        }
+
+        #[test]
+        fn rails_and_masts_that_only_movers_are_chosen_before_are_no_traffic() {
+            let rails = |w: &mut World| -> Vec<Detection> {
+                (0..40_u8)
+                    .map(|i| {
+                        let range = 20.0 + 4.0 * f32::from(i) + w.draw(-0.2, 0.2);
+                        World::at(range, 15.0, w.draw(-0.3, 0.3), w.draw(0.0, 20.0))
+                    })
+                    .collect()
+            };
+            is_never_unusable(GateConfig { min_speed_mps: 1.0, ..GateConfig::default() }, rails);
+        }
+
+        #[test]
+        fn traffic_that_is_too_weak_for_the_gate_is_no_free_road_within_five_seconds() {
+            let cases = [("15 dB weaker", 15.0), ("nearly all of it", 12.8)];
+            for (what, weaker_db) in cases {
+                for conditions in twice(GateConfig::default(), 75, |w| w.traffic(weaker_db)) {
+                    assert_eq!(conditions.last(), Some(&Condition::Unusable), "{what}");
+                }
+            }
+            // what is seen well enough is worked with
+            is_never_unusable(GateConfig::default(), |w| w.traffic(8.0));
+        }
+
+        #[test]
+        fn traffic_that_is_marked_or_too_fast_is_no_free_road_either() {
+            let marked = |w: &mut World| w.traffic(0.0).into_iter().map(|d| Detection { marked: true, ..d }).collect();
+            let fast = |w: &mut World| {
+                let too_fast = |d: Detection| Detection { radial_velocity_cm_s: 9 * d.radial_velocity_cm_s, ..d };
+                w.traffic(0.0).into_iter().map(too_fast).collect()
+            };
+            for conditions in twice(GateConfig::default(), 75, marked) {
+                assert_eq!(conditions.last(), Some(&Condition::Unusable));
+            }
+            for conditions in twice(GateConfig::default(), 75, fast) {
+                assert_eq!(conditions.last(), Some(&Condition::Unusable));
+            }
+        }
     }
 }

@@ -6,5 +6,6 @@ pub mod gate;
 pub mod health;
 pub mod reflection;
 pub mod repeatability;
+pub mod repeats;
 pub mod scan;
 pub mod thinning;

@@ -139,6 +139,7 @@ mod tests {
             radial_velocity_cm_s: 100,
             rcs_half_dbsm: None,
             snr_half_db: Some(30),
+            marked: false,
         };
         let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
         noise.place(&d, &levelling)
@@ -192,6 +193,7 @@ mod tests {
                 radial_velocity_cm_s: 100,
                 rcs_half_dbsm: None,
                 snr_half_db: Some(30),
+                marked: false,
             };
             let r = NoiseConfig::default().noise().unwrap().place_on(&d, &levelling, &ground);
             assert!((i32::from(r.ground_cm) - 10_000).abs() <= 3, "{grade}: {r:?}");

@@ -2,10 +2,12 @@
 
 use heapless::Vec;
 
+use crate::fixed::time::Time;
 use crate::frame::detection::Detection;
 use crate::frame::gate::{Gate, Rejection, Rejections};
 use crate::frame::health::{FrameStatus, Points};
 use crate::frame::reflection::Reflection;
+use crate::frame::repeats::Repeats;
 use crate::frame::thinning::Thinning;
 
 /// Up to `D` reflections of the frame, in order of arrival.
@@ -18,6 +20,8 @@ use crate::frame::thinning::Thinning;
 pub struct Scan<const D: usize> {
     reflections: Vec<Reflection, D, u16>,
     rejections: Rejections,
+    /// Points that cannot be judged.
+    unjudged: Repeats,
 }
 
 impl<const D: usize> Default for Scan<D> {
@@ -29,13 +33,14 @@ impl<const D: usize> Default for Scan<D> {
 impl<const D: usize> Scan<D> {
     /// An empty scan.
     pub const fn new() -> Self {
-        Self { reflections: Vec::new(), rejections: Rejections::NONE }
+        Self { reflections: Vec::new(), rejections: Rejections::NONE, unjudged: Repeats::NEW }
     }
 
     /// Takes the detections of a frame that pass the gate, as `place` places them, in the place of the last
-    /// frame's, and counts why others do not, those refused or unwanted before among them. Returns where all of them were.
+    /// frame's, and counts why others do not, those refused before among them. Returns where all of them were.
     pub fn gather<'a>(
         &mut self,
+        now: Time,
         detections: impl Iterator<Item = &'a Detection> + Clone,
         status: FrameStatus,
         gate: &Gate,
@@ -43,12 +48,12 @@ impl<const D: usize> Scan<D> {
     ) -> Points {
         self.reflections.clear();
         self.rejections = Rejections::NONE;
-        let (refused, unwanted) = (status.refused.into(), status.unwanted.into());
+        let refused = status.refused.into();
         self.rejections.add_many(Rejection::Refused, refused);
-        self.rejections.add_many(Rejection::Unwanted, unwanted);
+        let again = self.unjudged.frame(now, detections.clone().filter_map(|d| gate.cannot_judge(d)));
         let room = D.min(gate.max_detections);
         let mut kept: Vec<&Detection, D, u16> = Vec::new();
-        let (mut reported, mut passed) = (0_u32, 0);
+        let (mut reported, mut passed) = (0_u32, 0_u32);
         let mut arriving = detections;
         let mut late = None;
         while let Some(d) = arriving.next() {
@@ -57,17 +62,17 @@ impl<const D: usize> Scan<D> {
                 self.rejections.add(reason);
                 continue;
             }
-            passed += 1;
-            if passed > room {
+            passed = passed.saturating_add(1);
+            if kept.len() >= room {
                 self.rejections.add(Rejection::Overflow);
                 continue;
             }
             let _ = kept.push(d);
-            if passed == room {
+            if kept.len() == room {
                 late = Some(arriving.clone());
             }
         }
-        if let Some(late) = late.filter(|_| passed > room) {
+        if let Some(late) = late.filter(|_| passed as usize > room) {
             let late = late.filter(|d| gate.judge(d).is_ok());
             let (mut thinning, mut priorities) = (Thinning::NEW, Priorities([0; PRIORITIES]));
             for d in kept.iter().copied().chain(late.clone()) {
@@ -85,8 +90,9 @@ impl<const D: usize> Scan<D> {
         for d in kept {
             let _ = self.reflections.push(place(d));
         }
-        let outside = self.rejections.outside();
-        Points { inside: reported.saturating_sub(outside), outside, refused, unwanted }
+        let (outside, unwanted) = (self.rejections.outside(), self.rejections.count(Rejection::Unwanted));
+        let inside = reported.saturating_sub(outside).saturating_sub(unwanted);
+        Points { inside, outside, refused, unwanted, passed, again }
     }
 
     /// The same points, where a wrong mount puts all that were kept where no map reaches: they lie outside.
@@ -173,6 +179,7 @@ pub(crate) mod tests {
             radial_velocity_cm_s: 0,
             rcs_half_dbsm: None,
             snr_half_db: Some(strength),
+            marked: false,
         }
     }
 
@@ -196,9 +203,13 @@ pub(crate) mod tests {
         let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
         let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
         let mut scan = Scan::new();
-        let status = FrameStatus { fault: false, refused: 7, unwanted: 3 };
-        let points = scan.gather(detections.iter(), status, &gate, |d| noise.place(d, &levelling));
-        assert_eq!(points, Points { inside: detections.len() as u32, outside: 0, refused: 7, unwanted: 3 });
+        let status = FrameStatus { fault: false, refused: 7 };
+        let marked = [Detection { marked: true, ..detection(2000, 40) }; 3];
+        let all = marked.iter().chain(detections);
+        let points = scan.gather(Time::from_micros(1), all, status, &gate, |d| noise.place(d, &levelling));
+        let passed = detections.iter().filter(|d| gate.judge(d).is_ok()).count() as u32;
+        let inside = detections.len() as u32;
+        assert_eq!(points, Points { inside, outside: 0, refused: 7, unwanted: 3, passed, again: 0 });
         let counted = [Rejection::Refused, Rejection::Unwanted].map(|reason| scan.rejections().count(reason));
         assert_eq!(counted, [7, 3]);
         scan

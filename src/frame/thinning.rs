@@ -96,6 +96,7 @@ mod tests {
             radial_velocity_cm_s: 0,
             rcs_half_dbsm: None,
             snr_half_db: snr_db.map(|db| 2 * db),
+            marked: false,
         }
     }
 

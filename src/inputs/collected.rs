@@ -17,6 +17,9 @@ pub trait Entry: Copy {
 
     /// Its priority, as the next to arrive.
     fn priority(&self, counts: &mut Self::Counts) -> Self::Priority;
+
+    /// Marks it as left out by the sensor's own marks.
+    fn mark(&mut self);
 }
 
 impl Entry for Detection {
@@ -26,6 +29,10 @@ impl Entry for Detection {
 
     fn priority(&self, counts: &mut Thinning) -> u8 {
         counts.priority(self)
+    }
+
+    fn mark(&mut self) {
+        self.marked = true;
     }
 }
 
@@ -38,15 +45,20 @@ impl Entry for ImageBox {
     fn priority(&self, (): &mut ()) -> i32 {
         self.area()
     }
+
+    /// Detectors have no such marks.
+    fn mark(&mut self) {}
 }
 
 /// Up to `N` detections or boxes, those of the greatest [priority](Entry::priority), in order of arrival.
 #[derive(Debug, Clone)]
 pub(crate) struct Collected<const N: usize, T: Entry = Detection> {
     detections: Vec<T, N, u16>,
-    /// The radar's numbers in the same order; `None` of what is not to be kept.
+    /// The radar's numbers in the same order; `None` of what is left out.
     numbers: Vec<Option<u16>, N, u16>,
     priorities: Vec<T::Priority, N, u16>,
+    /// Once finished, those that are not left out.
+    wanted: usize,
     counts: T::Counts,
 }
 
@@ -61,7 +73,7 @@ pub(crate) enum Added {
 
 impl<const N: usize, T: Entry> Collected<N, T> {
     pub(crate) const fn new() -> Self {
-        Self { detections: Vec::new(), numbers: Vec::new(), priorities: Vec::new(), counts: T::NO_COUNTS }
+        Self { detections: Vec::new(), numbers: Vec::new(), priorities: Vec::new(), wanted: 0, counts: T::NO_COUNTS }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -69,6 +81,7 @@ impl<const N: usize, T: Entry> Collected<N, T> {
         self.numbers.clear();
         self.priorities.clear();
         self.counts = T::NO_COUNTS;
+        self.wanted = 0;
     }
 
     /// Takes a detection; in a full list it takes the room of the last of those of the least priority, if its own is greater.
@@ -97,20 +110,31 @@ impl<const N: usize, T: Entry> Collected<N, T> {
         self.numbers.iter().position(|n| *n == Some(number))
     }
 
-    /// Marks a detection as not to be kept.
+    /// Marks a detection as left out.
     pub(crate) fn reject(&mut self, place: usize) {
         if let Some(number) = self.numbers.get_mut(place) {
             *number = None;
         }
+        if let Some(detection) = self.detections.get_mut(place) {
+            detection.mark();
+        }
     }
 
-    /// Drops what was rejected; the order stays.
+    /// Brings what was left out behind the rest, whose order stays.
     pub(crate) fn finish(&mut self) {
-        let mut numbers = self.numbers.iter();
-        self.detections.retain(|_| numbers.next().is_some_and(Option::is_some));
-        let mut numbers = self.numbers.iter();
-        self.priorities.retain(|_| numbers.next().is_some_and(Option::is_some));
-        self.numbers.retain(Option::is_some);
+        let mut wanted = 0;
+        for (place, number) in self.numbers.iter().enumerate() {
+            if number.is_some() {
+                exchange(&mut self.detections, wanted, place);
+                wanted += 1;
+            }
+        }
+        self.wanted = wanted;
+    }
+
+    /// What is not left out, once finished.
+    pub(crate) fn wanted(&self) -> &[T] {
+        self.detections.get(..self.wanted).unwrap_or(&[])
     }
 
     pub(crate) fn get_mut(&mut self, place: usize) -> Option<&mut T> {
@@ -130,6 +154,16 @@ fn replace<E>(list: &mut [E], place: usize, last: E) {
     }
 }
 
+/// Exchanges two elements. Unlike `swap`, cannot panic.
+fn exchange<E: Copy>(list: &mut [E], a: usize, b: usize) {
+    let (Some(at_a), Some(at_b)) = (list.get(a).copied(), list.get(b).copied()) else { return };
+    for (place, element) in [(a, at_b), (b, at_a)] {
+        if let Some(there) = list.get_mut(place) {
+            *there = element;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -146,6 +180,7 @@ mod tests {
             radial_velocity_cm_s: 0,
             rcs_half_dbsm: None,
             snr_half_db: Some(snr),
+            marked: false,
         }
     }
 
@@ -200,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rejected_go_and_the_rest_keeps_its_order() {
+    fn what_is_left_out_comes_behind_the_rest_which_keeps_its_order() {
         let mut c = Collected::<8>::new();
         for (n, s) in [(1, 10), (2, 20), (3, 30), (4, 40)] {
             c.add(n, detection(s));
@@ -209,7 +244,8 @@ mod tests {
         c.reject(2);
         assert_eq!(c.place(1, 0), None);
         c.finish();
-        assert_eq!(strengths(&c), [20, 40]);
-        assert_eq!(c.place(4, 0), Some(1));
+        assert_eq!(strengths(&c)[..2], [20, 40]);
+        assert_eq!(c.wanted().iter().filter_map(Detection::strength).collect::<StdVec<_>>(), [20, 40]);
+        assert_eq!(c.detections().iter().map(|d| d.marked).collect::<StdVec<_>>(), [false, false, true, true]);
     }
 }

@@ -28,12 +28,12 @@ pub struct RadarScan<'a, T = Detection> {
     pub number: u32,
     /// What was measured and passed the radar's own quality marks.
     pub detections: &'a [T],
+    /// The same, and behind it what was [left out by them](Detection::marked): estimators look at where that lies.
+    pub all: &'a [T],
     /// Announced and not arrived; the most it can be, where that is not known exactly.
     pub missing: u16,
     /// Points that arrived and are no detections: not finite, at no distance, or absurd; boxes of no known class.
     pub refused: u16,
-    /// Points that arrived and were left out by the radar's own marks: something was measured, and where is not known.
-    pub unwanted: u16,
     /// Whether the radar says that something is wrong with it.
     pub fault: bool,
 }
@@ -41,12 +41,17 @@ pub struct RadarScan<'a, T = Detection> {
 impl<T> RadarScan<'_, T> {
     /// What the estimators get besides the detections.
     pub fn status(&self) -> FrameStatus {
-        FrameStatus { fault: self.fault, refused: self.refused, unwanted: self.unwanted }
+        FrameStatus { fault: self.fault, refused: self.refused }
+    }
+
+    /// What was left out by the radar's own marks.
+    pub fn unwanted(&self) -> &[T] {
+        self.all.get(self.detections.len()..).unwrap_or(&[])
     }
 
     /// As a frame for an estimator.
     pub fn frame(&self) -> Frame<'_, [T]> {
-        Frame { measured: self.time, input: self.detections, incomplete: self.missing > 0, status: self.status() }
+        Frame { measured: self.time, input: self.all, incomplete: self.missing > 0, status: self.status() }
     }
 }
 

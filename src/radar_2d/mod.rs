@@ -149,8 +149,8 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
         self.known = false;
     }
 
-    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the numbers of
-    /// points that are no detections, and of those left out by the sensor's own marks.
+    /// Takes a radar frame. `status` is the sensor's own fault flag, and where there can be any with it the number of
+    /// points that are no detections.
     pub fn process<'a>(
         &mut self,
         p: &Radar2dParameters,
@@ -160,7 +160,7 @@ impl<const NX: usize, const NW: usize, const N: usize, const D: usize> Radar2d<N
     ) -> Condition {
         let status = status.into();
         let place = |d: &Detection| p.noise.place_flat(d, &p.levelling);
-        let points = self.scan.gather(detections.into_iter(), status, &p.gate, place);
+        let points = self.scan.gather(now, detections.into_iter(), status, &p.gate, place);
         self.rejections.add_all(self.scan.rejections());
         let points = self.scan.within_reach(points, |r| p.reaches(r));
         match self.health.frame(now, &points, status.fault, &p.health) {

@@ -336,7 +336,8 @@ mod tests {
             map: &mut Squares,
             ended: &mut impl FnMut(),
         ) -> Progress {
-            if status.unwanted > 0 {
+            // what this sensor refuses is no frame of it
+            if status.refused > 0 {
                 ended();
                 let condition = self.expire(rows, measured, map);
                 return Progress { continuity: Continuity::Unjudged, condition, used: 0 };
@@ -421,8 +422,8 @@ mod tests {
     fn a_map_is_not_sent_as_of_a_frame_that_was_left_out() {
         let (mut camera, mut map, mut kept) = (Camera::default(), [[true; 4]; 4], Kept::default());
         let mut unit = Unit::new(&3, &mut camera, &mut map, &mut kept);
-        let mut sent = |ms: u64, unwanted: u16| {
-            let status = FrameStatus { unwanted, ..FrameStatus::default() };
+        let mut sent = |ms: u64, refused: u16| {
+            let status = FrameStatus { refused, ..FrameStatus::default() };
             let input = &[[1, 2]][..];
             let frame = Frame { measured: Time::from_micros(ms * 1000), input, incomplete: false, status };
             unit.frame(&frame, &mut |_| {});

@@ -65,7 +65,8 @@ pub enum Reason {
     BusOff,
     /// The time of a frame was exceeded.
     Overrun,
-    /// Points keep coming, but none that can be used: not finite, or all outside the field of view.
+    /// Points keep coming, but none that can be used: not finite, all outside the field of view, or nearly all too weak, too fast
+    /// or left out by the radar's own marks.
     UnusablePoints,
     /// Other sensors see what it should see, or what stands there is not seen any more: a part of its maps is unknown.
     SectorBlind,

@@ -118,6 +118,7 @@ pub fn detection(sensor: &Sensor, point: [f64; 3], velocity: [f64; 2], elevation
         radial_velocity_cm_s: (radial * 100.0).round() as i16,
         rcs_half_dbsm: Some(20),
         snr_half_db: Some(50),
+        marked: false,
     })
 }
 

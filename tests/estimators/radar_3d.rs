@@ -273,14 +273,16 @@ fn rejected_is_not_empty() {
 
 #[test]
 fn what_was_left_out_is_neither_empty_nor_evidence() {
-    let left_out = FrameStatus { unwanted: 40, ..FrameStatus::default() };
-    let mut rig = Rig::new(gantry(6.0, 0.0));
-    let (seen, known) = conditions(&mut rig, left_out, &[]);
+    let sensor = gantry(6.0, 0.0);
+    let clutter = detection(&sensor, [60.0, 9.0, 0.3], [0.0; 2], true).unwrap();
+    let left_out = [Detection { marked: true, ..clutter }; 40];
+    let mut rig = Rig::new(sensor);
+    let (seen, known) = conditions(&mut rig, FrameStatus::default(), &left_out);
     assert!(!known && seen.iter().all(|c| *c == Condition::Starting), "{seen:?}");
     assert_eq!(rig.state.rejections().count(Rejection::Unwanted), 23 * 40);
     rig.drive(&[Vehicle::truck(110.0, 0.0, -20.0)], 30, true);
     let obstacles = rig.state.obstacles().iter().count();
-    let (seen, known) = conditions(&mut rig, left_out, &[]);
+    let (seen, known) = conditions(&mut rig, FrameStatus::default(), &left_out);
     assert_eq!((seen[6], seen[7]), (Condition::Healthy, Condition::Stale), "half a second after the last frame");
     assert!(!known && !seen.contains(&Condition::Blind), "{seen:?}");
     assert_eq!(rig.state.obstacles().iter().count(), obstacles, "nobody saw that they are gone");
@@ -364,6 +366,7 @@ fn of_ten_thousand_detections_256_are_taken_and_the_rest_is_counted() {
             radial_velocity_cm_s: (i % 6000 - 3000) as i16,
             rcs_half_dbsm: None,
             snr_half_db: Some((20 + i % 100) as i16),
+            marked: false,
         })
         .collect();
     for _ in 0..10 {

@@ -25,6 +25,7 @@ fn car() -> Detection {
         radial_velocity_cm_s: -2500,
         rcs_half_dbsm: Some(-20),
         snr_half_db: Some(30),
+        marked: false,
     }
 }
 
@@ -237,6 +238,7 @@ fn any_detection() -> impl Strategy<Value = Detection> {
             radial_velocity_cm_s,
             rcs_half_dbsm,
             snr_half_db,
+            marked: false,
         },
     )
 }

@@ -26,6 +26,7 @@ fn post(range_m: f32, azimuth_deg: f32, half_dbsm: i16) -> Detection {
         radial_velocity_cm_s: 0,
         rcs_half_dbsm: Some(half_dbsm),
         snr_half_db: None,
+        marked: false,
     }
 }
 

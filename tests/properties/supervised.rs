@@ -47,6 +47,7 @@ impl Watched {
                 radial_velocity_cm_s: 0,
                 rcs_half_dbsm: Some(20),
                 snr_half_db: None,
+                marked: false,
             });
             let seen: Vec<Detection> = posts.into_iter().filter_map(&change).collect();
             self.frame += 1;

@@ -33,6 +33,7 @@ pub fn any_detection() -> impl Strategy<Value = Detection> {
             radial_velocity_cm_s,
             rcs_half_dbsm,
             snr_half_db,
+            marked: false,
         })
 }
 
@@ -146,6 +147,7 @@ impl Drive {
             radial_velocity_cm_s: (radial * 100.0) as i16,
             rcs_half_dbsm: None,
             snr_half_db: None,
+            marked: false,
         }
     }
 }
@@ -188,6 +190,7 @@ pub fn crowd(setup: &Setup, seed: u64, count: usize) -> Vec<Detection> {
         radial_velocity_cm_s: ((bits >> 24) % 14_000) as i16 - 7000,
         rcs_half_dbsm: None,
         snr_half_db: Some(((bits >> 40) % 100) as i16),
+        marked: false,
     };
     (0..count).map(|_| drawn_in(d(random()), setup)).collect()
 }

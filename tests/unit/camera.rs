@@ -207,6 +207,7 @@ fn a_radar_and_a_camera_of_one_number_do_not_take_each_others_messages() {
         radial_velocity_cm_s: 0,
         rcs_half_dbsm: None,
         snr_half_db: None,
+        marked: false,
     };
     let mut radar = NativeReceiver::<64>::new(NativeConfig::sensor(3));
     let mut camera = NativeReceiver::<64, ImageBox>::boxes(NativeConfig::camera(3));

@@ -111,6 +111,7 @@ impl General {
             },
             rcs_half_dbsm: Some(self.rcs_half_dbsm.get(word) as i16),
             snr_half_db: None,
+            marked: false,
         });
         (number, detection)
     }

@@ -126,7 +126,7 @@ pub struct Ars408Counters {
     pub no_scan: u32,
     /// Status messages or entries that came twice.
     pub repeated: u32,
-    /// Entries beyond those announced.
+    /// Entries beyond those announced. From the third scan in a row on they are taken.
     pub surplus: u32,
     /// Qualities of entries that did not arrive.
     pub unknown_entry: u32,
@@ -143,7 +143,9 @@ pub struct Ars408Counters {
 /// # Limits
 /// `N` entries a scan; of more, crowded places give way first, then the least RCS. Where a status message is lost and scans follow each
 /// other without a pause, entries can fill the gaps of the scan before. Whether quality messages follow is learnt: before the
-/// first of them, or the first state message, scans are given out without waiting for them.
+/// first of them, or the first state message, scans are given out without waiting for them. Some gateways and clones announce fewer
+/// entries than they send, or none: after two such scans in a row what is announced counts no longer, and a scan is over when
+/// nothing more of it comes, until eight in a row had no more than announced.
 #[derive(Debug, Clone)]
 pub struct Ars408<const N: usize> {
     config: Ars408Config,
@@ -155,7 +157,57 @@ pub struct Ars408<const N: usize> {
     quality: bool,
     counter: MeasurementCounter,
     fault: bool,
+    announcements: Announcements,
     counters: Ars408Counters,
+}
+
+/// Scans in a row with more entries than announced, from which on these are taken.
+const MORE: u8 = 2;
+/// Scans in a row without, from which on announcements count again.
+const NO_MORE: u8 = 8;
+
+/// Whether as many entries come as are announced.
+#[derive(Debug, Clone, Copy, Default)]
+struct Announcements {
+    /// Kind, entries and latest frame of the scan that was given out last.
+    last: Option<(bool, Numbers, Time)>,
+    /// More came of the scan under way, or of the last.
+    more: bool,
+    /// Scans in a row of which more came.
+    scans: u8,
+    /// Scans in a row since then of which no more came.
+    as_announced: u8,
+}
+
+impl Announcements {
+    const NEW: Self = Self { last: None, more: false, scans: 0, as_announced: 0 };
+
+    /// Whether an entry without a scan is one of the last.
+    fn is_of_last(&self, objects: bool, number: u16, now: Time, timeout_us: u32) -> bool {
+        self.last.as_ref().is_some_and(|(of, numbers, latest)| {
+            let soon = now.since(*latest).is_some_and(|us| us <= u64::from(timeout_us));
+            *of == objects && soon && !numbers.contains(number)
+        })
+    }
+
+    /// Takes note that one came.
+    fn beyond(&mut self, number: u16, now: Time) {
+        self.more = true;
+        if let Some((_, numbers, latest)) = &mut self.last {
+            numbers.insert(number);
+            *latest = now;
+        }
+    }
+
+    /// Takes note that a status message came, and says whether entries beyond those it announces are taken.
+    fn next(&mut self) -> bool {
+        (self.scans, self.as_announced) = match (core::mem::take(&mut self.more), self.scans >= MORE) {
+            (true, _) => (self.scans.saturating_add(1), 0),
+            (false, true) if self.as_announced < NO_MORE => (self.scans, self.as_announced + 1),
+            (false, _) => (0, 0),
+        };
+        self.scans >= MORE
+    }
 }
 
 /// A scan under way.
@@ -167,11 +219,11 @@ struct Gathering {
     /// When its latest frame came.
     latest: Time,
     announced: u16,
+    /// More may come.
+    open: bool,
     arrived: u16,
     /// Of these, entries at no distance.
     refused: u16,
-    /// Of these, entries left out by the sensor's own marks.
-    unwanted: u16,
     qualified: u16,
     entries: Numbers,
     qualities: Numbers,
@@ -212,6 +264,7 @@ impl<const N: usize> Ars408<N> {
             quality: false,
             counter: MeasurementCounter::NEW,
             fault: false,
+            announcements: Announcements::NEW,
             counters: Ars408Counters {
                 frames: 0,
                 scans: 0,
@@ -260,8 +313,8 @@ impl<const N: usize> Ars408<N> {
         match message {
             Message::ClusterStatus => self.begin(false, word, now),
             Message::ObjectStatus => self.begin(true, word, now),
-            Message::ClusterGeneral => self.entry(false, word),
-            Message::ObjectGeneral => self.entry(true, word),
+            Message::ClusterGeneral => self.entry(false, word, now),
+            Message::ObjectGeneral => self.entry(true, word, now),
             Message::ClusterQuality => self.quality(false, word),
             Message::ObjectQuality => self.quality(true, word),
             Message::RadarState => match RadarState::read(data) {
@@ -311,9 +364,9 @@ impl<const N: usize> Ars408<N> {
             started: now,
             latest: now,
             announced,
+            open: self.announcements.next(),
             arrived: 0,
             refused: 0,
-            unwanted: 0,
             qualified: 0,
             entries: Numbers::default(),
             qualities: Numbers::default(),
@@ -346,23 +399,39 @@ impl<const N: usize> Ars408<N> {
         if objects { &self.config.profile.object } else { &self.config.profile.cluster }
     }
 
-    fn entry(&mut self, objects: bool, word: u64) -> Ars408Outcome<'_> {
+    fn entry(&mut self, objects: bool, word: u64, now: Time) -> Ars408Outcome<'_> {
         self.forget_given_out();
         let (number, detection) = self.general(objects).read(word);
         let Some(scan) = self.scan.as_mut().filter(|s| s.objects == objects) else {
+            if self.announcements.is_of_last(objects, number, now, self.config.timeout_us) {
+                self.announcements.beyond(number, now);
+                count(&mut self.counters.surplus);
+                return Ars408Outcome::Refused(Refusal::Surplus);
+            }
             count(&mut self.counters.no_scan);
             return Ars408Outcome::Refused(Refusal::NoScan);
         };
         if scan.arrived >= scan.announced {
-            count(&mut self.counters.surplus);
-            return Ars408Outcome::Refused(Refusal::Surplus);
+            if scan.entries.contains(number) && scan.announced <= 256 {
+                count(&mut self.counters.repeated);
+                return Ars408Outcome::Refused(Refusal::Repeated);
+            }
+            self.announcements.more = true;
+            if !scan.open {
+                count(&mut self.counters.surplus);
+                return Ars408Outcome::Refused(Refusal::Surplus);
+            }
         }
         // of more than 256 entries numbers come twice
         if !scan.entries.insert(number) && scan.announced <= 256 {
             count(&mut self.counters.repeated);
             return Ars408Outcome::Refused(Refusal::Repeated);
         }
-        scan.arrived += 1;
+        scan.arrived = scan.arrived.saturating_add(1);
+        if scan.arrived > scan.announced {
+            count(&mut self.counters.surplus);
+            scan.announced = scan.arrived;
+        }
         match detection.map(|d| self.collected.add(number, d)) {
             None => {
                 scan.refused += 1;
@@ -399,7 +468,6 @@ impl<const N: usize> Ars408<N> {
         if let Some(place) = self.collected.place(number, scan.next) {
             scan.next = place + 1;
             if !wanted {
-                scan.unwanted += 1;
                 count(&mut self.counters.unwanted);
                 self.collected.reject(place);
             }
@@ -430,6 +498,7 @@ impl<const N: usize> Ars408<N> {
         // a scan without entries has none of the scan before
         self.forget_given_out();
         self.given_out = true;
+        self.announcements.last = Some((scan.objects, scan.entries, scan.latest));
         if scan.arrived > 0 && scan.qualified == 0 {
             // it has waited in vain
             self.quality = false;
@@ -448,10 +517,10 @@ impl<const N: usize> Ars408<N> {
             time: scan.started,
             received: scan.started,
             number: u32::from(scan.number),
-            detections: self.collected.detections(),
+            detections: self.collected.wanted(),
+            all: self.collected.detections(),
             missing,
             refused: scan.refused,
-            unwanted: scan.unwanted,
             fault: self.fault,
         })
     }
@@ -464,6 +533,6 @@ impl Gathering {
     }
 
     fn complete(&self, quality: bool) -> bool {
-        self.arrived == self.announced && (!quality || self.qualified == self.announced)
+        !self.open && self.arrived == self.announced && (!quality || self.qualified == self.announced)
     }
 }

@@ -235,5 +235,6 @@ fn read_detection(&[r0, r1, a0, a1, e0, e1, v0, v1, rcs, snr]: &[u8; RECORD]) ->
         radial_velocity_cm_s: i16::from_le_bytes([v0, v1]),
         rcs_half_dbsm: (rcs != NO_RCS).then(|| i16::from(rcs)),
         snr_half_db: (snr != NO_SNR).then(|| i16::from(snr)),
+        marked: false,
     })
 }

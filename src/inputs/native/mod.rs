@@ -62,6 +62,7 @@
 //!     radial_velocity_cm_s: -2500,
 //!     rcs_half_dbsm: Some(20),
 //!     snr_half_db: None,
+//!     marked: false,
 //! };
 //! let mut sender = NativeSender::new(7);
 //! let mut receiver = NativeReceiver::<256>::new(NativeConfig::sensor(7));

@@ -330,9 +330,9 @@ impl<const N: usize, T: NativeEntry> NativeReceiver<N, T> {
             received: scan.received,
             number: u32::from(scan.number),
             detections: self.collected.detections(),
+            all: self.collected.detections(),
             missing,
             refused: scan.refused,
-            unwanted: 0,
             fault: scan.fault,
         }))
     }

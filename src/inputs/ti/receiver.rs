@@ -400,9 +400,9 @@ impl<const N: usize> Ti<N> {
             received: self.started,
             number: header.number,
             detections: self.collected.detections(),
+            all: self.collected.detections(),
             missing: announced.saturating_sub(self.points),
             refused: self.refused,
-            unwanted: 0,
             fault: false,
         })
     }

@@ -22,6 +22,7 @@ fn detection(b: &[u8]) -> Detection {
         radial_velocity_cm_s: two(6),
         rcs_half_dbsm: (b[8] & 2 == 2).then(|| i16::from(b[9] as i8).max(-127)),
         snr_half_db: (b[8] & 4 == 4).then(|| i16::from(b[9]).min(254)),
+        marked: false,
     }
 }
 

@@ -59,6 +59,7 @@ fn detections() -> Vec<Detection> {
         radial_velocity_cm_s: -500,
         rcs_half_dbsm: Some(3),
         snr_half_db: Some(40),
+        marked: false,
     };
     (0..DETECTIONS).map(one).collect()
 }

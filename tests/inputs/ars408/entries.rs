@@ -128,7 +128,8 @@ fn the_radars_own_marks_sort_out() {
     }
     let Ars408Outcome::Scan(scan) = radar.push(&frame(&quality(4, 0x0B)), at(71)) else { panic!() };
     assert_eq!(scan.detections.len(), 2, "the ambiguous and the invalid one are gone");
-    assert_eq!((scan.unwanted, scan.missing, scan.refused), (2, 0, 0), "they arrived");
+    assert_eq!((scan.unwanted().len(), scan.missing, scan.refused), (2, 0, 0), "they arrived");
+    assert!(scan.unwanted().iter().all(|d| d.marked) && scan.frame().input.len() == 4, "estimators are told where");
     assert_eq!((radar.counters().unwanted, radar.counters().incomplete), (2, 0));
     let all = Ars408Config { wanted: Ars408Wanted::ALL, ..Ars408Config::sensor(0) };
     assert_eq!(Ars408::<64>::new(all).config().wanted, Ars408Wanted::ALL);

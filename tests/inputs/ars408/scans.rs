@@ -25,6 +25,65 @@ fn a_scan_is_over_when_everything_announced_has_come() {
     assert_eq!((counters.frames, counters.scans, counters.incomplete, counters.lost), (8, 4, 0, 0));
 }
 
+/// Scans of both entries, 70 ms apart, under status messages that announce so many, polled as time passes.
+fn announced(radar: &mut Ars408<64>, first: u64, counts: &[u16]) -> Vec<Vec<u16>> {
+    let mut all = Vec::new();
+    let mut keep = |outcome: Option<Ars408Outcome<'_>>| {
+        all.extend(outcome.and_then(got).map(|scan| scan.detections.iter().map(|d| d.0).collect::<Vec<_>>()));
+    };
+    for (i, count) in (first..).zip(counts) {
+        let status = format!("60A#{count:02X}{:04X}10", 2 * i + 1);
+        for (k, text) in (0..).zip([status.as_str(), NEAR, FAR]) {
+            keep(Some(radar.push(&frame(text), at(i * 70 + k))));
+        }
+        for wait in [20, 40] {
+            keep(radar.poll(at(i * 70 + wait)));
+        }
+    }
+    all
+}
+
+#[test]
+fn entries_beyond_those_announced_are_evidence_from_the_third_scan_on() {
+    for (count, first) in [(0, vec![]), (1, vec![2000])] {
+        let mut radar = radar();
+        let scans = announced(&mut radar, 0, &[count; 6]);
+        let whole = vec![2000, 3000];
+        assert_eq!(
+            scans.iter().collect::<Vec<_>>(),
+            [&first, &first, &whole, &whole, &whole, &whole],
+            "{count} announced"
+        );
+        assert_eq!(radar.counters().surplus, 6 * u32::from(2 - count));
+    }
+}
+
+#[test]
+fn announcements_count_again_once_they_hold() {
+    let mut radar = radar();
+    announced(&mut radar, 0, &[0; 3]);
+    let long = radar.poll(at(3 * 70));
+    assert_eq!(long, None, "it was given out when nothing more came");
+    let scans = announced(&mut radar, 3, &[2; 10]);
+    assert!(scans.iter().all(|scan| scan.len() == 2), "{scans:?}");
+    // the last of them did not wait
+    radar.push(&frame("60A#01FFFF10"), at(13 * 70));
+    assert!(got(radar.push(&frame(NEAR), at(13 * 70 + 1))).is_some());
+}
+
+#[test]
+fn entries_of_a_scan_whose_status_was_lost_are_not_taken_for_more_of_the_one_before() {
+    let mut radar = radar();
+    for k in 0..4 {
+        let status = format!("60A#01{:04X}10", 4 * k + 1);
+        assert_eq!(scans(&mut radar, &[&status, NEAR]).len(), 1);
+        for text in [NEAR, FAR] {
+            assert_eq!(radar.push(&frame(text), at(70)), Ars408Outcome::Refused(Refusal::NoScan));
+        }
+    }
+    assert_eq!((radar.counters().surplus, radar.counters().no_scan), (0, 8));
+}
+
 #[test]
 fn the_next_scan_ends_one_that_misses_entries() {
     let mut radar = radar();

@@ -53,6 +53,7 @@ fn detections(scene: &str, frame: u64) -> Vec<Detection> {
                 radial_velocity_cm_s: if scene == CROWD && i % 2 == 0 { 0 } else { speed },
                 rcs_half_dbsm: Some(20),
                 snr_half_db: Some(60),
+                marked: false,
             }
         })
         .collect()

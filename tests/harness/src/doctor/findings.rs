@@ -34,6 +34,10 @@ pub struct Finding {
     pub remedy: String,
 }
 
+/// What to do about points of which nothing is known.
+pub const UNUSABLE: &str =
+    "compare with the vehicles on the road: a unit says that its radar is unusable until they pass";
+
 /// Frames of 8 bytes that fit into a second of 500 kbit/s, stuff bits included.
 const MOST_FRAMES: usize = 3700;
 
@@ -281,10 +285,17 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
     if c.restarts > 0 && !runs_backwards(report) {
         found.add(Severity::Warning, format!("{name} started over {} times", c.restarts), "check its supply");
     }
-    if c.repeated + c.surplus > 0 {
+    if c.surplus > 0 {
         found.add(
             Severity::Warning,
-            format!("{name}: {} entries or status messages came twice or beyond those announced", c.repeated + c.surplus),
+            format!("{name}: {} entries came beyond those that the status messages announce", c.surplus),
+            "nothing for the map: from the third such scan on they are taken. A gateway or clone that counts wrongly, or two devices with one sensor id",
+        );
+    }
+    if c.repeated > 0 {
+        found.add(
+            Severity::Warning,
+            format!("{name}: {} entries or status messages came twice", c.repeated),
             "two devices with one sensor id, or a log with every frame twice: give each sensor an id of its own (2x0, SensorID)",
         );
     }
@@ -299,7 +310,13 @@ fn scans(found: &mut Findings, sensor: &Sensor, report: &Report) {
         found.add(
             Severity::Warning,
             format!("{name}: the RCS of all {} entries is {rcs} dBsm: it is not filled", sensor.entries),
-            "look for the gateway's or the clone's settings; until then it is taken as not measured",
+            "look for the gateway's or the clone's settings: replays take it as not measured, and a unit knows nothing of the road until then",
+        );
+    } else if let Some(unusable) = &sensor.unusable {
+        found.add(
+            if sensor.unusable_share > 0.5 { Severity::Error } else { Severity::Warning },
+            format!("{name}: {unusable}"),
+            UNUSABLE,
         );
     }
     if sensor.implausible > 0.2 {

@@ -182,7 +182,7 @@ fn judged<L: Lines + ?Sized>(
     duration_s: f64,
 ) -> Examined {
     let profile = known.profile.unwrap_or(&Ars408Profile::ARS408);
-    let sensors = sensor::all(lines, profile);
+    let sensors = sensor::all(lines, profile, known.wanted);
     if sensors.is_empty() {
         let native = recording::native::of_log(lines);
         if !native.is_empty() {

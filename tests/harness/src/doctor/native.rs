@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::findings::UNUSABLE;
 use super::findings::{Finding, Severity};
 use super::sensor::Spread;
+use crate::recording::judged::Watch;
 use crate::recording::native::{Messages, flaws, scans, sensors};
 
 /// What is said of a capture.
@@ -29,6 +31,9 @@ pub struct Sensor {
     pub detections: usize,
     pub period_ms: Option<Spread>,
     pub faults: usize,
+    /// What a unit concludes of points that come again and are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unusable: Option<String>,
     pub counters: BTreeMap<&'static str, u32>,
 }
 
@@ -37,8 +42,12 @@ pub fn examine(log: String, messages: &Messages, framing_errors: u32) -> Report 
     let found = sensors(messages);
     let one = |(&sensor, &n): (&u8, &usize)| {
         let (mut times, mut detections, mut faults) = (Vec::new(), 0, 0);
+        let mut watch = Watch::anywhere();
         let counters = scans(sensor, messages, |scan| {
             times.push(scan.time.micros());
+            if let Some(watch) = &mut watch {
+                watch.frame(scan.time, scan.all);
+            }
             detections += scan.detections.len();
             faults += usize::from(scan.fault);
         });
@@ -46,7 +55,8 @@ pub fn examine(log: String, messages: &Messages, framing_errors: u32) -> Report 
         // what does not pass this sensor's check may be another's
         counters.remove("message damaged, refused");
         let periods = times.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 / 1000.0).collect();
-        Sensor { sensor, messages: n, scans: times.len(), detections, period_ms: Spread::of(periods), faults, counters }
+        let (period_ms, unusable) = (Spread::of(periods), watch.and_then(Watch::end).map(|found| found.said()));
+        Sensor { sensor, messages: n, scans: times.len(), detections, period_ms, faults, unusable, counters }
     };
     let known: usize = found.values().sum();
     let sensors: Vec<Sensor> = found.iter().map(one).collect();
@@ -68,6 +78,9 @@ pub fn examine(log: String, messages: &Messages, framing_errors: u32) -> Report 
         );
     }
     for s in &sensors {
+        if let Some(unusable) = &s.unusable {
+            add(Severity::Warning, format!("sensor {}: {unusable}", s.sensor), UNUSABLE);
+        }
         for (what, n) in s.counters.iter().filter(|(_, n)| **n > 0) {
             add(
                 Severity::Warning,

@@ -17,6 +17,7 @@ use crate::recording::ars408_feed::{Feed, classic};
 use crate::recording::can_log::Line;
 use crate::recording::can_log::log::Lines;
 use crate::recording::capture::weak;
+use crate::recording::judged::Watch;
 use crate::recording::kind;
 
 /// What a sensor sends.
@@ -50,6 +51,11 @@ pub struct Sensor {
     /// The RCS of all entries, where it never changes and is below the gate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub only_rcs_dbsm: Option<f32>,
+    /// What a unit concludes of points that come again and are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unusable: Option<String>,
+    /// Share of the scans of which nothing is known for that.
+    pub unusable_share: f64,
     pub version: Option<String>,
     #[serde(serialize_with = "state")]
     pub state: Option<RadarState>,
@@ -75,7 +81,7 @@ impl Spread {
 }
 
 /// Every sensor that sent something.
-pub fn all<L: Lines + ?Sized>(lines: &L, profile: &Ars408Profile) -> Vec<Sensor> {
+pub fn all<L: Lines + ?Sized>(lines: &L, profile: &Ars408Profile, wanted: Option<Ars408Wanted>) -> Vec<Sensor> {
     let mut found: Vec<Examining> = Vec::new();
     lines.each(&mut |line| {
         let Some(frame) = classic(line).filter(|f| !f.fd) else { return };
@@ -84,7 +90,7 @@ pub fn all<L: Lines + ?Sized>(lines: &L, profile: &Ars408Profile) -> Vec<Sensor>
         };
         let place = found.iter().position(|one| one.sensor == sensor && one.interface == line.interface);
         let place = place.unwrap_or_else(|| {
-            found.push(Examining::new(&line.interface, sensor, profile));
+            found.push(Examining::new(&line.interface, sensor, profile, wanted));
             found.len() - 1
         });
         found[place].take(line, &frame, message);
@@ -110,12 +116,18 @@ struct Examining {
     first: Vec<Line>,
 }
 
-#[derive(Default)]
 struct Scans {
     times: Vec<u64>,
     entries: usize,
     odd: usize,
     only_rcs: Option<i16>,
+    watch: Option<Watch>,
+}
+
+impl Default for Scans {
+    fn default() -> Self {
+        Self { times: Vec::new(), entries: 0, odd: 0, only_rcs: None, watch: Watch::anywhere() }
+    }
 }
 
 /// Entries that tell that a value never changes.
@@ -124,20 +136,24 @@ const TELLING: usize = 50;
 impl Scans {
     fn take(&mut self, scan: &RadarScan<'_>) {
         self.times.push(scan.time.micros());
-        for detection in scan.detections {
+        if let Some(watch) = &mut self.watch {
+            watch.frame(scan.time, scan.all);
+        }
+        for detection in scan.all {
             let same = self.entries == 0 || self.only_rcs == detection.rcs_half_dbsm;
             self.only_rcs = detection.rcs_half_dbsm.filter(|_| same);
             self.entries += 1;
         }
         // behind: more than a quarter turn to a side
-        self.odd +=
-            scan.detections.iter().filter(|d| d.range_cm > 26_000 || d.azimuth.raw().unsigned_abs() > 1 << 14).count();
+        self.odd += scan.all.iter().filter(|d| d.range_cm > 26_000 || d.azimuth.raw().unsigned_abs() > 1 << 14).count();
     }
 }
 
 impl Examining {
-    fn new(interface: &str, sensor: u8, profile: &Ars408Profile) -> Self {
-        let config = Ars408Config { wanted: Ars408Wanted::ALL, profile: *profile, ..Ars408Config::sensor(sensor) };
+    fn new(interface: &str, sensor: u8, profile: &Ars408Profile, wanted: Option<Ars408Wanted>) -> Self {
+        let usual = Ars408Config::sensor(sensor);
+        let wanted = wanted.unwrap_or(usual.wanted);
+        let config = Ars408Config { wanted, profile: *profile, ..usual };
         Self {
             interface: interface.to_owned(),
             sensor,
@@ -175,11 +191,12 @@ impl Examining {
     }
 
     fn end(mut self) -> Sensor {
-        let Scans { times, entries, odd, only_rcs } = {
+        let Scans { times, entries, odd, only_rcs, watch } = {
             let scans = &mut self.scans;
             self.feed.end(&mut |scan| scans.take(scan));
             std::mem::take(scans)
         };
+        let unusable = watch.and_then(Watch::end);
         let (clusters, objects) = (self.clusters, self.objects);
         Sensor {
             interface: self.interface,
@@ -199,6 +216,8 @@ impl Examining {
             only_rcs_dbsm: only_rcs
                 .map(|rcs| f32::from(rcs) / 2.0)
                 .filter(|rcs| *rcs < weak()[1] && entries >= TELLING),
+            unusable_share: unusable.as_ref().map_or(0.0, |found| found.frames as f64 / found.of.max(1) as f64),
+            unusable: unusable.map(|found| found.said()),
             rather: kind::rather(&self.first.iter().collect::<Vec<_>>(), self.sensor, &self.profile),
             implausible: if entries > 0 { odd as f64 / entries as f64 } else { 0.0 },
             version: self.version.map(|v| v.release.map(|n| n.to_string()).join(".")),
@@ -258,7 +277,7 @@ fn counters<S: serde::Serializer>(c: &Ars408Counters, serializer: S) -> Result<S
 }
 
 /// The decoder's counters by name.
-pub fn named(c: &Ars408Counters) -> [(&'static str, u32); 13] {
+pub fn named(c: &Ars408Counters) -> [(&'static str, u32); 14] {
     [
         ("frames", c.frames),
         ("scans", c.scans),
@@ -272,6 +291,7 @@ pub fn named(c: &Ars408Counters) -> [(&'static str, u32); 13] {
         ("surplus", c.surplus),
         ("unknown_entry", c.unknown_entry),
         ("no_range", c.no_range),
+        ("unwanted", c.unwanted),
         ("overflow", c.overflow),
     ]
 }

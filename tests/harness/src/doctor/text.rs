@@ -127,6 +127,7 @@ fn in_words(counter: &str) -> Option<&'static str> {
         "surplus" => "entries more than announced",
         "unknown_entry" => "entries of another scan",
         "no_range" => "entries at no measurable range",
+        "unwanted" => "entries left out by the radar's own marks",
         "overflow" => "entries more than there is room for",
         _ => return None,
     })

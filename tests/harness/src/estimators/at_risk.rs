@@ -1,5 +1,6 @@
 //! `radar-3d-risk`: the map of `radar-3d` with bits that keep a risk, by a unit's table of probabilities.
 
+use viewshed::frame::health::Condition;
 use viewshed::map::polar::PolarGeometry;
 use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
@@ -47,8 +48,8 @@ impl Estimator for AtRisk {
         self.inner.reset();
     }
 
-    fn is_settled(&self) -> bool {
-        self.inner.is_settled()
+    fn condition(&self) -> Condition {
+        self.inner.condition()
     }
 
     fn step(&mut self, frame: &Frame) {

@@ -172,7 +172,7 @@ mod tests {
     }
 
     fn frame(time_ns: i64) -> Frame {
-        Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: 0, fault: false }
+        Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: Vec::new(), fault: false }
     }
 
     /// A truck to the left: 12 x 2.5 x 4 m, its rear at 40 m, 3 m to the left.

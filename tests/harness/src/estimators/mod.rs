@@ -16,7 +16,7 @@ use viewshed::camera::Camera3dConfig;
 use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{Detection, NotADetection};
 use viewshed::frame::gate::{Rejection, Rejections};
-use viewshed::frame::health::FrameStatus;
+use viewshed::frame::health::{Condition, FrameStatus};
 use viewshed::grid::settling::SettlingConfig;
 use viewshed::map::polar::{PolarGeometry, PolarMap};
 use viewshed::map::{CellState, VisibilityMap};
@@ -75,10 +75,10 @@ pub trait Estimator: Send {
         Vec::new()
     }
 
-    /// Whether its map has [settled](viewshed::grid::settling): nothing of it is unknown because the unit has just started, or
-    /// frames were missing.
-    fn is_settled(&self) -> bool {
-        true
+    /// What its map is worth after the last frame; not healthy as long as it has not [settled](viewshed::grid::settling), or
+    /// points come that cannot be used.
+    fn condition(&self) -> Condition {
+        Condition::Healthy
     }
 
     /// Azimuth's noise that it now works with, degrees, where that is learnt and not the configured one.
@@ -420,12 +420,12 @@ impl Intake {
     pub(crate) fn take(&mut self, frame: &Frame) -> (Time, &[Detection], FrameStatus) {
         self.detections.clear();
         let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
-        let unwanted = u16::try_from(frame.unwanted).unwrap_or(u16::MAX);
         self.dropped += frame.refused;
-        for d in &frame.detections {
+        let unwanted = frame.unwanted.iter().map(|d| (d, true));
+        for (d, marked) in frame.detections.iter().map(|d| (d, false)).chain(unwanted) {
             let why = match Detection::new(&measurement(d)) {
                 Ok(d) => {
-                    self.detections.push(d);
+                    self.detections.push(Detection { marked, ..d });
                     continue;
                 }
                 Err(why) => why,
@@ -438,7 +438,7 @@ impl Intake {
             }
         }
         let micros = u64::try_from(frame.time_ns / 1000).unwrap_or(0);
-        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused, unwanted })
+        (Time::from_micros(micros), &self.detections, FrameStatus { fault: frame.fault, refused })
     }
 
     fn counters(&self, rejections: &Rejections) -> Vec<(&'static str, u64)> {

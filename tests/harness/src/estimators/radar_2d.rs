@@ -1,6 +1,7 @@
 //! `radar-2d` and `radar-2d-first`: the two readings of the conventional grid.
 
 use anyhow::Result;
+use viewshed::frame::health::Condition;
 use viewshed::map::query::Footprint;
 use viewshed::map::{CellState, VisibilityMap};
 use viewshed::radar_2d::{Radar2d, Radar2dConfig, Radar2dParameters, Radar2dReading};
@@ -27,6 +28,7 @@ struct Driver<const D: usize> {
     parameters: Radar2dParameters,
     state: Box<Radar2d<CELLS, WORDS, RAYS, D>>,
     intake: Intake,
+    condition: Condition,
 }
 
 /// The estimator; storage for 256 detections unless more are asked for.
@@ -37,12 +39,12 @@ pub fn new(
     config: &Radar2dConfig,
 ) -> Result<Box<dyn Estimator>> {
     let parameters = Radar2dParameters::new::<CELLS, WORDS, RAYS>(sensor, config)?;
-    let intake = Intake::default();
+    let (intake, condition) = (Intake::default(), Condition::Starting);
     Ok(if config.gate.max_detections <= 256 {
-        Box::new(Driver::<256> { name, reading, parameters, state: Box::default(), intake })
+        Box::new(Driver::<256> { name, reading, parameters, state: Box::default(), intake, condition })
     } else {
         let state: Box<Radar2d<CELLS, WORDS, RAYS, MOST_DETECTIONS>> = Box::default();
-        Box::new(Driver { name, reading, parameters, state, intake })
+        Box::new(Driver { name, reading, parameters, state, intake, condition })
     })
 }
 
@@ -67,7 +69,11 @@ impl<const D: usize> Estimator for Driver<D> {
 
     fn step(&mut self, frame: &Frame) {
         let (now, detections, status) = self.intake.take(frame);
-        self.state.process(&self.parameters, now, detections, status);
+        self.condition = self.state.process(&self.parameters, now, detections, status);
+    }
+
+    fn condition(&self) -> Condition {
+        self.condition
     }
 
     fn map(&self) -> &dyn VisibilityMap {

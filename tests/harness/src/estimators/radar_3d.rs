@@ -72,7 +72,7 @@ struct Driver<const R: usize, const A: usize, const E: usize, const W: usize, co
     mount: Mount,
     intake: Intake,
     no_room: u32,
-    is_settled: bool,
+    condition: Condition,
     /// What was counted before the recording that is judged.
     counted_before: Vec<(&'static str, u64)>,
 }
@@ -162,7 +162,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
             mount,
             intake,
             no_room: 0,
-            is_settled: false,
+            condition: Condition::Starting,
             counted_before: Vec::new(),
         })
     }
@@ -208,7 +208,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         let (now, detections, status) = self.intake.take(frame);
         let report = self.state.process(&self.parameters, now, detections, status, &mut self.map);
         self.no_room = report.obstacles_dropped;
-        self.is_settled = report.condition != Condition::Settling;
+        self.condition = report.condition;
     }
 
     fn map(&self) -> &dyn VisibilityMap {
@@ -247,8 +247,8 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         all.map(|(name, n)| (name, n - before(name))).filter(|(_, n)| *n > 0).collect()
     }
 
-    fn is_settled(&self) -> bool {
-        self.is_settled
+    fn condition(&self) -> Condition {
+        self.condition
     }
 
     fn azimuth_noise_deg(&self) -> Option<f64> {
@@ -316,7 +316,7 @@ mod tests {
             time_ns: 1_000_000_000 + k * 66_000_000,
             detections: (0..vehicles).map(detection).collect(),
             refused: 0,
-            unwanted: 0,
+            unwanted: Vec::new(),
             fault: false,
         }
     }

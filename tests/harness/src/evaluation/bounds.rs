@@ -44,7 +44,7 @@ fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool)
         counters: Vec::new(),
         azimuth_noise_deg: None,
         learnt_lanes: None,
-        settled: Vec::new(),
+        conditions: Vec::new(),
     }
 }
 

@@ -106,7 +106,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
             counters: Vec::new(),
             azimuth_noise_deg: None,
             learnt_lanes: None,
-            settled: Vec::new(),
+            conditions: Vec::new(),
             ..s.clone()
         })
         .collect();
@@ -126,7 +126,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
                 time_ns: frames.len() as i64 * BLOCK_NS,
                 detections: Vec::new(),
                 refused: 0,
-                unwanted: 0,
+                unwanted: Vec::new(),
                 fault: false,
             });
             counted += second.frames;

@@ -372,7 +372,7 @@ pub mod by_hand {
                     time_ns: k as i64 * PERIOD_NS,
                     detections: Vec::new(),
                     refused: 0,
-                    unwanted: 0,
+                    unwanted: Vec::new(),
                     fault: false,
                 })
                 .collect(),

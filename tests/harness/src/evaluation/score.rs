@@ -1,5 +1,6 @@
 //! Runs one estimator over a recording and scores its map at every counted frame.
 
+use viewshed::frame::health::Condition;
 use viewshed::map::{Visibility, VisibilityMap};
 use viewshed::sensor::road::RoadPoint;
 
@@ -34,8 +35,8 @@ pub struct Score {
     pub azimuth_noise_deg: Option<f64>,
     /// Places at which it has learnt a lane until the end; `None` of several recordings together.
     pub learnt_lanes: Option<usize>,
-    /// Whether its map had settled, by frame; empty where that is not known.
-    pub settled: Vec<bool>,
+    /// What its map was worth, by frame; empty where that is not known.
+    pub conditions: Vec<Condition>,
 }
 
 /// The frames whose map had settled, and what is counted in them.
@@ -62,7 +63,7 @@ impl Score {
     /// What is left without the frames whose map had not settled; `None` where all had.
     pub fn settled(&self, samples: &[FrameSamples]) -> Option<Settled> {
         let counted: Vec<usize> = (0..samples.len()).filter(|k| samples[*k].counted).collect();
-        let has_settled = |k: &usize| self.settled.get(*k).copied().unwrap_or(true);
+        let has_settled = |k: &usize| self.conditions.get(*k) != Some(&Condition::Settling);
         if counted.iter().all(has_settled) {
             return None;
         }
@@ -75,6 +76,13 @@ impl Score {
             settled.cells += self.cells.get(k).map(|tally| tally.counts).unwrap_or_default();
         }
         Some(settled)
+    }
+
+    /// Counted frames in which points came and could not be used, so that all was unknown.
+    pub fn unusable(&self, samples: &[FrameSamples]) -> usize {
+        let unusable =
+            |(sample, condition): &(&FrameSamples, &Condition)| sample.counted && **condition == Condition::Unusable;
+        samples.iter().zip(&self.conditions).filter(unusable).count()
     }
 
     pub fn cell_counts(&self) -> CellCounts {
@@ -94,7 +102,7 @@ pub fn score(
 ) -> Score {
     let mut judged_on = grid;
     let (mut verdicts, mut cells) = (Vec::new(), Vec::new());
-    let mut settled = Vec::with_capacity(samples.len());
+    let mut conditions = Vec::with_capacity(samples.len());
     // hours without labels have nothing to be judged frame by frame
     let judged = samples.iter().any(|sample| !sample.objects.is_empty() || !sample.cells.is_empty());
     cells.extend((!judged && !samples.is_empty()).then(CellTally::default));
@@ -104,7 +112,7 @@ pub fn score(
         }
         estimator.step(frame);
         progress();
-        settled.push(estimator.is_settled());
+        conditions.push(estimator.condition());
         if !judged {
             continue;
         }
@@ -128,7 +136,7 @@ pub fn score(
         counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
         azimuth_noise_deg: estimator.azimuth_noise_deg(),
         learnt_lanes: Some(estimator.learnt_lanes().len()),
-        settled,
+        conditions,
     }
 }
 
@@ -241,7 +249,7 @@ pub mod by_hand {
             counters: Vec::new(),
             azimuth_noise_deg: None,
             learnt_lanes: None,
-            settled: Vec::new(),
+            conditions: Vec::new(),
         }
     }
 }

@@ -43,6 +43,8 @@ pub struct Row {
     pub learnt_lanes: Option<usize>,
     /// Without the frames whose map had not settled, where there are any.
     pub settled: Option<Settled>,
+    /// Frames in which points came and could not be used, so that all was unknown.
+    pub unusable: usize,
     /// Counts of each object unit, and of each block: what is drawn again.
     pub by_unit: Vec<Counts>,
     pub by_block: Vec<CellCounts>,
@@ -164,6 +166,7 @@ impl Summary {
                 azimuth_noise_deg: score.azimuth_noise_deg,
                 learnt_lanes: score.learnt_lanes,
                 settled: score.settled(samples),
+                unusable: score.unusable(samples),
                 by_unit: drawn.by_unit.clone(),
                 by_block: drawn.by_block.clone(),
             }

@@ -87,7 +87,7 @@ fn of_log(name: &str, log: &Log, heard: &Heard, mut problems: Problems, options:
         if scan.fault {
             problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
         }
-        if scan.unwanted > 0 && scan.detections.is_empty() {
+        if !scan.unwanted().is_empty() && scan.detections.is_empty() {
             problems.add(
                 &interface,
                 "scan of which every entry was left out: it says nothing of the road",
@@ -99,7 +99,7 @@ fn of_log(name: &str, log: &Log, heard: &Heard, mut problems: Problems, options:
             time_ns: nanoseconds(scan.time),
             detections,
             refused: scan.refused.into(),
-            unwanted: scan.unwanted.into(),
+            unwanted: scan.unwanted().iter().map(capture::detection).collect(),
             fault: scan.fault,
         });
     };
@@ -217,7 +217,7 @@ fn report(problems: &mut Problems, interface: &str, start: i64, c: &Ars408Counte
         ("frame too short, refused", c.too_short),
         ("entry without a status message before it, refused", c.no_scan),
         ("entry or status that came twice, refused", c.repeated),
-        ("entry beyond those announced, refused", c.surplus),
+        ("entry beyond those announced; from the third such scan on they are taken", c.surplus),
         ("quality of an entry that did not arrive", c.unknown_entry),
         ("entry at no distance or beyond 655 m, dropped", c.no_range),
         (
@@ -291,7 +291,7 @@ mod tests {
         };
         let (without, with) = (read(0x00), read(0x02));
         let entries = |r: &Recording| r.frames.iter().map(|f| f.detections.len()).sum::<usize>();
-        let unwanted = |r: &Recording| r.frames.iter().map(|f| f.unwanted).sum::<u64>();
+        let unwanted = |r: &Recording| r.frames.iter().map(|f| f.unwanted.len() as u64).sum::<u64>();
         assert_eq!((entries(&without), unwanted(&with)), (0, 0));
         assert_eq!(unwanted(&without), entries(&with) as u64);
         let said: Vec<_> = without.problems.iter().map(|p| (p.what, p.count)).collect();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 
 use super::labels::{self, LabelClock, LabelsRead};
-use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, labelled, plausible, unfilled};
+use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, judged, labelled, plausible, unfilled};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -51,6 +51,7 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
         clock::check(&recording.frames, &mut recording.problems);
     }
     unfilled::check(&mut recording);
+    judged::check(&mut recording);
     plausible::check(&mut recording);
     labelled::check(&mut recording);
     restrict(&mut recording, options);

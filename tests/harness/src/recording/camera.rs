@@ -131,7 +131,7 @@ impl RecordedCamera {
     /// As a recording of its own, its frames without detections; `sensor` says what is known beside the view.
     pub fn alone(mut self, name: String, sensor: Sensor, truth: Option<Truth>, range_max_m: f64) -> Recording {
         self.alone = true;
-        let frame = |time_ns| Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: 0, fault: false };
+        let frame = |time_ns| Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: Vec::new(), fault: false };
         Recording {
             name,
             sensor: Sensor {

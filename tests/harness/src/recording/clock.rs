@@ -71,7 +71,7 @@ mod tests {
             time_ns: (s * 1e9) as i64,
             detections: Vec::new(),
             refused: 0,
-            unwanted: 0,
+            unwanted: Vec::new(),
             fault: false,
         };
         let frames: Vec<Frame> = seconds.iter().map(frame).collect();

@@ -178,8 +178,13 @@ mod tests {
                 snr_db: Some(20.0 + (k % 5) as f32),
             };
             let detections = (0..4).map(d).collect();
-            let frame =
-                super::super::Frame { time_ns: k * 66_000_000, detections, refused: 0, unwanted: 0, fault: false };
+            let frame = super::super::Frame {
+                time_ns: k * 66_000_000,
+                detections,
+                refused: 0,
+                unwanted: Vec::new(),
+                fault: false,
+            };
             writer.frame(&frame).unwrap();
         }
         let bytes = writer.finish().unwrap().into_inner();

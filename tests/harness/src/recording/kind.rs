@@ -57,7 +57,7 @@ impl Fit {
                 time_ns: i64::try_from(scan.time.micros()).unwrap_or(i64::MAX / 1000).saturating_mul(1000),
                 detections: scan.detections.iter().map(capture::detection).collect(),
                 refused: 0,
-                unwanted: 0,
+                unwanted: Vec::new(),
                 fault: false,
             });
         };

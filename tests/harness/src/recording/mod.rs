@@ -15,6 +15,7 @@ mod dialects;
 pub mod file;
 pub mod foreign;
 pub mod ignored;
+pub mod judged;
 pub mod kind;
 pub mod labelled;
 pub mod labels;
@@ -85,8 +86,8 @@ pub struct Frame {
     pub detections: Vec<RadarDetection>,
     /// Points dropped when it was read: not finite, or at no distance.
     pub refused: u64,
-    /// Points left out by the radar's own marks.
-    pub unwanted: u64,
+    /// What was left out by the radar's own marks: no estimator uses it, and it is looked at where it lies.
+    pub unwanted: Vec<RadarDetection>,
     /// The radar says that something is wrong with it.
     pub fault: bool,
 }

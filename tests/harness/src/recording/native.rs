@@ -101,7 +101,7 @@ pub fn read(name: String, messages: &Messages, broken: u32, options: &ReadOption
             time_ns,
             detections,
             refused: scan.refused.into(),
-            unwanted: scan.unwanted.into(),
+            unwanted: scan.unwanted().iter().map(capture::detection).collect(),
             fault: scan.fault,
         });
     });

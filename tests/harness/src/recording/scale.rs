@@ -258,7 +258,7 @@ mod tests {
                     add(place, speed * place[0] / place[0].hypot(place[1]), &mut dice, 0.9);
                 }
             }
-            Frame { time_ns: (time_s * 1e9) as i64, detections, refused: 0, unwanted: 0, fault: false }
+            Frame { time_ns: (time_s * 1e9) as i64, detections, refused: 0, unwanted: Vec::new(), fault: false }
         };
         (0..150).map(frame).collect()
     }

@@ -227,7 +227,7 @@ fn of_one_scan(first: &Message, message: &Message, period: Option<Period>, near_
 /// One frame of the messages of a scan.
 fn joined(group: Vec<Message>, topic: &str, problems: &mut Problems) -> Frame {
     let time_ns = group.first().map_or(0, |m| m.time_ns);
-    let mut frame = Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: 0, fault: false };
+    let mut frame = Frame { time_ns, detections: Vec::new(), refused: 0, unwanted: Vec::new(), fault: false };
     let (mut taken, mut pieces): (Vec<Vec<RadarDetection>>, u64) = (Vec::new(), 0);
     for m in group {
         let Points { detections, not_finite, not_a_range, .. } = m.points;

@@ -62,7 +62,7 @@ pub fn read(name: String, bytes: &[u8], options: &ReadOptions) -> Result<Recordi
             time_ns: START_NS,
             detections,
             refused: scan.refused.into(),
-            unwanted: scan.unwanted.into(),
+            unwanted: scan.unwanted().iter().map(capture::detection).collect(),
             fault: scan.fault,
         });
     });

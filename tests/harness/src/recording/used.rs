@@ -22,7 +22,7 @@ pub fn frames(recording: &Recording) -> Vec<Frame> {
     let Some(gate) = usable::gate(recording, &GateConfig::default()) else { return recording.frames.clone() };
     let used = |frame: &Frame| {
         let all = frame.detections.iter().filter(|d| !is_outside(usable::rejected(&gate, d)));
-        Frame { detections: all.copied().collect(), ..*frame }
+        Frame { detections: all.copied().collect(), unwanted: frame.unwanted.clone(), ..*frame }
     };
     recording.frames.iter().map(used).collect()
 }

@@ -122,7 +122,7 @@ impl<W: Write + Seek> RecordingWriter<W> {
     /// A frame of any radar, by its place among them. One of which every point was refused or left out is not written:
     /// read back, a cloud without points would be a radar that looks and sees nothing.
     pub fn frame_of(&mut self, radar: usize, frame: &Frame) -> Result<()> {
-        if frame.detections.is_empty() && frame.refused + frame.unwanted > 0 {
+        if frame.detections.is_empty() && (frame.refused > 0 || !frame.unwanted.is_empty()) {
             return Ok(());
         }
         let [topic, frame_id] = self.radars.get(radar).context("a frame of no radar")?.clone();

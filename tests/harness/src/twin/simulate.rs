@@ -202,7 +202,7 @@ impl Simulation {
             }
         };
         let in_view = self.in_view(&labels);
-        let frame = |detections| Frame { time_ns, detections, refused: 0, unwanted: 0, fault: false };
+        let frame = |detections| Frame { time_ns, detections, refused: 0, unwanted: Vec::new(), fault: false };
         let further = (1..).zip(&self.further_radars);
         let further =
             further.map(|(k, radar)| frame(self.scan(radar, since_s, number + (k << FURTHER_BITS)))).collect();

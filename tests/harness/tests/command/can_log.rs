@@ -244,7 +244,7 @@ fn the_doctor_tells_two_devices_with_one_id_restarts_and_heat() {
     let (code, report) = judge(&folder, &lines);
     assert_eq!(code, 1, "a fault is an error");
     for (what, severity, remedy) in [
-        ("came twice or beyond those announced", "warning", "two devices with one sensor id"),
+        ("entries or status messages came twice", "warning", "two devices with one sensor id"),
         ("started over 1 times", "warning", "supply"),
         ("reports temperature", "error", "cool"),
         ("a scan every 200 ms", "warning", "time stamps"),

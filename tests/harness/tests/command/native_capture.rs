@@ -21,6 +21,7 @@ fn scan(i: u64) -> Vec<Detection> {
         radial_velocity_cm_s: -750,
         rcs_half_dbsm: Some(10 + n as i16),
         snr_half_db: Some(40 + n as i16),
+        marked: false,
     };
     (0..12).map(one).collect()
 }

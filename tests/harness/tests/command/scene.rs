@@ -73,7 +73,7 @@ fn step(pose: &SensorPose, k: usize) -> (Frame, Vec<Label>) {
         })
         .map(|p| detection(pose, p))
         .collect();
-    (Frame { time_ns, detections, refused: 0, unwanted: 0, fault: false }, labels)
+    (Frame { time_ns, detections, refused: 0, unwanted: Vec::new(), fault: false }, labels)
 }
 
 /// What the radar measures at a road point that drives with everything else.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use viewshed::fixed::time::Time;
 use viewshed::frame::detection::{MAX_RANGE_M, Measurement};
 use viewshed::frame::gate::{GateConfig, Rejection};
 use viewshed::frame::health::Points;
@@ -149,8 +150,14 @@ mod tests {
             let exact = Scan::new(&measurements, &config, &VIEW, &noise, &Levelled::new(&mount));
             let mut scan = viewshed::frame::scan::Scan::<256>::new();
             let detections: Vec<Detection> = measurements.iter().map(|m| Detection::new(m).unwrap()).collect();
-            let points = scan.gather(detections.iter(), false.into(), &gate, |d| noises.place(d, &levelling));
-            assert_eq!(points, exact.points);
+            let points = scan
+                .gather(Time::from_micros(0), detections.iter(), false.into(), &gate, |d| noises.place(d, &levelling));
+            assert_eq!(
+                (points.passed, points.again),
+                (400, 0),
+                "those that there is no room for were let through, too"
+            );
+            assert_eq!(Points { passed: 0, ..points }, exact.points);
             assert_eq!((scan.reflections().len(), exact.placed.len()), (64, 64));
             for (got, exact) in scan.reflections().iter().zip(&exact.placed) {
                 assert!((f64::from(got.ground_cm) / 100.0 - exact.ground()).abs() < 0.07);

@@ -102,6 +102,9 @@ pub struct Estimator {
     /// Frames whose map had settled since the start and since gaps, of how many, and the rates over these alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     settled: Option<Value>,
+    /// Frames in which points came and could not be used, so that all was unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    unusable_frames: Option<usize>,
     /// `TV FV TI FI` of each unit, a line each: what `viewshed compare` draws again.
     by_unit: Vec<String>,
     /// `blocked blocked_visible clear clear_not_visible` of each block of 1 s, in the order of time.
@@ -251,6 +254,7 @@ pub(super) fn estimator(row: &Row) -> Estimator {
                 "cell_fir": s.cells.fir(),
             })
         }),
+        unusable_frames: Some(row.unusable).filter(|frames| *frames > 0),
         by_unit: row.by_unit.iter().map(|c| format!("{} {} {} {}", c.tv, c.fv, c.ti, c.fi)).collect(),
         by_block: row.cells.iter().flat_map(|_| row.by_block.iter().map(block)).collect(),
     }

@@ -10,7 +10,7 @@ use crate::evaluation::Options;
 use crate::evaluation::bootstrap::{Interval, LEAST_RUNS};
 use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
-use crate::evaluation::summary::Row;
+use crate::evaluation::summary::{Row, Summary};
 use crate::evaluation::units::RUN_BLOCKS;
 use crate::recording::truth::LabelsBeside;
 use crate::recording::{Frame, Recording};
@@ -80,6 +80,7 @@ pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     lines.extend(cartesian.map(|r| format!("{} was judged on the {} grid: its map has no other.", r.name, r.grid)));
     lines.extend(summary.comparisons.iter().map(comparison));
     lines.extend(settled(&summary.rows));
+    lines.extend(unusable(summary));
     lines.extend(noise_learnt(&summary.rows));
     lines.extend(lanes_learnt(&summary.rows));
     lines.extend(left_out(recording, &summary.rows));
@@ -190,7 +191,7 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
     let (all, what) = match recording.of_camera() {
         Some(camera) => (camera.frames.iter().map(|f| f.boxes.len() as u64 + f.refused).sum(), "boxes"),
         None => {
-            let came = |f: &Frame| f.detections.len() as u64 + f.refused + f.unwanted;
+            let came = |f: &Frame| f.detections.len() as u64 + f.refused + f.unwanted.len() as u64;
             (recording.frames.iter().map(came).sum::<u64>(), "detections")
         }
     };
@@ -210,6 +211,17 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
         }
     };
     said.iter().map(line).collect()
+}
+
+/// In how many frames nothing was known though points came.
+fn unusable(summary: &Summary) -> impl Iterator<Item = String> + '_ {
+    let rows = summary.rows.iter().filter(|row| row.unusable > 0);
+    rows.map(|row| {
+        format!(
+            "{}: in {} of {} frames all was unknown, since points kept coming of which nearly none could be used; what was left out for which reason stands below.",
+            row.name, row.unusable, summary.frames
+        )
+    })
 }
 
 /// How much of the frames had a map that had settled, and the rates over these alone.

@@ -204,6 +204,7 @@ fn posts(seconds: f64, left: bool) -> Scan {
         radial_velocity_cm_s: 0,
         rcs_half_dbsm: Some(20),
         snr_half_db: Some(40),
+        marked: false,
     };
     let right = [post(2000, -50.0), post(3500, -48.0), post(6000, 5.0)];
     let left = [post(2000, 50.0), post(3500, 48.0)].into_iter().filter(|_| left);
