@@ -270,9 +270,9 @@ impl Unjudged {
         for _ in 0..RECENT {
             if now.since(self.begun).is_some_and(|us| us >= BLOCK_US) {
                 self.begun = Time::from_micros(self.begun.micros().saturating_add(BLOCK_US));
-                self.blocks.rotate_right(1);
-                if let Some(newest) = self.blocks.first_mut() {
-                    *newest = Block::NONE;
+                let mut newer = Block::NONE;
+                for block in &mut self.blocks {
+                    core::mem::swap(block, &mut newer);
                 }
             }
         }

@@ -99,8 +99,9 @@ impl Repeats {
             let _ = list.push(point);
         }
         let came = count(&again).saturating_mul(self.all).checked_div(watched).unwrap_or(0);
-        for point in new {
-            let _ = again.push(point);
+        // by reference: what drops a list by value could panic
+        for point in &new {
+            let _ = again.push(*point);
         }
         (self.last, self.watched, self.all) = (Some(now), again, all);
         came
