@@ -5,7 +5,8 @@
 #
 # First choice: the installed compiler already has the target's core library, or rustup can add it.
 # Nothing is printed then. Second choice: Debian's compiler and library sources (rustc-web, cargo-web,
-# rust-web-src) build it once, without the network, into a directory of their own; the settings that
+# rust-web-src) build it once into a directory of their own, with the crates it needs from the package of
+# sources or, of those that come without, from crates.io; the settings that
 # make cargo use it are printed. Once it is built, rustup is not asked any more. VIEWSHED_TOOLCHAIN=debian
 # goes straight to the second choice.
 # Exit code 1 and one line on stderr if neither works.
@@ -27,7 +28,7 @@ compiler=${RUSTC:-rustc}
 debian=/usr/bin/rustc
 library=/usr/lib/rustlib/src/rust/library
 root=
-if [ -x "$debian" ] && [ -x /usr/bin/cargo ] && [ -d "$library/core" ] && [ -d "$library/vendor" ]; then
+if [ -x "$debian" ] && [ -x /usr/bin/cargo ] && [ -d "$library/core" ]; then
     version=$("$debian" -vV | sed -n 's/^commit-hash: //p')
     # a directory a compiler version: libraries of another one do not fit
     root=${VIEWSHED_SYSROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/viewshed-sysroot}/$version
@@ -79,11 +80,15 @@ END
     (
         cd "$work"
         unset CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_RUSTFLAGS CARGO_BUILD_TARGET RUSTC_WRAPPER
-        CARGO_HOME=$work/home CARGO_TARGET_DIR=$work/target RUSTC=$debian RUSTC_BOOTSTRAP=1 \
-            RUSTFLAGS=-Cembed-bitcode=yes /usr/bin/cargo build --quiet --offline --release --target "$1" \
-            -Zbuild-std=core,alloc -Zbuild-std-features=compiler-builtins-mem \
-            --config 'source.crates-io.replace-with="vendored"' \
-            --config "source.vendored.directory=\"$library/vendor\""
+        set -- --target "$1"
+        if [ -d "$library/vendor" ]; then
+            export CARGO_HOME="$work/home"
+            set -- "$@" --offline --config 'source.crates-io.replace-with="vendored"' \
+                --config "source.vendored.directory=\"$library/vendor\""
+        fi
+        CARGO_TARGET_DIR=$work/target RUSTC=$debian RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Cembed-bitcode=yes \
+            /usr/bin/cargo build --quiet --release "$@" \
+            -Zbuild-std=core,alloc -Zbuild-std-features=compiler-builtins-mem
     ) >&2
     mkdir -p "$root/lib/rustlib/$1/lib"
     for crate in core alloc compiler_builtins; do
