@@ -30,7 +30,7 @@ const H743: Board = Board {
     dma: 0x2407_F000..0x2408_0000,
     coupled: Some([0x20..0x1_0000, 0x2000_0000..0x2002_0000]),
     most_flash: 190_000,
-    most_ram: 497_000,
+    most_ram: 498_500,
     least_stack: 64_000,
 };
 
@@ -40,8 +40,8 @@ const G474: Board = Board {
     ram: 0x2000_0800..0x2002_0000,
     dma: 0x2000_0000..0x2000_0800,
     coupled: None,
-    most_flash: 216_000,
-    most_ram: 107_000,
+    most_flash: 220_000,
+    most_ram: 108_000,
     least_stack: 22_000,
 };
 
