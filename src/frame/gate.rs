@@ -81,6 +81,11 @@ impl Rejection {
         Self::Unwanted,
     ];
 
+    /// Whether a point lies outside the field of view.
+    const fn is_of_place(self) -> bool {
+        matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
+    }
+
     /// Short name for reports.
     pub const fn name(self) -> &'static str {
         match self {
@@ -196,20 +201,17 @@ impl Gate {
         if d.marked { Err(Rejection::Unwanted) } else { self.judge_unmarked(d) }
     }
 
-    /// Whether a detection cannot be told from noise or cannot be right, and was not left out by choice or because of where it lies:
-    /// what is there is then not known.
-    pub fn cannot_judge(&self, d: &Detection) -> Option<Point> {
+    /// Whether a detection that was rejected for this cannot be told from noise or cannot be right, and was not left out by
+    /// choice or because of where it lies: what is there is then not known.
+    pub fn cannot_judge(&self, d: &Detection, reason: Rejection) -> Option<Point> {
         let speed = i32::from(d.radial_velocity_cm_s).abs();
-        if speed < self.min_speed_cm_s {
-            return None;
-        }
-        match self.judge_unmarked(d) {
-            Err(Rejection::Quality | Rejection::Rcs) => {}
-            Err(Rejection::Velocity) => return Some(Point::new(d, false)),
-            Ok(()) if d.marked => {}
-            _ => return None,
-        }
-        Some(Point::new(d, speed <= self.max_speed_cm_s))
+        let elsewhere = || matches!(self.judge_unmarked(d), Err(reason) if reason.is_of_place());
+        let is_left_out = match reason {
+            Rejection::Unwanted => elsewhere(),
+            other => other.is_of_place(),
+        };
+        let chosen = speed < self.min_speed_cm_s;
+        (!is_left_out && !chosen).then(|| Point::new(d, speed <= self.max_speed_cm_s))
     }
 
     fn judge_unmarked(&self, d: &Detection) -> Result<(), Rejection> {
@@ -287,21 +289,22 @@ mod tests {
     #[test]
     fn what_cannot_be_judged_is_told_from_what_was_chosen_and_from_what_lies_elsewhere() {
         let g = gate(GateConfig { min_speed_mps: 1.0, ..GateConfig::default() });
+        let left_out = |d: &Detection| g.judge(d).err().and_then(|reason| g.cannot_judge(d, reason));
         let weak = Detection { snr_half_db: Some(0), ..D };
         let small = Detection { rcs_half_dbsm: Some(-128), ..D };
         let fast = Detection { radial_velocity_cm_s: 7001, ..D };
         let marked = Detection { marked: true, ..D };
         assert_eq!(g.judge(&marked), Err(Rejection::Unwanted));
         for d in [weak, small, marked] {
-            assert_eq!(g.cannot_judge(&d), Some(Point::new(&d, true)), "{d:?}");
+            assert_eq!(left_out(&d), Some(Point::new(&d, true)), "{d:?}");
             for chosen in [Detection { radial_velocity_cm_s: 99, ..d }, Detection { range_cm: 20_001, ..d }] {
-                assert_eq!(g.cannot_judge(&chosen), None, "{chosen:?}");
+                assert_eq!(left_out(&chosen), None, "{chosen:?}");
             }
         }
         for d in [fast, Detection { marked: true, ..fast }, Detection { snr_half_db: Some(0), ..fast }] {
-            assert_eq!(g.cannot_judge(&d), Some(Point::new(&d, false)), "{d:?}");
+            assert_eq!(left_out(&d), Some(Point::new(&d, false)), "{d:?}");
         }
-        assert_eq!(g.cannot_judge(&D), None);
+        assert_eq!(left_out(&D), None);
     }
 
     #[test]

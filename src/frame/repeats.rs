@@ -5,7 +5,7 @@
 //! rain and interference lie elsewhere in each frame. Where the speed itself is what cannot be right, the place alone is compared.
 //!
 //! # Limits
-//! [`WATCHED`] points of a frame are compared with all of the next; what they show is taken for all of the frame.
+//! `WATCHED` points of a frame are compared with all of the next; what they show is taken for all of the frame.
 //!
 //! # Cost
 //! Six bytes a watched point, and a comparison for each point with each of them.
@@ -78,32 +78,52 @@ impl Repeats {
     /// Before the first frame.
     pub const NEW: Self = Self { last: None, watched: Vec::new(), all: 0 };
 
-    /// Takes the points of a frame in the place of the last one's; about how many of those came again.
-    pub fn frame(&mut self, now: Time, points: impl Iterator<Item = Point>) -> u32 {
+    /// Begins a frame.
+    pub fn frame(&mut self, now: Time) -> Comparing<'_> {
         let passed_us = self.last.and_then(|last| now.since(last)).filter(|us| *us <= LONGEST_US);
-        let mut again: Vec<Point, WATCHED, u16> = Vec::new();
-        let mut new: Vec<Point, WATCHED, u16> = Vec::new();
+        self.last = Some(now);
         let watched = count(&self.watched);
-        let mut all = 0_u32;
-        for point in points {
-            all = all.saturating_add(1);
-            let before = passed_us.and_then(|us| self.watched.iter().position(|before| before.is(point, us)));
-            // each is found once; those that were are watched on
-            let list = match before {
-                Some(before) => {
-                    take(&mut self.watched, before);
-                    &mut again
-                }
-                None => &mut new,
-            };
-            let _ = list.push(point);
-        }
-        let came = count(&again).saturating_mul(self.all).checked_div(watched).unwrap_or(0);
+        Comparing { repeats: self, passed_us, watched, again: Vec::new(), new: Vec::new(), all: 0 }
+    }
+}
+
+/// A frame's points as they come.
+#[derive(Debug)]
+pub struct Comparing<'a> {
+    repeats: &'a mut Repeats,
+    passed_us: Option<u64>,
+    watched: u32,
+    again: Vec<Point, WATCHED, u16>,
+    new: Vec<Point, WATCHED, u16>,
+    all: u32,
+}
+
+impl Comparing<'_> {
+    /// Takes one.
+    pub fn add(&mut self, point: Point) {
+        self.all = self.all.saturating_add(1);
+        let watched = &mut self.repeats.watched;
+        let before = self.passed_us.and_then(|us| watched.iter().position(|before| before.is(point, us)));
+        // each is found once; those that were are watched on
+        let list = match before {
+            Some(before) => {
+                take(watched, before);
+                &mut self.again
+            }
+            None => &mut self.new,
+        };
+        let _ = list.push(point);
+    }
+
+    /// They stand in the place of the last frame's; about how many of those came again.
+    pub fn end(mut self) -> u32 {
+        let before = self.repeats.all;
+        let came = count(&self.again).saturating_mul(before).checked_div(self.watched).unwrap_or(0);
         // by reference: what drops a list by value could panic
-        for point in &new {
-            let _ = again.push(*point);
+        for point in &self.new {
+            let _ = self.again.push(*point);
         }
-        (self.last, self.watched, self.all) = (Some(now), again, all);
+        (self.repeats.watched, self.repeats.all) = (self.again, self.all);
         came
     }
 }
@@ -133,10 +153,17 @@ mod tests {
         Point { range_cm: (range_m * 100.0) as u16, azimuth: Angle::from_degrees(azimuth_deg), speed_cm_s }
     }
 
+    /// Points that came again in a frame at this time, milliseconds.
+    fn frame(repeats: &mut Repeats, ms: u64, points: &[Point]) -> u32 {
+        let mut comparing = repeats.frame(Time::from_micros(ms * 1000));
+        points.iter().for_each(|point| comparing.add(*point));
+        comparing.end()
+    }
+
     /// Points that came again, frame by frame, 100 ms apart.
     fn again(frames: &[&[Point]]) -> StdVec<u32> {
         let mut repeats = Repeats::NEW;
-        let each = |(i, frame): (u64, &&[Point])| repeats.frame(Time::from_micros(i * 100_000), frame.iter().copied());
+        let each = |(i, points): (u64, &&[Point])| frame(&mut repeats, i * 100, points);
         (0..).zip(frames).map(each).collect()
     }
 
@@ -185,7 +212,7 @@ mod tests {
         let p = point(50.0, 0.0, 0.0);
         let mut repeats = Repeats::NEW;
         for (ms, came) in [(5000, 0), (5100, 1), (6101, 0), (6201, 1), (2000, 0), (2100, 1)] {
-            assert_eq!(repeats.frame(Time::from_micros(ms * 1000), [p].into_iter()), came, "{ms} ms");
+            assert_eq!(frame(&mut repeats, ms, &[p]), came, "{ms} ms");
         }
     }
 
@@ -202,7 +229,7 @@ mod tests {
         for i in 0..1000 {
             let drops: StdVec<Point> =
                 (0..20).map(|_| point(3.0 + draw(27.0), draw(120.0) - 60.0, draw(6.0) - 3.0)).collect();
-            sum += repeats.frame(Time::from_micros(i * 70_000), drops.into_iter());
+            sum += frame(&mut repeats, i * 70, &drops);
         }
         assert!(sum < 2 * 1000, "{sum} of 20000, which is fewer than two a frame");
     }

@@ -50,16 +50,19 @@ impl<const D: usize> Scan<D> {
         self.rejections = Rejections::NONE;
         let refused = status.refused.into();
         self.rejections.add_many(Rejection::Refused, refused);
-        let again = self.unjudged.frame(now, detections.clone().filter_map(|d| gate.cannot_judge(d)));
         let room = D.min(gate.max_detections);
         let mut kept: Vec<&Detection, D, u16> = Vec::new();
         let (mut reported, mut passed) = (0_u32, 0_u32);
+        let mut unjudged = self.unjudged.frame(now);
         let mut arriving = detections;
         let mut late = None;
         while let Some(d) = arriving.next() {
             reported = reported.saturating_add(1);
             if let Err(reason) = gate.judge(d) {
                 self.rejections.add(reason);
+                if let Some(point) = gate.cannot_judge(d, reason) {
+                    unjudged.add(point);
+                }
                 continue;
             }
             passed = passed.saturating_add(1);
@@ -90,6 +93,7 @@ impl<const D: usize> Scan<D> {
         for d in kept {
             let _ = self.reflections.push(place(d));
         }
+        let again = unjudged.end();
         let (outside, unwanted) = (self.rejections.outside(), self.rejections.count(Rejection::Unwanted));
         let inside = reported.saturating_sub(outside).saturating_sub(unwanted);
         Points { inside, outside, refused, unwanted, passed, again }

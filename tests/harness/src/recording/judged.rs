@@ -96,14 +96,18 @@ impl Watch {
     /// Takes a frame.
     pub fn frame(&mut self, now: Time, detections: &[Detection]) {
         self.frames += 1;
-        let mut passed = 0;
+        let (mut passed, mut unjudged) = (0, self.repeats.frame(now));
         for d in detections {
-            match self.gate.judge(d) {
-                Ok(()) => passed += 1,
-                Err(reason) => self.rejections.add(reason),
+            let Err(reason) = self.gate.judge(d) else {
+                passed += 1;
+                continue;
+            };
+            self.rejections.add(reason);
+            if let Some(point) = self.gate.cannot_judge(d, reason) {
+                unjudged.add(point);
             }
         }
-        let again = self.repeats.frame(now, detections.iter().filter_map(|d| self.gate.cannot_judge(d)));
+        let again = unjudged.end();
         // what lies elsewhere or is no detection is told by others
         self.health.frame(now, &Points { inside: passed, passed, again, ..Points::default() }, false, &self.limits);
         if self.health.condition(now, &self.limits) == Condition::Unusable {

@@ -9,7 +9,7 @@ use crate::shipped;
 /// The linker's regions of each size, and the bytes an image may take of flash, of which controllers have several times
 /// that: so that growth is seen, and not another compiler's code: 4 % more than they take.
 const LIMITS: [(Profile, &str, u64); 2] =
-    [(Profile::Reference, "reference.x", 92_500), (Profile::Small, "small.x", 101_500)];
+    [(Profile::Reference, "reference.x", 95_000), (Profile::Small, "small.x", 103_500)];
 
 fn regions(script: &str) -> Regions {
     Regions::of("mps2-an386", script)
