@@ -195,7 +195,7 @@ mod tests {
             for b in [1, 2, 3, 4369, 65_537, 1 << 20, (1 << 22) - 1] {
                 let check = |ratio: fn(i32, i32) -> i32, bits| {
                     if let Some(exact) = exact(a, b, bits) {
-                        assert_eq!(ratio(a, b), exact, "{a} / {b}")
+                        assert_eq!(ratio(a, b), exact, "{a} / {b}");
                     }
                 };
                 check(ratio::<8>, 8);

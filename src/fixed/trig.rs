@@ -195,7 +195,7 @@ mod tests {
         for raw in i16::MIN..=i16::MAX {
             let a = Angle::from_raw(raw);
             assert_eq!(direction(a), Direction { x: cos(a) as i16, y: sin(a) as i16 }, "direction {raw}");
-            let exact = f64::from(raw) / 32768.0 * std::f64::consts::PI;
+            let exact = f64::from(raw) / 32768.0 * PI;
             assert!((f64::from(sin(a)) - exact.sin() * 16384.0).abs() < 2.0, "sin {raw}");
             assert!((f64::from(cos(a)) - exact.cos() * 16384.0).abs() < 2.0, "cos {raw}");
         }
@@ -208,10 +208,10 @@ mod tests {
         assert_eq!(bearing(-5, 0).raw(), i16::MIN);
         assert_eq!(bearing(0, 0), Angle::ZERO);
         for i in 0..2000 {
-            let exact = f64::from(i) / 2000.0 * std::f64::consts::TAU - std::f64::consts::PI;
+            let exact = f64::from(i) / 2000.0 * std::f64::consts::TAU - PI;
             let (x, y) = ((exact.cos() * 20_000.0).round(), (exact.sin() * 20_000.0).round());
             let got = bearing(x as i32, y as i32);
-            let off = f64::from(got.raw()) - y.atan2(x) / std::f64::consts::PI * 32768.0;
+            let off = f64::from(got.raw()) - y.atan2(x) / PI * 32768.0;
             let off = (off + 32768.0).rem_euclid(65536.0) - 32768.0;
             assert!(off.abs() < 2.0, "bearing of {exact}: off by {off}");
         }

@@ -11,7 +11,7 @@
 //! without: an empty road settles, too.
 //!
 //! A gap between frames takes off what may have happened in it: its length of the time for what moves, and
-//! [`GAP_COUNTS`] times as much of the time for what stands, since a vehicle may have come and stopped. What stood
+//! `GAP_COUNTS` times as much of the time for what stands, since a vehicle may have come and stopped. What stood
 //! before the gap and stands there after it hides no more than it did.
 //!
 //! # Limits

@@ -6,7 +6,7 @@
 //! in every frame. The one across follows from place: a Kalman filter of two states, place and speed
 //! across the line of sight, whose measurement is the centre of a frame's detections. It is right wherever
 //! a thing goes, and slow: 2 m/s after half a second. Where detections of one frame span an angle, how
-//! [Doppler changes over it](super::doppler_slope) tells that speed sooner.
+//! Doppler changes over it (`doppler_slope`) tells that speed sooner.
 
 use crate::fixed::math::{mul_shift, ratio};
 use crate::fixed::time::Step;

@@ -37,7 +37,7 @@ impl Levels {
     }
 
     /// As a header has them.
-    pub fn to_bytes(&self) -> [u8; 5] {
+    pub fn to_bytes(self) -> [u8; 5] {
         let [a, b] = self.table.to_be_bytes();
         [self.known, self.visible, self.clear, a, b]
     }

@@ -199,16 +199,12 @@ mod tests {
 
     #[test]
     fn the_least_grade_of_a_bin_is_the_first_of_the_step_that_reaches_a_level() {
-        let quantiser = quantiser(Some(Threshold::From(180)));
+        let by_180 = quantiser(Some(Threshold::From(180)));
         for (a, r) in [(0, 0), (3, 2), (7, 7)] {
             let first = [1].into_iter().chain(edges().grades).zip(values()[a][r]).find(|(_, p)| *p >= 180);
-            assert_eq!(
-                quantiser.least_grade(a, r, false),
-                first.map_or(NO_GRADE, |(grade, _)| grade.into()),
-                "{a} {r}"
-            );
+            assert_eq!(by_180.least_grade(a, r, false), first.map_or(NO_GRADE, |(grade, _)| grade.into()), "{a} {r}");
         }
-        assert_eq!(super::tests::quantiser(Some(Threshold::Nothing)).least_grade(0, 0, false), NO_GRADE);
-        assert_eq!(super::tests::quantiser(None).least_grade(0, 0, false), 128);
+        assert_eq!(quantiser(Some(Threshold::Nothing)).least_grade(0, 0, false), NO_GRADE);
+        assert_eq!(quantiser(None).least_grade(0, 0, false), 128);
     }
 }

@@ -131,7 +131,7 @@ pub enum Sequence {
     /// The same counter again.
     Repeated,
     /// A gap that is not allowed.
-    WrongSequence,
+    Wrong,
 }
 
 /// Follows the counters of one data ID.
@@ -156,7 +156,7 @@ impl Counter {
             Ok(0) => Sequence::Repeated,
             Ok(1) => Sequence::Ok,
             Ok(step) if step <= max_step => Sequence::SomeLost { lost: step - 1 },
-            _ => Sequence::WrongSequence,
+            _ => Sequence::Wrong,
         }
     }
 }
@@ -212,7 +212,7 @@ mod tests {
         assert_eq!(follow(0), Sequence::Ok, "15 is no counter");
         assert_eq!(follow(0), Sequence::Repeated);
         assert_eq!(follow(3), Sequence::SomeLost { lost: 2 });
-        assert_eq!(follow(7), Sequence::WrongSequence);
+        assert_eq!(follow(7), Sequence::Wrong);
         let mut counter = Counter::NEW;
         assert_eq!(counter.follow(Profile::P05, 255, 1), Sequence::Ok);
         assert_eq!(counter.follow(Profile::P05, 0, 1), Sequence::Ok);

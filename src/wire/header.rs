@@ -182,7 +182,7 @@ impl Header {
 
     /// The groups with the number 7.
     fn more(&self) -> impl Iterator<Item = [u8; GROUP]> {
-        self.probability.map(|levels| levels.to_bytes()).into_iter().chain(self.narrow_group())
+        self.probability.map(Levels::to_bytes).into_iter().chain(self.narrow_group())
     }
 
     fn narrow_group(&self) -> Option<[u8; GROUP]> {

@@ -8,9 +8,7 @@ use embassy_stm32::usart::{Uart, UartTx};
 use embassy_stm32::wdg::{IndependentWatchdog, Instance};
 use embassy_time::Timer;
 use embedded_hal::digital::OutputPin;
-use viewshed::board::{
-    Flow, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SettingsSlots, StatusOutput,
-};
+use viewshed::board::{Flow, Roadside, RoadsideMemory, RoadsidePorts, RoadsideStart, SettingsSlots, StatusOutput};
 use viewshed::{CanFrame, Feed, InUnit, MapSender};
 
 use crate::can::{Port, Queue, Receiver, queue};
@@ -71,14 +69,11 @@ macro_rules! memory {
             receiver.run(&RADAR_QUEUE).await
         }
 
-        fn memory() -> viewshed::board::RoadsideMemory<
-            'static,
-            viewshed::$size::supervised::State,
-            viewshed::$size::$sender,
-        > {
+        fn memory()
+        -> viewshed::board::RoadsideMemory<'static, viewshed::$size::supervised::State, viewshed::$size::$sender> {
             use static_cell::{ConstStaticCell, StaticCell};
-            use viewshed::$size::$sender as Sender;
             use viewshed::$size::supervised::{Map, Parameters, State};
+            use viewshed::$size::$sender as Sender;
             static STATE: ConstStaticCell<State> = ConstStaticCell::new(State::new(viewshed::$size::State::new()));
             static MAP: ConstStaticCell<Map> = ConstStaticCell::new(Map::NOWHERE);
             static PARAMETERS: ConstStaticCell<Option<Parameters>> = ConstStaticCell::new(None);

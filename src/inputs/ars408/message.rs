@@ -87,7 +87,7 @@ impl Message {
     }
 
     /// Whether the sensor sends it, rather than being sent it.
-    pub const fn from_sensor(self) -> bool {
+    pub const fn sent_by_sensor(self) -> bool {
         !matches!(self, Self::RadarConfiguration | Self::FilterConfiguration | Self::Speed | Self::YawRate)
     }
 

@@ -287,7 +287,7 @@ impl<const N: usize> Ars408<N> {
     /// Takes a frame, any frame of the bus.
     pub fn push(&mut self, frame: &CanFrame, now: Time) -> Ars408Outcome<'_> {
         let message = match Message::of(frame.id) {
-            Some((message, sensor)) if sensor == self.config.sensor && message.from_sensor() && !frame.fd => message,
+            Some((message, sensor)) if sensor == self.config.sensor && message.sent_by_sensor() && !frame.fd => message,
             _ => return Ars408Outcome::NotMine,
         };
         count(&mut self.counters.frames);

@@ -312,7 +312,7 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             Sequence::Ok => {}
             Sequence::SomeLost { lost } => c.lost = c.lost.saturating_add(u32::from(lost)),
             Sequence::Repeated => c.repeated = c.repeated.saturating_add(1),
-            Sequence::WrongSequence => c.out_of_sequence = c.out_of_sequence.saturating_add(1),
+            Sequence::Wrong => c.out_of_sequence = c.out_of_sequence.saturating_add(1),
         }
     }
 

@@ -54,7 +54,7 @@ impl Network {
     ) -> Result<Self> {
         let place = || format!("--model {}", path.display());
         ensure!(path.is_file(), "{}: there is no such file", place());
-        let model = tract_onnx::onnx().model_for_path(path);
+        let model = onnx().model_for_path(path);
         let model = model.with_context(|| format!("{}: no ONNX model that can be read", place()))?;
         let (shape, input, planes) = input(&model, size).with_context(place)?;
         let outlets = model.output_outlets()?.to_vec();

@@ -193,8 +193,7 @@ mod tests {
 
     #[test]
     fn an_answer_that_is_none_is_an_error() {
-        let error =
-            |answer: &[u8], scans| compare(answer, &super::tests::answer(&[1, 2], 0), scans).unwrap_err().to_string();
+        let error = |bytes: &[u8], scans| compare(bytes, &answer(&[1, 2], 0), scans).unwrap_err().to_string();
         assert!(error(b"", 2).contains("refused"));
         assert!(error(&answer(&[1], 0), 2).contains("2 scans sent, 1 frames answered"));
         assert!(error(&answer(&[1, 2], 3), 2).contains("reason 3"));

@@ -89,7 +89,7 @@ fn run(
 ) {
     match profile {
         Profile::Reference => {
-            work(&mut Box::new(Supervised::new(reference::State::new())), is_bench, bytes, send, after)
+            work(&mut Box::new(Supervised::new(reference::State::new())), is_bench, bytes, send, after);
         }
         Profile::Small => work(&mut Box::new(Supervised::new(small::State::new())), is_bench, bytes, send, after),
     }

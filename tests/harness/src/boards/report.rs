@@ -223,8 +223,8 @@ mod tests {
             flash_bytes: 123_456,
             ram_bytes: 345_678,
         };
-        let widest = |extent| table(&[row.clone()], extent).lines().map(|line| line.chars().count()).max();
-        assert!(widest(Extent::Terminal).unwrap() <= 80, "{}", table(&[row.clone()], Extent::Terminal));
+        let widest = |extent| table(std::slice::from_ref(&row), extent).lines().map(|line| line.chars().count()).max();
+        assert!(widest(Extent::Terminal).unwrap() <= 80, "{}", table(std::slice::from_ref(&row), Extent::Terminal));
         assert!(widest(Extent::Wide).unwrap() > 200);
     }
 

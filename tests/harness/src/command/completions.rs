@@ -14,6 +14,7 @@ use super::{Cli, print};
 /// zsh:  viewshed completions zsh > "${fpath[1]}/_viewshed"
 /// fish: viewshed completions fish > ~/.config/fish/completions/viewshed.fish
 #[derive(Debug, clap::Args)]
+#[allow(rustdoc::broken_intra_doc_links)] // the brackets are of zsh
 #[command(verbatim_doc_comment)]
 pub struct Args {
     /// The shell

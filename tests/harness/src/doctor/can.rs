@@ -99,7 +99,7 @@ impl Bus {
         self.flexible += usize::from(!is_extended && frame.fd && frame.data().len() <= 8);
         if message == Message::Speed && !is_extended && frame.data().len() >= 2 {
             let told = self.told_cm_s.entry((line.interface.clone(), sensor)).or_default();
-            *told = (*told).max(i32::from(motion::speed_cm_s(frame.data())).abs());
+            *told = (*told).max(motion::speed_cm_s(frame.data()).abs());
         }
     }
 

@@ -85,7 +85,7 @@ pub fn all<L: Lines + ?Sized>(lines: &L, profile: &Ars408Profile, wanted: Option
     let mut found: Vec<Examining> = Vec::new();
     lines.each(&mut |line| {
         let Some(frame) = classic(line).filter(|f| !f.fd) else { return };
-        let Some((message, sensor)) = Message::of(frame.id).filter(|(message, _)| message.from_sensor()) else {
+        let Some((message, sensor)) = Message::of(frame.id).filter(|(message, _)| message.sent_by_sensor()) else {
             return;
         };
         let place = found.iter().position(|one| one.sensor == sensor && one.interface == line.interface);

@@ -145,6 +145,6 @@ mod tests {
         assert_eq!([10.0, 30.0, 60.0].map(|x| at(x, Threshold::Everything)), [Visible; 3]);
         assert_eq!([10.0, 60.0].map(|x| at(x, Threshold::Nothing)), [Invisible; 2]);
         assert_eq!(at(-5.0, Threshold::Everything), Unknown);
-        assert_eq!(table.look_up(200, 100, viewshed::Angle::ZERO), Some(Probability::from_raw(240)));
+        assert_eq!(table.look_up(200, 100, Angle::ZERO), Some(Probability::from_raw(240)));
     }
 }

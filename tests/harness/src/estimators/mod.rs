@@ -345,7 +345,7 @@ fn ground(recording: &Recording, options: &Options) -> Result<Ground> {
     if options.ground.is_empty() { Ok(recording.ground.clone()) } else { Ground::new(options.ground.points.clone()) }
 }
 
-/// The estimator whose map a sensor sends: `radar-3d` with all that is said of the [site](unit), or `camera-3d` of a
+/// The estimator whose map a sensor sends: `radar-3d` with all that is said of the [site](fn@unit), or `camera-3d` of a
 /// camera's own recording.
 ///
 /// # Errors

@@ -23,7 +23,7 @@ pub(super) fn said<'a>(usual: &Radar3dConfig, told: &Radar3dConfig) -> Vec<(&'a 
     said
 }
 
-/// How many rows of tables [`said`] makes, of so many things that are said of a site.
+/// How many rows of tables `said` makes, of so many things that are said of a site.
 pub const fn site_rows(said: u64) -> u64 {
     if said > 1 { said + 1 } else { said }
 }

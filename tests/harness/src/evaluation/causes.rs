@@ -9,7 +9,7 @@
 //! would not hide it if it were as low as its vehicle, or of one that is elsewhere or larger. What lies in none is beside one,
 //! by less than cells and rounding are wide, or behind what stands unmoving in the grid.
 //!
-//! Box and vehicle belong together where the middle of one lies on the other's footprint, or [`NEAR_M`] beside it; of several
+//! Box and vehicle belong together where the middle of one lies on the other's footprint, or `NEAR_M` beside it; of several
 //! the nearest.
 
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 //!
 //! A command makes the routes, one answer a path ([`label`], [`view`]); [`server`] gives them an address that holds a secret
 //! ([`guard`]) and answers until it is stopped. All scripts and styles are in the program ([`assets`]); no path of a
-//! request names a file. [`labels`] keeps what a person draws, [`points`] and [`visibility`] are what is drawn on.
+//! request names a file. `labels` keeps what a person draws, `points` and `visibility` are what is drawn on.
 //!
 //! How the page of `viewshed label` is used: `README.md` beside this file.
 

@@ -29,7 +29,7 @@ pub enum Item<'a> {
 /// Gives every record that is read to `each`; index and summary records are passed over.
 pub fn read(bytes: &[u8], each: &mut dyn FnMut(Item<'_>)) {
     let mut rest = bytes;
-    while let Some(file) = rest.strip_prefix(&MAGIC[..]) {
+    while let Some(file) = rest.strip_prefix(MAGIC) {
         each(Item::File);
         rest = one_file(file, each);
     }
@@ -86,7 +86,7 @@ fn one_file<'a>(mut bytes: &'a [u8], each: &mut dyn FnMut(Item<'_>)) -> &'a [u8]
                     }
                 }
             },
-            op::FOOTER => return bytes.strip_prefix(&MAGIC[..]).unwrap_or(bytes),
+            op::FOOTER => return bytes.strip_prefix(MAGIC).unwrap_or(bytes),
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::METADATA | op::DATA_END => {
                 ended |= opcode == op::DATA_END;
                 match parse_record(opcode, body) {

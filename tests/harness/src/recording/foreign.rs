@@ -142,7 +142,7 @@ fn begin(bytes: &[u8]) -> String {
     let mut lines = text::Lines::new(&bytes[..bytes.len().min(START)]);
     let mut start = String::new();
     while start.len() < 4096
-        && let Ok(Some(line)) = lines.next()
+        && let Ok(Some(line)) = lines.next_line()
     {
         start += line;
         start.push('\n');

@@ -7,7 +7,7 @@
 //!
 //! - *Sign*: over one frame, pairs with the velocity as it stands against pairs with its opposite.
 //! - *Scale*: by tracks of positions alone ([`scale`]).
-//! - *Yaw*: over [`PAUSE_S`], the direction in the road frame from one to the other. Most pairs have that of the road's
+//! - *Yaw*: over `PAUSE_S`, the direction in the road frame from one to the other. Most pairs have that of the road's
 //!   axis. A few degrees off it the yaw is wrong by as much. Farther off it may as well be another road's, or one's square
 //!   to it: then no angle is advised. Nothing is said of a direction in which labelled vehicles drive, too.
 //! - *Height and pitch*: the median height above the road of what moves, over its distance. By a height that is wrong

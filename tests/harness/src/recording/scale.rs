@@ -2,7 +2,7 @@
 //!
 //! # Method
 //! What moves is followed by positions alone over about a second: a detection, one near it in the next frame, and from
-//! there on the one that lies where the two lead. A track counts if it moves more than [`LEAST_WAY_M`], leaves its first
+//! there on the one that lies where the two lead. A track counts if it moves more than `LEAST_WAY_M`, leaves its first
 //! place empty and comes to one that was empty: rails and masts, however evenly they stand, lead nowhere. How fast its
 //! range changes over the radial velocity of its detections is the scale, if most tracks agree.
 

@@ -7,7 +7,7 @@
 //! clock that steps back is neither: long pieces then overlap in time, and frames stay as they are.
 //!
 //! *Joining.* The period is learnt: the gap that half of the time between messages is made of. Messages within
-//! [`TOGETHER`] of it after the first are its scan, if they have the first one's frame and were logged close to it, and if
+//! `TOGETHER` of it after the first are its scan, if they have the first one's frame and were logged close to it, and if
 //! this is the rule in the recording; messages of one stamp always are.
 //!
 //! *Places without a point.* Clouds of one fixed size have NaN or zero where there is nothing. In clouds whose size

@@ -70,7 +70,7 @@ impl<R: Read> Lines<R> {
     ///
     /// # Errors
     /// Those of the source.
-    pub fn next(&mut self) -> io::Result<Option<&str>> {
+    pub fn next_line(&mut self) -> io::Result<Option<&str>> {
         self.line.clear();
         loop {
             let rest = &self.text[self.at..];
@@ -198,7 +198,7 @@ mod tests {
     fn lines(bytes: &[u8], at_once: usize) -> (Vec<String>, u64) {
         let mut lines = Lines::new(Slowly(bytes, at_once));
         let mut all = Vec::new();
-        while let Some(line) = lines.next().unwrap() {
+        while let Some(line) = lines.next_line().unwrap() {
             all.push(line.to_owned());
         }
         (all, lines.zeros())

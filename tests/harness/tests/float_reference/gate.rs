@@ -121,7 +121,7 @@ mod tests {
         let config = GateConfig { min_speed_mps: 0.5, ..GateConfig::default() };
         let integer = config.gate(&VIEW.limits().unwrap()).unwrap();
         let mut random = Random::new(3);
-        let (mut differ, mut reasons) = (0, std::collections::BTreeMap::new());
+        let (mut differ, mut reasons) = (0, BTreeMap::new());
         for _ in 0..40_000 {
             let m = random.any_measurement();
             let Ok(d) = Detection::new(&m) else {

@@ -131,7 +131,7 @@ mod tests {
             let (levelled, levelling) = (Levelled::new(&mount), mount.levelling().unwrap());
             for _ in 0..4000 {
                 let m = random.measurement();
-                let exact = super::place(&m, &noise, &levelled);
+                let exact = place(&m, &noise, &levelled);
                 let d = Detection::new(&m).unwrap();
                 let got = integer.place(&d, &levelling);
                 let [x, y] = [0, 1].map(|k| f64::from([got.x_cm, got.y_cm][k]) - 100.0 * exact.at[k]);

@@ -71,7 +71,7 @@ fn watch(
     stood: Option<usize>,
     dt: f64,
 ) -> (Option<usize>, f64) {
-    let now = nearest.filter(|r| !stood.is_some_and(|stood| r + SAME >= stood));
+    let now = nearest.filter(|r| stood.is_none_or(|stood| r + SAME < stood));
     let counted = seen >= LASTS;
     let nearer = now.is_some_and(|now| held.is_none_or(|held| now + SAME < held));
     let held = if !counted && nearer { now } else { held };

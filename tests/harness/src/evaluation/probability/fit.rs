@@ -209,7 +209,7 @@ pub fn table(places: &Places, fingerprint: u32) -> Option<ProbabilityTable> {
 /// Parts that samples are left out in.
 const FOLDS: usize = 4;
 
-/// What tables say of samples they were not fitted on: units in [`FOLDS`] parts, in their order (days stay together, as
+/// What tables say of samples they were not fitted on: units in `FOLDS` parts, in their order (days stay together, as
 /// far as they are alike long), each left out in turn. A threshold from these is not flattered by the fit. `None` where
 /// a part leaves nothing to fit on.
 pub fn left_out(places: &Places) -> Option<Grades> {

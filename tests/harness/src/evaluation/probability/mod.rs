@@ -1,6 +1,6 @@
 //! Probabilities of detection: a table fitted to labelled samples, and what is made of it.
 //!
-//! [`samples`] of a recording's scores are fitted ([`fit`]) to the library's table; a [`file`] keeps it with the counts
+//! [`samples`] of a recording's scores are fitted ([`fit`]) to the library's table; a [`file`](mod@file) keeps it with the counts
 //! that a [`risk`] is turned into a threshold by.
 
 pub mod file;

@@ -36,7 +36,7 @@ pub fn assembled(paths: Vec<Path>, instants: &[Instant]) -> Vec<Path> {
     for convoy in convoys {
         match &convoy[..] {
             [(only, _)] if paths[*only].lane.is_none() || paths[*only].mean_speed() > SLOW_MPS => {
-                all.push(paths[*only].clone())
+                all.push(paths[*only].clone());
             }
             _ => all.extend(vehicles(&paths, &convoy, instants)),
         }

@@ -90,7 +90,7 @@ impl Found {
         let mut text = open(&source)?;
         let (mut survey, mut others, mut skipped) = (Survey::default(), BTreeSet::new(), Problems::default());
         let (mut going, mut last, mut end) = (reader.clone(), 0, 0);
-        while let Some(line) = text.next().with_context(place)? {
+        while let Some(line) = text.next_line().with_context(place)? {
             end += 1;
             match going.line(line) {
                 Some(Ok(line)) if interface.is_some_and(|name| name != line.interface) => {
@@ -223,7 +223,7 @@ impl Log {
         let Ok(mut text) = open(&self.source) else { return };
         let mut reader = self.reader.clone();
         for _ in 0..self.end {
-            let Ok(Some(line)) = text.next() else { return };
+            let Ok(Some(line)) = text.next_line() else { return };
             let Some(Ok(mut line)) = reader.line(line) else { continue };
             if self.interface.as_ref().is_some_and(|name| *name != line.interface) {
                 continue;

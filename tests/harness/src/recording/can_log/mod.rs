@@ -1,7 +1,7 @@
 //! Logs of CAN buses, whatever tool wrote them: `candump` with and without `-L`, Vector's ASC, the CSV of SavvyCAN and of
 //! python-can.
 //!
-//! [`text`](super::text) makes lines of bytes, a format's reader makes a frame of a line, and [`log`] brings frames into the
+//! [`text`] makes lines of bytes, a format's reader makes a frame of a line, and [`log`] brings frames into the
 //! [order of time](order). Nothing is kept but what is out of order.
 
 pub mod asc;
@@ -82,7 +82,7 @@ const START: usize = 1 << 20;
 fn begin(source: &Source) -> Result<Vec<String>> {
     let mut text = text::Lines::new(source.open()?);
     let (mut lines, mut bytes) = (Vec::new(), 0);
-    while let Some(line) = text.next().with_context(|| format!("cannot read {}", source.shown()))? {
+    while let Some(line) = text.next_line().with_context(|| format!("cannot read {}", source.shown()))? {
         if is_remark(line) {
             continue;
         }

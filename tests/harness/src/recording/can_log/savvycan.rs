@@ -70,7 +70,7 @@ mod tests {
         let expected = [candump::line("(166.064) 0 60A#01C24910"), candump::line("(166.0655) 1 18DAF110#FF")];
         let table = new.replace(',', ";").replace("0000060A", "60A").replace("01;C2", "1;C2").replace("true", "WAHR");
         let lower = new.to_lowercase();
-        let fraction = format!("{}", new.replace(',', ";").replace("166064000;", "166064000,0;"));
+        let fraction = new.replace(',', ";").replace("166064000;", "166064000,0;");
         for log in [new, old, &table, &lower, &fraction] {
             assert!(is_log(&[log.lines().next().unwrap().to_owned()]));
             assert_eq!(read(log), expected);

@@ -137,7 +137,7 @@ pub enum LanesFrom {
     Settings,
     /// The net of its traffic.
     Nets,
-    /// [`LEARNT_S`] of other traffic, seen by the same radar, and what learns them from that.
+    /// `LEARNT_S` of other traffic, seen by the same radar, and what learns them from that.
     OtherDays(Vec<PathBuf>, fn(&[Recording]) -> Vec<Lane>),
 }
 

@@ -51,7 +51,7 @@ impl Ranked {
 }
 
 impl Site {
-    /// All sets of `size` mounts, best first; beyond [`MOST_SETS`] only those that grow from good smaller ones.
+    /// All sets of `size` mounts, best first; beyond `MOST_SETS` only those that grow from good smaller ones.
     pub fn ranked(&self, size: usize, by: Rank) -> Vec<Ranked> {
         let n = self.candidates.len();
         if size == 0 || size > n {

@@ -1,7 +1,7 @@
 //! Who of several sensors is wrong: what others that look there say of each, what usually stands in its view says, and
 //! both; and what visibility is worth to them.
 //!
-//! Every sensor of a site runs in order, and with each [fault](fault) from a moment on. [With its own map](Sight) a miss
+//! Every sensor of a site runs in order, and with each [fault] from a moment on. [With its own map](Sight) a miss
 //! counts only where that says visible, and a fixture is asked for only there; without it, wherever the sensor looks.
 //! [`turned`] is of mounts that are wrong from the first day.
 
