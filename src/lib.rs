@@ -175,9 +175,12 @@
 //!   visibility, never make any.
 #![no_std]
 #![forbid(unsafe_code)]
+#![warn(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![warn(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 #![cfg_attr(test, allow(clippy::cast_possible_truncation))]
-// rooms also hold what only benches and tests call
-#![cfg_attr(not(feature = "bench"), allow(dead_code, unused_imports))]
+// rooms also hold what only benches and tests call, and of rooms that are public in part, what other features use; with all
+// features, whatever is left unused is found
+#![cfg_attr(not(all(feature = "bench", feature = "monitoring")), allow(dead_code, unused_imports))]
 
 #[cfg(test)]
 extern crate std;

@@ -2,8 +2,6 @@
 //!
 //! `tests/fuzz.sh` runs them for longer and looks for new paths.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, clippy::cast_possible_truncation)] // a test may fail
-
 #[path = "shadows/mod.rs"]
 mod shadows;
 #[path = "fuzz/src/lib.rs"]

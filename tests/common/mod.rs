@@ -1,7 +1,6 @@
 //! A small world for the library's integration tests: boxes that reflect at their corners.
 
 #![allow(dead_code)] // each test file uses a part
-#![allow(clippy::cast_possible_truncation, clippy::unwrap_used)]
 
 use viewshed::bench::start;
 use viewshed::fixed::angle::Angle;

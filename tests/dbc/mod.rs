@@ -1,7 +1,5 @@
 //! Frames read by a description.
 
-#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used, clippy::panic)] // a test may fail
-
 use std::collections::BTreeMap;
 
 use can_dbc::{ByteOrder, Dbc, MultiplexIndicator, Signal, ValueType};

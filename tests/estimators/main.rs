@@ -1,7 +1,5 @@
 //! The estimators on small scenes: what is hidden, what is followed, what is unknown, and what it takes.
 
-#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // a test may fail
-
 #[path = "../common/mod.rs"]
 mod common;
 

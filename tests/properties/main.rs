@@ -3,9 +3,6 @@
 //! Built with overflow checks (any debug build) an arithmetic overflow is a failure too. The same
 //! inputs are tried on every run; `PROPTEST_RNG_SEED=7 PROPTEST_CASES=5000` tries others, and more.
 
-// inputs are made up by casting random bits, and a rig that cannot be built fails its test
-#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used)]
-
 use proptest::test_runner::{Config, RngSeed};
 
 mod setup;

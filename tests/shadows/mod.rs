@@ -1,7 +1,6 @@
 //! Maps of moving shadows, and a bus that loses, delays, repeats and reorders.
 
 #![allow(dead_code)] // each test file uses a part
-#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::unwrap_used)]
 
 use viewshed::fixed::angle::Angle;
 use viewshed::fixed::bits::Bits;

@@ -1,7 +1,5 @@
 //! Maps on the wire: code, protection, authentication, receivers, and the promise that nothing is seen that is not.
 
-#![allow(clippy::cast_possible_truncation, clippy::indexing_slicing, clippy::panic, clippy::unwrap_used)] // a test may fail
-
 #[path = "../dbc/mod.rs"]
 mod dbc;
 #[path = "../shadows/mod.rs"]
