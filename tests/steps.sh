@@ -1,6 +1,8 @@
 # shellcheck shell=bash
 # The steps of tests/all.sh, which sources this: `run COMMAND...` for each.
 need_compilers
+# before targets are: rustup does one thing at a time
+tests/gate.sh --install >/dev/null || true
 
 # what has to be fetched is, while the harness is built; each is a script that takes --install
 to_fetch="browser mcap_ros2 detector cantools linux_kernel firmware fuzz"
@@ -17,6 +19,7 @@ fetching=$!
 export CARGO_PROFILE_RELEASE_LTO=off
 # nothing is built twice
 export CARGO_INCREMENTAL=0
+run tests/gate.sh
 # the library's own tests run once, below: they take longer to optimise than to run with overflow checks
 run cargo test --release --locked --workspace --exclude viewshed --no-run
 wait $fetching || true
