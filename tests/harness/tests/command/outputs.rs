@@ -229,6 +229,15 @@ fn commands(text: &str) -> Vec<String> {
     code.chain(quoted).filter_map(command).collect()
 }
 
+/// What links call a page's headings: their letters in lower case, and a dash for each space.
+fn anchors(page: &str) -> Vec<String> {
+    let outside_code = page.split("```").step_by(2).flat_map(str::lines);
+    let heading = |line: &str| line.strip_prefix('#').map(|rest| rest.trim_start_matches('#').trim().to_lowercase());
+    let kept = |c: &char| c.is_alphanumeric() || " -_".contains(*c);
+    let anchor = |heading: String| heading.chars().filter(kept).map(|c| if c == ' ' { '-' } else { c }).collect();
+    outside_code.filter_map(heading).map(anchor).collect()
+}
+
 #[test]
 fn links_between_pages_lead_somewhere() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -242,16 +251,18 @@ fn links_between_pages_lead_somewhere() {
             } else if name.ends_with(".md") {
                 let text = std::fs::read_to_string(&path).unwrap();
                 for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-                    let file = link.split('#').next().unwrap_or_default();
-                    if file.is_empty()
-                        || file.contains("::")
-                        || file.contains("://")
-                        || file.contains(char::is_whitespace)
-                    {
+                    let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+                    if link.contains("::") || link.contains("://") || link.contains(char::is_whitespace) {
                         continue;
                     }
                     links += 1;
-                    assert!(folder.join(file).exists(), "{}: {link}", path.display());
+                    let page = if file.is_empty() { path.clone() } else { folder.join(file) };
+                    assert!(page.exists(), "{}: {link}", path.display());
+                    let is_page = page.extension().is_some_and(|extension| extension == "md");
+                    if !heading.is_empty() && is_page {
+                        let anchors = anchors(&std::fs::read_to_string(&page).unwrap());
+                        assert!(anchors.iter().any(|a| a == heading), "{}: {link}, of {anchors:?}", path.display());
+                    }
                 }
             }
         }
