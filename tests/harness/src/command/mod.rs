@@ -16,6 +16,7 @@ pub mod listen;
 pub mod options;
 pub mod progress;
 pub mod replay;
+pub mod results;
 pub mod simulate;
 pub mod site;
 pub mod starts;
@@ -59,6 +60,7 @@ enum Command {
     Detections(Box<detections::Args>),
     Configure(Box<configure::Args>),
     Lanes(Box<lanes::Args>),
+    Results(results::Args),
     Completions(completions::Args),
     #[cfg(feature = "pages")]
     Label(Box<label::Args>),
@@ -84,6 +86,7 @@ impl Cli {
             Command::Detections(args) => detections::run(args),
             Command::Configure(args) => configure::run(args),
             Command::Lanes(args) => lanes::run(args),
+            Command::Results(args) => results::run(args),
             Command::Completions(args) => completions::run(args),
             #[cfg(feature = "pages")]
             Command::Label(args) => label::run(args),

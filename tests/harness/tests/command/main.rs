@@ -15,6 +15,7 @@ mod python;
 mod radar_scan;
 mod read_by_people;
 mod replay;
+mod results;
 mod scene;
 mod scenes;
 mod simulate;

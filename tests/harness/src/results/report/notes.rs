@@ -230,12 +230,17 @@ fn settled(rows: &[Row]) -> impl Iterator<Item = String> + '_ {
         let settled = row.settled?;
         let pair = |fvr, fir| format!("{} / {}", percent(fvr), percent(fir));
         let share = 100.0 * settled.frames as f64 / settled.of.max(1) as f64;
-        Some(format!(
-            "{}: {share:.0} % of the frames had settled since the start and since gaps (before that what is behind things that \
-             stand is unknown); over these alone FVR / FIR {} %, cells {} %.",
-            row.name,
+        let rates = format!(
+            "; over these alone FVR / FIR {} %, cells {} %",
             pair(settled.counts.fvr(), settled.counts.fir()),
             pair(settled.cells.fvr(), settled.cells.fir())
+        );
+        let is_judged = settled.counts.fvr().is_some() || settled.cells.fvr().is_some();
+        Some(format!(
+            "{}: {share:.0} % of the frames had settled since the start and since gaps (before that what is behind things that \
+             stand is unknown){}.",
+            row.name,
+            if is_judged { rates } else { String::new() }
         ))
     })
 }
