@@ -86,7 +86,8 @@ library() {
     done
 }
 
-# board FOLDER: as boards/build.sh builds it, so that macros are built once for both, with what boards share
+# board FOLDER: as boards/build.sh builds it, so that macros are built once for both. What boards share is no member of their
+# workspaces, so clippy passes it over.
 board() (
     cd "$1" || exit
     unset CARGO_PROFILE_RELEASE_LTO
