@@ -4,7 +4,7 @@
 //! tables are counted through all that the part printed, from 1 on.
 //!
 //! `<!-- results * | columns A; B | row LABEL = PART X | row ... -->` puts a row of each of several parts together: what its
-//! first table with that row says in each column, and as the column [`FLAT`] what the flat grid has.
+//! first table with that row says in each column, and as the column `FLAT` what the flat grid has.
 
 use std::path::{Path, PathBuf};
 
@@ -104,9 +104,9 @@ fn together(words: &[&str], kept: &Kept) -> Result<String> {
             let measured = kept.get(part).with_context(|| format!("`viewshed results --only {part}` was not run"))?;
             let cell = |column: &String| match column.as_str() {
                 FLAT => flat_grid(measured),
-                column => tables(measured)
-                    .iter()
-                    .find_map(|table| Some(table.of(&[column], &[name]).ok()?.rows.pop()?.pop()?)),
+                column => {
+                    tables(measured).iter().find_map(|table| table.of(&[column], &[name]).ok()?.rows.pop()?.pop())
+                }
             };
             let cells = table
                 .columns
