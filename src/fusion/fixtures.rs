@@ -309,8 +309,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         self.missing = Level::new(i32::from(limits.fewer));
     }
 
-    /// Takes one detection of a frame.
+    /// Takes one detection of a frame; one that the radar's own marks leave out says nothing.
     pub fn observe(&mut self, detection: &Detection) {
+        if detection.marked {
+            return;
+        }
         let stands = detection.radial_velocity_cm_s.unsigned_abs() <= STANDS_CM_S;
         // of several, the nearest along the line of sight: posts stand in rows
         let near = self.fixtures.iter_mut().filter(|f| stands && f.is_near(detection));

@@ -105,6 +105,17 @@ fn a_sector_without_its_posts_is_blind_within_10_s_and_until_they_are_back() {
 }
 
 #[test]
+fn what_the_radars_own_marks_leave_out_teaches_nothing_and_hides_no_fault() {
+    let mut standing = new();
+    run(&mut standing, 0, 32, everywhere, |d| Some(Detection { marked: true, ..d }));
+    assert_eq!(standing.learned(), Some(0));
+    let mut standing = learned();
+    let marked = |d: Detection| Detection { marked: d.azimuth.raw() > Angle::from_degrees(30.0).raw(), ..d };
+    run(&mut standing, 32, 10, everywhere, |d| Some(marked(d)));
+    assert!(standing.is_blind(5));
+}
+
+#[test]
 fn a_lorry_that_waits_before_the_posts_is_no_fault() {
     let mut standing = learned();
     let dark = |d: Detection| (d.azimuth.raw() < Angle::from_degrees(30.0).raw()).then_some(d);
