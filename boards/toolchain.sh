@@ -5,8 +5,7 @@
 #
 # First choice: the installed compiler already has the target's core library, or rustup can add it.
 # Nothing is printed then. Second choice: Debian's compiler and library sources (rustc-web, cargo-web,
-# rust-web-src) build it once into a directory of their own, with the crates it needs from the package of
-# sources or, of those that come without, from crates.io; the settings that
+# rust-web-src) build it once, without the network, into a directory of their own; the settings that
 # make cargo use it are printed. Once it is built, rustup is not asked any more. VIEWSHED_TOOLCHAIN=debian
 # goes straight to the second choice.
 # Exit code 1 and one line on stderr if neither works.
@@ -28,7 +27,11 @@ compiler=${RUSTC:-rustc}
 debian=/usr/bin/rustc
 library=/usr/lib/rustlib/src/rust/library
 root=
-if [ -x "$debian" ] && [ -x /usr/bin/cargo ] && [ -d "$library/core" ]; then
+# a compiler that is too old is none
+minor() { sed -n 's/^[a-z-]*[:=" ]*1\.\([0-9]*\).*/\1/p'; }
+least=$(grep '^rust-version' "$(dirname "$0")/../Cargo.toml" | sed 's/ = / /' | minor)
+if [ -x "$debian" ] && [ -x /usr/bin/cargo ] && [ -d "$library/core" ] && [ -d "$library/vendor" ] &&
+    [ "$("$debian" -vV | grep '^release' | minor)" -ge "${least:-0}" ]; then
     version=$("$debian" -vV | sed -n 's/^commit-hash: //p')
     # a directory a compiler version: libraries of another one do not fit
     root=${VIEWSHED_SYSROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/viewshed-sysroot}/$version
@@ -80,15 +83,11 @@ END
     (
         cd "$work"
         unset CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_RUSTFLAGS CARGO_BUILD_TARGET RUSTC_WRAPPER
-        set -- --target "$1"
-        if [ -d "$library/vendor" ]; then
-            export CARGO_HOME="$work/home"
-            set -- "$@" --offline --config 'source.crates-io.replace-with="vendored"' \
-                --config "source.vendored.directory=\"$library/vendor\""
-        fi
-        CARGO_TARGET_DIR=$work/target RUSTC=$debian RUSTC_BOOTSTRAP=1 RUSTFLAGS=-Cembed-bitcode=yes \
-            /usr/bin/cargo build --quiet --release "$@" \
-            -Zbuild-std=core,alloc -Zbuild-std-features=compiler-builtins-mem
+        CARGO_HOME=$work/home CARGO_TARGET_DIR=$work/target RUSTC=$debian RUSTC_BOOTSTRAP=1 \
+            RUSTFLAGS=-Cembed-bitcode=yes /usr/bin/cargo build --quiet --offline --release --target "$1" \
+            -Zbuild-std=core,alloc -Zbuild-std-features=compiler-builtins-mem \
+            --config 'source.crates-io.replace-with="vendored"' \
+            --config "source.vendored.directory=\"$library/vendor\""
     ) >&2
     mkdir -p "$root/lib/rustlib/$1/lib"
     for crate in core alloc compiler_builtins; do

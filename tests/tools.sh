@@ -34,8 +34,9 @@ apt_get() {
 install() {
     may_install || return 1
     say "installing $*"
+    # lists of packages are absent on a bare machine; old ones, of an image say, have compilers that are too old
+    [ -n "$(find /var/lib/apt/lists -maxdepth 0 -mtime -1 2>/dev/null)" ] || apt_get update || true
     apt_get install -y --no-install-recommends "$@" && return
-    # lists of packages are absent on a bare machine, and old on others
     apt_get update && apt_get install -y --no-install-recommends "$@" && return
     say "cannot install $*: $(printf '%s\n' "$apt_said" | grep -m 1 '^E:' || printf '%s\n' "$apt_said" | tail -n 1)"
     return 1
