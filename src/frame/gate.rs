@@ -3,7 +3,7 @@
 use crate::fixed::angle::Angle;
 use crate::fixed::math;
 use crate::frame::detection::Detection;
-use crate::frame::repeats::Point;
+use crate::frame::repeats::{Comparing, Point};
 use crate::sensor::config::{ConfigError, above, within};
 use crate::sensor::field_of_view::Limits;
 
@@ -82,7 +82,7 @@ impl Rejection {
     ];
 
     /// Whether a point lies outside the field of view.
-    const fn is_of_place(self) -> bool {
+    pub const fn is_outside(self) -> bool {
         matches!(self, Self::Range | Self::Azimuth | Self::Elevation)
     }
 
@@ -139,8 +139,8 @@ impl Rejections {
 
     /// Of these, points outside the field of view.
     pub fn outside(&self) -> u32 {
-        let outside = [Rejection::Range, Rejection::Azimuth, Rejection::Elevation];
-        outside.iter().fold(0, |sum: u32, reason| sum.saturating_add(self.count(*reason)))
+        let outside = Rejection::ALL.into_iter().filter(|reason| reason.is_outside());
+        outside.fold(0, |sum: u32, reason| sum.saturating_add(self.count(reason)))
     }
 
     /// Sum over all reasons.
@@ -201,17 +201,27 @@ impl Gate {
         if d.marked { Err(Rejection::Unwanted) } else { self.judge_unmarked(d) }
     }
 
+    /// Whether a detection of a frame may be used. Of others the reason is counted, and those that cannot be judged are
+    /// compared with those of the frame before.
+    pub fn takes(&self, d: &Detection, rejections: &mut Rejections, unjudged: &mut Comparing<'_>) -> bool {
+        let Err(reason) = self.judge(d) else { return true };
+        rejections.add(reason);
+        if let Some(point) = self.cannot_judge(d, reason) {
+            unjudged.add(point);
+        }
+        false
+    }
+
     /// Whether a detection that was rejected for this cannot be told from noise or cannot be right, and was not left out by
     /// choice or because of where it lies: what is there is then not known.
-    pub fn cannot_judge(&self, d: &Detection, reason: Rejection) -> Option<Point> {
+    fn cannot_judge(&self, d: &Detection, reason: Rejection) -> Option<Point> {
         let speed = i32::from(d.radial_velocity_cm_s).abs();
-        let elsewhere = || matches!(self.judge_unmarked(d), Err(reason) if reason.is_of_place());
-        let is_left_out = match reason {
-            Rejection::Unwanted => elsewhere(),
-            other => other.is_of_place(),
+        let is_outside = match reason {
+            Rejection::Unwanted => self.judge_unmarked(d).is_err_and(Rejection::is_outside),
+            other => other.is_outside(),
         };
-        let chosen = speed < self.min_speed_cm_s;
-        (!is_left_out && !chosen).then(|| Point::new(d, speed <= self.max_speed_cm_s))
+        let is_chosen = speed < self.min_speed_cm_s;
+        (!is_outside && !is_chosen).then(|| Point::new(d, speed <= self.max_speed_cm_s))
     }
 
     fn judge_unmarked(&self, d: &Detection) -> Result<(), Rejection> {

@@ -9,3 +9,4 @@ pub mod repeatability;
 pub mod repeats;
 pub mod scan;
 pub mod thinning;
+pub mod unjudged;

@@ -58,11 +58,7 @@ impl<const D: usize> Scan<D> {
         let mut late = None;
         while let Some(d) = arriving.next() {
             reported = reported.saturating_add(1);
-            if let Err(reason) = gate.judge(d) {
-                self.rejections.add(reason);
-                if let Some(point) = gate.cannot_judge(d, reason) {
-                    unjudged.add(point);
-                }
+            if !gate.takes(d, &mut self.rejections, &mut unjudged) {
                 continue;
             }
             passed = passed.saturating_add(1);
@@ -175,6 +171,18 @@ pub(crate) mod tests {
     use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec as StdVec;
 
+    /// A sensor as it may be installed.
+    pub(crate) const MOUNT: Mount =
+        Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
+    pub(crate) const VIEW: FieldOfView = FieldOfView {
+        azimuth_min_deg: -60.0,
+        azimuth_max_deg: 60.0,
+        elevation_min_deg: -16.0,
+        elevation_max_deg: 16.0,
+        range_min_m: 3.0,
+        range_max_m: 200.0,
+    };
+
     fn detection(range_cm: u16, strength: i16) -> Detection {
         Detection {
             range_cm,
@@ -195,17 +203,8 @@ pub(crate) mod tests {
 
     /// A frame of detections that all lie in the field of view.
     pub(crate) fn gathered<const D: usize>(detections: &[Detection]) -> Scan<D> {
-        let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
-        let view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
-        let gate = GateConfig::default().gate(&view.limits().unwrap()).unwrap();
-        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), mount.levelling().unwrap());
+        let gate = GateConfig::default().gate(&VIEW.limits().unwrap()).unwrap();
+        let (noise, levelling) = (NoiseConfig::default().noise().unwrap(), MOUNT.levelling().unwrap());
         let mut scan = Scan::new();
         let status = FrameStatus { fault: false, refused: 7 };
         let marked = [Detection { marked: true, ..detection(2000, 40) }; 3];

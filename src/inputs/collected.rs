@@ -57,8 +57,6 @@ pub(crate) struct Collected<const N: usize, T: Entry = Detection> {
     /// The radar's numbers in the same order; `None` of what is left out.
     numbers: Vec<Option<u16>, N, u16>,
     priorities: Vec<T::Priority, N, u16>,
-    /// Once finished, those that are not left out.
-    wanted: usize,
     counts: T::Counts,
 }
 
@@ -73,7 +71,7 @@ pub(crate) enum Added {
 
 impl<const N: usize, T: Entry> Collected<N, T> {
     pub(crate) const fn new() -> Self {
-        Self { detections: Vec::new(), numbers: Vec::new(), priorities: Vec::new(), wanted: 0, counts: T::NO_COUNTS }
+        Self { detections: Vec::new(), numbers: Vec::new(), priorities: Vec::new(), counts: T::NO_COUNTS }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -81,7 +79,6 @@ impl<const N: usize, T: Entry> Collected<N, T> {
         self.numbers.clear();
         self.priorities.clear();
         self.counts = T::NO_COUNTS;
-        self.wanted = 0;
     }
 
     /// Takes a detection; in a full list it takes the room of the last of those of the least priority, if its own is greater.
@@ -129,12 +126,11 @@ impl<const N: usize, T: Entry> Collected<N, T> {
                 wanted += 1;
             }
         }
-        self.wanted = wanted;
     }
 
     /// What is not left out, once finished.
     pub(crate) fn wanted(&self) -> &[T] {
-        self.detections.get(..self.wanted).unwrap_or(&[])
+        self.detections.get(..self.numbers.iter().flatten().count()).unwrap_or(&[])
     }
 
     pub(crate) fn get_mut(&mut self, place: usize) -> Option<&mut T> {

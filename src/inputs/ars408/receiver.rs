@@ -411,22 +411,19 @@ impl<const N: usize> Ars408<N> {
             count(&mut self.counters.no_scan);
             return Ars408Outcome::Refused(Refusal::NoScan);
         };
+        // of more than 256 entries numbers come twice
+        if scan.entries.contains(number) && scan.announced <= 256 {
+            count(&mut self.counters.repeated);
+            return Ars408Outcome::Refused(Refusal::Repeated);
+        }
         if scan.arrived >= scan.announced {
-            if scan.entries.contains(number) && scan.announced <= 256 {
-                count(&mut self.counters.repeated);
-                return Ars408Outcome::Refused(Refusal::Repeated);
-            }
             self.announcements.more = true;
             if !scan.open {
                 count(&mut self.counters.surplus);
                 return Ars408Outcome::Refused(Refusal::Surplus);
             }
         }
-        // of more than 256 entries numbers come twice
-        if !scan.entries.insert(number) && scan.announced <= 256 {
-            count(&mut self.counters.repeated);
-            return Ars408Outcome::Refused(Refusal::Repeated);
-        }
+        scan.entries.insert(number);
         scan.arrived = scan.arrived.saturating_add(1);
         if scan.arrived > scan.announced {
             count(&mut self.counters.surplus);

@@ -42,12 +42,10 @@ pub fn examine(log: String, messages: &Messages, framing_errors: u32) -> Report 
     let found = sensors(messages);
     let one = |(&sensor, &n): (&u8, &usize)| {
         let (mut times, mut detections, mut faults) = (Vec::new(), 0, 0);
-        let mut watch = Watch::anywhere();
+        let mut watch = Watch::default();
         let counters = scans(sensor, messages, |scan| {
             times.push(scan.time.micros());
-            if let Some(watch) = &mut watch {
-                watch.frame(scan.time, scan.all);
-            }
+            watch.frame(scan.time, scan.all);
             detections += scan.detections.len();
             faults += usize::from(scan.fault);
         });
@@ -55,7 +53,7 @@ pub fn examine(log: String, messages: &Messages, framing_errors: u32) -> Report 
         // what does not pass this sensor's check may be another's
         counters.remove("message damaged, refused");
         let periods = times.windows(2).map(|w| w[1].saturating_sub(w[0]) as f64 / 1000.0).collect();
-        let (period_ms, unusable) = (Spread::of(periods), watch.and_then(Watch::end).map(|found| found.said()));
+        let (period_ms, unusable) = (Spread::of(periods), watch.end().map(|found| found.said()));
         Sensor { sensor, messages: n, scans: times.len(), detections, period_ms, faults, unusable, counters }
     };
     let known: usize = found.values().sum();

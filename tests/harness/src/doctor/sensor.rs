@@ -116,18 +116,13 @@ struct Examining {
     first: Vec<Line>,
 }
 
+#[derive(Default)]
 struct Scans {
     times: Vec<u64>,
     entries: usize,
     odd: usize,
     only_rcs: Option<i16>,
-    watch: Option<Watch>,
-}
-
-impl Default for Scans {
-    fn default() -> Self {
-        Self { times: Vec::new(), entries: 0, odd: 0, only_rcs: None, watch: Watch::anywhere() }
-    }
+    watch: Watch,
 }
 
 /// Entries that tell that a value never changes.
@@ -136,9 +131,7 @@ const TELLING: usize = 50;
 impl Scans {
     fn take(&mut self, scan: &RadarScan<'_>) {
         self.times.push(scan.time.micros());
-        if let Some(watch) = &mut self.watch {
-            watch.frame(scan.time, scan.all);
-        }
+        self.watch.frame(scan.time, scan.all);
         for detection in scan.all {
             let same = self.entries == 0 || self.only_rcs == detection.rcs_half_dbsm;
             self.only_rcs = detection.rcs_half_dbsm.filter(|_| same);
@@ -196,7 +189,7 @@ impl Examining {
             self.feed.end(&mut |scan| scans.take(scan));
             std::mem::take(scans)
         };
-        let unusable = watch.and_then(Watch::end);
+        let unusable = watch.end();
         let (clusters, objects) = (self.clusters, self.objects);
         Sensor {
             interface: self.interface,

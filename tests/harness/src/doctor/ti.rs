@@ -10,10 +10,7 @@ use super::findings::{self, Finding, Severity};
 use crate::recording::ReadOptions;
 use crate::recording::capture::weak;
 use crate::recording::judged::Watch;
-use crate::recording::ti::{MAGIC, feed, flaw, flaws, learn, of_cars, records_of_cars};
-
-/// From frame to frame of a capture, which holds no times, microseconds.
-const PERIOD_US: u64 = 100_000;
+use crate::recording::ti::{MAGIC, PERIOD_S, feed, flaw, flaws, learn, of_cars, records_of_cars};
 
 /// What is said of a capture.
 #[derive(Debug, Serialize)]
@@ -59,16 +56,12 @@ pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
         counters: BTreeMap::new(),
         findings: Vec::new(),
     };
-    let (mut only_ratio, mut watch) = (None, Watch::anywhere());
+    let (mut only_ratio, mut watch) = (None, Watch::default());
     if let Some(family) = family {
         let mut radar = Ti::<1024>::new(TiConfig { family: Some(family), dialect });
         feed(&mut radar, bytes, |outcome| match outcome {
             TiOutcome::Scan(s) => {
-                // a capture has no times
-                let now = Time::from_micros(report.scans as u64 * PERIOD_US);
-                if let Some(watch) = &mut watch {
-                    watch.frame(now, s.all);
-                }
+                watch.frame(Time::from_micros((report.scans as f64 * PERIOD_S * 1e6) as u64), s.all);
                 report.scans += 1;
                 report.empty_scans += usize::from(s.detections.is_empty());
                 report.points += s.detections.len();
@@ -101,7 +94,7 @@ pub fn examine(log: String, bytes: &[u8], known: &ReadOptions) -> Report {
             ),
             "look for the firmware's side information: replays take it as not measured, and a unit knows nothing of the road until then",
         );
-    } else if let Some(unusable) = watch.and_then(Watch::end) {
+    } else if let Some(unusable) = watch.end() {
         findings::add(&mut report.findings, Severity::Warning, unusable.said(), findings::UNUSABLE);
     }
     report

@@ -421,8 +421,7 @@ impl Intake {
         self.detections.clear();
         let mut refused = u16::try_from(frame.refused).unwrap_or(u16::MAX);
         self.dropped += frame.refused;
-        let unwanted = frame.unwanted.iter().map(|d| (d, true));
-        for (d, marked) in frame.detections.iter().map(|d| (d, false)).chain(unwanted) {
+        for (d, marked) in frame.all() {
             let why = match Detection::new(&measurement(d)) {
                 Ok(d) => {
                     self.detections.push(Detection { marked, ..d });

@@ -7,9 +7,9 @@ use viewshed::frame::health::{Condition, Health, HealthConfig, HealthLimits, Poi
 use viewshed::frame::repeats::Repeats;
 use viewshed::sensor::field_of_view::FieldOfView;
 
+use super::Recording;
 use super::problems::POINTS;
 use super::usable::{self, measurement};
-use super::{Frame, Recording};
 
 /// What a doctor knows of the view: nothing.
 const ANYWHERE: FieldOfView = FieldOfView {
@@ -23,6 +23,10 @@ const ANYWHERE: FieldOfView = FieldOfView {
 
 /// Reasons that leave nothing known.
 const REASONS: [Rejection; 4] = [Rejection::Quality, Rejection::Rcs, Rejection::Velocity, Rejection::Unwanted];
+
+/// What is said of those that an ARS408 leaves out itself, and a guess of why.
+const MARKED: &str = "entries that the radar itself marks as predicted, deleted, invalid or ambiguous";
+const CLONES: &str = "clones fill these marks as they like: --cluster-states takes clusters of more states, and marks of objects are left out by switching clusters on";
 
 /// Frames in which points keep coming and nearly none is let through.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,39 +43,21 @@ pub struct Unusable {
 impl Unusable {
     /// In a sentence, with a guess of why.
     pub fn said(&self) -> String {
+        let (points, hint) = match self.reason {
+            Rejection::Unwanted => (MARKED.to_owned(), CLONES),
+            other => (format!("points {}", usable::in_words(other)), usable::hint(other.name())),
+        };
         format!(
-            "in {} of {} frames points come again and at most one in twenty of them is let through ({} {}): so nothing is known then, and the map is unknown; {}",
-            self.frames,
-            self.of,
-            self.points,
-            in_words(self.reason),
-            hint(self.reason)
+            "in {} of {} frames points come again and at most one in twenty of them is let through ({} {points}): so nothing is known then, and the map is unknown; {hint}",
+            self.frames, self.of, self.points,
         )
-    }
-}
-
-fn in_words(reason: Rejection) -> &'static str {
-    match reason {
-        Rejection::Quality => "points with too low an SNR",
-        Rejection::Rcs => "points with too low an RCS",
-        Rejection::Velocity => "points with a velocity no vehicle has",
-        _ => "entries that the radar itself marks as predicted, deleted, invalid or ambiguous",
-    }
-}
-
-fn hint(reason: Rejection) -> &'static str {
-    match reason {
-        Rejection::Unwanted => {
-            "clones fill these marks as they like: --cluster-states takes clusters of more states, and marks of objects are left out by switching clusters on"
-        }
-        other => usable::hint(other.name()),
     }
 }
 
 /// Watches frames as a unit does.
 pub struct Watch {
-    gate: Gate,
-    limits: HealthLimits,
+    /// None where the defaults cannot be worked with, which a test denies.
+    by: Option<(Gate, HealthLimits)>,
     repeats: Repeats,
     health: Health,
     rejections: Rejections,
@@ -79,38 +65,30 @@ pub struct Watch {
     unusable: Option<(usize, u64, Rejections)>,
 }
 
-impl Watch {
-    /// Of a radar whose view is not known; `None` where the defaults are none, which a test denies.
-    pub fn anywhere() -> Option<Self> {
-        Some(Self::new(
-            GateConfig::default().gate(&ANYWHERE.limits().ok()?).ok()?,
-            HealthConfig::default().limits().ok()?,
-        ))
+impl Default for Watch {
+    /// Of a radar whose view is not known.
+    fn default() -> Self {
+        Self::by(ANYWHERE.limits().and_then(|view| GateConfig::default().gate(&view)).ok())
     }
+}
 
-    fn new(gate: Gate, limits: HealthLimits) -> Self {
+impl Watch {
+    fn by(gate: Option<Gate>) -> Self {
+        let by = gate.zip(HealthConfig::default().limits().ok());
         let (repeats, health) = (Repeats::NEW, Health::NEW);
-        Self { gate, limits, repeats, health, rejections: Rejections::NONE, frames: 0, unusable: None }
+        Self { by, repeats, health, rejections: Rejections::NONE, frames: 0, unusable: None }
     }
 
     /// Takes a frame.
     pub fn frame(&mut self, now: Time, detections: &[Detection]) {
+        let Some((gate, limits)) = &self.by else { return };
         self.frames += 1;
-        let (mut passed, mut unjudged) = (0, self.repeats.frame(now));
-        for d in detections {
-            let Err(reason) = self.gate.judge(d) else {
-                passed += 1;
-                continue;
-            };
-            self.rejections.add(reason);
-            if let Some(point) = self.gate.cannot_judge(d, reason) {
-                unjudged.add(point);
-            }
-        }
+        let mut unjudged = self.repeats.frame(now);
+        let passed = detections.iter().filter(|d| gate.takes(d, &mut self.rejections, &mut unjudged)).count() as u32;
         let again = unjudged.end();
         // what lies elsewhere or is no detection is told by others
-        self.health.frame(now, &Points { inside: passed, passed, again, ..Points::default() }, false, &self.limits);
-        if self.health.condition(now, &self.limits) == Condition::Unusable {
+        self.health.frame(now, &Points { inside: passed, passed, again, ..Points::default() }, false, limits);
+        if self.health.condition(now, limits) == Condition::Unusable {
             let (frames, _, rejections) = self.unusable.get_or_insert((0, now.micros(), Rejections::NONE));
             (*frames, *rejections) = (*frames + 1, self.rejections);
         }
@@ -136,22 +114,15 @@ pub fn check(recording: &mut Recording) {
 }
 
 fn of(recording: &Recording) -> Option<Unusable> {
-    let mut watch =
-        Watch::new(usable::gate(recording, &GateConfig::default())?, HealthConfig::default().limits().ok()?);
+    let mut watch = Watch::by(usable::gate(recording, &GateConfig::default()));
     let mut detections = Vec::new();
     for frame in &recording.frames {
         detections.clear();
-        detections.extend(of_frame(frame));
+        let as_unit = |(d, marked)| Some(Detection { marked, ..Detection::new(&measurement(d)).ok()? });
+        detections.extend(frame.all().filter_map(as_unit));
         watch.frame(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &detections);
     }
     watch.end()
-}
-
-/// Its points as a unit has them.
-fn of_frame(frame: &Frame) -> impl Iterator<Item = Detection> + '_ {
-    let wanted = frame.detections.iter().map(|d| (d, false));
-    let all = wanted.chain(frame.unwanted.iter().map(|d| (d, true)));
-    all.filter_map(|(d, marked)| Some(Detection { marked, ..Detection::new(&measurement(d)).ok()? }))
 }
 
 #[cfg(test)]
@@ -182,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_doctor_watches() {
-        assert!(Watch::anywhere().is_some());
+        assert!(Watch::default().by.is_some());
     }
 
     #[test]

@@ -92,6 +92,13 @@ pub struct Frame {
     pub fault: bool,
 }
 
+impl Frame {
+    /// What was detected, and behind it what the radar's own marks left out, which is true of it.
+    pub fn all(&self) -> impl Iterator<Item = (&RadarDetection, bool)> {
+        self.detections.iter().map(|d| (d, false)).chain(self.unwanted.iter().map(|d| (d, true)))
+    }
+}
+
 /// Static field of view, in the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldOfView {

@@ -19,7 +19,7 @@ pub const MAGIC: [u8; 8] = [2, 1, 4, 3, 6, 5, 8, 7];
 const WITHIN: usize = 1 << 17;
 
 /// Time between frames of TI's own demonstrations.
-const PERIOD_S: f64 = 0.1;
+pub const PERIOD_S: f64 = 0.1;
 
 /// Time of the first frame.
 const START_NS: i64 = 1_000_000_000;

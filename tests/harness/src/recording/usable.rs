@@ -39,6 +39,21 @@ pub fn hint(reason: &str) -> &'static str {
     }
 }
 
+/// What was rejected, in words.
+pub fn in_words(reason: Rejection) -> &'static str {
+    match reason {
+        Rejection::Range => "nearer or farther than the field of view",
+        Rejection::Azimuth => "beside the field of view",
+        Rejection::Elevation => "above or below the field of view",
+        Rejection::Quality => "with too low an SNR",
+        Rejection::Rcs => "with too low an RCS",
+        Rejection::Velocity => "with a velocity no vehicle has",
+        Rejection::Overflow => "too many for --max-detections, of crowded places first",
+        Rejection::Unwanted => "left out by the radar's own marks",
+        Rejection::Refused => "not finite",
+    }
+}
+
 /// The gate of a recording's radar; `None` where there can be none, which its estimators say.
 pub fn gate(recording: &Recording, config: &GateConfig) -> Option<Gate> {
     config.gate(&sensor(recording, &NoiseConfig::default()).field_of_view.limits().ok()?).ok()

@@ -29,8 +29,10 @@ pub fn frames(recording: &Recording) -> Vec<Frame> {
 
 /// Nowhere, or outside the field of view: what weak and fast ones are is the estimators' choice.
 fn is_outside(reason: Option<&str>) -> bool {
-    let outside = [Rejection::Range, Rejection::Azimuth, Rejection::Elevation].map(Rejection::name);
-    reason.is_some_and(|why| [DROPPED, NOT_FINITE, NO_RANGE, ABSURD].contains(&why) || outside.contains(&why))
+    let mut outside = Rejection::ALL.into_iter().filter(|reason| reason.is_outside());
+    reason.is_some_and(|why| {
+        [DROPPED, NOT_FINITE, NO_RANGE, ABSURD].contains(&why) || outside.any(|outside| outside.name() == why)
+    })
 }
 
 /// Adds it to the recording's problems where many points are nowhere, or outside the field of view.

@@ -13,6 +13,7 @@ use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::{Row, Summary};
 use crate::evaluation::units::RUN_BLOCKS;
 use crate::recording::truth::LabelsBeside;
+use crate::recording::usable;
 use crate::recording::{Frame, Recording};
 
 /// What the table is of.
@@ -155,15 +156,11 @@ fn comparison(c: &Comparison) -> String {
 
 /// A reason for which estimators leave out a detection or a box, in words; `None` for what is neither.
 fn in_words(reason: &str) -> Option<&str> {
+    let of_gate = Rejection::ALL.into_iter().filter(|rejection| *rejection != Rejection::Refused);
+    if let Some(rejection) = of_gate.into_iter().find(|rejection| rejection.name() == reason) {
+        return Some(usable::in_words(rejection));
+    }
     Some(match reason {
-        _ if reason == Rejection::Range.name() => "nearer or farther than the field of view",
-        _ if reason == Rejection::Azimuth.name() => "beside the field of view",
-        _ if reason == Rejection::Elevation.name() => "above or below the field of view",
-        _ if reason == Rejection::Quality.name() => "with too low an SNR",
-        _ if reason == Rejection::Rcs.name() => "with too low an RCS",
-        _ if reason == Rejection::Velocity.name() => "with a velocity no vehicle has",
-        _ if reason == Rejection::Overflow.name() => "too many for --max-detections, of crowded places first",
-        _ if reason == Rejection::Unwanted.name() => "left out by the radar's own marks",
         DROPPED => "not finite or without a range when read",
         NOT_FINITE => "not finite",
         NO_RANGE => "at no measurable range",
