@@ -102,11 +102,10 @@ fn together(words: &[&str], kept: &Kept) -> Result<String> {
             let (label, of) = row.with_context(|| format!("`{word}`: columns, or row LABEL = PART ROW"))?;
             let (part, name) = of.trim().split_once(' ').with_context(|| format!("`{word}`: PART and ROW"))?;
             let measured = kept.get(part).with_context(|| format!("`viewshed results --only {part}` was not run"))?;
+            let all = tables(measured);
             let cell = |column: &String| match column.as_str() {
                 FLAT => flat_grid(measured),
-                column => {
-                    tables(measured).iter().find_map(|table| table.of(&[column], &[name]).ok()?.rows.pop()?.pop())
-                }
+                column => all.iter().find_map(|table| table.of(&[column], &[name]).ok()?.rows.pop()?.pop()),
             };
             let cells = table
                 .columns

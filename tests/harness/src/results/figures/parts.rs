@@ -8,6 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 use viewshed::estimator::ESTIMATOR_VERSION;
+use viewshed::wire::header::fingerprint;
 
 /// The plan, from the repository's root.
 pub const PLAN: &str = "tests/results.toml";
@@ -33,7 +34,7 @@ pub struct Part {
     /// Short enough for every run of the tests.
     #[serde(default)]
     pub quick: bool,
-    /// Arguments of `viewshed`, run one after the other in the repository's root; `TMP` is a folder that is thrown away.
+    /// Arguments of `viewshed`, run one after the other in the repository's root.
     pub run: Vec<String>,
 }
 
@@ -102,22 +103,16 @@ impl Measured {
     /// A command that cannot be run, or ends with an error.
     pub fn by_running(part: &Part, root: &Path, sources: &str) -> Result<Self> {
         let program = std::env::current_exe().context("this program's own path")?;
-        let folder = std::env::temp_dir().join(format!("viewshed-results-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
         let begun = Instant::now();
         let run = |line: &String| -> Result<Vec<String>> {
-            let temporary = folder.display().to_string();
-            let arguments = line.split_whitespace().map(|word| word.replace("TMP", &temporary));
-            let output = Command::new(&program).args(arguments).current_dir(root).env("COLUMNS", "200").output();
+            let output = Command::new(&program).args(line.split_whitespace()).current_dir(root).output();
             let output = output.with_context(|| format!("viewshed {line}"))?;
             if !output.status.success() {
                 bail!("viewshed {line}: {}", String::from_utf8_lossy(&output.stderr).trim());
             }
-            let printed = String::from_utf8_lossy(&output.stdout).replace(&temporary, "TMP");
-            Ok(printed.lines().filter(|line| !line.starts_with("wrote ")).map(str::to_owned).collect())
+            Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
         };
         let printed: Result<_> = part.run.iter().map(run).collect();
-        let _ = std::fs::remove_dir_all(&folder);
         Ok(Self {
             run: part.run.clone(),
             sources: sources.to_owned(),
@@ -155,16 +150,10 @@ pub fn sources(root: &Path) -> Result<String> {
     // pages change nothing
     let mut files: Vec<&str> = listed.lines().filter(|line| !line.ends_with(".md")).collect();
     files.sort_unstable();
-    // FNV-1a
-    let mut sum = 0xcbf2_9ce4_8422_2325_u64;
-    for name in files {
-        // one that was removed is none
-        let Ok(bytes) = std::fs::read(root.join(name)) else { continue };
-        for byte in name.bytes().chain([0]).chain(bytes) {
-            sum = (sum ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
-        }
-    }
-    Ok(format!("{sum:016x}")[..8].to_owned())
+    // one that was removed is none
+    let of = |name: &str| Some(format!("{name} {:08x}\n", fingerprint(&std::fs::read(root.join(name)).ok()?)));
+    let all: String = files.into_iter().filter_map(of).collect();
+    Ok(format!("{:08x}", fingerprint(all.as_bytes())))
 }
 
 #[cfg(test)]
