@@ -29,7 +29,7 @@ library=/usr/lib/rustlib/src/rust/library
 root=
 # a compiler that is too old is none
 minor() { sed -n 's/^[a-z-]*[:=" ]*1\.\([0-9]*\).*/\1/p'; }
-least=$(grep '^rust-version' "$(dirname "$0")/../Cargo.toml" | sed 's/ = / /' | minor)
+least=$(grep '^rust-version' "$(dirname "$0")/../Cargo.toml" | minor)
 if [ -x "$debian" ] && [ -x /usr/bin/cargo ] && [ -d "$library/core" ] && [ -d "$library/vendor" ] &&
     [ "$("$debian" -vV | grep '^release' | minor)" -ge "${least:-0}" ]; then
     version=$("$debian" -vV | sed -n 's/^commit-hash: //p')
