@@ -48,14 +48,11 @@ use crate::map::{Visibility, VisibilityMap};
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::road::RoadPoint;
 
-#[cfg(feature = "monitoring")]
 pub use alignment::{Alignment, AlignmentConfig};
-#[cfg(feature = "monitoring")]
-pub use fixtures::{Fixtures, FixturesConfig};
+pub use fixtures::{Fixtures, FixturesConfig, FixturesLimits};
 pub use monitor::{Monitor, MonitorConfig, Observed, Watched};
 use places::Places;
 pub use polar::{fill, polar};
-#[cfg(feature = "monitoring")]
 pub use supervised::{Supervised, Supervision};
 pub use view::{Conflict, Fused, FusedCell, Sensors};
 

@@ -5,7 +5,7 @@
 //! [`RadarScan`], or what was wrong. Bad input is counted and never stops a decoder.
 
 pub mod ars408;
-mod collected;
+pub mod collected;
 pub mod native;
 mod polar;
 pub mod signal;

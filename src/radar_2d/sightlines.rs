@@ -149,12 +149,6 @@ impl<const N: usize> Sightlines<N> {
         behind += u32::from(end.is_some_and(|e| here > e));
         ((255 * (runs - behind)).checked_div(runs).unwrap_or(255) as u8).max(BLOCKED)
     }
-
-    /// The last occupied range cell of a ray: what lies up to it is visible in the one reading, all
-    /// to the limit where there is none.
-    pub fn last_seen(&self, ray: usize) -> Option<usize> {
-        self.rays.get(ray).and_then(|bits| bits.last())
-    }
 }
 
 #[cfg(test)]
@@ -179,7 +173,7 @@ mod tests {
         let grade = |x: i32| s.grade(x, 50, &f);
         assert_eq!((grade(3_050), grade(5_050), grade(7_050), grade(9_050), grade(12_050)), (255, 255, 127, 127, 1));
         assert_eq!(s.grade(12_050, 3_050, &f), 255, "another ray");
-        assert_eq!(s.last_seen(f.locate(9_050, 50).1 as usize >> 8), Some(90));
+        assert_eq!(s.rays[f.locate(9_050, 50).1 as usize >> 8].last(), Some(90));
     }
 
     #[test]
@@ -194,7 +188,7 @@ mod tests {
     fn a_near_cell_covers_as_many_rays_as_it_is_wide() {
         let (mut s, f) = (Sightlines::<360>::new(), fan());
         s.block(1_050, 50, &f);
-        let covered = (0..360).filter(|ray| s.last_seen(*ray).is_some()).count();
+        let covered = (0..360).filter(|ray| s.rays[*ray].last().is_some()).count();
         // 1.2 m at 10.5 m are 6.5 degrees of 126 on 360 rays
         assert!((17..=21).contains(&covered), "{covered}");
     }

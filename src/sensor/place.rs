@@ -63,13 +63,7 @@ impl Place<'static> {
     pub const NOTHING: Self = Self { lanes: LaneList::Metres(&[]), heights: Points::Metres(&[]) };
 }
 
-impl Place<'_> {
-    /// Whether nothing is known of it.
-    pub fn is_nothing(&self) -> bool {
-        let Self { mut lanes, mut heights } = *self;
-        lanes.next().is_none() && heights.next().is_none()
-    }
-}
+impl Place<'_> {}
 
 impl<'a> Iterator for LaneList<'a> {
     type Item = Points<'a>;
@@ -239,12 +233,5 @@ mod tests {
             assert_eq!(whole, usize::from(cut >= 15), "{cut}");
         }
         assert_eq!(LaneList::Bytes(&[0, 1, 2, 3, 4, 5, 6]).count(), 0, "a lane of no points");
-    }
-
-    #[test]
-    fn a_place_of_which_nothing_is_known_says_so() {
-        assert!(Place::NOTHING.is_nothing());
-        assert!(!Place { lanes: LaneList::Metres(&LANES), ..Place::NOTHING }.is_nothing());
-        assert!(!Place { heights: Points::Metres(&[[0.0, 0.0]]), ..Place::NOTHING }.is_nothing());
     }
 }

@@ -8,9 +8,12 @@ use crate::estimator::Estimator;
 use crate::frame::detection::Detection;
 #[cfg(feature = "monitoring")]
 use crate::fusion::Supervised;
-use crate::map::polar::{PolarGeometry, PolarMap};
+use crate::map::polar::PolarGeometry;
+#[cfg(feature = "monitoring")]
+use crate::map::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::sensor::config::{ConfigError, Problem};
+use crate::sensor::mount::Mount;
 use crate::sensor::place::Place;
 use crate::unit::sender::MapSender;
 use crate::unit::settings::{Settings, SettingsCheck};
@@ -114,11 +117,23 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
-        let axes = parameters.axes();
-        let view = axes.view(A / 2);
-        let geometry = axes.polar(parameters.levelling());
-        header::<R, A>(settings, &geometry, Known::new(view.start, view.end))
+        let header = of_radar(&settings.sensor.mount, parameters)?;
+        Ok(Header { fingerprint: settings.fingerprint(), ..header })
     }
+}
+
+/// What receivers have to know of a radar's maps; without a fingerprint of settings.
+///
+/// # Errors
+/// Maps that cannot be sent.
+pub(super) fn of_radar<const R: usize, const A: usize, const E: usize>(
+    mount: &Mount,
+    parameters: &Radar3dParameters<R, A, E>,
+) -> Result<Header, ConfigError> {
+    let axes = parameters.axes();
+    let view = axes.view(A / 2);
+    let geometry = axes.polar(parameters.levelling());
+    header::<R, A>(mount, &geometry, Known::new(view.start, view.end))
 }
 
 /// A radar's unit, supervised where its settings say so.
@@ -148,7 +163,7 @@ where
 }
 
 fn header<const R: usize, const A: usize>(
-    settings: &Settings,
+    mount: &Mount,
     geometry: &PolarGeometry,
     usual: Known,
 ) -> Result<Header, ConfigError> {
@@ -159,7 +174,7 @@ fn header<const R: usize, const A: usize>(
         value: A as f32,
         problem: Problem::OutOfLimits { min: 1.0, max: MOST_AZIMUTHS as f32 },
     };
-    Header::new::<R, A>(&settings.sensor.mount, geometry, usual, 1, settings.fingerprint()).map_err(|_| refused)
+    Header::new::<R, A>(mount, geometry, usual, 1, 0).map_err(|_| refused)
 }
 
 /// Of the settings a camera takes the mount, the field of view as the angles at which its picture ends along its
@@ -188,6 +203,7 @@ impl<const NX: usize, const NY: usize> InUnit for Camera3d<NX, NY> {
 
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
         let [from, to] = parameters.ahead();
-        header::<NX, AZIMUTHS>(settings, &parameters.geometry(), Known::new(from, to))
+        let header = header::<NX, AZIMUTHS>(&settings.sensor.mount, &parameters.geometry(), Known::new(from, to))?;
+        Ok(Header { fingerprint: settings.fingerprint(), ..header })
     }
 }

@@ -24,6 +24,7 @@ pub mod identity;
 pub mod profile;
 #[cfg(feature = "probability")]
 pub mod quantised;
+pub mod radar;
 pub mod radar_clock;
 pub mod roadside;
 mod safe_state;

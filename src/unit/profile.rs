@@ -22,9 +22,12 @@ macro_rules! size {
             /// Who sends it where there may be a table of probabilities.
             #[cfg(feature = "probability")]
             pub type QuantisedSender = crate::unit::quantised::QuantisedSender<$azimuths, WORDS>;
-            /// A radar of the ARS408 family with as many detections.
-            #[cfg(feature = "board")]
-            pub type Radar = crate::inputs::ars408::Ars408<$detections>;
+            /// An estimator with its parameters and its map, for one `static`.
+            pub type Radar = crate::unit::radar::Radar<$ranges, $azimuths, $elevations, WORDS, $obstacles, $detections>;
+            /// A decoder of an ARS408 or one of its kin, with as many detections.
+            pub type Ars408 = crate::inputs::ars408::Ars408<$detections>;
+            /// Who receives the maps of one sensor of this size.
+            pub type Receiver = crate::wire::receive::Receiver<1, $azimuths, WORDS>;
             /// Whether a unit of this size can run with settings.
             #[cfg(feature = "board")]
             pub const CHECK: crate::unit::settings::SettingsCheck =
@@ -41,8 +44,7 @@ macro_rules! size {
                 pub type State = crate::fusion::Supervised<super::State>;
                 /// What it works with.
                 pub type Parameters = <State as Estimator>::Parameters;
-                #[cfg(feature = "board")]
-                pub use super::Radar;
+                pub use super::Ars408;
                 /// Whether a unit of this size can run with settings.
                 #[cfg(feature = "board")]
                 pub const CHECK: crate::unit::settings::SettingsCheck =

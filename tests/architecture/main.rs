@@ -2,5 +2,7 @@
 
 mod circles;
 mod extending;
-mod public_names;
+mod face;
+mod figures;
 mod skips;
+mod uncalled;

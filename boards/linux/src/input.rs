@@ -12,7 +12,7 @@ use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, Identity, RadarClock, Seria
 use viewshed::{BusConfig, CanFrame, Epoch, Feed, NativeConfig, NativeReceiver, Reason, Ti, Time, Unstuffer};
 
 use super::run::Unit;
-use super::size::{Radar as Decoder, State as Radar3d};
+use super::size::{Ars408 as Decoder, State as Radar3d};
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};
 use crate::frames::from_socketcan;

@@ -31,12 +31,6 @@ pub fn speed_cm_s(data: &[u8]) -> i32 {
     }
 }
 
-/// Yaw rate in hundredths of a degree a second, + to the left, out of the frame's data.
-#[allow(clippy::cast_possible_wrap)] // 16 bits
-pub fn yaw_rate_centidegrees_s(data: &[u8]) -> i32 {
-    YAW_RATE.get(word(data)) as i32 - 0x8000
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -53,10 +47,8 @@ mod tests {
     }
 
     #[test]
-    fn speeds_and_yaw_rates_have_signs() {
+    fn speeds_have_signs() {
         assert_eq!(speed_cm_s(&[0x40 | 0x03, 0xE8]), 2000, "forward");
         assert_eq!(speed_cm_s(&[0x80 | 0x03, 0xE8]), -2000, "backward");
-        assert_eq!(yaw_rate_centidegrees_s(&[0x80, 0x64]), 100);
-        assert_eq!(yaw_rate_centidegrees_s(&[0x7F, 0x9C, 0, 0, 0, 0, 0, 0]), -100, "frames of 8 bytes too");
     }
 }

@@ -56,11 +56,6 @@ pub static DEVIATION_MM: [u16; 31] = [
     2817, 3630, 4676, 6025, 7762, 10_000,
 ];
 
-/// A standard deviation; `None` where the radar has none.
-pub fn deviation_mm(index: u32) -> Option<u16> {
-    DEVIATION_MM.get(usize::try_from(index).ok()?).copied()
-}
-
 /// Which entries are wanted, by the radar's own marks. Entries without marks always are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -191,7 +186,8 @@ mod tests {
 
     #[test]
     fn deviations_come_from_the_table() {
-        assert_eq!((deviation_mm(0), deviation_mm(30), deviation_mm(31)), (Some(5), Some(10_000), None));
+        let at = |index: usize| DEVIATION_MM.get(index).copied();
+        assert_eq!((at(0), at(30), at(31)), (Some(5), Some(10_000), None));
         assert!(DEVIATION_MM.is_sorted());
     }
 }

@@ -19,7 +19,7 @@ use viewshed::wire::broadcast::Medium;
 use viewshed::wire::message::Addresses;
 use zcu102_r5::can::Can;
 use zcu102_r5::profile::State as Radar3d;
-use zcu102_r5::profile::supervised::{CHECK, Map, Parameters, Radar, Sender, State};
+use zcu102_r5::profile::supervised::{Ars408, CHECK, Map, Parameters, Sender, State};
 use zcu102_r5::stack;
 
 /// The radar's own number on this bench, whatever the block says.
@@ -43,7 +43,7 @@ extern "C" fn main() -> ! {
     let mut flash = FlashFile::<HostFile>::open();
     let grid = [Radar3d::RANGES as u8, Radar3d::AZIMUTHS as u8];
     let identity = Identity { board: "zcu102-r5", chip: CHIP, is_bench: true, grid };
-    let mut session = CanBench::new(Radar::new(Ars408Config::sensor(RADAR)));
+    let mut session = CanBench::new(Ars408::new(Ars408Config::sensor(RADAR)));
     let (mut starts, mut has_time) = (0, false);
 
     loop {

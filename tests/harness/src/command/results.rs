@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use super::progress::bar;
 use super::{print, told};
 use crate::results::figures::pages;
-use crate::results::figures::parts::{self, KEPT, Measured, PAGE, Plan};
+use crate::results::figures::parts::{self, KEPT, Measured, PAGE, Pictures, Plan};
 
 /// Exit code where something is not as it was kept.
 const DIFFERS: u8 = 1;
@@ -17,8 +17,8 @@ const DIFFERS: u8 = 1;
 ///
 /// The plan is tests/results.toml. What each part prints is kept in tests/results.json, with a check sum of the sources it was
 /// measured on, and written to tests/RESULTS.md and between the markers of all pages. Parts whose sources are still the
-/// same are not run again, so a run that was ended goes on where it was. All parts take some minutes together, quick ones
-/// seconds.
+/// same are not run again, so a run that was ended goes on where it was. All parts take a quarter of an hour together, quick
+/// ones seconds. Pictures that pages show are made by the same parts.
 ///
 /// Examples:
 ///   viewshed results --quick            after a change: what takes seconds
@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let running = bar("measuring", due.len() as u64);
     for part in due {
         told(&format!("{}: {}", part.name, part.shows));
-        let measured = Measured::by_running(part, root, &sources)?;
+        let measured = Measured::by_running(part, root, &sources, Pictures::Made)?;
         print(&format!("{}: {} s\n", part.name, measured.seconds))?;
         kept.insert(part.name.clone(), measured);
         // what was measured is kept at once
@@ -90,7 +90,7 @@ fn check(args: &Args, plan: &Plan, kept: &parts::Kept) -> Result<ExitCode> {
     let root = args.root.as_path();
     let mut differs = Vec::new();
     for part in plan.part.iter().filter(|part| part.quick) {
-        let measured = Measured::by_running(part, root, "")?;
+        let measured = Measured::by_running(part, root, "", Pictures::Left)?;
         match kept.get(&part.name) {
             Some(before) if before.printed == measured.printed && before.run == measured.run => {}
             Some(before) => {

@@ -2,4 +2,5 @@
 
 pub mod pages;
 pub mod parts;
+pub mod photo;
 pub mod table;

@@ -149,14 +149,32 @@ pub fn results(plan: &Plan, kept: &Kept) -> String {
             page += "\nNot measured yet.\n";
             continue;
         };
+        let mut number = 0;
         for (line, printed) in measured.run.iter().zip(&measured.printed) {
             page += &format!("\n    viewshed {line}\n\n");
-            for piece in pieces(&printed.join("\n")) {
-                page += &match piece {
-                    Piece::Table(table) => format!("\n{}\n", table.markdown()),
-                    Piece::Line(line) if line.is_empty() => String::new(),
-                    Piece::Line(line) => format!("{}\n\n", line.replace('<', "&lt;")),
-                };
+            let (mut said, mut tables) = (String::new(), String::new());
+            let mut lines = pieces(&printed.join("\n")).into_iter().peekable();
+            while let Some(piece) = lines.next() {
+                match piece {
+                    Piece::Table(table) => {
+                        number += 1;
+                        if part.shows_table(number) {
+                            tables += &format!("{}\n", table.markdown());
+                        }
+                    }
+                    Piece::Line(line) if line.is_empty() => {}
+                    // the line above a table says what it is of
+                    Piece::Line(line) if matches!(lines.peek(), Some(Piece::Table(_))) => {
+                        if part.shows_table(number + 1) {
+                            tables += &format!("{}\n\n", line.replace('<', "&lt;"));
+                        }
+                    }
+                    Piece::Line(line) => said += &format!("{}\n\n", line.replace('<', "&lt;")),
+                }
+            }
+            page += &tables;
+            if !said.is_empty() {
+                page += &format!("<details><summary>what it says beside</summary>\n\n{said}</details>\n");
             }
         }
         page += &format!(

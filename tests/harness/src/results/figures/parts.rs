@@ -10,12 +10,18 @@ use serde::{Deserialize, Serialize};
 use viewshed::estimator::ESTIMATOR_VERSION;
 use viewshed::wire::header::fingerprint;
 
+use super::photo;
+
 /// The plan, from the repository's root.
 pub const PLAN: &str = "tests/results.toml";
 /// What was printed, and on what.
 pub const KEPT: &str = "tests/results.json";
 /// The same to read.
 pub const PAGE: &str = "tests/RESULTS.md";
+/// Pictures that pages show.
+pub const PICTURES: &str = "tests/pictures";
+/// Stands in a command for a folder of the part's own, which is gone afterwards.
+pub const OUT: &str = "{out}";
 
 /// All that is measured.
 #[derive(Debug, Clone, Deserialize)]
@@ -34,8 +40,21 @@ pub struct Part {
     /// Short enough for every run of the tests.
     #[serde(default)]
     pub quick: bool,
-    /// Arguments of `viewshed`, run one after the other in the repository's root.
+    /// Arguments of `viewshed`, run one after the other in the repository's root; `{out}` is a folder of their own.
     pub run: Vec<String>,
+    /// Which tables the page of results shows, counted through all that is printed, from 1 on; all where none is named.
+    #[serde(default)]
+    pub tables: Vec<usize>,
+    /// Pictures of pages, by their names in `tests/pictures`, and what of `{out}` they are: a picture, or a page to photograph.
+    #[serde(default)]
+    pub pictures: BTreeMap<String, String>,
+}
+
+impl Part {
+    /// Whether the page of results shows a table.
+    pub fn shows_table(&self, number: usize) -> bool {
+        self.tables.is_empty() || self.tables.contains(&number)
+    }
 }
 
 impl Plan {
@@ -80,6 +99,13 @@ pub struct Measured {
     pub printed: Vec<Vec<String>>,
 }
 
+/// Whether a part's pictures are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pictures {
+    Made,
+    Left,
+}
+
 /// All that was kept, by part.
 pub type Kept = BTreeMap<String, Measured>;
 
@@ -97,29 +123,38 @@ pub fn kept(root: &Path) -> Result<Kept> {
 }
 
 impl Measured {
-    /// Runs a part's commands by this very program.
+    /// Runs a part's commands by this very program, and has its pictures made.
     ///
     /// # Errors
-    /// A command that cannot be run, or ends with an error.
-    pub fn by_running(part: &Part, root: &Path, sources: &str) -> Result<Self> {
+    /// A command that cannot be run, or ends with an error; a picture that did not come of them.
+    pub fn by_running(part: &Part, root: &Path, sources: &str, pictures: Pictures) -> Result<Self> {
         let program = std::env::current_exe().context("this program's own path")?;
         let begun = Instant::now();
+        let out = tempfile::tempdir().context("a folder for what the part writes")?;
+        let folder = out.path().to_string_lossy();
         let run = |line: &String| -> Result<Vec<String>> {
-            let output = Command::new(&program).args(line.split_whitespace()).current_dir(root).output();
+            let words = line.split_whitespace().map(|word| word.replace(OUT, &folder));
+            let output = Command::new(&program).args(words).current_dir(root).output();
             let output = output.with_context(|| format!("viewshed {line}"))?;
             if !output.status.success() {
                 bail!("viewshed {line}: {}", String::from_utf8_lossy(&output.stderr).trim());
             }
             Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
         };
-        let printed: Result<_> = part.run.iter().map(run).collect();
+        let printed = part.run.iter().map(run).collect::<Result<Vec<_>>>()?;
+        if pictures == Pictures::Made {
+            for (name, of) in &part.pictures {
+                photo::make(&out.path().join(of), &root.join(PICTURES).join(name))?;
+            }
+        }
+        let without_folder = |line: &String| line.replace(&*folder, OUT);
         Ok(Self {
             run: part.run.clone(),
             sources: sources.to_owned(),
             estimator_version: ESTIMATOR_VERSION,
             seconds: begun.elapsed().as_secs(),
             machine: machine(),
-            printed: printed?,
+            printed: printed.iter().map(|lines| lines.iter().map(without_folder).collect()).collect(),
         })
     }
 }

@@ -1,10 +1,7 @@
 //! The example on the shipped log of an ARS408's bus.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use viewshed::{CanFrame, CanId, FieldOfView, Mount, NoiseConfig, RoadPoint, Sensor, Time};
-use viewshed_example::Guard;
+use viewshed::{CanFrame, CanId, FieldOfView, Mount, NoiseConfig, RoadPoint, Sensor, Time, small};
+use viewshed_example::ars408_unit::Guard;
 
 const LOG: &str = include_str!("../../recordings/ars408-made-up.log");
 
@@ -40,20 +37,13 @@ fn sensor() -> Sensor {
     }
 }
 
-/// On a controller without threads, a cell that is taken once.
-fn place() -> &'static Mutex<Guard> {
-    static GUARDS: [Mutex<Guard>; 2] = [const { Mutex::new(Guard::NOWHERE) }; 2];
-    static TAKEN: AtomicUsize = AtomicUsize::new(0);
-    &GUARDS[TAKEN.fetch_add(1, Ordering::Relaxed)]
-}
-
 #[test]
 fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
-    let mut guard = place().lock().unwrap();
+    let (mut input, mut radar) = (Box::new(Guard::INPUT), Box::new(small::Radar::new()));
+    let mut guard = Guard::start(&mut input, &mut radar, &sensor()).unwrap();
     let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
     let behind = RoadPoint::from_metres(-20.0, 0.0).unwrap();
-    assert!(!guard.is_free(near, Time::from_micros(0)).unwrap(), "not begun");
-    guard.start(&sensor()).unwrap();
+    assert!(!guard.is_free(near, Time::from_micros(0)).unwrap(), "no scan yet");
     let (mut now, mut frames, mut free) = (Time::from_micros(0), 0, 0);
     for (time, frame) in log() {
         guard.take(&frame, time);
@@ -69,8 +59,8 @@ fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
 
 #[test]
 fn nothing_is_free_while_parts_of_the_last_scan_are_missing() {
-    let mut guard = place().lock().unwrap();
-    guard.start(&sensor()).unwrap();
+    let (mut input, mut radar) = (Box::new(Guard::INPUT), Box::new(small::Radar::new()));
+    let mut guard = Guard::start(&mut input, &mut radar, &sensor()).unwrap();
     let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
     let (mut scans, mut free) = (0, 0);
     let is = |frame: &CanFrame, id: u16| Some(frame.id) == CanId::standard(id);
