@@ -400,7 +400,10 @@ impl Config {
 
     /// The table of probabilities for the file's own settings, if both are given.
     pub fn table(&self) -> Option<anyhow::Result<Table>> {
-        self.probability.as_ref().zip(self.settings()).map(|(given, settings)| given.read(self.grid, &settings))
+        self.probability
+            .as_ref()
+            .zip(self.settings())
+            .map(|(given, settings)| given.read(self.grid == Grid::Reference, &settings))
     }
 
     /// Which program the service says this is; its chip is the machine.

@@ -11,7 +11,7 @@ use socketcan::dump::{ParseError, Reader};
 use viewshed::board::{Ars408Upkeep, BusKeeper, Flow, Identity, RadarClock, SerialSession, StoredSettings};
 use viewshed::{BusConfig, CanFrame, Epoch, Feed, NativeConfig, NativeReceiver, Reason, Ti, Time, Unstuffer};
 
-use super::run::Unit;
+use super::Unit;
 use super::size::{Ars408 as Decoder, State as Radar3d};
 use crate::can::Interface;
 use crate::config::{ClockSource, Config, Radar};

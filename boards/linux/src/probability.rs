@@ -10,8 +10,6 @@ use serde::Deserialize;
 use viewshed::Settings;
 use viewshed::probability::{ProbabilityTable, Quantiser, Threshold};
 
-use crate::config::Grid;
-
 /// Which table, and what of it is called visible.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,13 +33,13 @@ impl Given {
         self.risk.filter(|risk| !share(risk)).map(|_| ("risk", "not between 0 and 1: 0.1 is 10 %"))
     }
 
-    /// Reads the table.
+    /// Reads the table, for a unit on the reference grid or another.
     ///
     /// # Errors
     /// The file, and what is wrong with it: cut off, damaged, not monotone, of another configuration.
-    pub fn read(&self, grid: Grid, settings: &Settings) -> Result<Table> {
+    pub fn read(&self, on_reference: bool, settings: &Settings) -> Result<Table> {
         let read = || -> Result<Table> {
-            ensure!(grid == Grid::Reference, "tables are fitted on grid = \"reference\"");
+            ensure!(on_reference, "tables are fitted on grid = \"reference\"");
             let text = std::fs::read_to_string(&self.file)?;
             let (table, counted) = table_file::parse(&text)?;
             let threshold = self.risk.map(|risk| Threshold::keeping(risk, &counted));

@@ -9,16 +9,14 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use viewshed::board::{BlockError, Flow, StoredSettings};
 use viewshed::{PolarMap, Reason, Time, UnitState};
 
+use super::Unit;
 use super::input::{self, Input, Step, Work};
 use super::size::supervised::{CHECK, Map, Parameters, State};
 use super::size::{QuantisedSender as Sender, State as Radar3d};
-use crate::config::{ClockSource, Config};
+use crate::config::{ClockSource, Config, Grid};
 use crate::output::{Output, version};
 use crate::state::{FileSlots, KeptEpoch};
 use crate::systemd::Systemd;
-
-/// The daemon's unit: radar-3d on the grid of this module.
-pub type Unit<'u> = viewshed::Unit<'u, State, Sender>;
 
 /// Waits between two looks: while something is to be sent, and otherwise.
 const BUSY: Duration = Duration::from_millis(1);
@@ -73,7 +71,7 @@ pub fn run(config: &Config, stop: &AtomicBool) -> Result<()> {
             // what does not build was refused above
             let header = settings.build::<State>(&mut parameters).map_err(|e| anyhow!("{e}"))?;
             let now = input.now(clock.now());
-            let given = config.probability.as_ref().map(|given| given.read(config.grid, settings));
+            let given = config.probability.as_ref().map(|given| given.read(config.grid == Grid::Reference, settings));
             let quantiser = match given.transpose() {
                 Ok(table) => table.zip(parameters.as_ref()).map(|(table, (p, _))| {
                     info!("{}", table.said());

@@ -2,6 +2,9 @@
 
 use viewshed::small as size;
 
+/// radar-3d on this grid, with its sender.
+type Unit<'u> = viewshed::Unit<'u, size::supervised::State, size::QuantisedSender>;
+
 #[path = "input.rs"]
 mod input;
 #[path = "run.rs"]
