@@ -1,5 +1,5 @@
 #!/bin/sh
-# The commands of "From nothing to a map of your road", on files that other libraries wrote.
+# The commands of the user's guide, on files that other libraries wrote.
 set -eu
 cd "$(dirname "$0")/.."
 . tests/tools.sh
@@ -15,14 +15,14 @@ ln -s "$(realpath "$viewshed")" "$folder/bin/viewshed"
 # made ready by mcap_ros2.sh and cantools.sh
 for writer in mcap_ros2:bag cantools:bus; do
     "$target/${writer%:*}/bin/python" tests/your_data.py "${writer#*:}" "$folder" 2>/dev/null ||
-        skip "${writer%:*}" "the page of own recordings (tests/${writer%:*}.sh installs it)"
+        skip "${writer%:*}" "the guide's commands (tests/${writer%:*}.sh installs it)"
 done
 # every block of commands, as it stands on the page
-sed -n '/^```sh$/,/^```$/{/^```/!p}' tests/harness/src/recording/YOUR_DATA.md >"$folder/commands.sh"
+sed -n '/^```sh$/,/^```$/{/^```/!p}' tests/GUIDE.md >"$folder/commands.sh"
 [ "$(wc -l <"$folder/commands.sh")" -ge 4 ]
 (cd "$folder" && PATH=$folder/bin:$PATH sh -eux commands.sh) >"$folder/said.txt" 2>&1 || { cat "$folder/said.txt"; exit 1; }
 for said in 'radar-3d' 'drive.labels.csv' 'sensor 0 on 1: Clusters, 28 of 28 scans' 'files into bus-map'; do
     grep -q "$said" "$folder/said.txt" || { cat "$folder/said.txt"; echo "your_data: \`$said\` was not said"; exit 1; }
 done
 [ -f "$folder/map/birdseye-radar-3d.png" ] && [ -f "$folder/results.json" ] && [ -f "$folder/bus-map/birdseye-radar-3d.png" ]
-echo "the commands of tests/harness/src/recording/YOUR_DATA.md do what they say"
+echo "the commands of tests/GUIDE.md do what they say"

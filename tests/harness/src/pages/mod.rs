@@ -4,7 +4,18 @@
 //! ([`guard`]) and answers until it is stopped. All scripts and styles are in the program ([`assets`]); no path of a
 //! request names a file. `labels` keeps what a person draws, `points` and `visibility` are what is drawn on.
 //!
-//! How the page of `viewshed label` is used: `README.md` beside this file.
+//! How the pages are used: `tests/GUIDE.md`.
+//!
+//! Those in `web/` are plain modules without a build step, in the order of the data: `recording.js` loads, `points.js` draws
+//! detections, `plot.js` is one plot, `tracks.js` and `history.js` what is drawn, `session.js` all that keys and clicks do,
+//! `saving.js` the way back; `viewer*.js` is the page of `view`, on the same plots. Points are drawn by a loop over the bytes
+//! of a canvas, the same on every machine. A pan moves the drawn picture at once and draws it afresh when it rests.
+//!
+//! The tests drive a real browser (Debian: `chromium-headless-shell`); with `VIEWSHED_PICTURES=$PWD/tests/pictures` they renew
+//! the pictures of the pages. Times:
+//!
+//!     cargo test --release -p viewshed-harness --test label -- --ignored --nocapture
+//!     cargo test --release -p viewshed-harness --test view -- --ignored --nocapture takes_to_the_screen
 
 pub mod assets;
 mod camera;

@@ -282,8 +282,8 @@ fn the_commands_that_are_written_down_are_understood_and_run_twice() {
         "src/README.md",
         "src/inputs/README.md",
         "src/wire/README.md",
+        "tests/GUIDE.md",
         "tests/harness/src/evaluation/README.md",
-        "tests/harness/src/recording/YOUR_DATA.md",
         "tests/harness/src/twin/README.md",
         "tests/recordings/README.md",
     ];

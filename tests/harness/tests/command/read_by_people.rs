@@ -8,7 +8,7 @@ use viewshed_harness::recording::labels::{read_labels, read_occlusion};
 use crate::scene::{Scene, folder, json, replay, stderr, stdout, viewshed};
 
 const RECORDINGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings");
-const YOUR_DATA: &str = include_str!("../../src/recording/YOUR_DATA.md");
+const GUIDE: &str = include_str!("../../../GUIDE.md");
 
 fn good(output: &Output) -> String {
     assert!(output.status.success(), "{}{}", stdout(output), stderr(output));
@@ -110,11 +110,11 @@ fn the_columns_of_labels_are_in_the_help_in_the_page_and_in_an_example() {
         let heading = text.lines().find(|line| !line.starts_with('#')).unwrap();
         assert!(help.contains(&format!("NAME.{name}.csv")));
         for column in heading.split(',') {
-            assert!(help.contains(column) && YOUR_DATA.contains(column), "{column}");
+            assert!(help.contains(column) && GUIDE.contains(column), "{column}");
         }
     }
     // the page shows rows as they can be
-    let shown = YOUR_DATA.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
+    let shown = GUIDE.split("```text\n").nth(1).unwrap().split("```").next().unwrap();
     assert_eq!(shown.lines().next(), example("labels").lines().nth(1));
     let read = read_labels(Path::new(&format!("{RECORDINGS}/example.labels.csv")), 0, 2_000_000_000).unwrap();
     assert_eq!((read.labels.len(), read.sized_by_class), (5, 2));
