@@ -15,7 +15,7 @@
 //!
 //! # Limits
 //! Boxes of the class's size seen without error are placed within 0.3 m along and 0.1 m across the view up to
-//! 100 m. Some 2500 instructions a box, and a comparison with every other box of the frame.
+//! 100 m. Each box is compared with every other box of the frame.
 
 use crate::camera::boxes::{BoxRejection, ImageBox, SUBPIXELS, VehicleClass};
 use crate::camera::projection::Projection;

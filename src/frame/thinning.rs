@@ -3,7 +3,8 @@
 //! A road full of vehicles gives more detections than a list of 256, or of 128, has room for. The strongest are then many of the vehicles that are near,
 //! and of those far away none is left; what nobody has detected hides nothing, so the map calls visible what lies behind
 //! them. The tenth detection of a bonnet tells less than the first of a car behind it. So each detection that came before
-//! from the same place, some 2 m wide and 2.5 m deep, makes the next of that place count for 32 dB less.
+//! from the same place, some 2 m wide and 2.5 m deep, makes the next of that place count for 32 dB less. Strength still counts
+//! between places: false alarms, each in a place of its own, would otherwise be kept before anything else.
 //!
 //! # Model
 //! Places are bins of range and of arc, range times azimuth, so they are as large far away as near. They are told apart by a
@@ -16,26 +17,6 @@
 //! # Cost
 //! 1 kB of the stack while a frame is thinned, and nothing where the list is long enough. In each input 1 kB and a byte an entry, and
 //! the priority of every detection.
-//!
-//! # What was tried
-//! Cells FVR / FIR in percent and vehicles from `geometry-slice`, of training scenes: three crossings of a layout with 3 + 3 and 2 + 2
-//! lanes (traffic, mounts and seeds are not in this repository), of whose detections a quarter finds no room among 256, and the shipped motorway, with 256 detections and with 128. Synthetic data.
-//!
-//! | rule | crossings, 256 | crossings, 128 | motorway, 256 | motorway, 128 |
-//! |---|---|---|---|---|
-//! | the strongest | 26.9 / 13.0 (+13.5 / +9.0) | 46.8 / 10.5 (+32.1 / +4.2) | 11.7 / 15.1 (+0.1 / +4.1) | 29.9 / 11.0 (+16.6 / -1.0) |
-//! | as many of each place, the first | 22.6 / 13.9 (+10.8 / +10.0) | 50.1 / 12.7 (+32.6 / +5.4) | 11.6 / 15.1 (+0.5 / +4.2) | 22.1 / 13.7 (+5.1 / +2.9) |
-//! | as many of each place, the strongest | 21.1 / 15.0 (+9.4 / +10.6) | 48.5 / 12.5 (+31.7 / +5.7) | 11.5 / 15.1 (+0.0 / +4.2) | 21.4 / 13.4 (+4.4 / +2.7) |
-//! | 4 dB for each before it | 23.9 / 13.6 (+11.6 / +9.1) | 41.6 / 11.8 (+29.1 / +5.7) | 11.6 / 14.8 (-0.2 / +4.4) | 23.8 / 12.3 (+11.1 / -0.1) |
-//! | 8 dB | 25.9 / 13.1 (+11.9 / +8.7) | 39.8 / 12.5 (+26.0 / +6.6) | 11.3 / 14.9 (+0.2 / +4.4) | 19.8 / 15.3 (+6.9 / +2.5) |
-//! | 16 dB | 22.5 / 13.9 (+11.3 / +9.9) | 36.7 / 12.1 (+24.1 / +6.6) | 11.5 / 15.0 (+0.4 / +4.3) | 15.9 / 14.1 (-0.4 / +3.1) |
-//! | 24 dB | | 34.5 / 13.3 (+20.2 / +7.8) | | 13.3 / 13.7 (-0.5 / +3.6) |
-//! | 32 dB: kept | 21.5 / 14.4 (+8.6 / +10.2) | 33.6 / 13.4 (+20.5 / +8.5) | 11.7 / 14.9 (+0.2 / +4.3) | 14.0 / 14.4 (+0.6 / +2.6) |
-//! | 40 dB | | 34.4 / 13.5 (+21.4 / +8.5) | | 12.9 / 15.0 (-0.5 / +3.5) |
-//! | no limit: 1024 detections | 20.4 / 13.8 (+8.1 / +9.6) | | 11.6 / 14.9 (+0.2 / +4.2) | |
-//!
-//! Six other training crossings, of whose detections fewer find no room, went from 18.9 / 13.6 (+10.1 / +9.9) to 18.4 / 12.5 (+9.6 / +7.7), six queues from
-//! 16.0 / 10.4 to 15.8 / 10.2. The second and third row make no use of strength between places: false alarms, each in a place of its own, are then kept before anything else.
 
 use crate::frame::detection::Detection;
 

@@ -20,26 +20,6 @@
 //! A box never hides the place it fills itself. Evidence in a box's place leaves the grid: the place was
 //! swept. A vehicle that is detected in another's shadow stays in it: showing its place would be right of
 //! every detected object by construction, and say nothing of the lines of sight there.
-//!
-//! # What was tried
-//! To hide the farther part of a box's own place, too: what is behind a vehicle is called visible where its box reaches
-//! too far. Cells FVR / FIR in percent, and vehicles from `geometry-slice`, at sixteen training crossings and on another
-//! generator's; synthetic data. One rate is traded for the other, and of the vehicles that are detected more are called invisible.
-//!
-//! | hidden of a box's place | crossings | vehicles | other generator |
-//! |---|---|---|---|
-//! | nothing: kept | 16.0 / 12.1 | +2.9 / +9.4 | 17.9 / 14.5 |
-//! | the farther quarter | 15.3 / 12.6 | +0.9 / +11.4 | 15.8 / 15.3 |
-//! | the farther half | 14.9 / 13.2 | -0.5 / +13.7 | 14.7 / 15.8 |
-//!
-//! To give the column of a box's middle no more than its share loses a third of the shadows of boxes 0.7 columns wide, and with
-//! them those of cars 150 m away. FVR / FIR on the five days of motorway, columns of 1 degree:
-//!
-//! | column of the middle | edges nearer in the others | cells | objects |
-//! |---|---|---|---|
-//! | its share | 0 | 13.2 / 14.7 | 22.0 / 8.5 |
-//! | whole | 0 | 12.0 / 15.6 | 21.7 / 8.7 |
-//! | whole: kept | 5 / 256 | 12.5 / 15.2 | 22.6 / 8.3 |
 
 use core::ops::Range;
 

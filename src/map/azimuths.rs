@@ -10,11 +10,7 @@
 //! With 4 times as many columns per degree within ten degrees, the shadow of a car 150 m away has an edge right to 1 m instead of
 //! 2.6, and the columns beside are 1.5 degrees wide, 1.6 m at 60 m.
 //!
-//! # What was tried
-//! Twice as many columns all over, for twice the memory and more than a message carries: cells FVR / FIR in percent on the
-//! training recordings of `tests/recordings/tuning.toml` went from 16.0 / 12.1 to 15.3 / 11.9 at crossings, where vehicles are near
-//! and boxes are what is wrong, from 18.9 / 7.2 to 16.4 / 6.1 in queues, and from 12.6 / 14.2 to 10.4 / 11.8 on motorways. Most of that is to be had
-//! from narrow columns alone, in the same memory.
+//! Twice as many columns all over would do little more, for twice the memory and more than a message carries.
 
 use crate::fixed::angle::Angle;
 

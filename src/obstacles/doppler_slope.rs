@@ -13,24 +13,6 @@
 //!
 //! # Cost
 //! Four multiplications for each detection, and of 64 bits six divisions for each obstacle that spans an angle.
-//!
-//! # What was tried
-//! On the recordings of `tests/recordings/tuning.toml`, a crossing of another generator, and two motorways of it and the
-//! shipped one; cells FVR / FIR in percent, of crossings and queues from the 30th second on. Synthetic data.
-//!
-//! | rule | crossings | queues | motorways | other crossing | shipped | low at the roadside |
-//! |---|---|---|---|---|---|---|
-//! | speed across from places alone | 16.1 / 12.1 | 18.9 / 7.2 | 12.6 / 14.2 | 17.9 / 14.5 | 11.8 / 15.0 | 5.7 / 14.1 |
-//! | and from Doppler's slope, turning of 6 degrees a second, Doppler's noise 0.2 m/s | 15.9 / 11.9 | 18.8 / 7.0 | | 14.9 / 14.6 | 12.7 / 15.2 | 5.3 / 13.4 |
-//! | turning of 3 degrees a second, Doppler's noise as assumed, 0.15 m/s | 15.5 / 12.1 | 18.7 / 6.8 | 12.3 / 14.4 | 14.0 / 14.3 | 12.7 / 15.4 | 5.3 / 13.3 |
-//! | and 2 m of height are noise, azimuths' a quarter of the spread, not half: kept | 15.4 / 11.9 | 18.9 / 6.7 | 12.5 / 13.8 | 14.1 / 13.7 | 12.2 / 15.0 | 5.3 / 13.3 |
-//! | turning of 6 degrees a second | 15.2 / 12.3 | 18.8 / 6.9 | 12.6 / 14.0 | 15.5 / 13.9 | 11.9 / 15.1 | 5.3 / 13.4 |
-//! | kept, with azimuths' noise as it is learnt, not as it is assumed | 15.0 / 12.8 | 18.7 / 6.9 | 12.5 / 13.7 | 14.3 / 13.8 | 12.1 / 15.0 | 5.3 / 13.3 |
-//! | the second line, and what was seen to stand stays where it is while it is hidden | 16.2 / 11.9 | 18.9 / 7.2 | | 17.2 / 15.7 | | |
-//! | in an obstacle's first 20 frames alone, the third line | | | | 17.5 / 14.9 | 12.1 / 15.4 | 5.3 / 13.3 |
-//!
-//! On six crossings that are reported 21.3 / 12.1 became 19.3 / 11.4 by it, in four queues 14.1 / 7.1 became 13.1 / 8.0, on five motorways
-//! 14.9 / 14.1 became 15.0 / 14.1 (`viewshed experiment`).
 
 use super::motion::Across;
 use crate::fixed::math;

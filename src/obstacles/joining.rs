@@ -1,19 +1,10 @@
 //! Parts of one vehicle that were taken for several.
 //!
-//! # What was tried
-//! In a creeping queue of another generator whole vehicles were called invisible far too often, most of them behind a box of 18 m that was
-//! a lorry and the rear of the car before it. From the 30th second on, cells FVR / FIR in percent and vehicles from `geometry-slice`; beside it
-//! the training scenes of `tests/recordings/tuning.toml`. Synthetic data.
-//!
-//! | rule | that queue | its vehicles | queues | crossings | another generator's crossing | kept |
-//! |---|---|---|---|---|---|---|
-//! | none of these | 9.3 / 8.2 | -9.9 / +24.7 | 19.0 / 6.5 | 15.2 / 11.1 | 11.6 / 12.1 | |
-//! | what is low for certain is no part of what is tall for certain | 10.2 / 7.4 | -5.3 / +13.6 | 19.5 / 6.3 | 16.3 / 10.3 | 16.8 / 12.5 | no: trailers reflect low in their middle, and fell apart |
-//! | only what has shown a whole car, to 5.3 m | 9.1 / 8.2 | -9.0 / +21.3 | 19.0 / 6.5 | 15.2 / 11.0 | 11.6 / 12.1 | |
-//! | and a car's end is up to 2 m long, not 1.5 | 10.1 / 7.7 | -5.1 / +14.9 | 19.0 / 6.5 | 15.2 / 11.0 | 11.6 / 12.1 | |
-//! | and two whole cars are not one; a whole car to 6 m | 10.6 / 7.4 | -0.8 / +11.9 | 19.0 / 6.5 | 15.1 / 10.9 | 11.6 / 12.1 | yes |
-//! | and a tall farther end whose box overlaps the one before it is its end | 10.5 / 7.4 | -1.1 / +12.6 | 19.0 / 6.5 | 15.1 / 10.9 | 11.6 / 12.1 | no |
-//! | the fourth, and slow vehicles keep their place across for longer | 11.5 / 7.3 | +2.4 / +8.6 | 19.5 / 6.6 | 16.7 / 10.9 | 14.2 / 13.4 | no |
+//! # Model
+//! Parts are one vehicle where they are in line, equally fast, and no farther apart than vehicles keep at that speed. In a queue gaps
+//! do not tell: there two ends as far apart as a car's are one car's, and a face that lies less than a car and a gap behind
+//! another face is its other end. A whole car is no part of a lorry, and two whole cars are not one.
+//! What is low is not kept from what is tall in general: trailers reflect low in their middle, and would fall apart.
 
 use core::ops::RangeInclusive;
 

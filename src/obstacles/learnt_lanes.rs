@@ -12,7 +12,7 @@
 //! the one they were given here, so that the lanes do not confirm themselves; or the road's axis, where what is measured agrees.
 //!
 //! What stands, and what shows a lorry's length, keeps the heading it drove with: a lane at the same place turns it by no more
-//! than 20 degrees. What goes its own way across the road and knows it takes no lane.
+//! than 20 degrees. A vehicle that crosses the road, and whose heading is known, takes no lane.
 //!
 //! # Limits
 //! 164 m ahead, to either side and behind, of which 20 m are followed; 2688 courses on the reference grid, 784 on the small one.
@@ -21,72 +21,12 @@
 //! hundred vehicles elsewhere. What is learnt stays over gaps and steps of the clock, and is lost with the power. Mirror images
 //! that pass for vehicles teach, too. None without the feature `learning`.
 //!
+//! A vehicle that is nearer than three lengths of its outline teaches nothing: its reflections move along its side, so its
+//! heading is measured wrongly.
+//!
 //! # Cost
 //! 16.1 kB on the reference grid, 4.7 kB on the small one. Nine cells are looked at for every obstacle that follows a
 //! learnt lane in every frame, and for the others in one of four.
-//!
-//! # What was tried
-//! On thirteen of the training crossings of `tests/recordings/tuning.toml`, after the unit had run over twice 90 s of
-//! other days there; cells FVR / FIR in percent from the 30th second on, vehicles from `geometry-slice`. Synthetic
-//! data. Then what the same rules did to training queues and motorways, within the recording alone.
-//!
-//! | rule | crossings | vehicles | queues | motorways |
-//! |---|---|---|---|---|
-//! | nothing learnt | 16.9 / 11.2 | +3.9 / +8.3 | 18.1 / 6.6 | 12.6 / 14.2 |
-//! | boxes as on given lanes: moved to the middle, a quarter of the margin | 16.2 / 10.1 | | 17.0 / 7.8 | 11.1 / 15.2 |
-//! | the margin of what goes its own way, none along the road | 14.1 / 11.5 | +2.7 / +8.0 | 19.1 / 6.8 | 13.9 / 12.4 |
-//! | headings known to ten standard deviations teach, an eighth of the margin along the road | 14.9 / 11.0 | | 17.9 / 7.4 | 12.4 / 13.8 |
-//! | and not moved to the middle; three vehicles make a lane, of within 30 degrees | 14.5 / 11.2 | +2.0 / +8.5 | 17.9 / 7.5 | 12.1 / 14.3 |
-//! | what stands or is long keeps its heading; counted by way; strays; own way where a lane ends | 13.7 / 11.3 | -0.4 / +8.8 | 17.6 / 8.1 | 11.2 / 16.1 |
-//! | own way where a lane across the road ends | 13.5 / 11.4 | -0.8 / +8.7 | 19.2 / 7.3 | 11.8 / 15.4 |
-//! | what stands on a learnt lane is not questioned; lanes along the road for what knows its own way | 13.4 / 10.9 | -0.6 / +8.4 | 18.2 / 7.1 | 12.2 / 14.5 |
-//! | as often in the mean, whatever way it makes in a frame: kept | 13.6 / 11.4 | -0.6 / +8.7 | 17.8 / 7.9 | 12.2 / 14.5 |
-//! | what coasts (`joining.rs`) takes no box away that is seen to stand: kept | 13.5 / 11.4 | -0.8 / +8.7 | 17.8 / 7.9 | 12.2 / 14.5 |
-//! | the last but one after 90 s of one other day; within the recording alone | 13.4 / 11.2; 15.3 / 11.7 | -1.0 / +8.6; +2.9 / +8.5 | | |
-//!
-//! Three rules more, each alone; all cells together; crossings after both days, then all within the
-//! recording alone:
-//!
-//! | rule | learnt | crossings | queues | motorways | other generator |
-//! |---|---|---|---|---|---|
-//! | nothing learnt | | 16.0 / 12.1 | 18.9 / 7.2 | 12.6 / 14.2 | 17.9 / 14.5 |
-//! | those above that were kept | 13.9 / 11.0 | 15.1 / 12.1 | 18.3 / 8.5 | 12.2 / 14.5 | 15.9 / 15.6 |
-//! | no lanes along the road's axis | 14.3 / 11.3 | 15.2 / 12.1 | 19.1 / 7.9 | 12.2 / 15.0 | 16.6 / 16.8 |
-//! | none along it for what follows it anyway | 14.8 / 11.2 | 15.7 / 11.9 | 19.5 / 7.5 | 13.0 / 13.6 | 16.3 / 16.9 |
-//! | nearer to a lane, 80 and 60 cm in place of 120 | 14.1 / 11.4, 14.2 / 11.2 | 15.3 / 12.1, 15.3 / 11.8 | 18.3 / 8.0, 17.9 / 7.9 | | |
-//!
-//! None is kept. What queues lost came from one of eight, beside an exit: its vehicles creep past 7 m before the radar and took the lane
-//! beside theirs, which was learnt 20 degrees off there, for of what drives by so near the reflection moves along the side. So what is
-//! nearer than three lengths of its outline teaches nothing:
-//!
-//! | what teaches | learnt | crossings | queues | that queue | other generator |
-//! |---|---|---|---|---|---|
-//! | nothing | | 16.1 / 12.1 | 18.9 / 7.2 | 13.1 / 13.1 | 17.9 / 14.5 |
-//! | all of the above | 13.9 / 11.4 | 15.3 / 12.0 | 18.3 / 8.5 | 15.2 / 21.2 | 15.9 / 15.6 |
-//! | what is 15 m away; 25 m | ; 13.7 / 11.9 | 15.5 / 11.7; 14.9 / 12.5 | 18.4 / 9.0; 18.9 / 7.3 | 14.5 / 31.6; 14.2 / 13.3 | 15.9 / 15.6; 15.9 / 15.3 |
-//! | 20 m, and takes a lane there | 13.8 / 11.6 | 15.0 / 12.1 | 18.9 / 7.5 | | 15.9 / 15.4 |
-//! | two lengths away | 14.0 / 11.1 | 15.2 / 12.0 | 18.3 / 7.8 | | 15.9 / 15.6 |
-//! | three lengths away: kept | 13.8 / 11.6 | 15.2 / 12.0 | 18.1 / 7.7 | 13.2 / 14.4 | 15.6 / 15.0 |
-//!
-//! On the fourteenth crossing a bus and a lorry that stand side by side 12 m from the radar are the greater part of what is
-//! hidden. Without lanes 17 % of what is hidden there are called visible and 17 % of what is clear invisible, with these rules 21 to 23
-//! and 14 to 15, by which other days were seen before: part of the bus is taken to go its own way while it stops.
-//! On six crossings that are reported 17.2 / 11.4 become 15.3 / 11.3, and vehicles +4.4 / +7.0
-//! become +3.0 / +7.1 (`viewshed experiment --scene crossing --learn-lanes`).
-//!
-//! Where the rest lies: cells by exact shadows of the boxes on all fourteen after both days, with the truth in place of some of them.
-//!
-//! | truth in place of | crossings |
-//! |---|---|
-//! | nothing | 13.7 / 12.5 |
-//! | the heading; the place across it; the place along it; that and the length | 13.4 / 12.3; 12.8 / 12.0; 13.3 / 12.3; 13.0 / 9.2 |
-//! | the height; all but the height | 11.4 / 11.5; 13.5 / 3.7 |
-//! | pedestrians, riders and masts; cars; vans; lorries and buses | 13.9 / 9.5; 12.8 / 7.8; 12.6 / 11.8; 11.6 / 10.6 |
-//! | what stands; what goes across the road | 12.4 / 9.5; 13.0 / 10.2 |
-//! | every box of something that is there | 8.8 / 1.7 |
-//!
-//! So most clear cells called invisible lie beside boxes that are a little too wide and too long, all over: they are drawn as
-//! large as they may be. Masts, and pedestrians drawn as cars, have a cause of their own ([what was tried](super::reflectivity)).
 
 use core::num::NonZeroU16;
 

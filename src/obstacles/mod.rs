@@ -5,156 +5,28 @@
 //! moving frame, where a second of them draws its outline. The outline's length gives the class,
 //! the class the height, and the box casts its shadow on the map (`grid/shadow.rs`); cells of the grid stay as they are.
 //!
+//! # Model
+//! *Association.* A detection belongs to the obstacle whose outline, place and speed it fits best within a gate (`search.rs`).
+//! What fits none and moves begins one (`newborn.rs`). Parts that drive in line, equally fast, with gaps smaller than vehicles
+//! keep at that speed, become one (`joining.rs`).
+//!
+//! *Motion.* Beside the motion along the road's axis each has one without a heading ([motion]), to which it changes where the two
+//! differ for certain (`own_way.rs`). Lanes that are given or learnt say where vehicles head ([lanes], [learnt_lanes]).
+//!
+//! *Extent.* The outline is a fading histogram of reflections ([profile]). A length is remembered while a part is hidden, and a box
+//! lies behind the side that is seen, since only that side reflects (`hidden_end.rs`, `room.rs`).
+//!
+//! *Height.* Length gives it ([size]); elevations ([tallness]) and the radar cross section ([reflectivity]) correct it.
+//!
+//! *End.* Evidence is lost quickly in plain view, slowly in a shadow, and more slowly still by what stands: a radar misses
+//! stationary objects more often.
+//!
 //! # Limits
 //! At most `N` obstacles. When the list is full, a new one replaces the one with the least evidence
-//! if that is unconfirmed, and is dropped and counted otherwise.
+//! if that is unconfirmed, and is dropped and counted otherwise. An obstacle that was never seen moving is none: it hides
+//! what the grid knows of it.
 //!
-//! # What was tried
-//! What today's rules are worth, each switched off alone, on scenes that are reported and with intervals, is in one table of
-//! `tests/harness/src/evaluation/README.md` ("Rule by rule"). The tables here are the history: each has its own scenes, first second
-//! and rules before it, so lines of one table can be compared with each other, and not with another table or with figures of today.
-//! None has intervals; differences below a point are not told from chance, and few rules were tried again later.
-//!
-//! This first table can tell what turned the whole map on two crossings and two queues; it cannot tell small effects, as two scenes of a kind are few.
-//! Cells FVR / FIR in percent on training scenes of the twin, two crossings and two queues, from their 20th
-//! second on, and on the motorway recording; each line on top of those above that were kept. Synthetic data.
-//! Lines below "middle of what is seen shown" were measured with it. Without it, and counted from the 30th
-//! second on, `viewshed experiment --scene crossing --train` printed 23.4 / 13.6 with the rules of this table, `--scene queue --train`
-//! 19.5 / 11.4, and `viewshed replay` of the motorway 17.6 / 14.7.
-//!
-//! | rule | crossings | queues | motorway | kept |
-//! |---|---|---|---|---|
-//! | along the road only, a standing box is forgotten | 37.5 / 23.0 | 24.3 / 10.1 | 19.9 / 17.8 | |
-//! | [motion] without a heading beside it, gaps of 1.6 m in a queue | 29.1 / 17.8 | 22.7 / 11.8 | 19.7 / 18.7 | yes |
-//! | what stands and what moves is not joined, outline less azimuth's noise | 31.0 / 13.8 | 23.6 / 11.4 | 20.1 / 18.0 | yes |
-//! | outline and place across remembered by way, not by time | 31-32 / 15-21 | 25-29 / 10 | same | no |
-//! | box behind the side that is seen | 32.4 / 13.8 | 21.9 / 10.9 | 20.6 / 15.6 | yes |
-//! | as long as its proven height implies | 31.6 / 13.5 | 20.9 / 11.4 | 20.4 / 15.9 | yes |
-//! | own heading only where known to a quarter of a radian | 25.3 / 17.3 | 20.8 / 12.1 | 20.5 / 15.1 | yes |
-//! | outline of what goes its own way follows the place seen | 26.7 / 13.8 | 20.7 / 12.3 | same | yes |
-//! | height proven by one reflection in 8 or 12, not 20 | 27.2 / 13.7 | 20.9 / 12.2 | same | no |
-//! | length remembered for 10 s at any speed | 23.8 / 18.0 | 18.8 / 13.2 | 20.0 / 16.8 | no |
-//! | [shadows](crate::grid::shadow) with exact ends, not through cells | 25.1 / 14.2 | 19.4 / 12.7 | 19.1 / 15.9 | yes |
-//! | middle of what is seen shown: objects' FIR 14.0 to 7.5 and 12.5 to 5.8 | 25.4 / 14.1 | 19.9 / 12.6 | 19.3 / 15.8 | no: right of what is detected by construction |
-//! | length remembered for 3 s below 4 m/s | 24.8 / 15.0 | 19.3 / 12.8 | same | yes |
-//! | low or tall by [all heights](tallness), low at any length | 28.1 / 10.6 | 37.2 / 8.8 | 23.7 / 13.0 | no |
-//! | the same, low only below 9 m | 24.4 / 14.0 | 19.7 / 12.2 | 17.8 / 14.6 | yes |
-//! | what moves in a standing, unseen box is its departure | 24.5 / 14.1 | 19.7 / 12.2 | 17.8 / 14.7 | yes |
-//!
-//! The next can tell whether a rule of the table above holds from other poles; its traffic is the same, so it cannot tell whether it holds on other days.
-//! The same with five more mounts on the traffic of the training scenes (x, y, height, yaw, seed): crossing train-1 at
-//! (18, 17, 4.5 m, -150, 5101) and (-72, -13, 7 m, 5, 5102), train-2 at (-22.2, -10.5, 5 m, 25, 5103); queue train-1 at
-//! (-10, 0, 7.5 m, 0, 5104), train-2 at (0, -17.5, 5 m, 5, 5105).
-//!
-//! | rule | crossings | queues | motorway | kept |
-//! |---|---|---|---|---|
-//! | the rules kept above | 24.3 / 17.0 | 18.7 / 10.4 | 17.6 / 14.7 | |
-//! | a mover after 1 m instead of 2 m of way | 23.7 / 16.3 | 18.4 / 10.4 | same | yes |
-//! | speed along a kept heading from the places seen, not from Doppler alone | 23.3 / 16.0 | 18.5 / 10.1 | same | yes |
-//! | own way from a fifth of the speed to the side, not a quarter | 22.5 / 15.1 | 18.5 / 9.9 | 16.8 / 15.5 | yes |
-//! | box behind its side only where that is most of what is seen, for what is shorter than 8 m | 22.8 / 16.0 | 18.9 / 10.2 | 17.3 / 14.6 | no |
-//!
-//! The last line was measured without the fourth. The next can tell what helps at crossings of several layouts, and what that
-//! costs vehicles; on queues, of which it has no more than before, it can tell less.
-//! With three more crossings on other layouts and seeds (traffic made as
-//! in `tests/recordings/crossing/traffic.sh`, 90 s: skewed, seed 1003, cycle 90 s, scale 0.9, turned by 20 degrees, radar
-//! at (-64, -8, 6 m, 15), seed 5106; tee, 1004, 80 s, 1.1, by 9 degrees, (24, -20, 6 m, 148), 5107; wide, 1005, 90 s,
-//! 1.1, (-24, 21, 7 m, -42), 5108; masts and parked cars of `skewed-2`, `tee-2` and `wide-1`). Counted
-//! from the 30th second on; objects are those at crossings, from `geometry-slice`:
-//!
-//! | rule | crossings | objects | queues | kept |
-//! |---|---|---|---|---|
-//! | the rules kept above | 23.7 / 16.0 | +9.4 / +12.1 | 19.2 / 9.5 | |
-//! | what is low for certain is not joined to more than 9 m, nor stretched beyond | 25.9 / 13.1 | +11.5 / +10.1 | 19.6 / 9.2 | yes |
-//! | longer ones are low where no part between gaps is longer than 6 m | 26.4 / 12.2 | +12.1 / +9.0 | 19.7 / 9.1 | no: lorries seen at both ends only |
-//! | what goes its own way 0.6 m wider to either side | 22.6 / 15.1 | +8.3 / +11.5 | 19.2 / 9.7 | yes |
-//! | height of all unmoving things measured against a prior of 1.5 m, not 0.4 m | 20.0 / 15.6 | +6.2 / +11.9 | 18.8 / 10.1 | no: guard rails |
-//! | [the same](crate::grid::evidence) where three reflections lie within 3 m | 21.2 / 15.3 | +7.2 / +11.6 | 19.2 / 9.7 | yes |
-//! | what was measured half a standard deviation above a level fills it | 20.7 / 15.4 | +6.9 / +11.6 | 19.1 / 9.7 | yes |
-//! | longer ones are low where each part between gaps is as long as a car, 2.5 to 6 m | 21.0 / 15.0 | +7.2 / +11.1 | 19.2 / 9.6 | yes |
-//! | joining parts moves the free motion's place too: no push to the side | 21.8 / 14.3 | +9.0 / +10.0 | 19.4 / 9.7 | yes |
-//! | own way from 1.5 m/s to the side | 21.7 / 13.6 | +8.8 / +9.4 | 19.3 / 10.4 | yes |
-//! | what is low and long keeps its ends, up to 0.5 m beyond the outline | 21.7 / 14.3 | +9.3 / +9.9 | 19.0 / 10.2 | yes: lorries that show nothing high |
-//! | four reflections within 2.5 m: guard rails with a post every 2 m | 21.8 / 14.3 | +9.4 / +9.9 | 19.0 / 10.2 | yes |
-//! | what reflects higher than a car is twice as high | 20.7 / 15.3 | +8.7 / +9.9 | 18.7 / 10.2 | yes |
-//! | 0.4 m wider to either side, not 0.6: the motorway's cells 15.0 / 17.1, not 14.6 / 17.9 | 21.5 / 14.8 | +9.7 / +9.7 | 18.9 / 10.0 | yes |
-//! | own way from 0.15 of the speed to the side, not a fifth | 21.4 / 13.9 | +8.5 / +9.1 | 18.9 / 10.1 | yes |
-//! | its outline follows the place seen by a tenth a frame, not a twentieth | 21.2 / 13.8 | +8.8 / +8.9 | 18.8 / 10.1 | yes |
-//! | 0.6 m wider where it goes across the road, more than 14.5 degrees off its axis | 20.5 / 14.5 | +8.0 / +9.3 | 18.8 / 10.1 | yes |
-//! | low from elevations better than 1.5 m only (measured before the last four): motorways' FIR rises by 2 points | 21.2 / 15.2 | +6.9 / +10.2 | 18.2 / 10.7 | no |
-//! | small boxes for what reflects weakly, once a frame (before the last four): cars in queues, mostly hidden, do too | 21.6 / 14.6 | +9.7 / +9.8 | 20.4 / 10.0 | no |
-//! | place across remembered for 0.8 s, not 1 s | 19.0 / 15.2 | +5.9 / +10.0 | 18.6 / 9.9 | yes |
-//! | what stands and should be seen is given up in 3/5 of the time, 0.3 m wider along the road | 19.1 / 15.1 | +6.1 / +9.9 | 18.7 / 9.4 | yes |
-//!
-//! The next can tell what exact lanes are worth; learnt ones need not be worth as much. Its motorways are other recordings than above.
-//! On the same scenes, and with the lanes of their nets as `viewshed lanes` makes them; objects at crossings and the
-//! cells of thirteen motorways, from the 30th second on:
-//!
-//! | rule | crossings | objects | queues | motorways | kept |
-//! |---|---|---|---|---|---|
-//! | the rules kept above | 19.1 / 15.1 | +6.1 / +9.9 | 18.7 / 9.4 | 18.8 / 10.4 | |
-//! | what Doppler would make faster than 45 m/s along the road goes along the line of sight, from 3 m/s | 18.6 / 15.0 | +5.9 / +9.8 | same | same | yes |
-//! | faster than 20 m/s: motorways' traffic beside the radar | 19.5 / 14.5 | +5.9 / +9.6 | 19.2 / 10.0 | worse by 6 points | no |
-//! | faster than 35 m/s | 18.8 / 14.7 | +5.4 / +9.6 | same | same | no: 2 points more on another generator's crossing |
-//! | confirmed by 2.25 detections, not 3, and 0.7 m wider across the road, not 0.6 | 17.9 / 15.2 | +5.2 / +9.9 | 18.5 / 9.5 | +0.2 FIR | yes |
-//! | own way from 2.6 standard deviations; heading from 3.5 | 19.3 / 15.6, 19.2 / 14.4 | +7.6 / +10.2, +7.4 / +9.3 | same | same | no |
-//! | [lanes]: heading only, no margin | 19.1 / 14.3 | +3.4 / +10.6 | none given | | |
-//! | and 0.6 of the way to the middle of the lane | 18.0 / 14.1 | +3.7 / +10.7 | | | yes |
-//! | and a quarter of the margin to either side | 16.3 / 15.0 | +1.7 / +11.6 | | | yes |
-//! | and turned about the middle, not the anchor | 15.7 / 14.9 | +1.6 / +11.4 | | | yes |
-//! | with what was kept for all | 15.4 / 15.1 | +1.2 / +11.7 | | | yes |
-//!
-//! The next can tell whether a rule holds for another generator's traffic, in one crossing (90 s) and one queue (60 s) of it: not how much it is worth there.
-//! With sixteen recordings of the twin, eight crossings, four queues and four motorways, none of them reported, and a crossing and a creeping
-//! queue of another generator; from the 30th second on, objects again from `geometry-slice`:
-//!
-//! | rule | crossings | queues | other crossing's objects | other queue's objects | kept |
-//! |---|---|---|---|---|---|
-//! | the rules kept above | 19.1 / 15.4 | 19.7 / 9.0 | +11.0 / +13.9 | -10.2 / +33.9 | |
-//! | what begins behind a face (`joining.rs`) by less than a car and a gap is its other end | 19.0 / 15.5 | 19.7 / 9.0 | +10.0 / +8.1 | -10.6 / +33.0 | yes |
-//! | and two ends as far apart as a car's are one car's | 19.0 / 15.4 | 19.6 / 9.0 | +12.0 / +8.0 | -10.0 / +28.2 | yes |
-//! | ends before they are confirmed, too | 19.0 / 15.5 | 19.5 / 9.3 | +12.0 / +8.0 | -9.4 / +34.3 | no |
-//!
-//! The next shows what trades one rate for the other; its lines are alternatives to each other, none was tried with the others.
-//! On top of the first line above, with motorways' cells where these changed (15.9 / 16.8):
-//!
-//! | rule | crossings | queues | motorways | kept |
-//! |---|---|---|---|---|
-//! | parts are one where their distance stays while their speed changes by 1.5 m/s | 18.5 / 16.0 | 19.7 / 9.0 | same | no |
-//! | parts that stand and touch are one, along the line between their middles | 18.1 / 15.8 | 19.5 / 9.0 | same | no |
-//! | what goes its own way by less than 30 degrees keeps its outline | 18.9 / 16.4 | 19.7 / 9.2 | 15.4 / 17.6 | no |
-//! | as high as its greatest length of the last 30 s implies | 18.5 / 16.1 | 19.0 / 9.2 | 15.8 / 17.0 | no |
-//! | tall of 2.6, 3.1 or 4 m, with strays, in place of one height | 19.0 / 15.2 | 20.7 / 8.8 | 16.9 / 16.3 | no |
-//! | heights of a car spread by 0.55 m, as they are measured, not 0.35 m | 19.4 / 14.9 | 19.9 / 8.8 | 16.3 / 16.2 | no |
-//!
-//! What is not kept there buys one rate with the other. The next says where errors lay then, not what can be had: with the truth in place of
-//! several things at once effects do not add up. For today, see `viewshed replay --causes`. Where the rest lies: exact shadows of the boxes at those crossings are
-//! 16.4 / 17.0, and with the truth in place of some of them
-//!
-//! | truth in place of | crossings |
-//! |---|---|
-//! | what stands and was never seen moving, nearly all of it masts: all that a background learnt over minutes could tell | 14.7 / 16.0 |
-//! | what stands and moved before | 9.9 / 11.8 |
-//! | what turns; crosses; goes along the road | 15.4 / 15.7; 14.4 / 13.9; 13.0 / 13.3 |
-//! | long vehicles in several boxes; in one | 12.3 / 15.8; 13.6 / 14.6 |
-//! | all others in one box, which is drawn wider than it is known to be | 16.4 / 7.2 |
-//! | the height of every box; its place, heading and length | 12.5 / 17.8; 13.6 / 11.4 |
-//! | every box; every vehicle without one | 8.1 / 1.9; 12.2 / 17.0 |
-//!
-//! The last can tell what one rule does to vehicles in queues; the other generator's queue is one minute, counted from its first second on.
-//! In the creeping queue of another generator boxes from 60 to 150 m ahead lay 0.5 to 0.8 m too near to the sensor's side, their
-//! ends hidden (`hidden_end.rs`). Cells, and objects from slice, there and in the eight training queues of `tests/recordings/tuning.toml`:
-//!
-//! | rule | training | objects | other queue | objects | kept |
-//! |---|---|---|---|---|---|
-//! | the rules kept above | 19.9 / 10.0 | +10.7 / +7.0 | 12.4 / 9.2 | +0.0 / +21.7 | |
-//! | below 4 m/s behind the side where the end is hidden | 19.5 / 10.1 | +13.2 / +4.7 | 12.3 / 8.6 | +0.9 / +16.6 | yes |
-//! | and there all of the noise taken off the spread: crossings' FVR +0.3 | 19.6 / 10.2 | +13.5 / +4.5 | 12.5 / 8.3 | +1.4 / +13.8 | yes |
-//! | everywhere: motorways' cells 15.8 / 8.8, not 15.5 / 8.9 | 19.9 / 10.3 | +13.6 / +4.5 | 12.4 / 8.2 | +1.4 / +13.8 | no |
-//! | what is lower than 3 m only | 20.4 / 9.8 | +13.3 / +5.6 | 12.5 / 8.6 | +0.8 / +15.5 | no |
-//!
-//! What farther ends (`room.rs`), [radar cross sections](reflectivity), Doppler's slope (`doppler_slope.rs`), fixtures (`fixtures.rs`) and headings
-//! that turn by the way that is made (`own_way.rs`) gave stands there.
+//! What was tried, and what it was worth: `tests/STUDIES.md`.
 
 mod body;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Obstacles that go their own way: across the road, or around a corner.
+//! Obstacles that turn or cross: their own way across the road, or around a corner.
 //!
 //! Most traffic follows the road, and its axis gives a heading that Doppler alone cannot. Beside that,
 //! every obstacle's motion is followed without a heading. Where the two differ for certain, and to the
@@ -6,30 +6,10 @@
 //!
 //! # Model
 //! Its speed across the line of sight is known badly, so its outline would drift off along it: a tenth of the way in a frame it
-//! follows the centre of what is detected, which is compared with the centre of all that the outline holds. Its heading turns
+//! follows the centre of what is detected, which is compared with the centre of all that the outline holds. (Its middle would
+//! put lorries too near to the sensor, since they reflect on the near side.) Its heading turns
 //! into the direction of its motion by a filter of one state: a turn adds variance by the way that is made, and the motion tells a
 //! heading as well as its speed is known, over that speed. So what brakes, or creeps, keeps the heading it drove with.
-//!
-//! # What was tried
-//! On the training scenes of `tests/recordings/tuning.toml`, from the 30th second on; cells FVR / FIR in percent, vehicles from
-//! `geometry-slice`, and a crossing of another generator with its vehicles. Synthetic data. With cells alone a difference of
-//! 0.2 on crossings, and of 1 on the single other one, is chance: a change of the fifth digit makes it.
-//!
-//! | rule | crossings | vehicles | queues | motorways | other generator | its vehicles | kept |
-//! |---|---|---|---|---|---|---|---|
-//! | it follows by the middle of its outline, its heading is the motion's | 15.5 / 11.3 | +2.6 / +8.4 | 18.9 / 6.6 | 12.5 / 13.8 | 16.1 / 13.3 | +11.2 / +7.1 | |
-//! | by the centre of what it holds: lorries lay 1 to 2 m too near to the sensor | 15.7 / 10.9 | +3.3 / +8.6 | 18.9 / 6.5 | 12.6 / 13.6 | 12.3 / 11.5 | +10.4 / +6.3 | yes |
-//! | by a twentieth a frame; a fifth | 15.5 / 11.1; 15.8 / 11.0 | +3.4 / +8.5; +3.3 / +8.2 | | | 13.4 / 12.3; 12.7 / 12.5 | +8.3 / +5.9; +5.4 / +7.3 | no |
-//! | its heading turns by the way it makes | 15.2 / 11.1 | +3.6 / +7.9 | 19.0 / 6.5 | 12.6 / 13.6 | 11.6 / 12.1 | +7.0 / +6.8 | yes |
-//! | the motion a mean of two thirds of a second, not of one | 15.5 / 11.0 | +3.2 / +7.8 | | | 12.8 / 11.9 | +9.5 / +5.8 | no |
-//! | turns of twice the variance a metre; of a tenth | 15.4 / 11.1; 15.4 / 11.0 | +3.3 / +7.9; +4.1 / +7.8 | | | 11.8 / 12.9; 13.7 / 12.6 | +7.9 / +6.2; +11.6 / +6.1 | no |
-//! | headings told from 2.5 standard deviations on, not 4; from 1 m/s, not 2 | 15.6 / 10.8; 15.7 / 10.9 | +4.3 / +7.9; +5.1 / +7.9 | | | 15.0 / 11.9; 12.6 / 12.9 | +9.1 / +5.8; +10.3 / +7.2 | no |
-//! | with these, boxes 0.15 m farther along the heading: their nearer ends lie 0.1 to 0.3 m too near | 15.7 / 11.0 | +3.6 / +8.5 | 18.7 / 6.6 | 12.4 / 13.7 | 12.4 / 11.7 | +10.3 / +6.2 | no |
-//! | no car taken for shorter than 4.2 m, not 3.8 | 15.5 / 11.1 | +3.9 / +8.4 | 18.7 / 6.7 | 12.3 / 13.9 | 13.2 / 11.2 | +6.4 / +5.3 | no |
-//! | boxes 0.15 m farther, and less far behind the side that is seen where azimuth's noise is large | 15.5 / 11.1 | +3.5 / +8.5 | 18.4 / 6.7 | 12.0 / 14.1 | 12.4 / 11.7 | +10.3 / +6.2 | no: a trade |
-//!
-//! The last three lines were measured without the fourth. On six crossings that are reported 18.9 / 10.9 became 18.2 / 10.9, and vehicles +5.8 / +6.9 became
-//! +5.0 / +6.4 (`viewshed experiment --scene crossing`).
 
 use super::doppler_slope::Target;
 use super::lanes::{LEARNT, NO_LANE};

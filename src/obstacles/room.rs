@@ -4,25 +4,9 @@
 //! next vehicle: one that begins where the rest of this one should still be leaves no room for it, so that lies before
 //! what is seen.
 //!
-//! # What it is worth
-//! Where tall vehicles creep in a line, a third of all boxes had their middle in a gap, most of them begun by a farther end (counted
-//! once). Cells FVR / FIR in percent and objects from `geometry-slice`, of a creeping queue and of a crossing of another
-//! generator; the eight training queues of `tests/recordings/tuning.toml`, pooled from their 30th second on, go from 19.7 / 8.5 and
-//! +12.6 / +4.8 to 19.8 / 8.3 and +12.7 / +4.7, and its sixteen training crossings from 18.5 / 12.1 and +4.5 / +8.6 to 18.4 / 12.1 and
-//! +4.1 / +8.6. Motorways that flow stay the same. Synthetic data. In the table below the other generator's recordings are counted from their first second on.
-//! Later rules changed the queue: it is at 11.6 / 8.2 and +1.3 / +18.2 now, counted from its 30th second on at 10.4 / 7.8 and -0.8 / +11.8. From there
-//! on [Doppler's slope](super::doppler_slope) alone took FIR from +17.0 to +24.8: headings along the road became right more often, and by chance a lorry and a car became one; that a
-//! [whole car](super::joining) is no part of a lorry took it back.
-//!
-//! | rule | queue | objects | crossing | objects | kept |
-//! |---|---|---|---|---|---|
-//! | without | 12.5 / 8.3 | +1.4 / +13.8 | 16.4 / 16.0 | +11.6 / +7.9 | |
-//! | [two ends](super::joining) as far apart as a van's are one van's | 12.5 / 8.3 | +0.4 / +13.3 | 16.4 / 16.0 | +11.6 / +7.9 | yes |
-//! | and the rest lies before an end without room behind it | 12.3 / 8.1 | +0.3 / +11.7 | 16.0 / 15.3 | +11.7 / +8.0 | yes |
-//! | also where more than 3 m is seen: training queues' FVR 20.7 | 12.3 / 8.1 | +0.3 / +11.7 | 16.0 / 15.2 | +11.7 / +7.9 | no |
-//! | also of what is low | 12.4 / 8.1 | +0.2 / +11.7 | 16.0 / 15.2 | +11.7 / +8.1 | no |
-//! | tall parts up to 4 m apart are one, in place of both | 12.7 / 8.4 | +0.5 / +15.0 | 15.8 / 16.3 | +11.7 / +8.2 | no |
-//! | a car with both ends takes its own from what reaches beyond it | 12.3 / 8.1 | +0.3 / +11.7 | 16.0 / 15.2 | +11.6 / +8.5 | no |
+//! # Limits
+//! Of what is tall, and shows no more than 3 m of itself. Tall vehicles that creep in a line are what it is for: many of
+//! their boxes are begun by the farther end.
 
 use super::Obstacles;
 use super::obstacle::Obstacle;

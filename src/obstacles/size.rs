@@ -5,18 +5,6 @@
 //! delivery vans are about 6 m long and 2.6 m high, and goods vehicles fill what the law allows
 //! (2.55 m wide and 4.00 m high in the European Union, directive 96/53/EC). An outline is a little shorter than what drew
 //! it, so the table reaches a height half a metre to a metre before the class does.
-//!
-//! # What was tried
-//! On the training scenes of `tests/recordings/tuning.toml`, cells FVR / FIR in percent and vehicles from `geometry-slice`; synthetic
-//! data. Lorries of 9 m are 3.6 m high in them, cars of 4.6 m between 1.5 and 1.9 m.
-//!
-//! | heights | crossings | vehicles | queues | vehicles | motorways | vehicles | kept |
-//! |---|---|---|---|---|---|---|---|
-//! | 3.4 m from 9 m of length on, 4 m from 12 m | 15.2 / 10.9 | +3.4 / +7.9 | 19.0 / 6.5 | +12.6 / +3.4 | 12.6 / 13.4 | +6.3 / +3.6 | |
-//! | 3.6 m from 9 m, 4 m from 12 m | 14.9 / 11.1 | +3.1 / +8.0 | 18.2 / 6.5 | +11.5 / +3.6 | 12.0 / 13.4 | +5.2 / +3.9 | |
-//! | 3.6 m from 8.5 m, 4 m from 11 m | 14.8 / 11.2 | +2.9 / +8.1 | 17.4 / 6.6 | +10.8 / +3.9 | 11.5 / 13.6 | +4.6 / +4.2 | yes |
-//! | 3.4 m from 7.5 m, 4 m from 9 m | 14.7 / 11.8 | +2.7 / +8.4 | 16.5 / 7.0 | +9.8 / +4.4 | 11.1 / 14.1 | +4.3 / +4.6 | no: a trade |
-//! | with the third, cars of 1.55 m instead of 1.5 m | 13.9 / 12.0 | +2.4 / +8.8 | 16.6 / 7.2 | +10.0 / +4.3 | 11.0 / 14.8 | +4.4 / +4.3 | no: a trade |
 
 use crate::fixed::math;
 use crate::sensor::config::{ConfigError, above, within};

@@ -21,8 +21,8 @@ use crate::results::report::table;
 /// seconds, the same ones of both runs, so that what they have in common drops out. A rate is better or worse where the
 /// interval of its difference excludes 0, and n/a where the recording is too short for an interval: cells take 80 s.
 ///
-/// At crossings the tracker amplifies the smallest difference: a change that alters nothing in truth can move a single
-/// scene by 10 points of FVR and 3 of cell FVR. Judge such changes by several scenes or seeds together.
+/// At crossings the tracker amplifies the smallest difference: a change that alters nothing in truth can move the rates of
+/// a single scene by several points. Judge such changes by several scenes or seeds together.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The run before the change

@@ -3,26 +3,8 @@
 //! An integrator rarely has a net of the crossing. A minute or two of the radar's own detections shows where vehicles
 //! drive: those that are followed both ways through time for [`proposals`], side by side in one direction, are a lane.
 //!
-//! # What was tried
-//! On four of the training crossings of `tests/recordings/tuning.toml`, each with lanes learnt from 90 s of other traffic
-//! there; cells FVR / FIR in percent of `radar-3d`, vehicles from `geometry-slice`. Synthetic data.
-//!
-//! | lanes | cells | vehicles |
-//! |---|---|---|
-//! | none | 15.7 / 13.9 | +3.6 / +10.9 |
-//! | of the net | 14.7 / 10.5 | +5.3 / +7.7 |
-//! | of what moves, followed once | 14.9 / 11.2 | +3.2 / +8.9 |
-//! | and smoothed over 12 m | 15.3 / 11.2 | +1.3 / +8.6 |
-//! | and followed again with these lanes | 15.5 / 11.4 | +1.1 / +7.9 |
-//! | and without mirror images and what is unlikely: kept, since guard rails make few lanes then | 15.2 / 11.5 | +0.9 / +8.2 |
-//! | from three recordings of 90 s, not one | 15.8 / 11.2 | +1.2 / +7.9 |
-//! | moved to where flanks say the middle is, before smoothing | 15.1 / 11.6 | +3.5 / +9.2 |
-//! | ended where nobody drove | 14.6 / 12.4 | +0.4 / +9.6 |
-//! | driven on by three, not two | 16.6 / 11.5 | +4.5 / +7.8 |
-//!
-//! On the six crossings that are reported 17.2 / 11.4 become 16.8 / 10.7, and 15.0 / 10.3 with the net; on the crossing of
-//! another generator, from its 50th second on and with lanes learnt before the 45th, 20.9 / 10.5 became 21.8 / 12.1 where
-//! a unit is started then, and 10.6 / 13.3 became 9.9 / 15.1 where it has run since the start.
+//! They are smoothed, followed once more with these lanes, and left out where they are likely to be mirror images: guard rails
+//! make false ones. What was tried: `tests/STUDIES.md`.
 //!
 //! # Limits
 //! Lanes that were not driven on by two vehicles at least are missing, and so are those the radar does not see. Their
