@@ -37,7 +37,7 @@ fn no_page_and_no_comment_has_a_figure_of_its_own() {
 fn is_figure(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
     let decimal = |word: &&str| {
-        let word = word.trim_matches(|c: char| !c.is_ascii_digit());
+        let word = word.trim_start_matches(['+', '-', '*']).trim_end_matches(|c: char| !c.is_ascii_digit());
         word.split_once('.').is_some_and(|(a, b)| a.parse::<u32>().is_ok() && b.parse::<u32>().is_ok())
     };
     let is_pair = words.windows(3).any(|three| three[1] == "/" && decimal(&three[0]) && decimal(&three[2]));

@@ -13,7 +13,7 @@ use viewshed::unit::can_bus::{BusKeeper, CanPort};
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::reference::State as Radar3d;
-use viewshed::unit::profile::reference::supervised::{CHECK, Map as PolarMap, Parameters, Radar, Sender, State};
+use viewshed::unit::profile::reference::supervised::{Ars408, CHECK, Map as PolarMap, Parameters, Sender, State};
 use viewshed::unit::settings::{Settings, StoredSettings};
 use viewshed::unit::{Flow, Unit};
 use viewshed::wire::frame::{CanFrame, CanId};
@@ -98,7 +98,7 @@ pub fn answer(flash: &mut Flash, steps: &[Step]) -> Vec<Sent> {
     let mut state = Box::new(State::new(Radar3d::new()));
     let mut map = Box::new(PolarMap::NOWHERE);
     let mut sender: Box<Option<Sender>> = Box::new(None);
-    let mut session = CanBench::new(Radar::new(Ars408Config::sensor(SENSOR)));
+    let mut session = CanBench::new(Ars408::new(Ars408Config::sensor(SENSOR)));
     let frames = steps.iter().enumerate().flat_map(|(k, step)| step.all().map(move |frame| (k, frame))).peekable();
     let mut port = Scripted { frames, step: 0, quiet: false, sent: Vec::new(), starts: 0 };
     let empty = |step: &Step| Sent { time: step.time, frames: Vec::new(), maps: Vec::new(), starts_over: false };
