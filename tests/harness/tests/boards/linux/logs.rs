@@ -9,7 +9,7 @@ use viewshed::inputs::ars408::Ars408Config;
 use viewshed::map::polar::PolarMap;
 use viewshed::probability::Quantiser;
 use viewshed::unit::Unit;
-use viewshed::unit::profile::reference::supervised::{Parameters, Radar, State};
+use viewshed::unit::profile::reference::supervised::{Ars408, Parameters, State};
 use viewshed::unit::profile::reference::{QuantisedSender, State as Radar3d};
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::{BroadcastConfig, Medium};
@@ -49,7 +49,7 @@ pub fn twin(
     let mut sender = Box::new(QuantisedSender::new(config, header, quantiser, EPOCH, at(first)).unwrap());
     let mut unit = Unit::new(&parameters, &mut *state, &mut *map, &mut *sender);
     unit.broadcast().status_mut().firmware = [0, 1, 0];
-    let mut decoder = Radar::new(Ars408Config::sensor(radar));
+    let mut decoder = Ars408::new(Ars408Config::sensor(radar));
     let (mut sent, mut rest, mut now) = (Sent::new(), log, first);
     let flush = |unit: &mut Unit<'_, State, QuantisedSender>, now: u64, sent: &mut Sent| {
         sent.extend(std::iter::from_fn(|| unit.next_frame(at(now))).map(|frame| (now, frame)));
