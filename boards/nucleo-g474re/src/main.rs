@@ -34,7 +34,7 @@ use stm32::can::open;
 use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
 use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, StoredSettings, UnitConfig};
-use viewshed::small::supervised::{CHECK, Radar};
+use viewshed::small::supervised::{Ars408, CHECK};
 use viewshed::{Ars408Config, Epoch};
 
 const CAN_CLOCK_HZ: u32 = 24_000_000;
@@ -123,5 +123,5 @@ async fn main(_spawner: Spawner) {
     let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into(), cycles };
     let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PA5, Level::Low, Speed::Low), watchdog };
     let scans = scans(radar_receiver).expect("room for one");
-    run(start, memory(), move || Radar::new(Ars408Config::sensor(stored.unit().radar_id)), scans, wiring).await
+    run(start, memory(), move || Ars408::new(Ars408Config::sensor(stored.unit().radar_id)), scans, wiring).await
 }

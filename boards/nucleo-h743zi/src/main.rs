@@ -39,7 +39,7 @@ use stm32::crash;
 use stm32::unit::{REQUESTS, Wiring, run};
 use viewshed::board::{CycleCounter, FlashSlots, ResetFlags, RoadsideStart, SettingsCheck, StoredSettings, UnitConfig};
 use viewshed::reference::QuantisedSender;
-use viewshed::reference::supervised::{Radar, State};
+use viewshed::reference::supervised::{Ars408, State};
 use viewshed::{Ars408Config, Epoch};
 
 const CAN_CLOCK_HZ: u32 = 80_000_000;
@@ -139,5 +139,5 @@ async fn main(_spawner: Spawner) {
     let start = RoadsideStart { identity, epoch, stored, reset_cause: flags.into(), cycles };
     let wiring = Wiring { radar, broadcast, line, slots, light: Output::new(p.PB0, Level::Low, Speed::Low), watchdog };
     let scans = scans(radar_receiver).expect("room for one");
-    run(start, memory(), move || Radar::new(Ars408Config::sensor(stored.unit().radar_id)), scans, wiring).await
+    run(start, memory(), move || Ars408::new(Ars408Config::sensor(stored.unit().radar_id)), scans, wiring).await
 }
