@@ -30,14 +30,14 @@ use crate::grid::spherical::SphericalGrid;
 use crate::map::polar::PolarMap;
 use crate::obstacles::config::ObstacleConfig;
 use crate::obstacles::lanes::Lane;
-use crate::obstacles::tracking::Tracking;
+use crate::obstacles::parameters::TrackingParameters;
 use crate::obstacles::{Claimed, Obstacles};
 use crate::sensor::Sensor;
 use crate::sensor::config::{ConfigError, within};
 use crate::sensor::ground::Ground;
 use crate::sensor::mount::Levelling;
 use crate::sensor::noise::Noise;
-use crate::sensor::place::{LaneList, Place, Points};
+use crate::sensor::site::{LaneList, Points, Site};
 
 /// Everything that can be set, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -68,8 +68,8 @@ pub struct Radar3dConfig {
 
 impl Radar3dConfig {
     /// What it says of the place.
-    pub fn place(&self) -> Place<'static> {
-        Place { lanes: LaneList::Metres(self.lanes), heights: Points::Metres(self.ground) }
+    pub fn place(&self) -> Site<'static> {
+        Site { lanes: LaneList::Metres(self.lanes), heights: Points::Metres(self.ground) }
     }
 }
 
@@ -113,7 +113,7 @@ pub struct Radar3dParameters<const R: usize, const A: usize, const E: usize> {
     levelling: Levelling,
     gate: Gate,
     noise: Noise,
-    tracking: Tracking,
+    tracking: TrackingParameters,
     inverse_sensor: InverseSensor,
     health: HealthLimits,
     settling: SettlingTimes,
@@ -143,7 +143,7 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
     ///
     /// # Errors
     /// As [`new`](Self::new).
-    pub fn at(sensor: &Sensor, config: &Radar3dConfig, place: &Place<'_>) -> Result<Self, ConfigError> {
+    pub fn at(sensor: &Sensor, config: &Radar3dConfig, place: &Site<'_>) -> Result<Self, ConfigError> {
         let levelling = sensor.mount.levelling()?;
         let view = sensor.field_of_view.limits()?;
         let noise = sensor.noise.noise()?;
@@ -200,7 +200,7 @@ impl<const R: usize, const A: usize, const E: usize> Radar3dParameters<R, A, E> 
     }
 
     /// The parameters of obstacle tracking.
-    pub fn tracking(&self) -> &Tracking {
+    pub fn tracking(&self) -> &TrackingParameters {
         &self.tracking
     }
 

@@ -1,6 +1,6 @@
 //! What a unit keeps over a loss of power, for boards and hosts of a test bench that have no flash.
 
-use crate::unit::settings::{ALL_SLOTS_LEN, Kind, SettingsSlots, in_copy};
+use crate::unit::settings::{ALL_SLOTS_LEN, BlockKind, SettingsSlots, in_copy};
 use crate::wire::message::Epoch;
 
 /// Bytes of it: all slots, starts.
@@ -28,7 +28,7 @@ impl Flash {
 
     /// The bytes of a slot, to damage them.
     pub fn slot_mut(&mut self, slot: usize) -> &mut [u8] {
-        let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
+        let length = BlockKind::of_slot(slot).map_or(0, BlockKind::most_len);
         self.bytes.get_mut(in_copy(slot)).and_then(|slot| slot.get_mut(..length)).unwrap_or_default()
     }
 
@@ -46,7 +46,7 @@ impl Flash {
 
 impl SettingsSlots for Flash {
     fn slot(&self, slot: usize) -> &[u8] {
-        let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
+        let length = BlockKind::of_slot(slot).map_or(0, BlockKind::most_len);
         self.bytes.get(in_copy(slot)).and_then(|slot| slot.get(..length)).unwrap_or(&[])
     }
 
@@ -65,7 +65,7 @@ mod tests {
         let mut flash = Flash::ERASED;
         assert_eq!(flash.start(), Epoch::new(0));
         flash.write(1, &[7; BLOCK_LEN]);
-        flash.write(Kind::Lanes.slots()[1], &[8; BLOCK_LEN]);
+        flash.write(BlockKind::Lanes.slots()[1], &[8; BLOCK_LEN]);
         flash.write(SLOTS, &[9; BLOCK_LEN]);
         let mut kept = Flash::new(*flash.bytes());
         assert_eq!((kept.slot(0), kept.slot(1)), (&[0xFF; BLOCK_LEN][..], &[7; BLOCK_LEN][..]));

@@ -9,18 +9,18 @@ pub const MOST_AROUND: usize = 32;
 
 /// Where a reflection is, centimetres in the levelled frame, and its place in the scan.
 #[derive(Debug, Clone, Copy)]
-pub struct Place {
+pub struct Located {
     /// Along the levelled frame's axis.
     pub x_cm: i32,
     /// To its left.
     pub y_cm: i32,
-    /// Place in the scan.
+    /// Located in the scan.
     pub index: u16,
 }
 
 /// The places of up to `D` reflections, nearest bin first, in order of arrival within a bin.
 pub struct ByRange<const D: usize> {
-    places: [Place; D],
+    places: [Located; D],
     /// Where each bin begins in `places`, and where the last ends.
     begins: [u16; BINS + 1],
     bin_cm: i32,
@@ -31,7 +31,7 @@ impl<const D: usize> ByRange<D> {
     /// Sorts by counting: two passes over the reflections.
     pub fn sort(reflections: &[Reflection], limit_cm: i32) -> Self {
         let mut sorted = Self {
-            places: [Place { x_cm: 0, y_cm: 0, index: 0 }; D],
+            places: [Located { x_cm: 0, y_cm: 0, index: 0 }; D],
             begins: [0; BINS + 1],
             bin_cm: (limit_cm / BINS as i32).max(1),
         };
@@ -50,7 +50,7 @@ impl<const D: usize> ByRange<D> {
         for (i, r) in reflections.iter().enumerate() {
             let Some(at) = next.get_mut(sorted.bin(i32::from(r.ground_cm))) else { continue };
             if let Some(slot) = sorted.places.get_mut(usize::from(*at)) {
-                *slot = Place { x_cm: r.x_cm, y_cm: r.y_cm, index: i as u16 };
+                *slot = Located { x_cm: r.x_cm, y_cm: r.y_cm, index: i as u16 };
             }
             *at += 1;
         }
@@ -62,7 +62,7 @@ impl<const D: usize> ByRange<D> {
     }
 
     /// All reflections between two distances, and some around them.
-    pub fn between(&self, from_cm: i32, to_cm: i32) -> &[Place] {
+    pub fn between(&self, from_cm: i32, to_cm: i32) -> &[Located] {
         let begin = self.begins.get(self.bin(from_cm)).copied().unwrap_or(0);
         let end = self.begins.get(self.bin(to_cm) + 1).copied().unwrap_or(0);
         self.places.get(usize::from(begin)..usize::from(end)).unwrap_or(&[])

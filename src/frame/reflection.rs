@@ -128,7 +128,7 @@ mod tests {
     use crate::sensor::mount::Mount;
     use crate::sensor::noise::NoiseConfig;
     #[cfg(feature = "ground")]
-    use crate::sensor::place::Points;
+    use crate::sensor::site::Points;
 
     fn place(range_m: f32, azimuth_deg: f32, elevation_deg: Option<f32>, pitch_deg: f32) -> Reflection {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };

@@ -49,7 +49,7 @@ const MARGIN: (i32, i32) = (3, 2);
 /// The last frame's fixtures, and what pairs of them have shown.
 #[derive(Debug, Clone)]
 pub struct Repeatability {
-    fixtures: [Fixture; SLOTS],
+    fixtures: [Repeater; SLOTS],
     /// Standard deviation of the azimuth, 2^-24 rad; 0 until there was a pair.
     azimuth: i32,
     pairs: u16,
@@ -57,12 +57,12 @@ pub struct Repeatability {
 
 /// A detection that does not move and has its range for itself; at no range where there is none.
 #[derive(Debug, Clone, Copy)]
-struct Fixture {
+struct Repeater {
     ground_cm: u16,
     sight: Direction,
 }
 
-impl Fixture {
+impl Repeater {
     // all zero: a static that holds it needs no place in an image
     const NONE: Self = Self { ground_cm: 0, sight: Direction { x: 0, y: 0 } };
 }
@@ -76,7 +76,7 @@ impl Default for Repeatability {
 impl Repeatability {
     /// Has seen nothing.
     pub const fn new() -> Self {
-        Self { fixtures: [Fixture::NONE; SLOTS], azimuth: 0, pairs: 0 }
+        Self { fixtures: [Repeater::NONE; SLOTS], azimuth: 0, pairs: 0 }
     }
 
     /// The configured noise, its azimuth as fixtures have shown it, with the margin.
@@ -90,7 +90,7 @@ impl Repeatability {
 
     /// Compares a frame's fixtures with the last frame's.
     pub fn compare<const D: usize>(&mut self, reflections: &[Reflection], by_range: &ByRange<D>, configured: &Noise) {
-        let mut fixtures = [Fixture::NONE; SLOTS];
+        let mut fixtures = [Repeater::NONE; SLOTS];
         let unmoving = 2 * configured.radial_velocity_cm_s;
         for r in reflections {
             let ground = i32::from(r.ground_cm);
@@ -101,7 +101,7 @@ impl Repeatability {
                 continue;
             }
             let Some(place) = fixtures.get_mut(slot(ground)) else { continue };
-            *place = Fixture { ground_cm: r.ground_cm, sight: r.sight };
+            *place = Repeater { ground_cm: r.ground_cm, sight: r.sight };
             if let Some(before) = self.before(ground) {
                 self.learn(difference(before.sight, r.sight), configured.azimuth);
             }
@@ -110,10 +110,10 @@ impl Repeatability {
     }
 
     /// The one fixture that the last frame had at this range; `None` where it had none or two.
-    fn before(&self, ground_cm: i32) -> Option<&Fixture> {
+    fn before(&self, ground_cm: i32) -> Option<&Repeater> {
         let at = slot(ground_cm);
         let around = self.fixtures.get(at.saturating_sub(1)..self.fixtures.len().min(at + 2))?;
-        let same = |f: &&Fixture| f.ground_cm > 0 && (i32::from(f.ground_cm) - ground_cm).abs() <= ALONE_CM;
+        let same = |f: &&Repeater| f.ground_cm > 0 && (i32::from(f.ground_cm) - ground_cm).abs() <= ALONE_CM;
         let mut same = around.iter().filter(same);
         same.next().filter(|_| same.next().is_none())
     }

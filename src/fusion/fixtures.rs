@@ -101,7 +101,7 @@ const STRENGTH_MEMORY: u32 = 6;
 
 /// Where one stands and how strong it is; means while it is learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Fixture {
+struct Landmark {
     range_cm: u16,
     /// 2^-16 turns.
     azimuth: i16,
@@ -121,7 +121,7 @@ const STRENGTH: usize = 2;
 /// Detections of a fixture that count in a window.
 const MOST_DETECTIONS: u8 = 8;
 
-impl Fixture {
+impl Landmark {
     fn of(d: &Detection) -> Self {
         Self {
             range_cm: d.range_cm,
@@ -258,7 +258,7 @@ pub struct Fixtures<const N: usize, const K: usize> {
     limits: FixturesLimits,
     window: Window,
     windows: u16,
-    fixtures: heapless::Vec<Fixture, N>,
+    fixtures: heapless::Vec<Landmark, N>,
     sectors: [Sector; K],
     levels: [Level; 3],
     /// Share of the fixtures that is missing, 2^-8 of those usually seen.
@@ -329,11 +329,11 @@ impl<const N: usize, const K: usize> Fixtures<N, K> {
         if !stands {
             return;
         }
-        if self.is_learning() && self.fixtures.push(Fixture::of(detection)).is_err() {
+        if self.is_learning() && self.fixtures.push(Landmark::of(detection)).is_err() {
             // no room: the one that was seen least goes, if it is not one of this window
             let least = self.fixtures.iter_mut().filter(|f| f.count == 0).min_by_key(|f| f.seen);
             if let Some(least) = least.filter(|f| u32::from(f.seen) * 4 < u32::from(self.windows)) {
-                *least = Fixture::of(detection);
+                *least = Landmark::of(detection);
             }
         }
     }

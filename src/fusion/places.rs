@@ -6,7 +6,7 @@ use crate::sensor::road::RoadPoint;
 
 /// Cells of a polar map that a cell of the road touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub struct TouchedCells {
     /// The first one's number, azimuth by azimuth.
     first: u16,
     /// How many azimuths, none where the map does not reach.
@@ -15,12 +15,12 @@ pub struct Place {
     ranges: u8,
 }
 
-const NOWHERE: Place = Place { first: 0, azimuths: 0, ranges: BEYOND };
+const NOWHERE: TouchedCells = TouchedCells { first: 0, azimuths: 0, ranges: BEYOND };
 
 /// A part lies beyond the map.
 const BEYOND: u8 = 0x80;
 
-impl Place {
+impl TouchedCells {
     /// Whether all of the cell lies on the map.
     pub fn is_complete(self) -> bool {
         self.ranges & BEYOND == 0
@@ -44,7 +44,7 @@ const FARTHEST_CM: u32 = 40_000;
 pub struct Places<const NX: usize, const NY: usize> {
     /// What they were worked out for: geometry, ranges, azimuths, and the map's threshold.
     of: Option<(PolarGeometry, usize, usize, u8)>,
-    rows: [[Place; NY]; NX],
+    rows: [[TouchedCells; NY]; NX],
     /// First cell of each row that the map reaches, and the one behind the last.
     spans: [(u16, u16); NX],
 }
@@ -90,7 +90,7 @@ impl<const NX: usize, const NY: usize> Places<NX, NY> {
     }
 
     /// Row by row.
-    pub fn rows(&self) -> &[[Place; NY]; NX] {
+    pub fn rows(&self) -> &[[TouchedCells; NY]; NX] {
         &self.rows
     }
 
@@ -102,7 +102,7 @@ impl<const NX: usize, const NY: usize> Places<NX, NY> {
 
 /// The first and the last azimuth and range that an area touches, and whether that is all of it; none if it touches
 /// nothing, or more than can be told.
-fn touched<const R: usize, const A: usize>(map: &PolarMap<R, A>, area: &Footprint) -> Option<Place> {
+fn touched<const R: usize, const A: usize>(map: &PolarMap<R, A>, area: &Footprint) -> Option<TouchedCells> {
     let mut ends = None::<[usize; 4]>;
     let complete = map.geometry().touched(area, R, A, |azimuth, near, far| {
         let [right, _, nearest, farthest] = ends.unwrap_or([azimuth, azimuth, near, far]);
@@ -111,7 +111,7 @@ fn touched<const R: usize, const A: usize>(map: &PolarMap<R, A>, area: &Footprin
     let [right, left, nearest, farthest] = ends?;
     let number = |first: usize, last: usize| u8::try_from(last.checked_sub(first)? + 1).ok();
     let ranges = number(nearest, farthest).filter(|ranges| ranges & BEYOND == 0)?;
-    Some(Place {
+    Some(TouchedCells {
         first: u16::try_from(right * R + nearest).ok()?,
         azimuths: number(right, left)?,
         ranges: ranges | if complete { 0 } else { BEYOND },

@@ -136,7 +136,7 @@ mod tests {
     use crate::sensor::field_of_view::FieldOfView;
     use crate::sensor::ground::Ground;
     use crate::sensor::mount::Mount;
-    use crate::sensor::place::Points;
+    use crate::sensor::site::Points;
     use std::string::String;
     use std::vec::Vec;
 

@@ -3,8 +3,8 @@
 use super::hidden_end::ALL;
 use super::lanes::{LEARNT, NO_LANE};
 use super::obstacle::Obstacle;
+use super::parameters::TrackingParameters;
 use super::size::Size;
-use super::tracking::Tracking;
 use crate::fixed::math::root;
 use crate::obstacles::solid::Solid;
 
@@ -24,7 +24,7 @@ const ALONG: i32 = (1 << 14) / 8;
 impl Obstacle {
     /// The box it fills: the outline lengthened to what is usual, behind the face the radar sees, or
     /// before it where that is its farther end.
-    pub fn solid(&self, t: &Tracking) -> Solid {
+    pub fn solid(&self, t: &TrackingParameters) -> Solid {
         let size = self.size(t);
         let (along, aside) = self.middle_of_box(&size);
         let low = self.tallness.is_low() && self.may_be_low(&size, t);
@@ -53,7 +53,7 @@ impl Obstacle {
     }
 
     /// What its outline, what it has shown for long and its proven height make it.
-    pub(super) fn size(&self, t: &Tracking) -> Size {
+    pub(super) fn size(&self, t: &TrackingParameters) -> Size {
         let tall = t.sizes.least_length_cm(self.tallness.floor_cm());
         let shown = self.extent.length_cm();
         if shown < LONGEST_RIDER_CM && tall == 0 && self.reflectivity.is_below(t.weak_rcs) {
@@ -64,7 +64,7 @@ impl Obstacle {
 
     /// Whether something of this size that shows nothing high is low. What is as long as a lorry may be one, unless it is
     /// several cars in a row or hardly reflects; so may what is longer than a car and reflects like a lorry.
-    fn may_be_low(&self, size: &Size, t: &Tracking) -> bool {
+    fn may_be_low(&self, size: &Size, t: &TrackingParameters) -> bool {
         if size.length_cm >= LONGEST_LOW_CM {
             return self.profile.is_a_row_of_cars(&self.extent) || self.reflectivity.is_below(t.low_rcs);
         }
@@ -74,19 +74,19 @@ impl Obstacle {
     /// What its box is wider to either side for what is unsure of its place, centimetres: half of it where it goes its
     /// own way nearly along the road, whose axis it had for a heading until then, and a quarter on a lane. On a lane
     /// that was learnt it goes its own way, too, but for an eighth along the road.
-    fn margin_cm(&self, t: &Tracking) -> i32 {
+    fn margin_cm(&self, t: &TrackingParameters) -> i32 {
         let off_axis = t.road.sine(self.heading).abs();
         match (self.lane, self.free_heading) {
             (NO_LANE, false) => 0,
-            (LEARNT, _) if self.goes_along_the_road(t) => t.own_way_margin_cm / 8,
-            (NO_LANE | LEARNT, _) if off_axis > ACROSS => t.own_way_margin_cm,
-            (NO_LANE | LEARNT, _) => t.own_way_margin_cm / 2,
-            _ => t.own_way_margin_cm / 4,
+            (LEARNT, _) if self.goes_along_the_road(t) => t.off_axis_margin_cm / 8,
+            (NO_LANE | LEARNT, _) if off_axis > ACROSS => t.off_axis_margin_cm,
+            (NO_LANE | LEARNT, _) => t.off_axis_margin_cm / 2,
+            _ => t.off_axis_margin_cm / 4,
         }
     }
 
     /// Whether it goes along the road's axis, either way, within 7.2 degrees.
-    pub(super) fn goes_along_the_road(&self, t: &Tracking) -> bool {
+    pub(super) fn goes_along_the_road(&self, t: &TrackingParameters) -> bool {
         t.road.sine(self.heading).abs() < ALONG
     }
 
@@ -228,17 +228,17 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_its_own_way_is_drawn_wider_by_what_is_unsure_of_its_place() {
+    fn what_leaves_the_axis_is_drawn_wider_by_what_is_unsure_of_its_place() {
         let t = rules();
         let mut o = Obstacle::new(&seen_at(5000, 0, 0), AHEAD, 2000);
         let along_the_road = o.solid(&t).half_width_cm;
         o.free_heading = true;
-        assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.own_way_margin_cm / 2);
+        assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.off_axis_margin_cm / 2);
         for across in [AHEAD.left(), AHEAD.left().reversed(), Direction::of(-3, 1), Direction::of(3, -1)] {
             o.heading = across;
-            assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.own_way_margin_cm, "{across:?}");
+            assert_eq!(o.solid(&t).half_width_cm, along_the_road + t.off_axis_margin_cm, "{across:?}");
         }
-        assert!(t.own_way_margin_cm > 0);
+        assert!(t.off_axis_margin_cm > 0);
     }
 
     #[test]

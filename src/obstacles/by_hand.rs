@@ -4,8 +4,8 @@ use std::vec::Vec;
 
 use super::Obstacles;
 use super::config::ObstacleConfig;
+use super::parameters::TrackingParameters;
 use super::tallness::Tallness;
-use super::tracking::Tracking;
 use crate::fixed::math::length;
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
@@ -14,7 +14,7 @@ use crate::frame::reflection::Reflection;
 use crate::sensor::noise::NoiseConfig;
 
 /// Default rules for a road straight ahead, followed to 225 m.
-pub fn rules() -> Tracking {
+pub fn rules() -> TrackingParameters {
     ObstacleConfig::default().tracking(NoiseConfig::default().noise().unwrap(), Direction::AHEAD, 22_500).unwrap()
 }
 

@@ -1,14 +1,14 @@
 //! What can be set of obstacle tracking, in SI units.
 
-use super::fixtures;
+use super::clutter;
 use super::lanes::Lanes;
 use super::learnt_lanes;
+use super::parameters::TrackingParameters;
 use super::profile::HIT;
 use super::reflectivity;
 use super::size::SizeConfig;
 #[cfg(feature = "tuned")]
 use super::size::SizePoint;
-use super::tracking::Tracking;
 use crate::fixed::math;
 use crate::fixed::trig::Direction;
 #[cfg(feature = "tuned")]
@@ -81,17 +81,17 @@ pub struct ObstacleConfig {
     pub turning_noise_mps: f32,
     /// Standard deviations by which the motion that is seen must differ from the one along the heading, before
     /// an obstacle goes its own way.
-    pub own_way_sigmas: f32,
+    pub off_axis_sigmas: f32,
     /// Least speed to the side for that, m/s.
-    pub own_way_mps: f32,
+    pub off_axis_mps: f32,
     /// Least share of the speed for that.
-    pub own_way_share: f32,
+    pub off_axis_share: f32,
     /// Share of the way to the place seen that the outline of what goes its own way is moved in a frame.
-    pub own_way_follow: f32,
+    pub off_axis_follow: f32,
     /// How much farther than its width the box of what goes its own way reaches to either side, metres: its place
     /// across is known to so much, and what may be in the way is not drawn smaller. Half of it less than 14.5 degrees
     /// off the road's axis.
-    pub own_way_margin_m: f32,
+    pub off_axis_margin_m: f32,
     /// How long an outline must be longer until the box is, seconds.
     pub length_growth_s: f32,
     /// How long the box stays longer than an outline of which a part is hidden, seconds.
@@ -155,11 +155,11 @@ impl Default for ObstacleConfig {
             turning_speed_mps: 2.0,
             outline_sigmas: 0.7,
             turning_noise_mps: 1.0,
-            own_way_sigmas: 3.0,
-            own_way_mps: 1.5,
-            own_way_share: 0.15,
-            own_way_follow: 0.1,
-            own_way_margin_m: 0.7,
+            off_axis_sigmas: 3.0,
+            off_axis_mps: 1.5,
+            off_axis_share: 0.15,
+            off_axis_follow: 0.1,
+            off_axis_margin_m: 0.7,
             length_growth_s: 1.0,
             length_memory_s: 3.0,
             slow_mps: 4.0,
@@ -187,8 +187,8 @@ impl ObstacleConfig {
             outline_memory_s, outline_min_hits, outline_share, lateral_memory_s, drift_gain,
             confirm_hits, max_evidence, tentative_loss_per_s, visible_loss_per_s, hidden_loss_per_s,
             merge_lateral_m, abreast_m, merge_speed_mps, half_width_m, mover_way_m, turning_speed_mps,
-            outline_sigmas, turning_noise_mps, own_way_sigmas, own_way_mps, own_way_share,
-            own_way_follow, own_way_margin_m, length_growth_s, length_memory_s, slow_mps,
+            outline_sigmas, turning_noise_mps, off_axis_sigmas, off_axis_mps, off_axis_share,
+            off_axis_follow, off_axis_margin_m, length_growth_s, length_memory_s, slow_mps,
             heading_sigmas, standing_speed_mps, standing_visible_loss_per_s, standing_hidden_loss_per_s,
             weak_rcs_dbsm, low_rcs_dbsm, lorry_rcs_dbsm, fixture_after_s,
             lane_vehicles;
@@ -210,7 +210,7 @@ impl ObstacleConfig {
     /// # Errors
     /// Names the parameter outside its limits.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // limits are checked
-    pub fn tracking(&self, noise: Noise, road: Direction, limit_cm: i32) -> Result<Tracking, ConfigError> {
+    pub fn tracking(&self, noise: Noise, road: Direction, limit_cm: i32) -> Result<TrackingParameters, ConfigError> {
         let cm = |name, v, min, max| within(name, v, min, max).map(|m| math::round_i32(m * 100.0));
         let seconds = |name, v| within(name, v, 0.05, 60.0).map(|s| math::round_i32(s * 65536.0));
         let sigmas = |name, v| within(name, v, 0.0, 8.0).map(|s| math::round_i32(s * 16.0));
@@ -228,7 +228,7 @@ impl ObstacleConfig {
             // nothing would ever be confirmed
             above("obstacles.max_evidence", self.max_evidence, self.confirm_hits)?;
         }
-        Ok(Tracking {
+        Ok(TrackingParameters {
             min_speed_cm_s: cm("obstacles.min_speed_mps", self.min_speed_mps, 0.3, 20.0)?,
             doppler_gate: cm("obstacles.doppler_gate_mps", self.doppler_gate_mps, 0.1, 10.0)? << 4,
             gap_cm,
@@ -263,15 +263,17 @@ impl ObstacleConfig {
             turning_speed: fine("obstacles.turning_speed_mps", self.turning_speed_mps, 0.5, 20.0)?,
             outline_sigmas: sigmas("obstacles.outline_sigmas", self.outline_sigmas)?,
             turning_noise: math::round_i32(turning * turning * 10_000.0),
-            own_way_sigmas: sigmas("obstacles.own_way_sigmas", self.own_way_sigmas)?,
-            own_way_cm_s: cm("obstacles.own_way_mps", self.own_way_mps, 0.0, 50.0)?,
-            own_way_share: math::round_i32(within("obstacles.own_way_share", self.own_way_share, 0.0, 2.0)? * 65536.0),
-            own_way_margin_cm: cm("obstacles.own_way_margin_m", self.own_way_margin_m, 0.0, 2.0)?,
+            off_axis_sigmas: sigmas("obstacles.off_axis_sigmas", self.off_axis_sigmas)?,
+            off_axis_cm_s: cm("obstacles.off_axis_mps", self.off_axis_mps, 0.0, 50.0)?,
+            off_axis_share: math::round_i32(
+                within("obstacles.off_axis_share", self.off_axis_share, 0.0, 2.0)? * 65536.0,
+            ),
+            off_axis_margin_cm: cm("obstacles.off_axis_margin_m", self.off_axis_margin_m, 0.0, 2.0)?,
             length_growth: seconds("obstacles.length_growth_s", self.length_growth_s)?,
             length_memory: seconds("obstacles.length_memory_s", self.length_memory_s)?,
             slow_speed: fine("obstacles.slow_mps", self.slow_mps, 0.0, 50.0)?,
-            own_way_follow: math::round_i32(
-                within("obstacles.own_way_follow", self.own_way_follow, 0.0, 1.0)? * 65536.0,
+            off_axis_follow: math::round_i32(
+                within("obstacles.off_axis_follow", self.off_axis_follow, 0.0, 1.0)? * 65536.0,
             ),
             heading_sigmas: sigmas("obstacles.heading_sigmas", self.heading_sigmas)?,
             standing_speed: fine("obstacles.standing_speed_mps", self.standing_speed_mps, 0.0, 5.0)?,
@@ -286,7 +288,7 @@ impl ObstacleConfig {
             limit_cm,
             lanes: Lanes::default(),
             fixture_after: math::round_i32(
-                within("obstacles.fixture_after_s", self.fixture_after_s, 0.0, 200.0)? * f32::from(fixtures::SECOND),
+                within("obstacles.fixture_after_s", self.fixture_after_s, 0.0, 200.0)? * f32::from(clutter::SECOND),
             ) as u16,
             lane_vehicles: math::round_i32(within("obstacles.lane_vehicles", self.lane_vehicles, 0.0, most)?),
         })

@@ -6,8 +6,8 @@
 
 use super::Obstacles;
 use super::obstacle::Obstacle;
+use super::parameters::{EVEN_SPREAD, TrackingParameters};
 use super::solid::Solid;
-use super::tracking::{EVEN_SPREAD, Tracking};
 
 /// A whole one, 2^-8.
 pub(super) const ALL: i32 = 1 << 8;
@@ -18,7 +18,7 @@ impl<const N: usize> Obstacles<N> {
     /// Boxes of the confirmed, those whose end is hidden about the middle of what is seen of them. Two sensors that see
     /// a vehicle from both sides each tell its middle from their own, and all that is wrong with that has one sign; so
     /// bearings are compared by these.
-    pub fn where_seen<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
+    pub fn where_seen<'a>(&'a self, t: &'a TrackingParameters) -> impl Iterator<Item = Solid> + 'a {
         self.confirmed(t)
             .map(|o| if i32::from(o.hidden_end) > ALL / FRAMES { o.about_what_is_seen().solid(t) } else { o.solid(t) })
     }
@@ -28,7 +28,7 @@ impl Obstacle {
     /// Looks on the last map whether the nearer end of a slow one that was detected is hidden. The end of what is fast
     /// counts as in sight: it keeps its distance.
     #[allow(clippy::cast_possible_truncation)] // from 0 to 256
-    pub(super) fn look_for_end(&mut self, t: &Tracking, in_view: impl Fn(i32, i32) -> bool) {
+    pub(super) fn look_for_end(&mut self, t: &TrackingParameters, in_view: impl Fn(i32, i32) -> bool) {
         if !self.seen() {
             return;
         }
@@ -50,7 +50,7 @@ impl Obstacle {
     }
 
     /// The corners of its nearer end and the middle between them, centimetres.
-    fn nearer_end(&self, t: &Tracking) -> [(i32, i32); 3] {
+    fn nearer_end(&self, t: &TrackingParameters) -> [(i32, i32); 3] {
         let solid = self.solid(t);
         let [front_left, rear_left, rear_right, front_right] = solid.corners();
         let is_ahead = solid.heading.along(solid.x_cm, solid.y_cm) > 0;

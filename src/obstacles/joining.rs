@@ -11,8 +11,8 @@ use core::ops::RangeInclusive;
 use super::body::LONGEST_LOW_CM;
 use super::gathered::sigma_of_weight;
 use super::obstacle::{FRACTION, Obstacle};
+use super::parameters::{MERGE_PARALLEL, TrackingParameters};
 use super::profile::BIN_CM;
-use super::tracking::{MERGE_PARALLEL, Tracking};
 use crate::fixed::math::{hypot_gate, length};
 use crate::fixed::trig::Direction;
 
@@ -43,7 +43,7 @@ const ENDS_SPEED: i32 = 100 << FRACTION;
 impl Obstacle {
     /// Whether another obstacle is near enough to be a part of the same vehicle, or to lie within it.
     #[inline]
-    pub fn is_near(&self, other: &Self, t: &Tracking) -> bool {
+    pub fn is_near(&self, other: &Self, t: &TrackingParameters) -> bool {
         let far = (2 * t.max_length_cm) << FRACTION;
         (self.position.0 - other.position.0).abs() <= far && (self.position.1 - other.position.1).abs() <= far
     }
@@ -51,7 +51,7 @@ impl Obstacle {
     /// Whether another obstacle, a [near](Self::is_near) one, is a part of the same vehicle: in line, equally fast, and no farther
     /// away than vehicles keep from each other at this speed.
     #[inline]
-    pub fn is_one_with(&self, other: &Self, t: &Tracking) -> bool {
+    pub fn is_one_with(&self, other: &Self, t: &TrackingParameters) -> bool {
         let apart = hypot_gate(self.velocity.0 - other.velocity.0, self.velocity.1 - other.velocity.1);
         if apart > t.merge_speed {
             return false;
@@ -84,7 +84,7 @@ impl Obstacle {
 
     /// Whether one of both is a whole car, and the other something tall, or another whole car whose middle lies so far away: a
     /// car behind a lorry, or beside another where the place of one was guessed.
-    fn is_another_car_than(&self, other: &Self, offset_cm: i32, t: &Tracking) -> bool {
+    fn is_another_car_than(&self, other: &Self, offset_cm: i32, t: &TrackingParameters) -> bool {
         match (self.is_whole_car(t), other.is_whole_car(t)) {
             (true, true) => offset_cm > TWICE_CM,
             (true, false) => other.tallness.is_tall(),
@@ -94,15 +94,15 @@ impl Obstacle {
     }
 
     /// Whether it is low for certain and has shown all of a car.
-    fn is_whole_car(&self, t: &Tracking) -> bool {
+    fn is_whole_car(&self, t: &TrackingParameters) -> bool {
         let shown = self.extent.length_cm().max(self.remembered_length_cm(t));
         self.existence >= t.confirmed && self.tallness.is_low() && WHOLE_CAR_CM.contains(&shown)
     }
 
     /// Whether another obstacle that points elsewhere is a part of the same lorry: both stand, are tall, and touch along
     /// the line between their middles, which lies more ahead of this one than beside it.
-    fn is_one_lorry_with(&self, other: &Self, t: &Tracking) -> bool {
-        let both = |is: fn(&Self, &Tracking) -> bool| is(self, t) && is(other, t);
+    fn is_one_lorry_with(&self, other: &Self, t: &TrackingParameters) -> bool {
+        let both = |is: fn(&Self, &TrackingParameters) -> bool| is(self, t) && is(other, t);
         if !both(Self::is_standing)
             || !both(|o, _| o.tallness.is_tall())
             || self.heading.cosine(other.heading) < CROOKED
@@ -122,7 +122,7 @@ impl Obstacle {
     /// same car. Gaps do not tell: in a queue cars are as close to each other as their own ends are. But no face of another
     /// car lies less than a car's length and a gap behind a face. And two ends as far apart as a car's are one car's, two tall
     /// ones as a van's one van's; it then has both, so the next end is the next vehicle's.
-    fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &Tracking) -> bool {
+    fn has_other_end(&self, other: &Self, along: i32, length: i32, t: &TrackingParameters) -> bool {
         let ahead = along > self.extent.middle_cm();
         // what lies ahead of the sensor shows it the face that is nearer, and its other end is farther away
         let behind_its_face = ahead == self.shows_its_rear();
@@ -136,7 +136,7 @@ impl Obstacle {
     /// Whether another obstacle lies within this one, where nothing else can be: a wheel that was taken
     /// for a vehicle, or an echo between the two.
     #[inline]
-    pub fn encloses(&self, other: &Self, t: &Tracking) -> bool {
+    pub fn encloses(&self, other: &Self, t: &TrackingParameters) -> bool {
         let far = t.max_length_cm << FRACTION;
         if (self.position.0 - other.position.0).abs() > far || (self.position.1 - other.position.1).abs() > far {
             return false;
@@ -147,19 +147,19 @@ impl Obstacle {
     }
 
     /// Whether another obstacle lies within this one, which has far more detections, so that it is nothing of its own.
-    pub(super) fn takes_away(&self, other: &Self, t: &Tracking) -> bool {
+    pub(super) fn takes_away(&self, other: &Self, t: &TrackingParameters) -> bool {
         self.hits / 2 >= other.hits && self.encloses(other, t) && !self.coasts_over(other, t)
     }
 
     /// Whether it moves on without being seen, so that its place is guessed, and the other is seen to stand.
-    fn coasts_over(&self, other: &Self, t: &Tracking) -> bool {
+    fn coasts_over(&self, other: &Self, t: &TrackingParameters) -> bool {
         let guessed = !self.seen() && !self.is_standing(t);
         guessed && other.seen() && other.is_standing(t) && other.existence >= t.confirmed
     }
 
     /// Whether what moves within this one can be itself, which leaves: it stands, and nothing of it is seen
     /// standing any more.
-    pub fn may_be_leaving_as(&self, mover: &Self, t: &Tracking) -> bool {
+    pub fn may_be_leaving_as(&self, mover: &Self, t: &TrackingParameters) -> bool {
         self.is_standing(t)
             && !self.seen()
             && mover.seen()
@@ -196,7 +196,7 @@ impl Obstacle {
 
     /// Takes over what another obstacle knows of the same vehicle.
     #[allow(clippy::cast_possible_truncation)] // a share of the offset
-    pub fn join(&mut self, other: &Self, t: &Tracking) {
+    pub fn join(&mut self, other: &Self, t: &TrackingParameters) {
         if self.heading.cosine(other.heading) < MERGE_PARALLEL {
             self.point_along_the_line_to(other);
         }

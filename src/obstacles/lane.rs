@@ -4,7 +4,7 @@ use super::lanes::{LEARNT, Motion, NO_LANE};
 use super::learnt_lanes::{LearntLanes, PARALLEL, spacing_cm};
 use super::motion::FreeMotion;
 use super::obstacle::{FRACTION, NEWBORN_PLACE, NEWBORN_SPEED, Obstacle};
-use super::tracking::{LEAST_PROJECTION, Tracking};
+use super::parameters::{LEAST_PROJECTION, TrackingParameters};
 use crate::fixed::math::{hypot_gate, mul_shift};
 use crate::fixed::trig::Direction;
 
@@ -43,7 +43,7 @@ impl Obstacle {
     }
 
     /// Takes the lane that its motion fits best, if there is any.
-    pub(super) fn find_lane(&mut self, t: &Tracking) {
+    pub(super) fn find_lane(&mut self, t: &TrackingParameters) {
         if t.lanes.is_empty() {
             return;
         }
@@ -54,7 +54,7 @@ impl Obstacle {
     }
 
     /// Takes a given lane, or else one that was learnt.
-    pub(super) fn find_any_lane<const N: usize>(&mut self, learnt: &LearntLanes<N>, t: &Tracking) {
+    pub(super) fn find_any_lane<const N: usize>(&mut self, learnt: &LearntLanes<N>, t: &TrackingParameters) {
         self.find_lane(t);
         self.find_learnt(learnt, t);
     }
@@ -111,7 +111,7 @@ impl Obstacle {
     }
 
     /// Turns with the lane it is on; at its end, into the next.
-    pub(super) fn keep_to_lane(&mut self, t: &Tracking) {
+    pub(super) fn keep_to_lane(&mut self, t: &TrackingParameters) {
         if !self.is_on_given_lane() {
             return;
         }
@@ -129,7 +129,7 @@ impl Obstacle {
     }
 
     /// Looks for a better lane now and then.
-    pub(super) fn look_for_lane(&mut self, t: &Tracking) {
+    pub(super) fn look_for_lane(&mut self, t: &TrackingParameters) {
         if !t.lanes.is_empty() && self.age % LOOK_EVERY == 1 {
             self.find_lane(t);
         }
@@ -137,7 +137,7 @@ impl Obstacle {
 
     /// Takes the [learnt lane](super::learnt_lanes) that its motion fits best, where none is given and its own way is not
     /// known better.
-    fn find_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
+    fn find_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &TrackingParameters) {
         let knows = self.free_heading && self.knows_its_way(t) && !self.goes_along_the_road(t);
         if t.lane_vehicles == 0 || knows || !matches!(self.lane, NO_LANE | LEARNT) {
             return;
@@ -149,7 +149,7 @@ impl Obstacle {
     }
 
     /// Turns with the learnt lane it is on. Where that ends it goes on as it goes, along the road or its own way.
-    pub(super) fn keep_to_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
+    pub(super) fn keep_to_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &TrackingParameters) {
         if self.lane != LEARNT {
             return;
         }
@@ -165,7 +165,7 @@ impl Obstacle {
     }
 
     /// The same as for given lanes, but for the place: lanes are learnt from the middles of boxes.
-    fn motion_for_learnt(&self, across_cm: i32, t: &Tracking) -> Motion {
+    fn motion_for_learnt(&self, across_cm: i32, t: &TrackingParameters) -> Motion {
         let motion = self.motion_for_lanes();
         let place_variance = ASIDE_VARIANCE + across_cm * across_cm;
         if self.age == 0 {
@@ -181,7 +181,7 @@ impl Obstacle {
         &self,
         motion: &Motion,
         lanes: &LearntLanes<N>,
-        t: &Tracking,
+        t: &TrackingParameters,
     ) -> Option<Direction> {
         let is_settled = self.is_standing(t) || (self.is_mover(t) && self.extent.length_cm() >= SETTLED_CM);
         let heading = lanes.heading(motion, t.lane_vehicles)?;
@@ -189,7 +189,7 @@ impl Obstacle {
     }
 
     /// Looks for a better learnt lane now and then.
-    pub(super) fn look_for_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &Tracking) {
+    pub(super) fn look_for_learnt<const N: usize>(&mut self, lanes: &LearntLanes<N>, t: &TrackingParameters) {
         if self.age % LOOK_EVERY == 1 {
             self.find_learnt(lanes, t);
         }
@@ -197,7 +197,7 @@ impl Obstacle {
 
     /// Shows where a lane is, if it is a vehicle that drives and its heading is known: what is measured of it, or the road's
     /// axis where that agrees with it.
-    pub(super) fn teach<const N: usize>(&mut self, lanes: &mut LearntLanes<N>, t: &Tracking) {
+    pub(super) fn teach<const N: usize>(&mut self, lanes: &mut LearntLanes<N>, t: &TrackingParameters) {
         let drives = self.seen() && self.existence >= t.confirmed && self.hits >= TEACHING_HITS && self.is_mover(t);
         let speed = self.speed();
         let known = speed >= TEACHING_SPEED && self.free.is_sure_of(speed >> FRACTION, TEACHING_SIGMAS);
@@ -237,7 +237,7 @@ impl Obstacle {
     }
 
     /// How far to the left its middle is moved towards the middle of its lane, centimetres.
-    pub(super) fn towards_lane(&self, place: (i32, i32), t: &Tracking) -> i32 {
+    pub(super) fn towards_lane(&self, place: (i32, i32), t: &TrackingParameters) -> i32 {
         let Some(on) = t.lanes.along(self.lane, place) else { return 0 };
         -mul_shift(on.left_cm.clamp(-MOST_ASIDE_CM, MOST_ASIDE_CM), TO_THE_MIDDLE, 8)
     }
@@ -254,29 +254,29 @@ mod tests {
     use super::super::Obstacles;
     use super::super::by_hand::{PERIOD_S, Vehicle, car, rules};
     use super::super::lanes::{Lane, Lanes};
-    use super::super::tracking::Tracking;
+    use super::super::parameters::TrackingParameters;
     use super::*;
     use crate::fixed::angle::Angle;
     use crate::fixed::time::Step;
     use crate::frame::by_range::ByRange;
     use crate::frame::reflection::Reflection;
     use crate::sensor::mount::Levelling;
-    use crate::sensor::place::LaneList;
     use crate::sensor::road::RoadPoint;
+    use crate::sensor::site::LaneList;
     use std::vec::Vec;
 
     /// The default rules with lanes; the sensor stands at the origin and looks along x.
-    fn with_lanes(lanes: &[Lane]) -> Tracking {
+    fn with_lanes(lanes: &[Lane]) -> TrackingParameters {
         let level = Levelling::on_road(RoadPoint::new(0, 0), 600, Angle::ZERO);
-        Tracking { lanes: Lanes::new(&level, LaneList::Metres(lanes)).unwrap(), ..rules() }
+        TrackingParameters { lanes: Lanes::new(&level, LaneList::Metres(lanes)).unwrap(), ..rules() }
     }
 
-    fn frame(list: &mut Obstacles<16>, seen: &[Reflection], t: &Tracking) {
+    fn frame(list: &mut Obstacles<16>, seen: &[Reflection], t: &TrackingParameters) {
         let step = Step::from_micros((PERIOD_S * 1e6) as u64);
         list.step(seen, &ByRange::<64>::sort(seen, t.limit_cm), step, t, |_, _| false);
     }
 
-    fn follow(list: &mut Obstacles<16>, car: &mut Vehicle, frames: usize, t: &Tracking) {
+    fn follow(list: &mut Obstacles<16>, car: &mut Vehicle, frames: usize, t: &TrackingParameters) {
         for _ in 0..frames {
             frame(list, &car.reflections(), t);
             car.moved(PERIOD_S);
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn on_a_lane_across_the_road_a_car_has_its_heading_in_the_first_frame() {
-        let first = |t: &Tracking| {
+        let first = |t: &TrackingParameters| {
             let (mut list, mut car) = (Obstacles::new(), car([40.0, -20.0], [0.0, 1.0], 9.0));
             follow(&mut list, &mut car, 1, t);
             degrees(&list)
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn what_turns_off_a_lane_goes_its_own_way() {
+    fn what_turns_off_a_lane_leaves_the_axis() {
         let t = with_lanes(&[ACROSS]);
         let (mut list, mut car) = (Obstacles::new(), car([40.0, -25.0], [0.0, 1.0], 9.0));
         follow(&mut list, &mut car, 15, &t);
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn far_from_all_lanes_nothing_changes() {
-        let boxes = |t: &Tracking| {
+        let boxes = |t: &TrackingParameters| {
             let (mut list, mut car) = (Obstacles::new(), car([30.0, 12.0], [1.0, 0.0], 9.0));
             follow(&mut list, &mut car, 20, t);
             list.solids(t).collect::<Vec<_>>()
@@ -339,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_box_lies_nearer_to_the_middle_of_its_lane_than_what_is_seen() {
-        let middle = |t: &Tracking| {
+        let middle = |t: &TrackingParameters| {
             let (mut list, mut car) = (Obstacles::new(), car([30.0, 11.0], [1.0, 0.0], 9.0));
             follow(&mut list, &mut car, 20, t);
             list.solids(t).next().unwrap().y_cm
@@ -349,12 +349,12 @@ mod tests {
     }
 
     /// The default rules, and lanes are learnt from three vehicles.
-    fn learning() -> Tracking {
-        Tracking { lane_vehicles: 3, ..rules() }
+    fn learning() -> TrackingParameters {
+        TrackingParameters { lane_vehicles: 3, ..rules() }
     }
 
     /// After so many cars have crossed at 40 m, one after the other.
-    fn after_cars(cars: usize, t: &Tracking) -> Obstacles<16> {
+    fn after_cars(cars: usize, t: &TrackingParameters) -> Obstacles<16> {
         let mut list = Obstacles::new();
         for _ in 0..cars {
             follow(&mut list, &mut car([40.0, -35.0], [0.0, 1.0], 9.0), 90, t);
@@ -366,7 +366,7 @@ mod tests {
     #[test]
     fn where_cars_have_crossed_the_next_has_its_heading_in_the_first_frame() {
         // ahead of the sensor Doppler says nothing: from the right, it still comes nearer
-        let first = |cars, t: &Tracking, velocity| {
+        let first = |cars, t: &TrackingParameters, velocity| {
             let mut list = after_cars(cars, t);
             follow(&mut list, &mut car([40.0, -13.0 * velocity], [0.0, velocity], 9.0), 1, t);
             degrees(&list)
@@ -434,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_a_learnt_lane_goes_its_own_way() {
+    fn what_leaves_a_learnt_lane_leaves_the_axis() {
         let t = learning();
         let (mut list, mut car) = (after_cars(4, &t), car([40.0, -14.0], [0.0, 1.0], 9.0));
         follow(&mut list, &mut car, 10, &t);
@@ -447,7 +447,7 @@ mod tests {
     }
 
     /// What crosses at 40 m and then crawls, as one that is drawn 16 m long along the road's axis or as a car.
-    fn stopped(length_cm: i32, speed_cm_s: i32, t: &Tracking) -> f64 {
+    fn stopped(length_cm: i32, speed_cm_s: i32, t: &TrackingParameters) -> f64 {
         let lanes = after_cars(6, t);
         let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 100, 0), Direction::AHEAD, speed_cm_s);
         o.travelled_cm = 2000;
@@ -485,7 +485,7 @@ mod tests {
     }
 
     #[test]
-    fn where_a_learnt_lane_across_the_road_ends_the_box_keeps_the_margin_of_its_own_way() {
+    fn where_a_learnt_lane_across_the_road_ends_the_box_keeps_the_margin_off_the_axis() {
         let t = learning();
         let mut list = after_cars(4, &t);
         // 4 s after the last cell that was driven on
@@ -506,7 +506,7 @@ mod tests {
     #[test]
     fn given_lanes_go_before_learnt_ones() {
         let crossing = after_cars(4, &learning());
-        let given = Tracking { lane_vehicles: 3, ..with_lanes(&[&[[38.5, -60.0], [41.5, 60.0]]]) };
+        let given = TrackingParameters { lane_vehicles: 3, ..with_lanes(&[&[[38.5, -60.0], [41.5, 60.0]]]) };
         let mut list = crossing.clone();
         follow(&mut list, &mut car([40.0, -13.0], [0.0, 1.0], 9.0), 1, &given);
         let o = list.iter().max_by_key(|o| o.hits).unwrap();

@@ -18,8 +18,8 @@ use crate::fixed::math::{length, mul_shift};
 use crate::fixed::trig::{self, Direction};
 use crate::sensor::config::{ConfigError, Problem, within};
 use crate::sensor::mount::Levelling;
-use crate::sensor::place::{LaneList, Points};
 use crate::sensor::road::RoadPoint;
+use crate::sensor::site::{LaneList, Points};
 
 /// A lane: a polyline in the direction of its traffic, metres in road coordinates, x along the road and y to the left.
 pub type Lane = &'static [[f32; 2]];

@@ -34,7 +34,7 @@ use heapless::Vec;
 
 use super::Obstacles;
 use super::lanes::{MOST_MISFIT, Motion};
-use super::tracking::Tracking;
+use super::parameters::TrackingParameters;
 use crate::fixed::angle::Angle;
 use crate::fixed::trig::{self, Direction};
 
@@ -255,7 +255,7 @@ impl<const N: usize> LearntLanes<N> {
 impl<const N: usize> Obstacles<N> {
     /// Where lanes were learnt, a place for each cell and course, and which way they go there; centimetres in the
     /// levelled frame. None where none are to be learnt.
-    pub fn learnt_lanes(&self, t: &Tracking) -> impl Iterator<Item = ((i32, i32), Direction)> {
+    pub fn learnt_lanes(&self, t: &TrackingParameters) -> impl Iterator<Item = ((i32, i32), Direction)> {
         self.lanes.places(t.lane_vehicles)
     }
 }

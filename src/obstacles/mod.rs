@@ -11,10 +11,10 @@
 //! keep at that speed, become one (`joining.rs`).
 //!
 //! *Motion.* Beside the motion along the road's axis each has one without a heading ([motion]), to which it changes where the two
-//! differ for certain (`own_way.rs`). Lanes that are given or learnt say where vehicles head ([lanes], [learnt_lanes]).
+//! differ for certain (`off_axis.rs`). Lanes that are given or learnt say where vehicles head ([lanes], [learnt_lanes]).
 //!
 //! *Extent.* The outline is a fading histogram of reflections ([profile]). A length is remembered while a part is hidden, and a box
-//! lies behind the side that is seen, since only that side reflects (`hidden_end.rs`, `room.rs`).
+//! lies behind the side that is seen, since only that side reflects (`hidden_end.rs`, `farther_end.rs`).
 //!
 //! *Height.* Length gives it ([size]); elevations ([tallness]) and the radar cross section ([reflectivity]) correct it.
 //!
@@ -31,9 +31,10 @@
 mod body;
 #[cfg(test)]
 mod by_hand;
+mod clutter;
 pub mod config;
 mod doppler_slope;
-mod fixtures;
+mod farther_end;
 mod gathered;
 mod hidden_end;
 mod joining;
@@ -43,17 +44,16 @@ pub mod learnt_lanes;
 pub mod motion;
 mod newborn;
 pub mod obstacle;
-mod own_way;
+mod off_axis;
+pub mod parameters;
 pub mod profile;
 pub mod reflectivity;
-mod room;
 mod search;
 pub mod size;
 pub mod solid;
 #[cfg(test)]
 mod stops;
 pub mod tallness;
-pub mod tracking;
 
 use heapless::Vec;
 
@@ -61,10 +61,10 @@ use crate::fixed::time::{Phase, Step};
 use crate::frame::by_range::ByRange;
 use crate::frame::reflection::Reflection;
 use crate::obstacles::solid::Solid;
-use fixtures::Fixtures;
+use clutter::ClutterMap;
 use learnt_lanes::LearntLanes;
 use obstacle::Obstacle;
-use tracking::Tracking;
+use parameters::TrackingParameters;
 
 /// How far behind the sensor an obstacle is followed, centimetres.
 const BEHIND_CM: i32 = -2000;
@@ -74,7 +74,7 @@ const BEHIND_CM: i32 = -2000;
 pub struct Obstacles<const N: usize> {
     list: Vec<Obstacle, N, u16>,
     lanes: LearntLanes<N>,
-    fixtures: Fixtures<N>,
+    fixtures: ClutterMap<N>,
     dropped: u32,
     phase: Phase,
 }
@@ -107,7 +107,13 @@ impl<const N: usize> Default for Obstacles<N> {
 impl<const N: usize> Obstacles<N> {
     /// No obstacles.
     pub const fn new() -> Self {
-        Self { list: Vec::new(), lanes: LearntLanes::new(), fixtures: Fixtures::new(), dropped: 0, phase: Phase::START }
+        Self {
+            list: Vec::new(),
+            lanes: LearntLanes::new(),
+            fixtures: ClutterMap::new(),
+            dropped: 0,
+            phase: Phase::START,
+        }
     }
 
     /// Forgets all but the lanes they drove on and the fixtures beside them.
@@ -133,11 +139,11 @@ impl<const N: usize> Obstacles<N> {
     }
 
     /// Boxes of the confirmed.
-    pub fn solids<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = Solid> + 'a {
+    pub fn solids<'a>(&'a self, t: &'a TrackingParameters) -> impl Iterator<Item = Solid> + 'a {
         self.confirmed(t).map(|o| o.solid(t))
     }
 
-    fn confirmed<'a>(&'a self, t: &'a Tracking) -> impl Iterator<Item = &'a Obstacle> {
+    fn confirmed<'a>(&'a self, t: &'a TrackingParameters) -> impl Iterator<Item = &'a Obstacle> {
         self.list.iter().filter(|o| o.existence >= t.confirmed && o.age >= 2 && o.is_mover(t))
     }
 
@@ -149,7 +155,7 @@ impl<const N: usize> Obstacles<N> {
         reflections: &[Reflection],
         by_range: &ByRange<D>,
         step: Step,
-        t: &Tracking,
+        t: &TrackingParameters,
         in_view: impl Fn(i32, i32) -> bool,
     ) -> Claimed<D> {
         let kept = t.kept_over(step);
@@ -166,7 +172,7 @@ impl<const N: usize> Obstacles<N> {
         self.found(reflections, by_range, &of_fixtures, &mut claimed, t);
         self.learn_fixtures(reflections, by_range, &claimed, step, t, &in_view);
         self.join_parts(t);
-        self.look_for_room(t);
+        self.find_farther_ends(t);
         self.list.iter_mut().for_each(|o| o.look_for_end(t, &in_view));
         self.doubt_the_unseen(step, t, in_view);
         self.list.iter_mut().for_each(|o| o.teach(&mut self.lanes, t));
@@ -175,7 +181,7 @@ impl<const N: usize> Obstacles<N> {
 
     /// Moves all on over a gap in the frames in which nobody looked. What moves is believed in for seconds, what stands for
     /// as long as a red light lasts, and neither what was not confirmed.
-    pub fn bridge(&mut self, gap: Step, t: &Tracking) {
+    pub fn bridge(&mut self, gap: Step, t: &TrackingParameters) {
         let (mut left, second) = (gap, Step::from_micros(1_000_000));
         self.list.retain(|o| o.existence >= t.confirmed);
         for o in self.list.iter_mut().filter(|o| o.is_standing(t)) {
@@ -204,7 +210,7 @@ impl<const N: usize> Obstacles<N> {
         by_range: &ByRange<D>,
         of_fixtures: &Claimed<D>,
         outline_kept: i32,
-        t: &Tracking,
+        t: &TrackingParameters,
     ) -> Claimed<D> {
         const { assert!(N < u16::MAX as usize) }
         const NONE: (i32, u16) = (i32::MAX, u16::MAX);
@@ -268,7 +274,7 @@ impl<const N: usize> Obstacles<N> {
     /// Joins obstacles that are parts of one vehicle: the one with more detections takes the other,
     /// which is left without evidence and so dropped. So is what lies within a vehicle, unless one of them stands and the other
     /// is not seen: then it is that vehicle itself, which leaves, or another that one only seems to have reached.
-    fn join_parts(&mut self, t: &Tracking) {
+    fn join_parts(&mut self, t: &TrackingParameters) {
         let mut rest = self.list.as_mut_slice();
         while let Some((a, others)) = rest.split_first_mut() {
             for b in others.iter_mut().filter(|b| b.existence > 0) {
@@ -297,7 +303,7 @@ impl<const N: usize> Obstacles<N> {
 
     /// Takes evidence from obstacles nobody saw, quickly where they should have been seen, and
     /// drops those without evidence or out of reach.
-    fn doubt_the_unseen(&mut self, step: Step, t: &Tracking, in_view: impl Fn(i32, i32) -> bool) {
+    fn doubt_the_unseen(&mut self, step: Step, t: &TrackingParameters, in_view: impl Fn(i32, i32) -> bool) {
         for o in &mut self.list {
             if o.seen() || o.existence <= 0 {
                 continue;

@@ -1,7 +1,7 @@
 //! Where obstacles come from: detections that move and belong to none.
 
 use super::obstacle::Obstacle;
-use super::tracking::Tracking;
+use super::parameters::TrackingParameters;
 use super::{Claimed, Obstacles};
 use crate::fixed::time::Step;
 use crate::frame::by_range::ByRange;
@@ -9,7 +9,7 @@ use crate::frame::reflection::Reflection;
 
 impl<const N: usize> Obstacles<N> {
     /// Starts obstacles from detections that move and belong to nobody: along the road, or along the line of sight where
-    /// nothing drives so fast along the road (`Tracking::course`). At most half as many in a frame as there is room for in
+    /// nothing drives so fast along the road (`TrackingParameters::course`). At most half as many in a frame as there is room for in
     /// all; the rest waits for the next.
     pub(super) fn found<const D: usize>(
         &mut self,
@@ -17,7 +17,7 @@ impl<const N: usize> Obstacles<N> {
         by_range: &ByRange<D>,
         of_fixtures: &Claimed<D>,
         claimed: &mut Claimed<D>,
-        t: &Tracking,
+        t: &TrackingParameters,
     ) {
         let mut room = N / 2;
         for (i, seed) in reflections.iter().enumerate() {
@@ -63,7 +63,7 @@ impl<const N: usize> Obstacles<N> {
         }
     }
 
-    pub(super) fn admit(&mut self, newborn: Obstacle, t: &Tracking) {
+    pub(super) fn admit(&mut self, newborn: Obstacle, t: &TrackingParameters) {
         let Err(newborn) = self.list.push(newborn) else { return };
         let weakest = self.list.iter_mut().min_by_key(|o| o.existence);
         match weakest {

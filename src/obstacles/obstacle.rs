@@ -4,12 +4,13 @@ use super::BEHIND_CM;
 use super::gathered::Gathered;
 use super::lanes::NO_LANE;
 use super::motion::FreeMotion;
+use super::parameters::{
+    EVEN_SPREAD, INERTIA, MOST_HITS_A_FRAME, RECENTRE_BINS, TrackingParameters, YOUNG_FRAMES, YOUNG_INERTIA,
+    speed_error,
+};
 use super::profile::{BIN_CM, Extent, Profile};
 use super::reflectivity::Reflectivity;
 use super::tallness::Tallness;
-use super::tracking::{
-    EVEN_SPREAD, INERTIA, MOST_HITS_A_FRAME, RECENTRE_BINS, Tracking, YOUNG_FRAMES, YOUNG_INERTIA, speed_error,
-};
 use crate::fixed::math::{hypot_gate, mul_shift, ratio};
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
@@ -153,7 +154,7 @@ impl Obstacle {
 
     /// Moves it on by a time step, which leaves a part (2^-16) of its lateral weight, and forgets the last
     /// frame's sums.
-    pub fn predict(&mut self, step: Step, lateral_kept: i32, t: &Tracking) {
+    pub fn predict(&mut self, step: Step, lateral_kept: i32, t: &TrackingParameters) {
         let (dx, dy) = (step.times(self.velocity.0), step.times(self.velocity.1));
         self.position.0 += dx;
         self.position.1 += dy;
@@ -169,40 +170,40 @@ impl Obstacle {
     }
 
     /// Whether it has moved far enough to be no fixture that clutter gave a speed.
-    pub fn is_mover(&self, t: &Tracking) -> bool {
+    pub fn is_mover(&self, t: &TrackingParameters) -> bool {
         i32::from(self.travelled_cm) >= t.mover_cm
     }
 
     /// Whether it stands still without ever having moved.
-    pub fn is_fixture(&self, t: &Tracking) -> bool {
+    pub fn is_fixture(&self, t: &TrackingParameters) -> bool {
         !self.is_mover(t) && self.age >= 2 && self.speed() < t.fixture_speed
     }
 
     /// Whether it is where obstacles are followed.
-    pub(super) fn is_within_reach(&self, t: &Tracking) -> bool {
+    pub(super) fn is_within_reach(&self, t: &TrackingParameters) -> bool {
         let (x, y) = self.anchor();
         x > BEHIND_CM && x < t.limit_cm && y.abs() < t.limit_cm
     }
 
     /// Whether it has come to a stop.
-    pub fn is_standing(&self, t: &Tracking) -> bool {
+    pub fn is_standing(&self, t: &TrackingParameters) -> bool {
         self.is_mover(t) && self.speed() < t.standing_speed
     }
 
     /// Longest stretch without reflections within one vehicle: no longer than vehicles keep from each
     /// other at this speed.
-    pub(super) fn gap_cm(&self, t: &Tracking) -> i32 {
+    pub(super) fn gap_cm(&self, t: &TrackingParameters) -> i32 {
         t.gap_cm.min(self.headway_cm(t.headway, t))
     }
 
     /// Distance that vehicles this fast keep at a headway (2^-16 s).
-    pub(super) fn headway_cm(&self, headway: i32, t: &Tracking) -> i32 {
+    pub(super) fn headway_cm(&self, headway: i32, t: &TrackingParameters) -> i32 {
         let speed = self.speed() >> FRACTION;
         t.standstill_cm + mul_shift(speed, headway, 16)
     }
 
     /// Takes a detection that belongs to it.
-    pub fn absorb(&mut self, r: &Reflection, t: &Tracking) {
+    pub fn absorb(&mut self, r: &Reflection, t: &TrackingParameters) {
         let (along, left) = self.local(r.x_cm, r.y_cm);
         let error = speed_error((self.velocity.0 >> 4, self.velocity.1 >> 4), r);
         self.gathered.add(r, self.heading, (along, left), error, &t.noise);
@@ -232,7 +233,7 @@ impl Obstacle {
 
     /// Brings motion, place and outline up to date with what was absorbed.
     #[allow(clippy::cast_possible_truncation)] // counts of one frame
-    pub fn settle(&mut self, step: Step, t: &Tracking) {
+    pub fn settle(&mut self, step: Step, t: &TrackingParameters) {
         let g = self.gathered;
         if g.count == 0 {
             return;
@@ -290,7 +291,7 @@ impl Obstacle {
     }
 
     /// Lets a lasting drift to one side turn the heading.
-    fn turn(&mut self, offset: i32, step: Step, t: &Tracking) {
+    fn turn(&mut self, offset: i32, step: Step, t: &TrackingParameters) {
         // at most a metre a second, which a ratio of one would exceed
         let (drift, step) = (mul_shift(offset, t.drift_gain, 16), step.raw().clamp(1, 1 << 20));
         let dv = ratio::<16>(drift.clamp(-step, step), step).clamp(-FASTEST_DRIFT, FASTEST_DRIFT);
@@ -304,19 +305,19 @@ impl Obstacle {
 
     /// Lets the length it has shown follow the outline: quickly where that grows, slowly where a part of it
     /// is hidden.
-    fn remember_length(&mut self, step: Step, t: &Tracking) {
+    fn remember_length(&mut self, step: Step, t: &TrackingParameters) {
         let off = (self.extent.length_cm() << LENGTH_FRACTION) - self.shown_length;
         let memory = if off > 0 { t.length_growth } else { t.length_memory };
         self.shown_length += mul_shift(off, (1 << 16) - step.keep(memory), 16);
     }
 
     /// Length it has shown for long, centimetres, while slow.
-    pub(super) fn remembered_length_cm(&self, t: &Tracking) -> i32 {
+    pub(super) fn remembered_length_cm(&self, t: &TrackingParameters) -> i32 {
         if self.speed() < t.slow_speed { self.shown_length >> LENGTH_FRACTION } else { 0 }
     }
 
     /// Reads the outline and keeps the anchor near its middle.
-    pub(super) fn update_extent(&mut self, t: &Tracking) {
+    pub(super) fn update_extent(&mut self, t: &TrackingParameters) {
         let Some(mut extent) = self.profile.extent(t.outline_min_hits, t.outline_share) else { return };
         // azimuth's noise lengthens what stands across the line of sight
         let noise = (self.gathered.smear_cm(self.heading) * t.outline_sigmas) >> 4;

@@ -5,8 +5,8 @@
 use super::body::LONGEST_LOW_CM;
 use super::gathered::{sigma_across, sigma_along};
 use super::obstacle::Obstacle;
+use super::parameters::{TrackingParameters, speed_error};
 use super::profile::Extent;
-use super::tracking::{Tracking, speed_error};
 use crate::fixed::math::length;
 use crate::fixed::trig::Direction;
 use crate::frame::reflection::Reflection;
@@ -80,7 +80,7 @@ impl Search {
     /// Where a detection lies in the obstacle's axes; `None` where it is out of reach, whatever the direction
     /// of its noise.
     #[inline]
-    pub fn offset(&self, r: &Reflection, t: &Tracking) -> Option<Offset> {
+    pub fn offset(&self, r: &Reflection, t: &TrackingParameters) -> Option<Offset> {
         let (dx, dy) = (r.x_cm - self.anchor.0, r.y_cm - self.anchor.1);
         let noise = (t.sigmas * (t.noise.range_cm + i32::from(r.across_cm))) >> 4;
         let left = self.heading.across(dx, dy);
@@ -101,7 +101,7 @@ impl Search {
     /// Whether a detection may come from a wheel of this obstacle, which returns anything between standstill
     /// and twice its speed.
     #[inline]
-    pub fn is_speed_of_wheel(&self, r: &Reflection, t: &Tracking) -> bool {
+    pub fn is_speed_of_wheel(&self, r: &Reflection, t: &TrackingParameters) -> bool {
         let body = r.sight.along(self.velocity.0, self.velocity.1);
         let wheel = i32::from(r.radial_velocity_cm_s) << 4;
         let spun = if body < 0 { -wheel } else { wheel };
@@ -110,7 +110,7 @@ impl Search {
 
     /// How badly a detection with this offset and error of its speed fits, 2^-8; `None` where it cannot belong
     /// to this obstacle.
-    pub fn misfit(&self, r: &Reflection, offset: Offset, error: i32, t: &Tracking) -> Option<i32> {
+    pub fn misfit(&self, r: &Reflection, offset: Offset, error: i32, t: &TrackingParameters) -> Option<i32> {
         let Offset { left, beside, beyond } = offset;
         let stretched = self.extent.length_cm() + beyond;
         // one as long as a lorry that shows nothing high keeps its ends
@@ -137,7 +137,7 @@ impl Search {
 
 impl Obstacle {
     /// What it takes to look for this obstacle's detections.
-    pub(super) fn search(&self, t: &Tracking) -> Search {
+    pub(super) fn search(&self, t: &TrackingParameters) -> Search {
         let outline = self.extent.front_cm.max(-self.extent.rear_cm);
         let gap_cm = self.gap_cm(t);
         let anchor = self.anchor();

@@ -19,7 +19,7 @@ use crate::fixed::math;
 use crate::fixed::trig::Direction;
 use crate::sensor::config::{ConfigError, Problem, above, within};
 use crate::sensor::mount::Levelling;
-use crate::sensor::place::Points;
+use crate::sensor::site::Points;
 
 /// Whether there is room for any.
 pub const ROOM: bool = cfg!(feature = "ground");

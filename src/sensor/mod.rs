@@ -5,8 +5,8 @@ pub mod field_of_view;
 pub mod ground;
 pub mod mount;
 pub mod noise;
-pub mod place;
 pub mod road;
+pub mod site;
 
 use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::mount::Mount;

@@ -14,7 +14,7 @@ use crate::map::polar::PolarMap;
 use crate::radar_3d::{Radar3d, Radar3dParameters};
 use crate::sensor::config::{ConfigError, Problem};
 use crate::sensor::mount::Mount;
-use crate::sensor::place::Place;
+use crate::sensor::site::Site;
 use crate::unit::sender::MapSender;
 use crate::unit::settings::{Settings, SettingsCheck};
 use crate::wire::code::ray::Known;
@@ -29,8 +29,8 @@ pub trait InUnit: Estimator {
     ///
     /// # Errors
     /// Names the first parameter that cannot be worked with; lanes and heights that it has no use for.
-    fn parameters_at(settings: &Settings, place: &Place<'_>) -> Result<Self::Parameters, ConfigError> {
-        let Place { mut lanes, mut heights } = *place;
+    fn parameters_at(settings: &Settings, place: &Site<'_>) -> Result<Self::Parameters, ConfigError> {
+        let Site { mut lanes, mut heights } = *place;
         let without_use = |parameter, problem| Err(ConfigError { parameter, value: 0.0, problem });
         if lanes.next().is_some() {
             return without_use("lanes", Problem::TooManyLanes);
@@ -73,7 +73,7 @@ impl Settings {
     #[inline(never)] // what it takes of the stack is free again afterwards
     pub fn build_at<E: InUnit>(
         &self,
-        place: &Place<'_>,
+        place: &Site<'_>,
         parameters: &mut Option<E::Parameters>,
     ) -> Result<Header, ConfigError> {
         *parameters = None;
@@ -93,7 +93,7 @@ impl Settings {
 
 /// Whether a unit with this sender can be made by these settings.
 #[inline(never)] // as above
-fn check<E: InUnit, S: MapSender<E::Map>>(settings: &Settings, place: &Place<'_>) -> Result<Header, ConfigError> {
+fn check<E: InUnit, S: MapSender<E::Map>>(settings: &Settings, place: &Site<'_>) -> Result<Header, ConfigError> {
     settings.build_at::<E>(place, &mut None).and_then(|header| S::fits(&header).map(|()| header))
 }
 
@@ -111,7 +111,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         (settings.sensor, settings.radar_3d())
     }
 
-    fn parameters_at(settings: &Settings, place: &Place<'_>) -> Result<Self::Parameters, ConfigError> {
+    fn parameters_at(settings: &Settings, place: &Site<'_>) -> Result<Self::Parameters, ConfigError> {
         let (sensor, config) = Self::config(settings);
         Radar3dParameters::at(&sensor, &config, place)
     }
@@ -148,7 +148,7 @@ where
         (E::config(settings), settings.fixtures().map(|fixtures| (settings.sensor.mount, azimuth_deg, fixtures)))
     }
 
-    fn parameters_at(settings: &Settings, place: &Place<'_>) -> Result<Self::Parameters, ConfigError> {
+    fn parameters_at(settings: &Settings, place: &Site<'_>) -> Result<Self::Parameters, ConfigError> {
         let (_, supervision) = Self::config(settings);
         Ok((E::parameters_at(settings, place)?, Self::limits(supervision.as_ref())?))
     }

@@ -2,10 +2,10 @@
 
 use crate::fixed::time::Time;
 use crate::unit::identity::{Identity, VERSION};
+use crate::unit::reply::Piece;
 use crate::unit::safe_state::SafeState;
-use crate::unit::said::Piece;
 use crate::unit::service::{PART_LEN, Reply, Request};
-use crate::unit::settings::{BlockError, Kind, SettingsSlots, StoredError, StoredSettings, announced_length};
+use crate::unit::settings::{BlockError, BlockKind, SettingsSlots, StoredError, StoredSettings, announced_length};
 use crate::unit::timing::Took;
 use crate::wire::broadcast::Medium;
 use crate::wire::message::{Epoch, Packing};
@@ -132,7 +132,7 @@ impl SerialService {
         let came = self.incoming.bytes().len();
         if place == came && !self.incoming.put(place, bytes) {
             let head = if place == 0 { bytes } else { self.incoming.bytes() };
-            let kind = Kind::of_block(head).unwrap_or(Kind::Settings);
+            let kind = BlockKind::of_block(head).unwrap_or(BlockKind::Settings);
             return self.reply(&Reply::Refused(&StoredError { kind, error: BlockError::NoRoom }), line);
         }
         let incoming = self.incoming;

@@ -39,8 +39,8 @@ use crate::fixed::bytes::Reader;
 use crate::fixed::time::Time;
 use crate::sensor::config::ConfigError;
 use crate::unit::identity::{Identified, Identity};
-use crate::unit::said::{Piece, Refusal, Said};
-use crate::unit::settings::{BlockError, Kind, StoredError, Which};
+use crate::unit::reply::{Piece, Refusal, Said};
+use crate::unit::settings::{BlockError, BlockKind, StoredError, Which};
 use crate::unit::timing::{Count, Took};
 use crate::wire::e2e::Profile;
 use crate::wire::serial::MOST_BYTES;
@@ -71,7 +71,7 @@ pub enum Request<'a> {
     /// Say which unit you are.
     Identify,
     /// Empty both slots of a kind.
-    Clear(Kind),
+    Clear(BlockKind),
     /// Say how long frames take.
     Timing,
 }
@@ -201,7 +201,7 @@ impl<'a> Request<'a> {
             3 => Some(Self::Restart),
             4 => Reader(body).u64().map(|t| Self::Time(Time::from_micros(t))),
             5 => Some(Self::Identify),
-            6 => Kind::of_clear_mark(body).map(Self::Clear),
+            6 => BlockKind::of_clear_mark(body).map(Self::Clear),
             7 => Some(Self::Timing),
             8 => body.split_first_chunk().map(|(place, bytes)| Self::Part(u16::from_le_bytes(*place), bytes)),
             _ => None,
@@ -330,15 +330,15 @@ mod tests {
     fn requests_read_back_and_belong_to_one_sensor() {
         for request in [
             Request::Write(&[1, 2, 3]),
-            Request::Read(Which::in_use(Kind::Settings)),
-            Request::Read(Which::newest(Kind::Settings)),
-            Request::ReadPart(Which::in_use(Kind::Lanes), 200),
-            Request::ReadPart(Which::newest(Kind::Probabilities), 0),
+            Request::Read(Which::in_use(BlockKind::Settings)),
+            Request::Read(Which::newest(BlockKind::Settings)),
+            Request::ReadPart(Which::in_use(BlockKind::Lanes), 200),
+            Request::ReadPart(Which::newest(BlockKind::Probabilities), 0),
             Request::Part(600, &[4; PART_LEN]),
             Request::Restart,
             Request::Time(Time::from_micros(0x0102_0304_0506_0708)),
-            Request::Clear(Kind::Settings),
-            Request::Clear(Kind::Heights),
+            Request::Clear(BlockKind::Settings),
+            Request::Clear(BlockKind::Heights),
             Request::Timing,
             Request::Identify,
         ] {
@@ -378,14 +378,17 @@ mod tests {
             let Some(Said::Refused(refusal)) = Said::read(message.bytes(), 0) else { panic!() };
             (message.bytes()[4], refusal.of_kind(), refusal.detail)
         };
-        assert_eq!(refused(Kind::Settings, BlockError::Layout(0x0102)), (3, (Some(Kind::Settings), 3), [1, 2, 0, 0]));
-        assert_eq!(refused(Kind::Lanes, BlockError::CheckSum), (0x24, (Some(Kind::Lanes), 4), [0; 4]));
+        assert_eq!(
+            refused(BlockKind::Settings, BlockError::Layout(0x0102)),
+            (3, (Some(BlockKind::Settings), 3), [1, 2, 0, 0])
+        );
+        assert_eq!(refused(BlockKind::Lanes, BlockError::CheckSum), (0x24, (Some(BlockKind::Lanes), 4), [0; 4]));
         #[cfg(feature = "probability")]
         {
             use crate::probability::TableError;
-            let of_table = |error| refused(Kind::Probabilities, error);
+            let of_table = |error| refused(BlockKind::Probabilities, error);
             let falls = TableError::NotMonotone { azimuth: 3, range: 5 };
-            assert_eq!(of_table(BlockError::Table(falls)), (0x39, (Some(Kind::Probabilities), 9), [3, 5, 0, 0]));
+            assert_eq!(of_table(BlockError::Table(falls)), (0x39, (Some(BlockKind::Probabilities), 9), [3, 5, 0, 0]));
             let other = TableError::Configuration { table: 1, unit: 0x0102_0304 };
             assert_eq!(of_table(BlockError::Table(other)).2, [1, 2, 3, 4]);
             assert_eq!(of_table(BlockError::Grid([200, 120])).2, [200, 120, 0, 0]);
@@ -402,8 +405,8 @@ mod tests {
             (Reply::Written(70_000), Said::Written(70_000)),
             (Reply::Block(&[1, 2, 3]), Said::Block(Piece::new(&[1, 2, 3]))),
             (
-                Reply::Part(Which::newest(Kind::Lanes), 400, &[7; PART_LEN]),
-                Said::Part(Which::newest(Kind::Lanes), 400, part),
+                Reply::Part(Which::newest(BlockKind::Lanes), 400, &[7; PART_LEN]),
+                Said::Part(Which::newest(BlockKind::Lanes), 400, part),
             ),
             (Reply::Came(400), Said::Came(400)),
             (Reply::Started(Some((1, 9))), Said::Started(Some((1, 9)))),

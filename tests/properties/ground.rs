@@ -13,7 +13,7 @@ use viewshed::obstacles::solid::Solid;
 use viewshed::radar_3d::{Radar3d, Radar3dParameters};
 use viewshed::sensor::ground::Ground;
 use viewshed::sensor::mount::Mount;
-use viewshed::sensor::place::Points;
+use viewshed::sensor::site::Points;
 
 use crate::cases;
 use crate::setup::{Setup, setups};

@@ -104,8 +104,8 @@ fn unsure() -> impl Strategy<Value = Setup> {
             (obstacles.gate_sigmas, obstacles.lateral_gate_m) = (8.0, 5.0);
         }
         if unsure {
-            (obstacles.heading_sigmas, obstacles.own_way_sigmas) = (0.0, 0.0);
-            (obstacles.own_way_mps, obstacles.own_way_share) = (0.0, 0.0);
+            (obstacles.heading_sigmas, obstacles.off_axis_sigmas) = (0.0, 0.0);
+            (obstacles.off_axis_mps, obstacles.off_axis_share) = (0.0, 0.0);
         }
         if creeps {
             (obstacles.turning_speed_mps, obstacles.min_speed_mps) = (0.5, 0.3);

@@ -7,9 +7,9 @@ use viewshed::unit::can_service::{ANSWER, Answers, CanService, CanServiceConfig,
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::reference::State;
 use viewshed::unit::profile::small;
-use viewshed::unit::said::{Piece, Said};
+use viewshed::unit::reply::{Piece, Said};
 use viewshed::unit::settings::{
-    BLOCK_LEN, BlockError, Kind, Settings, SettingsSlots, StoredError, StoredSettings, Which,
+    BLOCK_LEN, BlockError, BlockKind, Settings, SettingsSlots, StoredError, StoredSettings, Which,
 };
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};
@@ -86,7 +86,7 @@ fn a_block_is_written_read_back_and_counts_from_the_restart_on() {
             }
             sequence += 1;
             assert!(answers(&mut unit, &slots, medium).contains(&Said::Written(sequence)));
-            unit.take(&tool.read(Which::newest(Kind::Settings)).unwrap(), &mut slots);
+            unit.take(&tool.read(Which::newest(BlockKind::Settings)).unwrap(), &mut slots);
             let written = settings(height).to_block(sequence);
             assert_eq!(
                 answers(&mut unit, &slots, medium),
@@ -99,7 +99,7 @@ fn a_block_is_written_read_back_and_counts_from_the_restart_on() {
             assert_eq!(unit.settings(), Some(&settings(height)));
             let slot = 1 - (sequence & 1) as u8;
             assert_eq!(answers(&mut unit, &slots, medium), [Said::Started(Some((slot, sequence)))], "slots take turns");
-            unit.take(&tool.read(Which::in_use(Kind::Settings)).unwrap(), &mut slots);
+            unit.take(&tool.read(Which::in_use(BlockKind::Settings)).unwrap(), &mut slots);
             let read = answers(&mut unit, &slots, medium);
             let [Said::Block(block)] = read.as_slice() else { panic!("{read:?}") };
             assert_eq!(Settings::from_block(block.bytes()), Ok((sequence, settings(height))));
@@ -122,7 +122,7 @@ fn the_messages_are_these_bytes() {
     // the rest is the specification's example
     let mut unit = start(CLASSIC, &slots);
     let mut talk: Vec<CanFrame> = (0..2).map(|_| unit.next_frame(at(0), &slots).unwrap()).collect();
-    let read = tool.read(Which::in_use(Kind::Settings)).unwrap();
+    let read = tool.read(Which::in_use(BlockKind::Settings)).unwrap();
     assert_eq!(unit.take(&read, &mut slots), Some(Flow::Continue));
     talk.extend([read, unit.next_frame(at(0), &slots).unwrap(), tool.restart().unwrap()]);
     let page = include_str!("../../src/wire/SPECIFICATION.md");
@@ -231,7 +231,7 @@ fn answers_keep_their_distance_and_identifiers_are_where_the_installation_has_th
     let config = CanServiceConfig::new(SENSOR, medium);
     let mut unit = CanService::start(config, Epoch::new(1), at(0), stored(&slots));
     let mut tool = Tool::new(SENSOR, medium);
-    unit.take(&tool.read(Which::in_use(Kind::Settings)).unwrap(), &mut slots.clone());
+    unit.take(&tool.read(Which::in_use(BlockKind::Settings)).unwrap(), &mut slots.clone());
     let mut sent = Vec::new();
     for us in 0..200_000 {
         let now = Time::from_micros(us);
@@ -241,7 +241,7 @@ fn answers_keep_their_distance_and_identifiers_are_where_the_installation_has_th
     assert!(sent.windows(2).all(|w| w[1].0 - w[0].0 == 2000));
     assert!(sent.iter().all(|(_, frame)| frame.id == CanId::Extended(0x0A00_0000 + 32 * 2 + 25)));
     // a clock that steps back does not silence it
-    unit.take(&tool.read(Which::in_use(Kind::Settings)).unwrap(), &mut slots.clone());
+    unit.take(&tool.read(Which::in_use(BlockKind::Settings)).unwrap(), &mut slots.clone());
     assert!(unit.next_frame(Time::from_micros(0), &slots).is_some());
 }
 
@@ -313,11 +313,11 @@ fn emptied_slots_count_from_the_restart_on() {
         send(tool.write(&settings(8.0).to_block(0)), &mut unit, &mut slots);
         let last = tool.write(&settings(8.0).to_block(0)).last().unwrap();
         answers(&mut unit, &slots, medium);
-        send(tool.clear(Kind::Settings).into_iter(), &mut unit, &mut slots);
+        send(tool.clear(BlockKind::Settings).into_iter(), &mut unit, &mut slots);
         assert_eq!(answers(&mut unit, &slots, medium), [Said::Cleared]);
         assert_eq!(unit.settings(), Some(&settings(7.0)), "it runs on");
         // there is nothing to read, and the block that was written before does not count as written any more
-        send(tool.read(Which::in_use(Kind::Settings)).into_iter().chain([last]), &mut unit, &mut slots);
+        send(tool.read(Which::in_use(BlockKind::Settings)).into_iter().chain([last]), &mut unit, &mut slots);
         let said = answers(&mut unit, &slots, medium);
         assert!(matches!(said[..], [Said::Refused(_)]), "{said:?}");
         let restarted = start(medium, &slots);
@@ -349,7 +349,7 @@ fn a_block_of_layout_1_is_taken_and_the_units_own_figures_stay() {
     let slot: [u8; BLOCK_LEN] = std::array::from_fn(|k| old.get(k).copied().unwrap_or(0xFF));
     let slots = InRam([slot, [0xFF; BLOCK_LEN]], 0);
     let mut unit = start(CLASSIC, &slots);
-    unit.take(&tool.read(Which::in_use(Kind::Settings)).unwrap(), &mut slots.clone());
+    unit.take(&tool.read(Which::in_use(BlockKind::Settings)).unwrap(), &mut slots.clone());
     let said = answers(&mut unit, &slots, CLASSIC);
     assert!(said.contains(&Said::Block(Piece::new(&old))), "{said:?}");
 }

@@ -4,18 +4,18 @@ use viewshed::bench::flash::Flash;
 use viewshed::bench::start_stored;
 use viewshed::fixed::time::Time;
 use viewshed::probability::{Edges, ProbabilityTable, TableError, fitted_with};
-use viewshed::sensor::place::{LaneList, Place, Points};
+use viewshed::sensor::site::{LaneList, Points, Site};
 use viewshed::unit::Flow;
 use viewshed::unit::can_service::{Answers, CanService, CanServiceConfig, Tool};
 use viewshed::unit::identity::Identity;
 use viewshed::unit::quantised::QuantisedSender;
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 use viewshed::unit::serial_service::SerialLine;
 use viewshed::unit::service::{PART_LEN, Request};
 use viewshed::unit::session::SerialSession;
 use viewshed::unit::settings::{
-    BLOCK_LEN, BlockError, Kind, MOST_BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredError, StoredSettings,
-    Which, heights_block, lanes_block, table_block,
+    BLOCK_LEN, BlockError, BlockKind, MOST_BLOCK_LEN, Settings, SettingsCheck, SettingsSlots, StoredError,
+    StoredSettings, Which, heights_block, lanes_block, table_block,
 };
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::header::Header;
@@ -99,7 +99,7 @@ fn starts(flash: &Flash) -> Option<(Header, Option<Reason>)> {
     header.map(|header| (header, lacking))
 }
 
-fn refused(kind: Kind, error: BlockError) -> StoredError {
+fn refused(kind: BlockKind, error: BlockError) -> StoredError {
     StoredError { kind, error }
 }
 
@@ -107,7 +107,7 @@ fn refused(kind: Kind, error: BlockError) -> StoredError {
 fn what_is_kept_is_what_a_pc_has_with_the_same_file() {
     let flash = flash(&[&settings().to_block(0), &heights(&HEIGHTS), &lanes(&LANES)]);
     let place = StoredSettings::place(&flash).unwrap();
-    let parameters = |settings: &Settings, place: &Place<'_>| {
+    let parameters = |settings: &Settings, place: &Site<'_>| {
         let mut made = None;
         let header = settings.build_at::<SmallState>(place, &mut made).unwrap();
         (header, format!("{made:?}"))
@@ -124,21 +124,25 @@ fn slots_take_turns_and_a_damaged_one_leaves_the_one_before() {
     let of = |lanes| Settings { lanes, ..settings() }.fingerprint();
     let fingerprint = |flash: &Flash| starts(flash).map(|(header, _)| header.fingerprint);
     assert_eq!(fingerprint(&flash), Some(of(&LANES)));
-    flash.slot_mut(Kind::Lanes.slots()[1])[20] ^= 1;
+    flash.slot_mut(BlockKind::Lanes.slots()[1])[20] ^= 1;
     assert_eq!(fingerprint(&flash), Some(of(&OTHER_LANES)));
     // both: not without lanes that were given
-    flash.slot_mut(Kind::Lanes.slots()[0])[20] ^= 1;
+    flash.slot_mut(BlockKind::Lanes.slots()[0])[20] ^= 1;
     assert_eq!(fingerprint(&flash), None);
-    assert_eq!(stored(&flash).position(), Err(refused(Kind::Lanes, BlockError::CheckSum)));
-    let slot = stored(&flash).find(Which::newest(Kind::Settings), &flash);
+    assert_eq!(stored(&flash).position(), Err(refused(BlockKind::Lanes, BlockError::CheckSum)));
+    let slot = stored(&flash).find(Which::newest(BlockKind::Settings), &flash);
     assert_eq!(slot, Ok(0), "the settings themselves are still read");
     let settings_again = stored(&flash).write(&settings().to_block(0), &mut flash);
-    assert_eq!(settings_again, Err(refused(Kind::Lanes, BlockError::CheckSum)), "it could not start with them either");
+    assert_eq!(
+        settings_again,
+        Err(refused(BlockKind::Lanes, BlockError::CheckSum)),
+        "it could not start with them either"
+    );
     // a write, and emptying, get out of it
     let mut written = flash.clone();
     assert_eq!(stored(&flash).write(&lanes(&LANES), &mut written), Ok(1));
     assert_eq!(fingerprint(&written), Some(of(&LANES)));
-    StoredSettings::clear(Kind::Lanes, &mut flash);
+    StoredSettings::clear(BlockKind::Lanes, &mut flash);
     assert_eq!(fingerprint(&flash), Some(settings().fingerprint()));
 }
 
@@ -148,7 +152,7 @@ fn a_unit_that_is_safe_for_its_lanes_keeps_its_number_and_its_bit_rates() {
     numbered.unit.sensor = 5;
     numbered.broadcast_bus.bit_rate = 250_000;
     let mut flash = flash(&[&numbered.to_block(0), &lanes(&LANES)]);
-    flash.slot_mut(Kind::Lanes.slots()[0])[20] ^= 1;
+    flash.slot_mut(BlockKind::Lanes.slots()[0])[20] ^= 1;
     let stored = stored(&flash);
     assert!(stored.settings().is_none());
     assert_eq!((stored.unit().sensor, stored.buses()[1].bit_rate), (5, 250_000), "not another unit's identifiers");
@@ -159,12 +163,12 @@ fn heights_that_do_not_hold_do_not_become_a_flat_road() {
     let mut flash = flash(&[&settings().to_block(0), &heights(&HEIGHTS)]);
     for byte in 0..heights(&HEIGHTS).len() {
         let before = flash.clone();
-        flash.slot_mut(Kind::Heights.slots()[0])[byte] ^= 0x10;
+        flash.slot_mut(BlockKind::Heights.slots()[0])[byte] ^= 0x10;
         assert!(starts(&flash).is_none(), "byte {byte}");
         flash = before;
     }
     // power failed while the first block was written: nobody was told that it is there, and it is not taken for none
-    flash.slot_mut(Kind::Heights.slots()[0])[30..].fill(0xFF);
+    flash.slot_mut(BlockKind::Heights.slots()[0])[30..].fill(0xFF);
     assert!(starts(&flash).is_none());
 }
 
@@ -178,21 +182,24 @@ fn blocks_a_unit_could_not_start_with_are_refused_by_name_and_not_written() {
         error => panic!("{error}"),
     };
     let crossing: &[[f32; 2]] = &[[0.0, 0.0], [50.0, 0.0], [50.0, 20.0], [20.0, -20.0]];
-    assert_eq!(parameter(write(&lanes(&[LANES[0], crossing]))), (Kind::Lanes, "lanes", 1.0));
-    assert_eq!(parameter(write(&lanes(&[&[[0.0, 0.0], [300.0, 0.0], [500.0, 0.0]]]))), (Kind::Lanes, "lanes", 0.0));
-    assert_eq!(parameter(write(&heights(&[[0.0, 0.0], [10.0, 1.3]]))), (Kind::Heights, "ground", 1.0));
+    assert_eq!(parameter(write(&lanes(&[LANES[0], crossing]))), (BlockKind::Lanes, "lanes", 1.0));
+    assert_eq!(
+        parameter(write(&lanes(&[&[[0.0, 0.0], [300.0, 0.0], [500.0, 0.0]]]))),
+        (BlockKind::Lanes, "lanes", 0.0)
+    );
+    assert_eq!(parameter(write(&heights(&[[0.0, 0.0], [10.0, 1.3]]))), (BlockKind::Heights, "ground", 1.0));
     // a mount from which the stored lanes are out of reach
     let mut far = settings();
     far.sensor.mount.x_m = 5000.0;
-    assert_eq!(parameter(write(&far.to_block(0))), (Kind::Settings, "ground.x_m", 0.0));
+    assert_eq!(parameter(write(&far.to_block(0))), (BlockKind::Settings, "ground.x_m", 0.0));
     for length in [0, 4, 11, 12, 40] {
         let cut = &lanes(&LANES)[..length];
-        let kind = if length < 4 { Kind::Settings } else { Kind::Lanes };
+        let kind = if length < 4 { BlockKind::Settings } else { BlockKind::Lanes };
         assert_eq!(write(cut), refused(kind, BlockError::Short), "{length}");
     }
     let mut other = lanes(&LANES);
     other[4] = 2;
-    assert_eq!(write(&other), refused(Kind::Lanes, BlockError::Layout(2)));
+    assert_eq!(write(&other), refused(BlockKind::Lanes, BlockError::Layout(2)));
     assert_eq!(flash, before);
 }
 
@@ -203,14 +210,18 @@ fn a_table_is_of_one_grid_and_one_configuration_and_without_it_the_unit_says_so(
     let unit = with_place().fingerprint();
     let error = stored(&flash.clone()).write(&table(settings().fingerprint()), &mut flash).unwrap_err();
     let other = TableError::Configuration { table: fitted_with(settings().fingerprint()), unit: fitted_with(unit) };
-    assert_eq!(error, refused(Kind::Probabilities, BlockError::Table(other)), "that of the flat road without lanes");
+    assert_eq!(
+        error,
+        refused(BlockKind::Probabilities, BlockError::Table(other)),
+        "that of the flat road without lanes"
+    );
     let mut of_another_grid = table(unit);
     of_another_grid[12] = 200;
     let end = of_another_grid.len() - 4;
     let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&of_another_grid[..end]);
     of_another_grid[end..].copy_from_slice(&sum.to_le_bytes());
     let error = stored(&flash.clone()).write(&of_another_grid, &mut flash).unwrap_err();
-    assert_eq!(error, refused(Kind::Probabilities, BlockError::Grid([200, 40])));
+    assert_eq!(error, refused(BlockKind::Probabilities, BlockError::Grid([200, 40])));
     assert_eq!(
         starts(&flash).map(|(header, lacking)| (header.probability, lacking)),
         Some((None, None)),
@@ -230,7 +241,7 @@ fn a_table_is_of_one_grid_and_one_configuration_and_without_it_the_unit_says_so(
     stored(&flash.clone()).write(&lanes(&OTHER_LANES), &mut flash).unwrap();
     let by_grades = |flash: &Flash| starts(flash).map(|(header, lacking)| (header.probability, lacking));
     assert_eq!(by_grades(&flash), Some((None, Some(Reason::NoProbabilities))));
-    flash.slot_mut(Kind::Probabilities.slots()[0])[100] ^= 1;
+    flash.slot_mut(BlockKind::Probabilities.slots()[0])[100] ^= 1;
     assert_eq!(by_grades(&flash), Some((None, Some(Reason::NoProbabilities))), "maps do not depend on it");
 }
 
@@ -241,7 +252,7 @@ fn kinds_there_is_no_room_for_are_refused_and_the_rest_works() {
     let stored = StoredSettings::read(&slots, CHECK);
     assert_eq!(stored.write(&settings().to_block(0), &mut slots), Ok(1));
     let stored = StoredSettings::read(&slots, CHECK);
-    for (kind, block) in [(Kind::Heights, heights(&HEIGHTS)), (Kind::Lanes, lanes(&LANES))] {
+    for (kind, block) in [(BlockKind::Heights, heights(&HEIGHTS)), (BlockKind::Lanes, lanes(&LANES))] {
         assert_eq!(stored.write(&block, &mut slots), Err(refused(kind, BlockError::NoRoom)));
         assert_eq!(stored.find(Which::newest(kind), &slots), Err(refused(kind, BlockError::NoRoom)));
     }
@@ -250,7 +261,7 @@ fn kinds_there_is_no_room_for_are_refused_and_the_rest_works() {
     let mut flash = flash(&[&settings().to_block(0)]);
     let plain = StoredSettings::read(&flash, SettingsCheck::of::<SmallState, SmallSender>());
     let error = plain.write(&table(settings().fingerprint()), &mut flash);
-    assert_eq!(error, Err(refused(Kind::Probabilities, BlockError::NoRoom)));
+    assert_eq!(error, Err(refused(BlockKind::Probabilities, BlockError::NoRoom)));
 }
 
 /// What a unit says on its serial line.
@@ -311,7 +322,7 @@ fn on_a_serial_line_blocks_come_and_go_in_parts() {
     assert_eq!((unit.part(&block, 400), unit.part(&block, 600)), (Said::Came(600), Said::Came(800)));
     assert_eq!(unit.part(&block, 800), Said::Written(1));
     assert_eq!(unit.part(&block, 800), Said::Written(1), "the answer may be lost, and nothing is written twice");
-    let which = Which::newest(Kind::Probabilities);
+    let which = Which::newest(BlockKind::Probabilities);
     let mut read = Vec::new();
     while read.len() < block.len() {
         let said = unit.ask(&Request::ReadPart(which, read.len() as u16));
@@ -321,7 +332,7 @@ fn on_a_serial_line_blocks_come_and_go_in_parts() {
     }
     assert_eq!(read[12..block.len() - 4], block[12..block.len() - 4]);
     // not yet in use, and of nothing else there is any
-    for (which, reason) in [(Which::in_use(Kind::Probabilities), 0x31), (Which::newest(Kind::Lanes), 0x21)] {
+    for (which, reason) in [(Which::in_use(BlockKind::Probabilities), 0x31), (Which::newest(BlockKind::Lanes), 0x21)] {
         let said = unit.ask(&Request::ReadPart(which, 0));
         assert!(matches!(said[..], [Said::Refused(refusal)] if refusal.reason == reason), "{said:?}");
     }
@@ -333,8 +344,8 @@ fn on_a_serial_line_blocks_come_and_go_in_parts() {
         matches!(said, Said::Refused(refusal) if refusal.reason == 0x27),
         "longer than there is room for: {said:?}"
     );
-    assert_eq!(unit.ask(&Request::Clear(Kind::Probabilities)), [Said::Cleared]);
-    assert_eq!(unit.flash.slot(Kind::Probabilities.slots()[0])[..4], [0xFF; 4]);
+    assert_eq!(unit.ask(&Request::Clear(BlockKind::Probabilities)), [Said::Cleared]);
+    assert_eq!(unit.flash.slot(BlockKind::Probabilities.slots()[0])[..4], [0xFF; 4]);
     assert!(stored(&unit.flash).settings().is_some(), "of the kind alone");
 }
 
@@ -355,13 +366,13 @@ fn on_a_bus_they_come_and_go_in_parts_of_four_bytes() {
     for frame in [first].into_iter().chain(parts.iter().rev()).chain([last]) {
         unit.take(frame, &mut slots);
     }
-    unit.take(&tool.read(Which::newest(Kind::Probabilities)).unwrap(), &mut slots);
+    unit.take(&tool.read(Which::newest(BlockKind::Probabilities)).unwrap(), &mut slots);
     let said: Vec<Said> =
         std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|frame| answers.take(&frame)).collect();
     let [Said::Started(Some(_)), Said::Written(1), Said::Block(read)] = said[..] else { panic!("{said:?}") };
     assert_eq!(read.bytes()[12..block.len() - 4], block[12..block.len() - 4]);
-    unit.take(&tool.read(Which::newest(Kind::Heights)).unwrap(), &mut slots);
-    unit.take(&tool.clear(Kind::Probabilities).unwrap(), &mut slots);
+    unit.take(&tool.read(Which::newest(BlockKind::Heights)).unwrap(), &mut slots);
+    unit.take(&tool.clear(BlockKind::Probabilities).unwrap(), &mut slots);
     let said: Vec<Said> =
         std::iter::from_fn(|| unit.next_frame(now, &slots)).filter_map(|frame| answers.take(&frame)).collect();
     assert!(matches!(said[..], [Said::Cleared, Said::Refused(refusal)] if refusal.reason == 0x11), "{said:?}");

@@ -16,7 +16,7 @@ use viewshed::probability::Levels;
 use viewshed::sensor::road::RoadPoint;
 use viewshed::unit::can_service::{ANSWER, CanService, CanServiceConfig, REQUEST, Tool};
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{Kind, SettingsSlots, StoredSettings, Which};
+use viewshed::unit::settings::{BlockKind, SettingsSlots, StoredSettings, Which};
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::header::{Header, WireMount};
@@ -206,7 +206,7 @@ fn configuration(medium: Medium) -> Vec<CanFrame> {
         CanService::start(config, Epoch::new(11), Time::from_micros(0), StoredSettings::read(&Nowhere, check));
     let mut tool = Tool::new(0, medium);
     let mut frames: Vec<CanFrame> = tool.write(&[0x56; 12]).collect();
-    frames.extend([tool.read(Which::in_use(Kind::Settings)).unwrap(), tool.restart().unwrap()]);
+    frames.extend([tool.read(Which::in_use(BlockKind::Settings)).unwrap(), tool.restart().unwrap()]);
     for frame in frames.clone() {
         let _ = unit.take(&frame, &mut Nowhere);
         frames.extend(std::iter::from_fn(|| unit.next_frame(Time::from_micros(0), &Nowhere)));

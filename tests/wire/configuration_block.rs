@@ -8,7 +8,7 @@ use viewshed::sensor::config::{ConfigError, Problem};
 use viewshed::sensor::field_of_view::FieldOfView;
 use viewshed::sensor::mount::Mount;
 use viewshed::sensor::noise::NoiseConfig;
-use viewshed::sensor::place::{LaneList, Points};
+use viewshed::sensor::site::{LaneList, Points};
 use viewshed::unit::settings::{BLOCK_LEN, BlockError, MOST_BLOCK_LEN, Settings, heights_block, lanes_block};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);

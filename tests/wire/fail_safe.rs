@@ -14,7 +14,7 @@ use std::collections::{BinaryHeap, VecDeque};
 use crate::shadows::{A, Map, R, Random, Shadows, W, header};
 use viewshed::fixed::time::Time;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
-use viewshed::wire::code::block::Kind;
+use viewshed::wire::code::block::Basis;
 use viewshed::wire::code::ray::Ray;
 use viewshed::wire::code::reading::{self, Reader};
 use viewshed::wire::frame::CanFrame;
@@ -182,7 +182,7 @@ impl World {
         let _ = reading::decode(
             map.words(),
             &context,
-            Kind::Refresh,
+            Basis::Refresh,
             map.start,
             &mut { reading::Resume::START },
             &mut azimuths,

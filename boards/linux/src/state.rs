@@ -168,7 +168,7 @@ impl SettingsSlots for FileSlots {
 mod tests {
     use super::*;
     use viewshed::board::{BlockError, StoredSettings};
-    use viewshed::unit::settings::Kind;
+    use viewshed::unit::settings::BlockKind;
     use viewshed::{ConfigError, FieldOfView, Mount, NoiseConfig, Sensor, reference::CHECK};
 
     fn settings(height_m: f32) -> Settings {
@@ -259,7 +259,7 @@ mod tests {
         let folder = folder("emptied-first");
         let mut slots = FileSlots::open(Some(&folder), Some(&settings(6.0)));
         for _ in 0..2 {
-            StoredSettings::clear(Kind::Settings, &mut slots);
+            StoredSettings::clear(BlockKind::Settings, &mut slots);
             assert_eq!((height(&slots), folder.join("slots").exists()), (Ok(6.0), false));
         }
         assert_eq!(height(&FileSlots::open(Some(&folder), Some(&settings(8.0)))), Ok(8.0));

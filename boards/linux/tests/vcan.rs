@@ -16,7 +16,7 @@ use viewshed::map::Visibility;
 use viewshed::sensor::Sensor;
 use viewshed::unit::can_service::{Answers, Tool};
 use viewshed::unit::profile::reference::State;
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::{CanFrame, CanId};

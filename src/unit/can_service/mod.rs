@@ -53,7 +53,7 @@ pub use tool::{Answers, Tool};
 pub use unit::{CanService, CanServiceConfig};
 
 use crate::fixed::bits::Bits;
-use crate::unit::settings::{Kind, MOST_BLOCK_LEN, Which};
+use crate::unit::settings::{BlockKind, MOST_BLOCK_LEN, Which};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::{CanFrame, fd_length};
 use crate::wire::message::{Epoch, Message, Packet, Received};
@@ -89,7 +89,7 @@ enum BlockRequest {
     Complete { last: [u8; 4] },
     Read(Which),
     Restart,
-    Clear(Kind),
+    Clear(BlockKind),
     Identify,
     Address { chip: u32 },
 }
@@ -121,7 +121,7 @@ impl BlockRequest {
             3 => Some(Self::Complete { last: bytes }),
             4 => Which::from_number(number).map(Self::Read),
             5 => (bytes == RESTART).then_some(Self::Restart),
-            6 => Kind::of_clear_mark(&bytes).map(Self::Clear),
+            6 => BlockKind::of_clear_mark(&bytes).map(Self::Clear),
             7 => Some(Self::Identify),
             8 => Some(Self::Address { chip: u32::from_be_bytes(bytes) }),
             _ => None,
@@ -201,12 +201,12 @@ mod tests {
             BlockRequest::Begin { length: 0x0102 },
             BlockRequest::Part { number: 36, bytes: [1, 2, 3, 4] },
             BlockRequest::Complete { last: [5, 6, 7, 8] },
-            BlockRequest::Read(Which::in_use(Kind::Settings)),
-            BlockRequest::Read(Which::newest(Kind::Settings)),
-            BlockRequest::Read(Which::newest(Kind::Probabilities)),
+            BlockRequest::Read(Which::in_use(BlockKind::Settings)),
+            BlockRequest::Read(Which::newest(BlockKind::Settings)),
+            BlockRequest::Read(Which::newest(BlockKind::Probabilities)),
             BlockRequest::Restart,
-            BlockRequest::Clear(Kind::Settings),
-            BlockRequest::Clear(Kind::Lanes),
+            BlockRequest::Clear(BlockKind::Settings),
+            BlockRequest::Clear(BlockKind::Lanes),
             BlockRequest::Identify,
             BlockRequest::Address { chip: 0x0102_0304 },
         ] {

@@ -2,8 +2,8 @@
 
 use super::{ANSWER, BlockAnswer, BlockRequest, Came, REQUEST, frame, received};
 use crate::unit::identity::Identified;
-use crate::unit::said::{Piece, Refusal, Said};
-use crate::unit::settings::{Kind, Which, announced_length};
+use crate::unit::reply::{Piece, Refusal, Said};
+use crate::unit::settings::{BlockKind, Which, announced_length};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -56,7 +56,7 @@ impl Tool {
     }
 
     /// Asks for both slots of a kind to be emptied.
-    pub fn clear(&mut self, kind: Kind) -> Option<CanFrame> {
+    pub fn clear(&mut self, kind: BlockKind) -> Option<CanFrame> {
         self.frame(BlockRequest::Clear(kind))
     }
 

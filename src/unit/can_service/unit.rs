@@ -4,9 +4,11 @@ use super::{ANSWER, BlockAnswer, BlockRequest, Came, INCOMPLETE, REQUEST, frame,
 use crate::fixed::time::Time;
 use crate::unit::Flow;
 use crate::unit::identity::Identity;
+use crate::unit::reply::Piece;
 use crate::unit::safe_state::SafeState;
-use crate::unit::said::Piece;
-use crate::unit::settings::{BlockError, Kind, MOST_BLOCK_LEN, Settings, SettingsSlots, StoredError, StoredSettings};
+use crate::unit::settings::{
+    BlockError, BlockKind, MOST_BLOCK_LEN, Settings, SettingsSlots, StoredError, StoredSettings,
+};
 use crate::wire::broadcast::Medium;
 use crate::wire::frame::CanFrame;
 use crate::wire::message::Epoch;
@@ -44,7 +46,7 @@ impl CanServiceConfig {
 /// A block is sent in parts, written, and read by the next start:
 /// ```
 /// # use viewshed::unit::can_service::{Answers, Tool};
-/// # use viewshed::unit::said::Said;
+/// # use viewshed::unit::reply::Said;
 /// # use viewshed::board::{BLOCK_LEN, CanService, CanServiceConfig, Flow, SettingsSlots, StoredSettings};
 /// # use viewshed::{Addresses, Epoch, FieldOfView, Medium, Mount, NoiseConfig, Sensor, Settings, Time, small};
 /// # struct InRam([[u8; BLOCK_LEN]; 2]);
@@ -269,7 +271,7 @@ impl Incoming {
         self.length = None;
         let block = self.block.bytes().get(..length).unwrap_or(&[]);
         if block.last_chunk::<4>().is_some_and(|end| *end != last) {
-            let kind = Kind::of_block(block).unwrap_or(Kind::Settings);
+            let kind = BlockKind::of_block(block).unwrap_or(BlockKind::Settings);
             return Err(What::Block(StoredError { kind, error: BlockError::CheckSum }));
         }
         let sequence = stored.write(block, slots).map_err(What::Block)?;

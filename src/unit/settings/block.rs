@@ -16,7 +16,7 @@ use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::ground;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
-use crate::sensor::place::Place;
+use crate::sensor::site::Site;
 use crate::unit::can_bus::BusConfig;
 use crate::wire::header::fingerprint;
 
@@ -58,7 +58,7 @@ impl Settings {
 
     /// The same at another place than the settings' own.
     #[inline(never)] // once a start
-    pub fn fingerprint_at(&self, place: &Place<'_>) -> u32 {
+    pub fn fingerprint_at(&self, place: &Site<'_>) -> u32 {
         let mut block = [0; LAYOUT_1_LEN];
         self.write(1, 0, &mut block);
         // not of the check sum as well: a CRC over its own is the same for every block
@@ -71,7 +71,7 @@ impl Settings {
             sum = fingerprint(&with);
         };
         // where there is no room for lanes, nothing runs with them
-        let Place { lanes, mut heights } = *place;
+        let Site { lanes, mut heights } = *place;
         for (number, lane) in (1..).zip(lanes).take(MOST_LANES) {
             take([number, 0]);
             lane.for_each(|point| take(point.map(f32::to_bits)));

@@ -12,7 +12,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::kind::word;
-use super::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SettingsSlots, in_copy};
+use super::{ALL_SLOTS_LEN, BlockKind, MOST_BLOCK_LEN, SettingsSlots, in_copy};
 
 /// The longest block up to the next whole word.
 const MOST_STORED_LEN: usize = word(MOST_BLOCK_LEN);
@@ -52,7 +52,7 @@ impl<F: NorFlash, const N: usize> FlashSlots<F, N> {
 
 impl<F: NorFlash, const N: usize> SettingsSlots for FlashSlots<F, N> {
     fn slot(&self, slot: usize) -> &[u8] {
-        let length = Kind::of_slot(slot).map_or(0, Kind::most_len);
+        let length = BlockKind::of_slot(slot).map_or(0, BlockKind::most_len);
         let copy = self.copies.get(in_copy(slot)).filter(|_| slot < N);
         copy.and_then(|copy| copy.get(..length)).unwrap_or(&[])
     }

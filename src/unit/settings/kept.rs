@@ -15,18 +15,18 @@
 //!
 //! | body | |
 //! |---|---|
-//! | heights | number of points (2 bytes), 0 (2 bytes), points as [`place`](crate::sensor::place) has them |
+//! | heights | number of points (2 bytes), 0 (2 bytes), points as [`place`](crate::sensor::site) has them |
 //! | lanes | number of lanes (2 bytes), bytes of their points (2 bytes), points as there |
 //! | probabilities | ranges and azimuths of the grid it was fitted on (1 byte each); what is visible: 0 what has the map's least grade, 1 what has at least the next byte's probability, 2 nothing (1 byte); that probability in 1/255 (1 byte); the table as [`crate::probability`] has it |
 
 use super::BlockError;
 #[cfg(feature = "probability")]
 use super::kind::TABLE_LEN;
-use super::kind::{COUNT_LEN, HEADER_LEN, Kind, SUM_LEN};
+use super::kind::{BlockKind, COUNT_LEN, HEADER_LEN, SUM_LEN};
 use crate::fixed::bytes::{Reader, Writer, fingerprint};
 #[cfg(feature = "probability")]
 use crate::probability::{self, ProbabilityTable, Threshold};
-use crate::sensor::place::{HEIGHT_LEN, LaneList, PackError, Points};
+use crate::sensor::site::{HEIGHT_LEN, LaneList, PackError, Points};
 
 const LAYOUT: u16 = 1;
 
@@ -46,7 +46,7 @@ pub fn heights_block(points: Points<'_>, block: &mut [u8]) -> Result<usize, Pack
     let count = u16::try_from(points.count()).map_err(|_| PackError::TooMany)?;
     let body = body_mut(block, COUNT_LEN).ok_or(PackError::TooMany)?;
     let length = points.pack(body)?;
-    seal(Kind::Heights, [count.to_le_bytes(), [0; 2]], COUNT_LEN + length, block).ok_or(PackError::TooMany)
+    seal(BlockKind::Heights, [count.to_le_bytes(), [0; 2]], COUNT_LEN + length, block).ok_or(PackError::TooMany)
 }
 
 /// Writes lanes; how many bytes.
@@ -59,7 +59,7 @@ pub fn lanes_block(lanes: LaneList<'_>, block: &mut [u8]) -> Result<usize, PackE
     let length = lanes.pack(body)?;
     let bytes = u16::try_from(length).map_err(|_| PackError::TooMany)?;
     let counts = [count.to_le_bytes(), bytes.to_le_bytes()];
-    seal(Kind::Lanes, counts, COUNT_LEN + length, block).ok_or(PackError::TooMany)
+    seal(BlockKind::Lanes, counts, COUNT_LEN + length, block).ok_or(PackError::TooMany)
 }
 
 /// Writes a table that was fitted on a grid of so many ranges and azimuths, and what of it is visible; without a
@@ -76,7 +76,7 @@ pub fn table_block(grid: [u8; 2], table: &ProbabilityTable, threshold: Option<Th
     if let Some(body) = body_mut(&mut block, COUNT_LEN) {
         Writer(body).put(table.to_block());
     }
-    let _ = seal(Kind::Probabilities, [grid, rule], COUNT_LEN + probability::BLOCK_LEN, &mut block);
+    let _ = seal(BlockKind::Probabilities, [grid, rule], COUNT_LEN + probability::BLOCK_LEN, &mut block);
     block
 }
 
@@ -87,7 +87,7 @@ fn body_mut(block: &mut [u8], from: usize) -> Option<&mut [u8]> {
 
 /// Writes what goes around a body of this length, which begins with `counts`, and fills what is left up to the check
 /// sum; bytes of the block.
-fn seal(kind: Kind, counts: [[u8; 2]; 2], body: usize, block: &mut [u8]) -> Option<usize> {
+fn seal(kind: BlockKind, counts: [[u8; 2]; 2], body: usize, block: &mut [u8]) -> Option<usize> {
     let length = (HEADER_LEN + body + SUM_LEN).next_multiple_of(4);
     let block = block.get_mut(..length)?;
     block.get_mut(HEADER_LEN + body..)?.fill(0);
@@ -116,7 +116,7 @@ fn add_sum(block: &mut [u8]) {
 }
 
 /// Bytes of the block that a slot begins with, as it says itself; 0 without one.
-pub(super) fn length(kind: Kind, slot: &[u8]) -> usize {
+pub(super) fn length(kind: BlockKind, slot: &[u8]) -> usize {
     let mut r = Reader(slot);
     let of_kind = r.take().filter(|magic| *magic == kind.magic());
     let length = of_kind.and_then(|_| r.u16()).filter(|layout| *layout == LAYOUT).and_then(|_| r.u16());
@@ -128,7 +128,7 @@ pub(super) fn length(kind: Kind, slot: &[u8]) -> usize {
 ///
 /// # Errors
 /// The first thing that does not hold. Empty is erased memory only: what else is there was a block once.
-pub(super) fn open(kind: Kind, bytes: &[u8]) -> Result<(u32, &[u8]), BlockError> {
+pub(super) fn open(kind: BlockKind, bytes: &[u8]) -> Result<(u32, &[u8]), BlockError> {
     let mut header = Reader(bytes);
     match header.take::<4>() {
         Some(magic) if magic == kind.magic() => {}
@@ -149,13 +149,13 @@ pub(super) fn open(kind: Kind, bytes: &[u8]) -> Result<(u32, &[u8]), BlockError>
     }
     let sequence = header.u32().ok_or(BlockError::Short)?;
     let whole = match kind {
-        Kind::Settings => false,
-        Kind::Heights => heights(body).is_some(),
-        Kind::Lanes => lanes(body).is_some(),
+        BlockKind::Settings => false,
+        BlockKind::Heights => heights(body).is_some(),
+        BlockKind::Lanes => lanes(body).is_some(),
         #[cfg(feature = "probability")]
-        Kind::Probabilities => table(body).map_err(BlockError::Table)?.is_some(),
+        BlockKind::Probabilities => table(body).map_err(BlockError::Table)?.is_some(),
         #[cfg(not(feature = "probability"))]
-        Kind::Probabilities => false,
+        BlockKind::Probabilities => false,
     };
     if whole { Ok((sequence, body)) } else { Err(BlockError::Short) }
 }
@@ -164,9 +164,9 @@ pub(super) fn open(kind: Kind, bytes: &[u8]) -> Result<(u32, &[u8]), BlockError>
 ///
 /// # Errors
 /// The first thing that does not hold.
-pub fn kept_points(kind: Kind, block: &[u8]) -> Result<(Option<Points<'_>>, Option<LaneList<'_>>), BlockError> {
+pub fn kept_points(kind: BlockKind, block: &[u8]) -> Result<(Option<Points<'_>>, Option<LaneList<'_>>), BlockError> {
     let (_, body) = open(kind, block)?;
-    Ok((heights(body).filter(|_| kind == Kind::Heights), lanes(body).filter(|_| kind == Kind::Lanes)))
+    Ok((heights(body).filter(|_| kind == BlockKind::Heights), lanes(body).filter(|_| kind == BlockKind::Lanes)))
 }
 
 /// The heights in a body.

@@ -5,13 +5,13 @@ use core::ops::Range;
 use super::BLOCK_LEN;
 use crate::obstacles::lanes::{self, MOST_LANES, MOST_SEGMENTS};
 use crate::sensor::ground::{self, MOST_HEIGHTS};
-use crate::sensor::place::{HEIGHT_LEN, LANE_HEAD_LEN, LANE_POINT_LEN};
+use crate::sensor::site::{HEIGHT_LEN, LANE_HEAD_LEN, LANE_POINT_LEN};
 
 /// What a block is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
-pub enum Kind {
+pub enum BlockKind {
     /// Settings of the sensor, its buses and the unit.
     Settings,
     /// Heights of the road.
@@ -55,13 +55,13 @@ pub fn announced_length(head: &[u8]) -> Option<usize> {
 
 /// Where a slot lies in a copy of all of them.
 pub fn in_copy(slot: usize) -> Range<usize> {
-    let length = |slot| Kind::of_slot(slot).map_or(0, |kind| word(kind.most_len()));
+    let length = |slot| BlockKind::of_slot(slot).map_or(0, |kind| word(kind.most_len()));
     let from = (0..slot).map(length).sum();
     from..from + length(slot)
 }
 
 /// Slots of all kinds.
-pub const SLOTS: usize = 2 * Kind::ALL.len();
+pub const SLOTS: usize = 2 * BlockKind::ALL.len();
 
 // parts of four bytes have numbers of one byte
 const _: () = assert!(MOST_BLOCK_LEN <= 4 * 255);
@@ -75,7 +75,7 @@ pub(super) const fn word(length: usize) -> usize {
     length.next_multiple_of(32)
 }
 
-impl Kind {
+impl BlockKind {
     /// All of them, in the order of their numbers.
     pub const ALL: [Self; 4] = [Self::Settings, Self::Heights, Self::Lanes, Self::Probabilities];
 
@@ -143,19 +143,19 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Which {
     /// What it is of.
-    pub kind: Kind,
+    pub kind: BlockKind,
     /// The one that counts from the next restart on, instead of the one in use.
     pub newest: bool,
 }
 
 impl Which {
     /// The one in use.
-    pub const fn in_use(kind: Kind) -> Self {
+    pub const fn in_use(kind: BlockKind) -> Self {
         Self { kind, newest: false }
     }
 
     /// The one that counts from the next restart on.
-    pub const fn newest(kind: Kind) -> Self {
+    pub const fn newest(kind: BlockKind) -> Self {
         Self { kind, newest: true }
     }
 
@@ -166,7 +166,7 @@ impl Which {
 
     /// Of a number on the wire.
     pub fn from_number(number: u8) -> Option<Self> {
-        Kind::from_number(number / 2).map(|kind| Self { kind, newest: number & 1 == 1 })
+        BlockKind::from_number(number / 2).map(|kind| Self { kind, newest: number & 1 == 1 })
     }
 }
 
@@ -176,20 +176,23 @@ mod tests {
 
     #[test]
     fn numbers_slots_and_marks_are_each_kinds_own() {
-        for (number, kind) in (0..).zip(Kind::ALL) {
-            assert_eq!((kind.number(), Kind::from_number(number)), (number, Some(kind)));
+        for (number, kind) in (0..).zip(BlockKind::ALL) {
+            assert_eq!((kind.number(), BlockKind::from_number(number)), (number, Some(kind)));
             assert_eq!(
-                (Kind::of_block(&kind.magic()), Kind::of_clear_mark(&kind.clear_mark())),
+                (BlockKind::of_block(&kind.magic()), BlockKind::of_clear_mark(&kind.clear_mark())),
                 (Some(kind), Some(kind))
             );
-            assert!(kind.slots().iter().all(|slot| Kind::of_slot(*slot) == Some(kind)));
+            assert!(kind.slots().iter().all(|slot| BlockKind::of_slot(*slot) == Some(kind)));
         }
-        assert_eq!((Kind::from_number(4), Kind::of_slot(SLOTS), Kind::of_block(b"VSXB")), (None, None, None));
-        assert_eq!(Kind::Settings.clear_mark(), *b"VSCF", "as firmware before the other kinds has it");
+        assert_eq!(
+            (BlockKind::from_number(4), BlockKind::of_slot(SLOTS), BlockKind::of_block(b"VSXB")),
+            (None, None, None)
+        );
+        assert_eq!(BlockKind::Settings.clear_mark(), *b"VSCF", "as firmware before the other kinds has it");
     }
 
     #[test]
     fn blocks_are_whole_parts_of_four_bytes() {
-        assert!(Kind::ALL.iter().all(|kind| kind.most_len().is_multiple_of(4)));
+        assert!(BlockKind::ALL.iter().all(|kind| kind.most_len().is_multiple_of(4)));
     }
 }

@@ -34,7 +34,7 @@ pub use flash::FlashSlots;
 #[cfg(feature = "probability")]
 pub use kept::table_block;
 pub use kept::{heights_block, kept_points, lanes_block};
-pub use kind::{ALL_SLOTS_LEN, Kind, MOST_BLOCK_LEN, SLOTS, Which, announced_length, in_copy};
+pub use kind::{ALL_SLOTS_LEN, BlockKind, MOST_BLOCK_LEN, SLOTS, Which, announced_length, in_copy};
 pub use stored::{SettingsCheck, SettingsSlots, StoredError, StoredSettings};
 pub use unit_config::{ConfigureRadar, UnitConfig};
 
@@ -56,7 +56,7 @@ use crate::sensor::config::ConfigError;
 use crate::sensor::field_of_view::FieldOfView;
 use crate::sensor::mount::Mount;
 use crate::sensor::noise::NoiseConfig;
-use crate::sensor::place::{LaneList, Place, Points};
+use crate::sensor::site::{LaneList, Points, Site};
 use crate::unit::can_bus::BusConfig;
 
 /// Everything an integrator sets for one installation.
@@ -225,8 +225,8 @@ impl Settings {
     }
 
     /// What they say of the place.
-    pub fn place(&self) -> Place<'static> {
-        Place { lanes: LaneList::Metres(self.lanes), heights: Points::Metres(self.ground) }
+    pub fn place(&self) -> Site<'static> {
+        Site { lanes: LaneList::Metres(self.lanes), heights: Points::Metres(self.ground) }
     }
 
     /// The estimator's configuration; what an integrator does not set is the library's.

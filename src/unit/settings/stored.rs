@@ -13,12 +13,12 @@
 //! grades and says so.
 
 use super::block::{is_layout_1, length};
-use super::kind::{Kind, Which};
+use super::kind::{BlockKind, Which};
 use super::{BlockError, MOST_BLOCK_LEN, Newest, Settings, UnitConfig, kept, newer};
 #[cfg(feature = "probability")]
 use crate::probability::{ProbabilityTable, Quantiser, TableError, Threshold};
 use crate::sensor::config::ConfigError;
-use crate::sensor::place::{LaneList, Place, Points};
+use crate::sensor::site::{LaneList, Points, Site};
 use crate::unit::can_bus::BusConfig;
 use crate::wire::header::Header;
 
@@ -36,7 +36,7 @@ pub trait SettingsSlots {
 /// Whether a unit can be built with settings: with its grid, its senders and its controller's clock.
 #[derive(Debug, Clone, Copy)]
 pub struct SettingsCheck {
-    build: fn(&Settings, &Place<'_>) -> Result<Header, ConfigError>,
+    build: fn(&Settings, &Site<'_>) -> Result<Header, ConfigError>,
     /// Clock of the CAN controllers this program sets the bit rate of.
     can_clock_hz: Option<u32>,
     /// Whether its sender has a use for a table of probabilities.
@@ -45,7 +45,7 @@ pub struct SettingsCheck {
 
 impl SettingsCheck {
     /// By this function; [`SettingsCheck::of`] is the one for an estimator and a sender.
-    pub const fn by(build: fn(&Settings, &Place<'_>) -> Result<Header, ConfigError>, takes_tables: bool) -> Self {
+    pub const fn by(build: fn(&Settings, &Site<'_>) -> Result<Header, ConfigError>, takes_tables: bool) -> Self {
         Self { build, can_clock_hz: None, takes_tables }
     }
 
@@ -63,7 +63,7 @@ impl SettingsCheck {
     }
 
     /// The same at another place than the settings' own; the header of its maps.
-    fn at(&self, settings: &Settings, place: &Place<'_>) -> Result<Header, ConfigError> {
+    fn at(&self, settings: &Settings, place: &Site<'_>) -> Result<Header, ConfigError> {
         if let Some(clock_hz) = self.can_clock_hz {
             settings.radar_bus.check_clock("radar_bus", clock_hz)?;
             settings.broadcast_bus.check_clock("broadcast_bus", clock_hz)?;
@@ -77,7 +77,7 @@ impl SettingsCheck {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StoredError {
     /// What the block is of.
-    pub kind: Kind,
+    pub kind: BlockKind,
     /// What is wrong with it.
     pub error: BlockError,
 }
@@ -85,7 +85,7 @@ pub struct StoredError {
 impl StoredError {
     /// Of settings.
     pub const fn of_settings(error: BlockError) -> Self {
-        Self { kind: Kind::Settings, error }
+        Self { kind: BlockKind::Settings, error }
     }
 }
 
@@ -119,10 +119,10 @@ impl StoredError {
 impl core::fmt::Display for StoredError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self.kind {
-            Kind::Settings => write!(f, "{}", self.error),
-            Kind::Heights => write!(f, "heights of the road: {}", self.error),
-            Kind::Lanes => write!(f, "lanes: {}", self.error),
-            Kind::Probabilities => write!(f, "table of probabilities: {}", self.error),
+            BlockKind::Settings => write!(f, "{}", self.error),
+            BlockKind::Heights => write!(f, "heights of the road: {}", self.error),
+            BlockKind::Lanes => write!(f, "lanes: {}", self.error),
+            BlockKind::Probabilities => write!(f, "table of probabilities: {}", self.error),
         }
     }
 }
@@ -140,7 +140,7 @@ pub struct StoredSettings {
     /// Where they say the far road lies.
     far_road_deg: Option<i8>,
     /// Slots of the blocks in use, by kind.
-    in_use: [Option<usize>; Kind::ALL.len()],
+    in_use: [Option<usize>; BlockKind::ALL.len()],
     check: SettingsCheck,
 }
 
@@ -148,11 +148,11 @@ impl StoredSettings {
     /// The newest blocks that the unit can run with.
     pub fn read(slots: &impl SettingsSlots, check: SettingsCheck) -> Self {
         let found = place(slots).and_then(|place| newest(slots, check, &place));
-        let in_use = Kind::ALL.map(|kind| match kind {
-            Kind::Settings => found.as_ref().ok().map(|newest| newest.slot),
+        let in_use = BlockKind::ALL.map(|kind| match kind {
+            BlockKind::Settings => found.as_ref().ok().map(|newest| newest.slot),
             _ => stored(kind, slots).ok().flatten().map(|(slot, _)| slot),
         });
-        let alone = || newest(slots, check, &Place::NOTHING);
+        let alone = || newest(slots, check, &Site::NOTHING);
         let of_unit = found.or_else(|_| alone()).ok().map(|newest| newest.settings);
         let buses = of_unit.map_or_else(Default::default, |s| [s.radar_bus, s.broadcast_bus]);
         let unit = of_unit.map_or_else(UnitConfig::default, |s| s.unit);
@@ -169,7 +169,7 @@ impl StoredSettings {
     ///
     /// # Errors
     /// A block that does not hold.
-    pub fn place(slots: &impl SettingsSlots) -> Result<Place<'_>, StoredError> {
+    pub fn place(slots: &impl SettingsSlots) -> Result<Site<'_>, StoredError> {
         place(slots)
     }
 
@@ -190,7 +190,7 @@ impl StoredSettings {
     pub fn find(&self, Which { kind, newest }: Which, slots: &impl SettingsSlots) -> Result<usize, StoredError> {
         let slot = match (newest, kind) {
             (false, _) => self.in_use.get(usize::from(kind.number())).copied().flatten(),
-            (true, Kind::Settings) => self.newest(slots).ok().map(|newest| newest.slot),
+            (true, BlockKind::Settings) => self.newest(slots).ok().map(|newest| newest.slot),
             (true, _) => stored(kind, slots).ok().flatten().map(|(slot, _)| slot),
         };
         // emptied since the start it holds none
@@ -201,8 +201,8 @@ impl StoredSettings {
     /// The block in a slot, as long as it says itself; empty without one.
     pub fn in_slot(slots: &impl SettingsSlots, slot: usize) -> &[u8] {
         let bytes = slots.slot(slot);
-        let length = match Kind::of_slot(slot) {
-            None | Some(Kind::Settings) => length(bytes),
+        let length = match BlockKind::of_slot(slot) {
+            None | Some(BlockKind::Settings) => length(bytes),
             Some(kind) => kept::length(kind, bytes),
         };
         // a slot is as long as the longest block
@@ -210,10 +210,10 @@ impl StoredSettings {
     }
 
     /// Why there is nothing to read of a kind: what was refused at the start, or that nothing is stored or could be.
-    fn absence_of(&self, kind: Kind, slots: &impl SettingsSlots) -> StoredError {
+    fn absence_of(&self, kind: BlockKind, slots: &impl SettingsSlots) -> StoredError {
         let empty = if has_room(kind, slots, self.check) { BlockError::Empty } else { BlockError::NoRoom };
         let error = match kind {
-            Kind::Settings => self.found.err().filter(|refused| refused.kind == kind).map(|refused| refused.error),
+            BlockKind::Settings => self.found.err().filter(|refused| refused.kind == kind).map(|refused| refused.error),
             _ => stored(kind, slots).err().map(|refused| refused.error),
         };
         StoredError { kind, error: error.unwrap_or(empty) }
@@ -231,8 +231,8 @@ impl StoredSettings {
 
     /// The newest settings that the unit could run with, at the place that is stored where that holds.
     fn newest(&self, slots: &impl SettingsSlots) -> Result<Newest, StoredError> {
-        let place = place(slots).unwrap_or(Place::NOTHING);
-        newest(slots, self.check, &place).or_else(|_| newest(slots, self.check, &Place::NOTHING))
+        let place = place(slots).unwrap_or(Site::NOTHING);
+        newest(slots, self.check, &place).or_else(|_| newest(slots, self.check, &Site::NOTHING))
     }
 
     /// Checks a block that came and writes it into the slot of its kind that is not in use; its sequence. It counts
@@ -241,8 +241,8 @@ impl StoredSettings {
     /// # Errors
     /// Why the unit could not start with it; nothing is written then.
     pub fn write(&self, block: &[u8], slots: &mut impl SettingsSlots) -> Result<u32, StoredError> {
-        match Kind::of_block(block) {
-            None | Some(Kind::Settings) => self.write_settings(block, slots),
+        match BlockKind::of_block(block) {
+            None | Some(BlockKind::Settings) => self.write_settings(block, slots),
             Some(kind) => self.write_kept(kind, block, slots).map_err(|error| StoredError { kind, error }),
         }
     }
@@ -263,7 +263,7 @@ impl StoredSettings {
         written.map_err(StoredError::of_settings)
     }
 
-    fn write_kept(&self, kind: Kind, block: &[u8], slots: &mut impl SettingsSlots) -> Result<u32, BlockError> {
+    fn write_kept(&self, kind: BlockKind, block: &[u8], slots: &mut impl SettingsSlots) -> Result<u32, BlockError> {
         if !has_room(kind, slots, self.check) {
             return Err(BlockError::NoRoom);
         }
@@ -284,14 +284,14 @@ impl StoredSettings {
 
     /// Whether the unit could start with this body in place of the stored one. Without settings there is nothing it
     /// could not fit: they are checked together with it when they come.
-    fn fits(&self, kind: Kind, body: &[u8], slots: &impl SettingsSlots) -> Result<(), BlockError> {
+    fn fits(&self, kind: BlockKind, body: &[u8], slots: &impl SettingsSlots) -> Result<(), BlockError> {
         // what does not hold of the other kind stands against every settings, and is no matter of this block
-        let stored = |other: Kind| stored(other, slots).ok().flatten().map(|(_, (_, body))| body);
-        let of = |other: Kind| if other == kind { Some(body) } else { stored(other) };
-        let place = place_from(of(Kind::Heights), of(Kind::Lanes));
+        let stored = |other: BlockKind| stored(other, slots).ok().flatten().map(|(_, (_, body))| body);
+        let of = |other: BlockKind| if other == kind { Some(body) } else { stored(other) };
+        let place = place_from(of(BlockKind::Heights), of(BlockKind::Lanes));
         let Ok(Newest { settings, .. }) = self.newest(slots) else { return Ok(()) };
         #[cfg(feature = "probability")]
-        if kind == Kind::Probabilities {
+        if kind == BlockKind::Probabilities {
             let header = self.check.at(&settings.of_grades(), &place).map_err(BlockError::Parameter)?;
             return fitted(body, &header, header.fingerprint).map(|_| ());
         }
@@ -308,7 +308,7 @@ impl StoredSettings {
         header: &Header,
         slots: &impl SettingsSlots,
     ) -> Result<Option<Quantiser>, StoredError> {
-        let kind = Kind::Probabilities;
+        let kind = BlockKind::Probabilities;
         let refused = |error| StoredError { kind, error };
         let Some((_, (_, body))) = stored(kind, slots)? else { return Ok(None) };
         let fingerprint = settings.of_grades().fingerprint_at(&place(slots)?);
@@ -319,7 +319,7 @@ impl StoredSettings {
 
     /// Empties both slots of a kind: from the next start on the unit is as it was before its first block of it. A slot that
     /// is empty already is left alone: erasing takes a controller long, and a request may come again.
-    pub fn clear(kind: Kind, slots: &mut impl SettingsSlots) {
+    pub fn clear(kind: BlockKind, slots: &mut impl SettingsSlots) {
         const ERASED: [u8; MOST_BLOCK_LEN] = [0xFF; MOST_BLOCK_LEN];
         for slot in kind.slots() {
             if slots.slot(slot).iter().all(|byte| *byte == 0xFF) {
@@ -342,8 +342,8 @@ fn fitted(body: &[u8], header: &Header, fingerprint: u32) -> Result<(Probability
 }
 
 /// Whether blocks of a kind can be kept and are of use.
-fn has_room(kind: Kind, slots: &impl SettingsSlots, check: SettingsCheck) -> bool {
-    let is_of_use = kind != Kind::Probabilities || check.takes_tables;
+fn has_room(kind: BlockKind, slots: &impl SettingsSlots, check: SettingsCheck) -> bool {
+    let is_of_use = kind != BlockKind::Probabilities || check.takes_tables;
     let longest = kind.most_len();
     is_of_use && longest > 0 && kind.slots().iter().all(|slot| slots.slot(*slot).len() >= longest)
 }
@@ -352,7 +352,7 @@ fn has_room(kind: Kind, slots: &impl SettingsSlots, check: SettingsCheck) -> boo
 type Body<'s> = (u32, &'s [u8]);
 
 /// The newest stored block of a kind that is no settings, and its slot; none where nothing was ever stored.
-fn stored(kind: Kind, slots: &impl SettingsSlots) -> Result<Option<(usize, Body<'_>)>, StoredError> {
+fn stored(kind: BlockKind, slots: &impl SettingsSlots) -> Result<Option<(usize, Body<'_>)>, StoredError> {
     let [first, second] = kind.slots();
     if kind.most_len() == 0 || slots.slot(first).is_empty() {
         return Ok(None);
@@ -364,21 +364,21 @@ fn stored(kind: Kind, slots: &impl SettingsSlots) -> Result<Option<(usize, Body<
     }
 }
 
-fn place(slots: &impl SettingsSlots) -> Result<Place<'_>, StoredError> {
+fn place(slots: &impl SettingsSlots) -> Result<Site<'_>, StoredError> {
     let body = |kind| stored(kind, slots).map(|found| found.map(|(_, (_, body))| body));
-    Ok(place_from(body(Kind::Heights)?, body(Kind::Lanes)?))
+    Ok(place_from(body(BlockKind::Heights)?, body(BlockKind::Lanes)?))
 }
 
-fn place_from<'s>(heights: Option<&'s [u8]>, lanes: Option<&'s [u8]>) -> Place<'s> {
-    Place {
+fn place_from<'s>(heights: Option<&'s [u8]>, lanes: Option<&'s [u8]>) -> Site<'s> {
+    Site {
         lanes: lanes.and_then(kept::lanes).unwrap_or(LaneList::Bytes(&[])),
         heights: heights.and_then(kept::heights).unwrap_or(Points::Heights(&[])),
     }
 }
 
-fn newest(slots: &impl SettingsSlots, check: SettingsCheck, place: &Place<'_>) -> Result<Newest, StoredError> {
+fn newest(slots: &impl SettingsSlots, check: SettingsCheck, place: &Site<'_>) -> Result<Newest, StoredError> {
     let accept = |settings: &Settings| check.at(settings, place).map(|_| ());
-    let [first, second] = Kind::Settings.slots();
+    let [first, second] = BlockKind::Settings.slots();
     Settings::newest([slots.slot(first), slots.slot(second)], accept).map_err(worst).map_err(StoredError::of_settings)
 }
 

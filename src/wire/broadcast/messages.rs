@@ -3,7 +3,7 @@
 use super::outgoing_plane::{Encoding, Next};
 use super::{Broadcaster, Running};
 use crate::fixed::time::Time;
-use crate::wire::code::block::Kind;
+use crate::wire::code::block::Basis;
 use crate::wire::header::Clock;
 use crate::wire::map_message::{self, LIMITS, SEGMENTS};
 use crate::wire::message::{Message, Packet, Part, Plane, WIRE_VERSION, Word};
@@ -102,7 +102,7 @@ impl<const A: usize, const W: usize, const P: usize> Broadcaster<A, W, P> {
         let packet = |part, own: &[u8]| self.packet(Message::Map(plane, part), own);
         match running.next {
             Next::Block { kind, start, ref block } => {
-                let first = if kind == Kind::Refresh { Part::Refresh } else { Part::Delta };
+                let first = if kind == Basis::Refresh { Part::Refresh } else { Part::Delta };
                 if long {
                     let (own, length) = map_message::words(scan, start, block.words());
                     return Some((packet(first, own.get(..length)?), true));

@@ -7,7 +7,7 @@
 
 use core::ops::Range;
 
-use crate::wire::code::block::{Block, Context, Kind, Rays};
+use crate::wire::code::block::{Basis, Block, Context, Rays};
 use crate::wire::code::ray::Ray;
 use crate::wire::message::Azimuths;
 use crate::wire::scan_number::ScanNumber;
@@ -27,7 +27,7 @@ pub(super) struct Encoding {
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Next {
     /// Azimuths `start..` up to the block's end.
-    Block { kind: Kind, start: usize, block: Block },
+    Block { kind: Basis, start: usize, block: Block },
     /// An azimuth in plain bits.
     Plain { azimuth: usize },
 }
@@ -50,7 +50,7 @@ pub(super) struct OutgoingPlane<const A: usize, const W: usize> {
 /// The azimuths of a plane that are encoded in one way, from a start on.
 struct Run<'a, const A: usize, const W: usize> {
     plane: &'a OutgoingPlane<A, W>,
-    kind: Kind,
+    kind: Basis,
     encoding: &'a Encoding,
 }
 
@@ -112,10 +112,10 @@ impl<const A: usize, const W: usize> OutgoingPlane<A, W> {
     }
 
     /// How an azimuth is encoded.
-    fn kind(&self, azimuth: usize, encoding: &Encoding) -> Kind {
+    fn kind(&self, azimuth: usize, encoding: &Encoding) -> Basis {
         match self.ticks.get(azimuth) {
-            Some(&ticks @ 1..) if !encoding.all => Kind::Delta { ticks },
-            _ => Kind::Refresh,
+            Some(&ticks @ 1..) if !encoding.all => Basis::Delta { ticks },
+            _ => Basis::Refresh,
         }
     }
 
@@ -124,32 +124,32 @@ impl<const A: usize, const W: usize> OutgoingPlane<A, W> {
         let start = self.pending.next(from).or_else(|| self.pending.next(0))?;
         let mut kind = self.kind(start, encoding);
         let mut block = self.block(encoding, kind, start);
-        if block.end == start && kind != Kind::Refresh {
+        if block.end == start && kind != Basis::Refresh {
             // against its refresh it does not fit
             self.refreshed.clear(start);
             if let Some(ticks) = self.ticks.get_mut(start) {
                 *ticks = 0;
             }
-            kind = Kind::Refresh;
+            kind = Basis::Refresh;
             block = self.block(encoding, kind, start);
         }
-        if kind == Kind::Refresh {
+        if kind == Basis::Refresh {
             // receivers may take any part of it
             (start..block.end.max(start + 1)).for_each(|azimuth| self.refreshed.clear(azimuth));
         }
         Some(if block.end == start { Next::Plain { azimuth: start } } else { Next::Block { kind, start, block } })
     }
 
-    fn block(&self, encoding: &Encoding, kind: Kind, start: usize) -> Block {
+    fn block(&self, encoding: &Encoding, kind: Basis, start: usize) -> Block {
         let run = Run { plane: self, kind, encoding };
         Block::new(&encoding.context, kind, start, &run)
     }
 
     /// What was handed out whole is encoded.
-    pub fn encoded(&mut self, kind: Option<Kind>, start: usize, end: usize, scan: ScanNumber) {
+    pub fn encoded(&mut self, kind: Option<Basis>, start: usize, end: usize, scan: ScanNumber) {
         for azimuth in start..end.min(A) {
             self.pending.clear(azimuth);
-            if kind == Some(Kind::Refresh) {
+            if kind == Some(Basis::Refresh) {
                 self.refreshed.set(azimuth);
                 if let (Some(was), Some(now)) = (self.was.get_mut(azimuth), self.now.get(azimuth)) {
                     *was = *now;

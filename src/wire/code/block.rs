@@ -14,10 +14,10 @@
 //! 256 azimuths, 256 range cells. Decoding a block never loops more than (azimuths x 2 cells) times,
 //! whatever the words say.
 
+pub use super::basis::Basis;
 use super::edges::{EdgeList, Hints};
 use super::expectation::{EdgeTables, Expectation, Last, distance_table, first_table, shift, stop_table};
 use super::interval::{Coder, Encoder, Form, Words};
-pub use super::kind::Kind;
 use super::model::{AS_EXPECTED, BELOW, EDGES, GONE, IN_FULL, KNOWN, NEW, REACH, STOPS_BELOW};
 use super::ray::{Known, Ray};
 
@@ -57,7 +57,7 @@ pub struct Block {
 
 impl Block {
     /// Encodes as many azimuths from `start` on as fit, up to the first for which there is no ray.
-    pub fn new<const W: usize>(context: &Context, kind: Kind, start: usize, rays: &impl Rays<W>) -> Self {
+    pub fn new<const W: usize>(context: &Context, kind: Basis, start: usize, rays: &impl Rays<W>) -> Self {
         let mut words = Words::NONE;
         let mut encoder = Encoder::new(&mut words, context.form);
         let end = encode(&mut encoder, context, kind, start, rays);
@@ -82,11 +82,11 @@ impl Block {
 pub fn encode<const W: usize>(
     coder: &mut impl Coder,
     context: &Context,
-    kind: Kind,
+    kind: Basis,
     start: usize,
     rays: &impl Rays<W>,
 ) -> usize {
-    if let Kind::Delta { ticks } = kind {
+    if let Basis::Delta { ticks } = kind {
         // the first word has room
         let _ = coder.plain(AGE_BITS, usize::from(ticks.saturating_sub(1)));
     }
@@ -131,8 +131,8 @@ fn encode_ray<const W: usize>(
 ) -> Option<()> {
     let ray = rays.now(azimuth)?;
     let was = match progress.kind {
-        Kind::Refresh => &Ray::UNKNOWN,
-        Kind::Delta { .. } => rays.was(azimuth).filter(|was| was.known == ray.known)?,
+        Basis::Refresh => &Ray::UNKNOWN,
+        Basis::Delta { .. } => rays.was(azimuth).filter(|was| was.known == ray.known)?,
     };
     if !progress.before.first {
         coder.symbol(stop_table(coder.room())?, 0)?;

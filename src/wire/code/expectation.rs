@@ -1,7 +1,7 @@
 //! What both sides of a block know before each symbol: what is expected, and how frequent what is.
 
+use super::basis::Basis;
 use super::edges::EdgeList;
-use super::kind::Kind;
 use super::model::{BELOW, STOP_CLASSES, STOPS_BELOW};
 use super::ray::{Known, Ray};
 
@@ -17,12 +17,12 @@ pub(super) struct Before {
 impl Before {
     pub const START: Self = Self { first: true, as_expected: true, still: true };
 
-    pub fn index(self, kind: Kind) -> usize {
+    pub fn index(self, kind: Basis) -> usize {
         match kind {
-            Kind::Refresh if self.first => 0,
-            Kind::Refresh => 1 + usize::from(!self.as_expected),
-            Kind::Delta { .. } if self.first => 3,
-            Kind::Delta { .. } => 4 + usize::from(!self.as_expected) + 2 * usize::from(!self.still),
+            Basis::Refresh if self.first => 0,
+            Basis::Refresh => 1 + usize::from(!self.as_expected),
+            Basis::Delta { .. } if self.first => 3,
+            Basis::Delta { .. } => 4 + usize::from(!self.as_expected) + 2 * usize::from(!self.still),
         }
     }
 }
@@ -45,11 +45,11 @@ pub(super) struct EdgeTables {
 }
 
 impl EdgeTables {
-    pub fn of(kind: Kind) -> Self {
+    pub fn of(kind: Basis) -> Self {
         let ([refresh, delta], [refresh_end, delta_end]) = (&BELOW.edge, &BELOW.end);
         match kind {
-            Kind::Refresh => Self { edge: refresh, end: refresh_end },
-            Kind::Delta { .. } => Self { edge: delta, end: delta_end },
+            Basis::Refresh => Self { edge: refresh, end: refresh_end },
+            Basis::Delta { .. } => Self { edge: delta, end: delta_end },
         }
     }
 
@@ -105,7 +105,7 @@ pub(super) fn shift(edge: usize, hint: usize) -> Last {
 /// What the rays encoded so far say of the next.
 #[derive(Debug, Clone)]
 pub(super) struct Expectation<const W: usize> {
-    pub kind: Kind,
+    pub kind: Basis,
     pub before: Before,
     /// The ray before, or the usual one.
     neighbour: Ray<W>,
@@ -118,12 +118,12 @@ pub(super) struct Expectation<const W: usize> {
 
 impl<const W: usize> Expectation<W> {
     /// At a block's start.
-    pub fn new(kind: Kind, usual: Known) -> Self {
+    pub fn new(kind: Basis, usual: Known) -> Self {
         Self::after(kind, Before::START, Ray::clear(usual), Ray::UNKNOWN)
     }
 
     /// After an azimuth.
-    pub fn after(kind: Kind, before: Before, neighbour: Ray<W>, neighbour_was: Ray<W>) -> Self {
+    pub fn after(kind: Basis, before: Before, neighbour: Ray<W>, neighbour_was: Ray<W>) -> Self {
         let mut lists = [EdgeList::NONE; 2];
         lists[0].read(neighbour.edges());
         Self { kind, before, neighbour, neighbour_was, lists, swapped: false }
@@ -150,10 +150,10 @@ impl<const W: usize> Expectation<W> {
     pub fn expect(&mut self, was: &Ray<W>) -> Ray<W> {
         let expected = match self.kind {
             // the hints are the neighbour's already
-            Kind::Refresh => return self.neighbour,
+            Basis::Refresh => return self.neighbour,
             // as is the first
-            Kind::Delta { .. } if self.before.still => *was,
-            Kind::Delta { .. } => was.expected(&self.neighbour, &self.neighbour_was),
+            Basis::Delta { .. } if self.before.still => *was,
+            Basis::Delta { .. } => was.expected(&self.neighbour, &self.neighbour_was),
         };
         self.hints().read(expected.edges());
         expected

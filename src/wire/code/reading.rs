@@ -1,6 +1,6 @@
 //! The words of a block in, as far as they are there, rays out.
 
-use super::block::{AGE_BITS, Context, Kind};
+use super::block::{AGE_BITS, Basis, Context};
 use super::edges::{EdgeList, Hints};
 use super::expectation::{Before, EdgeTables, Expectation, Last, distance_table, first_table, shift, stop_table};
 use super::interval::{Decoder, Form, OutOfWords};
@@ -80,10 +80,10 @@ impl Resume {
 
     /// What went before the azimuth to go on with: the ray, and what it was in the refresh. `None` at the
     /// start, or if it is not at hand any more.
-    fn after<const W: usize>(&self, kind: Kind, reader: &impl Reader<W>) -> Option<(Ray<W>, Ray<W>)> {
+    fn after<const W: usize>(&self, kind: Basis, reader: &impl Reader<W>) -> Option<(Ray<W>, Ray<W>)> {
         let before = usize::from(self.azimuth).checked_sub(1)?;
         let neighbour = reader.taken(before)?;
-        Some((neighbour, if kind == Kind::Refresh { Ray::UNKNOWN } else { reader.was(before)? }))
+        Some((neighbour, if kind == Basis::Refresh { Ray::UNKNOWN } else { reader.was(before)? }))
     }
 }
 
@@ -91,7 +91,7 @@ impl Resume {
 pub fn decode<const W: usize>(
     words: &[u64],
     context: &Context,
-    kind: Kind,
+    kind: Basis,
     start: usize,
     place: &mut Resume,
     reader: &mut impl Reader<W>,
@@ -106,7 +106,7 @@ pub fn decode<const W: usize>(
             after
         }
         None => {
-            if kind != Kind::Refresh && decoder.plain(AGE_BITS).is_err() {
+            if kind != Basis::Refresh && decoder.plain(AGE_BITS).is_err() {
                 return Ending::OutOfWords;
             }
             (Ray::clear(context.usual), Ray::UNKNOWN)
@@ -140,8 +140,8 @@ fn go<const W: usize>(
             }
         }
         let refreshed = match progress.kind {
-            Kind::Refresh => Ray::UNKNOWN,
-            Kind::Delta { .. } => match reader.was(azimuth) {
+            Basis::Refresh => Ray::UNKNOWN,
+            Basis::Delta { .. } => match reader.was(azimuth) {
                 Some(ray) => ray,
                 None => return (Ending::NoRefresh, at),
             },
@@ -190,7 +190,7 @@ fn decode_ray<const W: usize>(
     let known = match decoder.symbol(progress.table())? {
         AS_EXPECTED => return Ok(true),
         EDGES => ray.known,
-        KNOWN if progress.kind == Kind::Refresh => {
+        KNOWN if progress.kind == Basis::Refresh => {
             let near = decode_limit(decoder, ray.known.near())?;
             let end = decode_limit(decoder, ray.known.end())?;
             limits::<W>(near, end, ranges)?
@@ -410,7 +410,7 @@ mod tests {
     }
 
     /// All blocks of a map, decoded again.
-    fn through(map: &Map, form: Form, kind: Kind) -> (Vec<Ray<2>>, usize) {
+    fn through(map: &Map, form: Form, kind: Basis) -> (Vec<Ray<2>>, usize) {
         let count = map.now.len();
         let context = Context { form, usual: USUAL, azimuths: count, ranges: 64 };
         let mut got = vec![Ray::UNKNOWN; count];
@@ -460,7 +460,7 @@ mod tests {
         fn any_map_comes_back_from_refreshes(now in prop::collection::vec(any_ray(), 1..40), long: bool) {
             let map = Map { was: Vec::new(), now };
             let form = if long { Form::LONG } else { Form::CLASSIC };
-            prop_assert_eq!(through(&map, form, Kind::Refresh).0, map.now);
+            prop_assert_eq!(through(&map, form, Basis::Refresh).0, map.now);
         }
 
         #[test]
@@ -471,9 +471,9 @@ mod tests {
             let was: Vec<_> = rays.iter().map(|(was, ..)| *was).collect();
             let now = rays.iter().map(|(was, edges, same)| if *same { *was } else { ray(was.known, edges) }).collect();
             let map = Map { now, was };
-            let block = Block::new(&context(Form::CLASSIC, map.now.len()), Kind::Delta { ticks }, 0, &map);
+            let block = Block::new(&context(Form::CLASSIC, map.now.len()), Basis::Delta { ticks }, 0, &map);
             prop_assert_eq!(age(block.words(), Form::CLASSIC), Some(ticks));
-            prop_assert_eq!(through(&map, Form::CLASSIC, Kind::Delta { ticks }).0, map.now);
+            prop_assert_eq!(through(&map, Form::CLASSIC, Basis::Delta { ticks }).0, map.now);
         }
 
         #[test]
@@ -483,7 +483,7 @@ mod tests {
             start in 0..130_usize,
             usual in (0..64_usize, 0..=64_usize),
         ) {
-            let kind = if delta { Kind::Delta { ticks: 3 } } else { Kind::Refresh };
+            let kind = if delta { Basis::Delta { ticks: 3 } } else { Basis::Refresh };
             let mut taken = 0;
             let was = |a: usize| (a % 7 != 6).then(|| ray(USUAL, &[a % 50, 55]));
             let usual = Known::new(usual.0, usual.1);
@@ -501,7 +501,7 @@ mod tests {
         let was = vec![ray(USUAL, &[]), ray(USUAL, &[20, 30]), ray(USUAL, &[20, 30]), ray(USUAL, &[])];
         let now = vec![ray(USUAL, &[]), ray(USUAL, &[18, 28]), ray(USUAL, &[18, 28]), ray(USUAL, &[])];
         let map = Map { now, was };
-        let block = Block::new(&context(Form::CLASSIC, 4), Kind::Delta { ticks: 4 }, 0, &map);
+        let block = Block::new(&context(Form::CLASSIC, 4), Basis::Delta { ticks: 4 }, 0, &map);
         let bits = 132 - block.room();
         assert!(block.end == 4 && bits <= 32, "{bits} bits, and 4 of them for the refresh's age");
     }
@@ -509,7 +509,7 @@ mod tests {
     #[test]
     fn a_delta_without_its_refresh_gives_no_ray() {
         let map = Map { now: vec![ray(USUAL, &[9])], was: vec![ray(USUAL, &[])] };
-        let kind = Kind::Delta { ticks: 1 };
+        let kind = Basis::Delta { ticks: 1 };
         let block = Block::new(&context(Form::LONG, 1), kind, 0, &map);
         let ending = decode::<2>(
             block.words(),
@@ -525,7 +525,7 @@ mod tests {
     #[test]
     fn known_cells_that_changed_need_a_refresh() {
         let map = Map { now: vec![ray(Known::new(4, 60), &[])], was: vec![ray(USUAL, &[])] };
-        assert_eq!(Block::new(&context(Form::LONG, 1), Kind::Delta { ticks: 1 }, 0, &map).end, 0);
-        assert_eq!(Block::new(&context(Form::LONG, 1), Kind::Refresh, 0, &map).end, 1);
+        assert_eq!(Block::new(&context(Form::LONG, 1), Basis::Delta { ticks: 1 }, 0, &map).end, 0);
+        assert_eq!(Block::new(&context(Form::LONG, 1), Basis::Refresh, 0, &map).end, 1);
     }
 }

@@ -6,7 +6,7 @@ use super::measure::ReceiverLimits;
 use super::sectors::Sectors;
 use super::session::{Entry, Hearing, Session};
 use crate::fixed::time::Time;
-use crate::wire::code::block::Kind;
+use crate::wire::code::block::Basis;
 use crate::wire::code::ray::Ray;
 use crate::wire::code::reading::{self, Ending, Reader};
 use crate::wire::e2e::{Counter, Sequence};
@@ -386,8 +386,8 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
             (words, delta, place) = (begun.words(), begun.delta, begun.reading);
         }
         let kind = match (delta, reading::age(words, context.form)) {
-            (false, _) => Kind::Refresh,
-            (true, Some(ticks)) => Kind::Delta { ticks },
+            (false, _) => Basis::Refresh,
+            (true, Some(ticks)) => Basis::Delta { ticks },
             (true, None) => return Err(Refused::Malformed),
         };
         let mut reader = BlockReader { sectors, kind, scan: map.scan };
@@ -431,20 +431,20 @@ impl<const A: usize, const W: usize, const P: usize> SensorReceiver<A, W, P> {
 /// Reads a block into sectors.
 struct BlockReader<'a, const A: usize, const W: usize> {
     sectors: &'a mut Sectors<A, W>,
-    kind: Kind,
+    kind: Basis,
     scan: ScanNumber,
 }
 
 impl<const A: usize, const W: usize> Reader<W> for BlockReader<'_, A, W> {
     fn was(&self, azimuth: usize) -> Option<Ray<W>> {
         match self.kind {
-            Kind::Refresh => None,
-            Kind::Delta { ticks } => self.sectors.refresh(azimuth, self.scan.before(ticks)),
+            Basis::Refresh => None,
+            Basis::Delta { ticks } => self.sectors.refresh(azimuth, self.scan.before(ticks)),
         }
     }
 
     fn take(&mut self, azimuth: usize, ray: &Ray<W>) {
-        self.sectors.take(azimuth, self.scan, ray, self.kind == Kind::Refresh);
+        self.sectors.take(azimuth, self.scan, ray, self.kind == Basis::Refresh);
     }
 
     fn taken(&self, azimuth: usize) -> Option<Ray<W>> {

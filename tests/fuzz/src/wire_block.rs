@@ -1,7 +1,7 @@
 //! Any words as a block: the end comes, rays keep within their limits, and what is read can be resumed.
 
 use viewshed::fixed::bits::Bits;
-use viewshed::wire::code::block::{Context, Kind};
+use viewshed::wire::code::block::{Basis, Context};
 use viewshed::wire::code::interval::Form;
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::code::reading::{Ending, Reader, Resume, decode};
@@ -32,7 +32,7 @@ impl Reader<7> for Rays {
 pub fn run(bytes: &[u8]) {
     let [flags, start, near, last, pattern, words @ ..] = bytes else { return };
     let form = if flags & 1 == 0 { Form::CLASSIC } else { Form::LONG };
-    let kind = if flags & 2 == 0 { Kind::Refresh } else { Kind::Delta { ticks: 3 } };
+    let kind = if flags & 2 == 0 { Basis::Refresh } else { Basis::Delta { ticks: 3 } };
     let words: Vec<u64> = words
         .chunks_exact(5)
         .take(form.most)

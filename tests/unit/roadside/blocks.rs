@@ -3,9 +3,9 @@
 use crc::Crc;
 use proptest::prelude::*;
 use viewshed::unit::can_service::Tool;
-use viewshed::unit::said::{Piece, Refusal, Said};
+use viewshed::unit::reply::{Piece, Refusal, Said};
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, Kind, SettingsSlots, Which};
+use viewshed::unit::settings::{BLOCK_LEN, BlockKind, SettingsSlots, Which};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::status::{Reason, UnitState};
 
@@ -124,8 +124,8 @@ impl World {
         let started =
             self.said.iter().find_map(|said| if let Said::Started(place) = said { Some(*place) } else { None });
         let started = started.expect("says on the bus that it starts");
-        self.ports.broadcast.incoming.extend(tool().read(Which::in_use(Kind::Settings)));
-        self.ask(Request::Read(Which::in_use(Kind::Settings)));
+        self.ports.broadcast.incoming.extend(tool().read(Which::in_use(BlockKind::Settings)));
+        self.ask(Request::Read(Which::in_use(BlockKind::Settings)));
         let before = self.replies.len();
         self.run(200);
         let read: Vec<u8> =

@@ -1,11 +1,11 @@
 //! What a block says of the unit itself: its number, the bit rate of its line, how old its maps may get.
 
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, ConfigureRadar, Kind, Settings, UnitConfig, Which};
+use viewshed::unit::settings::{BLOCK_LEN, BlockKind, ConfigureRadar, Settings, UnitConfig, Which};
 use viewshed::wire::frame::{CanFrame, CanId};
 
 use super::{VERSION, World, settings};
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 
 fn with(unit: UnitConfig) -> World {
     World::new([Settings { unit, ..settings() }.to_block(1), [0xFF; BLOCK_LEN]])
@@ -51,7 +51,7 @@ fn a_unit_sends_and_answers_by_the_number_of_its_block() {
     }
     assert_eq!(ids.into_iter().collect::<Vec<_>>(), [0x400 / 32 + 3]);
     // asked by another number it says nothing, asked without one it says its own
-    world.ask(Request::Read(Which::in_use(Kind::Settings)));
+    world.ask(Request::Read(Which::in_use(BlockKind::Settings)));
     world.run(100);
     assert!(!world.replies.iter().any(|reply| reply[3] == 130));
     world.ask(Request::Identify);

@@ -8,7 +8,7 @@ use anyhow::{Result, bail, ensure};
 use serde::Serialize;
 use viewshed::fixed::time::Time;
 use viewshed::map::Visibility;
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 use viewshed::unit::settings::Settings;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Message, Received};

@@ -1,6 +1,6 @@
 //! How often radar-3d's maps use each symbol of the wire's code: where its tables come from.
 
-use viewshed::wire::code::block::{self, Context, Kind, Rays};
+use viewshed::wire::code::block::{self, Basis, Context, Rays};
 use viewshed::wire::code::interval::{Coder, Encoder, Form, Mark, Words};
 use viewshed::wire::code::model::{BELOW, Model};
 use viewshed::wire::code::ray::{Known, Ray};
@@ -77,7 +77,7 @@ impl Symbols {
     }
 
     /// Counts the symbols of one scan; returns the words it took.
-    pub fn count<const W: usize>(&mut self, scan: &Scan<'_, W>, form: Form, kind: Kind, usual: Known) -> usize {
+    pub fn count<const W: usize>(&mut self, scan: &Scan<'_, W>, form: Form, kind: Basis, usual: Known) -> usize {
         let context = Context { form, usual, azimuths: scan.now.len(), ranges: 32 * W };
         let all = tables(&BELOW);
         let (mut at, mut words) = (0, 0);

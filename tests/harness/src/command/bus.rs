@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail, ensure};
 use clap::builder::PossibleValuesParser;
 use viewshed::wire::broadcast::Medium;
-use viewshed::wire::code::block::Kind;
+use viewshed::wire::code::block::Basis;
 use viewshed::wire::code::interval::Form;
 
 use super::key::KeyArgs;
@@ -201,7 +201,7 @@ fn count(symbols: &mut Symbols, maps: &Maps) {
         if ticks == 0 {
             was.clone_from(&scan.rays);
         }
-        let kind = if ticks == 0 { Kind::Refresh } else { Kind::Delta { ticks } };
+        let kind = if ticks == 0 { Basis::Refresh } else { Basis::Delta { ticks } };
         symbols.count(&symbols::Scan { now: &scan.rays, was: &was }, Form::CLASSIC, kind, maps.header.usual);
     }
 }

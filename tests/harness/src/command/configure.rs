@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail, ensure};
 use viewshed::bench::stage::Stage;
-use viewshed::unit::settings::{BlockError, Kind, Settings, Which};
+use viewshed::unit::settings::{BlockError, BlockKind, Settings, Which};
 use viewshed::unit::timing::Count;
 
 use serde_json::{Map, Value, json};
@@ -156,7 +156,7 @@ fn carry_out(args: &Args, told: &mut Told) -> Result<ExitCode> {
                 unit.clear(kind)?;
             }
         }
-        unit.clear(Kind::Settings)?;
+        unit.clear(BlockKind::Settings)?;
         unit.restart()?;
         told.insert("emptied".into(), true.into());
         print("emptied and restarted: it sends its status only, until it is configured\n")?;

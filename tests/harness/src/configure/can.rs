@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use viewshed::unit::can_service::{Answers, Tool};
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Received};

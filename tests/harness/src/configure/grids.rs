@@ -2,7 +2,7 @@
 
 use viewshed::probability::{TableError, fitted_with};
 use viewshed::unit::profile::{reference, small};
-use viewshed::unit::settings::{BlockError, Kind, Settings, SettingsCheck, UnitConfig};
+use viewshed::unit::settings::{BlockError, BlockKind, Settings, SettingsCheck, UnitConfig};
 
 use super::file::{FITTED_ON, UnitFile};
 use super::kept::{self, KINDS};
@@ -68,11 +68,11 @@ impl Grid {
 
     /// Boards of this grid that have no room for all of a file, and what for.
     pub fn not_on(&self, file: &UnitFile) -> Vec<(&'static str, String)> {
-        let has = |kind: Kind| KINDS.into_iter().zip(&file.blocks).any(|(k, block)| k == kind && block.is_some());
+        let has = |kind: BlockKind| KINDS.into_iter().zip(&file.blocks).any(|(k, block)| k == kind && block.is_some());
         let missing = |board: &Board| {
             let parts = [
-                (has(Kind::Lanes) && !board.lanes, kept::key(Kind::Lanes)),
-                (has(Kind::Probabilities) && !board.table, kept::key(Kind::Probabilities)),
+                (has(BlockKind::Lanes) && !board.lanes, kept::key(BlockKind::Lanes)),
+                (has(BlockKind::Probabilities) && !board.table, kept::key(BlockKind::Probabilities)),
                 (file.settings.unit.learn_lanes && !board.learns, "learn_lanes"),
             ];
             parts.into_iter().filter(|(lacks, _)| *lacks).map(|(_, key)| key).collect::<Vec<_>>()
@@ -86,7 +86,7 @@ impl Grid {
 /// settings were written.
 pub fn table_refused(file: &UnitFile, cells: [u8; 2]) -> Option<String> {
     let table = file.fitted_with?;
-    let key = kept::key(Kind::Probabilities);
+    let key = kept::key(BlockKind::Probabilities);
     if file.settings.unit.learn_lanes {
         return Some(format!(
             "{key}: tables are fitted without learn_lanes, and fit no unit that learns; take one out"

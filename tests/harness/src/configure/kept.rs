@@ -1,25 +1,25 @@
 //! What a unit keeps of its place beside its settings: heights of the road, lanes of traffic, a table of probabilities.
 
 use anyhow::{Result, bail, ensure};
-use viewshed::sensor::place::{LaneList, PackError, Points};
-use viewshed::unit::said::Said;
+use viewshed::sensor::site::{LaneList, PackError, Points};
+use viewshed::unit::reply::Said;
 use viewshed::unit::settings::{
-    BlockError, Kind, MOST_BLOCK_LEN, Which, announced_length, heights_block, kept_points, lanes_block,
+    BlockError, BlockKind, MOST_BLOCK_LEN, Which, announced_length, heights_block, kept_points, lanes_block,
 };
 
 use super::link::Ask;
 use super::{ANSWER, Found};
 
 /// Kinds of blocks beside settings.
-pub const KINDS: [Kind; 3] = [Kind::Heights, Kind::Lanes, Kind::Probabilities];
+pub const KINDS: [BlockKind; 3] = [BlockKind::Heights, BlockKind::Lanes, BlockKind::Probabilities];
 
 /// What a kind is called in a file.
-pub const fn key(kind: Kind) -> &'static str {
+pub const fn key(kind: BlockKind) -> &'static str {
     match kind {
-        Kind::Settings => "settings",
-        Kind::Heights => "[ground]",
-        Kind::Lanes => "[[lanes]]",
-        Kind::Probabilities => "[probability]",
+        BlockKind::Settings => "settings",
+        BlockKind::Heights => "[ground]",
+        BlockKind::Lanes => "[[lanes]]",
+        BlockKind::Probabilities => "[probability]",
     }
 }
 
@@ -80,7 +80,7 @@ pub fn same(a: &[u8], b: &[u8]) -> bool {
 ///
 /// # Errors
 /// A block that does not hold.
-pub fn text(kind: Kind, block: &[u8]) -> Result<String> {
+pub fn text(kind: BlockKind, block: &[u8]) -> Result<String> {
     let (heights, lanes) = kept_points(kind, block)?;
     let list = |points: Points<'_>| -> String {
         points.map(|[x, y]| format!("[{x:?}, {y:?}]")).collect::<Vec<_>>().join(", ")
@@ -92,7 +92,7 @@ pub fn text(kind: Kind, block: &[u8]) -> Result<String> {
     for lane in lanes.into_iter().flatten() {
         text += &format!("\n[[lanes]]\npoints = [{}]\n", list(lane));
     }
-    if kind == Kind::Probabilities {
+    if kind == BlockKind::Probabilities {
         let sum = block.len().checked_sub(4).and_then(|at| block.get(at..)).unwrap_or_default();
         text += &format!("\n# a table of probabilities, in a block of check sum {:02x?}\n", sum);
     }
@@ -116,7 +116,7 @@ impl Found<'_> {
             })?;
             match heard {
                 // firmware that knows settings alone answers with these
-                Some(Said::Block(block)) if Kind::of_block(block.bytes()) != Some(which.kind) => {
+                Some(Said::Block(block)) if BlockKind::of_block(block.bytes()) != Some(which.kind) => {
                     return Ok(Kept::NoRoom);
                 }
                 Some(Said::Block(block)) => return Ok(Kept::Block(Some(block.bytes().to_vec()))),
@@ -143,7 +143,7 @@ impl Found<'_> {
     ///
     /// # Errors
     /// It does not answer; it has no room for what the file has.
-    pub fn plan(&mut self, blocks: &Blocks) -> Result<Vec<(Kind, bool)>> {
+    pub fn plan(&mut self, blocks: &Blocks) -> Result<Vec<(BlockKind, bool)>> {
         let mut plan = Vec::new();
         for (kind, wanted) in KINDS.into_iter().zip(blocks) {
             match (self.kept(Which::newest(kind))?, wanted) {
@@ -165,7 +165,7 @@ impl Found<'_> {
     ///
     /// # Errors
     /// It refuses it, falls silent, or says something else afterwards.
-    pub fn write_kept(&mut self, kind: Kind, block: &[u8]) -> Result<u32> {
+    pub fn write_kept(&mut self, kind: BlockKind, block: &[u8]) -> Result<u32> {
         let sequence = self.send(block)?;
         let kept = self.kept(Which::newest(kind))?;
         let is_same = matches!(&kept, Kept::Block(Some(has)) if same(has, block));

@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use viewshed::unit::said::Said;
-use viewshed::unit::settings::{Kind, Which};
+use viewshed::unit::reply::Said;
+use viewshed::unit::settings::{BlockKind, Which};
 
 /// What a unit is asked.
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +26,7 @@ pub enum Ask<'a> {
     /// Start over.
     Restart,
     /// Empty both slots of a kind.
-    Clear(Kind),
+    Clear(BlockKind),
     /// Say how long frames take.
     Timing,
 }

@@ -23,9 +23,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use viewshed::unit::can_service::INCOMPLETE;
 use viewshed::unit::identity::Identified;
-use viewshed::unit::said::{Refusal, Said};
+use viewshed::unit::reply::{Refusal, Said};
 use viewshed::unit::service::PART_LEN;
-use viewshed::unit::settings::{BlockError, Kind, Settings, Which};
+use viewshed::unit::settings::{BlockError, BlockKind, Settings, Which};
 use viewshed::unit::timing::Took;
 
 use file::UnitFile;
@@ -223,7 +223,7 @@ impl Found<'_> {
     /// # Errors
     /// It does not answer.
     pub fn in_use(&mut self) -> Result<Result<Stored, BlockError>> {
-        self.read_block(Ask::Read(Which::in_use(Kind::Settings)))
+        self.read_block(Ask::Read(Which::in_use(BlockKind::Settings)))
     }
 
     /// The block it will run with from its next start on.
@@ -231,7 +231,7 @@ impl Found<'_> {
     /// # Errors
     /// It does not answer.
     pub fn newest(&mut self) -> Result<Result<Stored, BlockError>> {
-        self.read_block(Ask::Read(Which::newest(Kind::Settings)))
+        self.read_block(Ask::Read(Which::newest(BlockKind::Settings)))
     }
 
     /// Writes settings and reads them back; the block's sequence.
@@ -322,7 +322,7 @@ impl Found<'_> {
     ///
     /// # Errors
     /// It does not answer.
-    pub fn clear(&mut self, kind: Kind) -> Result<()> {
+    pub fn clear(&mut self, kind: BlockKind) -> Result<()> {
         let cleared = self.ask(Ask::Clear(kind), WRITING, |said| (said == Said::Cleared).then_some(()))?;
         ensure!(cleared.is_some(), "{}: the unit does not say that its slots are empty; --read tells", self.place());
         Ok(())

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 use viewshed::unit::service::{EVERY_SENSOR, PART_LEN, Request};
 use viewshed::unit::settings::UnitConfig;
 use viewshed::wire::message::Received;

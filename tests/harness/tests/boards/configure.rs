@@ -19,7 +19,7 @@ use viewshed::unit::Flow;
 use viewshed::unit::can_service::{CanService, CanServiceConfig};
 use viewshed::unit::identity::Identity;
 use viewshed::unit::profile::small;
-use viewshed::unit::settings::{Kind, StoredSettings};
+use viewshed::unit::settings::{BlockKind, StoredSettings};
 use viewshed::wire::broadcast::Medium;
 use viewshed::wire::frame::CanFrame;
 use viewshed::wire::message::{Addresses, Epoch};
@@ -541,7 +541,7 @@ fn zcu102_is_configured_over_its_can_controller() {
     assert_eq!(unit.restart().unwrap(), Some(sequence));
     assert_eq!(unit.unit.sensor, 6);
     assert_eq!(unit.in_use().unwrap().unwrap(), Stored { sequence, settings });
-    unit.clear(Kind::Settings).unwrap();
+    unit.clear(BlockKind::Settings).unwrap();
     assert_eq!(unit.restart().unwrap(), None);
     assert!(unit.in_use().unwrap().is_err());
 }

@@ -6,7 +6,7 @@
 //! the comparison of its stage, [`agreement`] compares the whole over the shipped recording and [`traffic`] on random scenes.
 //!
 //! Parameters come from the library's configurations in SI units. Rules of tracking that are no
-//! configuration are read from [`viewshed::obstacles::tracking::Tracking`] in their stated units.
+//! configuration are read from [`viewshed::obstacles::parameters::TrackingParameters`] in their stated units.
 //! What differs from the library by design: no sorting by range, no table, no byte. All roads are flat here; over
 //! others shadows are compared with lines of sight in `tests/properties/ground.rs`.
 

@@ -174,7 +174,13 @@ class Page {
       ? (sample) => sample.tv + sample.fv > 0
       : (sample) => sample.unknown < 1;
     const begins = samples.findIndex((sample) => sample && saysSomething(sample));
-    if (!this.isLive && !this.touched && begins > 0 && this.number < begins) this.goTo(begins, true);
+    // an address that ends in #SECONDS leads to that moment, once it is there
+    const asked = Number(location.hash.slice(1) || NaN);
+    const isThere = samples.some((sample) => sample && sample.time_s >= asked);
+    if (!this.isLive && !this.touched && isThere && !this.led) {
+      this.led = true;
+      this.goTo(this.source.nearest(asked), true);
+    } else if (!this.isLive && !this.touched && !this.led && begins > 0 && this.number < begins) this.goTo(begins, true);
     this.fitTime(samples);
     this.plots.time.changed();
   }

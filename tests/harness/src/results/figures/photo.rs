@@ -33,7 +33,10 @@ pub fn make(of: &Path, picture: &Path) -> Result<()> {
         return Ok(());
     }
     let program = browser().with_context(|| {
-        format!("{}: no Chromium to photograph a page with (apt-get install chromium-headless-shell)", picture.display())
+        format!(
+            "{}: no Chromium to photograph a page with (apt-get install chromium-headless-shell)",
+            picture.display()
+        )
     })?;
     let address = format!("file://{}", of.display());
     let to = format!("--screenshot={}", std::path::absolute(picture)?.display());

@@ -8,7 +8,7 @@ use viewshed::inputs::ti::TiFamily;
 use viewshed::map::Visibility;
 use viewshed::unit::profile::reference::State;
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{Kind, Settings, Which};
+use viewshed::unit::settings::{BlockKind, Settings, Which};
 use viewshed::wire::message::{Addresses, Message, Received};
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
 use viewshed::wire::serial::Unstuffer;
@@ -62,13 +62,13 @@ fn maps(messages: &[Vec<u8>]) -> Vec<(u8, Vec<u8>)> {
 fn linux_in_a_test_bench_every_message_of_five_seconds_is_the_same() {
     let (settings, scans) = shipped(5.0);
     let mut script = Script::default();
-    script.request(&Request::Read(Which::in_use(Kind::Settings)));
+    script.request(&Request::Read(Which::in_use(BlockKind::Settings)));
     script.configure(&settings);
     scans.iter().for_each(|s| script.scan(s, scans[0].time));
     let mut broken = settings;
     broken.sensor.mount.height_m = 50.0;
     script.request(&Request::Write(&broken.to_block(7)));
-    script.request(&Request::Read(Which::in_use(Kind::Settings)));
+    script.request(&Request::Read(Which::in_use(BlockKind::Settings)));
     let expected = answer(Profile::Reference, &script.bytes).bytes;
 
     // two starts before the twin's last epoch

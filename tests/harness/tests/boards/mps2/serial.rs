@@ -9,9 +9,9 @@ use viewshed::frame::detection::Detection;
 use viewshed::frame::thinning::Thinning;
 use viewshed::map::Visibility;
 use viewshed::unit::profile::reference::{Map, State};
-use viewshed::unit::said::Said;
+use viewshed::unit::reply::Said;
 use viewshed::unit::service::Request;
-use viewshed::unit::settings::{BLOCK_LEN, BlockError, Kind, Settings, Which};
+use viewshed::unit::settings::{BLOCK_LEN, BlockError, BlockKind, Settings, Which};
 use viewshed::wire::message::{Addresses, Plane, Received};
 use viewshed::wire::planes::{Planes, Quantised};
 use viewshed::wire::receive::{Receiver, ReceiverLimits};
@@ -275,9 +275,9 @@ fn a_configuration_reads_back_and_counts_from_the_restart_on() {
     let mut other = settings;
     other.visibility.visible_from = 0.8;
     script.request(&Request::Write(&other.to_block(0)));
-    script.request(&Request::Read(Which::in_use(Kind::Settings)));
+    script.request(&Request::Read(Which::in_use(BlockKind::Settings)));
     script.request(&Request::Restart);
-    script.request(&Request::Read(Which::in_use(Kind::Settings)));
+    script.request(&Request::Read(Which::in_use(BlockKind::Settings)));
     scans.iter().for_each(|s| script.scan(s, scans[0].time));
     script.request(&Request::Restart);
     let board = same(Profile::Small, &script);
@@ -314,10 +314,10 @@ fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_map
     script.configure(&settings);
     kept::blocks(&settings).iter().for_each(|block| script.write(block));
     // not before the restart
-    script.request(&Request::ReadPart(Which::in_use(Kind::Lanes), 0));
-    script.request(&Request::ReadPart(Which::newest(Kind::Lanes), 0));
+    script.request(&Request::ReadPart(Which::in_use(BlockKind::Lanes), 0));
+    script.request(&Request::ReadPart(Which::newest(BlockKind::Lanes), 0));
     script.request(&Request::Restart);
-    script.request(&Request::ReadPart(Which::in_use(Kind::Lanes), 0));
+    script.request(&Request::ReadPart(Which::in_use(BlockKind::Lanes), 0));
     scans.iter().for_each(|s| script.scan(s, first));
     let board = same(Profile::Reference, &script);
     let all = messages(&board.line.answer);
@@ -326,15 +326,15 @@ fn lanes_heights_and_a_table_of_probabilities_outlast_a_restart_and_give_the_map
     assert_eq!(written, 4, "settings, heights, lanes, table");
     let [_, lanes, _] = kept::blocks(&settings);
     let of_lanes = |said: &&Said| match said {
-        Said::Part(which, ..) => which.kind == Kind::Lanes,
-        Said::Refused(refusal) => refusal.of_kind().0 == Some(Kind::Lanes),
+        Said::Part(which, ..) => which.kind == BlockKind::Lanes,
+        Said::Refused(refusal) => refusal.of_kind().0 == Some(BlockKind::Lanes),
         _ => false,
     };
     let parts: Vec<_> = said.iter().filter(of_lanes).collect();
     let [Said::Refused(none), Said::Part(_, 0, newest), Said::Part(_, 0, in_use)] = parts[..] else {
         panic!("{parts:?}")
     };
-    assert_eq!((none.of_kind(), newest), ((Some(Kind::Lanes), BlockError::Empty.code()), in_use));
+    assert_eq!((none.of_kind(), newest), ((Some(BlockKind::Lanes), BlockError::Empty.code()), in_use));
     assert!(configure::kept::same(newest.bytes(), &lanes));
 
     let scans: Vec<Scan> = scans.into_iter().map(collected).collect();

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use viewshed::bench::flash::Flash;
 use viewshed::fixed::time::Time;
 use viewshed::unit::can_service::{Answers, Tool};
-use viewshed::unit::said::Said;
-use viewshed::unit::settings::{Kind, Settings, Which};
+use viewshed::unit::reply::Said;
+use viewshed::unit::settings::{BlockKind, Settings, Which};
 use viewshed::wire::frame::{CanFrame, CanId};
 use viewshed::wire::status::{Reason, UnitState};
 use viewshed_harness::boards::can::CanBoard;
@@ -112,7 +112,7 @@ fn a_configuration_goes_over_the_bus_and_a_corrupted_one_is_refused_with_its_rea
         steps.push(Step { time: at(1000 + 100 * k as u64), frames: tool.write(block).collect() });
     }
     steps.push(Step { time: at(1300), frames: tool.restart().into_iter().collect() });
-    steps.push(Step { time: at(1320), frames: tool.read(Which::in_use(Kind::Settings)).into_iter().collect() });
+    steps.push(Step { time: at(1320), frames: tool.read(Which::in_use(BlockKind::Settings)).into_iter().collect() });
     let mut traffic = clusters(&scans, 20, 40);
     traffic.iter_mut().for_each(|step| step.time = Time::from_micros(step.time.micros() + 1_400_000));
     steps.extend(traffic.clone());

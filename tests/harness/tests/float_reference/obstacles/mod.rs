@@ -2,8 +2,8 @@
 
 mod fixtures;
 mod obstacle;
+mod off_axis;
 mod outline;
-mod own_way;
 mod rules;
 mod synthetic;
 

@@ -2,8 +2,8 @@
 
 use viewshed_harness::geometry::solid::Solid;
 
+use super::off_axis::FreeMotion;
 use super::outline::{BIN_M, Extent, Profile, Reflectivity, TALL, Tallness, least_length, size};
-use super::own_way::FreeMotion;
 use super::rules::Rules;
 use crate::geometry::{Ground, Placed, across, along, difference, left, moved};
 
@@ -527,8 +527,8 @@ impl Obstacle {
         let across = along(left(rules.road), self.heading).abs() > ACROSS;
         let margin = match (self.free_heading, across) {
             (false, _) => 0.0,
-            (true, false) => rules.own_way_margin / 2.0,
-            (true, true) => rules.own_way_margin,
+            (true, false) => rules.off_axis_margin / 2.0,
+            (true, true) => rules.off_axis_margin,
         };
         let yaw_rad = self.heading[1].atan2(self.heading[0]);
         Solid { center: [x, y, height / 2.0], yaw_rad, size: [length, width + 2.0 * margin, height] }

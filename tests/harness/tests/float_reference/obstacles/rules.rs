@@ -1,10 +1,10 @@
 //! Parameters of tracking in metres and seconds.
 
 use viewshed::obstacles::config::ObstacleConfig;
-use viewshed::obstacles::size::SizeConfig;
-use viewshed::obstacles::tracking::{
+use viewshed::obstacles::parameters::{
     INERTIA, MERGE_PARALLEL, MOST_HITS_A_FRAME, RECENTRE_BINS, YOUNG_FRAMES, YOUNG_INERTIA,
 };
+use viewshed::obstacles::size::SizeConfig;
 use viewshed::sensor::noise::NoiseConfig;
 
 use crate::geometry::{Ground, Placed, along};
@@ -59,14 +59,14 @@ pub struct Rules {
     pub half_width: f64,
     pub outline_sigmas: f64,
     pub turning_noise: f64,
-    pub own_way: f64,
-    pub own_way_share: f64,
-    pub own_way_follow: f64,
-    pub own_way_margin: f64,
+    pub off_axis: f64,
+    pub off_axis_share: f64,
+    pub off_axis_follow: f64,
+    pub off_axis_margin: f64,
     pub length_growth: f64,
     pub length_memory: f64,
     pub slow: f64,
-    pub own_way_sigmas: f64,
+    pub off_axis_sigmas: f64,
     pub heading_sigmas: f64,
     pub standing_speed: f64,
     pub standing_visible_loss: f64,
@@ -125,14 +125,14 @@ impl Rules {
             half_width: real(c.half_width_m),
             outline_sigmas: real(c.outline_sigmas),
             turning_noise: real(c.turning_noise_mps),
-            own_way: real(c.own_way_mps),
-            own_way_share: real(c.own_way_share),
-            own_way_follow: real(c.own_way_follow),
-            own_way_margin: real(c.own_way_margin_m),
+            off_axis: real(c.off_axis_mps),
+            off_axis_share: real(c.off_axis_share),
+            off_axis_follow: real(c.off_axis_follow),
+            off_axis_margin: real(c.off_axis_margin_m),
             length_growth: real(c.length_growth_s),
             length_memory: real(c.length_memory_s),
             slow: real(c.slow_mps),
-            own_way_sigmas: real(c.own_way_sigmas),
+            off_axis_sigmas: real(c.off_axis_sigmas),
             heading_sigmas: real(c.heading_sigmas),
             standing_speed: real(c.standing_speed_mps),
             standing_visible_loss: real(c.standing_visible_loss_per_s),

@@ -59,7 +59,7 @@ mod tests {
         levelled: Levelled,
         noise: NoiseConfig,
         levelling: viewshed::sensor::mount::Levelling,
-        tracking: viewshed::obstacles::tracking::Tracking,
+        tracking: viewshed::obstacles::parameters::TrackingParameters,
         rules: Rules,
         integer: IntegerObstacles<16>,
         exact: Obstacles,

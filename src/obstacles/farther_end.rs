@@ -10,17 +10,17 @@
 
 use super::Obstacles;
 use super::obstacle::Obstacle;
-use super::tracking::{MERGE_PARALLEL, Tracking};
+use super::parameters::{MERGE_PARALLEL, TrackingParameters};
 
 /// Longest outline of one end of something tall, centimetres.
 const END_CM: i32 = 300;
 
 impl<const N: usize> Obstacles<N> {
     /// Looks which are seen at their farther end alone.
-    pub(super) fn look_for_room(&mut self, t: &Tracking) {
+    pub(super) fn find_farther_ends(&mut self, t: &TrackingParameters) {
         let mut farther = [false; N];
         for (o, farther) in self.list.iter().zip(&mut farther) {
-            *farther = o.is_an_end_of_something_tall(t) && self.list.iter().any(|next| o.has_no_room_before(next, t));
+            *farther = o.is_an_end_of_something_tall(t) && self.list.iter().any(|next| o.would_overlap(next, t));
         }
         for (o, farther) in self.list.iter_mut().zip(farther) {
             o.farther_end = farther;
@@ -29,13 +29,13 @@ impl<const N: usize> Obstacles<N> {
 }
 
 impl Obstacle {
-    fn is_an_end_of_something_tall(&self, t: &Tracking) -> bool {
+    fn is_an_end_of_something_tall(&self, t: &TrackingParameters) -> bool {
         self.tallness.is_tall() && self.speed() < t.slow_speed && self.extent.length_cm() < END_CM
     }
 
     /// Whether another vehicle, farther away in the same line, begins where the rest of this one should be. What is tall
     /// as well may be a part of it.
-    fn has_no_room_before(&self, next: &Self, t: &Tracking) -> bool {
+    fn would_overlap(&self, next: &Self, t: &TrackingParameters) -> bool {
         if next.existence < t.confirmed || !next.is_mover(t) || next.tallness.is_tall() || !self.is_near(next, t) {
             return false;
         }
@@ -82,7 +82,7 @@ mod tests {
         let t = rules();
         let mut all = Obstacles::<4>::new();
         vehicles.iter().for_each(|o| all.list.push(o.clone()).unwrap());
-        all.look_for_room(&t);
+        all.find_farther_ends(&t);
         let solid = all.iter().next().unwrap().solid(&t);
         [solid.x_cm - solid.half_length_cm, solid.x_cm + solid.half_length_cm]
     }

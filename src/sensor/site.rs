@@ -20,7 +20,7 @@ pub const LANE_POINT_LEN: usize = 4;
 
 /// Lanes and heights.
 #[derive(Debug, Clone, Copy)]
-pub struct Place<'a> {
+pub struct Site<'a> {
     /// Which way traffic goes; may be none.
     pub lanes: LaneList<'a>,
     /// Heights of the road over its length; none where it is flat.
@@ -58,12 +58,12 @@ pub enum PackError {
     TooFar(usize),
 }
 
-impl Place<'static> {
+impl Site<'static> {
     /// No lanes, and a flat road.
     pub const NOTHING: Self = Self { lanes: LaneList::Metres(&[]), heights: Points::Metres(&[]) };
 }
 
-impl Place<'_> {}
+impl Site<'_> {}
 
 impl<'a> Iterator for LaneList<'a> {
     type Item = Points<'a>;

@@ -1,7 +1,7 @@
 //! What a unit says to its integrator, whatever line it came over.
 
 use super::identity::Identified;
-use super::settings::{Kind, MOST_BLOCK_LEN, Which};
+use super::settings::{BlockKind, MOST_BLOCK_LEN, Which};
 use super::timing::Took;
 
 /// Why a unit refused a block.
@@ -27,8 +27,8 @@ impl Refusal {
 
     /// What the block is of, and what is wrong with it, as in
     /// [`BlockError::code`](crate::unit::settings::BlockError::code).
-    pub fn of_kind(&self) -> (Option<Kind>, u8) {
-        (Kind::from_number(self.reason >> 4), self.reason & 0xF)
+    pub fn of_kind(&self) -> (Option<BlockKind>, u8) {
+        (BlockKind::from_number(self.reason >> 4), self.reason & 0xF)
     }
 
     /// The parameter's name; empty if the refusal is not about one.

@@ -21,7 +21,7 @@ const MOST_NOISE: f64 = 0.25;
 const TURN: f64 = 0.05;
 const SHARED: f64 = 1.0 / 3.0;
 /// Frames in a row in which motion along the heading must fail.
-const OWN_WAY_FRAMES: u32 = 2;
+const OFF_AXIS_FRAMES: u32 = 2;
 
 /// A Kalman filter of place and speed across the line of sight; Doppler along it.
 #[derive(Debug, Clone, Copy)]
@@ -101,7 +101,7 @@ impl Obstacle {
         if self.free_heading {
             let centre = self.profile.mean().unwrap_or(self.extent.middle());
             let off = along(self.heading, difference(self.free.place, self.anchor)) - centre;
-            self.anchor = moved(self.anchor, self.heading, off * rules.own_way_follow);
+            self.anchor = moved(self.anchor, self.heading, off * rules.off_axis_follow);
         }
     }
 
@@ -151,10 +151,10 @@ impl Obstacle {
         }
         let off = difference(self.free.velocity, self.velocity);
         let aside = across(self.heading, off).abs();
-        let certain = aside > rules.own_way.max(rules.own_way_share * length(self.velocity))
-            && self.free.is_sure_of(length(off), rules.own_way_sigmas);
+        let certain = aside > rules.off_axis.max(rules.off_axis_share * length(self.velocity))
+            && self.free.is_sure_of(length(off), rules.off_axis_sigmas);
         self.unexplained = if certain { self.unexplained + 1 } else { 0 };
-        if self.unexplained >= OWN_WAY_FRAMES {
+        if self.unexplained >= OFF_AXIS_FRAMES {
             self.free_heading = true;
             self.anchor = self.free.place;
             self.velocity = self.free.velocity;

@@ -3,7 +3,7 @@
 /// What a block is built on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Kind {
+pub enum Basis {
     /// Decodes alone.
     Refresh,
     /// On the refresh this many ticks older, 1 to 16.

@@ -15,14 +15,14 @@ use super::doppler_slope::Target;
 use super::lanes::{LEARNT, NO_LANE};
 use super::motion::{Across, Seen};
 use super::obstacle::{FRACTION, Obstacle};
+use super::parameters::TrackingParameters;
 use super::profile::{BIN_CM, Extent, Profile};
-use super::tracking::Tracking;
 use crate::fixed::math::{length, mul_shift, ratio};
 use crate::fixed::time::Step;
 use crate::fixed::trig::Direction;
 
 /// Frames in a row in which motion along the heading must fail.
-const OWN_WAY_FRAMES: u8 = 2;
+const OFF_AXIS_FRAMES: u8 = 2;
 /// Variance that a turn adds to a heading, 2^-16 rad^2 for a centimetre of way: a radian, the tightest turn, in 6 m at one
 /// standard deviation, or 13 degrees in a metre.
 const TURN: i32 = 33;
@@ -35,14 +35,14 @@ const LEAST_VARIANCE: i32 = 20 * 20;
 
 impl Obstacle {
     /// Whether the heading of one that goes its own way is known better than what it was while faster.
-    pub(super) fn knows_its_way(&self, t: &Tracking) -> bool {
+    pub(super) fn knows_its_way(&self, t: &TrackingParameters) -> bool {
         let (vx, vy) = self.free.velocity;
         let speed = length(vx >> FRACTION, vy >> FRACTION);
         self.speed() > t.turning_speed && self.free.is_sure_of(speed, t.heading_sigmas)
     }
 
     /// Lets the free motion follow this frame's detections.
-    pub(super) fn follow(&mut self, t: &Tracking) {
+    pub(super) fn follow(&mut self, t: &TrackingParameters) {
         let g = self.gathered;
         let (along, left) = ((g.offset.0 << FRACTION) / g.count.max(1), (g.offset.1 << FRACTION) / g.count.max(1));
         let (hx, hy) = (i32::from(self.heading.x), i32::from(self.heading.y));
@@ -69,7 +69,7 @@ impl Obstacle {
             // not the middle of the outline: of a lorry the nearer end shows more of itself
             let centre = self.profile.mean_cm().unwrap_or(self.extent.middle_cm());
             let ahead = self.heading.along(dx, dy) - (centre << FRACTION);
-            let by = mul_shift(ahead, t.own_way_follow, 16);
+            let by = mul_shift(ahead, t.off_axis_follow, 16);
             self.position.0 += mul_shift(by, hx, 14);
             self.position.1 += mul_shift(by, hy, 14);
         }
@@ -108,30 +108,30 @@ impl Obstacle {
 
     /// Judges whether motion along the heading explains where it is seen; if not for long, it goes its own way. What stands
     /// on a learnt lane has driven there: what is seen of a lorry beside the radar moves though it does not.
-    pub(super) fn question_heading(&mut self, t: &Tracking) {
+    pub(super) fn question_heading(&mut self, t: &TrackingParameters) {
         if self.free_heading || (self.lane == LEARNT && self.is_standing(t)) {
             return;
         }
         let (fx, fy) = self.free.velocity;
         let (dx, dy) = ((fx - self.velocity.0) >> FRACTION, (fy - self.velocity.1) >> FRACTION);
         let aside = self.heading.across(dx, dy).abs();
-        let least = t.own_way_cm_s.max(mul_shift(self.speed(), t.own_way_share, 16 + FRACTION));
-        if aside > least && self.free.is_sure_of(length(dx, dy), t.own_way_sigmas) {
+        let least = t.off_axis_cm_s.max(mul_shift(self.speed(), t.off_axis_share, 16 + FRACTION));
+        if aside > least && self.free.is_sure_of(length(dx, dy), t.off_axis_sigmas) {
             self.unexplained += 1;
         } else {
             self.unexplained = 0;
         }
-        if self.unexplained >= OWN_WAY_FRAMES {
+        if self.unexplained >= OFF_AXIS_FRAMES {
             self.lane = NO_LANE;
             self.find_lane(t);
             if !self.is_on_lane() {
-                self.go_own_way();
+                self.leave_axis();
             }
         }
     }
 
     /// Goes on from the free motion, with a new outline.
-    fn go_own_way(&mut self) {
+    fn leave_axis(&mut self) {
         self.free_heading = true;
         self.position = self.free.place;
         self.velocity = self.free.velocity;

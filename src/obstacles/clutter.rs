@@ -1,4 +1,4 @@
-//! Fixtures that a unit on a pole learns: what reflects at the same place for long and is no vehicle.
+//! ClutterMap that a unit on a pole learns: what reflects at the same place for long and is no vehicle.
 //!
 //! Masts, posts and guard rails stand beside lanes, as near to them as boxes are wide. A vehicle that stops beside a mast, or
 //! crosses the line of sight there, which shows no Doppler either, takes its detections for its own: the box grows to it, and
@@ -27,7 +27,7 @@
 use heapless::Vec;
 
 use super::obstacle::Obstacle;
-use super::tracking::Tracking;
+use super::parameters::TrackingParameters;
 use super::{Claimed, Obstacles};
 use crate::fixed::math::length;
 use crate::fixed::time::{Phase, Step};
@@ -63,7 +63,7 @@ const POINT: (i32, i32) = (150, 3500);
 
 /// A place that reflects.
 #[derive(Debug, Clone, Copy)]
-struct Fixture {
+struct Reflector {
     /// Centimetres times [`FOLLOWS`], in the levelled frame.
     place: (i32, i32),
     /// How far away that is, centimetres.
@@ -79,8 +79,8 @@ struct Fixture {
 
 /// What reflects at the same place, for long or as a candidate.
 #[derive(Debug, Clone)]
-pub(super) struct Fixtures<const N: usize> {
-    list: Vec<Fixture, N, u16>,
+pub(super) struct ClutterMap<const N: usize> {
+    list: Vec<Reflector, N, u16>,
     phase: Phase,
     /// The first that is compared with the obstacles in the next frame.
     turn: usize,
@@ -90,7 +90,7 @@ fn stands(r: &Reflection) -> bool {
     r.radial_velocity_cm_s.unsigned_abs() <= STANDS_CM_S
 }
 
-impl Fixture {
+impl Reflector {
     fn new(r: &Reflection) -> Self {
         let place = (r.x_cm * FOLLOWS, r.y_cm * FOLLOWS);
         Self { place, distance_cm: length(r.x_cm, r.y_cm), known_for: 0, compared: 0, away: 0, hidden: 0 }
@@ -109,7 +109,7 @@ impl Fixture {
         &self,
         reflections: &'a [Reflection],
         by_range: &'a ByRange<D>,
-        t: &Tracking,
+        t: &TrackingParameters,
     ) -> impl Iterator<Item = (usize, &'a Reflection, bool)> + 'a {
         let ((x, y), distance, sigmas) = (self.place_cm(), self.distance_cm, t.sigmas);
         let around = by_range.between(distance - 2 * ALONG_CM, distance + 2 * ALONG_CM).iter().take(MOST_AROUND);
@@ -145,7 +145,7 @@ impl Fixture {
     }
 }
 
-impl<const N: usize> Fixtures<N> {
+impl<const N: usize> ClutterMap<N> {
     pub const fn new() -> Self {
         Self { list: Vec::new(), phase: Phase::START, turn: 0 }
     }
@@ -181,7 +181,7 @@ impl<const N: usize> Obstacles<N> {
         &self,
         reflections: &[Reflection],
         by_range: &ByRange<D>,
-        t: &Tracking,
+        t: &TrackingParameters,
     ) -> Claimed<D> {
         let mut kept = Claimed::NONE;
         for fixture in self.fixtures.list.iter().filter(|f| f.is_learnt()) {
@@ -197,7 +197,7 @@ impl<const N: usize> Obstacles<N> {
         by_range: &ByRange<D>,
         claimed: &Claimed<D>,
         step: Step,
-        t: &Tracking,
+        t: &TrackingParameters,
         in_view: impl Fn(i32, i32) -> bool,
     ) {
         let fixtures = &mut self.fixtures;
@@ -231,7 +231,7 @@ impl<const N: usize> Obstacles<N> {
             let is_of_last = |last: &Reflection| (last.x_cm - r.x_cm).abs() + (last.y_cm - r.y_cm).abs() < 2 * ALONG_CM;
             if !last.is_some_and(is_of_last) {
                 // where there is no room it is not learnt
-                let _ = fixtures.list.push(Fixture::new(r));
+                let _ = fixtures.list.push(Reflector::new(r));
             }
             last = Some(r);
         }
@@ -240,14 +240,14 @@ impl<const N: usize> Obstacles<N> {
 
 impl Obstacle {
     /// Whether what reflects at a place may be a part of it that its outline lacks.
-    fn may_have_a_part_at(&self, x: i32, y: i32, t: &Tracking) -> bool {
+    fn may_have_a_part_at(&self, x: i32, y: i32, t: &TrackingParameters) -> bool {
         let (along, left) = self.local(x, y);
         let near = left.abs() < PART_CM[0] && self.extent.beyond_cm(along) < PART_CM[1];
         near && self.existence >= t.confirmed && self.is_mover(t)
     }
 
     /// Whether it stands, shows one point alone, and that is as high as only wide or long vehicles are.
-    pub(super) fn is_a_mast(&self, t: &Tracking) -> bool {
+    pub(super) fn is_a_mast(&self, t: &TrackingParameters) -> bool {
         let point = self.extent.length_cm() < POINT.0 && self.spread < POINT.1;
         let stands = self.seen() && self.speed() < 2 * t.standing_speed;
         point && stands && self.tallness.is_tall() && !self.reflectivity.is_above(t.lorry_rcs)
@@ -443,7 +443,7 @@ mod tests {
 
     #[test]
     fn none_is_learnt_where_that_is_configured() {
-        let t = Tracking { fixture_after: 0, ..rules() };
+        let t = TrackingParameters { fixture_after: 0, ..rules() };
         let (mut list, seen) = (Obstacles::<16>::new(), [mast(0)]);
         let sorted = ByRange::<16>::sort(&seen, t.limit_cm);
         for _ in 0..600 {

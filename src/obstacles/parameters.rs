@@ -11,7 +11,7 @@ use crate::sensor::noise::Noise;
 /// [`ObstacleConfig`](super::config::ObstacleConfig) in integers; lengths in centimetres.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[allow(missing_docs)] // the fields are the configuration's, in the units below
-pub struct Tracking {
+pub struct TrackingParameters {
     pub min_speed_cm_s: i32,
     /// 2^-4 cm/s
     pub doppler_gate: i32,
@@ -63,11 +63,11 @@ pub struct Tracking {
     /// (cm/s)^2 per second
     pub turning_noise: i32,
     /// 2^-4
-    pub own_way_sigmas: i32,
-    pub own_way_cm_s: i32,
+    pub off_axis_sigmas: i32,
+    pub off_axis_cm_s: i32,
     /// 2^-16
-    pub own_way_follow: i32,
-    pub own_way_margin_cm: i32,
+    pub off_axis_follow: i32,
+    pub off_axis_margin_cm: i32,
     /// 2^-16 s
     pub length_growth: i32,
     /// 2^-16 s
@@ -75,7 +75,7 @@ pub struct Tracking {
     /// 2^-8 cm/s
     pub slow_speed: i32,
     /// 2^-16
-    pub own_way_share: i32,
+    pub off_axis_share: i32,
     /// 2^-4
     pub heading_sigmas: i32,
     /// 2^-8 cm/s
@@ -126,7 +126,7 @@ pub(super) fn speed_error(velocity: (i32, i32), r: &Reflection) -> i32 {
     (i32::from(r.radial_velocity_cm_s) << 4) - r.sight.along(velocity.0, velocity.1)
 }
 
-impl Tracking {
+impl TrackingParameters {
     /// What a time step leaves of every obstacle's memories.
     pub fn kept_over(&self, step: Step) -> Kept {
         Kept { lateral: step.keep(self.lateral_memory), outline: step.keep(self.outline_memory) }
