@@ -46,7 +46,7 @@ pub trait Reader<const W: usize> {
 
 /// Where reading goes on when a further word comes.
 ///
-/// Without it each word has its block read from the start again, which costs a receiver on classic CAN half as much again.
+/// Without it each word has its block read from the start again: a receiver on classic CAN then takes half as long again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Resume {
     /// The azimuth that could not be read; 0 if reading begins at the start.
