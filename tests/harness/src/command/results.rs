@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     drop(running);
     write(root.join(PAGE), &pages::results(&plan, &kept))?;
-    for page in pages::all(root, &kept)? {
+    for page in pages::all(root, &plan, &kept)? {
         if page.before != page.after {
             write(page.path.clone(), &page.after)?;
             print(&format!("{}: figures written\n", page.path.display()))?;
@@ -107,7 +107,7 @@ fn check(args: &Args, plan: &Plan, kept: &parts::Kept) -> Result<ExitCode> {
     if page != pages::results(plan, kept) {
         differs.push(format!("{PAGE} is not what was measured"));
     }
-    let pages = pages::all(root, kept)?.into_iter().filter(|page| page.before != page.after);
+    let pages = pages::all(root, plan, kept)?.into_iter().filter(|page| page.before != page.after);
     differs.extend(pages.map(|page| format!("{} does not show what was measured", page.path.display())));
     if differs.is_empty() {
         print("figures and pages are as they were measured\n")?;

@@ -30,8 +30,8 @@ pub struct Page {
 /// Every page of the repository with a marker.
 ///
 /// # Errors
-/// A marker that names nothing that was measured, or has no end.
-pub fn all(root: &Path, kept: &Kept) -> Result<Vec<Page>> {
+/// A marker that names no part, or something that it did not print, or has no end.
+pub fn all(root: &Path, plan: &Plan, kept: &Kept) -> Result<Vec<Page>> {
     let mut pages = Vec::new();
     let mut folders = vec![root.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -43,7 +43,7 @@ pub fn all(root: &Path, kept: &Kept) -> Result<Vec<Page>> {
             } else if name.ends_with(".md") {
                 let before = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
                 if before.contains(BEGIN) {
-                    let after = filled(&before, kept).with_context(|| path.display().to_string())?;
+                    let after = filled(&before, plan, kept).with_context(|| path.display().to_string())?;
                     pages.push(Page { path, before, after });
                 }
             }
@@ -53,18 +53,34 @@ pub fn all(root: &Path, kept: &Kept) -> Result<Vec<Page>> {
     Ok(pages)
 }
 
-/// A page's text with its blocks filled.
-fn filled(text: &str, kept: &Kept) -> Result<String> {
+/// A page's text with its blocks filled; one of a part that was not measured yet stays as it is.
+fn filled(text: &str, plan: &Plan, kept: &Kept) -> Result<String> {
     let mut out = String::new();
     let mut rest = text;
     while let Some((before, begun)) = rest.split_once(BEGIN) {
         let (marker, body) = begun.split_once(" -->").context("a marker without an end")?;
-        let (_, after) = body.split_once(END).with_context(|| format!("`{BEGIN}{marker} -->` without `{END}`"))?;
-        let block = block(marker, kept).with_context(|| format!("`{BEGIN}{marker} -->`"))?;
-        out += &format!("{before}{BEGIN}{marker} -->\n\n{block}\n{END}");
+        let (old, after) = body.split_once(END).with_context(|| format!("`{BEGIN}{marker} -->` without `{END}`"))?;
+        let awaited = |name: &str| plan.part.iter().any(|part| part.name == name) && !kept.contains_key(name);
+        out += &if parts_of(marker).any(awaited) {
+            format!("{before}{BEGIN}{marker} -->{old}{END}")
+        } else {
+            let block = block(marker, kept).with_context(|| format!("`{BEGIN}{marker} -->`"))?;
+            format!("{before}{BEGIN}{marker} -->\n\n{block}\n{END}")
+        };
         rest = after;
     }
     Ok(out + rest)
+}
+
+/// The parts that a marker names.
+fn parts_of(marker: &str) -> impl Iterator<Item = &str> {
+    let words = marker.split('|').map(str::trim);
+    let one = words.clone().next().filter(|name| *name != "*");
+    one.into_iter().chain(words.filter_map(part_of_row))
+}
+
+fn part_of_row(word: &str) -> Option<&str> {
+    word.strip_prefix("row ")?.split_once(" = ")?.1.split_whitespace().next()
 }
 
 fn block(marker: &str, kept: &Kept) -> Result<String> {
@@ -206,14 +222,26 @@ mod tests {
         Kept::from([("one".to_owned(), measured)])
     }
 
+    fn plan() -> Plan {
+        toml::from_str("[[part]]\nname = \"one\"\nshows = \"It.\"\nrun = [\"replay x\"]\n[[part]]\nname = \"two\"\nshows = \"It.\"\nrun = [\"bus x\"]\n").unwrap()
+    }
+
+    #[test]
+    fn a_block_of_what_was_not_measured_yet_stays() {
+        for marker in ["two | table 1", "* | columns b | row x = one x | row y = two y"] {
+            let page = format!("a\n<!-- results {marker} -->\nold\n<!-- end of results -->\nb\n");
+            assert_eq!(filled(&page, &plan(), &kept()).unwrap(), page);
+        }
+    }
+
     #[test]
     fn a_block_holds_what_was_measured_and_the_text_around_it_stays() {
         let page = "Before.\n\n<!-- results one | columns b; a | rows y -->\nold\n<!-- end of results -->\n\nAfter.\n";
-        let filled = filled(page, &kept()).unwrap();
+        let filled = filled(page, &plan(), &kept()).unwrap();
         let block =
             "\n\n| b | a |\n|---|---|\n| 2 | y |\n\n<sub>`viewshed results --only one`, sources 12345678</sub>\n\n";
         assert_eq!(filled, page.replace("\nold\n", block));
-        assert_eq!(super::filled(&filled, &kept()).unwrap(), filled, "again is the same");
+        assert_eq!(super::filled(&filled, &plan(), &kept()).unwrap(), filled, "again is the same");
     }
 
     #[test]
@@ -223,7 +251,7 @@ mod tests {
         other.printed[0].push("At equal FIR of cells (8.4 %): radar-3d has FVR 1 %, the best of radar-2d and radar-2d-first 68.7 %: -5 points".into());
         kept.insert("two".into(), other);
         let page = |columns: &str, rows: &str| {
-            filled(&format!("<!-- results * | columns {columns} | {rows} --> <!-- end of results -->"), &kept)
+            filled(&format!("<!-- results * | columns {columns} | {rows} --> <!-- end of results -->"), &plan(), &kept)
         };
         let both = page("b", "row first = one x | row second, and last = two y").unwrap();
         assert!(both.contains("| place | b |\n|---|---|\n| first | 1 |\n| second, and last | 2 |\n"), "{both}");
@@ -237,19 +265,18 @@ mod tests {
     fn a_marker_that_names_nothing_is_an_error() {
         let error = |marker: &str| {
             let page = format!("<!-- results {marker} --> <!-- end of results -->");
-            format!("{:#}", filled(&page, &kept()).unwrap_err())
+            format!("{:#}", filled(&page, &plan(), &kept()).unwrap_err())
         };
-        assert!(error("two").contains("`viewshed results --only two` was not run"));
+        assert!(error("three").contains("`viewshed results --only three` was not run"));
         assert!(error("one | table 2").contains("there is no table 2"));
         assert!(error("one | rows z").contains("no row `z`, only x; y"));
         assert!(error("one | color red").contains("table, columns or rows"));
-        assert!(filled("<!-- results one -->", &kept()).is_err());
+        assert!(filled("<!-- results one -->", &plan(), &kept()).is_err());
     }
 
     #[test]
     fn the_page_of_results_has_commands_tables_and_what_they_were_measured_on() {
-        let plan: Plan = toml::from_str("[[part]]\nname = \"one\"\nshows = \"It.\"\nrun = [\"replay x\"]\n[[part]]\nname = \"two\"\nshows = \"It.\"\nrun = [\"bus x\"]\n").unwrap();
-        let page = results(&plan, &kept());
+        let page = results(&plan(), &kept());
         for text in [
             "a whole run took 2 minutes",
             "## one\n\nIt.\n\n    viewshed replay x\n",

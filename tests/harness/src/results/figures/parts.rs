@@ -45,7 +45,8 @@ pub struct Part {
     /// Which tables the page of results shows, counted through all that is printed, from 1 on; all where none is named.
     #[serde(default)]
     pub tables: Vec<usize>,
-    /// Pictures of pages, by their names in `tests/pictures`, and what of `{out}` they are: a picture, or a page to photograph.
+    /// Pictures of pages, by their names in `tests/pictures`, and what they are: a picture of `{out}`, a page
+    /// there, or `view ARGUMENTS#SECONDS` of the viewer.
     #[serde(default)]
     pub pictures: BTreeMap<String, String>,
 }
@@ -144,7 +145,7 @@ impl Measured {
         let printed = part.run.iter().map(run).collect::<Result<Vec<_>>>()?;
         if pictures == Pictures::Made {
             for (name, of) in &part.pictures {
-                photo::make(&out.path().join(of), &root.join(PICTURES).join(name))?;
+                photo::make(of, [out.path(), root], &root.join(PICTURES).join(name))?;
             }
         }
         let without_folder = |line: &String| line.replace(&*folder, OUT);
