@@ -52,7 +52,7 @@ pub fn read(path: &Path, interface: Option<&str>) -> Result<Log> {
     let (mut chunks, mut unread) = (Vec::new(), 0);
     let mut text = text::Lines::new(source.open()?);
     while let Some(line) = text.next_line().with_context(|| format!("cannot read {}", source.shown()))? {
-        match Chunk::parse(line) {
+        match Chunk::parse(&line) {
             Ok(chunk) => chunks.push(Logged::Chunk(chunk)),
             Err(_) => unread += 1,
         }

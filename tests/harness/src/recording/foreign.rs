@@ -144,7 +144,7 @@ fn begin(bytes: &[u8]) -> String {
     while start.len() < 4096
         && let Ok(Some(line)) = lines.next_line()
     {
-        start += line;
+        start += &line;
         start.push('\n');
     }
     start

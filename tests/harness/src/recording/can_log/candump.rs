@@ -6,14 +6,18 @@
 
 use std::fmt;
 
-use viewshed::wire::frame::{CanFrame, CanId};
+use viewshed::wire::frame::{CanFrame, CanId, MOST_BYTES};
 
 use super::time::seconds;
-use super::{Content, ERROR_FLAG, Line, identifier};
+use super::{Content, ERROR_FLAG, Line, identifier, split_at_letter};
 
 /// Reads a line of `candump -L`; the error says what is wrong with it.
 pub fn line(line: &str) -> Result<Line, String> {
-    let mut words = line.split_whitespace();
+    // letters of other alphabets have spaces of their own, which hardly a log has
+    if line.is_ascii() { of_words(line.split_ascii_whitespace()) } else { of_words(line.split_whitespace()) }
+}
+
+fn of_words<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Line, String> {
     let (time, interface, frame) = match (words.next(), words.next(), words.next()) {
         (Some(time), Some(interface), Some(frame)) => (time, interface, frame),
         _ => return Err("not `(seconds) interface identifier#data`".into()),
@@ -69,39 +73,65 @@ pub fn time(line: &str) -> Option<i64> {
 /// `(seconds.fraction)` with any number of digits.
 pub(in crate::recording) fn nanoseconds(text: &str) -> Result<i64, String> {
     let wrong = || format!("`{text}` is not a time in brackets");
-    let inside = text.strip_prefix('(').and_then(|t| t.strip_suffix(')')).ok_or_else(wrong)?;
-    seconds(inside).ok_or_else(wrong)
+    let inside = match text.as_bytes() {
+        [b'(', .., b')'] => text.get(1..text.len() - 1),
+        _ => None,
+    };
+    inside.and_then(seconds).ok_or_else(wrong)
 }
 
 /// `identifier#data`.
 fn content(text: &str) -> Result<Content, String> {
-    let (id, data) = text.split_once('#').ok_or_else(|| format!("`{text}` has no #"))?;
+    let (id, data) = split_at_letter(text, b'#').ok_or_else(|| format!("`{text}` has no #"))?;
     let id = match identifier(id)? {
         Ok(id) => id,
         Err(class) => return Ok(Content::Error(class)),
     };
-    if data.starts_with('R') {
+    if data.as_bytes().first() == Some(&b'R') {
         return Ok(Content::Remote(id));
     }
-    let fd = data.strip_prefix('#').map(|data| data.split_at_checked(1).map_or("", |(_flags, data)| data));
+    let fd = match data.as_bytes() {
+        [b'#', ..] => Some(data.get(2..).unwrap_or("")),
+        _ => None,
+    };
     // a raw length code may follow
-    let digits = fd.unwrap_or(data).split('_').next().unwrap_or("");
-    let bytes = bytes(digits).ok_or_else(|| format!("`{digits}` is not whole bytes"))?;
+    let digits = split_at_letter(fd.unwrap_or(data), b'_').map_or_else(|| fd.unwrap_or(data), |(digits, _)| digits);
+    let mut buffer = [0; MOST_BYTES];
+    let wrong = || format!("`{digits}` is not whole bytes");
+    let bytes = match bytes_into(digits, &mut buffer).ok_or_else(wrong)? {
+        length if length <= MOST_BYTES => &buffer[..length],
+        length => return Err(format!("{length} bytes are too many")),
+    };
     let frame = match fd {
-        Some(_) => CanFrame::fd(id, &bytes),
-        None => CanFrame::classic(id, &bytes),
+        Some(_) => CanFrame::fd(id, bytes),
+        None => CanFrame::classic(id, bytes),
     };
     frame.map(Content::Data).ok_or_else(|| format!("{} bytes are too many", bytes.len()))
 }
 
 /// Bytes of hexadecimal digits, with or without points between them.
 pub(in crate::recording) fn bytes(digits: &str) -> Option<Vec<u8>> {
-    let mut digits = digits.bytes().filter(|b| *b != b'.').map(|b| char::from(b).to_digit(16));
-    let mut bytes = Vec::with_capacity(8);
-    while let Some(high) = digits.next() {
-        bytes.push((high? << 4 | digits.next()??) as u8);
-    }
+    let mut bytes = vec![0; digits.len() / 2];
+    let length = bytes_into(digits, &mut bytes)?;
+    bytes.truncate(length);
     Some(bytes)
+}
+
+/// The same into a buffer; how many there are, of which only those are written that it has room for.
+fn bytes_into(digits: &str, bytes: &mut [u8]) -> Option<usize> {
+    let (mut high, mut length) = (None, 0);
+    for digit in digits.bytes().filter(|b| *b != b'.') {
+        let digit = char::from(digit).to_digit(16)? as u8;
+        let Some(before) = high.take() else {
+            high = Some(digit);
+            continue;
+        };
+        if let Some(byte) = bytes.get_mut(length) {
+            *byte = before << 4 | digit;
+        }
+        length += 1;
+    }
+    high.is_none().then_some(length)
 }
 
 impl fmt::Display for Line {

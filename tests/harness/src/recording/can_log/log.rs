@@ -1,6 +1,7 @@
 //! A log of any format, read line by line as often as wanted, each bus in the order of time.
 
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 
 use anyhow::{Context, Result, bail};
 
@@ -92,7 +93,7 @@ impl Found {
         let (mut going, mut last, mut end) = (reader.clone(), 0, 0);
         while let Some(line) = text.next_line().with_context(place)? {
             end += 1;
-            match going.line(line) {
+            match going.line(&line) {
                 Some(Ok(line)) if interface.is_some_and(|name| name != line.interface) => {
                     others.insert(line.interface);
                 }
@@ -212,25 +213,53 @@ impl Log {
             );
         }
         let mut sorted = Vec::with_capacity(usize::try_from(lines).unwrap_or(0));
-        self.in_its_order(&mut |line| sorted.push(line));
+        self.in_its_order(&mut |line| {
+            sorted.push(line);
+            ControlFlow::Continue(())
+        });
         self.survey.sort(&mut sorted);
         self.sorted = Some(sorted);
         Ok(())
     }
 
-    /// Every frame as the log has it. A file that cannot be read any more ends there.
-    fn in_its_order(&self, see: &mut dyn FnMut(Line)) {
+    /// Every frame as the log has it, until `see` has seen enough. A file that cannot be read any more ends there.
+    fn in_its_order(&self, see: &mut dyn FnMut(Line) -> ControlFlow<()>) {
         let Ok(mut text) = open(&self.source) else { return };
         let mut reader = self.reader.clone();
         for _ in 0..self.end {
             let Ok(Some(line)) = text.next_line() else { return };
-            let Some(Ok(mut line)) = reader.line(line) else { continue };
+            let Some(Ok(mut line)) = reader.line(&line) else { continue };
             if self.interface.as_ref().is_some_and(|name| *name != line.interface) {
                 continue;
             }
             let time = if self.turned { line.time_ns.saturating_neg() } else { line.time_ns };
             line.time_ns = time.saturating_add(self.shift_ns);
-            see(line);
+            if see(line).is_break() {
+                return;
+            }
+        }
+    }
+
+    /// Each bus in the order of time, until `see` has seen enough.
+    pub fn until(&self, see: &mut dyn FnMut(&Line) -> ControlFlow<()>) {
+        match (&self.plan, &self.sorted) {
+            (Plan::Sorted, Some(lines)) => {
+                let _ = lines.iter().try_for_each(see);
+            }
+            (Plan::HeldBack { together }, _) => {
+                let (mut held_back, mut flow) = (self.survey.held_back(*together), ControlFlow::Continue(()));
+                let mut show = |flow: &mut ControlFlow<()>, line: &Line| {
+                    if flow.is_continue() {
+                        *flow = see(line);
+                    }
+                };
+                self.in_its_order(&mut |line| {
+                    held_back.push(line, &mut |line| show(&mut flow, line));
+                    flow
+                });
+                held_back.end(&mut |line| show(&mut flow, line));
+            }
+            _ => self.in_its_order(&mut |line| see(&line)),
         }
     }
 
@@ -245,14 +274,9 @@ impl Log {
 impl Lines for Log {
     /// Each bus in the order of time.
     fn each(&self, see: &mut dyn FnMut(&Line)) {
-        match (&self.plan, &self.sorted) {
-            (Plan::Sorted, Some(lines)) => lines.iter().for_each(see),
-            (Plan::HeldBack { together }, _) => {
-                let mut held_back = self.survey.held_back(*together);
-                self.in_its_order(&mut |line| held_back.push(line, see));
-                held_back.end(see);
-            }
-            _ => self.in_its_order(&mut |line| see(&line)),
-        }
+        self.until(&mut |line| {
+            see(line);
+            ControlFlow::Continue(())
+        });
     }
 }

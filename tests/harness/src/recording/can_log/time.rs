@@ -1,6 +1,8 @@
 //! Times as logs write them: with a sign or without, with a decimal point or comma, since the start, since 1970 or since
 //! the line before.
 
+use super::split_at_letter;
+
 /// Lines at the begin of a log that show what its times count from.
 pub const SHOWN: usize = 20_000;
 
@@ -19,6 +21,24 @@ pub fn microseconds(text: &str) -> Option<i64> {
 
 /// A decimal number times ten to the power of `digits`; what is smaller is cut off.
 fn decimal(text: &str, digits: u32) -> Option<i64> {
+    plain(text, digits).or_else(|| of_any_form(text, digits))
+}
+
+/// A number as nearly all logs have it: a few digits, a point and no more digits than are asked for.
+fn plain(text: &str, digits: u32) -> Option<i64> {
+    let (whole, fraction) = split_at_letter(text, b'.')?;
+    let number = |part: &str| -> Option<i64> {
+        let digit = |b: u8| b.is_ascii_digit().then(|| i64::from(b - b'0'));
+        part.bytes().try_fold(0, |sum, b| Some(10 * sum + digit(b)?))
+    };
+    let missing = digits.checked_sub(u32::try_from(fraction.len()).ok()?)?;
+    let few = (1..=10).contains(&whole.len()) && !fraction.is_empty() && digits <= 9;
+    // at most 10^19 / 10: within 63 bits with nine digits behind the point only up to 9.2 * 10^9
+    let whole = number(whole).filter(|whole| few && *whole < 9_000_000_000)?;
+    Some(whole * 10_i64.pow(digits) + number(fraction)? * 10_i64.pow(missing))
+}
+
+fn of_any_form(text: &str, digits: u32) -> Option<i64> {
     // as python prints what is near 0, and spreadsheets what is large
     if let Some((number, power)) = text.split_once(['e', 'E']) {
         let (power, number): (i32, f64) = (power.parse().ok()?, number.replace(',', ".").parse().ok()?);
