@@ -218,27 +218,16 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
             self.degrade(now, Reason::BusOverload);
         }
         let trouble = self.trouble.filter(|(since, _)| recent(*since, now)).map(|(_, reason)| reason);
-        let status = self.broadcast.status_mut();
-        (status.state, status.reason) = match (condition, trouble) {
-            (Condition::Stale, _) => (UnitState::Blind, Reason::RadarSilent),
-            _ if self.fault => (UnitState::Fault, Reason::RadarFault),
-            (Condition::Starting, _) => (UnitState::Starting, Reason::None),
-            (Condition::Blind, _) => (UnitState::Blind, Reason::None),
-            (Condition::Unusable, _) => (UnitState::Blind, Reason::UnusablePoints),
-            // what is wrong with the sensor lasts; what happened just now comes again
-            (Condition::SectorBlind, _) => (UnitState::Degraded, Reason::SectorBlind),
-            (Condition::Misaligned, _) => (UnitState::Degraded, Reason::Misaligned),
-            (Condition::Weaker, None) => (UnitState::Degraded, Reason::Weaker),
-            (Condition::Healthy | Condition::Settling | Condition::Weaker, Some(reason)) => {
-                (UnitState::Degraded, reason)
-            }
+        let (state, reason) = state_of(condition, self.fault);
+        let instead = match (state, reason) {
             // what is lacking lasts longer than settling
-            (Condition::Healthy | Condition::Settling, None) => {
-                let settling = (condition == Condition::Settling).then_some(Reason::Settling);
-                let lasting = self.lacking.or(settling);
-                lasting.map_or((UnitState::Ok, Reason::None), |reason| (UnitState::Degraded, reason))
-            }
+            (UnitState::Ok, _) | (_, Reason::Settling) => trouble.or(self.lacking),
+            (_, Reason::Weaker) => trouble,
+            // what is wrong with the sensor lasts; what happened just now comes again
+            _ => None,
         };
+        let status = self.broadcast.status_mut();
+        (status.state, status.reason) = instead.map_or((state, reason), |reason| (UnitState::Degraded, reason));
     }
 
     /// Forgets everything but the counters: what comes next does not follow.
@@ -280,6 +269,22 @@ impl<'a, E: Estimator, S: MapSender<E::Map>> Unit<'a, E, S> {
     /// The sender, for its counters and its clock.
     pub fn broadcast(&mut self) -> &mut S {
         self.broadcast
+    }
+}
+
+/// What a status says of a sensor's condition, and of the fault that the sensor says it has.
+pub const fn state_of(condition: Condition, fault: bool) -> (UnitState, Reason) {
+    match condition {
+        Condition::Stale => (UnitState::Blind, Reason::RadarSilent),
+        _ if fault => (UnitState::Fault, Reason::RadarFault),
+        Condition::Starting => (UnitState::Starting, Reason::None),
+        Condition::Blind => (UnitState::Blind, Reason::None),
+        Condition::Unusable => (UnitState::Blind, Reason::UnusablePoints),
+        Condition::SectorBlind => (UnitState::Degraded, Reason::SectorBlind),
+        Condition::Misaligned => (UnitState::Degraded, Reason::Misaligned),
+        Condition::Weaker => (UnitState::Degraded, Reason::Weaker),
+        Condition::Settling => (UnitState::Degraded, Reason::Settling),
+        Condition::Healthy => (UnitState::Ok, Reason::None),
     }
 }
 

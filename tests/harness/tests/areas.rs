@@ -41,7 +41,7 @@ fn most_places_that_are_clear_are_answered_free() {
     let (mut clear, mut not_clear) = (Counts::default(), Counts::default());
     let mut frames = recording.frames.iter().zip(&samples).enumerate();
     let sensor = estimators::sensor(&recording, &options.noise);
-    radar_3d::maps(&recording.frames, &sensor, &options.radar_3d, |_, map| {
+    radar_3d::maps(&recording.frames, &sensor, &options.radar_3d, |_, map, _| {
         let (k, (frame, samples)) = frames.next().unwrap();
         if !samples.counted {
             return;

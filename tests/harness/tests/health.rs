@@ -17,7 +17,7 @@ fn unknown(recording: &Recording) -> [usize; 2] {
         &recording.frames,
         &estimators::sensor(recording, &options.noise),
         &options.radar_3d,
-        |time, map| {
+        |time, map, _| {
             if (time.micros() as i64 - begin) as f64 >= SETTLES_S * 1e6 {
                 all += 1;
                 unknown += usize::from((0..radar_3d::AZIMUTHS).all(|a| map.grades(a).unwrap().iter().all(|g| *g == 0)));

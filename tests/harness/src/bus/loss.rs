@@ -107,6 +107,8 @@ mod tests {
     use viewshed::wire::code::ray::{Known, Ray};
 
     use super::super::traffic::{BUSES, Scan};
+    use viewshed::wire::status::{Reason, UnitState};
+
     use super::*;
     use crate::estimators::Options;
     use crate::evaluation::samples::by_hand::recording;
@@ -118,6 +120,7 @@ mod tests {
             measured: Time::from_micros(500_000 + k * 66_667),
             rays: vec![Ray::new(Known::new(3, 100), Bits::NONE); A],
             probable: Vec::new(),
+            state: (UnitState::Ok, Reason::None),
         };
         let arrived = |count: u64| {
             let scans = (0..count).map(scan).collect();

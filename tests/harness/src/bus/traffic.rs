@@ -4,6 +4,7 @@ use anyhow::{Result, anyhow, ensure};
 use viewshed::fixed::time::Time;
 use viewshed::map::polar::PolarMap;
 use viewshed::probability::Quantiser;
+use viewshed::unit::state_of;
 use viewshed::wire::broadcast::{BroadcastConfig, Broadcaster, Medium};
 use viewshed::wire::code::ray::{Known, Ray};
 use viewshed::wire::frame::CanFrame;
@@ -12,6 +13,7 @@ use viewshed::wire::message::{Addresses, Epoch, Plane};
 use viewshed::wire::planes::{Planes, Quantised};
 use viewshed::wire::secoc::Sealer;
 use viewshed::wire::serial::{self, MOST_STUFFED};
+use viewshed::wire::status::{Reason, UnitState};
 
 use super::bits;
 use super::ears::Key;
@@ -50,6 +52,8 @@ pub struct Scan {
     pub rays: Vec<Ray<W>>,
     /// Those of the plane of probability, where it is sent.
     pub probable: Vec<Ray<W>>,
+    /// What a unit says of itself at this scan.
+    pub state: (UnitState, Reason),
 }
 
 /// The maps of a recording, and what they are of.
@@ -76,7 +80,7 @@ impl Maps {
         );
         let (sensor, config) = estimators::unit(recording, options)?;
         let (mut scans, mut geometry, mut holes) = (Vec::new(), None, 0);
-        radar_3d::maps(&recording.frames, &sensor, &config, |measured, map| {
+        radar_3d::maps(&recording.frames, &sensor, &config, |measured, map, condition| {
             geometry = Some(*map.geometry());
             let plane = |plane| -> Vec<Ray<W>> {
                 let ray = |azimuth| {
@@ -90,7 +94,8 @@ impl Maps {
             let rays = plane(Plane::Visibility);
             holes += holes_of(map, &rays);
             let probable = if quantiser.is_some() { plane(Plane::Grade) } else { Vec::new() };
-            scans.push(Scan { measured, rays, probable });
+            let fault = recording.frames.get(scans.len()).is_some_and(|frame| frame.fault);
+            scans.push(Scan { measured, rays, probable, state: state_of(condition, fault) });
             step();
         })?;
         let geometry = geometry.ok_or_else(|| anyhow!("{} has no radar frames", recording.name))?;
@@ -182,13 +187,14 @@ impl Traffic {
         let config = BroadcastConfig { visible_range_ms, secured, planes, ..BroadcastConfig::new(sensor, bus.medium) };
         let mut sender = Broadcaster::<A, W, 2>::new(config, maps.header, Epoch::new(1), begin)
             .map_err(|error| anyhow!("{}: {error}", bus.name))?;
-        sender.status_mut().state = viewshed::wire::status::UnitState::Ok;
         // a clock in microseconds runs ahead of any number of messages
         let mut sealer = key.map(|key| Sealer::new(*key, begin.micros()));
         let (mut sent, mut scans, mut offered) = (Vec::new(), 0, 0);
         // the bus is busy up to here
         let mut free = begin;
         for (k, scan) in maps.scans.iter().enumerate() {
+            let status = sender.status_mut();
+            (status.state, status.reason) = scan.state;
             if sender.scan(scan.measured, scan).is_ok() {
                 scans += 1;
                 offered += u64::from(sender.pending());
@@ -236,11 +242,16 @@ impl Sent {
 
 #[cfg(test)]
 mod tests {
+    use viewshed::grid::settling::SettlingConfig;
     use viewshed::probability::Levels;
+    use viewshed::radar_3d::Radar3dConfig;
 
     use super::*;
+    use crate::bus::listening::Listening;
     use crate::estimators::{FarRoad, Grid, Options};
     use crate::evaluation::samples::by_hand::recording;
+    use crate::recording::RadarDetection;
+    use crate::recording::can_log::{Content, Line};
 
     #[test]
     fn a_scan_offers_an_azimuth_and_half_a_probability_for_each() {
@@ -249,6 +260,7 @@ mod tests {
                 measured: Time::from_micros(500_000 + k * 66_667),
                 rays: vec![Ray::clear(Known::new(3, 100)); A],
                 probable: vec![Ray::UNKNOWN; A],
+                state: (UnitState::Ok, Reason::None),
             };
             let maps = Maps { estimator: String::new(), header, scans: (0..30).map(scan).collect(), holes: 0 };
             let traffic = Traffic::new(&maps, BUSES[0], None, 0, None).unwrap();
@@ -271,6 +283,7 @@ mod tests {
             measured: Time::from_micros(begin + 500_000 + k * 66_667),
             rays: vec![Ray::clear(Known::new(3, 100)); A],
             probable: Vec::new(),
+            state: (UnitState::Ok, Reason::None),
         };
         let scans = starts.into_iter().flat_map(|begin| (0..30).map(move |k| scan(begin, k))).collect();
         let maps = Maps { estimator: String::new(), header, scans, holes: 0 };
@@ -296,5 +309,44 @@ mod tests {
         assert_ne!(usual.fingerprint, told.fingerprint);
         let error = of(&Options { grid: Grid::Small, ..Options::default() }).err().unwrap().to_string();
         assert!(error.contains("leave out --grid-size"), "{error}");
+    }
+
+    /// What the last status says to a receiver of maps of so many vehicles that come nearer, with this SNR.
+    fn last_status(snr_db: f32) -> (String, String) {
+        let mut recording = recording(90, 0);
+        for (k, frame) in (0_u8..).zip(&mut recording.frames) {
+            frame.time_ns = 1_000_000_000 + i64::from(k) * 66_000_000;
+            let one = |i: u8| RadarDetection {
+                range_m: 40.0 + f32::from(i) * 10.0 - 0.066 * f32::from(k) * 3.0,
+                azimuth_rad: 0.02 * f32::from(i),
+                elevation_rad: None,
+                radial_velocity_mps: -3.0,
+                rcs_dbsm: Some(5.0),
+                snr_db: Some(snr_db),
+            };
+            frame.detections.extend((0..10).map(one));
+            // one that can be used now and then: a recording without any is refused
+            frame.detections.extend((k < 2).then(|| RadarDetection { snr_db: Some(20.0), ..one(5) }));
+        }
+        let options = Options {
+            radar_3d: Radar3dConfig { settling: SettlingConfig::AT_ONCE, ..Default::default() },
+            ..Default::default()
+        };
+        let maps = Maps::new(&recording, &options, None, &|| ()).unwrap();
+        let traffic = Traffic::new(&maps, BUSES[2], None, 0, None).unwrap();
+        let mut listening = Listening::new(Addresses::STANDARD, None);
+        for sent in &traffic.sent {
+            let time_ns = i64::try_from(sent.at.micros()).unwrap() * 1000;
+            let content = Content::Data(sent.frame.unwrap());
+            listening.take(&Line { time_ns, interface: "can0".into(), content });
+        }
+        let status = listening.heard(0, Vec::new()).unwrap().status.unwrap();
+        (status.state, status.reason)
+    }
+
+    #[test]
+    fn a_status_says_what_a_unit_would_at_that_scan() {
+        assert_eq!(last_status(20.0), ("Ok".into(), "None".into()));
+        assert_eq!(last_status(-3.0), ("Blind".into(), "UnusablePoints".into()));
     }
 }

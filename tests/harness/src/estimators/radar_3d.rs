@@ -115,7 +115,7 @@ pub fn grid(sensor: &Sensor, config: &Radar3dConfig) -> Result<(PolarGeometry, u
     Ok((parameters.axes().polar(parameters.levelling()), parameters.visible_from()))
 }
 
-/// Runs the estimator over frames and shows its map after each, with the frame's time.
+/// Runs the estimator over frames and shows its map after each, with the frame's time and what the map is worth.
 ///
 /// # Errors
 /// A parameter the library refuses, by name.
@@ -123,7 +123,7 @@ pub fn maps(
     frames: &[Frame],
     sensor: &Sensor,
     config: &Radar3dConfig,
-    visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>),
+    visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>, Condition),
 ) -> Result<()> {
     if config.gate.max_detections <= 256 {
         maps_with::<256>(frames, sensor, config, visit)
@@ -136,12 +136,13 @@ fn maps_with<const D: usize>(
     frames: &[Frame],
     sensor: &Sensor,
     config: &Radar3dConfig,
-    mut visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>),
+    mut visit: impl FnMut(Time, &PolarMap<RANGES, AZIMUTHS>, Condition),
 ) -> Result<()> {
     let mut driver = OfReference::<D>::new("radar-3d", sensor, config)?;
     for frame in frames {
         driver.step(frame);
-        visit(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &driver.map);
+        let measured = Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0));
+        visit(measured, &driver.map, driver.condition);
     }
     Ok(())
 }
