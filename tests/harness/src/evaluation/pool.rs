@@ -145,6 +145,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
         sensor: first.recording.sensor.clone(),
         pose: first.recording.pose,
         frames,
+        scans: None,
         ground: first.recording.ground.clone(),
         truth: Some(Truth { tracks, ..Truth::default() }),
         occlusion: Default::default(),

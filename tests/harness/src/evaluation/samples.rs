@@ -376,6 +376,7 @@ pub mod by_hand {
                     fault: false,
                 })
                 .collect(),
+            scans: None,
             ground: Ground::default(),
             truth: Some(Truth::new((0..tracks).map(label).collect())),
             occlusion: Default::default(),

@@ -6,13 +6,11 @@
 //! Pairs are formed by chance, too: what most agree on counts. In the same way places are compared of detections that
 //! have a vehicle's azimuth and speed, for a mount of which the position is wrong.
 
-use super::problems::{MOUNT, Problems};
+use super::problems::MOUNT;
 use super::truth::Object;
 use super::{Frame, Recording};
 use crate::geometry::pose::{SensorPose, Spherical};
 
-/// Frames that are looked at, spread over the recording.
-const MOST_FRAMES: usize = 300;
 /// What is slower tells no direction, m/s along the line of sight.
 const LEAST_SPEED_MPS: f64 = 3.0;
 /// A detection of a vehicle has its radial velocity within this, m/s.
@@ -46,22 +44,17 @@ struct Turned {
     sum_deg: f64,
 }
 
-/// Adds what labels deny of a mount to the recording's problems; whether there is something.
-pub fn check(recording: &mut Recording) -> bool {
-    let Some(what) = contradiction(recording) else { return false };
-    let start = recording.frames.first().map_or(0, |f| f.time_ns);
-    let problems: &mut Problems = &mut recording.problems;
-    problems.add(MOUNT, what, start);
+/// Adds what labels deny of a mount to the recording's problems; whether there is something. `frames` are some of its own.
+pub fn check(recording: &mut Recording, frames: &[Frame], start_ns: i64) -> bool {
+    let Some(what) = contradiction(recording, frames) else { return false };
+    recording.problems.add(MOUNT, what, start_ns);
     true
 }
 
-fn contradiction(recording: &Recording) -> Option<String> {
+fn contradiction(recording: &Recording, frames: &[Frame]) -> Option<String> {
     let truth = recording.truth.as_ref()?;
-    let step = recording.frames.len().div_ceil(MOST_FRAMES).max(1);
-    let frames: Vec<(&Frame, Vec<Expected>)> = recording
-        .frames
+    let frames: Vec<(&Frame, Vec<Expected>)> = frames
         .iter()
-        .step_by(step)
         .map(|frame| {
             let expected = |object: Object| Expected::new(object, &recording.pose);
             (frame, truth.at(frame.time_ns).into_iter().map(expected).collect())

@@ -1,21 +1,22 @@
 //! Recordings from CAN logs of an ARS408 or one of its kin.
 
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
 use anyhow::{Result, bail};
-use viewshed::fixed::time::Time;
-use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
 use viewshed::inputs::ars408::profile::Ars408Profile;
 use viewshed::inputs::ars408::{Ars408Config, Ars408Counters};
 
-use super::ars408_feed::{Feed, classic};
-use super::can_log::log::{Found, Lines, Log};
+use super::ars408_feed::is_classic;
+use super::can_log::log::{Found, Log};
 use super::can_log::{Format, Line};
 use super::capture::{self, Kind};
+use super::frames::Survey;
 use super::problems::{POINTS, Problems};
+use super::unheld::{self, Scans};
 use super::{Frame, ReadOptions, Recording, kind, native};
-
-/// Entries of a scan that are kept; clones announce more than 255.
-const MOST_ENTRIES: usize = 1024;
 
 /// Beyond the time asked for, what is read to make the last scan whole and to find lines that come late, seconds.
 const MORE_S: f64 = 3.0;
@@ -24,19 +25,25 @@ const MORE_S: f64 = 3.0;
 /// radars send one about every 70.
 const LEAST_PERIOD_MS: f64 = 7.0;
 
-/// Reads the scans of one sensor; of a log that goes on beyond the time asked for only what is needed.
+/// Reads the scans of one sensor; of a log that goes on beyond the time asked for only what is needed. The scans are
+/// [read again](Scans), so many at once, or held.
 ///
 /// # Errors
 /// No scan of such a radar, or several sensors and none named, or no such interface; times that cannot be.
-pub fn read(name: &str, found: &Found, options: &ReadOptions) -> Result<(Recording, Option<String>)> {
+pub fn read(
+    name: &str,
+    found: &Found,
+    options: &ReadOptions,
+    part: Option<usize>,
+) -> Result<(Recording, Option<String>)> {
     // what comes first may be of no use: then all of it is read
     if options.to_s.is_some()
-        && let Ok((recording, damage, whole)) = read_up_to(name, found, options, options.to_s)
+        && let Ok((recording, damage, whole)) = read_up_to(name, found, options, options.to_s, part)
         && (whole || recording.duration_s() >= options.to_s.unwrap_or(0.0))
     {
         return Ok((recording, damage));
     }
-    let (recording, damage, _) = read_up_to(name, found, options, None)?;
+    let (recording, damage, _) = read_up_to(name, found, options, None, part)?;
     Ok((recording, damage))
 }
 
@@ -46,6 +53,7 @@ fn read_up_to(
     found: &Found,
     options: &ReadOptions,
     to_s: Option<f64>,
+    part: Option<usize>,
 ) -> Result<(Recording, Option<String>, bool)> {
     let mut problems = Problems::default();
     let (mut heard, mut native, mut begin, mut whole) = (Heard::default(), false, None, true);
@@ -71,49 +79,51 @@ fn read_up_to(
     if native && heard.0.is_empty() {
         return Ok((native::read(name.to_owned(), &native::of_log(&log), 0, options)?, damage, whole));
     }
-    let recording = of_log(name, &log, &heard, problems, options)?;
+    let recording = of_log(name, log, &heard, problems, options, part)?;
     Ok((recording, damage, whole))
 }
 
-fn of_log(name: &str, log: &Log, heard: &Heard, mut problems: Problems, options: &ReadOptions) -> Result<Recording> {
+fn of_log(
+    name: &str,
+    log: Log,
+    heard: &Heard,
+    mut problems: Problems,
+    options: &ReadOptions,
+    part: Option<usize>,
+) -> Result<Recording> {
     let (interface, sensor) = choose(name, heard, options)?;
     let elsewhere = heard.0.iter().filter(|(i, s, _)| *i != interface && *s == sensor).map(|(.., n)| n).sum::<u64>();
     let profile = *options.profile.unwrap_or(&Ars408Profile::ARS408);
     let usual = Ars408Config::sensor(sensor);
     let wanted = options.wanted.unwrap_or(usual.wanted);
-    let mut feed = Feed::<MOST_ENTRIES>::new(Ars408Config { profile, wanted, ..usual });
-    let (mut frames, mut start, mut flexible, mut first) = (Vec::new(), None, 0, Vec::new());
-    let mut take = |scan: &RadarScan<'_>| {
-        if scan.fault {
-            problems.add(&interface, "scan of a radar that reports a fault", nanoseconds(scan.time));
+    let format = log.format();
+    let mut scans =
+        Scans::new(log, &interface, Ars408Config { profile, wanted, ..usual }, part.unwrap_or(unheld::PART));
+    let (mut start, mut flexible, mut first) = (None, 0, Vec::new());
+    let (mut frames, mut survey, mut periods) = (Vec::new(), Survey::default(), Periods::default());
+    let mut take = |frame: Frame| {
+        if frame.fault {
+            problems.add(&interface, "scan of a radar that reports a fault", frame.time_ns);
         }
-        if !scan.unwanted().is_empty() && scan.detections.is_empty() {
-            problems.add(
-                &interface,
-                "scan of which every entry was left out: it says nothing of the road",
-                nanoseconds(scan.time),
-            );
+        if !frame.unwanted.is_empty() && frame.detections.is_empty() {
+            let what = "scan of which every entry was left out: it says nothing of the road";
+            problems.add(&interface, what, frame.time_ns);
         }
-        let detections = scan.detections.iter().map(capture::detection).collect();
-        frames.push(Frame {
-            time_ns: nanoseconds(scan.time),
-            detections,
-            refused: scan.refused.into(),
-            unwanted: scan.unwanted().iter().map(capture::detection).collect(),
-            fault: scan.fault,
-        });
+        survey.frame(&frame);
+        periods.frame(frame.time_ns);
+        if part.is_none() {
+            frames.push(frame);
+        }
+        ControlFlow::Continue(())
     };
-    log.each(&mut |line| {
-        if line.interface == interface {
-            start.get_or_insert(line.time_ns);
-            if first.len() < kind::MOST_LINES {
-                first.push(line.clone());
-            }
-            flexible += u64::from(sensor_of(line) == Some(sensor) && line.frame().is_some_and(|frame| frame.fd));
-            feed.push(line, &mut take);
+    let mut line = |line: &Line| {
+        start.get_or_insert(line.time_ns);
+        if first.len() < kind::MOST_LINES {
+            first.push(line.clone());
         }
-    });
-    feed.end(&mut take);
+        flexible += u64::from(sensor_of(line) == Some(sensor) && line.frame().is_some_and(|frame| frame.fd));
+    };
+    let counters = scans.decode(&mut line, &mut take);
     let start = start.unwrap_or(0);
     problems.add_many(&interface, "frames of the same sensor id on another interface, left out", start, elsewhere);
     problems.add_many(
@@ -122,19 +132,19 @@ fn of_log(name: &str, log: &Log, heard: &Heard, mut problems: Problems, options:
         start,
         flexible,
     );
-    if log.format() == Format::PythonCan {
+    if format == Format::PythonCan {
         problems.add("log", "Python-can's CSV does not say on which bus a frame was: all are taken for one bus", start);
     }
     let mine: Vec<&Line> = first.iter().collect();
-    if frames.is_empty() {
+    if survey.extent.frames == 0 {
         if let Some(rather) = kind::rather(&mine, sensor, &profile) {
             let what = kind::said(&format!("sensor {sensor} on {interface}"), &profile, &rather);
             bail!("{name}: {what}; read it with --radar {}", rather.0);
         }
         bail!("{name}: no whole scan of sensor {sensor} on {interface}; `viewshed doctor` says what is on the bus");
     }
-    plausible_times(name, &frames)?;
-    report(&mut problems, &interface, start, feed.radar.counters());
+    periods.plausible(name)?;
+    report(&mut problems, &interface, start, &counters);
     if let Some(rather) = kind::rather(&mine, sensor, &profile) {
         let what = kind::said(&format!("sensor {sensor}"), &profile, &rather);
         problems.add(POINTS, format!("{what}; read it with --radar {}", rather.0), start);
@@ -146,32 +156,57 @@ fn of_log(name: &str, log: &Log, heard: &Heard, mut problems: Problems, options:
         range_m: [0.2, 250.0],
         has_elevation: profile.cluster.up_cm.is_some(),
     };
-    Ok(capture::recording(name.to_owned(), kind, frames, problems, options))
+    let recording = capture::without_frames(name.to_owned(), kind, survey.extent.first_ns, problems, options);
+    scans.surveyed(survey);
+    Ok(Recording { frames, scans: part.map(|_| Arc::new(scans)), ..recording })
 }
 
-/// Refuses times of which no map can be made.
-fn plausible_times(name: &str, frames: &[Frame]) -> Result<()> {
-    let mut periods: Vec<i64> = frames.windows(2).map(|w| w[1].time_ns.saturating_sub(w[0].time_ns)).collect();
-    periods.sort_unstable();
-    let Some(period) = periods.get(periods.len() / 2).filter(|_| periods.len() >= 5) else { return Ok(()) };
-    let period_ms = *period as f64 * 1e-6;
-    if (0.0..LEAST_PERIOD_MS).contains(&period_ms) {
-        bail!(
-            "{name}: a scan every {period_ms:.2} ms, and these radars send one about every 70: the log's times seem to be in another unit than its format has; write them in microseconds (SavvyCAN) or seconds"
-        );
+/// Times from one scan to the next, of which the middle one tells the unit. Those that are too short are counted by
+/// microseconds, in which scans have their times.
+#[derive(Default)]
+struct Periods {
+    last_ns: Option<i64>,
+    all: usize,
+    back: usize,
+    short: BTreeMap<i64, usize>,
+}
+
+impl Periods {
+    fn frame(&mut self, time_ns: i64) {
+        let Some(last_ns) = self.last_ns.replace(time_ns) else { return };
+        let period = time_ns.saturating_sub(last_ns);
+        self.all += 1;
+        if period < 0 {
+            self.back += 1;
+        } else if (period as f64 * 1e-6) < LEAST_PERIOD_MS {
+            *self.short.entry(period).or_default() += 1;
+        }
     }
-    Ok(())
-}
 
-fn nanoseconds(time: Time) -> i64 {
-    i64::try_from(time.micros()).unwrap_or(i64::MAX).saturating_mul(1000)
+    /// Refuses times of which no map can be made.
+    fn plausible(&self, name: &str) -> Result<()> {
+        let middle = (self.all / 2).checked_sub(self.back).filter(|_| self.all >= 5);
+        let mut passed = 0;
+        let period = self.short.iter().find(|(_, n)| {
+            passed += **n;
+            middle.is_some_and(|middle| passed > middle)
+        });
+        if let Some((period, _)) = period {
+            let period_ms = *period as f64 * 1e-6;
+            bail!(
+                "{name}: a scan every {period_ms:.2} ms, and these radars send one about every 70: the log's times seem to be in another unit than its format has; write them in microseconds (SavvyCAN) or seconds"
+            );
+        }
+        Ok(())
+    }
 }
 
 /// The sensor whose scan a frame belongs to.
 fn sensor_of(line: &Line) -> Option<u8> {
-    let (message, sensor) = Message::of(classic(line).filter(|f| !f.fd)?.id)?;
+    let frame = line.frame()?;
+    let (message, sensor) = Message::of(frame.id)?;
     let scan = [Message::ClusterStatus, Message::ClusterGeneral, Message::ObjectStatus, Message::ObjectGeneral];
-    scan.contains(&message).then_some(sensor)
+    (scan.contains(&message) && is_classic(frame)).then_some(sensor)
 }
 
 /// Frames of scans, by interface and sensor.
@@ -248,7 +283,7 @@ mod tests {
         let mount = Some([0.0, 0.0, 5.0, 0.0, 0.03, 0.0]);
         let options = ReadOptions { sensor_id: Some(0), mount, ..ReadOptions::default() };
         let found = log::find(&Source::of_bytes(log.as_bytes())).unwrap().unwrap();
-        let (recording, _) = read("log", &found, &options).unwrap();
+        let (recording, _) = read("log", &found, &options, None).unwrap();
         let mut seen = false;
         for estimator in &mut estimators::all(&recording, &Options::default()).unwrap() {
             for frame in &recording.frames {
@@ -287,7 +322,7 @@ mod tests {
             let wanted = Ars408Wanted::default().with_clusters([state]);
             let options = ReadOptions { sensor_id: Some(0), wanted, ..ReadOptions::default() };
             let found = log::find(&Source::of_bytes(of_state(0x02).as_bytes())).unwrap().unwrap();
-            read("log", &found, &options).unwrap().0
+            read("log", &found, &options, None).unwrap().0
         };
         let (without, with) = (read(0x00), read(0x02));
         let entries = |r: &Recording| r.frames.iter().map(|f| f.detections.len()).sum::<usize>();

@@ -1,5 +1,7 @@
 //! The library's decoder of ARS408 messages, given the lines of a log.
 
+use std::borrow::Cow;
+
 use viewshed::fixed::time::Time;
 use viewshed::inputs::RadarScan;
 use viewshed::inputs::ars408::message::Message;
@@ -45,10 +47,15 @@ impl<const N: usize> Feed<N> {
 }
 
 /// A line's frame. One of a radar that a gateway or an adapter marks as CAN FD is the classic one that the radar sent.
-pub fn classic(line: &Line) -> Option<CanFrame> {
+pub fn classic(line: &Line) -> Option<Cow<'_, CanFrame>> {
     let frame = line.frame()?;
-    if frame.fd && frame.data().len() <= 8 && Message::of(frame.id).is_some() {
-        return CanFrame::classic(frame.id, frame.data());
+    if frame.fd && is_classic(frame) && Message::of(frame.id).is_some() {
+        return CanFrame::classic(frame.id, frame.data()).map(Cow::Owned);
     }
-    Some(*frame)
+    Some(Cow::Borrowed(frame))
+}
+
+/// Whether a frame is a classic one, also where it is marked as CAN FD.
+pub fn is_classic(frame: &CanFrame) -> bool {
+    !frame.fd || frame.data().len() <= 8
 }

@@ -1,11 +1,15 @@
 //! Files beside a recording, and the part of it that is wanted.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Result, bail, ensure};
 
+use super::frames::{Correction, Extent, Frames, Survey, Wanted};
+use super::judged::Watching;
 use super::labels::{self, LabelClock, LabelsRead};
-use super::{Frame, LabelsFrom, ReadOptions, Recording, clock, file, judged, labelled, plausible, unfilled};
+use super::plausible::Asked;
+use super::{LabelsFrom, ReadOptions, Recording, file, labelled};
 use crate::recording::truth::{LabelsBeside, Truth};
 
 /// Labels and occlusion grades beside a recording, there or not.
@@ -39,32 +43,58 @@ pub fn complete(mut recording: Recording, path: &Path, options: &ReadOptions) ->
     if occlusion_csv.exists() {
         recording.occlusion = labels::read_occlusion(&occlusion_csv)?;
     }
-    if options.approaching_is_positive {
-        let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
-        all.for_each(|d| d.radial_velocity_mps = -d.radial_velocity_mps);
+    let scans = recording.scans.take();
+    if let Some(mut scans) = scans.and_then(Arc::into_inner) {
+        check(&mut recording, &mut scans, options);
+        recording.scans = Some(Arc::new(scans));
+    } else {
+        let mut frames = std::mem::take(&mut recording.frames);
+        check(&mut recording, &mut frames, options);
+        recording.frames = frames;
     }
-    if let Some(scale) = options.velocity_scale {
-        let all = recording.frames.iter_mut().flat_map(|frame| &mut frame.detections);
-        all.for_each(|d| d.radial_velocity_mps = (f64::from(d.radial_velocity_mps) * scale) as f32);
-    }
-    if !recording.sensor.frames_independent {
-        clock::check(&recording.frames, &mut recording.problems);
-    }
-    unfilled::check(&mut recording);
-    judged::check(&mut recording);
-    plausible::check(&mut recording);
-    labelled::check(&mut recording);
-    restrict(&mut recording, options);
-    if recording.frames.is_empty() {
+    if recording.extent().frames == 0 {
         bail!("{}: no frame between --from and --to", path.display());
     }
     Ok(recording)
 }
 
+/// Whether there are labels for a recording besides its own.
+pub fn has_labels(path: &Path, options: &ReadOptions) -> bool {
+    options.labels != LabelsFrom::Usual || files(path)[0].exists()
+}
+
+/// Adds what is wrong with a recording's frames to its problems, corrects what can be, and leaves those that are wanted.
+fn check(recording: &mut Recording, frames: &mut dyn Frames, options: &ReadOptions) {
+    let (reversed, scale) = (options.approaching_is_positive, options.velocity_scale);
+    frames.correct(Correction { reversed, scale, ..Correction::default() });
+    let Survey { extent, clock, unfilled } = frames.survey();
+    let start_ns = extent.first_ns;
+    if !recording.sensor.frames_independent {
+        clock.tell(&mut recording.problems);
+    }
+    let correction = unfilled.tell(recording, start_ns);
+    frames.correct(correction);
+    let (mut watching, mut asked) = (Watching::of(recording), Asked::of(recording, extent.frames));
+    let wanted = Wanted { start_ns, from_s: options.from_s, to_s: options.to_s };
+    let mut left = Extent::default();
+    frames.each(&mut |frame| {
+        watching.frame(frame);
+        asked.iter_mut().for_each(|asked| asked.frame(frame));
+        if wanted.has(frame.time_ns) {
+            left.frame(frame);
+        }
+    });
+    watching.tell(&mut recording.problems);
+    if let Some(asked) = asked {
+        asked.tell(recording, frames, start_ns);
+    }
+    labelled::check(recording, frames, &extent);
+    frames.cut(wanted, left);
+}
+
 /// Takes the labels of a file.
 fn add_labels(recording: &mut Recording, labels_csv: &Path, options: &ReadOptions) -> Result<()> {
-    let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
-    let end_ns = recording.frames.last().map_or(0, |f| f.time_ns);
+    let Extent { first_ns: start_ns, last_ns: end_ns, .. } = recording.extent();
     let LabelsRead { mut labels, sized_by_class, turned_by_path, clock: labels_clock } =
         labels::read_labels(labels_csv, start_ns, end_ns)?;
     labels::check_places(labels_csv, &labels, &recording.pose, 1.2 * recording.sensor.field_of_view.range_m[1])?;
@@ -92,14 +122,6 @@ fn add_labels(recording: &mut Recording, labels_csv: &Path, options: &ReadOption
     Ok(())
 }
 
-fn restrict(recording: &mut Recording, options: &ReadOptions) {
-    let Some(start) = recording.frames.first().map(|f| f.time_ns) else { return };
-    let since = |f: &Frame| f.time_ns.saturating_sub(start) as f64 * 1e-9;
-    recording
-        .frames
-        .retain(|f| options.from_s.is_none_or(|t| since(f) >= t) && options.to_s.is_none_or(|t| since(f) <= t));
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::{Cursor, Write};
@@ -111,6 +133,7 @@ mod tests {
     use crate::evaluation::samples::{by_hand, collect};
     use crate::geometry::ground::Ground;
     use crate::geometry::solid::Solid;
+    use crate::recording::Frame;
     use crate::recording::truth::Label;
     use crate::recording::write::RecordingWriter;
 

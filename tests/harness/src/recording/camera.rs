@@ -142,6 +142,7 @@ impl RecordedCamera {
             },
             pose: self.pose,
             frames: self.frames.iter().map(|f| frame(f.time_ns)).collect(),
+            scans: None,
             ground: Ground::default(),
             truth,
             occlusion: Default::default(),

@@ -22,14 +22,19 @@ pub struct Kind {
 }
 
 /// A recording of a raw capture's frames. Mount and field of view that are not given are assumed and reported.
-pub fn recording(
+pub fn recording(name: String, kind: Kind, frames: Vec<Frame>, problems: Problems, options: &ReadOptions) -> Recording {
+    let start = frames.first().map_or(0, |f| f.time_ns);
+    Recording { frames, ..without_frames(name, kind, start, problems, options) }
+}
+
+/// The same without its frames, of which the first has this time.
+pub fn without_frames(
     name: String,
     kind: Kind,
-    frames: Vec<Frame>,
+    start: i64,
     mut problems: Problems,
     options: &ReadOptions,
 ) -> Recording {
-    let start = frames.first().map_or(0, |f| f.time_ns);
     let pose = match options.mount {
         Some([x, y, z, yaw, pitch, roll]) => SensorPose::new([x, y, z], yaw, pitch, roll),
         None => {
@@ -63,7 +68,8 @@ pub fn recording(
         name,
         sensor,
         pose,
-        frames,
+        frames: Vec::new(),
+        scans: None,
         ground: Ground::default(),
         truth: None,
         occlusion: BTreeMap::new(),

@@ -3,7 +3,6 @@
 //! Every frame is judged at the time it bears. Estimators start over where that leaps (more than their reset gap) or runs
 //! backwards, so that no map outlives the recording's own time. What is counted here is told with the results.
 
-use super::Frame;
 use super::problems::Problems;
 
 /// A pause that is no loss of a few frames, seconds.
@@ -11,44 +10,77 @@ const GAP_S: f64 = 10.0;
 
 const TOPIC: &str = "clock";
 
-/// Adds steps back, equal times and gaps to the problems, each kind once with its number and extent.
-pub fn check(frames: &[Frame], problems: &mut Problems) {
-    let Some(start) = frames.first().map(|f| f.time_ns) else { return };
-    let passed = |pair: &[Frame]| pair[1].time_ns.saturating_sub(pair[0].time_ns) as f64 * 1e-9;
-    let (mut back, mut gaps, mut equal) = (Vec::new(), Vec::new(), Vec::new());
-    for (k, pair) in frames.windows(2).enumerate() {
-        match passed(pair) {
-            s if s < 0.0 => back.push((k + 1, -s)),
-            0.0 => equal.push(k + 1),
-            s if s >= GAP_S => gaps.push((k + 1, s)),
+/// What the clock did from frame to frame.
+#[derive(Debug, Clone, Default)]
+pub struct Clock {
+    start_ns: Option<i64>,
+    last_ns: i64,
+    back: Steps,
+    /// Frames after the first step back, and those of them that lie before the first frame.
+    after: usize,
+    before_start: usize,
+    gaps: Steps,
+    equal: Steps,
+}
+
+/// Steps of one kind.
+#[derive(Debug, Clone, Default)]
+struct Steps {
+    count: u64,
+    /// Time of the frame after the first of them.
+    first_ns: i64,
+    longest_s: f64,
+}
+
+impl Steps {
+    fn add(&mut self, time_ns: i64, seconds: f64) {
+        if self.count == 0 {
+            self.first_ns = time_ns;
+        }
+        self.count += 1;
+        self.longest_s = self.longest_s.max(seconds);
+    }
+}
+
+impl Clock {
+    /// Takes the time of the next frame.
+    pub fn frame(&mut self, time_ns: i64) {
+        let Some(start_ns) = self.start_ns else {
+            (self.start_ns, self.last_ns) = (Some(time_ns), time_ns);
+            return;
+        };
+        match time_ns.saturating_sub(self.last_ns) as f64 * 1e-9 {
+            s if s < 0.0 => self.back.add(time_ns, -s),
+            0.0 => self.equal.add(time_ns, 0.0),
+            s if s >= GAP_S => self.gaps.add(time_ns, s),
             _ => {}
         }
+        self.last_ns = time_ns;
+        if self.back.count > 0 {
+            self.after += 1;
+            self.before_start += usize::from(time_ns < start_ns);
+        }
     }
-    let longest = |all: &[(usize, f64)]| all.iter().map(|(_, s)| *s).fold(0.0, f64::max);
-    let at = |k: usize| frames[k].time_ns;
-    if let Some(&(first, _)) = back.first() {
-        let after = frames.len() - first;
-        let before_start = frames[first..].iter().filter(|f| f.time_ns < start).count();
-        let early = match before_start {
+
+    /// Adds steps back, equal times and gaps to the problems, each kind once with its number and extent.
+    pub fn tell(&self, problems: &mut Problems) {
+        let early = match self.before_start {
             0 => String::new(),
             n => format!(", {n} of them, which lie before the first frame, are left out as warm-up"),
         };
-        let what = format!(
-            "the clock steps back, by {} at most; the maps start over there, and the {after} frames after it are judged at their own times{early}",
-            spoken(longest(&back))
+        let back = format!(
+            "the clock steps back, by {} at most; the maps start over there, and the {} frames after it are judged at their own times{early}",
+            spoken(self.back.longest_s),
+            self.after
         );
-        problems.add_many(TOPIC, what, at(first), back.len() as u64);
-    }
-    if let Some(&(first, _)) = gaps.first() {
-        let what = format!(
+        problems.add_many(TOPIC, back, self.back.first_ns, self.back.count);
+        let gaps = format!(
             "no frames for {} at most; the maps start over after it, and what follows is judged from its first frame on",
-            spoken(longest(&gaps))
+            spoken(self.gaps.longest_s)
         );
-        problems.add_many(TOPIC, what, at(first), gaps.len() as u64);
-    }
-    if let Some(&first) = equal.first() {
-        let what = "a frame bears the time of the one before; the maps start over there, and both are judged";
-        problems.add_many(TOPIC, what, at(first), equal.len() as u64);
+        problems.add_many(TOPIC, gaps, self.gaps.first_ns, self.gaps.count);
+        let equal = "a frame bears the time of the one before; the maps start over there, and both are judged";
+        problems.add_many(TOPIC, equal, self.equal.first_ns, self.equal.count);
     }
 }
 
@@ -67,17 +99,11 @@ mod tests {
     use super::*;
 
     fn told(seconds: &[f64]) -> Vec<String> {
-        let frame = |s: &f64| Frame {
-            time_ns: (s * 1e9) as i64,
-            detections: Vec::new(),
-            refused: 0,
-            unwanted: Vec::new(),
-            fault: false,
-        };
-        let frames: Vec<Frame> = seconds.iter().map(frame).collect();
-        let mut problems = Problems::default();
-        check(&frames, &mut problems);
-        problems.iter().map(|p| p.since(frames[0].time_ns)).collect()
+        let times: Vec<i64> = seconds.iter().map(|s| (s * 1e9) as i64).collect();
+        let (mut clock, mut problems) = (Clock::default(), Problems::default());
+        times.iter().for_each(|time_ns| clock.frame(*time_ns));
+        clock.tell(&mut problems);
+        problems.iter().map(|p| p.since(times[0])).collect()
     }
 
     #[test]

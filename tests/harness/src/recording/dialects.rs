@@ -19,7 +19,7 @@ fn lines() -> Vec<Line> {
 fn read(bytes: &[u8]) -> Result<Recording, String> {
     let options = ReadOptions { sensor_id: Some(0), ..ReadOptions::default() };
     let found = find(&Source::of_bytes(bytes)).unwrap().ok_or("no log")?;
-    ars408::read("log", &found, &options).map(|(recording, _)| recording).map_err(|error| error.to_string())
+    ars408::read("log", &found, &options, None).map(|(recording, _)| recording).map_err(|error| error.to_string())
 }
 
 /// Times since the first, microseconds, and detections.
@@ -359,7 +359,7 @@ fn what_is_asked_for_ends_the_reading() {
     let bytes = text(&TOOLS[0], &lines, false);
     let options = |to_s| ReadOptions { sensor_id: Some(0), to_s, ..ReadOptions::default() };
     let found = find(&Source::of_bytes(bytes.as_bytes())).unwrap().unwrap();
-    let read = |to_s| ars408::read("log", &found, &options(to_s)).unwrap().0;
+    let read = |to_s| ars408::read("log", &found, &options(to_s), None).unwrap().0;
     let (all, some) = (read(None), read(Some(5.0)));
     assert!(all.duration_s() > 19.0 && (5.0..9.0).contains(&some.duration_s()), "{}", some.duration_s());
     assert_eq!(some.frames[..], all.frames[..some.frames.len()]);
@@ -367,7 +367,7 @@ fn what_is_asked_for_ends_the_reading() {
     let entries = |line: &&str| !line.starts_with("(10") || !line.contains(" 701#");
     let late: String = bytes.lines().filter(entries).map(|line| format!("{line}\n")).collect();
     let found = find(&Source::of_bytes(late.as_bytes())).unwrap().unwrap();
-    let read = |to_s| ars408::read("log", &found, &options(to_s)).unwrap().0;
+    let read = |to_s| ars408::read("log", &found, &options(to_s), None).unwrap().0;
     let (all, some) = (read(None), read(Some(5.0)));
     let until = |r: &Recording| r.frames.iter().filter(|f| f.time_ns - r.frames[0].time_ns <= 5_000_000_000).count();
     assert_eq!(until(&some), until(&all));

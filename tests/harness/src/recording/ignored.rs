@@ -20,7 +20,7 @@ pub fn note(recording: &mut Recording, options: &ReadOptions, kind: Kind) {
     let (can, ti) = ("CAN logs", "captures of TI radars");
     let (of_can, of_ti) = (kind == Kind::CanLog, kind == Kind::TiCapture);
     let has_sensors = of_can || kind == Kind::NativeCapture;
-    let start = recording.frames.first().map_or(0, |frame| frame.time_ns);
+    let start = recording.start_ns();
     for (option, given, applies, of) in [
         ("--interface", options.interface.is_some(), of_can, can),
         ("--radar", options.profile.is_some(), of_can, can),

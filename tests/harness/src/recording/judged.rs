@@ -7,9 +7,9 @@ use viewshed::frame::health::{Condition, Health, HealthConfig, HealthLimits, Poi
 use viewshed::frame::repeats::Repeats;
 use viewshed::sensor::field_of_view::FieldOfView;
 
-use super::Recording;
-use super::problems::POINTS;
+use super::problems::{POINTS, Problems};
 use super::usable::{self, measurement};
+use super::{Frame, Recording};
 
 /// What a doctor knows of the view: nothing.
 const ANYWHERE: FieldOfView = FieldOfView {
@@ -102,27 +102,35 @@ impl Watch {
     }
 }
 
-/// Adds it to a recording's problems where nothing is known of some of its frames.
-pub fn check(recording: &mut Recording) {
-    if recording.sensor.frames_independent {
-        return;
-    }
-    if let Some(found) = of(recording) {
-        let first_ns = i64::try_from(found.first_us).unwrap_or(i64::MAX / 1000).saturating_mul(1000);
-        recording.problems.add_many(POINTS, found.said(), first_ns, u64::from(found.points));
-    }
+/// Watches the frames of a recording; not those that do not follow one another.
+pub struct Watching {
+    watch: Option<Watch>,
+    detections: Vec<Detection>,
 }
 
-fn of(recording: &Recording) -> Option<Unusable> {
-    let mut watch = Watch::by(usable::gate(recording, &GateConfig::default()));
-    let mut detections = Vec::new();
-    for frame in &recording.frames {
-        detections.clear();
-        let as_unit = |(d, marked)| Some(Detection { marked, ..Detection::new(&measurement(d)).ok()? });
-        detections.extend(frame.all().filter_map(as_unit));
-        watch.frame(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &detections);
+impl Watching {
+    /// Of a recording's radar.
+    pub fn of(recording: &Recording) -> Self {
+        let follow = !recording.sensor.frames_independent;
+        let watch = || Watch::by(usable::gate(recording, &GateConfig::default()));
+        Self { watch: follow.then(watch), detections: Vec::new() }
     }
-    watch.end()
+
+    /// Takes the next frame.
+    pub fn frame(&mut self, frame: &Frame) {
+        let Some(watch) = &mut self.watch else { return };
+        self.detections.clear();
+        let as_unit = |(d, marked)| Some(Detection { marked, ..Detection::new(&measurement(d)).ok()? });
+        self.detections.extend(frame.all().filter_map(as_unit));
+        watch.frame(Time::from_micros(u64::try_from(frame.time_ns / 1000).unwrap_or(0)), &self.detections);
+    }
+
+    /// Adds it to the recording's problems where nothing is known of some of its frames.
+    pub fn tell(self, problems: &mut Problems) {
+        let Some(found) = self.watch.and_then(Watch::end) else { return };
+        let first_ns = i64::try_from(found.first_us).unwrap_or(i64::MAX / 1000).saturating_mul(1000);
+        problems.add_many(POINTS, found.said(), first_ns, u64::from(found.points));
+    }
 }
 
 #[cfg(test)]
@@ -147,7 +155,9 @@ mod tests {
             let list = if marked { &mut frame.unwanted } else { &mut frame.detections };
             list.extend((0..10).map(one));
         }
-        check(&mut recording);
+        let mut watching = Watching::of(&recording);
+        recording.frames.iter().for_each(|frame| watching.frame(frame));
+        watching.tell(&mut recording.problems);
         recording.problems.iter().map(|p| p.what).collect()
     }
 

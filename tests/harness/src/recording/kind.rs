@@ -11,7 +11,7 @@ use viewshed::inputs::ars408::quality::Ars408Wanted;
 
 use super::ars408_feed::Feed;
 use super::can_log::Line;
-use super::plausible::signs;
+use super::pairs::Signs;
 use super::{Frame, capture};
 
 /// Lines of a log that are enough to tell.
@@ -71,7 +71,7 @@ impl Fit {
                 apart.push(frame.clone());
             }
         }
-        Self { scans: frames.len(), implausible, agree: signs(&frames).0 + signs(&apart).0 }
+        Self { scans: frames.len(), implausible, agree: Signs::of(&frames).counted().0 + Signs::of(&apart).counted().0 }
     }
 
     /// Why the frames rather are of a radar by whose scales they look like `other`.

@@ -5,8 +5,9 @@
 //! is asked is how many fit the labels as they are, and how many fit them mirrored, turned, or at another time. What stands
 //! tells nothing, and a queue little: the time is judged by what drives.
 
+use super::frames::{Extent, Frames, spread};
 use super::problems::Problems;
-use super::{RadarDetection, Recording};
+use super::{Frame, RadarDetection, Recording};
 use crate::geometry::solid::Solid;
 use crate::recording::truth::Truth;
 
@@ -36,12 +37,13 @@ const FASTEST_MPS: f64 = 100.0;
 const TOPIC: &str = "labels";
 
 /// Adds what contradicts itself to a recording's problems.
-pub fn check(recording: &mut Recording) {
+pub fn check(recording: &mut Recording, frames: &dyn Frames, extent: &Extent) {
     let Some(truth) = recording.truth.take() else { return };
-    let start_ns = recording.frames.first().map_or(0, |f| f.time_ns);
+    let start_ns = extent.first_ns;
     note_jumps(&truth, &mut recording.problems);
     let is_apart = recording.sensor.platform_moving || recording.sensor.frames_independent;
-    let what = if is_apart { None } else { misplaced(recording, &truth) };
+    let some = || spread(frames, extent.frames, MOST_FRAMES);
+    let what = if is_apart { None } else { misplaced(recording, &truth, &some()) };
     if let Some(what) = what {
         recording.problems.add(TOPIC, what, start_ns);
     }
@@ -66,14 +68,11 @@ struct Moving {
 }
 
 /// What of the labels' places or times the detections deny.
-fn misplaced(recording: &Recording, truth: &Truth) -> Option<String> {
+fn misplaced(recording: &Recording, truth: &Truth, frames: &[Frame]) -> Option<String> {
     let [x, y, _] = recording.pose.position;
-    let step = recording.frames.len().div_ceil(MOST_FRAMES).max(1);
     let moves = |d: &&RadarDetection| f64::from(d.radial_velocity_mps.abs()) >= LEAST_SPEED_MPS;
-    let frames: Vec<Vec<Moving>> = recording
-        .frames
+    let frames: Vec<Vec<Moving>> = frames
         .iter()
-        .step_by(step)
         .map(|frame| {
             let moving = |d: &RadarDetection| {
                 let [px, py, _] = d.road_position(&recording.pose, 0.9);
@@ -211,8 +210,13 @@ mod tests {
         recording
     }
 
+    fn check_held(recording: &mut Recording) {
+        let frames = recording.frames.clone();
+        check(recording, &frames, &Extent::of(&frames));
+    }
+
     fn said(mut recording: Recording) -> String {
-        check(&mut recording);
+        check_held(&mut recording);
         assert!(recording.truth.is_some());
         recording.problems.iter().map(|p| p.what).collect::<Vec<_>>().join("\n")
     }
@@ -247,7 +251,7 @@ mod tests {
             solid: solid(if k % 2 == 0 { 20.0 } else { 80.0 }),
         };
         recording.truth = Some(Truth::new((0..5).map(label).collect()));
-        check(&mut recording);
+        check_held(&mut recording);
         assert_eq!(recording.problems.count("faster than 100 m/s"), 4);
     }
 }

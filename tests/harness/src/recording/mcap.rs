@@ -445,6 +445,7 @@ impl Reader {
             sensor,
             pose,
             frames: self.frames,
+            scans: None,
             ground,
             truth,
             occlusion: BTreeMap::new(),

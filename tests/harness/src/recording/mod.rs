@@ -14,6 +14,7 @@ pub mod container;
 mod dialects;
 pub mod file;
 pub mod foreign;
+pub mod frames;
 pub mod ignored;
 pub mod judged;
 pub mod kind;
@@ -21,6 +22,7 @@ pub mod labelled;
 pub mod labels;
 pub mod mcap;
 pub mod native;
+pub mod pairs;
 pub mod picture;
 pub mod plausible;
 pub mod points;
@@ -37,12 +39,14 @@ pub mod ti;
 pub mod transforms;
 pub mod truth;
 pub mod unfilled;
+pub mod unheld;
 pub mod usable;
 pub mod used;
 pub mod write;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use anyhow::{Result, bail};
 
@@ -53,6 +57,7 @@ use camera::RecordedCamera;
 use file::{Content, Source};
 use ignored::Kind;
 use problems::Problems;
+use unheld::Scans;
 
 /// One low-level radar measurement, as recorded.
 ///
@@ -143,14 +148,17 @@ impl Sensor {
     };
 }
 
-/// A whole recording in memory.
+/// A recording. Its frames are held in memory, or read again and again from their log.
 #[derive(Debug, Clone)]
 pub struct Recording {
     /// File stem.
     pub name: String,
     pub sensor: Sensor,
     pub pose: SensorPose,
+    /// Those that are held: all of them, or none.
     pub frames: Vec<Frame>,
+    /// Where they are read from if they are not held.
+    pub scans: Option<Arc<Scans>>,
     /// Heights of the road, where it is not flat.
     pub ground: Ground,
     /// Objects over time, if labelled.
@@ -167,13 +175,6 @@ impl Recording {
     /// The camera whose own recording this is.
     pub fn of_camera(&self) -> Option<&RecordedCamera> {
         self.camera.as_ref().filter(|camera| camera.alone)
-    }
-
-    pub fn duration_s(&self) -> f64 {
-        match (self.frames.first(), self.frames.last()) {
-            (Some(a), Some(b)) => b.time_ns.saturating_sub(a.time_ns) as f64 * 1e-9,
-            _ => 0.0,
-        }
     }
 }
 
@@ -252,6 +253,14 @@ pub fn files(path: &Path) -> impl Iterator<Item = PathBuf> {
 /// # Errors
 /// Those of [`read`]; several radars, some of them without a mount or a field of view: all are listed.
 pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, ReadOptions)>> {
+    open_each(path, options, None)
+}
+
+/// The same; an unlabelled CAN log is read so many scans at once, if that is said, and not held.
+///
+/// # Errors
+/// Those of [`read_each`].
+pub fn open_each(path: &Path, options: &ReadOptions, part: Option<usize>) -> Result<Vec<(Recording, ReadOptions)>> {
     let asked = options.radar_topic.is_some() || path.as_os_str() == file::STANDARD_INPUT || boxes::is_boxes(path);
     let is_mcap = !asked && Source::of(path)?.begin(::mcap::MAGIC.len() as u64)? == ::mcap::MAGIC;
     let Content { bytes, damage } =
@@ -260,7 +269,7 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
     if topics.len() < 2 {
         // whoever reads the file again finds the same topic
         let radar_topic = options.radar_topic.clone().or(topics.first().cloned());
-        return Ok(vec![(read(path, options)?, ReadOptions { radar_topic, ..options.clone() })]);
+        return Ok(vec![(open(path, options, part)?, ReadOptions { radar_topic, ..options.clone() })]);
     }
     let name = file::stem(path);
     if options.mount.is_some() {
@@ -305,13 +314,22 @@ pub fn read_each(path: &Path, options: &ReadOptions) -> Result<Vec<(Recording, R
 /// # Errors
 /// A file that is none of them, and whatever makes replaying it impossible.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
+    open(path, options, None)
+}
+
+/// The same; an unlabelled CAN log is read so many scans at once, if that is said, and not held.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn open(path: &Path, options: &ReadOptions, part: Option<usize>) -> Result<Recording> {
     let (source, name) = (Source::of(path)?, file::stem(path));
     if source.begin(1)?.is_empty() {
         bail!("{} is empty", file::shown(path));
     }
     let known = boxes::is_boxes(path) || source.begin(::mcap::MAGIC.len() as u64)? == ::mcap::MAGIC;
     if !known && let Some(log) = can_log::log::find(&source)? {
-        let (recording, damage) = ars408::read(&name, &log, options)?;
+        let part = part.filter(|_| !beside::has_labels(path, options));
+        let (recording, damage) = ars408::read(&name, &log, options, part)?;
         return complete(recording, Kind::CanLog, damage.as_deref(), path, options);
     }
     let Content { bytes, damage } = source.read()?;
@@ -351,6 +369,6 @@ fn complete(
 /// Adds what is wrong with how the file was packed.
 fn note_damage(recording: &mut Recording, damage: Option<&str>) {
     let Some(damage) = damage else { return };
-    let last = recording.frames.last().map_or(0, |frame| frame.time_ns);
+    let last = recording.extent().last_ns;
     recording.problems.add("file", format!("{damage}; {}", file::DAMAGE_REMEDY), last);
 }

@@ -6,8 +6,8 @@
 //! pairs agree on.
 //!
 //! - *Sign*: over one frame, pairs with the velocity as it stands against pairs with its opposite.
-//! - *Scale*: by tracks of positions alone ([`scale`]).
-//! - *Yaw*: over `PAUSE_S`, the direction in the road frame from one to the other. Most pairs have that of the road's
+//! - *Scale*: by [tracks](super::scale) of positions alone.
+//! - *Yaw*: over a second, the direction in the road frame from one to the other. Most pairs have that of the road's
 //!   axis. A few degrees off it the yaw is wrong by as much. Farther off it may as well be another road's, or one's square
 //!   to it: then no angle is advised. Nothing is said of a direction in which labelled vehicles drive, too.
 //! - *Height and pitch*: the median height above the road of what moves, over its distance. By a height that is wrong
@@ -16,24 +16,18 @@
 //! Only detections that an estimator can use are asked: where they are [no such](used), velocities and directions mean
 //! nothing. What labels deny of a mount is told [from them](against_labels), and no more of its yaw then.
 
+use std::cell::LazyCell;
+
 use viewshed::sensor::noise::NoiseConfig;
 
+use super::frames::{Frames, step};
+use super::pairs::{Directions, LEAST_SPEED_MPS, MOST_FRAMES, Signs, USUAL_HEIGHT_M, axis_deg, folded};
 use super::problems::{MOUNT, Problems};
-use super::{Frame, RadarDetection, Recording, against_labels, scale, sensor, used};
+use super::scale::Tracks;
+use super::used::Used;
+use super::{Frame, RadarDetection, Recording, against_labels, sensor};
 use crate::geometry::looks;
 use crate::geometry::pose::SensorPose;
-
-/// What is slower tells no direction, m/s.
-const LEAST_SPEED_MPS: f32 = 5.0;
-
-/// Time between the detections of a pair, seconds.
-const PAUSE_S: f64 = 1.0;
-
-/// Frames that are looked at, spread over the recording.
-const MOST_FRAMES: usize = 300;
-
-/// Median height of a vehicle's reflections above the road, metres.
-const USUAL_HEIGHT_M: f64 = 0.9;
 
 /// What is farther off is named: degrees and metres.
 const YAW_DEG: f64 = 1.5;
@@ -53,30 +47,74 @@ pub struct MountError {
     pub pitch_and_height: Option<(f64, f64)>,
 }
 
-/// Adds what contradicts itself to a recording's problems.
-pub fn check(recording: &mut Recording) {
-    if recording.of_camera().is_some() {
-        return;
-    }
-    used::check(recording);
-    if recording.ground.is_level() {
-        let start = recording.frames.first().map_or(0, |f| f.time_ns);
-        for doubt in looks::doubts(&sensor::sensor(recording, &NoiseConfig::default())) {
-            recording.problems.add(MOUNT, format!("{doubt}; --mount sets it"), start);
-        }
-    }
-    let used = used::frames(recording);
-    let as_read = std::mem::replace(&mut recording.frames, used);
-    of_used(recording);
-    recording.frames = as_read;
+/// What is asked of the frames of a recording, of so many in all.
+pub struct Asked {
+    used: Used,
+    /// What takes frames that follow one another from a place that stays.
+    following: Option<Following>,
+    taken: usize,
+    step: usize,
+    /// Some of the frames, spread over the recording.
+    some: Vec<Frame>,
 }
 
-/// What the detections contradict that an estimator can use.
-fn of_used(recording: &mut Recording) {
-    let follow = !recording.sensor.platform_moving && !recording.sensor.frames_independent;
-    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+struct Following {
+    signs: Signs,
+    tracks: Tracks,
+    directions: Directions,
+}
+
+impl Asked {
+    /// Nothing of a camera.
+    pub fn of(recording: &Recording, frames: usize) -> Option<Self> {
+        let follow = !recording.sensor.platform_moving && !recording.sensor.frames_independent;
+        let following = || Following {
+            signs: Signs::new(frames),
+            tracks: Tracks::new(frames),
+            directions: Directions::new(frames, &recording.pose),
+        };
+        let ask = || Self {
+            used: Used::of(recording),
+            following: follow.then(following),
+            taken: 0,
+            step: step(frames, MOST_FRAMES),
+            some: Vec::new(),
+        };
+        recording.of_camera().is_none().then(ask)
+    }
+
+    /// Takes the next frame.
+    pub fn frame(&mut self, frame: &Frame) {
+        self.used.frame(frame);
+        let used = &self.used;
+        let points = LazyCell::new(|| used.points(frame));
+        if let Some(Following { signs, tracks, directions }) = &mut self.following {
+            signs.frame(&points);
+            tracks.frame(frame, &points);
+            directions.frame(frame.time_ns, &points);
+        }
+        if self.taken.is_multiple_of(self.step) {
+            self.some.push(points.clone());
+        }
+        self.taken += 1;
+    }
+
+    /// Adds what contradicts itself to the recording's problems.
+    pub fn tell(self, recording: &mut Recording, frames: &dyn Frames, start_ns: i64) {
+        self.used.tell(recording, frames, start_ns);
+        if recording.ground.is_level() {
+            for doubt in looks::doubts(&sensor::sensor(recording, &NoiseConfig::default())) {
+                recording.problems.add(MOUNT, format!("{doubt}; --mount sets it"), start_ns);
+            }
+        }
+        of_used(recording, self.following, &self.some, start_ns);
+    }
+}
+
+/// What the detections contradict that an estimator can use; `frames` are some of theirs.
+fn of_used(recording: &mut Recording, following: Option<Following>, frames: &[Frame], start: i64) {
     let add = |problems: &mut Problems, what: String| problems.add(MOUNT, what, start);
-    let (as_it_stands, reversed) = if follow { signs(&recording.frames) } else { (0, 0) };
+    let (as_it_stands, reversed) = following.as_ref().map(|f| f.signs.counted()).unwrap_or_default();
     if reversed > 100 && reversed > 2 * as_it_stands {
         let what = format!(
             "velocities have the wrong sign, by how ranges change ({reversed} pairs against {as_it_stands}): + is receding; turn them with --velocity-sign approaching"
@@ -84,19 +122,18 @@ fn of_used(recording: &mut Recording) {
         add(&mut recording.problems, what);
         return;
     }
-    if let Some(contradiction) = scale::contradiction(&recording.frames).filter(|_| follow) {
+    let directions = following.map(|Following { tracks, directions, .. }| (tracks.end(), directions));
+    if let Some((Some(contradiction), _)) = &directions {
         recording.problems.add("velocity", contradiction.told(), start);
         return;
     }
-    let denied = against_labels::check(recording);
-    if !follow {
-        return;
-    }
-    let mut error = mount_error(&recording.frames, &recording.pose);
+    let denied = against_labels::check(recording, frames, start);
+    let Some((_, directions)) = directions else { return };
+    let mut error = mount_error(&directions.end(), frames, &recording.pose);
     if denied {
         (error.yaw_deg, error.off_axis_deg) = (None, None);
     }
-    if let Some(yaw) = error.yaw_deg.filter(|yaw| yaw.abs() >= YAW_DEG && !is_a_road(*yaw, recording)) {
+    if let Some(yaw) = error.yaw_deg.filter(|yaw| yaw.abs() >= YAW_DEG && !is_a_road(*yaw, recording, frames)) {
         add(
             &mut recording.problems,
             told(
@@ -108,7 +145,8 @@ fn of_used(recording: &mut Recording) {
             ),
         );
     }
-    if let Some(off) = error.off_axis_deg.filter(|off| off_any(*off) >= YAW_DEG && !is_a_road(*off, recording)) {
+    if let Some(off) = error.off_axis_deg.filter(|off| off_any(*off) >= YAW_DEG && !is_a_road(*off, recording, frames))
+    {
         let what = format!(
             "traffic runs {:.1} degrees off the road's axis and {:.1} off what is square to it: yaw {:.1} degrees is wrong, or the axis is of another road; look at the picture",
             off.abs(),
@@ -151,74 +189,15 @@ fn told(what: &str, error: f64, unit: &str, given: f64, why: &str) -> String {
     format!("{why}: {what} {given:.1} {unit} seems {:.1} too {word}; --mount sets it", error.abs())
 }
 
-/// Pairs of neighbouring frames that agree with the velocities as they stand, and with their opposites.
-pub fn signs(frames: &[Frame]) -> (usize, usize) {
-    let (mut as_it_stands, mut reversed) = (0, 0);
-    for pair in spread(frames.windows(2)) {
-        let [before, after] = pair else { continue };
-        let passed = seconds(before, after);
-        if !(0.01..=0.5).contains(&passed) {
-            continue;
-        }
-        for d in before.detections.iter().filter(|d| f64::from(d.radial_velocity_mps.abs()) * passed >= 0.5) {
-            let found = |sign: f64| {
-                let range = f64::from(d.range_m) + sign * f64::from(d.radial_velocity_mps) * passed;
-                after.detections.iter().any(|a| {
-                    (f64::from(a.range_m) - range).abs() < 0.25
-                        && (a.azimuth_rad - d.azimuth_rad).abs() < 0.015
-                        && (a.radial_velocity_mps - d.radial_velocity_mps).abs() < 0.5
-                })
-            };
-            match (found(1.0), found(-1.0)) {
-                (true, false) => as_it_stands += 1,
-                (false, true) => reversed += 1,
-                _ => {}
-            }
-        }
-    }
-    (as_it_stands, reversed)
-}
-
-/// By how much the mount is off.
-pub fn mount_error(frames: &[Frame], pose: &SensorPose) -> MountError {
-    let off = commonest(&directions(frames, pose));
+/// By how much the mount is off, by directions of pairs and by where frames have points.
+fn mount_error(directions: &[f64], frames: &[Frame], pose: &SensorPose) -> MountError {
+    let off = commonest(directions);
     let is_error = |off: &f64| off.abs() <= MOST_YAW_DEG;
     MountError {
         yaw_deg: off.filter(is_error),
         off_axis_deg: off.filter(|off| !is_error(off)),
         pitch_and_height: pitch_and_height(frames, pose),
     }
-}
-
-/// Directions of pairs in the road frame, degrees, -90 to 90.
-fn directions(frames: &[Frame], pose: &SensorPose) -> Vec<f64> {
-    let mut directions = Vec::new();
-    for (k, before) in spread(frames.iter().enumerate()) {
-        let Some(after) = frames[k..].iter().find(|after| seconds(before, after) >= PAUSE_S) else { break };
-        let passed = seconds(before, after);
-        if passed > 1.3 * PAUSE_S {
-            continue;
-        }
-        for d in before.detections.iter().filter(|d| d.radial_velocity_mps.abs() >= LEAST_SPEED_MPS) {
-            let from = d.road_position(pose, USUAL_HEIGHT_M);
-            for a in &after.detections {
-                let range =
-                    f64::from(d.range_m) + passed * f64::from(d.radial_velocity_mps + a.radial_velocity_mps) / 2.0;
-                if (a.radial_velocity_mps - d.radial_velocity_mps).abs() > 1.0
-                    || (f64::from(a.range_m) - range).abs() > 1.0
-                {
-                    continue;
-                }
-                let to = a.road_position(pose, USUAL_HEIGHT_M);
-                let (x, y) = (to[0] - from[0], to[1] - from[1]);
-                // across the line of sight everything fits
-                if y.hypot(x) < 2.0 * passed * f64::from(d.radial_velocity_mps.abs()) {
-                    directions.push(axis_deg([x, y]));
-                }
-            }
-        }
-    }
-    directions
 }
 
 /// The direction that most have, where one stands out from those beside it and from chance; degrees, -90 to 90.
@@ -240,20 +219,11 @@ fn commonest(directions: &[f64]) -> Option<f64> {
     (stands_out && agreed).then(|| near.iter().sum::<f64>() / near.len() as f64)
 }
 
-/// The direction of a step along a road, whichever way: degrees, -90 to 90.
-fn axis_deg([x, y]: [f64; 2]) -> f64 {
-    folded(y.atan2(x).to_degrees())
-}
-
-/// The same axis within -90 to 90 degrees.
-fn folded(degrees: f64) -> f64 {
-    (degrees + 90.0).rem_euclid(180.0) - 90.0
-}
-
 /// Whether many labelled vehicles drive in this direction: then a road runs there, whatever the axis is of.
-fn is_a_road(direction: f64, recording: &Recording) -> bool {
+fn is_a_road(direction: f64, recording: &Recording, frames: &[Frame]) -> bool {
     let Some(truth) = &recording.truth else { return false };
-    let driven: Vec<f64> = spread(recording.frames.iter())
+    let driven: Vec<f64> = frames
+        .iter()
         .flat_map(|frame| truth.at(frame.time_ns))
         .filter(|object| object.speed().is_some_and(|speed| speed >= f64::from(LEAST_SPEED_MPS)))
         .filter_map(|object| object.velocity.map(axis_deg))
@@ -267,7 +237,7 @@ fn pitch_and_height(frames: &[Frame], pose: &SensorPose) -> Option<(f64, f64)> {
     const BIN_M: f64 = 10.0;
     let mut heights: Vec<Vec<f64>> = vec![Vec::new(); 16];
     let moves = |d: &&RadarDetection| d.radial_velocity_mps.abs() >= LEAST_SPEED_MPS && d.elevation_rad.is_some();
-    for frame in spread(frames.iter()) {
+    for frame in frames {
         for d in frame.detections.iter().filter(moves) {
             let bin = (f64::from(d.range_m) / BIN_M) as usize;
             if let Some(bin) = heights.get_mut(bin) {
@@ -295,16 +265,6 @@ fn pitch_and_height(frames: &[Frame], pose: &SensorPose) -> Option<(f64, f64)> {
     let slope = medians.iter().map(|m| (m.0 - r) * (m.1 - z)).sum::<f64>()
         / medians.iter().map(|m| (m.0 - r).powi(2)).sum::<f64>();
     Some((-slope.atan().to_degrees(), z - slope * r - USUAL_HEIGHT_M))
-}
-
-/// Every so manieth, so that there are not more than [`MOST_FRAMES`].
-fn spread<I: ExactSizeIterator>(all: I) -> impl Iterator<Item = I::Item> {
-    let step = all.len().div_ceil(MOST_FRAMES).max(1);
-    all.step_by(step)
-}
-
-fn seconds(before: &Frame, after: &Frame) -> f64 {
-    after.time_ns.saturating_sub(before.time_ns) as f64 * 1e-9
 }
 
 #[cfg(test)]
@@ -352,7 +312,10 @@ mod tests {
     }
 
     fn said(mut recording: Recording) -> String {
-        check(&mut recording);
+        let mut asked = Asked::of(&recording, recording.frames.len()).unwrap();
+        recording.frames.iter().for_each(|frame| asked.frame(frame));
+        let frames = recording.frames.clone();
+        asked.tell(&mut recording, &frames, frames[0].time_ns);
         recording.problems.iter().map(|p| p.what).collect::<Vec<_>>().join("\n")
     }
 

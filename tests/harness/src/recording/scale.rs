@@ -6,7 +6,10 @@
 //! place empty and comes to one that was empty: rails and masts, however evenly they stand, lead nowhere. How fast its
 //! range changes over the radial velocity of its detections is the scale, if most tracks agree.
 
+use std::ops::Deref;
+
 use super::Frame;
+use super::frames::step;
 
 /// A track that moves less is none, metres.
 const LEAST_WAY_M: f64 = 3.0;
@@ -82,48 +85,104 @@ struct Point {
     velocity: f64,
 }
 
-/// What the positions of a recording say against its velocities; `None` where they agree, or say nothing.
-pub fn contradiction(frames: &[Frame]) -> Option<Contradiction> {
-    let all = || frames.iter().flat_map(|f| &f.detections);
-    let never_filled = all().all(|d| d.radial_velocity_mps.abs() < NOTHING_MPS);
-    let tracks = tracks(frames);
-    if tracks.len() < LEAST_TRACKS {
-        return None;
-    }
-    if never_filled {
-        let fastest_mps = tracks.iter().map(|(rate, _)| rate.abs()).fold(0.0, f64::max);
-        return Some(Contradiction::NeverFilled { tracks: tracks.len(), fastest_mps });
-    }
-    let has_velocity = |&&(_, velocity): &&(f64, f64)| velocity.abs() > 0.05;
-    let mut ratios: Vec<f64> = tracks.iter().filter(has_velocity).map(|(rate, velocity)| rate / velocity).collect();
-    ratios.sort_by(f64::total_cmp);
-    let factor = *ratios.get(ratios.len() / 2)?;
-    let agree = ratios.iter().filter(|r| (**r / factor - 1.0).abs() < 0.1).count();
-    let is_scale = (0.8..=1.25).contains(&factor);
-    (!is_scale && agree >= LEAST_TRACKS && agree * 3 >= tracks.len() * 2)
-        .then_some(Contradiction::Scaled { tracks: agree, factor })
+/// Of what moves: how fast the range changes, and the mean radial velocity of its detections.
+pub struct Tracks {
+    step: usize,
+    taken: usize,
+    start_ns: Option<i64>,
+    last_s: f64,
+    never_filled: bool,
+    /// Frames that are gathered from one on in which tracks begin.
+    open: Vec<Stretch>,
+    found: Vec<(f64, f64)>,
 }
 
-/// Of what moves: how fast the range changes, and the mean radial velocity of its detections.
-fn tracks(frames: &[Frame]) -> Vec<(f64, f64)> {
-    let points: Vec<Vec<Point>> = frames.iter().map(points).collect();
-    let times: Vec<f64> = frames.iter().map(|f| seconds(frames[0].time_ns, f.time_ns)).collect();
-    let step = frames.len().div_ceil(MOST_STARTS).max(1);
-    let mut found = Vec::new();
-    for first in (0..frames.len()).step_by(step) {
-        let within = |k: &usize| {
-            times[*k] - times[first] <= FOLLOWED_S || k - first <= LEAST_FRAMES && times[*k] - times[*k - 1] <= 0.5
-        };
-        let last = (first + 1..frames.len()).take_while(within).last().unwrap_or(first);
-        let in_order = times[first..=last].windows(2).all(|pair| (0.005..=0.5).contains(&(pair[1] - pair[0])));
-        if last - first < LEAST_FRAMES || !in_order {
-            continue;
+/// Frames that follow one another: their times since the recording's first and their detections.
+struct Stretch {
+    times: Vec<f64>,
+    points: Vec<Vec<Point>>,
+}
+
+impl Tracks {
+    /// Of so many frames.
+    pub fn new(frames: usize) -> Self {
+        Self {
+            step: step(frames, MOST_STARTS),
+            taken: 0,
+            start_ns: None,
+            last_s: 0.0,
+            never_filled: true,
+            open: Vec::new(),
+            found: Vec::new(),
         }
-        let (points, times) = (&points[first..=last], &times[first..=last]);
-        let share = points[0].len().div_ceil(MOST_FOLLOWED).max(1);
-        found.extend(points[0].iter().step_by(share).filter_map(|start| followed(*start, points, times)));
     }
-    found
+
+    /// Takes the next frame, as it is and with the points that can be used.
+    pub fn frame(&mut self, frame: &Frame, used: &impl Deref<Target = Frame>) {
+        let still = |frame: &Frame| frame.detections.iter().all(|d| d.radial_velocity_mps.abs() < NOTHING_MPS);
+        self.never_filled = self.never_filled && (still(frame) || still(used));
+        let now_s = seconds(*self.start_ns.get_or_insert(frame.time_ns), frame.time_ns);
+        let begins = self.taken.is_multiple_of(self.step);
+        if begins || !self.open.is_empty() {
+            let points = points(used);
+            let (passed, found) = (now_s - self.last_s, &mut self.found);
+            self.open.retain_mut(|stretch| match stretch.takes(now_s, passed) {
+                Some(true) => {
+                    stretch.times.push(now_s);
+                    stretch.points.push(points.clone());
+                    true
+                }
+                Some(false) => {
+                    found.extend(stretch.tracks());
+                    false
+                }
+                None => false,
+            });
+            if begins {
+                self.open.push(Stretch { times: vec![now_s], points: vec![points] });
+            }
+        }
+        self.last_s = now_s;
+        self.taken += 1;
+    }
+
+    /// What the positions say against the velocities; `None` where they agree, or say nothing.
+    pub fn end(mut self) -> Option<Contradiction> {
+        self.found.extend(self.open.iter().flat_map(Stretch::tracks));
+        let tracks = self.found;
+        if tracks.len() < LEAST_TRACKS {
+            return None;
+        }
+        if self.never_filled {
+            let fastest_mps = tracks.iter().map(|(rate, _)| rate.abs()).fold(0.0, f64::max);
+            return Some(Contradiction::NeverFilled { tracks: tracks.len(), fastest_mps });
+        }
+        let has_velocity = |&&(_, velocity): &&(f64, f64)| velocity.abs() > 0.05;
+        let mut ratios: Vec<f64> = tracks.iter().filter(has_velocity).map(|(rate, velocity)| rate / velocity).collect();
+        ratios.sort_by(f64::total_cmp);
+        let factor = *ratios.get(ratios.len() / 2)?;
+        let agree = ratios.iter().filter(|r| (**r / factor - 1.0).abs() < 0.1).count();
+        let is_scale = (0.8..=1.25).contains(&factor);
+        (!is_scale && agree >= LEAST_TRACKS && agree * 3 >= tracks.len() * 2)
+            .then_some(Contradiction::Scaled { tracks: agree, factor })
+    }
+}
+
+impl Stretch {
+    /// Whether a frame is one of these; `None` of one of a clock by which nothing can be followed.
+    fn takes(&self, now_s: f64, passed: f64) -> Option<bool> {
+        let is_near = now_s - self.times[0] <= FOLLOWED_S || self.times.len() <= LEAST_FRAMES && passed <= 0.5;
+        (!is_near || (0.005..=0.5).contains(&passed)).then_some(is_near)
+    }
+
+    fn tracks(&self) -> Vec<(f64, f64)> {
+        let Self { times, points } = self;
+        if times.len() <= LEAST_FRAMES {
+            return Vec::new();
+        }
+        let share = points[0].len().div_ceil(MOST_FOLLOWED).max(1);
+        points[0].iter().step_by(share).filter_map(|start| followed(*start, points, times)).collect()
+    }
 }
 
 fn seconds(from_ns: i64, to_ns: i64) -> f64 {
@@ -217,6 +276,12 @@ fn followed(start: Point, points: &[Vec<Point>], times: &[f64]) -> Option<(f64, 
 mod tests {
     use super::*;
     use crate::recording::RadarDetection;
+
+    fn contradiction(frames: &[Frame]) -> Option<Contradiction> {
+        let mut tracks = Tracks::new(frames.len());
+        frames.iter().for_each(|frame| tracks.frame(frame, &frame));
+        tracks.end()
+    }
 
     /// Numbers from 0 to 1, always the same.
     struct Dice(u64);

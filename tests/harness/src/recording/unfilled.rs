@@ -3,13 +3,16 @@
 //! No measurement is the same everywhere. Such a field is taken for not measured, and said once: a gate that goes by it
 //! would let everything through, or nothing.
 
-use super::{RadarDetection, Recording};
+use std::collections::BTreeSet;
+
+use super::frames::Correction;
+use super::{Frame, RadarDetection, Recording};
 
 /// Points before a value that drivers write for "nothing" is taken for that.
-const LEAST_POINTS: usize = 10;
+const LEAST_POINTS: u64 = 10;
 
 /// Points before any other value is: a lone reflector may have the same rounded value for long.
-const LEAST_POINTS_OTHER: usize = 200;
+const LEAST_POINTS_OTHER: u64 = 200;
 
 /// Places that these have to lie at, by whole metres of range.
 const LEAST_PLACES: usize = 3;
@@ -19,59 +22,96 @@ const NOTHING: [f32; 6] = [0.0, -128.0, 127.0, 255.0, -64.0, 63.5];
 
 const TOPIC: &str = "points";
 
-/// A field that may not be there: its name, what it says, and how to take it away.
-type Field = (&'static str, fn(&RadarDetection) -> Option<f32>, fn(&mut RadarDetection), bool);
+/// A field that may not be there.
+pub struct Field {
+    name: &'static str,
+    of: fn(&RadarDetection) -> Option<f32>,
+    /// Takes it away.
+    pub unset: fn(&mut RadarDetection),
+    /// Any value that never changes is none, and not only what drivers write for "nothing".
+    any_value: bool,
+}
 
-const FIELDS: [Field; 3] = [
-    ("SNR (or amplitude)", |d| d.snr_db, |d| d.snr_db = None, true),
-    ("RCS", |d| d.rcs_dbsm, |d| d.rcs_dbsm = None, true),
+/// All of them.
+pub const FIELDS: [Field; 3] = [
+    Field { name: "SNR (or amplitude)", of: |d| d.snr_db, unset: |d| d.snr_db = None, any_value: true },
+    Field { name: "RCS", of: |d| d.rcs_dbsm, unset: |d| d.rcs_dbsm = None, any_value: true },
     // a plane in which all points lie is measured by nobody; another one may be a mount's
-    ("elevation", |d| d.elevation_rad, |d| d.elevation_rad = None, false),
+    Field { name: ELEVATION, of: |d| d.elevation_rad, unset: |d| d.elevation_rad = None, any_value: false },
 ];
 
-/// Takes fields that are never filled for not measured.
-pub fn check(recording: &mut Recording) {
-    let start_ns = recording.frames.first().map_or(0, |frame| frame.time_ns);
-    for (name, of, unset, any_value) in FIELDS {
-        let Some((value, points)) = constant(recording, of, any_value) else { continue };
-        recording.frames.iter_mut().flat_map(|frame| &mut frame.detections).for_each(unset);
-        if name == "elevation" {
-            recording.sensor.has_elevation = false;
+const ELEVATION: &str = "elevation";
+
+/// What the points of a recording have in these fields.
+#[derive(Debug, Clone, Default)]
+pub struct Unfilled([Values; FIELDS.len()]);
+
+/// The values of one field.
+#[derive(Debug, Clone, Default)]
+struct Values {
+    first: Option<f32>,
+    varies: bool,
+    points: u64,
+    places: BTreeSet<i64>,
+}
+
+impl Unfilled {
+    /// Takes the next frame.
+    pub fn frame(&mut self, frame: &Frame) {
+        for (values, field) in self.0.iter_mut().zip(&FIELDS).filter(|(values, _)| !values.varies) {
+            frame.detections.iter().for_each(|d| values.take(d, field));
         }
-        let what = format!("{name} is {value} in every detection, so it is not filled, and taken for not measured");
-        recording.problems.add_many(TOPIC, what, start_ns, points);
+    }
+
+    /// Adds the fields that are never filled to a recording's problems, and says what is to be done about them.
+    pub fn tell(&self, recording: &mut Recording, start_ns: i64) -> Correction {
+        let mut correction = Correction::default();
+        for ((values, field), unfilled) in self.0.iter().zip(&FIELDS).zip(&mut correction.unfilled) {
+            let Some(value) = values.constant(field) else { continue };
+            *unfilled = true;
+            if field.name == ELEVATION {
+                recording.sensor.has_elevation = false;
+            }
+            let name = field.name;
+            let what = format!("{name} is {value} in every detection, so it is not filled, and taken for not measured");
+            recording.problems.add_many(TOPIC, what, start_ns, values.points);
+        }
+        correction
     }
 }
 
-/// The value that a field has in all points that have it, and how many these are.
-fn constant(recording: &Recording, of: fn(&RadarDetection) -> Option<f32>, any_value: bool) -> Option<(f32, u64)> {
-    let all = || recording.frames.iter().flat_map(|frame| &frame.detections);
-    let value = all().find_map(of)?;
-    let (mut points, mut places) = (0, std::collections::BTreeSet::new());
-    for d in all() {
-        match of(d) {
-            Some(v) if v == value => points += 1,
-            Some(_) => return None,
-            None => continue,
+impl Values {
+    fn take(&mut self, d: &RadarDetection, field: &Field) {
+        let Some(value) = (field.of)(d).filter(|_| !self.varies) else { return };
+        if *self.first.get_or_insert(value) != value {
+            self.varies = true;
+            return;
         }
-        if places.len() < LEAST_PLACES {
-            places.insert(d.range_m as i64);
+        self.points += 1;
+        if self.places.len() < LEAST_PLACES {
+            self.places.insert(d.range_m as i64);
         }
     }
-    let least = if NOTHING.contains(&value) && (any_value || value == 0.0) {
-        LEAST_POINTS
-    } else if any_value {
-        LEAST_POINTS_OTHER
-    } else {
-        return None;
-    };
-    (points >= least && places.len() >= LEAST_PLACES).then_some((value, points as u64))
+
+    /// The value that all points have that have the field.
+    fn constant(&self, field: &Field) -> Option<f32> {
+        let value = self.first.filter(|_| !self.varies)?;
+        let least = if NOTHING.contains(&value) && (field.any_value || value == 0.0) {
+            LEAST_POINTS
+        } else if field.any_value {
+            LEAST_POINTS_OTHER
+        } else {
+            return None;
+        };
+        (self.points >= least && self.places.len() >= LEAST_PLACES).then_some(value)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::evaluation::samples::by_hand;
+    use crate::recording::frames::Frames;
 
     /// 40 frames of five points whose values are these, by the number of the point.
     fn recording(of: impl Fn(usize) -> [f32; 3]) -> Recording {
@@ -91,7 +131,9 @@ mod tests {
                 });
             }
         }
-        check(&mut recording);
+        let survey = recording.frames.survey();
+        let correction = survey.unfilled.tell(&mut recording, 0);
+        recording.frames.correct(correction);
         recording
     }
 

@@ -370,6 +370,7 @@ impl Simulation {
             sensor,
             pose,
             frames,
+            scans: None,
             ground: self.ground.clone(),
             truth: truth.clone(),
             occlusion: Default::default(),

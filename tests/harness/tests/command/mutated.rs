@@ -112,7 +112,7 @@ fn no_damage_ends_in_a_panic() {
                     assert!(set || line.time_ns >= before, "{}", String::from_utf8_lossy(&bytes));
                 });
             }
-            read += usize::from(ars408::read("log", &found, &options).is_ok());
+            read += usize::from(ars408::read("log", &found, &options, None).is_ok());
         } else if ti::is_capture(&bytes) {
             read += usize::from(ti::read("capture".into(), &bytes, &options).is_ok());
         }

@@ -299,6 +299,7 @@ fn blank(simulation: &Simulation, mount: &Mount) -> Recording {
         sensor: simulation.sensor(),
         pose: mount.pose(),
         frames: Vec::new(),
+        scans: None,
         ground: Ground::default(),
         truth: None,
         occlusion: BTreeMap::new(),
