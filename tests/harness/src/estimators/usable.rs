@@ -1,11 +1,13 @@
 //! How much of a recording estimators can use: a map that rests on nothing is no map.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use anyhow::{Result, bail};
 
 use super::Options;
 use crate::recording::Recording;
+use crate::recording::frames::Extent;
 use crate::recording::usable::{DROPPED, gate, hint, rejected};
 
 /// From this share of usable points on a map rests on something: a broken field lets a few pass by chance.
@@ -18,18 +20,27 @@ const LEAST_OF: u64 = 1000;
 /// How many points are rejected, why most of them are, and what that may come from.
 pub fn check(recording: &Recording, options: &Options) -> Result<()> {
     let Some(gate) = gate(recording, &options.radar_3d.gate) else { return Ok(()) };
-    let all: u64 = recording.frames.iter().map(|f| f.detections.len() as u64 + f.refused).sum();
-    let detections = || recording.frames.iter().flat_map(|f| &f.detections);
+    let Extent { detections, refused, .. } = recording.extent();
+    let all = detections + refused;
     // of most recordings the first frames decide
-    let enough = usize::try_from(all.div_ceil(LEAST_OF)).unwrap_or(usize::MAX);
-    if all == 0 || detections().filter(|d| rejected(&gate, d).is_none()).take(enough).count() == enough {
+    let enough = all.div_ceil(LEAST_OF);
+    let (mut used, mut reasons) = (0, BTreeMap::<&str, u64>::new());
+    recording.all().parts(&mut |part| {
+        for detection in part.iter().flat_map(|frame| &frame.detections) {
+            match rejected(&gate, detection) {
+                None => used += 1,
+                Some(reason) => *reasons.entry(reason).or_default() += 1,
+            }
+            if used >= enough {
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    if used >= enough {
         return Ok(());
     }
-    let mut reasons: BTreeMap<&str, u64> = BTreeMap::new();
-    for reason in detections().filter_map(|d| rejected(&gate, d)) {
-        *reasons.entry(reason).or_default() += 1;
-    }
-    *reasons.entry(DROPPED).or_default() += recording.frames.iter().map(|f| f.refused).sum::<u64>();
+    *reasons.entry(DROPPED).or_default() += refused;
     let sum: u64 = reasons.values().sum();
     let most = reasons.into_iter().max_by_key(|(_, n)| *n).map_or(DROPPED, |(reason, _)| reason);
     bail!(

@@ -7,7 +7,7 @@
 use super::Grid;
 use super::cells::CellTally;
 use super::samples::{FrameSamples, Sample};
-use super::score::{Score, Verdict};
+use super::score::{Score, Verdict, Worth};
 
 pub const SLICE: &str = "geometry-slice";
 pub const BOX: &str = "geometry-box";
@@ -44,7 +44,7 @@ fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool)
         counters: Vec::new(),
         azimuth_noise_deg: None,
         learnt_lanes: None,
-        conditions: Vec::new(),
+        worth: Worth::default(),
     }
 }
 

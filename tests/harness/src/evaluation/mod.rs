@@ -3,7 +3,7 @@
 //! In data-flow order: a recording becomes [`samples`], an estimator's map is [`score`]d against
 //! them ([`bounds`] are scores too), and [`summary`] makes rates ([`counts`], [`cells`]), intervals
 //! ([`bootstrap`] over [`units`]), [`breakdown`]s, trade-off [`curve`]s and [`comparison`]s of the
-//! scores. [`replay`] does all of that for one recording, [`mount_error`] again with a wrong mount,
+//! scores. [`replay`] does all of that for one recording, [`unlabelled`] what is left of it without labels, [`mount_error`] again with a wrong mount,
 //! [`calibration`] judges probabilities, which [`probability`] fits,
 //! [`paired`] compares two runs, [`camera`] makes samples for a camera beside the radar, [`pool`] joins several, [`over_time`] counts window by window, and
 //! [`examples`] picks what is worth a picture.
@@ -31,6 +31,7 @@ pub mod score;
 pub mod sensor_set;
 pub mod summary;
 pub mod units;
+pub mod unlabelled;
 
 use serde::{Deserialize, Serialize};
 

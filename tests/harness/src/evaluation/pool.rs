@@ -8,7 +8,7 @@ use super::bounds;
 use super::cells::CellTally;
 use super::replay::Replay;
 use super::samples::FrameSamples;
-use super::score::{Score, Verdict};
+use super::score::{Score, Verdict, Worth};
 use super::summary::Summary;
 use super::units::BLOCK_NS;
 use crate::recording::problems::Problems;
@@ -106,7 +106,7 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
             counters: Vec::new(),
             azimuth_noise_deg: None,
             learnt_lanes: None,
-            conditions: Vec::new(),
+            worth: Worth::default(),
             ..s.clone()
         })
         .collect();

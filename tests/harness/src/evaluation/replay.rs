@@ -1,5 +1,8 @@
 //! One recording through every estimator: samples, scores and their summary.
 
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+
 use anyhow::Result;
 use rayon::prelude::*;
 
@@ -8,6 +11,7 @@ use super::camera;
 use super::samples::{self, FrameSamples};
 use super::score::{Score, score};
 use super::summary::Summary;
+use super::unlabelled;
 use crate::estimators::{self, Estimator};
 use crate::recording::Recording;
 use crate::recording::camera::INFO_TOPIC;
@@ -25,13 +29,17 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Runs estimators over a recording. `progress` is called after each of [`steps`].
+    /// Runs estimators over a recording; of an unlabelled one there are no samples. `progress` is called after each of
+    /// [`steps`].
     pub fn new(
         recording: Recording,
         estimators: &mut [Box<dyn Estimator>],
         options: &Options,
         progress: &(dyn Fn() + Sync),
     ) -> Self {
+        if recording.truth.is_none() {
+            return Self::unlabelled(recording, estimators, options, progress);
+        }
         let samples = samples::collect(&recording, options, progress);
         let scores: Vec<Score> = estimators
             .par_iter_mut()
@@ -39,6 +47,16 @@ impl Replay {
             .collect();
         let summary = Summary::new(&recording, &samples, &scores, options);
         Self { recording, samples, scores, summary, camera: None }
+    }
+
+    fn unlabelled(
+        recording: Recording,
+        estimators: &mut [Box<dyn Estimator>],
+        options: &Options,
+        progress: &(dyn Fn() + Sync),
+    ) -> Self {
+        let (scores, summary) = unlabelled::judge(&recording, estimators, options, progress);
+        Self { recording, samples: Vec::new(), scores, summary, camera: None }
     }
 
     /// Adds the recording's camera, if it has one. A camera that cannot be worked with is reported as a problem of the
@@ -49,7 +67,7 @@ impl Replay {
         match Self::of_camera(recording, estimators, options, progress) {
             Ok(camera) => self.camera = Some(Box::new(camera)),
             Err(error) => {
-                let first = self.recording.frames.first().map_or(0, |f| f.time_ns);
+                let first = self.recording.start_ns();
                 self.recording.problems.add(INFO_TOPIC, format!("boxes left out: {error:#}"), first);
             }
         }
@@ -68,6 +86,9 @@ impl Replay {
         let config = &estimators.camera_3d;
         recording.sensor.field_of_view.range_m[1] = f64::from(config.range_max_m);
         let mut running = estimators::all(&recording, estimators)?;
+        if recording.truth.is_none() {
+            return Ok(Self::unlabelled(recording, &mut running, options, progress));
+        }
         let samples = camera::samples(&recording, f64::from(config.visible_share), options, 1, progress);
         let scores: Vec<Score> = running
             .par_iter_mut()
@@ -93,7 +114,7 @@ impl Replay {
 /// Steps that `progress` will be told of: each frame once for the samples and once an estimator.
 pub fn steps(recording: &Recording, estimators: usize) -> u64 {
     let passes = estimators + usize::from(recording.truth.is_some());
-    (recording.frames.len() * passes) as u64
+    (recording.count() * passes) as u64
 }
 
 /// Calls of `progress` by [`Replay::add_camera`]: each of the camera's frames for the samples, and for each of its
@@ -103,21 +124,35 @@ pub fn camera_steps(recording: &Recording) -> u64 {
     recording.camera.as_ref().map_or(0, |camera| camera.frames.len() as u64 * passes)
 }
 
-/// Runs a fresh estimator up to the last of `frames`, and shows it to `visit` at each of them.
+/// Runs fresh estimators up to the last of `frames`, and shows each to `visit` at each of these, by the numbers of both.
 pub fn visit(
     recording: &Recording,
-    estimator: &mut dyn Estimator,
+    estimators: &mut [Box<dyn Estimator>],
     frames: &[usize],
-    mut visit: impl FnMut(usize, &dyn Estimator),
+    mut visit: impl FnMut(usize, usize, &dyn Estimator),
 ) {
     let end = frames.iter().max().map_or(0, |last| last + 1);
-    for (k, frame) in recording.frames.iter().enumerate().take(end) {
-        if recording.sensor.frames_independent {
-            estimator.reset();
+    let wanted: BTreeSet<usize> = frames.iter().copied().collect();
+    let independent = recording.sensor.frames_independent;
+    let mut begin = 0;
+    recording.all().parts(&mut |part| {
+        let mut rest = part.get(..end - begin).unwrap_or(part);
+        while !rest.is_empty() {
+            let next = wanted.range(begin..).next().map_or(rest.len(), |next| (next + 1 - begin).min(rest.len()));
+            let (now, later) = rest.split_at(next);
+            estimators.par_iter_mut().for_each(|estimator| {
+                for frame in now {
+                    if independent {
+                        estimator.reset();
+                    }
+                    estimator.step(frame);
+                }
+            });
+            (begin, rest) = (begin + next, later);
+            if wanted.contains(&(begin - 1)) {
+                estimators.iter().enumerate().for_each(|(k, estimator)| visit(begin - 1, k, estimator.as_ref()));
+            }
         }
-        estimator.step(frame);
-        if frames.contains(&k) {
-            visit(k, estimator);
-        }
-    }
+        if begin < end { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
 }

@@ -35,8 +35,34 @@ pub struct Score {
     pub azimuth_noise_deg: Option<f64>,
     /// Places at which it has learnt a lane until the end; `None` of several recordings together.
     pub learnt_lanes: Option<usize>,
-    /// What its map was worth, by frame; empty where that is not known.
-    pub conditions: Vec<Condition>,
+    /// What its map was worth.
+    pub worth: Worth,
+}
+
+/// What a map was worth at the counted frames.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Worth {
+    settled: Settled,
+    /// Frames in which points came and could not be used, so that all was unknown.
+    pub unusable: usize,
+}
+
+impl Worth {
+    /// Takes a counted frame and what is counted in it.
+    pub fn frame(&mut self, condition: Condition, counts: Counts, cells: CellCounts) {
+        self.settled.of += 1;
+        self.unusable += usize::from(condition == Condition::Unusable);
+        if condition != Condition::Settling {
+            self.settled.frames += 1;
+            self.settled.counts += counts;
+            self.settled.cells += cells;
+        }
+    }
+
+    /// What is left without the frames whose map had not settled; `None` where all had.
+    pub fn settled(&self) -> Option<Settled> {
+        Some(self.settled).filter(|settled| settled.frames < settled.of)
+    }
 }
 
 /// The frames whose map had settled, and what is counted in them.
@@ -60,31 +86,6 @@ impl Score {
         counts
     }
 
-    /// What is left without the frames whose map had not settled; `None` where all had.
-    pub fn settled(&self, samples: &[FrameSamples]) -> Option<Settled> {
-        let counted: Vec<usize> = (0..samples.len()).filter(|k| samples[*k].counted).collect();
-        let has_settled = |k: &usize| self.conditions.get(*k) != Some(&Condition::Settling);
-        if counted.iter().all(has_settled) {
-            return None;
-        }
-        let mut settled = Settled { of: counted.len(), ..Settled::default() };
-        for k in counted.into_iter().filter(has_settled) {
-            settled.frames += 1;
-            for (sample, verdict) in samples[k].objects.iter().zip(self.verdicts.get(k).into_iter().flatten()) {
-                settled.counts.add(verdict.visible, sample.detected);
-            }
-            settled.cells += self.cells.get(k).map(|tally| tally.counts).unwrap_or_default();
-        }
-        Some(settled)
-    }
-
-    /// Counted frames in which points came and could not be used, so that all was unknown.
-    pub fn unusable(&self, samples: &[FrameSamples]) -> usize {
-        let unusable =
-            |(sample, condition): &(&FrameSamples, &Condition)| sample.counted && **condition == Condition::Unusable;
-        samples.iter().zip(&self.conditions).filter(unusable).count()
-    }
-
     pub fn cell_counts(&self) -> CellCounts {
         let mut total = CellCounts::default();
         self.cells.iter().for_each(|c| total += c.counts);
@@ -92,7 +93,7 @@ impl Score {
     }
 }
 
-/// Scores one estimator over a whole recording. `progress` is called after each frame.
+/// Scores one estimator over a whole recording that is held. `progress` is called after each frame.
 pub fn score(
     estimator: &mut dyn Estimator,
     recording: &Recording,
@@ -101,8 +102,7 @@ pub fn score(
     progress: &dyn Fn(),
 ) -> Score {
     let mut judged_on = grid;
-    let (mut verdicts, mut cells) = (Vec::new(), Vec::new());
-    let mut conditions = Vec::with_capacity(samples.len());
+    let (mut verdicts, mut cells, mut worth) = (Vec::new(), Vec::new(), Worth::default());
     // hours without labels have nothing to be judged frame by frame
     let judged = samples.iter().any(|sample| !sample.objects.is_empty() || !sample.cells.is_empty());
     cells.extend((!judged && !samples.is_empty()).then(CellTally::default));
@@ -112,10 +112,6 @@ pub fn score(
         }
         estimator.step(frame);
         progress();
-        conditions.push(estimator.condition());
-        if !judged {
-            continue;
-        }
         let mut judge = |object: &Sample| {
             let map = estimator.map();
             if grid == Grid::Polar && estimator.polar().is_some() {
@@ -124,19 +120,35 @@ pub fn score(
             judged_on = Grid::Cartesian;
             verdict(map, object.cells.iter().map(|&(i, j)| RoadPoint::cell_centre(i, j)))
         };
-        verdicts.push(sample.objects.iter().map(&mut judge).collect());
-        cells.push(tally(estimator.map(), &sample.cells));
+        let of_objects: Vec<Verdict> = sample.objects.iter().map(&mut judge).collect();
+        let of_cells = tally(estimator.map(), &sample.cells);
+        if sample.counted {
+            let mut counts = Counts::default();
+            sample.objects.iter().zip(&of_objects).for_each(|(s, v)| counts.add(v.visible, s.detected));
+            worth.frame(estimator.condition(), counts, of_cells.counts);
+        }
+        if judged {
+            verdicts.push(of_objects);
+            cells.push(of_cells);
+        }
     }
-    Score {
-        name: estimator.name().to_owned(),
-        grid: judged_on,
-        graded: true,
-        verdicts,
-        cells,
-        counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
-        azimuth_noise_deg: estimator.azimuth_noise_deg(),
-        learnt_lanes: Some(estimator.learnt_lanes().len()),
-        conditions,
+    Score { grid: judged_on, verdicts, cells, ..Score::unjudged(estimator, grid, worth) }
+}
+
+impl Score {
+    /// Of an estimator that has run, without anything that was judged.
+    pub fn unjudged(estimator: &dyn Estimator, grid: Grid, worth: Worth) -> Self {
+        Self {
+            name: estimator.name().to_owned(),
+            grid,
+            graded: true,
+            verdicts: Vec::new(),
+            cells: Vec::new(),
+            counters: estimator.counters().into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
+            azimuth_noise_deg: estimator.azimuth_noise_deg(),
+            learnt_lanes: Some(estimator.learnt_lanes().len()),
+            worth,
+        }
     }
 }
 
@@ -249,7 +261,7 @@ pub mod by_hand {
             counters: Vec::new(),
             azimuth_noise_deg: None,
             learnt_lanes: None,
-            conditions: Vec::new(),
+            worth: Worth::default(),
         }
     }
 }

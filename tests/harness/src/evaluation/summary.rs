@@ -85,6 +85,9 @@ pub struct Distance {
 pub struct Summary {
     /// Counted frames.
     pub frames: usize,
+    /// All that were sampled, and those of them that are not counted. A pool of recordings has seconds here.
+    pub sampled: usize,
+    pub not_counted: usize,
     /// Distinct tracks counted.
     pub objects: usize,
     pub coverage_rate: Option<f64>,
@@ -165,8 +168,8 @@ impl Summary {
                 counters: score.counters.clone(),
                 azimuth_noise_deg: score.azimuth_noise_deg,
                 learnt_lanes: score.learnt_lanes,
-                settled: score.settled(samples),
-                unusable: score.unusable(samples),
+                settled: score.worth.settled(),
+                unusable: score.worth.unusable,
                 by_unit: drawn.by_unit.clone(),
                 by_block: drawn.by_block.clone(),
             }
@@ -175,6 +178,8 @@ impl Summary {
         rows.extend([row(slice, &slice_draws), row(&boxes, &box_draws)]);
         Self {
             frames: samples.iter().filter(|s| s.counted).count(),
+            sampled: samples.len(),
+            not_counted: samples.iter().filter(|s| !s.counted).count(),
             objects: distinct_tracks(samples),
             coverage_rate: slice.objects(samples).coverage(),
             coverage_interval: Interval::of(slice_draws.objects.iter().map(Counts::coverage)),

@@ -8,6 +8,7 @@ mod report;
 pub mod risk;
 mod run_in;
 pub mod shipped;
+mod window;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -26,7 +27,8 @@ use crate::evaluation::causes::{Causes, causes};
 use crate::evaluation::examples::{self, Example};
 use crate::evaluation::mount_error::{Extent, Sensitivity, sensitivity};
 use crate::evaluation::replay::{Replay, camera_steps, steps};
-use crate::recording::{Frame, ReadOptions, Recording, file};
+use crate::recording::unheld::{MOST_HELD, PART};
+use crate::recording::{ReadOptions, Recording, file};
 use crate::results::files::{OutputArgs, Target};
 use crate::results::foxglove;
 use crate::results::report::csv::SampleWriter;
@@ -313,7 +315,7 @@ fn missing(paths: &[PathBuf]) -> Vec<&PathBuf> {
 
 /// What each radar of a file recorded, and how it is read.
 fn radars(path: &Path, settings: &Settings, one_only: Option<&str>) -> Result<Vec<(Recording, ReadOptions)>> {
-    let radars = recording::read_each(path, &settings.reading).map_err(|error| named(error, path))?;
+    let radars = recording::open_each(path, &settings.reading, Some(PART)).map_err(|error| named(error, path))?;
     if let (Some(option), [_, _, ..]) = (one_only, &radars[..]) {
         let topics: Vec<&str> = radars.iter().filter_map(|(_, reading)| reading.radar_topic.as_deref()).collect();
         bail!(
@@ -322,7 +324,9 @@ fn radars(path: &Path, settings: &Settings, one_only: Option<&str>) -> Result<Ve
             topics.join(", ")
         );
     }
-    Ok(radars)
+    // what shows every frame, or copies it
+    let Some(option) = one_only else { return Ok(radars) };
+    radars.into_iter().map(|(recording, reading)| Ok((recording.hold(option, MOST_HELD)?, reading))).collect()
 }
 
 /// All sensors of a file as one map, where that is asked for or the file has several radars.
@@ -346,8 +350,12 @@ fn replay(
     mcap: Option<&(Target, Target)>,
     settings: &Settings,
 ) -> Result<Replayed> {
+    let mut recording = recording;
     let shown_frame = args.time.map(|time_s| frame_at(&recording, time_s)).transpose()?;
     let mut running = args.risk.estimators(&recording, settings)?;
+    if args.out.is_some() {
+        recording.keep(&[shown_frame.unwrap_or(recording.count() / 2)]);
+    }
     let (name, passes) = (recording.name.clone(), steps(&recording, running.len()));
     let replaying = bar(&format!("replaying {name}"), passes + camera_steps(&recording));
     let replay = if recording.of_camera().is_some() {
@@ -396,6 +404,9 @@ fn add_up(all: &mut Vec<Causes>, causes: &[Causes]) {
 /// Why cells are wrong, of each estimator of this kind.
 fn why(replay: &Replay, settings: &Settings) -> Result<Vec<Causes>> {
     let recording = &replay.recording;
+    if recording.truth.is_none() {
+        return Ok(Vec::new());
+    }
     let mut running = estimators::all(recording, &settings.estimators)?;
     running.retain(|e| e.name().starts_with(SHOWN));
     let frames = (recording.frames.len() * running.len()) as u64;
@@ -409,10 +420,15 @@ fn why(replay: &Replay, settings: &Settings) -> Result<Vec<Causes>> {
 
 /// The frame nearest to a time since the first.
 fn frame_at(recording: &Recording, time_s: f64) -> Result<usize> {
-    let start = recording.frames.first().map_or(0, |f| f.time_ns);
-    let apart = |f: &Frame| (f.time_ns.saturating_sub(start) as f64 * 1e-9 - time_s).abs();
-    let duration_s = recording.duration_s();
-    let nearest = recording.frames.iter().enumerate().min_by(|a, b| apart(a.1).total_cmp(&apart(b.1)));
+    let (start, duration_s) = (recording.start_ns(), recording.duration_s());
+    let (mut number, mut nearest) = (0, None);
+    recording.all().each(&mut |frame| {
+        let apart = (frame.time_ns.saturating_sub(start) as f64 * 1e-9 - time_s).abs();
+        if nearest.is_none_or(|(_, least)| apart < least) {
+            nearest = Some((number, apart));
+        }
+        number += 1;
+    });
     let Some((frame, _)) = nearest.filter(|_| (-1.0..=duration_s + 1.0).contains(&time_s)) else {
         bail!("--time {time_s}: {} lasts {duration_s:.1} s; name a time from 0 to that", recording.name);
     };
@@ -423,7 +439,7 @@ fn frame_at(recording: &Recording, time_s: f64) -> Result<usize> {
 /// number tells nobody anything.
 fn judged(replay: &Replay, settings: &Settings) -> Result<()> {
     let (recording, summary) = (&replay.recording, &replay.summary);
-    let (name, frames) = (&recording.name, recording.frames.len());
+    let (name, frames) = (&recording.name, recording.count());
     if summary.frames == 0 {
         bail!(
             "{name}: nothing can be judged: its {frames} frames, {:.1} s, end within the warm-up of {} s; shorten that with --warm-up",

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use viewshed::sensor::road::RoadPoint;
 
+use super::window::window;
 use crate::command::progress::bar;
 use crate::estimators::{Estimator, at_risk, camera_3d};
 use crate::evaluation::counts::Outcome;
@@ -11,16 +12,13 @@ use crate::evaluation::examples::Example;
 use crate::evaluation::replay::{Replay, visit};
 use crate::evaluation::summary::Row;
 use crate::evaluation::{Grid, Settings, bounds};
-use crate::geometry::pose::SensorPose;
-use crate::geometry::solid::Solid;
-use crate::recording::FieldOfView;
 use crate::recording::truth::Object;
 use crate::results::files::Folder;
 use crate::results::pictures::birdseye;
 use crate::results::pictures::camera_view::{self, View};
 use crate::results::pictures::cells::Carries;
 use crate::results::pictures::polar::{self, PolarGrid};
-use crate::results::pictures::scene::{Highlight, Scene, TruthBox, Window};
+use crate::results::pictures::scene::{Highlight, Scene, TruthBox};
 use crate::results::pictures::tradeoff::{self, Counted, Curve, Marker, MarkerKind, Span, TradeOff};
 use crate::results::pictures::{canvas::Canvas, palette};
 
@@ -42,31 +40,36 @@ pub fn write(
 ) -> Result<()> {
     let drawing = bar("drawing pictures", 1);
     let chosen = asked.unwrap_or_else(|| chosen_frame(replay, examples));
-    for estimator in &mut all {
-        let name = estimator.name().to_owned();
+    all.retain(|estimator| estimator.name() == shown || also_drawn(estimator.name()));
+    let mut drawn: Vec<Vec<Named>> = all.iter().map(|_| Vec::new()).collect();
+    let mut outcome = Ok(());
+    let mut draw = |frame: usize, k: usize, estimator: &dyn Estimator| -> Result<()> {
+        let (Some(drawn), name) = (drawn.get_mut(k), estimator.name()) else { return Ok(()) };
         if name == shown {
-            let mut frames: Vec<usize> = examples.iter().map(|e| e.frame).collect();
-            frames.push(chosen);
-            let mut outcome = Ok(());
-            visit(&replay.recording, estimator.as_mut(), &frames, |frame, estimator| {
-                if outcome.is_ok() {
-                    outcome = shown_frame(folder, replay, examples, estimator, frame, frame == chosen, settings);
-                }
-            });
-            outcome?;
-        } else if also_drawn(&name) {
-            let mut canvas = None;
-            visit(&replay.recording, estimator.as_mut(), &[chosen], |frame, estimator| {
-                canvas = Some(from_above(replay, estimator, frame, None, settings));
-            });
-            save(canvas, folder, &format!("birdseye-{name}"))?;
+            drawn.extend(shown_frame(replay, examples, estimator, frame, frame == chosen, settings)?);
+        } else if frame == chosen {
+            drawn.push((format!("birdseye-{name}"), from_above(replay, estimator, frame, None, settings)));
         }
+        Ok(())
+    };
+    let frames: Vec<usize> = examples.iter().map(|e| e.frame).chain([chosen]).collect();
+    visit(&replay.recording, &mut all, &frames, |frame, k, estimator| {
+        if outcome.is_ok() {
+            outcome = draw(frame, k, estimator);
+        }
+    });
+    outcome?;
+    for (name, canvas) in drawn.into_iter().flatten() {
+        save(Some(canvas), folder, &name)?;
     }
     save(trade_off(replay, Counted::Objects, |row| (&row.curve, rates(row))), folder, "tradeoff-objects")?;
     save(trade_off(replay, Counted::Cells, |row| (&row.cell_curve, cell_rates(row))), folder, "tradeoff-cells")?;
     drawing.step();
     Ok(())
 }
+
+/// A picture with the name of its file.
+type Named = (String, Canvas);
 
 fn save(canvas: Option<Canvas>, folder: &Folder, name: &str) -> Result<()> {
     canvas.map_or(Ok(()), |c| c.save(&folder.file(format!("{name}.png"))?))
@@ -75,35 +78,33 @@ fn save(canvas: Option<Canvas>, folder: &Folder, name: &str) -> Result<()> {
 /// The frame of the true invisible example, which has something to show; else the middle one.
 pub fn chosen_frame(replay: &Replay, examples: &[Example]) -> usize {
     let telling = examples.iter().find(|e| e.outcome == Outcome::Ti).or(examples.first());
-    telling.map_or(replay.recording.frames.len() / 2, |e| e.frame)
+    telling.map_or(replay.recording.count() / 2, |e| e.frame)
 }
 
 fn shown_frame(
-    folder: &Folder,
     replay: &Replay,
     examples: &[Example],
     estimator: &dyn Estimator,
     frame: usize,
     chosen: bool,
     settings: &Settings,
-) -> Result<()> {
-    let name = estimator.name();
+) -> Result<Vec<Named>> {
+    let (name, mut drawn) = (estimator.name(), Vec::new());
     if chosen {
-        save(Some(from_above(replay, estimator, frame, None, settings)), folder, &format!("birdseye-{name}"))?;
-        save(polar_grid(replay, estimator, frame), folder, &format!("polar-{name}"))?;
-        save(camera_view(replay, estimator, frame, settings)?, folder, "camera-view")?;
+        drawn.push((format!("birdseye-{name}"), from_above(replay, estimator, frame, None, settings)));
+        drawn.extend(polar_grid(replay, estimator, frame).map(|canvas| (format!("polar-{name}"), canvas)));
+        drawn.extend(camera_view(replay, estimator, frame, settings)?.map(|canvas| ("camera-view".to_owned(), canvas)));
     }
     for example in examples.iter().filter(|e| e.frame == frame) {
         let picture = from_above(replay, estimator, frame, Some(example), settings);
-        save(Some(picture), folder, &format!("example-{}", example.outcome.name()))?;
+        drawn.push((format!("example-{}", example.outcome.name()), picture));
     }
-    Ok(())
+    Ok(drawn)
 }
 
 pub fn title(replay: &Replay, name: &str, frame: usize) -> String {
     let recording = &replay.recording;
-    let start = recording.frames.first().map_or(0, |f| f.time_ns);
-    let time = recording.frames.get(frame).map_or(0, |f| f.time_ns.saturating_sub(start));
+    let time = recording.frame(frame).map_or(0, |f| f.time_ns.saturating_sub(recording.start_ns()));
     format!("{} · {name} · {:.2} s", recording.name, time as f64 * 1e-9)
 }
 
@@ -171,7 +172,7 @@ pub fn about(
 
 fn objects_at(replay: &Replay, frame: usize) -> Vec<Object> {
     let recording = &replay.recording;
-    recording.truth.as_ref().zip(recording.frames.get(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default()
+    recording.truth.as_ref().zip(recording.frame(frame)).map(|(t, f)| t.at(f.time_ns)).unwrap_or_default()
 }
 
 /// The labelled boxes of a frame, and what became of them by an estimator.
@@ -200,8 +201,8 @@ fn scene<'a>(
         pose: recording.pose,
         field_of_view: recording.sensor.field_of_view,
         slice_height_m: settings.evaluation.slice_height_m,
-        window: window(replay),
-        detections: recording.frames.get(frame).map_or(&[], |f| &f.detections),
+        window: window(&replay.recording),
+        detections: recording.frame(frame).map_or(&[], |f| &f.detections),
         boxes: boxes(replay, estimator.name(), frame),
         road: &[],
         lanes: if told { settings.estimators.lanes.as_slice().into() } else { estimator.learnt_lanes().into() },
@@ -226,45 +227,6 @@ fn cells_in_sight(replay: &Replay, estimator: &dyn Estimator, frame: usize, trac
     let sample = replay.samples.get(frame)?.objects.iter().find(|s| s.track == track)?;
     let visible = |&&(i, j): &&(i32, i32)| estimator.map().at(RoadPoint::cell_centre(i, j)).visible();
     Some((sample.cells.iter().filter(visible).count(), sample.cells.len()))
-}
-
-/// Everything labelled inside the field of view, and the sensor; without labels the detections, or the whole field of
-/// view where they show little of it.
-fn window(replay: &Replay) -> Window {
-    let recording = &replay.recording;
-    let inside = |p: [f64; 3]| recording.sensor.field_of_view.contains(recording.pose.to_spherical(p));
-    let sensor = [recording.pose.position[0], recording.pose.position[1]];
-    let solids = recording.truth.iter().flat_map(|t| t.solids());
-    let mut points: Vec<[f64; 2]> =
-        solids.filter(|s: &&Solid| inside(s.center)).map(|s| [s.center[0], s.center[1]]).collect();
-    if points.is_empty() {
-        let detections = recording.frames.iter().flat_map(|f| &f.detections);
-        points = detections
-            .map(|d| d.road_position(&recording.pose, 1.0))
-            .filter(|p| inside(*p))
-            .map(|p| [p[0], p[1]])
-            .collect();
-    }
-    points.push(sensor);
-    let view = &recording.sensor.field_of_view;
-    let reach = points.iter().map(|p| (p[0] - sensor[0]).hypot(p[1] - sensor[1])).fold(0.0, f64::max);
-    if points.len() < LITTLE || reach < 0.5 * view.range_m[1] {
-        points.extend(corners(&recording.pose, view));
-    }
-    Window::around(points, 6.0)
-}
-
-/// Fewer places than this, of a whole recording, do not show where the road is.
-const LITTLE: usize = 100;
-
-/// Ends of the field of view on the road: to the right, ahead and to the left.
-fn corners(pose: &SensorPose, view: &FieldOfView) -> impl Iterator<Item = [f64; 2]> {
-    let [right, left] = view.azimuth_rad;
-    let far = view.range_m[1];
-    (0..=8).map(move |k| right + (left - right) * f64::from(k) / 8.0).map(move |azimuth| {
-        let heading = pose.yaw_rad() + azimuth;
-        [pose.position[0] + far * heading.cos(), pose.position[1] + far * heading.sin()]
-    })
 }
 
 pub fn polar_grid(replay: &Replay, estimator: &dyn Estimator, frame: usize) -> Option<Canvas> {
@@ -366,7 +328,7 @@ mod tests {
     use super::*;
     use crate::evaluation::Options;
     use crate::evaluation::samples::by_hand;
-    use crate::recording::{Frame, RadarDetection};
+    use crate::recording::Frame;
 
     /// Visible to the right of the road's axis.
     struct Half;
@@ -395,30 +357,6 @@ mod tests {
 
     fn replay(recording: crate::recording::Recording) -> Replay {
         Replay::new(recording, &mut [], &Options { warm_up_s: 0.0, bootstrap: 0, ..Options::default() }, &|| ())
-    }
-
-    #[test]
-    fn where_little_was_detected_the_whole_field_of_view_is_shown() {
-        let detection = |range_m: f32| RadarDetection {
-            range_m,
-            azimuth_rad: 0.0,
-            elevation_rad: None,
-            radial_velocity_mps: 0.0,
-            rcs_dbsm: None,
-            snr_db: None,
-        };
-        let seen = |detections: Vec<RadarDetection>| {
-            let mut recording = by_hand::recording(1, 0);
-            (recording.truth, recording.frames[0].detections) = (None, detections);
-            window(&replay(recording))
-        };
-        // 1 rad to each side of 200 m
-        for little in [vec![], vec![detection(30.0); 3], vec![detection(30.0); 500]] {
-            let all = seen(little);
-            assert!(all.x_m[1] >= 200.0 && all.y_m[0] <= -168.0 && all.y_m[1] >= 168.0, "{all:?}");
-        }
-        let road = seen((0..500).map(|k| detection(20.0 + 0.3 * k as f32)).collect());
-        assert!(road.x_m[1] < 190.0 && road.y_m[1] <= 10.0, "{road:?}");
     }
 
     #[test]

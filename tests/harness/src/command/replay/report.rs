@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, ensure};
 use viewshed::map::Visibility;
 
 use super::{Replayed, SHOWN, SHOWN_OF_CAMERA, pictures};
@@ -35,13 +35,12 @@ pub fn write(target: &Target, replayed: &Replayed, settings: &Settings) -> Resul
     let frames: Vec<Vec<usize>> = worst.iter().map(|lasting| of_strip(replay, lasting)).collect();
     let mut strips: Vec<Strip> = worst.into_iter().map(|lasting| Strip { lasting, tiles: Vec::new() }).collect();
     let (mut drawn, mut shares) = (Vec::new(), Vec::new());
-    let mut estimator = estimators::all(&replay.recording, &settings.estimators)?
-        .into_iter()
-        .find(|estimator| estimator.name() == shown)
-        .ok_or_else(|| anyhow!("no estimator {shown}"))?;
-    let all: Vec<usize> = (0..replay.recording.frames.len()).collect();
+    let mut all = estimators::all(&replay.recording, &settings.estimators)?;
+    all.retain(|estimator| estimator.name() == shown);
+    ensure!(!all.is_empty(), "no estimator {shown}");
+    let every: Vec<usize> = (0..replay.recording.frames.len()).collect();
     let mut outcome = Ok(());
-    visit(&replay.recording, estimator.as_mut(), &all, |frame, estimator| {
+    visit(&replay.recording, &mut all, &every, |frame, _, estimator| {
         shares.extend(of_frame(replay, estimator, frame));
         let mut draw = || -> Result<()> {
             if frame == chosen {

@@ -1,5 +1,6 @@
 //! `--run-in`: recordings a unit has run over before the one that is judged.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
@@ -46,7 +47,11 @@ impl RunIn {
                 before.pose == judged.pose,
                 "--run-in {name}: its radar does not hang where that of {of} does, and what it learnt would be of another place"
             );
-            let shared = judged.frames.first().is_some_and(|first| before.frames.contains(first));
+            let mut shared = false;
+            judged.all().parts(&mut |part| {
+                shared = part.first().is_some_and(|first| before.frames.contains(first));
+                ControlFlow::Break(())
+            });
             ensure!(!shared, "--run-in {name}: it has frames of {of} itself; take another hour of the same place");
         }
         Ok(())

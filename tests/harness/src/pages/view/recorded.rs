@@ -39,8 +39,8 @@ pub fn fill(
 ) -> Result<()> {
     let Some((recording, others)) = radars.split_first() else { return Ok(()) };
     let mut others = others.iter().map(|other| Beside::new(other, settings)).collect::<Result<Vec<_>>>()?;
-    let mut estimator = estimators::own(recording, &settings.estimators)?;
-    let own_name = estimator.name().to_owned();
+    let mut shown_one = [estimators::own(recording, &settings.estimators)?];
+    let own_name = shown_one[0].name().to_owned();
     let name = if others.is_empty() { own_name.clone() } else { recording.sensor.name.clone() };
     let mut running = vec![estimators::own(recording, &settings.estimators)?];
     let frames = recording.frames.len();
@@ -54,7 +54,7 @@ pub fn fill(
     let all: Vec<usize> = (0..frames).collect();
     let start = recording.frames.first().map_or(0, |f| f.time_ns);
     let mut outcome = Ok(());
-    visit(recording, estimator.as_mut(), &all, |k, estimator| {
+    visit(recording, &mut shown_one, &all, |k, _, estimator| {
         let (Some(frame), Some(polar)) = (recording.frames.get(k), estimator.polar()) else { return };
         let (own, shares) = shown(&name, recording, &polar);
         let own = match table {

@@ -139,7 +139,7 @@ pub(super) struct Resampling {
 #[derive(Serialize)]
 struct Input {
     frames: usize,
-    detections: usize,
+    detections: u64,
     duration_s: f64,
     labelled: bool,
     problems: Vec<Problem>,
@@ -172,8 +172,8 @@ pub fn report(replay: &Replay, mount_error: Option<&[Sensitivity]>, examples: &[
         units: summary.unit_names.clone(),
         sensor: sensor(recording),
         input: Input {
-            frames: recording.frames.len(),
-            detections: recording.frames.iter().map(|f| f.detections.len()).sum(),
+            frames: recording.count(),
+            detections: recording.extent().detections,
             duration_s: recording.duration_s(),
             labelled: recording.truth.is_some(),
             problems: recording.problems.iter().collect(),

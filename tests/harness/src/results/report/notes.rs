@@ -12,6 +12,7 @@ use crate::evaluation::comparison::Comparison;
 use crate::evaluation::replay::Replay;
 use crate::evaluation::summary::{Row, Summary};
 use crate::evaluation::units::RUN_BLOCKS;
+use crate::recording::frames::Extent;
 use crate::recording::truth::LabelsBeside;
 use crate::recording::usable;
 use crate::recording::{Frame, Recording};
@@ -24,8 +25,8 @@ pub fn heading(replay: &Replay) -> String {
     } else {
         format!(" (sensor {})", recording.sensor.name)
     };
-    // a pool of recordings keeps no samples
-    let all = replay.samples.len();
+    // a pool of recordings has seconds
+    let all = summary.sampled;
     let frames = if all > summary.frames { format!("{} of {all}", summary.frames) } else { summary.frames.to_string() };
     if recording.truth.is_none() {
         return format!("{}{sensor}: {frames} frames", recording.name);
@@ -46,7 +47,7 @@ pub fn heading(replay: &Replay) -> String {
 pub fn below(replay: &Replay, options: &Options) -> Vec<String> {
     let (recording, summary) = (&replay.recording, &replay.summary);
     let mut lines = Vec::new();
-    let not_counted = replay.samples.iter().filter(|samples| !samples.counted).count();
+    let not_counted = summary.not_counted;
     if not_counted > 0 && !recording.sensor.frames_independent {
         lines.push(format!(
             "Not counted: the first {} s, {not_counted} frames, in which maps begin; --warm-up sets that.",
@@ -121,7 +122,7 @@ pub fn problems(recording: &Recording) -> Vec<String> {
     if recording.problems.is_empty() {
         return vec!["Problems of the input: none.".into()];
     }
-    let start = recording.frames.first().map_or(0, |f| f.time_ns);
+    let start = recording.start_ns();
     let each = recording.problems.iter().map(|p| format!("  {}", p.since(start)));
     ["Problems of the input:".to_owned()].into_iter().chain(each).collect()
 }
@@ -188,8 +189,8 @@ fn left_out(recording: &Recording, rows: &[Row]) -> Vec<String> {
     let (all, what) = match recording.of_camera() {
         Some(camera) => (camera.frames.iter().map(|f| f.boxes.len() as u64 + f.refused).sum(), "boxes"),
         None => {
-            let came = |f: &Frame| f.detections.len() as u64 + f.refused + f.unwanted.len() as u64;
-            (recording.frames.iter().map(came).sum::<u64>(), "detections")
+            let Extent { detections, refused, unwanted, .. } = recording.extent();
+            (detections + refused + unwanted, "detections")
         }
     };
     let line = |(counters, names): &(Counters, Vec<&str>)| {
