@@ -109,7 +109,7 @@ impl Obstacle {
 #[cfg(test)]
 mod tests {
     use super::super::Obstacles;
-    use super::super::by_hand::{PERIOD_S, reflection, rules, seen_at};
+    use super::super::made_up::{PERIOD_S, reflection, rules, seen_at};
     use super::super::obstacle::Obstacle;
     use super::super::size::Size;
     use crate::fixed::time::Step;
@@ -205,7 +205,7 @@ mod tests {
             assert_eq!((vehicle.width_cm, vehicle.length_cm >= 380), (180, true), "{vehicle:?}");
         }
         let mut high = reflecting(100, Some(-7));
-        high.tallness = super::super::by_hand::tall();
+        high.tallness = super::super::made_up::tall();
         assert!(high.size(&t).length_cm >= 600, "a weak echo of something that is tall for certain");
     }
 

@@ -256,7 +256,7 @@ impl Obstacle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{PERIOD_S, car, change_speed, follow, rules, seen_at, tall};
+    use super::super::made_up::{PERIOD_S, car, change_speed, follow, rules, seen_at, tall};
     use super::super::profile::Extent;
     use super::*;
     use crate::fixed::trig::Direction;

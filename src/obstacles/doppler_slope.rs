@@ -113,7 +113,7 @@ impl DopplerSlope {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{reflection, rules};
+    use super::super::made_up::{reflection, rules};
     use super::*;
     use crate::frame::reflection::Reflection;
 

@@ -59,7 +59,7 @@ impl Obstacle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{rules, seen_at, tall};
+    use super::super::made_up::{rules, seen_at, tall};
     use super::super::profile::Extent;
     use super::*;
     use crate::fixed::trig::Direction;

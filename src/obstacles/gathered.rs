@@ -116,7 +116,7 @@ pub(super) fn sigma_of_weight(weight: i32) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{rules, seen_at};
+    use super::super::made_up::{rules, seen_at};
     use super::*;
 
     const AHEAD: Direction = Direction::AHEAD;

@@ -65,7 +65,7 @@ fn middle(a: (i32, i32), b: (i32, i32)) -> (i32, i32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{PERIOD_S, reflection, rules};
+    use super::super::made_up::{PERIOD_S, reflection, rules};
     use super::*;
     use crate::fixed::time::Step;
     use crate::frame::by_range::ByRange;

@@ -226,7 +226,7 @@ impl Obstacle {
 #[cfg(test)]
 mod tests {
     use super::super::Obstacles;
-    use super::super::by_hand::{rules, seen_at, tall};
+    use super::super::made_up::{rules, seen_at, tall};
     use super::super::obstacle::MOST_WEIGHT;
     use super::super::profile::Extent;
     use super::super::tallness::Tallness;

@@ -252,8 +252,8 @@ fn speed_along(heading: Direction, sight: Direction, radial: i32) -> Option<i32>
 #[cfg(test)]
 mod tests {
     use super::super::Obstacles;
-    use super::super::by_hand::{PERIOD_S, Vehicle, car, rules};
     use super::super::lanes::{Lane, Lanes};
+    use super::super::made_up::{PERIOD_S, Vehicle, car, rules};
     use super::super::parameters::TrackingParameters;
     use super::*;
     use crate::fixed::angle::Angle;
@@ -401,7 +401,7 @@ mod tests {
     /// How often a car teaches on 40 m of way, by what it has counted of its way before.
     fn taught(before_cm: u16) -> usize {
         let (t, mut lanes) = (learning(), LearntLanes::<16>::new());
-        let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 0, 0), Direction::AHEAD, 1000);
+        let mut o = Obstacle::new(&super::super::made_up::seen_at(4000, 0, 0), Direction::AHEAD, 1000);
         (o.existence, o.hits, o.travelled_cm) = (t.existence_max, 100, before_cm);
         let step = Step::from_micros(100_000);
         let mut taught = 0;
@@ -449,7 +449,7 @@ mod tests {
     /// What crosses at 40 m and then crawls, as one that is drawn 16 m long along the road's axis or as a car.
     fn stopped(length_cm: i32, speed_cm_s: i32, t: &TrackingParameters) -> f64 {
         let lanes = after_cars(6, t);
-        let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 100, 0), Direction::AHEAD, speed_cm_s);
+        let mut o = Obstacle::new(&super::super::made_up::seen_at(4000, 100, 0), Direction::AHEAD, speed_cm_s);
         o.travelled_cm = 2000;
         o.age = 20;
         (o.extent.rear_cm, o.extent.front_cm) = (-length_cm / 2, length_cm / 2);
@@ -473,7 +473,7 @@ mod tests {
     #[test]
     fn after_an_hour_it_still_looks_for_a_lane_and_is_no_newborn() {
         let (step, t) = (Step::from_micros(0), rules());
-        let mut o = Obstacle::new(&super::super::by_hand::seen_at(4000, 100, 0), Direction::AHEAD, 0);
+        let mut o = Obstacle::new(&super::super::made_up::seen_at(4000, 100, 0), Direction::AHEAD, 0);
         o.age = u16::MAX - 9;
         let mut looks = 0;
         for _ in 0..40 {

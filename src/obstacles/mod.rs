@@ -29,8 +29,6 @@
 //! What was tried, and what it was worth: `tests/STUDIES.md`.
 
 mod body;
-#[cfg(test)]
-mod by_hand;
 mod clutter;
 pub mod config;
 mod doppler_slope;
@@ -41,6 +39,8 @@ mod joining;
 mod lane;
 pub mod lanes;
 pub mod learnt_lanes;
+#[cfg(test)]
+mod made_up;
 pub mod motion;
 mod newborn;
 pub mod obstacle;
@@ -332,7 +332,7 @@ impl<const N: usize> Obstacles<N> {
 
 #[cfg(test)]
 mod tests {
-    use super::by_hand::{rules as tracking, seen_at};
+    use super::made_up::{rules as tracking, seen_at};
     use super::*;
     use crate::fixed::trig::Direction;
     use std::vec::Vec as StdVec;

@@ -343,7 +343,7 @@ impl Obstacle {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{rules, seen_at};
+    use super::super::made_up::{rules, seen_at};
     use super::*;
 
     const AHEAD: Direction = Direction::AHEAD;

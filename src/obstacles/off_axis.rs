@@ -145,7 +145,7 @@ impl Obstacle {
 #[cfg(test)]
 mod tests {
     use super::super::Obstacles;
-    use super::super::by_hand::{PERIOD_S, car, follow, reflection, rules, seen_at};
+    use super::super::made_up::{PERIOD_S, car, follow, reflection, rules, seen_at};
     use super::super::motion::FreeMotion;
     use super::super::obstacle::{FRACTION, Obstacle};
     use crate::fixed::time::Step;

@@ -180,7 +180,7 @@ const LEAST_RADIAL_CM_S: i32 = 300;
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{rules, seen_at};
+    use super::super::made_up::{rules, seen_at};
     use super::*;
 
     #[test]

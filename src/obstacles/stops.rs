@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use super::Obstacles;
-use super::by_hand::{Vehicle, car, change_speed, follow, reflection, rules};
+use super::made_up::{Vehicle, car, change_speed, follow, reflection, rules};
 use super::solid::Solid;
 use crate::fixed::time::Step;
 use crate::frame::by_range::ByRange;

@@ -31,9 +31,9 @@ const PASSED: &str =
 #[test]
 fn a_board_that_is_skipped_fails_the_run_and_is_named() {
     let steps = format!("{PASSED}run echo 'skipped: zcu102-r5: no compiler'\n{PASSED}");
-    let [ci, by_hand] = ended("board", &steps);
-    assert!(!ci.0 && by_hand.0, "{ci:?} {by_hand:?}");
-    for (_, lines) in [&ci, &by_hand] {
+    let [ci, made_up] = ended("board", &steps);
+    assert!(!ci.0 && made_up.0, "{ci:?} {made_up:?}");
+    for (_, lines) in [&ci, &made_up] {
         assert_eq!(lines.last().unwrap(), "14 passed, 0 failed, 1 skipped");
         let summary = lines.iter().position(|line| line == "== summary").unwrap();
         assert!(lines[summary..].iter().any(|line| line == "skipped: zcu102-r5: no compiler"), "{lines:?}");

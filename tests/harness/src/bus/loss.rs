@@ -111,7 +111,7 @@ mod tests {
 
     use super::*;
     use crate::estimators::Options;
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
 
     #[test]
     fn maps_without_a_visible_cell_have_no_share_of_them_and_are_compared_all_the_same() {

@@ -249,7 +249,7 @@ mod tests {
     use super::*;
     use crate::bus::listening::Listening;
     use crate::estimators::{FarRoad, Grid, Options};
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
     use crate::recording::RadarDetection;
     use crate::recording::can_log::{Content, Line};
 

@@ -1,4 +1,4 @@
-//! `camera-3d` on the boxes of a recorded camera, and `camera-reference` on true boxes through the same voxels.
+//! `camera-3d` on the boxes of a recorded camera, and `camera-true-boxes` on true boxes through the same voxels.
 
 use std::sync::Arc;
 
@@ -130,7 +130,7 @@ struct Reference {
 
 impl Estimator for Reference {
     fn name(&self) -> &str {
-        "camera-reference"
+        "camera-true-boxes"
     }
 
     fn reset(&mut self) {}

@@ -107,7 +107,7 @@ pub struct PolarCells<'a> {
 pub struct Options {
     /// Detections of a frame an estimator may use, of those that pass its gate; of more, those of crowded places go first.
     pub max_detections: usize,
-    /// Share of a cell that boxes must fill for `reference` to call it occupied.
+    /// Share of a cell that boxes must fill for `true-boxes` to call it occupied.
     pub reference_share: f64,
     /// The grid of the estimator that is tuned, watched or drawn; on the small one, it runs beside `radar-3d` in tables.
     #[serde(skip_serializing_if = "Grid::is_reference")]
@@ -125,7 +125,7 @@ pub struct Options {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lanes: Vec<Lane>,
     /// Height of the road over its length, metres, where it is not the recording's own: the row `radar-3d-ground`, and
-    /// `reference` with it.
+    /// `true-boxes` with it.
     #[serde(skip_serializing_if = "Profile::is_empty")]
     pub ground: Profile,
     /// What is wrong with the heights that estimators are given.
@@ -271,7 +271,7 @@ pub use radar_2d::MOST_RANGE_M;
 pub use radar_3d::Grid;
 pub use site::{site_rows, unit_row};
 
-/// Every estimator for a recording, in the order of the table. `reference` needs ground truth.
+/// Every estimator for a recording, in the order of the table. `true-boxes` needs ground truth.
 ///
 /// # Errors
 /// A parameter the library refuses, by name, and a field of view that grids here do not cover.
@@ -453,7 +453,7 @@ impl Intake {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
     use crate::recording::RadarDetection;
 
     /// Options of a site of which all is said.

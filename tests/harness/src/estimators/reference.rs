@@ -1,4 +1,4 @@
-//! `reference`: perfect occupancy from ground-truth boxes, through the library's visibility step.
+//! `true-boxes`: perfect occupancy from ground-truth boxes, through the library's visibility step.
 //!
 //! One grid for all objects. A cell holds the share of it that boxes fill, taken over sub-columns
 //! in azimuth, points in range and, exactly, the span of slopes a box covers in elevation.
@@ -69,7 +69,7 @@ pub fn new(
 
 impl Estimator for Reference {
     fn name(&self) -> &str {
-        "reference"
+        "true-boxes"
     }
 
     fn reset(&mut self) {}

@@ -53,7 +53,7 @@ pub fn check(recording: &Recording, options: &Options) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
     use crate::recording::RadarDetection;
 
     const D: RadarDetection = RadarDetection {

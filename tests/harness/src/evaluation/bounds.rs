@@ -50,7 +50,7 @@ fn row(name: &str, samples: &[FrameSamples], in_sight: impl Fn(&Sample) -> bool)
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::by_hand::sample;
+    use super::super::samples::made_up::sample;
     use super::*;
 
     #[test]

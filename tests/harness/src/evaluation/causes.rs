@@ -291,7 +291,7 @@ mod tests {
     use viewshed::map::query::Footprint;
     use viewshed::map::{CellState, Visibility, VisibilityMap};
 
-    use super::super::samples::by_hand::recording;
+    use super::super::samples::made_up::recording;
     use super::*;
     use crate::geometry::ground::Ground;
     use crate::recording::Frame;

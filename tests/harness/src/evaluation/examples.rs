@@ -168,8 +168,8 @@ fn suits(recording: &Recording, sample: &Sample) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::by_hand::{frames, recording, sample};
-    use super::super::score::by_hand::score;
+    use super::super::samples::made_up::{frames, recording, sample};
+    use super::super::score::made_up::score;
     use super::*;
 
     #[test]

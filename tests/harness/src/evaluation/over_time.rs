@@ -46,8 +46,8 @@ pub fn windows(recording: &Recording, samples: &[FrameSamples], score: &Score) -
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::by_hand::{frames, recording, sample};
-    use super::super::score::by_hand::score;
+    use super::super::samples::made_up::{frames, recording, sample};
+    use super::super::score::made_up::score;
     use super::*;
 
     #[test]

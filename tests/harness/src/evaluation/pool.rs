@@ -162,8 +162,8 @@ pub fn pool(name: &str, parts: &[&Seconds], from_s: f64, options: &Options) -> O
 mod tests {
     use super::super::bounds::SLICE;
     use super::super::cells::CellCounts;
-    use super::super::samples::by_hand::{frames, recording, sample};
-    use super::super::score::by_hand::score;
+    use super::super::samples::made_up::{frames, recording, sample};
+    use super::super::score::made_up::score;
     use super::*;
 
     /// 3 s at 10 Hz of two tracks; the second is hidden and found in the last second only.

@@ -118,7 +118,7 @@ fn band(k: u32, sorted: &[u32]) -> Band {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::by_hand::{frames, recording, sample};
+    use super::super::samples::made_up::{frames, recording, sample};
     use super::*;
 
     #[test]

@@ -316,7 +316,7 @@ fn in_grown_footprint(solid: &Solid, pose: &SensorPose, p: [f64; 3], options: &O
 
 /// Samples and recordings put together by hand, for the tests of what is made of them.
 #[cfg(test)]
-pub mod by_hand {
+pub mod made_up {
     use super::*;
     use crate::recording::problems::Problems;
     use crate::recording::truth::{Label, Truth};

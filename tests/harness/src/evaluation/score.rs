@@ -246,7 +246,7 @@ mod tests {
 
 /// Scores put together by hand, for the tests of what is made of them.
 #[cfg(test)]
-pub mod by_hand {
+pub mod made_up {
     use super::*;
 
     /// A score that gives each sample the grade `grade` says, visible from 128 on.

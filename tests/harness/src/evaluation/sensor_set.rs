@@ -264,7 +264,7 @@ fn count(shown: &mut [Shown], recordings: &[Recording], samples: &[Vec<FrameSamp
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::{frames, recording, sample};
+    use crate::evaluation::samples::made_up::{frames, recording, sample};
 
     #[test]
     fn the_set_sees_and_detects_what_any_of_them_does() {

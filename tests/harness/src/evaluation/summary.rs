@@ -264,8 +264,8 @@ fn distinct_tracks(samples: &[FrameSamples]) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::by_hand::{frames, recording, sample};
-    use super::super::score::by_hand::score;
+    use super::super::samples::made_up::{frames, recording, sample};
+    use super::super::score::made_up::score;
     use super::*;
 
     /// 20 tracks of 10 frames; every third is hidden, and of the hidden ones few are detected.

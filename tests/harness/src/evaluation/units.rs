@@ -91,7 +91,7 @@ impl Units {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::by_hand::{frames, recording, sample};
+    use super::super::samples::made_up::{frames, recording, sample};
     use super::*;
 
     #[test]

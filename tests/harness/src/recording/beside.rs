@@ -130,7 +130,7 @@ mod tests {
     use flate2::write::GzEncoder;
 
     use super::*;
-    use crate::evaluation::samples::{by_hand, collect};
+    use crate::evaluation::samples::{collect, made_up};
     use crate::geometry::ground::Ground;
     use crate::geometry::solid::Solid;
     use crate::recording::Frame;
@@ -171,7 +171,7 @@ mod tests {
     fn labels_beside_a_recording_stand_on_its_ground_as_those_inside() {
         let folder = folder("ground");
         let ground = Ground::new(vec![[0.0, -2.0], [60.0, 1.0], [150.0, -5.0]]).unwrap();
-        let blank = by_hand::recording(30, 0);
+        let blank = made_up::recording(30, 0);
         let labels = labels(&blank, &ground);
         let write = |name: &str, inside: bool| {
             let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &blank.sensor, &blank.pose, 0).unwrap();

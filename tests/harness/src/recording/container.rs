@@ -160,13 +160,13 @@ mod tests {
     use std::io::Cursor;
 
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::recording::write::RecordingWriter;
     use crate::recording::{RadarDetection, ReadOptions, Recording, mcap as bag};
 
     /// A bag of so many frames, one point each; chunks as the crate writes them, packed or not.
     fn written(frames: i64, packed: bool) -> Vec<u8> {
-        let blank = by_hand::recording(1, 0);
+        let blank = made_up::recording(1, 0);
         let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &blank.sensor, &blank.pose, 0).unwrap();
         for k in 0..frames {
             let d = |n: i64| RadarDetection {

@@ -44,13 +44,13 @@ pub fn said(option: &str, of: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
 
     #[test]
     fn an_option_of_another_kind_of_file_is_named() {
         let options = ReadOptions { sensor_id: Some(3), frame_period_s: Some(0.1), ..ReadOptions::default() };
         let said = |kind| {
-            let mut recording = by_hand::recording(1, 0);
+            let mut recording = made_up::recording(1, 0);
             note(&mut recording, &options, kind);
             recording.problems.iter().map(|p| p.what).collect::<Vec<_>>()
         };

@@ -136,12 +136,12 @@ impl Watching {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::recording::RadarDetection;
 
     /// Ten vehicles that come nearer for 6 s, with this SNR, RCS and speed by the factor.
     fn said(snr_db: f32, rcs_dbsm: f32, faster: f32, marked: bool) -> String {
-        let mut recording = by_hand::recording(90, 0);
+        let mut recording = made_up::recording(90, 0);
         for (k, frame) in (0_u16..).zip(&mut recording.frames) {
             frame.time_ns = i64::from(k) * 66_000_000;
             let one = |i: u16| RadarDetection {

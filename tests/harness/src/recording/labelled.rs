@@ -173,13 +173,13 @@ fn objects_hit(frames: &[Vec<Moving>], truth: &Truth, recording: &Recording) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::geometry::pose::Spherical;
     use crate::recording::truth::Label;
 
     /// Traffic to both sides, and its labels: turned by these factors, and late.
     fn traffic(turn: [f64; 2], late_ns: i64, moved_m: f64) -> Recording {
-        let mut recording = by_hand::recording(200, 0);
+        let mut recording = made_up::recording(200, 0);
         let mut labels = Vec::new();
         for (k, frame) in recording.frames.iter_mut().enumerate() {
             frame.time_ns = k as i64 * 100_000_000;

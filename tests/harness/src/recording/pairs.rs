@@ -167,12 +167,12 @@ fn seconds(before_ns: i64, after_ns: i64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::recording::RadarDetection;
 
     #[test]
     fn directions_end_where_no_frame_is_a_second_later() {
-        let mut frames = by_hand::recording(40, 0).frames;
+        let mut frames = made_up::recording(40, 0).frames;
         for (k, frame) in (0_u8..).zip(&mut frames) {
             frame.detections.push(RadarDetection {
                 range_m: 40.0 + f32::from(k),
@@ -184,7 +184,7 @@ mod tests {
             });
         }
         let counted = |frames: &[Frame]| {
-            let mut directions = Directions::new(frames.len(), &by_hand::recording(0, 0).pose);
+            let mut directions = Directions::new(frames.len(), &made_up::recording(0, 0).pose);
             frames.iter().for_each(|frame| directions.frame(frame.time_ns, &frame));
             directions.end().len()
         };

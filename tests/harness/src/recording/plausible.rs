@@ -270,14 +270,14 @@ fn pitch_and_height(frames: &[Frame], pose: &SensorPose) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::geometry::pose::Spherical;
     use crate::geometry::solid::Solid;
     use crate::recording::truth::{Label, Truth};
 
     /// Traffic on a road in this direction, seen by a radar of yaw 0 that is said to have `yaw_deg`.
     fn traffic(direction_deg: f64, yaw_deg: f64, labelled: bool) -> Recording {
-        let mut recording = by_hand::recording(300, 0);
+        let mut recording = made_up::recording(300, 0);
         let (s, c) = direction_deg.to_radians().sin_cos();
         let mut labels = Vec::new();
         for (k, frame) in recording.frames.iter_mut().enumerate() {

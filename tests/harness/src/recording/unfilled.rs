@@ -110,12 +110,12 @@ impl Values {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::recording::frames::Frames;
 
     /// 40 frames of five points whose values are these, by the number of the point.
     fn recording(of: impl Fn(usize) -> [f32; 3]) -> Recording {
-        let mut recording = by_hand::recording(40, 0);
+        let mut recording = made_up::recording(40, 0);
         let mut n = 0;
         for frame in &mut recording.frames {
             for k in 0..5_u8 {

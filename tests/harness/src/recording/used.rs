@@ -151,7 +151,7 @@ impl Eq for Value {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
 
     /// What is said of points at these azimuths, in a view of -57 to 57 degrees.
     fn said_of(azimuths_deg: impl Iterator<Item = f32> + Clone) -> String {

@@ -59,7 +59,7 @@ fn boxes_as_csv_are_replayed_into_every_kind_of_result() {
     let report = json(&folder.join("r.json"));
     let rows = report["estimators"].as_array().unwrap();
     let names: Vec<&str> = rows.iter().map(|r| r["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["camera-3d", "camera-reference", "geometry-slice", "geometry-box"]);
+    assert_eq!(names, ["camera-3d", "camera-true-boxes", "geometry-slice", "geometry-box"]);
     assert_eq!((&rows[0]["tv"], &rows[0]["fi"]), (&40.into(), &0.into()), "{}", rows[0]);
     // a nose taken to be lower sees everything farther away
     let moved = &report["mount_error"].as_array().unwrap()[0]["estimators"][0];
@@ -71,10 +71,10 @@ fn boxes_as_csv_are_replayed_into_every_kind_of_result() {
             .lines()
             .next()
             .unwrap()
-            .ends_with("camera-3d_visible,camera-3d_grade,camera-reference_visible,camera-reference_grade")
+            .ends_with("camera-3d_visible,camera-3d_grade,camera-true-boxes_visible,camera-true-boxes_grade")
     );
     assert_eq!(samples.lines().count(), 41);
-    for picture in ["birdseye-camera-3d.png", "camera-view.png", "birdseye-camera-reference.png", "table.txt"] {
+    for picture in ["birdseye-camera-3d.png", "camera-view.png", "birdseye-camera-true-boxes.png", "table.txt"] {
         assert!(folder.join("o").join(picture).exists(), "{picture}");
     }
     let copy = std::fs::read(folder.join("m.mcap")).unwrap();

@@ -105,7 +105,7 @@ fn the_copy_of_a_piece_with_a_mount_given_by_hand_replays_the_same() {
     let output = replay(
         &folder,
         &[
-            &["scene.mcap", "--mcap", "maps.mcap", "--from", "0.5", "--to", "1.5", "--mcap-estimator", "reference"],
+            &["scene.mcap", "--mcap", "maps.mcap", "--from", "0.5", "--to", "1.5", "--mcap-estimator", "true-boxes"],
             // all of it lies within the usual warm-up
             &["--warm-up", "0"][..],
             &mount[..],

@@ -74,7 +74,7 @@ fn the_report_has_its_stable_keys_and_every_option() {
     }
     let names: Vec<&str> =
         report["estimators"].as_array().unwrap().iter().map(|e| e["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["radar-2d", "radar-2d-first", "radar-3d", "reference", "geometry-slice", "geometry-box"]);
+    assert_eq!(names, ["radar-2d", "radar-2d-first", "radar-3d", "true-boxes", "geometry-slice", "geometry-box"]);
     let evaluation = report["options"]["evaluation"].as_object().unwrap();
     assert_eq!(evaluation.len(), 10);
     assert_eq!(evaluation["min_speed_mps"], json!(2.0));

@@ -102,7 +102,7 @@ fn scenes_are_pooled_and_told_apart_with_and_without_elevation_and_warm_up() {
     let frames = |v: &Value| v["pooled"]["frames"].as_u64().unwrap();
     assert_eq!(variants.iter().map(frames).collect::<Vec<_>>(), [2 * 15, 2 * 15, 2 * 25]);
     for variant in variants {
-        for estimator in ["radar-2d", "radar-3d", "reference", "geometry-slice"] {
+        for estimator in ["radar-2d", "radar-3d", "true-boxes", "geometry-slice"] {
             for count in ["tv", "fv", "ti", "fi"] {
                 let of = |report: &Value| row(report, estimator)[count].as_u64().unwrap();
                 let alone: u64 = variant["scenes"].as_array().unwrap().iter().map(of).sum();
@@ -119,7 +119,7 @@ fn scenes_are_pooled_and_told_apart_with_and_without_elevation_and_warm_up() {
     let of = |k: usize, name: &str| row(&variants[k]["pooled"], name).clone();
     let visible = |r: &Value| r["tv"].as_u64().unwrap() + r["fv"].as_u64().unwrap();
     assert_eq!(visible(&of(0, "geometry-slice")), visible(&of(1, "geometry-slice")));
-    assert_eq!(of(0, "reference")["cells"], of(1, "reference")["cells"]);
+    assert_eq!(of(0, "true-boxes")["cells"], of(1, "true-boxes")["cells"]);
     assert_ne!(of(0, "radar-3d")["cells"], of(1, "radar-3d")["cells"]);
 }
 
@@ -136,7 +136,7 @@ fn a_scene_alone_counts_what_replaying_its_recording_counts() {
     let pooled = &found["variants"][0]["pooled"];
     assert_eq!(found["variants"].as_array().unwrap().len(), 2, "no run without elevation");
     assert_eq!((&pooled["frames"], &pooled["objects"]), (&replayed["frames"], &replayed["objects"]));
-    for name in ["radar-2d", "radar-2d-first", "radar-3d", "reference", "geometry-slice", "geometry-box"] {
+    for name in ["radar-2d", "radar-2d-first", "radar-3d", "true-boxes", "geometry-slice", "geometry-box"] {
         let [a, b] = [pooled, &replayed].map(|r| row(r, name));
         for key in ["tv", "fv", "ti", "fi", "distance_to_geometry_slice"] {
             assert_eq!(a[key], b[key], "{name} {key}");

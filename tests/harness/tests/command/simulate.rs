@@ -124,7 +124,7 @@ fn a_camera_beside_the_radar_has_rows_of_its_own() {
     let camera = &report["camera"];
     let rows = camera["estimators"].as_array().unwrap();
     let names: Vec<&str> = rows.iter().map(|e| e["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["camera-3d", "camera-reference", "geometry-slice", "geometry-box"]);
+    assert_eq!(names, ["camera-3d", "camera-true-boxes", "geometry-slice", "geometry-box"]);
     // 5 Hz after the first second
     assert_eq!((camera["frames"].as_u64(), camera["objects"].as_u64()), (Some(10), Some(2)));
     assert!(camera["coverage_rate"].as_f64().unwrap() > 0.7, "{}", camera["coverage_rate"]);
@@ -318,7 +318,7 @@ fn an_experiment_pools_its_reporting_days_and_tells_each() {
     let found = json(&folder.join("e.json"));
     let names: Vec<&str> =
         found["estimators"].as_array().unwrap().iter().map(|e| e["name"].as_str().unwrap()).collect();
-    let rows = ["radar-2d", "radar-2d-first", "radar-3d", "reference", "geometry-slice", "geometry-box"];
+    let rows = ["radar-2d", "radar-2d-first", "radar-3d", "true-boxes", "geometry-slice", "geometry-box"];
     assert_eq!(names, rows);
     let seeds = found["seeds"].as_array().unwrap();
     assert_eq!(seeds.iter().map(|s| s["seed"].as_u64().unwrap()).collect::<Vec<_>>(), [2, 3]);

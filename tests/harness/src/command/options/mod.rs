@@ -223,7 +223,7 @@ struct HeightArgs {
 struct EstimatorArgs {
     #[command(flatten)]
     unit: UnitArgs,
-    /// Share of a cell that boxes must fill for `reference` to call it occupied [default: 0.5, above 0 to 1]
+    /// Share of a cell that boxes must fill for `true-boxes` to call it occupied [default: 0.5, above 0 to 1]
     #[arg(long, allow_negative_numbers = true, value_name = "SHARE")]
     reference_share: Option<f64>,
 }
@@ -256,7 +256,7 @@ struct UnitArgs {
     /// Heights of the road that estimators are given wrongly: so many times as high, and so far ahead of where they are, to see
     /// what that costs [default: 1,0]
     ///
-    /// Of a road that is not flat. `reference` and all that is judged keep the true ones. A survey that takes a grade of 4 %
+    /// Of a road that is not flat. `true-boxes` and all that is judged keep the true ones. A survey that takes a grade of 4 %
     /// for 3 %: --ground-error 0.75,0; a crest 15 m too far away: --ground-error 1,15
     #[arg(long, value_name = "TIMES,M", value_parser = ground_error, allow_hyphen_values = true)]
     ground_error: Option<GroundError>,

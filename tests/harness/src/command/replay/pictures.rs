@@ -25,7 +25,7 @@ use crate::results::pictures::{canvas::Canvas, palette};
 /// Whether an estimator is drawn from above at the chosen frame, beside the one examples are of: `radar-3d` with
 /// whatever it was told, and what it is compared with.
 fn also_drawn(name: &str) -> bool {
-    name.starts_with("radar-3d-") || ["radar-2d", "reference", "camera-reference"].contains(&name)
+    name.starts_with("radar-3d-") || ["radar-2d", "true-boxes", "camera-true-boxes"].contains(&name)
 }
 
 /// Draws everything into a folder; `all` are the estimators of the table.
@@ -327,7 +327,7 @@ mod tests {
 
     use super::*;
     use crate::evaluation::Options;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::recording::Frame;
 
     /// Visible to the right of the road's axis.
@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn the_cells_that_make_an_object_visible_are_counted() {
         // 4.6 x 1.8 m: five or six cells long, y from -0.9 to 0.9
-        let replay = replay(by_hand::recording(2, 1));
+        let replay = replay(made_up::recording(2, 1));
         let (visible, all) = cells_in_sight(&replay, &Half, 0, 0).unwrap();
         assert!(2 * visible == all && all >= 10, "{visible} of {all}");
         assert_eq!(cells_in_sight(&replay, &Half, 0, 7), None, "nobody of that name");

@@ -64,7 +64,7 @@ fn corners(pose: &SensorPose, view: &FieldOfView) -> impl Iterator<Item = [f64; 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand;
+    use crate::evaluation::samples::made_up;
     use crate::recording::RadarDetection;
 
     #[test]
@@ -78,7 +78,7 @@ mod tests {
             snr_db: None,
         };
         let seen = |detections: Vec<RadarDetection>| {
-            let mut recording = by_hand::recording(1, 0);
+            let mut recording = made_up::recording(1, 0);
             (recording.truth, recording.frames[0].detections) = (None, detections);
             window(&recording)
         };

@@ -105,8 +105,8 @@ pub fn fingerprint(recording: &Recording, options: &estimators::Options) -> Resu
 mod tests {
     use super::*;
     use crate::estimators::{FarRoad, Lane, Profile};
-    use crate::evaluation::samples::by_hand::{frames, recording, sample};
-    use crate::evaluation::score::by_hand::score;
+    use crate::evaluation::samples::made_up::{frames, recording, sample};
+    use crate::evaluation::score::made_up::score;
 
     #[test]
     fn a_place_lies_where_the_map_has_it() {

@@ -101,7 +101,7 @@ fn comparison(experiment: &Experiment, extent: Extent) -> String {
 
 /// What the rebuilt experiment is expected to reach, and whether it does.
 fn expectations(experiment: &Experiment) -> String {
-    let expected = PAPER.iter().filter(|p| ["radar-3d", "reference"].contains(&p.ours));
+    let expected = PAPER.iter().filter(|p| ["radar-3d", "true-boxes"].contains(&p.ours));
     let lines = expected.filter_map(|p| {
         let counts = experiment.pooled(p.ours)?.counts;
         let (fvr, fir) = (counts.fvr()?, counts.fir()?);
@@ -152,7 +152,7 @@ fn by_day(experiment: &Experiment, extent: Extent) -> String {
             percent(summary.coverage_rate),
             percent(result.hidden()),
             pair("radar-3d"),
-            pair("reference"),
+            pair("true-boxes"),
         ]
     };
     let training = std::iter::once(row(&experiment.training, " (training, not pooled)"));

@@ -12,7 +12,7 @@ use crate::studies::experiment::PAPER;
 use crate::studies::experiment::gantry_camera::{Detected, SetResult};
 
 const OWN: &str = "camera-3d";
-const REFERENCE: &str = "camera-reference";
+const REFERENCE: &str = "camera-true-boxes";
 
 /// The experiment as text.
 pub fn text(sets: &[SetResult], extent: Extent) -> String {

@@ -271,8 +271,8 @@ fn lanes_learnt(rows: &[Row]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::{PERIOD_NS, frames, recording, sample};
-    use crate::evaluation::score::by_hand::score;
+    use crate::evaluation::samples::made_up::{PERIOD_NS, frames, recording, sample};
+    use crate::evaluation::score::made_up::score;
     use crate::evaluation::summary::Summary;
     use crate::recording::truth::{Label, Truth};
 

@@ -185,7 +185,7 @@ fn by_scene(counted: &[Counted], extent: Extent) -> String {
             from_slice(ours),
             cells(ours),
             if name == OURS { at_equal_fir(scene, "cells") } else { String::new() },
-            cells(summary.row("reference")),
+            cells(summary.row("true-boxes")),
         ];
         let more = beside.iter().map(|c| cells(c.scenes.get(k).and_then(|s| s.summary.row(name))));
         Some(fixed.into_iter().chain(more).collect::<Vec<String>>())
@@ -257,8 +257,8 @@ mod tests {
     use super::*;
     use crate::evaluation::Settings;
     use crate::evaluation::pool::{Seconds, pool};
-    use crate::evaluation::samples::by_hand::{frames, recording, sample};
-    use crate::evaluation::score::by_hand::score;
+    use crate::evaluation::samples::made_up::{frames, recording, sample};
+    use crate::evaluation::score::made_up::score;
     use crate::recording::Recording;
     use crate::studies::experiment::scenes::Variant;
 

@@ -308,7 +308,7 @@ mod tests {
     use viewshed::probability::fitted_with;
 
     use super::*;
-    use crate::evaluation::samples::by_hand::{frames, recording, sample};
+    use crate::evaluation::samples::made_up::{frames, recording, sample};
 
     fn shipped() -> Plan {
         Plan::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/calibration.toml")).unwrap()
@@ -346,7 +346,7 @@ mod tests {
                 clear.chain(hidden).collect()
             };
             let samples = frames((from..from + 40).map(objects));
-            let score = crate::evaluation::score::by_hand::score("radar-3d", &samples, |s| {
+            let score = crate::evaluation::score::made_up::score("radar-3d", &samples, |s| {
                 Some(if s.slice_in_sight { 255 } else { 20 })
             });
             (1, Places::of(&recording(40, 40), &samples, &score))

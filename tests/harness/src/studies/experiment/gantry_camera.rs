@@ -1,7 +1,7 @@
 //! The camera's experiment on the twin: detectors from ideal to poor over days of dense and of light traffic.
 //!
 //! A [`Plan`] names sets of days. On each day every detector is given the same views, and its boxes go through
-//! `camera-3d`; `camera-reference` has the true boxes, and what a detector found is what it is judged by. Days are
+//! `camera-3d`; `camera-true-boxes` has the true boxes, and what a detector found is what it is judged by. Days are
 //! pooled, detector by detector.
 
 use std::path::{Path, PathBuf};
@@ -360,7 +360,7 @@ mod tests {
     fn the_ideal_detector_finds_what_shows_and_nothing_else() {
         use crate::geometry::solid::Solid;
         use crate::twin::camera::Target;
-        use crate::twin::camera::by_hand::camera;
+        use crate::twin::camera::made_up::camera;
         let mut camera = camera();
         camera.model = detectors()[0].model;
         camera.model.check().unwrap();

@@ -163,7 +163,7 @@ fn merge(mut boxes: Vec<Box2d>, overlap: f64) -> Vec<Box2d> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::camera;
+    use super::super::made_up::camera;
     use super::*;
     use crate::geometry::solid::Solid;
 

@@ -109,7 +109,7 @@ impl Camera {
 }
 
 #[cfg(test)]
-pub mod by_hand {
+pub mod made_up {
     use super::*;
 
     /// At 6 m, level, 60 degrees wide.
@@ -124,7 +124,7 @@ pub mod by_hand {
 
 #[cfg(test)]
 mod tests {
-    use super::by_hand::camera;
+    use super::made_up::camera;
     use super::*;
 
     fn solid(x: f64, y: f64, size: [f64; 3]) -> Solid {

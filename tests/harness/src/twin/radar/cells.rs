@@ -105,7 +105,7 @@ fn neighbours([range, doppler, azimuth]: Bin) -> impl Iterator<Item = Bin> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::radar;
+    use super::super::made_up::radar;
     use super::*;
     use crate::twin::random::Use;
 

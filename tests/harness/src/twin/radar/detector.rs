@@ -67,7 +67,7 @@ pub fn false_alarms(radar: &Radar, dice: &mut Dice) -> Vec<Peak> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::radar;
+    use super::super::made_up::radar;
     use super::*;
     use crate::twin::random::Use;
 

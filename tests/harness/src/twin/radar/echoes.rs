@@ -144,7 +144,7 @@ fn ways(
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{Scene, radar};
+    use super::super::made_up::{Scene, radar};
     use super::*;
     use crate::twin::random::Use;
     use crate::twin::road::Road;

@@ -48,7 +48,7 @@ fn error(resolution: f64, least: f64, power: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::radar;
+    use super::super::made_up::radar;
     use super::*;
     use crate::twin::random::Use;
 

@@ -95,8 +95,8 @@ fn ghost(
 
 #[cfg(test)]
 mod tests {
-    use super::super::by_hand::{Scene, radar};
     use super::super::echoes::collect;
+    use super::super::made_up::{Scene, radar};
     use super::*;
     use crate::twin::random::Use;
     use crate::twin::traffic::types::Class;

@@ -75,7 +75,7 @@ impl Radar {
 
 /// Small worlds for the tests of the stages.
 #[cfg(test)]
-pub mod by_hand {
+pub mod made_up {
     use super::*;
     use crate::geometry::solid::Solid;
     use crate::twin::body::{Block, blocks};

@@ -114,7 +114,7 @@ fn soil(own: &mut Recording, from_ns: i64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
     use crate::recording::RadarDetection;
 
     /// Ten frames of 0.1 s with what lies 15 degrees to the left, at the horizon.

@@ -366,7 +366,7 @@ fn places(recording: &Recording, frame: &Frame, settings: &Settings) -> Vec<[f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::samples::by_hand::recording;
+    use crate::evaluation::samples::made_up::recording;
     use crate::geometry::pose::SensorPose;
     use crate::recording::RadarDetection;
 
