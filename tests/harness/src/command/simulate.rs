@@ -10,6 +10,7 @@ use serde_json::json;
 use super::print;
 use super::progress::bar;
 use crate::results::files::{OutputArgs, Target};
+use crate::twin::radar::misses::Misses;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::{Made, Simulation};
 
@@ -33,6 +34,9 @@ pub struct Args {
     /// Seed in place of the scene's own
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// What radars miss of vehicles in plain sight, in place of what the scene says: none, real, or a share of the frames
+    #[arg(long, value_name = "MISSES")]
+    misses: Option<Misses>,
     /// Length in place of the scene's own, in seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     duration: Option<f64>,
@@ -66,7 +70,7 @@ More that a scene may have, each with defaults:
   [radar]  has_elevation = false             a radar that measures none
   [radar.model]                              wavelength_m, reference_snr_db, max_detections; tables antenna,
                                              resolution, detector, accuracy, fading, road, mirrors,
-                                             interference, rounding (the file model.rs of the twin has every
+                                             interference, rounding, misses (the file model.rs of the twin has every
                                              parameter with its source)
   [[radar.interference]]                     from_s, to_s, noise_rise_db
   [[radar.outage]]                           from_s, to_s, frames = \"empty\" or \"missing\"
@@ -94,6 +98,9 @@ const EMPTY_S: f64 = 5.0;
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut scene = Scene::read(&args.scene)?;
     scene.seed = args.seed.unwrap_or(scene.seed);
+    if let Some(misses) = &args.misses {
+        scene.radar.model.misses = misses.clone();
+    }
     if let Some(duration_s) = args.duration {
         scene.duration_s = duration_s;
         scene.check().context("--duration")?;

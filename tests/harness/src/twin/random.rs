@@ -20,6 +20,8 @@ pub enum Use {
     Structure = 4,
     /// Whether interference meets a radar frame.
     Interference = 5,
+    /// In which frames a radar misses a vehicle.
+    Misses = 6,
 }
 
 /// A stream of draws.

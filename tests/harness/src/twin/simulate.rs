@@ -12,6 +12,7 @@ use super::camera::detector::{self, DetectorModel};
 use super::camera::{Camera, Target};
 use super::radar::Radar;
 use super::radar::disturbance::{Outage, noise_db, outage};
+use super::radar::misses::Missed;
 use super::random::{Dice, Use, name};
 use super::scatter::{Scatterer, scatterers};
 use super::scene::structure::{PIECE_M, PIECE_ON_GRADE_M, Piece};
@@ -45,6 +46,8 @@ pub struct Simulation {
     /// Those beside the first.
     pub further_radars: Vec<Radar>,
     vehicles: Vec<Prepared>,
+    /// What each radar misses, frame by frame.
+    missed: Vec<Missed>,
     structures: Vec<Piece>,
     ground: Ground,
 }
@@ -87,6 +90,20 @@ struct Instant<'a> {
     bodies: Vec<Body<'a>>,
     returns: Vec<&'a [Scatterer]>,
     labels: Vec<Label>,
+    /// Which vehicles drive, in this order behind the structures.
+    driving: Vec<usize>,
+}
+
+impl Instant<'_> {
+    /// Takes away what a radar misses.
+    fn without(&mut self, missed: &[usize]) {
+        let first = self.returns.len() - self.driving.len();
+        for (vehicle, returns) in self.driving.iter().zip(&mut self.returns[first..]) {
+            if missed.contains(vehicle) {
+                *returns = &[];
+            }
+        }
+    }
 }
 
 impl Simulation {
@@ -143,8 +160,16 @@ impl Simulation {
             radar.pose.position[2] += ground.height(radar.pose.position[0]);
             radar
         };
-        let further_radars = scene.radars().iter().skip(1).map(radar).collect();
-        Ok(Self { radar: radar(&scene.radar), further_radars, vehicles, structures, ground, traffic, scene })
+        let further_radars: Vec<Radar> = scene.radars().iter().skip(1).map(radar).collect();
+        let radar = radar(&scene.radar);
+        let (rate_hz, from_s) = (scene.radar.rate_hz, scene.from_s());
+        let missed = (0..).zip([&radar].into_iter().chain(&further_radars)).map(|(k, radar)| {
+            let [x, y, _] = radar.pose.position;
+            let times = (0..count(&scene, rate_hz)).map(|number| from_s + number as f64 / rate_hz);
+            Missed::new(&radar.model.misses, &traffic, [x, y], scene.seed.wrapping_add(k << FURTHER_BITS), times)
+        });
+        let missed = missed.collect();
+        Ok(Self { radar, further_radars, vehicles, missed, structures, ground, traffic, scene })
     }
 
     /// That vehicles of the traffic jump, in words.
@@ -173,8 +198,7 @@ impl Simulation {
     }
 
     fn count(&self, rate_hz: f64) -> u64 {
-        // a frame at the very end belongs to the next recording
-        (self.scene.duration_s * rate_hz - 1e-9).floor() as u64 + 1
+        count(&self.scene, rate_hz)
     }
 
     fn time_ns(&self, since_s: f64) -> i64 {
@@ -189,7 +213,9 @@ impl Simulation {
         let section = &self.scene.radar;
         let since_s = number as f64 / section.rate_hz;
         let time_ns = self.time_ns(since_s);
-        let Instant { bodies, returns, labels } = self.instant(since_s, time_ns);
+        let mut instant = self.instant(since_s, time_ns);
+        instant.without(self.missed_at(0, number));
+        let Instant { bodies, returns, labels, .. } = instant;
         self.passes_below(&labels, since_s)?;
         let radar = match outage(&section.outage, since_s) {
             Some(Outage::Missing) => None,
@@ -204,8 +230,12 @@ impl Simulation {
         let in_view = self.in_view(&labels);
         let frame = |detections| Frame { time_ns, detections, refused: 0, unwanted: Vec::new(), fault: false };
         let further = (1..).zip(&self.further_radars);
-        let further =
-            further.map(|(k, radar)| frame(self.scan(radar, since_s, number + (k << FURTHER_BITS)))).collect();
+        let further = further
+            .map(|(k, radar)| {
+                let own = number + (k << FURTHER_BITS);
+                frame(self.scan_without(radar, since_s, own, self.missed_at(k, number)))
+            })
+            .collect();
         Ok(Step { time_ns, radar: radar.map(frame), further, labels, in_view })
     }
 
@@ -255,12 +285,23 @@ impl Simulation {
 
     /// What a radar mounted anywhere measures at an instant; `number` makes the draws its own.
     pub fn scan(&self, radar: &Radar, since_s: f64, number: u64) -> Vec<RadarDetection> {
-        let Instant { bodies, returns, .. } = self.instant(since_s, self.time_ns(since_s));
+        self.scan_without(radar, since_s, number, &[])
+    }
+
+    /// The vehicles that a radar misses in a frame.
+    fn missed_at(&self, radar: u64, frame: u64) -> &[usize] {
+        usize::try_from(radar).ok().and_then(|radar| self.missed.get(radar)).map_or(&[], |missed| missed.at(frame))
+    }
+
+    fn scan_without(&self, radar: &Radar, since_s: f64, number: u64, missed: &[usize]) -> Vec<RadarDetection> {
+        let mut instant = self.instant(since_s, self.time_ns(since_s));
+        instant.without(missed);
+        let Instant { bodies, returns, .. } = instant;
         radar.scan(&World::over(&self.ground, radar.pose.position, bodies), &returns, self.scene.seed, number, 0.0)
     }
 
     fn instant(&self, since_s: f64, time_ns: i64) -> Instant<'_> {
-        let mut instant = Instant { bodies: Vec::new(), returns: Vec::new(), labels: Vec::new() };
+        let mut instant = Instant { bodies: Vec::new(), returns: Vec::new(), labels: Vec::new(), driving: Vec::new() };
         for piece in &self.structures {
             let Piece { label, blocks, scatterers, sides } = piece;
             instant.bodies.push(Body { solid: label.solid, velocity: [0.0; 2], blocks, sides: *sides });
@@ -278,6 +319,7 @@ impl Simulation {
                 sides: prepared.sides,
             });
             instant.returns.push(&prepared.scatterers);
+            instant.driving.push(k);
             let round = |v: f64| (v / LABEL_STEP_M).round() * LABEL_STEP_M;
             let [x, y, z] = solid.center;
             let z = if self.ground.is_level() { z } else { round(z) };
@@ -443,6 +485,12 @@ impl Simulation {
         let sink = writer.finish().context("cannot complete the recording")?;
         Ok((sink, made))
     }
+}
+
+/// Frames of a whole recording at a rate.
+fn count(scene: &Scene, rate_hz: f64) -> u64 {
+    // a frame at the very end belongs to the next recording
+    (scene.duration_s * rate_hz - 1e-9).floor() as u64 + 1
 }
 
 /// Puts what would stand on a flat road upon the ground below its middle.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::evaluation::Settings;
 use crate::recording::{Recording, mcap};
+use crate::twin::radar::misses::Misses;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 
@@ -39,6 +40,9 @@ pub struct Plan {
     /// Folder of the file.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// What its radar misses, in place of what the scene says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub misses: Option<Misses>,
 }
 
 /// Traffic of one day and the seed of everything else.
@@ -81,6 +85,9 @@ impl Plan {
         let mut scene = Scene::read(&self.folder.join(&self.scene))?;
         scene.seed = day.seed;
         scene.duration_s = self.duration_s;
+        if let Some(misses) = &self.misses {
+            scene.radar.model.misses = misses.clone();
+        }
         // boxes of a camera are no input of what is compared here
         scene.camera = None;
         Simulation::new(scene, Some(&self.folder.join(&day.fcd)))

@@ -18,6 +18,7 @@ use crate::evaluation::replay::Replay;
 use crate::evaluation::samples::{self, FrameSamples};
 use crate::evaluation::score::score;
 use crate::recording::{Recording, file};
+use crate::twin::radar::misses::Misses;
 use crate::twin::scene::Scene;
 use crate::twin::simulate::Simulation;
 
@@ -35,6 +36,9 @@ pub struct Plan {
     /// Folder of the file.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// What radars miss, in place of what scenes say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub misses: Option<Misses>,
 }
 
 /// Scenes that are pooled.
@@ -114,7 +118,14 @@ impl Plan {
     /// # Errors
     /// Those of reading a scene.
     pub fn scenes(&self, set: &Set) -> Result<Vec<Scene>> {
-        set.scenes.iter().map(|path| Scene::read(&self.folder.join(path))).collect()
+        let read = |path: &PathBuf| {
+            let mut scene = Scene::read(&self.folder.join(path))?;
+            if let Some(misses) = &self.misses {
+                scene.radar.model.misses = misses.clone();
+            }
+            Ok(scene)
+        };
+        set.scenes.iter().map(read).collect()
     }
 
     /// Traffic of another day at each scene of a set.

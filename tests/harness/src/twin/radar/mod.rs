@@ -3,7 +3,7 @@
 //! In the order of the signal: [`antenna`] and r^-4 give each path its strength, [`echoes`] collects the
 //! paths (straight, by the road, by mirrors), [`cells`] adds up what the sensor cannot resolve, [`detector`]
 //! sets the threshold, [`measure`] makes noisy, rounded detections. [`disturbance`] is what comes from
-//! outside: interference, outages. [`model`] holds every parameter with its source.
+//! outside: interference, outages, and [`misses`] which vehicles a frame does not show. [`model`] holds every parameter with its source.
 
 pub mod antenna;
 pub mod cells;
@@ -13,6 +13,7 @@ pub mod echo;
 pub mod echoes;
 pub mod measure;
 pub mod mirrors;
+pub mod misses;
 pub mod model;
 
 use super::random::{Dice, Use};

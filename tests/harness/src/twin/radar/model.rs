@@ -7,6 +7,7 @@
 use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::misses::Misses;
 use crate::twin::road::Road;
 
 /// Everything that makes one radar another.
@@ -30,6 +31,9 @@ pub struct RadarModel {
     /// Longest list of one frame, the strongest stay.
     pub max_detections: usize,
     pub rounding: Rounding,
+    /// Frames that show nothing of a vehicle in sight; the default never does, as no data sheet says how often.
+    #[serde(skip_serializing_if = "Misses::is_none")]
+    pub misses: Misses,
 }
 
 /// Gain over the angle from the boresight: 3GPP TR 38.901 table 7.3-1 (and ITU-R M.2101), parabola in dB with a floor.
@@ -155,6 +159,7 @@ impl Default for RadarModel {
             interference: Interference::default(),
             max_detections: 1024,
             rounding: Rounding::default(),
+            misses: Misses::default(),
         }
     }
 }
@@ -258,7 +263,7 @@ impl RadarModel {
             // a NaN lies in no range
             ensure!((low..=high).contains(&value), "model.{name} is {value}, it must lie in {low} to {high}");
         }
-        Ok(())
+        self.misses.check()
     }
 }
 
