@@ -4,6 +4,7 @@ mod frames;
 mod framing;
 mod points;
 mod random;
+mod real;
 mod session;
 
 use viewshed::fixed::time::Time;
