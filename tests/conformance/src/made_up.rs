@@ -154,7 +154,7 @@ pub fn maps(like: &Maps, random: &mut Random) -> Maps {
             let wide = ray(&rays[from], ranges, random);
             rays[from..(from + 20).min(azimuths)].fill(wide);
         }
-        scans.push(Scan { measured: scan.measured, rays: rays.clone(), probable: Vec::new() });
+        scans.push(Scan { measured: scan.measured, rays: rays.clone(), probable: Vec::new(), state: scan.state });
     }
     Maps { estimator: like.estimator.clone(), header: like.header, scans, holes: 0 }
 }

@@ -51,7 +51,7 @@ impl Frames for Vec<Frame> {
     }
 }
 
-/// Every so manieth of so many, so that there are not more than `most`.
+/// The stride through so many by which at most `most` are met.
 pub fn step(of: usize, most: usize) -> usize {
     of.div_ceil(most).max(1)
 }

@@ -13,7 +13,7 @@
 //! - *Height and pitch*: the median height above the road of what moves, over its distance. By a height that is wrong
 //!   it is off everywhere, by a pitch that is wrong the more the farther.
 //!
-//! Only detections that an estimator can use are asked: where they are [no such](used), velocities and directions mean
+//! Only detections that an estimator can use are asked: where they are [no such](super::used), velocities and directions mean
 //! nothing. What labels deny of a mount is told [from them](against_labels), and no more of its yaw then.
 
 use std::cell::LazyCell;
