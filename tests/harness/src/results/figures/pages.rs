@@ -151,6 +151,12 @@ fn tables(measured: &Measured) -> Vec<Table> {
     all.filter_map(|piece| if let Piece::Table(table) = piece { Some(table) } else { None }).collect()
 }
 
+/// Whether a line beside the tables says what came out: comparisons, and floors and aims with whether they are reached. All lines are in
+/// what was kept.
+fn is_finding(line: &str) -> bool {
+    line.starts_with("At equal FIR") || line.contains("reached")
+}
+
 /// The page of all results.
 pub fn results(plan: &Plan, kept: &Kept) -> String {
     let total: u64 = plan.part.iter().filter_map(|part| kept.get(&part.name)).map(|m| m.seconds).sum();
@@ -185,12 +191,13 @@ pub fn results(plan: &Plan, kept: &Kept) -> String {
                             tables += &format!("{}\n\n", line.replace('<', "&lt;"));
                         }
                     }
-                    Piece::Line(line) => said += &format!("{}\n\n", line.replace('<', "&lt;")),
+                    Piece::Line(line) if is_finding(&line) => said += &format!("- {}\n", line.replace('<', "&lt;")),
+                    Piece::Line(_) => {}
                 }
             }
             page += &tables;
             if !said.is_empty() {
-                page += &format!("<details><summary>what it says beside</summary>\n\n{said}</details>\n");
+                page += &format!("{said}\n");
             }
         }
         page += &format!(
@@ -210,7 +217,7 @@ mod tests {
     use super::*;
 
     fn kept() -> Kept {
-        let printed = "┌──┬──┐\n│ a ┆b │\n╞══╪══╡\n│ x ┆1 │\n│ y ┆2 │\n└──┴──┘\nmore";
+        let printed = "┌──┬──┐\n│ a ┆b │\n╞══╪══╡\n│ x ┆1 │\n│ y ┆2 │\n└──┴──┘\naim: reached\nand what else was said";
         let measured = Measured {
             run: vec!["replay x".into()],
             sources: "12345678".into(),
@@ -281,7 +288,7 @@ mod tests {
             "a whole run took 2 minutes",
             "## one\n\nIt.\n\n    viewshed replay x\n",
             "| x | 1 |",
-            "\nmore\n",
+            "\n- aim: reached\n",
             "sources 12345678",
             "## two\n\nIt.\n\nNot measured yet.",
         ] {
