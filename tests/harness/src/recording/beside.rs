@@ -72,8 +72,8 @@ fn check(recording: &mut Recording, frames: &mut dyn Frames, options: &ReadOptio
     if !recording.sensor.frames_independent {
         clock.tell(&mut recording.problems);
     }
-    let correction = unfilled.tell(recording, start_ns);
-    frames.correct(correction);
+    let unfilled = unfilled.tell(recording, start_ns);
+    frames.correct(Correction { unfilled, ..Correction::default() });
     let (mut watching, mut asked) = (Watching::of(recording), Asked::of(recording, extent.frames));
     let wanted = Wanted { start_ns, from_s: options.from_s, to_s: options.to_s };
     let mut left = Extent::default();

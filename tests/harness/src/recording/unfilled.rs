@@ -5,7 +5,6 @@
 
 use std::collections::BTreeSet;
 
-use super::frames::Correction;
 use super::{Frame, RadarDetection, Recording};
 
 /// Points before a value that drivers write for "nothing" is taken for that.
@@ -63,10 +62,10 @@ impl Unfilled {
         }
     }
 
-    /// Adds the fields that are never filled to a recording's problems, and says what is to be done about them.
-    pub fn tell(&self, recording: &mut Recording, start_ns: i64) -> Correction {
-        let mut correction = Correction::default();
-        for ((values, field), unfilled) in self.0.iter().zip(&FIELDS).zip(&mut correction.unfilled) {
+    /// Adds the fields that are never filled to a recording's problems, and says which these are.
+    pub fn tell(&self, recording: &mut Recording, start_ns: i64) -> [bool; FIELDS.len()] {
+        let mut found = [false; FIELDS.len()];
+        for ((values, field), unfilled) in self.0.iter().zip(&FIELDS).zip(&mut found) {
             let Some(value) = values.constant(field) else { continue };
             *unfilled = true;
             if field.name == ELEVATION {
@@ -76,7 +75,7 @@ impl Unfilled {
             let what = format!("{name} is {value} in every detection, so it is not filled, and taken for not measured");
             recording.problems.add_many(TOPIC, what, start_ns, values.points);
         }
-        correction
+        found
     }
 }
 
@@ -111,7 +110,7 @@ impl Values {
 mod tests {
     use super::*;
     use crate::evaluation::samples::made_up;
-    use crate::recording::frames::Frames;
+    use crate::recording::frames::{Correction, Frames};
 
     /// 40 frames of five points whose values are these, by the number of the point.
     fn recording(of: impl Fn(usize) -> [f32; 3]) -> Recording {
@@ -132,8 +131,8 @@ mod tests {
             }
         }
         let survey = recording.frames.survey();
-        let correction = survey.unfilled.tell(&mut recording, 0);
-        recording.frames.correct(correction);
+        let unfilled = survey.unfilled.tell(&mut recording, 0);
+        recording.frames.correct(Correction { unfilled, ..Correction::default() });
         recording
     }
 
