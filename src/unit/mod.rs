@@ -8,10 +8,10 @@
 //!
 //! | around it | modules |
 //! |---|---|
-//! | what an estimator needs to be in a unit, and the two sizes of radar-3d | [`build`](mod@build), [`profile`] |
+//! | what an estimator needs to be in a unit, the two sizes of radar-3d, and one with its map | [`build`](mod@build), [`profile`], [`radar`] |
 //! | who sends maps, and with a table of probabilities | [`sender`], `quantised` |
 //! | settings: the checked block, two slots of it, in flash | [`settings`] |
-//! | the integrator: asked for and written over serial lines and CAN, what a unit answers, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`said`], [`identity`], `safe_state` |
+//! | the integrator: asked for and written over serial lines and CAN, what a unit answers, and what is said without settings | [`service`], [`serial_service`], [`can_service`], [`reply`], [`identity`], `safe_state` |
 //! | native scans and the integrator on serial lines, and whose clock it is | [`session`], [`radar_clock`] |
 //! | lines: a bus that is listened to first and left after bus-off, queues, a line that stalls | [`can_bus`], [`frame_queue`], [`transmitter`] |
 //! | a unit on hardware of its own: the loop, what its lamp shows, and how long frames take | [`roadside`], [`status_output`], [`timing`] |

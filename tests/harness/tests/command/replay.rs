@@ -169,7 +169,7 @@ fn labelled_and_unlabelled_recordings_share_one_csv_in_any_order() {
         assert!(output.status.success(), "{}", stderr(&output));
         let csv = std::fs::read_to_string(folder.join("r.csv")).unwrap();
         assert_eq!(csv.lines().count(), 1 + 3 * COUNTED);
-        assert!(csv.lines().next().unwrap().contains("reference_grade"));
+        assert!(csv.lines().next().unwrap().contains("true-boxes_grade"));
     }
 }
 
