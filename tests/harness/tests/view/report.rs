@@ -98,7 +98,7 @@ fn charts_answer_to_mouse_keys_and_buttons() {
     // a button hides its series everywhere in its group
     let shown = "document.querySelectorAll('.group .series:not(.off)').length";
     let before = page.number(shown);
-    page.ask("document.querySelector('.legend button[data-series=reference]').click()");
+    page.ask("document.querySelector('.legend button[data-series=true-boxes]').click()");
     assert!(page.number(shown) <= before - 5.0, "{} of {before}", page.number(shown));
     // the threshold moves along the curve: nothing visible at its end
     page.ask(
