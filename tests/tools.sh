@@ -51,8 +51,7 @@ need_compilers() {
 
 # broadcast PROGRAM LOG: six seconds of maps as a unit sends them that has been on for long
 broadcast() {
-    printf '[estimators.radar_3d.settling]\nnear_s = 0.0\nfar_s = 0.0\nstanding_s = 0.0\n' >"$2.toml"
-    "$1" bus tests/recordings/motorway.mcap --to 6 --config "$2.toml" --log "$2" --force >/dev/null
+    "$1" bus tests/recordings/motorway.mcap --to 6 --config tests/recordings/settled.toml --log "$2" --force >/dev/null
 }
 
 # A Chromium for the tests of pages: true where there is one

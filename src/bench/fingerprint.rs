@@ -102,21 +102,13 @@ impl Fingerprint {
 mod tests {
     use super::*;
     use crate::grid::axes::Axes;
-    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::field_of_view::tests::VIEW;
     use crate::sensor::mount::Mount;
 
     fn map(visible_from: u8) -> PolarMap<50, 3> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
-        let view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
         let levelling = mount.levelling().unwrap();
-        let axes = Axes::<50, 3, 4>::new(&levelling, &view, 1.0).unwrap();
+        let axes = Axes::<50, 3, 4>::new(&levelling, &VIEW, 1.0).unwrap();
         PolarMap::unknown(axes.polar(&levelling), visible_from, 128)
     }
 

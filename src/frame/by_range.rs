@@ -14,7 +14,7 @@ pub struct Located {
     pub x_cm: i32,
     /// To its left.
     pub y_cm: i32,
-    /// Located in the scan.
+    /// Its place in the scan.
     pub index: u16,
 }
 

@@ -166,7 +166,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::fixed::angle::Angle;
     use crate::frame::gate::GateConfig;
-    use crate::sensor::field_of_view::FieldOfView;
+    use crate::sensor::field_of_view::tests::VIEW;
     use crate::sensor::mount::Mount;
     use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec as StdVec;
@@ -174,14 +174,6 @@ pub(crate) mod tests {
     /// A sensor as it may be installed.
     pub(crate) const MOUNT: Mount =
         Mount { x_m: 0.0, y_m: 0.0, height_m: 6.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 };
-    pub(crate) const VIEW: FieldOfView = FieldOfView {
-        azimuth_min_deg: -60.0,
-        azimuth_max_deg: 60.0,
-        elevation_min_deg: -16.0,
-        elevation_max_deg: 16.0,
-        range_min_m: 3.0,
-        range_max_m: 200.0,
-    };
 
     fn detection(range_cm: u16, strength: i16) -> Detection {
         Detection {

@@ -118,7 +118,8 @@ mod tests {
     use crate::frame::gate::GateConfig;
     use crate::frame::health::{Condition, FrameStatus, Health, HealthConfig};
     use crate::frame::scan::Scan;
-    use crate::frame::scan::tests::{MOUNT, VIEW};
+    use crate::frame::scan::tests::MOUNT;
+    use crate::sensor::field_of_view::tests::VIEW;
     use crate::sensor::noise::NoiseConfig;
     use std::vec::Vec;
 

@@ -469,19 +469,12 @@ fn part_of(slope: i32, height: i32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::field_of_view::tests::VIEW;
     use crate::sensor::mount::Mount;
 
     fn axes(height_m: f32, pitch_deg: f32) -> Axes<200, 120, 16> {
         let mount = Mount { x_m: 0.0, y_m: 0.0, height_m, yaw_deg: 0.0, pitch_deg, roll_deg: 0.0 };
-        let view = FieldOfView {
-            azimuth_min_deg: -60.0,
-            azimuth_max_deg: 60.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 3.0,
-            range_max_m: 200.0,
-        };
-        Axes::new(&mount.levelling().unwrap(), &view, 1.0).unwrap()
+        Axes::new(&mount.levelling().unwrap(), &VIEW, 1.0).unwrap()
     }
 
     #[test]

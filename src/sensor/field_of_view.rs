@@ -105,10 +105,11 @@ impl Limits {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    const FOV: FieldOfView = FieldOfView {
+    /// A usual radar's, for tests.
+    pub(crate) const VIEW: FieldOfView = FieldOfView {
         azimuth_min_deg: -60.0,
         azimuth_max_deg: 60.0,
         elevation_min_deg: -16.0,
@@ -119,20 +120,20 @@ mod tests {
 
     #[test]
     fn reversed_limits_are_named() {
-        let e = FieldOfView { azimuth_min_deg: 70.0, ..FOV }.limits().unwrap_err();
+        let e = FieldOfView { azimuth_min_deg: 70.0, ..VIEW }.limits().unwrap_err();
         assert_eq!(e.parameter, "field_of_view.azimuth_max_deg");
-        let e = FieldOfView { range_min_m: 250.0, ..FOV }.limits().unwrap_err();
+        let e = FieldOfView { range_min_m: 250.0, ..VIEW }.limits().unwrap_err();
         assert_eq!(e.parameter, "field_of_view.range_max_m");
-        let e = FieldOfView { elevation_max_deg: f32::NAN, ..FOV }.limits().unwrap_err();
+        let e = FieldOfView { elevation_max_deg: f32::NAN, ..VIEW }.limits().unwrap_err();
         assert_eq!(e.parameter, "field_of_view.elevation_max_deg");
     }
 
     #[test]
     fn left_is_positive_azimuth() {
-        let one_sided = FieldOfView { azimuth_min_deg: 0.0, ..FOV };
+        let one_sided = FieldOfView { azimuth_min_deg: 0.0, ..VIEW };
         assert!(one_sided.contains([10.0, 5.0, 0.0]) && !one_sided.contains([10.0, -5.0, 0.0]));
-        assert!(FOV.contains([199.0, 0.0, 0.0]) && !FOV.contains([201.0, 0.0, 0.0]));
-        assert!(!FOV.contains([10.0, 0.0, -5.0]), "the near range below the lower limit is outside");
+        assert!(VIEW.contains([199.0, 0.0, 0.0]) && !VIEW.contains([201.0, 0.0, 0.0]));
+        assert!(!VIEW.contains([10.0, 0.0, -5.0]), "the near range below the lower limit is outside");
         let limits = one_sided.limits().unwrap();
         assert!(limits.contains([1000, 500, 0]) && !limits.contains([1000, -500, 0]));
         assert!(!limits.contains([1000, 0, -500]) && !limits.contains([20_100, 0, 0]));

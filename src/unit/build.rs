@@ -49,7 +49,7 @@ pub trait InUnit: Estimator {
         Ok(())
     }
 
-    /// What receivers have to know of its maps.
+    /// What receivers have to know of its maps, but for the fingerprint of the settings, which [`Settings::build`] puts in.
     ///
     /// # Errors
     /// Maps that cannot be sent.
@@ -117,12 +117,11 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
     }
 
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
-        let header = of_radar(&settings.sensor.mount, parameters)?;
-        Ok(Header { fingerprint: settings.fingerprint(), ..header })
+        of_radar(&settings.sensor.mount, parameters)
     }
 }
 
-/// What receivers have to know of a radar's maps; without a fingerprint of settings.
+/// What receivers have to know of a radar's maps; without a fingerprint.
 ///
 /// # Errors
 /// Maps that cannot be sent.
@@ -203,7 +202,6 @@ impl<const NX: usize, const NY: usize> InUnit for Camera3d<NX, NY> {
 
     fn header(settings: &Settings, parameters: &Self::Parameters) -> Result<Header, ConfigError> {
         let [from, to] = parameters.ahead();
-        let header = header::<NX, AZIMUTHS>(&settings.sensor.mount, &parameters.geometry(), Known::new(from, to))?;
-        Ok(Header { fingerprint: settings.fingerprint(), ..header })
+        header::<NX, AZIMUTHS>(&settings.sensor.mount, &parameters.geometry(), Known::new(from, to))
     }
 }

@@ -67,7 +67,7 @@ impl<const R: usize, const A: usize, const E: usize, const W: usize, const N: us
         now: Time,
         detections: impl IntoIterator<Item = &'a Detection, IntoIter: Clone>,
     ) -> &PolarMap<R, A> {
-        self.report(now, detections, FrameStatus::from(false));
+        self.report(now, detections, false);
         &self.map
     }
 

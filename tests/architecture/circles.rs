@@ -5,7 +5,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use crate::files::below;
 
 /// A module's path below the crate.
 type Module = Vec<String>;
@@ -40,21 +42,18 @@ fn judge(root: &str, least: usize) {
 
 /// Every source with the module it is.
 fn sources(src: &Path) -> BTreeMap<Module, String> {
-    let (mut all, mut folders) = (BTreeMap::new(), vec![(src.to_owned(), Module::new())]);
-    while let Some((folder, module)) = folders.pop() {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            let within = || [&module[..], std::slice::from_ref(&name)].concat();
-            if path.is_dir() {
-                folders.push((path, within()));
-            } else if path.extension().is_some_and(|e| e == "rs") {
-                let own = if matches!(name.as_str(), "mod" | "lib") { module.clone() } else { within() };
-                all.insert(own, fs::read_to_string(path).unwrap());
-            }
-        }
-    }
-    all
+    let source = |path: PathBuf| {
+        let mut module: Module = path
+            .strip_prefix(src)
+            .unwrap()
+            .with_extension("")
+            .iter()
+            .map(|part| part.to_str().unwrap().to_owned())
+            .collect();
+        module.pop_if(|last| matches!(last.as_str(), "mod" | "lib"));
+        (module, fs::read_to_string(path).unwrap())
+    };
+    below(src, &[".rs"], &|_| false).into_iter().map(source).collect()
 }
 
 /// Which module uses which.

@@ -2,7 +2,9 @@
 //! Elsewhere it stands only between markers that the same command fills.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use crate::files::{below, name};
 
 /// Pages where figures may stand as they were measured, and why.
 const HOMES: [(&str, &str); 3] = [
@@ -21,8 +23,8 @@ const MEASURED: [&str; 6] = ["FVR", "FIR", "points of", "points more", "points f
 fn no_page_and_no_comment_has_a_figure_of_its_own() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = Vec::new();
-    for path in files(root) {
-        let name = path.strip_prefix(root).unwrap().display().to_string();
+    for path in below(root, &[".md", ".rs"], &|_| false) {
+        let name = name(&path, root);
         if HOMES.iter().chain(&NONE).any(|(page, _)| *page == name) {
             continue;
         }
@@ -71,23 +73,6 @@ fn page(text: &str) -> Vec<(usize, String)> {
 fn comments(text: &str) -> Vec<(usize, String)> {
     let comment = |line: &str| line.split_once("//").map(|(_, comment)| comment.to_owned());
     text.lines().enumerate().filter_map(|(k, line)| Some((k + 1, comment(line)?))).collect()
-}
-
-fn files(root: &Path) -> Vec<PathBuf> {
-    let (mut all, mut folders) = (Vec::new(), vec![root.to_owned()]);
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            let name = path.file_name().unwrap().to_string_lossy().into_owned();
-            if path.is_dir() && !name.starts_with('.') && !["target", "out"].contains(&name.as_str()) {
-                folders.push(path);
-            } else if path.extension().is_some_and(|kind| kind == "md" || kind == "rs") {
-                all.push(path);
-            }
-        }
-    }
-    all.sort();
-    all
 }
 
 #[test]

@@ -5,5 +5,6 @@ mod dependencies;
 mod extending;
 mod face;
 mod figures;
+mod files;
 mod skips;
 mod uncalled;

@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use crate::files::{below, name};
 
 /// Who has a use for the library.
 const USERS: [&str; 6] =
@@ -14,7 +16,9 @@ fn every_public_function_is_called_by_more_than_tests() {
     let mut words: BTreeMap<String, usize> = BTreeMap::new();
     let mut defined: BTreeMap<String, (usize, String)> = BTreeMap::new();
     for folder in USERS {
-        let sources = sources(&root.join(folder));
+        let folder_path = root.join(folder);
+        let read = |path: PathBuf| (name(&path, &folder_path), fs::read_to_string(&path).unwrap());
+        let sources: Vec<_> = below(&folder_path, &[".rs", ".md"], &|_| false).into_iter().map(read).collect();
         // whole files of tests, by the declaration in the file above
         let of_tests: BTreeSet<String> = sources.iter().flat_map(|(_, text)| declared_for_tests(text)).collect();
         for (path, text) in sources {
@@ -52,23 +56,6 @@ fn every_public_function_is_called_by_more_than_tests() {
         .map(|(name, (_, path))| (name.as_str(), path.as_str()))
         .collect();
     assert!(uncalled.is_empty(), "{} are called by tests only, or not at all: {uncalled:#?}", uncalled.len());
-}
-
-/// Every Rust file and page below a folder, with its path from there.
-fn sources(folder: &Path) -> Vec<(String, String)> {
-    let (mut all, mut folders) = (Vec::new(), vec![folder.to_owned()]);
-    while let Some(at) = folders.pop() {
-        for entry in fs::read_dir(at).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() && path.file_name().is_none_or(|name| name != "target") {
-                folders.push(path);
-            } else if path.extension().is_some_and(|kind| kind == "rs" || kind == "md") {
-                let name = path.strip_prefix(folder).unwrap().display().to_string();
-                all.push((name, fs::read_to_string(path).unwrap()));
-            }
-        }
-    }
-    all
 }
 
 /// Files of `#[cfg(test)] mod NAME;`.

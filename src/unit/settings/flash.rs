@@ -153,14 +153,7 @@ mod tests {
                 pitch_deg: 4.0,
                 roll_deg: 0.0,
             },
-            field_of_view: crate::sensor::field_of_view::FieldOfView {
-                azimuth_min_deg: -60.0,
-                azimuth_max_deg: 60.0,
-                elevation_min_deg: -16.0,
-                elevation_max_deg: 16.0,
-                range_min_m: 3.0,
-                range_max_m: 200.0,
-            },
+            field_of_view: crate::sensor::field_of_view::tests::VIEW,
             noise: crate::sensor::noise::NoiseConfig::default(),
         };
         let mut settings = Settings::of(sensor);

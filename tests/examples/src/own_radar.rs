@@ -8,9 +8,10 @@
 //! let mut own = OwnRadar { radar: RADAR.take(), sender: SENDER.take() };
 //! ```
 
+use viewshed::unit::state_of;
 use viewshed::{
     Addresses, BroadcastConfig, CanFrame, Condition, ConfigError, Detection, Epoch, Medium, Radar3dConfig, Sensor,
-    Time, UnitState, small,
+    Time, small,
 };
 
 /// Estimator, map and sender.
@@ -34,7 +35,7 @@ impl OwnRadar<'_> {
     /// [`Detection::new`] makes detections of metres and radians. `fault`: the radar says that something is wrong with it.
     pub fn frame(&mut self, measured: Time, detections: &[Detection], fault: bool) {
         let Some(report) = self.radar.report(measured, detections, fault) else { return };
-        self.say(report.condition);
+        self.say(report.condition, fault);
         if let Some(sender) = self.sender {
             // a map that cannot be sent now is followed by the next
             let _ = sender.scan(measured, self.radar.map());
@@ -45,15 +46,17 @@ impl OwnRadar<'_> {
     pub fn next_frame(&mut self, now: Time) -> Option<CanFrame> {
         // a radar that fell silent sees nothing
         let condition = self.radar.expire(now)?;
-        self.say(condition);
+        if condition == Condition::Stale {
+            self.say(condition, false);
+        }
         self.sender.as_mut()?.next_frame(now)
     }
 
     /// What receivers are told of the unit.
-    fn say(&mut self, condition: Condition) {
-        let state = if condition == Condition::Healthy { UnitState::Ok } else { UnitState::Degraded };
+    fn say(&mut self, condition: Condition, fault: bool) {
         if let Some(sender) = self.sender {
-            sender.status_mut().state = state;
+            let status = sender.status_mut();
+            (status.state, status.reason) = state_of(condition, fault);
         }
     }
 }

@@ -1,7 +1,11 @@
 //! The example on the shipped log of an ARS408's bus.
 
-use viewshed::{CanFrame, CanId, FieldOfView, Mount, NoiseConfig, RoadPoint, Sensor, Time, small};
+use viewshed::{CanFrame, CanId, RoadPoint, Time, small};
 use viewshed_example::ars408_unit::Guard;
+
+mod pole;
+
+use pole::sensor;
 
 const LOG: &str = include_str!("../../recordings/ars408-made-up.log");
 
@@ -22,25 +26,10 @@ fn log() -> impl Iterator<Item = (Time, CanFrame)> {
     (0..3).flat_map(move |round| LOG.lines().filter_map(frame).map(move |(time, frame)| (later(time, round), frame)))
 }
 
-fn sensor() -> Sensor {
-    Sensor {
-        mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 5.0, yaw_deg: 0.0, pitch_deg: 2.0, roll_deg: 0.0 },
-        field_of_view: FieldOfView {
-            azimuth_min_deg: -45.0,
-            azimuth_max_deg: 45.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 1.0,
-            range_max_m: 100.0,
-        },
-        noise: NoiseConfig::default(),
-    }
-}
-
 #[test]
 fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
     let (mut input, mut radar) = (Box::new(Guard::INPUT), Box::new(small::Radar::new()));
-    let mut guard = Guard::start(&mut input, &mut radar, &sensor()).unwrap();
+    let mut guard = Guard::start(&mut input, &mut radar, &sensor(2.0)).unwrap();
     let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
     let behind = RoadPoint::from_metres(-20.0, 0.0).unwrap();
     assert!(!guard.is_free(near, Time::from_micros(0)).unwrap(), "no scan yet");
@@ -60,7 +49,7 @@ fn the_road_ahead_is_free_while_scans_come_and_unknown_soon_after() {
 #[test]
 fn nothing_is_free_while_parts_of_the_last_scan_are_missing() {
     let (mut input, mut radar) = (Box::new(Guard::INPUT), Box::new(small::Radar::new()));
-    let mut guard = Guard::start(&mut input, &mut radar, &sensor()).unwrap();
+    let mut guard = Guard::start(&mut input, &mut radar, &sensor(2.0)).unwrap();
     let near = RoadPoint::from_metres(20.0, -2.0).unwrap();
     let (mut scans, mut free) = (0, 0);
     let is = |frame: &CanFrame, id: u16| Some(frame.id) == CanId::standard(id);

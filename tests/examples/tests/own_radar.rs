@@ -1,8 +1,12 @@
 //! A radar of one's own, its broadcast, and a vehicle that receives it.
 
-use viewshed::{Detection, Epoch, FieldOfView, Measurement, Mount, NoiseConfig, RoadPoint, Sensor, Time, small};
+use viewshed::{Detection, Epoch, Measurement, RoadPoint, Time, small};
 use viewshed_example::own_radar::OwnRadar;
 use viewshed_example::receiver::Vehicle;
+
+mod pole;
+
+use pole::sensor;
 
 /// A part with 128 kB has a stack and a radar's own lists, too.
 const MOST_BYTES: usize = 100_000;
@@ -30,21 +34,9 @@ fn truck(ms: u64) -> Vec<Detection> {
 fn a_vehicle_is_told_what_is_seen_and_not_what_a_truck_hides_nor_anything_by_silence() {
     let bytes = size_of::<small::Radar>() + size_of::<small::Sender>();
     assert!(bytes <= MOST_BYTES, "{bytes} bytes");
-    let sensor = Sensor {
-        mount: Mount { x_m: 0.0, y_m: 0.0, height_m: 5.0, yaw_deg: 0.0, pitch_deg: 0.0, roll_deg: 0.0 },
-        field_of_view: FieldOfView {
-            azimuth_min_deg: -45.0,
-            azimuth_max_deg: 45.0,
-            elevation_min_deg: -16.0,
-            elevation_max_deg: 16.0,
-            range_min_m: 1.0,
-            range_max_m: 100.0,
-        },
-        noise: NoiseConfig::default(),
-    };
     let (mut state, mut sender) = (Box::new(small::Radar::new()), Box::new(None));
     let mut radar = OwnRadar { radar: &mut state, sender: &mut sender };
-    radar.start(&sensor, Epoch::new(3), at(0)).unwrap();
+    radar.start(&sensor(0.0), Epoch::new(3), at(0)).unwrap();
     let mut vehicle = Vehicle::default();
     let (before, behind) = (RoadPoint::from_metres(30.0, 0.0).unwrap(), RoadPoint::from_metres(85.0, 0.3).unwrap());
     let mut last = 0;

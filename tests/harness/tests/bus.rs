@@ -24,10 +24,7 @@ fn sent(name: &str, more: &[&str]) -> (Value, PathBuf) {
     let to = if cfg!(debug_assertions) { "8" } else { "30" };
     let paths = [report.to_str().expect("UTF-8"), log.to_str().expect("UTF-8")];
     // as a unit sends that has been on for long: what a start costs has a test of its own
-    let settled = scratch(&format!("{name}-settled.toml"));
-    std::fs::write(&settled, "[estimators.radar_3d.settling]\nnear_s = 0.0\nfar_s = 0.0\nstanding_s = 0.0\n")
-        .expect("written");
-    let settled = settled.to_str().expect("UTF-8");
+    let settled = concat!(env!("CARGO_MANIFEST_DIR"), "/../recordings/settled.toml");
     let options = ["--to", to, "--json", paths[0], "--log", paths[1], "--config", settled, "--force"];
     let arguments = [&["bus", recording][..], &options, more].concat();
     let output = viewshed(&arguments);

@@ -98,9 +98,7 @@ const EMPTY_S: f64 = 5.0;
 pub fn run(args: &Args) -> Result<ExitCode> {
     let mut scene = Scene::read(&args.scene)?;
     scene.seed = args.seed.unwrap_or(scene.seed);
-    if let Some(misses) = &args.misses {
-        scene.radar.model.misses = misses.clone();
-    }
+    scene.set_misses(args.misses.as_ref());
     if let Some(duration_s) = args.duration {
         scene.duration_s = duration_s;
         scene.check().context("--duration")?;

@@ -1,5 +1,6 @@
 //! Scans of a CAN log that are not held in memory: the log is read and decoded again whenever they are asked for.
 
+use std::cell::Cell;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -62,22 +63,20 @@ impl Scans {
         scan: &mut dyn FnMut(Frame) -> ControlFlow<()>,
     ) -> Ars408Counters {
         let mut feed = Feed::<MOST_ENTRIES>::new(self.config);
-        let mut flow = ControlFlow::Continue(());
+        let flow = Cell::new(ControlFlow::Continue(()));
         let mut take = |s: &RadarScan<'_>| {
-            if flow.is_continue() {
-                flow = scan(frame(s));
+            if flow.get().is_continue() {
+                flow.set(scan(frame(s)));
             }
-            flow
         };
-        let mut ended = ControlFlow::Continue(());
         self.log.until(&mut |of_bus| {
             if of_bus.interface == self.interface {
                 line(of_bus);
-                feed.push(of_bus, &mut |scan| ended = take(scan));
+                feed.push(of_bus, &mut take);
             }
-            ended
+            flow.get()
         });
-        feed.end(&mut |scan| ended = take(scan));
+        feed.end(&mut take);
         *feed.radar.counters()
     }
 

@@ -189,16 +189,12 @@ impl Simulation {
 
     /// Radar frames of the whole recording.
     pub fn frames(&self) -> u64 {
-        self.count(self.scene.radar.rate_hz)
+        count(&self.scene, self.scene.radar.rate_hz)
     }
 
     /// Camera frames of the whole recording.
     pub fn camera_frames(&self) -> u64 {
-        self.scene.camera.as_ref().map_or(0, |c| self.count(c.rate_hz))
-    }
-
-    fn count(&self, rate_hz: f64) -> u64 {
-        count(&self.scene, rate_hz)
+        self.scene.camera.as_ref().map_or(0, |c| count(&self.scene, c.rate_hz))
     }
 
     fn time_ns(&self, since_s: f64) -> i64 {

@@ -1,7 +1,7 @@
 //! A real browser, driven as a person drives it: keys, mouse, and looks at what is shown.
 
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -15,6 +15,7 @@ use headless_chrome::protocol::cdp::types::Event;
 use headless_chrome::types::PrintToPdfOptions;
 use headless_chrome::{LaunchOptions, Tab};
 use serde_json::Value;
+use viewshed_harness::results::figures::photo;
 
 use crate::skipped::skipped;
 
@@ -25,26 +26,12 @@ pub const SHIFT: u32 = 8;
 /// How long anything may take on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// Where Debian's and other packages put a Chromium. The wrapper in /usr/bin would leave its child behind.
-const PLACES: [&str; 5] = [
-    "/usr/lib/chromium/chromium-headless-shell",
-    "/usr/bin/chromium-headless-shell",
-    "/usr/bin/chromium",
-    "/usr/bin/google-chrome",
-    "/usr/bin/chromium-browser",
-];
-
-fn program() -> Option<PathBuf> {
-    let named = std::env::var_os("VIEWSHED_BROWSER").map(PathBuf::from);
-    named.into_iter().chain(PLACES.map(PathBuf::from)).find(|path| path.exists())
-}
-
 pub struct Browser(headless_chrome::Browser);
 
 impl Browser {
     /// Starts one; without any on this machine, says so once a test.
     pub fn start(test: &str) -> Option<Self> {
-        let Some(program) = program() else {
+        let Some(program) = photo::browser() else {
             skipped("browser", &format!("the page, {test}: no Chromium (apt-get install chromium-headless-shell)"));
             return None;
         };

@@ -24,7 +24,7 @@ const NO_SUCH_DEVICE: i32 = 19;
 const NO_CAN_IN_KERNEL: [i32; 2] = [93, 97];
 const IS_DOWN: i32 = 100;
 
-/// BlockKind of a network interface in `/sys/class/net/NAME/type` that is one of a CAN bus.
+/// Kind of a network interface in `/sys/class/net/NAME/type` that is one of a CAN bus.
 const KIND_CAN: &str = "280";
 
 /// An open interface.

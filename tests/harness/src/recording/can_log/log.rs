@@ -1,5 +1,6 @@
 //! A log of any format, read line by line as often as wanted, each bus in the order of time.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
@@ -247,17 +248,17 @@ impl Log {
                 let _ = lines.iter().try_for_each(see);
             }
             (Plan::HeldBack { together }, _) => {
-                let (mut held_back, mut flow) = (self.survey.held_back(*together), ControlFlow::Continue(()));
-                let mut show = |flow: &mut ControlFlow<()>, line: &Line| {
-                    if flow.is_continue() {
-                        *flow = see(line);
+                let (mut held_back, flow) = (self.survey.held_back(*together), Cell::new(ControlFlow::Continue(())));
+                let mut show = |line: &Line| {
+                    if flow.get().is_continue() {
+                        flow.set(see(line));
                     }
                 };
                 self.in_its_order(&mut |line| {
-                    held_back.push(line, &mut |line| show(&mut flow, line));
-                    flow
+                    held_back.push(line, &mut show);
+                    flow.get()
                 });
-                held_back.end(&mut |line| show(&mut flow, line));
+                held_back.end(&mut show);
             }
             _ => self.in_its_order(&mut |line| see(&line)),
         }

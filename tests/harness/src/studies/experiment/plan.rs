@@ -85,9 +85,7 @@ impl Plan {
         let mut scene = Scene::read(&self.folder.join(&self.scene))?;
         scene.seed = day.seed;
         scene.duration_s = self.duration_s;
-        if let Some(misses) = &self.misses {
-            scene.radar.model.misses = misses.clone();
-        }
+        scene.set_misses(self.misses.as_ref());
         // boxes of a camera are no input of what is compared here
         scene.camera = None;
         Simulation::new(scene, Some(&self.folder.join(&day.fcd)))

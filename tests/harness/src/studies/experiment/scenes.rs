@@ -120,9 +120,7 @@ impl Plan {
     pub fn scenes(&self, set: &Set) -> Result<Vec<Scene>> {
         let read = |path: &PathBuf| {
             let mut scene = Scene::read(&self.folder.join(path))?;
-            if let Some(misses) = &self.misses {
-                scene.radar.model.misses = misses.clone();
-            }
+            scene.set_misses(self.misses.as_ref());
             Ok(scene)
         };
         set.scenes.iter().map(read).collect()

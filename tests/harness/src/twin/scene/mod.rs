@@ -53,6 +53,7 @@ use super::camera::detector::DetectorModel;
 use super::camera::{Camera, Image};
 use super::radar::Radar;
 use super::radar::disturbance::{NoiseInterval, OutageInterval};
+use super::radar::misses::Misses;
 use super::radar::model::RadarModel;
 use super::traffic::Source;
 use super::traffic::frame::RoadFrame;
@@ -331,6 +332,13 @@ fn check_rate(rate_hz: f64) -> Result<()> {
 }
 
 impl Scene {
+    /// Lets its radars miss so much in place of what it says, where that is given: those beside the first are like it.
+    pub fn set_misses(&mut self, misses: Option<&Misses>) {
+        if let Some(misses) = misses {
+            self.radar.model.misses = misses.clone();
+        }
+    }
+
     /// Reads a scene file.
     ///
     /// # Errors
